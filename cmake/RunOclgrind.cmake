@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
+# Runs a test program under oclgrind and fails on anything it reports.
+# - Its exit status is the program's own, and --log is truncated by every new cl_context: only stderr tells.
+# - --uninitialized is left out: oclgrind 21.10 does not see clEnqueueFillBuffer as a write.
+execute_process(COMMAND ${OCLGRIND} --data-races --check-api ${PROGRAM} --gtest_filter=-*Refuses*
+                RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE report)
+if(NOT status EQUAL 0 OR report MATCHES "data race|Invalid |divergence|OpenCL runtime error|Unaligned")
+  message(FATAL_ERROR "${output}\n${report}")
+endif()

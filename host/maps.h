@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/ocl/buffer.h"
+#include "kernels/shared.h"
+
+namespace egosgm {
+
+inline std::size_t pixel_count(shared::ImageSize size) { return static_cast<std::size_t>(size.width) * size.height; }
+
+/// Disparity [px] and variance [px^2] of both views, the left one first. Variance is 0 where the disparity is invalid.
+struct StereoMaps {
+  ocl::Buffer<float> disparity, variance;
+
+  StereoMaps(ocl::Context& context, shared::ImageSize size)
+      : disparity(context, 2 * pixel_count(size)), variance(context, 2 * pixel_count(size)) {}
+};
+
+}  // namespace egosgm

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/motion.h"
+
+#include "egosgm/error.h"
+
+namespace egosgm {
+
+void Motion::validate() const {
+  if (!current_from_previous.matrix().allFinite()) throw InvalidArgument("motion: not all values are finite: check its source");
+  const Eigen::Matrix3d rotation = current_from_previous.linear();
+  const double deviation = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (deviation > 1e-4 || rotation.determinant() < 0) {
+    throw InvalidArgument("motion: its 3x3 part is not a rotation (R R^T differs from 1 by " + std::to_string(deviation) +
+                          "): give an orthonormal right-handed one");
+  }
+  if (!covariance.allFinite() || !covariance.isApprox(covariance.transpose(), 1e-6) || covariance.diagonal().minCoeff() < 0) {
+    throw InvalidArgument("motion: the covariance is not symmetric with a non-negative diagonal: give zero if it is not known");
+  }
+}
+
+}  // namespace egosgm

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "host/ocl/context.h"
+
+namespace egosgm::ocl {
+
+/// Device memory for `size` elements of `T`.
+template <typename T>
+class Buffer {
+  static_assert(std::is_trivially_copyable_v<T>);
+
+ public:
+  Buffer(Context& context, std::size_t size) : size_(std::max<std::size_t>(size, 1)) {
+    context.expect_allocatable(size_ * sizeof(T));
+    buffer_ = cl::Buffer(context.get(), CL_MEM_READ_WRITE, size_ * sizeof(T));
+    context.count_allocation(size_ * sizeof(T));
+  }
+
+  std::size_t size() const { return size_; }
+  const cl::Buffer& get() const { return buffer_; }
+
+  /// For tests and set-up: blocks.
+  void write(Context& context, const std::vector<T>& values) {
+    context.queue().enqueueWriteBuffer(buffer_, CL_TRUE, 0, values.size() * sizeof(T), values.data());
+  }
+  void fill(Context& context, T value) {
+    cl::Event done;
+    context.queue().enqueueFillBuffer(buffer_, value, 0, size_ * sizeof(T), nullptr, &done);
+    context.record(done);
+  }
+  /// For tests: waits for all that was enqueued.
+  std::vector<T> read(Context& context) const {
+    std::vector<T> values(size_);
+    const Drain drain{context};
+    cl::Event done;
+    context.queue().enqueueReadBuffer(buffer_, CL_FALSE, 0, size_ * sizeof(T), values.data(), nullptr, &done);
+    context.record(done);
+    context.wait();
+    return values;
+  }
+
+ private:
+  std::size_t size_;
+  cl::Buffer buffer_;
+};
+
+}  // namespace egosgm::ocl

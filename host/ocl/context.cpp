@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/ocl/context.h"
+
+#include "egosgm/error.h"
+#include "host/ocl/sources.h"
+
+namespace egosgm::ocl {
+namespace {
+
+constexpr const char* kBaseOptions = "-cl-std=CL1.2 -Werror -cl-kernel-arg-info";
+
+// With contraction off, + - * and sqrt round as they do on the host, and tests can ask for equality.
+constexpr std::string_view kPreamble = "#pragma OPENCL FP_CONTRACT OFF\n";
+
+std::string expand(const std::string& file) {
+  const auto found = sources().find(file);
+  if (found == sources().end()) throw std::invalid_argument("no embedded kernel named " + file);
+  std::string text(found->second);
+  for (const auto& [name, header] : sources()) {
+    const std::string include = "#include \"" + std::string(name) + "\"";
+    if (const auto at = text.find(include); at != std::string::npos) text.replace(at, include.size(), header);
+  }
+  return text;
+}
+
+std::string build_options(const cl::Device& device) {
+  const bool rounds_division =
+      device.getInfo<CL_DEVICE_SINGLE_FP_CONFIG>() & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT;
+  return std::string(kBaseOptions) + (rounds_division ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
+}
+
+}  // namespace
+
+Context::Context(const cl::Device& device)
+    : device_(device),
+      context_(device),
+      queue_(context_, device, CL_QUEUE_PROFILING_ENABLE),
+      build_options_(build_options(device)),
+      max_work_group_size_(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>()),
+      max_allocation_bytes_(device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()) {}
+
+std::vector<Context::Finished> Context::wait() {
+  const auto commands = std::exchange(commands_, {});
+  std::vector<Finished> finished;
+  finished.reserve(commands.size());
+  for (const Command& command : commands) {
+    stage_ = command.stage;
+    command.event.wait();
+    const auto start = command.event.getProfilingInfo<CL_PROFILING_COMMAND_START>();
+    const auto end = command.event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
+    finished.push_back({command.stage, static_cast<double>(end - start) * 1e-6, command.is_launch});
+  }
+  return finished;
+}
+
+void Context::drain() noexcept {
+  ::clFinish(queue_());
+  commands_.clear();
+}
+
+void Context::expect_allocatable(std::uint64_t bytes) const {
+  if (bytes <= max_allocation_bytes_) return;
+  throw DeviceError(CL_MEM_OBJECT_ALLOCATION_FAILURE,
+                    std::string(stage_) + ": needs a buffer of " + std::to_string(bytes >> 20) +
+                        " MiB, the device allows " + std::to_string(max_allocation_bytes_ >> 20) +
+                        " MiB: choose fewer disparities, a smaller image or another device");
+}
+
+const cl::Program& Context::program(const std::string& file, const Defines& defines) {
+  const std::pair key{file, defines.text()};
+  if (const auto built = programs_.find(key); built != programs_.end()) return built->second;
+
+  cl::Program program(context_, std::string(kPreamble) + expand(file));
+  try {
+    program.build({device_}, (build_options_ + key.second).c_str());
+  } catch (const cl::BuildError& error) {
+    const auto logs = error.getBuildLog();
+    throw BuildError(error.err(), std::string(stage_) + ": building " + file + " failed with OpenCL status " +
+                                      std::to_string(error.err()) + "\n" + (logs.empty() ? "" : logs.front().second));
+  }
+  return programs_.emplace(key, program).first->second;
+}
+
+}  // namespace egosgm::ocl

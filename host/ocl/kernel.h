@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/ocl/buffer.h"
+#include "kernels/shared.h"
+
+namespace egosgm::ocl {
+
+/// The shape of a launch.
+struct Range {
+  cl::NDRange global;
+  cl::NDRange local;
+};
+
+/// A work-item a pixel and view: global ids are x, y, view. x is rounded up, so kernels guard their bounds.
+inline Range every_pixel(const Context& context, shared::ImageSize size, int views = 2) {
+  std::size_t local = 64;
+  while (local > context.max_work_group_size()) local /= 2;
+  return {cl::NDRange((size.width + local - 1) / local * local, size.height, views), cl::NDRange(local, 1, 1)};
+}
+
+/// A work-item a row and view: global ids are y, view.
+inline Range every_row(shared::ImageSize size, int views = 2) {
+  return {cl::NDRange(size.height, views), cl::NullRange};
+}
+
+/// A kernel with its C++ signature: `Buffer<T>` for `global T*`, `const Buffer<T>` for
+/// `global const T*`, anything else by value. tests/signatures_test.cpp checks it against the .cl.
+template <typename... Params>
+class Kernel {
+ public:
+  Kernel(const cl::Program& program, const char* name) : kernel_(program, name) {}
+
+  void operator()(Context& context, const Range& range, Params&... args) {
+    cl_uint index = 0;
+    (set(index++, args), ...);
+    cl::Event done;
+    context.queue().enqueueNDRangeKernel(kernel_, cl::NullRange, range.global, range.local, nullptr, &done);
+    context.record(done, true);
+  }
+
+  const cl::Kernel& get() const { return kernel_; }
+
+ private:
+  template <typename T>
+  void set(cl_uint index, const Buffer<T>& buffer) {
+    kernel_.setArg(index, buffer.get());
+  }
+  template <typename T>
+  void set(cl_uint index, const T& value) {
+    static_assert(std::is_trivially_copyable_v<T> && !std::is_pointer_v<T>);
+    kernel_.setArg(index, sizeof(T), &value);
+  }
+
+  cl::Kernel kernel_;
+};
+
+}  // namespace egosgm::ocl

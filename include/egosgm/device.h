@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace egosgm {
+
+/// What an OpenCL device says of itself.
+struct DeviceInfo {
+  std::string name;      // "pthread-skylake-avx512-AMD EPYC"
+  std::string type;      // "CPU", "GPU", "accelerator"
+  std::string vendor;
+  std::string platform;  // "Portable Computing Language"
+  std::string version;   // "OpenCL 3.0 PoCL ..."
+  std::string driver;
+  int compute_units = 0;
+  std::uint64_t memory_bytes = 0;
+  std::uint64_t max_allocation_bytes = 0;
+};
+
+/// An OpenCL device. Copies refer to the same one. Thread-safe.
+class Device {
+ public:
+  /// All devices, in the order in which they are preferred: GPUs, accelerators, CPUs; then as the platforms list them.
+  static std::vector<Device> list();
+
+  /// The device that `wanted` names: an index into `list()`, a type ("gpu", "cpu", "accelerator"), or a part of its name,
+  /// vendor or platform (upper and lower case alike; "PLATFORM:NAME" for both). Empty: the environment variable
+  /// EGOSGM_DEVICE, else the first of `list()`.
+  /// Throws InvalidArgument with the list where nothing fits, and how to install one where there is none.
+  static Device select(const std::string& wanted = {});
+
+  const DeviceInfo& info() const;
+
+  struct Handle;  // the OpenCL side, host/ocl/device_handle.h
+  const Handle& handle() const { return *handle_; }
+
+ private:
+  explicit Device(std::shared_ptr<const Handle> handle) : handle_(std::move(handle)) {}
+  std::shared_ptr<const Handle> handle_;
+};
+
+}  // namespace egosgm

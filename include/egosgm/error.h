@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace egosgm {
+
+/// What the caller gave cannot be used: an image, a calibration, an option, a file. `what()` names the
+/// value and the remedy in one line. Nothing was enqueued and nothing was written.
+class InvalidArgument : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+/// The device or its driver refused. `code()` is the OpenCL status, `what()` names the stage.
+class DeviceError : public std::runtime_error {
+ public:
+  DeviceError(int code, const std::string& what) : std::runtime_error(what), code_(code) {}
+  int code() const { return code_; }
+
+ private:
+  int code_;
+};
+
+/// A kernel did not compile. `what()` ends with the compiler's log.
+class BuildError : public DeviceError {
+ public:
+  using DeviceError::DeviceError;
+};
+
+}  // namespace egosgm

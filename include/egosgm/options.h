@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// What can be chosen: one aggregate a stage, the pipeline's options are their sum. A default is written here and nowhere else.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace egosgm {
+
+/// Matching cost of a pixel pair: Hamming distance of census codes, or the mean absolute difference of a 3x3 window.
+enum class MatchingCost { kCensus9x7, kCensus5x5, kSad3x3 };
+/// kBand: search where the prediction says (the method). kFull: search the whole range in every frame.
+enum class SearchMode { kBand, kFull };
+/// How the paths of BandedSgm run: diagonal wavefronts of tiles (CPUs, FPGAs) or a work-group a path (GPUs). Same bits.
+enum class Scheduling { kAutomatic, kWavefront, kPaths };
+
+struct ForwardWarpOptions {
+  float process_noise_px2 = 0.25f;  // constant part of q, added to every variance (eq. 6)
+};
+
+struct EdgeRejectionOptions {
+  float max_jump_px = 5.0f;  // a larger step to a neighbour drops the prediction on both sides; 0 keeps all
+};
+
+struct HoleFillOptions {
+  float max_difference_px = 1.0f;  // gamma (eqs. 7-8): neighbours that differ by less fill the gap between them
+};
+
+struct ConsistencyCheckOptions {
+  float prediction_px = 3.0f;   // largest left-right difference of the prediction,
+  float measurement_px = 3.0f;  // of the measurement,
+  float update_px = 3.0f;       // and of the update
+};
+
+struct SearchBandOptions {
+  float sigmas = 3.0f;             // half-width of a predicted pixel's band, in standard deviations
+  float min_half_width_px = 2.0f;  // and at least this
+  bool from_neighbours = true;     // unpredicted pixels search the range of the predictions around them
+  int neighbour_min_count = 8;     // with fewer predictions than this around, the whole range
+  float neighbour_margin_px = 4.0f;
+};
+
+struct BandedSgmOptions {
+  MatchingCost cost = MatchingCost::kCensus9x7;
+  int paths = 8;  // 4 (horizontal and vertical) or 8
+  int p1 = 10;    // penalty of a step of one disparity
+  int p2 = 120;   // penalty of a larger step; p1 <= p2, at most 190
+  int s_max = 120;  // matching variance: steps are counted until the path sums above the minimum add up to this
+  float variance_per_step_px2 = 0.1f;  // r = floor + this * (n_l + n_r)
+  float variance_floor_px2 = 0.05f;
+  Scheduling scheduling = Scheduling::kAutomatic;
+};
+
+struct SadCheckOptions {
+  float max_difference = 0.0f;  // mean absolute grey difference of the 3x3 windows (8-bit scale); 0: no check
+};
+
+struct SpeckleRemovalOptions {
+  int max_size_px = 100;           // connected regions up to this size are dropped; 0: none
+  float max_difference_px = 2.0f;  // neighbours within this belong to one region
+};
+
+struct KalmanUpdateOptions {
+  float gate_px = 3.0f;         // where prediction and measurement differ by more, the measurement is taken; 0: no gate
+  bool keep_predicted = true;   // a prediction without a measurement stays, with its grown variance
+  float min_variance_px2 = 0.02f;
+};
+
+struct PipelineOptions {
+  int disparities = 128;  // D >= 1: the range is [min_disparity, min_disparity + disparities)
+  int min_disparity = 0;  // of either sign
+  SearchMode search = SearchMode::kBand;
+  bool temporal = true;  // false: every frame alone, full range, left-right checked (the plain matcher)
+
+  ForwardWarpOptions forward_warp;
+  EdgeRejectionOptions edge_rejection;
+  HoleFillOptions hole_fill;
+  ConsistencyCheckOptions consistency;
+  SearchBandOptions search_band;
+  BandedSgmOptions banded_sgm;
+  SadCheckOptions sad_check;
+  SpeckleRemovalOptions speckle_removal;
+  KalmanUpdateOptions kalman_update;
+
+  /// The choices of Fućek et al. (IFAC 2017).
+  static PipelineOptions paper();
+
+  /// Throws InvalidArgument, naming the option, its value and what is allowed.
+  void validate() const;
+};
+
+/// An option by its name, `stage.option` (for example `banded_sgm.p2`), with its value as text.
+struct NamedOption {
+  std::string name;
+  std::string value;
+};
+
+/// All options of `options`, in the order of this header.
+std::vector<NamedOption> list_options(const PipelineOptions& options);
+
+/// Sets one. Throws InvalidArgument for a name that does not exist (with the nearest that does) or a value that does not parse.
+void set_option(PipelineOptions& options, std::string_view name, std::string_view value);
+
+}  // namespace egosgm

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "egosgm/calibration.h"
+#include "egosgm/device.h"
+#include "egosgm/image.h"
+#include "egosgm/motion.h"
+#include "egosgm/options.h"
+
+namespace egosgm {
+
+/// Where a frame's maps go: views of the caller's memory, width x height of the pipeline each. Empty views are not filled and
+/// cost nothing. Disparities in pixels, variances in px^2; kInvalidDisparity (and variance 0) where there is no value.
+struct FrameOutputs {
+  MapView<float> disparity, variance;              // the left view's result
+  MapView<float> right_disparity, right_variance;  // the right view's
+  MapView<float> predicted, predicted_variance;    // left, before matching
+  MapView<float> measured, measured_variance;      // left, after matching and its checks
+  MapView<std::uint16_t> search_width;             // left: disparities that can win at each pixel
+};
+
+/// Device time of a stage in one frame.
+struct StageTime {
+  std::string stage;
+  double ms = 0;
+};
+
+/// What happened in a frame.
+struct FrameReport {
+  bool full_range = false;        // no prediction was used: everything was searched,
+  std::string full_range_reason;  // because of this ("first frame", "no motion", "reset", "search is full", "not temporal")
+  double search_fraction = 0;     // cells that can win / (width * height * D), both views [0..1]
+  double computed_fraction = 0;   // with the lanes that were computed and cannot win
+  double predicted_fraction = 0;  // left pixels with a prediction
+  double density = 0;             // left pixels with a disparity
+  int launches = 0;               // kernels enqueued
+  std::vector<StageTime> stages;  // in the order in which they ran
+  double total_ms = 0;            // wall clock, upload to download
+};
+
+/// Dense disparity from stereo video (Fućek et al. 2017): the last frame's disparity map, moved by the camera's motion, says where
+/// to search, and a Kalman filter per pixel fuses what was predicted with what was measured.
+///
+/// Not thread-safe; two pipelines may run in two threads, also on one device.
+class Pipeline {
+ public:
+  /// Builds the kernels and allocates all memory for images of exactly `width` x `height`.
+  /// Throws InvalidArgument (size, calibration, option), DeviceError or BuildError.
+  Pipeline(const Calibration& calibration, int width, int height, const PipelineOptions& options = {},
+           const Device& device = Device::select());
+  ~Pipeline();
+  Pipeline(Pipeline&&) noexcept;
+  Pipeline& operator=(Pipeline&&) noexcept;
+
+  /// Matches one rectified pair, both images of the same type, and fills `outputs`.
+  /// `motion`: how the camera moved since the last frame that was processed; none: the whole range is searched.
+  /// Throws InvalidArgument before anything is enqueued, or DeviceError. A frame that throws leaves the pipeline as it was, so the
+  /// next one gives the bits that it would have given.
+  FrameReport process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
+                      const FrameOutputs& outputs);
+
+  /// Forgets the last frame: the next one searches the whole range.
+  void reset();
+
+  const PipelineOptions& options() const;
+  const Device& device() const;
+  std::uint64_t device_memory_bytes() const;  // allocated on the device, constant
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <vector>
+
+#include "kernels/shared.h"
+
+namespace egosgm::testing {
+
+/// Bit by bit, for stereo maps (two views of `size`) or anything else that lies row by row. Tells how many differ, where
+/// the first is, and both values.
+template <typename T>
+::testing::AssertionResult same_bits(const std::vector<T>& actual, const std::vector<T>& expected, shared::ImageSize size) {
+  if (actual.size() != expected.size()) {
+    return ::testing::AssertionFailure() << actual.size() << " values, expected " << expected.size();
+  }
+  std::size_t different = 0, first = 0;
+  for (std::size_t i = actual.size(); i-- > 0;) {
+    if (std::memcmp(&actual[i], &expected[i], sizeof(T)) != 0) ++different, first = i;
+  }
+  if (different == 0) return ::testing::AssertionSuccess();
+  const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
+  auto failure = ::testing::AssertionFailure();
+  failure << different << " of " << actual.size() << " differ, the first in view " << first / pixels << " at ("
+          << first % pixels % size.width << ", " << first % pixels / size.width << ")";
+  if constexpr (std::is_arithmetic_v<T>) failure << ": " << +actual[first] << ", expected " << +expected[first];
+  return failure;
+}
+
+/// The sizes that every kernel is tested at: nothing is a multiple of anything.
+inline const std::vector<shared::ImageSize> kSizes{{1, 1}, {7, 5}, {65, 3}, {127, 33}, {320, 97}, {1242, 375}};
+
+inline std::string size_name(const ::testing::TestParamInfo<shared::ImageSize>& info) {
+  return std::to_string(info.param.width) + "x" + std::to_string(info.param.height);
+}
+
+}  // namespace egosgm::testing

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <random>
+#include <vector>
+
+#include "kernels/shared.h"
+
+namespace egosgm::testing {
+
+/// Disparity and variance of both views, as the twins take them.
+struct HostMaps {
+  std::vector<float> disparity, variance;
+};
+
+/// Piecewise smooth disparities in [min, max] with jumps, noise and about `holes` of the pixels invalid.
+inline HostMaps random_maps(shared::ImageSize size, float min, float max, double holes, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> level(min, max), unit(0.0f, 1.0f);
+  const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
+  HostMaps maps{std::vector<float>(pixels), std::vector<float>(pixels)};
+  float base = level(random), slope = 0;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    if (unit(random) < 0.03f) base = level(random), slope = 0.2f * (unit(random) - 0.5f);
+    base += slope;
+    const float d = std::min(max, std::max(min, base + unit(random) - 0.5f));
+    const bool hole = unit(random) < holes;
+    maps.disparity[i] = hole ? EGOSGM_INVALID_DISPARITY : d;
+    maps.variance[i] = hole ? 0.0f : 0.05f + 3.0f * unit(random);
+  }
+  return maps;
+}
+
+}  // namespace egosgm::testing
