@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "egosgm/calibration.h"
+#include "egosgm/motion.h"
+
+namespace egosgm::vision {
+
+/// A drive through a street of houses, parked cars, trees and thin poles. Equal options give equal bits.
+struct SyntheticOptions {
+  int frames = 20;                 // 1..10000
+  int width = 640, height = 240;   // [px], 1..8192 each
+  unsigned seed = 1;               // of street, texture and sensor noise
+  bool moving_object = false;      // a vehicle ahead, and from time to time one that crosses the road
+  double moving_object_scale = 1;  // size of the vehicle ahead, 0.5..8; at 5 it covers about 40 % of the image
+  double speed_m = 0.8;            // forward travel per frame [m], 0..3
+  double turn_deg = 1.0;    // largest turn per frame [deg], -4..4, positive: to the right first; radius at least 15 m
+  double wobble = 1.0;      // scale of pitch, roll, sway and heave (1: 0.25 deg, 0.15 deg, 6 cm, 2 cm), 0..3
+  double noise_grey = 1.5;  // standard deviation of the sensor noise, independent in both images, 0..20
+  double pole_width_px = 3.0;  // mean width of a pole 10 m ahead [px], 1..20; single ones from 2/3 to 4/3 of it
+  int supersampling = 3;       // rays per pixel and axis for the intensity, 1..8
+
+  /// Throws InvalidArgument, naming the value.
+  void validate() const;
+};
+
+/// One rendered frame, all maps `height` x `width`. Disparities are exact at the pixel's centre (intensities are
+/// averaged over the pixel) and positive everywhere: the sky is a dome at a finite distance.
+struct SyntheticFrame {
+  cv::Mat left, right;                      // CV_8UC1
+  cv::Mat left_disparity, right_disparity;  // CV_32FC1, x_left - x_right > 0 [px]
+  cv::Mat left_noc, right_noc;              // CV_8UC1: 255 where the other camera sees the same surface point, else 0
+  cv::Mat left_moving, right_moving;        // CV_8UC1: 255 on moving objects, else 0
+  Eigen::Isometry3d world_from_camera;      // left camera's pose; identity for frame 0
+};
+
+/// Renders any frame of the drive on demand. Thread-safe: const calls may run at the same time.
+class SyntheticSequence {
+ public:
+  /// Throws InvalidArgument for options out of range.
+  explicit SyntheticSequence(const SyntheticOptions& options);
+  ~SyntheticSequence();
+  SyntheticSequence(SyntheticSequence&&) noexcept;
+  SyntheticSequence& operator=(SyntheticSequence&&) noexcept;
+
+  const SyntheticOptions& options() const;
+  int frames() const { return options().frames; }
+
+  /// fx = fy = 0.58 width, as KITTI's cameras; baseline 0.54 m.
+  Calibration calibration() const;
+
+  /// REQUIRES (all of these): 0 <= frame < frames(), else InvalidArgument.
+  Eigen::Isometry3d world_from_camera(int frame) const;
+  /// The motion from frame - 1 to `frame`, covariance zero; identity for frame 0.
+  Motion motion(int frame) const;
+  SyntheticFrame render(int frame) const;
+
+ private:
+  struct Scene;
+  std::unique_ptr<const Scene> scene_;
+};
+
+/// Renders all frames into `folder` (made if missing), in the layout of KITTI odometry plus truth; N is the frame as
+/// six digits:
+///   image_0/N.png, image_1/N.png          left and right, 8-bit grey
+///   calib.txt                             P0..P3 (P2, P3 repeat P0, P1)
+///   poses.txt, times.txt                  camera-to-world rows; seconds at 10 frames per second
+///   truth/left_disp_occ/N.png             disparity of every pixel, KITTI's 16-bit PNG
+///   truth/left_disp_noc/N.png             the same, 0 where the right camera does not see the point
+///   truth/right_disp_occ, right_disp_noc  likewise for the right view
+///   truth/left_moving, right_moving       with moving_object only: 255 on moving objects
+/// Every file appears whole or not at all; existing ones are replaced. `progress(done, frames)` is called after each
+/// frame, if given. Throws InvalidArgument, naming the file, where the folder cannot be written.
+void write_sequence(const SyntheticOptions& options, const std::filesystem::path& folder,
+                    const std::function<void(int done, int frames)>& progress = {});
+
+}  // namespace egosgm::vision
