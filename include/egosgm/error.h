@@ -13,6 +13,13 @@ class InvalidArgument : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
+/// The file system refused to take a result: a full disk, a folder that cannot be written. `what()` names the file and
+/// the system's reason in one line. What stood under the file's name before stands there still.
+class IoError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// The device or its driver refused. `code()` is the OpenCL status, `what()` names the stage.
 class DeviceError : public std::runtime_error {
  public:

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace egosgm::vision {
+
+/// What comparing one disparity map with its truth counted, over pixels that have truth. Counts of several images add
+/// up (KITTI 2015 pools pixels); KITTI 2012 instead averages each image's figures (mean_of). `bad`: |error| > 3 px.
+/// `d1`: bad, and |error| > 5 % of the truth. `interpolated`: after interpolate_background.
+struct DisparityCounts {
+  std::int64_t truth = 0;             // pixels with truth
+  std::int64_t valid = 0;             // of these, with an estimate
+  std::int64_t bad = 0;               // of these, bad
+  std::int64_t d1 = 0;                // of the valid ones
+  std::int64_t bad_interpolated = 0;  // of all with truth
+  std::int64_t d1_interpolated = 0;   // of all with truth
+  double absolute_error_px = 0;       // sum over the valid ones
+
+  DisparityCounts& operator+=(const DisparityCounts& other);
+};
+
+/// The figures, in percent of the pixels with truth unless said otherwise. NaN where there is nothing to divide by.
+struct DisparityMetrics {
+  double bad_or_missing = 0;   // bad or without an estimate
+  double bad_of_valid = 0;     // percent of the pixels with an estimate
+  double density = 0;          // with an estimate
+  double interpolated = 0;     // bad after background interpolation: KITTI 2012's official figure
+  double d1 = 0;               // KITTI 2015's rule, or without an estimate
+  double d1_interpolated = 0;  // KITTI 2015's official figure
+  double mae_px = 0;           // mean absolute error of the pixels with an estimate [px]
+};
+
+/// Both CV_32FC1 with kInvalidDisparity (see disparity_io.h). Throws InvalidArgument where sizes or types differ.
+/// Thread-safe.
+DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth);
+
+DisparityMetrics metrics_of(const DisparityCounts& counts);
+
+/// The mean of each image's figures, images whose figure is NaN left out (KITTI 2012).
+DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images);
+
+/// Fills the holes from the background, as KITTI's development kit does: in each row, a run of invalid pixels between
+/// two valid ones gets the smaller of the two, the ends of a row its nearest valid value; then the top and bottom of
+/// each column get its nearest valid value. A map without any valid pixel stays so. Thread-safe.
+cv::Mat interpolate_background(const cv::Mat& disparity);
+
+/// An estimate and the truth it is compared with.
+struct EvaluationPair {
+  std::filesystem::path estimate, truth;
+};
+
+struct EvaluationPairs {
+  std::vector<EvaluationPair> pairs;                    // in the order of names, never empty
+  std::vector<std::filesystem::path> without_estimate;  // truth files that no estimate belongs to
+};
+
+/// Pairs files with truth. FILE and FILE are a pair. With folders (of *.png and *.pfm; an output folder stands for its
+/// `disparity`), equal names without extension belong together; where no names are equal, `000010` belongs to the truth
+/// that ends in the same frame number, `000151_10`, if there is only one. Throws InvalidArgument where nothing belongs
+/// together or the truth is ambiguous.
+EvaluationPairs pair_with_truth(const std::filesystem::path& estimate, const std::filesystem::path& truth);
+
+}  // namespace egosgm::vision

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <opencv2/core.hpp>
+
+#include "egosgm/image.h"
+
+namespace egosgm::vision {
+
+/// Larger images are refused from their header alone, before anything is allocated.
+inline constexpr int kMaxImageSide = 16384;
+inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 28;
+
+/// Reads a PNG of any colour type as grey: CV_8UC1, or CV_16UC1 where the file has 16 bits a channel. Colour is
+/// weighted as cv::COLOR_RGB2GRAY does; alpha and gamma are ignored. The memory it takes is bounded by kMaxImagePixels
+/// and by about 1,100 times the file's size. Nothing is printed. Throws InvalidArgument, naming the file, where it is
+/// missing, too large, truncated, damaged or no PNG. Thread-safe.
+cv::Mat read_grey_png(const std::filesystem::path& file);
+
+/// Width and height from a PNG's header; the pixels are not looked at. Throws as read_grey_png does. Thread-safe.
+cv::Size read_png_size(const std::filesystem::path& file);
+
+/// Writes CV_8UC1, CV_8UC3 (BGR) or CV_16UC1, whole or not at all. Throws IoError, and InvalidArgument for another type
+/// or an empty image. Thread-safe for different files.
+void write_png(const std::filesystem::path& file, const cv::Mat& image);
+
+/// The core's view of a cv::Mat; the Mat must outlive it. Throws InvalidArgument unless CV_8UC1 or CV_16UC1.
+ImageView image_view(const cv::Mat& grey);
+
+/// The core's view of a CV_32FC1 map that it is to fill. Throws InvalidArgument for another type.
+MapView<float> map_view(cv::Mat& map);
+
+}  // namespace egosgm::vision
