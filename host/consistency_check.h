@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// Keeps what both views agree on: the pixel that a disparity points to in the other view must be inside of it, valid,
+/// and within a tolerance. Each view is checked against the other as it came in.
+class ConsistencyCheck {
+ public:
+  ConsistencyCheck(ocl::Context& context, shared::ImageSize size);
+
+  /// REQUIRES: `out` is not `in`.
+  void operator()(const StereoMaps& in, float max_difference_px, StereoMaps& out);
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<float>, ocl::Buffer<float>>
+      check_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// Drops the predictions on both sides of a disparity jump: a small error of the motion puts them on the wrong surface,
+/// and a narrow search could not get back. Neighbours are the nearest valid of the next two pixels to the left, right,
+/// above and below.
+class EdgeRejection {
+ public:
+  EdgeRejection(ocl::Context& context, shared::ImageSize size, const EdgeRejectionOptions& options);
+
+  /// REQUIRES: `out` is not `in`.
+  void operator()(const StereoMaps& in, StereoMaps& out);
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const float max_jump_px_;
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<float>, ocl::Buffer<float>>
+      reject_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// Closes the gaps of a pixel that forward motion tears into a map: an invalid pixel between two horizontal neighbours
+/// that differ by less than gamma gets their mean and the larger of their variances; then the same vertically (eqs.
+/// 7-8).
+class HoleFill {
+ public:
+  HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFillOptions& options);
+
+  /// REQUIRES: `out` is not `in`.
+  void operator()(const StereoMaps& in, StereoMaps& out);
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const float max_difference_px_;
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<float>, ocl::Buffer<float>>
+      fill_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// Fuses prediction and measurement, pixel by pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the
+/// two differ by more than the gate, or only the measurement is there, the measurement is taken.
+class KalmanUpdate {
+ public:
+  KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options);
+
+  /// REQUIRES: `updated` is neither `predicted` nor `measured`.
+  void operator()(const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated);
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const float gate_px_;
+  const cl_int keep_predicted_;
+  const float min_variance_px2_;
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const float, const ocl::Buffer<float>,
+              const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>,
+              ocl::Buffer<float>>
+      update_;
+};
+
+}  // namespace egosgm
