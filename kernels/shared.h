@@ -9,11 +9,13 @@ namespace egosgm::shared {
 typedef cl_int int32;
 typedef cl_short int16;
 typedef cl_ushort uint16;
+typedef cl_uint uint32;
 typedef cl_float float32;
 #else
 typedef int int32;
 typedef short int16;
 typedef ushort uint16;
+typedef uint uint32;
 typedef float float32;
 #endif
 
@@ -41,12 +43,33 @@ typedef struct {
   int32 min, count;
 } DisparityRange;
 
-// What a pixel searches. Lanes origin .. origin + chunks * EGOSGM_LANES - 1 are computed; first .. last (inclusive) can win.
+// What a pixel searches. Lanes origin .. origin + chunks * EGOSGM_LANES - 1 are computed; first .. last (inclusive) can
+// win.
 typedef struct {
   int16 origin;
   uint16 chunks;
   int16 first, last;
 } Band;
+
+// What a row of a view searches: cells that can win, lanes that are computed, pixels that were predicted.
+typedef struct {
+  uint32 searched, computed, predicted;
+} RowSum;
+
+// The predictions in a block of EGOSGM_BLOCK x EGOSGM_BLOCK pixels; count 0: none.
+typedef struct {
+  float32 min, max;
+  uint32 count;
+} BlockRange;
+
+// What a sweep of BandedSgm needs to know.
+typedef struct {
+  int32 width, height;
+  int32 min_disparity, disparities;
+  int32 padding;  // of the census codes' rows
+  int32 p1, p2, s_max;
+  float32 variance_floor, variance_per_step;
+} SgmParameters;
 
 // How a view's disparity space moves (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
 // noise: variance of the depth's error Z' as a form in (1, X', Y'), from the motion's covariance (see forward_warp.cl).
@@ -58,7 +81,8 @@ typedef struct {
 } DisparityMotion;
 
 #ifdef __cplusplus
-static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(DisparityMotion) == 96,
+static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 12 &&
+                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 40 && sizeof(DisparityMotion) == 96,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

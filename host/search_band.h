@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// Says for every pixel of both views which disparities are searched, and where their cells lie.
+///
+/// A predicted pixel searches d +- max(min_half_width_px, sigmas * sqrt(p)), another one the range that the predictions
+/// around it span, one with none near everything. Bands hold whole chunks of EGOSGM_LANES lanes; lanes outside of the
+/// disparity range, of which there may be up to EGOSGM_LANES - 1 at its end, do not exist for BandedSgm.
+class SearchBand {
+ public:
+  /// `row_group`: work-items that share a row when chunks are summed up; 0: one on a CPU, many elsewhere. Same bits.
+  SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+             const SearchBandOptions& options, int row_group = 0);
+
+  /// Bands from the prediction.
+  void operator()(const StereoMaps& predicted);
+  /// Every pixel searches everything.
+  void full_range();
+
+  /// One a pixel and view.
+  const ocl::Buffer<shared::Band>& bands() const { return bands_; }
+  /// One a pixel and view: the chunks of the pixels to the left of it in its row.
+  const ocl::Buffer<cl_uint>& cell_offsets() const { return cell_offsets_; }
+  /// One a row and view: index view * height + y.
+  const ocl::Buffer<shared::RowSum>& row_sums() const { return row_sums_; }
+
+  /// No pixel has more chunks than this.
+  static int max_chunks(shared::DisparityRange range) { return (range.count + EGOSGM_LANES - 1) / EGOSGM_LANES; }
+
+ private:
+  using Disparities = const ocl::Buffer<float>;
+
+  ocl::Context& context_;
+  const shared::ImageSize size_, blocks_;
+  const shared::DisparityRange range_;
+  const SearchBandOptions options_;
+  const int row_group_;
+  ocl::Buffer<shared::BlockRange> block_ranges_;
+  ocl::Buffer<shared::Band> block_bands_;
+  ocl::Buffer<shared::Band> bands_;
+  ocl::Buffer<cl_uint> cell_offsets_;
+  ocl::Buffer<shared::RowSum> row_sums_;
+  ocl::Kernel<const shared::ImageSize, Disparities, ocl::Buffer<shared::BlockRange>> gather_blocks_;
+  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const cl_int,
+              const ocl::Buffer<shared::BlockRange>, ocl::Buffer<shared::Band>>
+      bands_of_blocks_;
+  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
+              const ocl::Buffer<shared::Band>, ocl::Buffer<shared::Band>>
+      bands_of_pixels_;
+  ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
+              ocl::Buffer<shared::RowSum>>
+      sum_rows_;
+  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
+              ocl::Buffer<shared::RowSum>>
+      full_range_;
+};
+
+}  // namespace egosgm

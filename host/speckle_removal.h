@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// Drops small regions: 4-connected valid pixels whose disparities differ by at most `max_difference_px` from one to
+/// the next, in all at most `max_size_px` of them.
+///
+/// Regions are found by union-find over runs of connected pixels in a row; the root of a region is its first run.
+class SpeckleRemoval {
+ public:
+  /// `strip_rows`: rows that one work-item joins on its own before strips are joined by atomics; 0: by the device (many
+  /// on a CPU, one elsewhere). `row_group`: work-items that share a row in search of its runs; 0: by the device. Same
+  /// bits.
+  SpeckleRemoval(ocl::Context& context, shared::ImageSize size, const SpeckleRemovalOptions& options,
+                 int strip_rows = 0, int row_group = 0);
+
+  /// In place. With `max_size_px` 0 nothing is launched.
+  void operator()(StereoMaps& maps);
+
+ private:
+  using Disparities = const ocl::Buffer<float>;
+  using Indices = ocl::Buffer<cl_uint>;
+  using Runs = ocl::Buffer<cl_ushort>;
+
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const SpeckleRemovalOptions options_;
+  const int strip_rows_, row_group_;
+  Runs runs_;                        // column where the pixel's run begins
+  Indices parents_, roots_, sizes_;  // of runs, at the index of their first pixel
+  ocl::Kernel<const shared::ImageSize, const float, Disparities, Runs, Indices, Indices> find_runs_;
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, Disparities, const Runs, Indices> join_strips_;
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, Disparities, const Runs, Indices> join_seams_;
+  ocl::Kernel<const shared::ImageSize, const Runs, const Indices, Indices, Indices> measure_;
+  ocl::Kernel<const shared::ImageSize, const cl_uint, const Runs, const Indices, const Indices, ocl::Buffer<float>,
+              ocl::Buffer<float>>
+      drop_;
+};
+
+}  // namespace egosgm
