@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/banded_sgm.h"
+
+#include <cstdlib>
+
+namespace egosgm {
+namespace {
+
+// Tiles of a wavefront; measured best on two cores (bench/NOTES.md).
+constexpr int kTileWidth = 64;
+constexpr int kTileHeight = 47;
+
+int ceil_div(int a, int b) { return (a + b - 1) / b; }
+
+std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  const std::size_t slot = static_cast<std::size_t>(SearchBand::max_chunks(range) + 2) * EGOSGM_LANES;
+  return 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
+}
+
+std::size_t cell_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  return 2 * pixel_count(size) * SearchBand::max_chunks(range) * EGOSGM_LANES;
+}
+
+const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options) {
+  return context.program("banded_sgm.cl", ocl::Defines()
+                                              .set("MAX_CHUNKS", SearchBand::max_chunks(range))
+                                              .set("PATHS", options.paths)
+                                              .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
+                                              .set("TILE_WIDTH", kTileWidth)
+                                              .set("TILE_HEIGHT", kTileHeight));
+}
+
+}  // namespace
+
+BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options)
+    : context_((context.enter("BandedSgm"), context)),
+      size_(size),
+      parameters_{size.width,
+                  size.height,
+                  range.min,
+                  range.count,
+                  code_padding(range),
+                  options.p1,
+                  options.p2,
+                  options.s_max,
+                  options.variance_floor_px2,
+                  options.variance_per_step_px2},
+      slots_(context, slot_bytes(size, range)),
+      sums_(context, cell_bytes(size, range)),
+      forward_(build(context, range, options), "sweep_forward"),
+      backward_(build(context, range, options), "sweep_backward") {}
+
+void BandedSgm::operator()(const ocl::Buffer<cl_ulong>& codes, const SearchBand& band, StereoMaps& measured) {
+  context_.enter("BandedSgm");
+  const int tile_rows = ceil_div(size_.height, kTileHeight);
+  const int tile_columns = ceil_div(size_.width + kTileHeight, kTileWidth) + 1;
+  const int waves = tile_columns + 2 * (tile_rows - 1);
+  const ocl::Range tiles{cl::NDRange(tile_rows, 2), cl::NDRange(1, 1)};
+
+  slots_.fill(context_, 255);
+  for (cl_int wave = 0; wave < waves; ++wave) {
+    forward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), slots_, sums_);
+  }
+  slots_.fill(context_, 255);
+  for (cl_int wave = 0; wave < waves; ++wave) {
+    backward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), slots_, sums_,
+              measured.disparity, measured.variance);
+  }
+}
+
+int BandedSgm::code_padding(shared::DisparityRange range) {
+  return std::abs(range.min) + (SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
+}
+
+}  // namespace egosgm

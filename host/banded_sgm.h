@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/search_band.h"
+
+namespace egosgm {
+
+/// Semi-global matching of both views in their bands: disparity and matching variance (see kernels/banded_sgm.cl).
+class BandedSgm {
+ public:
+  BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options);
+
+  /// `codes`: what Census makes with a padding of `code_padding(range)`.
+  void operator()(const ocl::Buffer<cl_ulong>& codes, const SearchBand& band, StereoMaps& measured);
+
+  static int code_padding(shared::DisparityRange range);
+
+  using Forward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_ulong>,
+                              const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
+  using Backward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_ulong>,
+                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>,
+                               ocl::Buffer<float>, ocl::Buffer<float>>;
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const shared::SgmParameters parameters_;
+  ocl::Buffer<cl_uchar> slots_;  // path costs under way, one row of disparities a path and view
+  ocl::Buffer<cl_uchar> sums_;   // the forward sweep's sums, 8 bits a cell
+  Forward forward_;
+  Backward backward_;
+};
+
+}  // namespace egosgm

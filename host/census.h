@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/image.h"
+#include "egosgm/options.h"
+#include "host/maps.h"
+
+namespace egosgm {
+
+/// The census codes of both views, in padded rows, the right view's from right to left (see kernels/census.cl).
+class Census {
+ public:
+  /// Codes may be read up to `padding` pixels outside the image.
+  Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost window, int padding);
+
+  /// `images`: both views' pixels, the left view first, without gaps.
+  void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_ulong>& codes);
+
+  static std::size_t code_count(shared::ImageSize size, int padding) {
+    return 2 * (static_cast<std::size_t>(size.width) + 2 * static_cast<std::size_t>(padding)) * size.height;
+  }
+
+  using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>>;
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const cl_int padding_;
+  Kernel census_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+// Semi-global matching (Hirschmueller 2008) in a band per pixel, on diagonal wavefronts.
+//
+// Four of the eight paths come to a pixel from pixels that a sweep from the top left has done: from the left, the upper left, above and the upper
+// right. The other four are the same sweep over the image turned by 180 degrees. So two sweeps do it all. In a sweep, a pixel needs the one before it
+// and three of the row above; tiles skewed by a column a row need the tiles to the left, above and to the upper right, so all tiles (i, j) with
+// j + 2 i = wave run at once: a launch a wave, a work-item a tile.
+//
+// Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d +- 1) + P1, P2), which is
+// the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of q, or outside the disparity range.
+// The forward sweep leaves the saturated sum of its four paths in `sums`; the backward sweep adds its own and finds the winner.
+//
+// A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a pixel reads
+// its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them before it writes its own.
+#include "shared.h"
+
+#ifndef MAX_CHUNKS
+#error "MAX_CHUNKS: chunks of EGOSGM_LANES disparities in the whole range"
+#endif
+#ifndef PATHS
+#error "PATHS: 4 or 8"
+#endif
+#ifndef COST_SAD
+#error "COST_SAD: 0 for the Hamming distance of census codes, 1 for a 3x3 sum of absolute differences of grey values"
+#endif
+#ifndef TILE_WIDTH
+#error "TILE_WIDTH: columns of a tile"
+#endif
+#ifndef TILE_HEIGHT
+#error "TILE_HEIGHT: rows of a tile"
+#endif
+
+#define ABSENT 255
+#define MAX_COST 63
+#define SLOT_PADDING EGOSGM_LANES
+#define SLOT (MAX_CHUNKS * EGOSGM_LANES + 2 * SLOT_PADDING)
+#define DIRECTIONS (PATHS / 2)
+#define MAX_STEPS 8
+
+constant uchar16 kLane = (uchar16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+
+inline uchar minimum(const uchar16 v) {
+  const uchar8 a = min(v.lo, v.hi);
+  const uchar4 b = min(a.lo, a.hi);
+  const uchar2 c = min(b.lo, b.hi);
+  return min(c.x, c.y);
+}
+
+// 255 in the lanes from `first` on, 0 in those before it.
+inline uchar16 lanes_from(const int first) { return as_uchar16(kLane >= (uchar16)((uchar)clamp(first, 0, EGOSGM_LANES))); }
+
+// 65535 where a lane is 255; lanes are 0 or 255.
+inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
+
+inline ushort minimum_of_16(const ushort16 v) {
+  const ushort8 a = min(v.lo, v.hi);
+  const ushort4 b = min(a.lo, a.hi);
+  const ushort2 c = min(b.lo, b.hi);
+  return min(c.x, c.y);
+}
+
+// Matching cost of 16 disparities. `own` and `other` point at the pixel's code and at the first disparity's in their padded rows.
+inline uchar16 matching_cost(global const ulong* own, global const ulong* other, const long above, const long below) {
+#if COST_SAD
+  ushort16 sum = 0;
+  for (int dy = -1; dy <= 1; ++dy) {
+    const long row = dy < 0 ? above : dy > 0 ? below : 0;
+    for (int dx = -1; dx <= 1; ++dx) {
+      sum += convert_ushort16(abs_diff((ulong16)(own[row + dx]), vload16(0, other + row + dx)));
+    }
+  }
+  return convert_uchar16(min(sum / (ushort)9, (ushort16)(MAX_COST)));
+#else
+  return convert_uchar16(popcount((ulong16)(own[0]) ^ vload16(0, other)));
+#endif
+}
+
+// t(d) of one path. `from` points into the predecessor's slot, at the first of the 16 disparities.
+inline uchar16 path_cost(const uchar16 cost, global const uchar* from, const uchar16 p1, const uchar16 p2) {
+  const uchar16 same = vload16(0, from);
+  const uchar16 beside = add_sat(min(vload16(0, from - 1), vload16(0, from + 1)), p1);
+  return add_sat(cost, min(min(same, beside), p2));
+}
+
+// Steps from the winner in one direction until the sums above the minimum add up to `limit`; `sums` are those of the steps.
+inline int count_steps(const ushort8 sums, const ushort winner, const ushort limit) {
+  ushort8 total = sub_sat(sums, (ushort8)(winner));
+  total = add_sat(total, (ushort8)(0, total.s0123456));
+  total = add_sat(total, (ushort8)((ushort2)(0), total.s012345));
+  total = add_sat(total, (ushort8)((ushort4)(0), total.s0123));
+  const short8 counted = total < (ushort8)(limit);
+  const short4 a = counted.lo + counted.hi;
+  const short2 b = a.lo + a.hi;
+  return -(b.x + b.y);
+}
+
+// The winner among first..last by the sums, its sub-pixel place by a symmetric V through its neighbours, and the matching variance
+// (algorithm.md; the paper's n_l + n_r). `totals` holds the sums of all computed lanes, with MAX_STEPS of 65535 on both sides.
+inline void write_winner(const SgmParameters q, const Band band, const ushort* totals, const int lane, global float* disparity,
+                         global float* variance) {
+  const ushort* at = totals + MAX_STEPS + lane;
+  const float before = at[-1], here = at[0], after = at[1];
+  const float slope = max(before, after) - here;
+  const bool fits = at[-1] != 65535 && at[1] != 65535 && slope > 0.0f;
+  const float offset = fits ? clamp((before - after) / (2.0f * slope), -0.5f, 0.5f) : 0.0f;
+  *disparity = (float)(band.origin + lane) + offset;
+
+  const int steps = count_steps(vload8(0, at + 1), at[0], (ushort)q.s_max) + count_steps(vload8(0, at - 8).s76543210, at[0], (ushort)q.s_max);
+  *variance = q.variance_floor + q.variance_per_step * (float)steps;
+}
+
+inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns, global const ulong* codes,
+                  global const Band* bands, global const uint* offsets, global uchar* slots, global uchar* sums, global float* disparities,
+                  global float* variances) {
+  const int tile_y = get_global_id(0);
+  const int view = get_global_id(1);
+  const int tile_x = wave - 2 * tile_y;
+  if (tile_x < 0 || tile_x >= tile_columns) return;
+
+  const int width = q.width, height = q.height;
+  const size_t first_pixel = (size_t)view * width * height;
+  const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
+  const uchar16 p1 = (uchar16)((uchar)q.p1), p2 = (uchar16)((uchar)q.p2);
+  slots += (size_t)view * 3 * (width + height) * SLOT + SLOT_PADDING;
+
+  uchar16 t[DIRECTIONS][MAX_CHUNKS];
+  ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS];
+  vstore8((ushort8)(65535), 0, totals);
+
+  for (int row = 0; row < TILE_HEIGHT; ++row) {
+    const int y = tile_y * TILE_HEIGHT + row;
+    const int from = max(0, tile_x * TILE_WIDTH - row), to = min(width, (tile_x + 1) * TILE_WIDTH - row);
+    if (y >= height || from >= to) continue;
+    const int image_y = backward ? height - 1 - y : y;
+    const size_t row_cells = (first_pixel + (size_t)image_y * width) * MAX_CHUNKS;
+    global const ulong* own_codes = codes + ((size_t)view * height + image_y) * code_stride + q.padding;
+    global const ulong* other_codes = codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding;
+    const long above = image_y > 0 ? -(long)code_stride : 0, below = image_y + 1 < height ? (long)code_stride : 0;
+    const int towards = backward ? -1 : 1;
+
+    for (int x = from; x < to; ++x) {
+      const int image_x = backward ? width - 1 - x : x;
+      const int along = view == EGOSGM_LEFT ? image_x : width - 1 - image_x;
+      const size_t pixel = first_pixel + (size_t)image_y * width + image_x;
+      const Band band = bands[pixel];
+      const int lane = band.origin - q.min_disparity;
+
+      global uchar* path[4];
+      path[0] = slots + (size_t)y * SLOT;
+      path[1] = slots + (size_t)(height + x) * SLOT;
+      path[2] = slots + (size_t)(height + width + x - y + height - 1) * SLOT;
+      path[3] = slots + (size_t)(2 * height + 2 * width + x + y) * SLOT;
+      const bool has[4] = {x > 0, y > 0, x > 0 && y > 0, x + 1 < width && y > 0};
+      const long before[4] = {-towards, -towards * (long)width, -towards * ((long)width + 1), -towards * ((long)width - 1)};
+
+      uchar16 least[DIRECTIONS];
+      for (int r = 0; r < DIRECTIONS; ++r) least[r] = (uchar16)(ABSENT);
+      for (int v = 0; v < band.chunks; ++v) {
+        const int at = lane + EGOSGM_LANES * v;
+        const uchar16 absent = lanes_from(q.disparities - at);
+        const uchar16 cost = absent | matching_cost(own_codes + along, other_codes + (width - 1 - along) + band.origin + EGOSGM_LANES * v, above, below);
+        for (int r = 0; r < DIRECTIONS; ++r) {
+          t[r][v] = path_cost(cost, path[r] + at, p1, p2);
+          least[r] = min(least[r], t[r][v]);
+        }
+      }
+
+      for (int r = 0; r < DIRECTIONS; ++r) {
+        least[r] = (uchar16)(minimum(least[r]));
+        if (!has[r]) continue;
+        const Band wiped = bands[pixel + before[r]];
+        for (int v = 0; v < wiped.chunks; ++v) {
+          vstore16((uchar16)(ABSENT), 0, path[r] + (wiped.origin - q.min_disparity) + EGOSGM_LANES * v);
+        }
+      }
+
+      global uchar* cells = sums + (row_cells + offsets[pixel]) * EGOSGM_LANES;
+      int best = INT_MAX;
+      for (int v = 0; v < band.chunks; ++v) {
+        const int at = lane + EGOSGM_LANES * v;
+        const uchar16 absent = lanes_from(q.disparities - at);
+        uchar16 sum = 0;
+        for (int r = 0; r < DIRECTIONS; ++r) {
+          const uchar16 costs = (t[r][v] - least[r]) | absent;
+          sum = add_sat(sum, costs);
+          vstore16(costs, 0, path[r] + at);
+        }
+        if (!backward) {
+          vstore16(sum, v, cells);
+        } else {
+          const ushort16 total = (convert_ushort16(sum) + convert_ushort16(vload16(v, cells))) | widened(absent);
+          vstore16(total, 0, totals + MAX_STEPS + EGOSGM_LANES * v);
+          // The lane in the low bits: the smallest disparity wins a tie.
+          const int first = band.first - band.origin - EGOSGM_LANES * v;
+          const ushort16 barred = widened(~lanes_from(first) | lanes_from(band.last - band.first + 1 + first));
+          const int key = minimum_of_16((total << (ushort16)(4)) | convert_ushort16(kLane) | barred);
+          const int ranked = (key >> 4) * (MAX_CHUNKS * EGOSGM_LANES) + EGOSGM_LANES * v + (key & 15);
+          best = min(best, ranked);
+        }
+      }
+      if (backward) {
+        vstore8((ushort8)(65535), 0, totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
+        write_winner(q, band, totals, best % (MAX_CHUNKS * EGOSGM_LANES), disparities + pixel, variances + pixel);
+      }
+    }
+  }
+}
+
+kernel void sweep_forward(const SgmParameters q, const int wave, const int tile_columns, global const ulong* codes, global const Band* bands,
+                          global const uint* offsets, global uchar* slots, global uchar* sums) {
+  sweep(false, q, wave, tile_columns, codes, bands, offsets, slots, sums, 0, 0);
+}
+
+kernel void sweep_backward(const SgmParameters q, const int wave, const int tile_columns, global const ulong* codes, global const Band* bands,
+                           global const uint* offsets, global uchar* slots, global uchar* sums, global float* disparities,
+                           global float* variances) {
+  sweep(true, q, wave, tile_columns, codes, bands, offsets, slots, sums, disparities, variances);
+}

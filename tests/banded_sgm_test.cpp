@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/banded_sgm.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/reference/banded_sgm.h"
+#include "tests/reference/census.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+
+namespace egosgm {
+namespace {
+
+struct Case {
+  shared::ImageSize size;
+  shared::DisparityRange range;
+  MatchingCost cost = MatchingCost::kCensus9x7;
+  int paths = 8;
+  bool banded = true;
+};
+
+std::string name(const ::testing::TestParamInfo<Case>& info) {
+  const Case& c = info.param;
+  std::string text = std::to_string(c.size.width) + "x" + std::to_string(c.size.height) + "_D" + std::to_string(c.range.count) + "_from" +
+                     (c.range.min < 0 ? "minus" : "") + std::to_string(std::abs(c.range.min)) + "_paths" + std::to_string(c.paths);
+  if (c.cost == MatchingCost::kSad3x3) text += "_sad";
+  return text + (c.banded ? "_banded" : "_full");
+}
+
+/// Codes with some structure: the right view's are the left's, shifted by a few pixels, with noise.
+void random_codes(const Case& c, std::mt19937& random, std::vector<std::uint64_t> (&codes)[2]) {
+  const bool sad = c.cost == MatchingCost::kSad3x3;
+  const auto code = [&] { return sad ? random() & 255 : (std::uint64_t{random()} << 32 | random()) & random() * 0x100000001ull & ((1ull << 62) - 1); };
+  const std::size_t pixels = pixel_count(c.size);
+  for (std::size_t i = 0; i < pixels; ++i) codes[0].push_back(code());
+  for (std::size_t i = 0; i < pixels; ++i) {
+    const std::size_t shift = c.range.min + static_cast<int>(i / 50 % std::max(1, c.range.count));
+    codes[1].push_back(random() % 4 ? codes[0][(i + shift) % pixels] : code());
+  }
+}
+
+/// Half-banded predictions: smooth, with jumps and holes, so that bands of all widths meet.
+testing::HostMaps predictions(const Case& c) {
+  const float min = static_cast<float>(c.range.min), max = static_cast<float>(c.range.min + c.range.count - 1);
+  testing::HostMaps maps = testing::random_maps(c.size, min, max, 0.1, 5);
+  for (float& p : maps.variance) p = std::min(p, 1.5f);
+  return maps;
+}
+
+class BandedSgmTest : public ::testing::TestWithParam<Case> {};
+
+TEST_P(BandedSgmTest, EqualsReference) {
+  const Case c = GetParam();
+  std::mt19937 random(1);
+  std::vector<std::uint64_t> codes[2];
+  random_codes(c, random, codes);
+
+  ocl::Context context(testing::any_device());
+  const int padding = BandedSgm::code_padding(c.range);
+  const BandedSgmOptions options{.cost = c.cost, .paths = c.paths};
+  SearchBand band(context, c.size, c.range, {.min_half_width_px = 1});
+  BandedSgm sgm(context, c.size, c.range, options);
+  const auto padded = reference::padded_codes(c.size, codes[0], codes[1], padding);
+  ocl::Buffer<cl_ulong> device_codes(context, padded.size());
+  device_codes.write(context, {padded.begin(), padded.end()});
+  StereoMaps predicted(context, c.size), measured(context, c.size);
+  if (c.banded) {
+    const testing::HostMaps maps = predictions(c);
+    predicted.disparity.write(context, maps.disparity);
+    predicted.variance.write(context, maps.variance);
+    band(predicted);
+  } else {
+    band.full_range();
+  }
+  sgm(device_codes, band, measured);
+
+  const shared::SgmParameters parameters{c.size.width, c.size.height, c.range.min, c.range.count, padding, options.p1, options.p2,
+                                         options.s_max, options.variance_floor_px2, options.variance_per_step_px2};
+  const auto expected = reference::banded_sgm(parameters, c.paths, c.cost == MatchingCost::kSad3x3, codes, band.bands().read(context));
+  EXPECT_TRUE(testing::same_bits(measured.disparity.read(context), expected.disparity, c.size));
+  EXPECT_TRUE(testing::same_bits(measured.variance.read(context), expected.variance, c.size));
+}
+
+INSTANTIATE_TEST_SUITE_P(Banded, BandedSgmTest,
+                         ::testing::Values(Case{{1, 1}, {0, 1}}, Case{{1, 1}, {0, 128}}, Case{{7, 5}, {0, 16}}, Case{{7, 5}, {-3, 37}},
+                                           Case{{65, 3}, {0, 37}}, Case{{3, 65}, {0, 16}}, Case{{127, 33}, {0, 1}}, Case{{127, 33}, {0, 16}},
+                                           Case{{127, 33}, {-20, 37}}, Case{{127, 97}, {0, 128}}, Case{{127, 33}, {0, 128}, MatchingCost::kSad3x3},
+                                           Case{{127, 33}, {-7, 37}, MatchingCost::kCensus9x7, 4}, Case{{127, 33}, {0, 64}, MatchingCost::kSad3x3, 4},
+                                           Case{{320, 97}, {0, 37}}, Case{{320, 97}, {-50, 128}}, Case{{40, 30}, {0, 1024}}, Case{{1242, 375}, {0, 128}}),
+                         name);
+
+INSTANTIATE_TEST_SUITE_P(FullRange, BandedSgmTest,
+                         ::testing::Values(Case{.size = {1, 1}, .range = {0, 16}, .banded = false}, Case{.size = {65, 3}, .range = {-9, 37}, .banded = false},
+                                           Case{.size = {127, 33}, .range = {0, 1}, .banded = false}, Case{.size = {127, 97}, .range = {0, 128}, .banded = false},
+                                           Case{.size = {320, 97}, .range = {0, 16}, .banded = false},
+                                           Case{.size = {127, 33}, .range = {0, 64}, .paths = 4, .banded = false}),
+                         name);
+
+}  // namespace
+}  // namespace egosgm

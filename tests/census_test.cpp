@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/census.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/reference/census.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+
+namespace egosgm {
+namespace {
+
+class CensusTest : public ::testing::TestWithParam<std::tuple<shared::ImageSize, PixelType, MatchingCost>> {};
+
+TEST_P(CensusTest, EqualsReference) {
+  const auto [size, type, window] = GetParam();
+  const int padding = 19, bytes = type == PixelType::kU8 ? 1 : 2;
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> grey(0, type == PixelType::kU8 ? 255 : 65535);
+  std::vector<std::uint16_t> views[2];
+  std::vector<cl_uchar> raw;
+  for (auto& view : views) {
+    for (std::size_t i = 0; i < pixel_count(size); ++i) {
+      view.push_back(static_cast<std::uint16_t>(grey(random)));
+      for (int b = 0; b < bytes; ++b) raw.push_back(static_cast<cl_uchar>(view.back() >> (8 * b)));
+    }
+  }
+
+  ocl::Context context(testing::any_device());
+  Census census(context, size, type, window, padding);
+  ocl::Buffer<cl_uchar> images(context, raw.size());
+  ocl::Buffer<cl_ulong> codes(context, Census::code_count(size, padding));
+  images.write(context, raw);
+  census(images, codes);
+
+  const int radius_x = window == MatchingCost::kCensus5x5 ? 2 : 4, radius_y = window == MatchingCost::kCensus5x5 ? 2 : 3;
+  const auto expected = reference::padded_codes(size, reference::census(size, views[0], radius_x, radius_y),
+                                                reference::census(size, views[1], radius_x, radius_y), padding);
+  const auto actual = codes.read(context);
+  EXPECT_TRUE(testing::same_bits(std::vector<std::uint64_t>(actual.begin(), actual.end()), expected, {size.width + 2 * padding, size.height}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::kSizes),
+                                            ::testing::Values(PixelType::kU8, PixelType::kU16),
+                                            ::testing::Values(MatchingCost::kCensus9x7, MatchingCost::kCensus5x5)),
+                         [](const auto& info) {
+                           const auto [size, type, window] = info.param;
+                           return std::to_string(size.width) + "x" + std::to_string(size.height) +
+                                  (type == PixelType::kU8 ? "_8bit" : "_16bit") +
+                                  (window == MatchingCost::kCensus9x7 ? "_9x7" : "_5x5");
+                         });
+
+}  // namespace
+}  // namespace egosgm
