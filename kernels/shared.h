@@ -4,19 +4,22 @@
 #define EGOSGM_KERNELS_SHARED_H
 
 #ifdef __cplusplus
+#ifndef CL_TARGET_OPENCL_VERSION
+#define CL_TARGET_OPENCL_VERSION 120
+#endif
 #include <CL/cl_platform.h>
 namespace egosgm::shared {
-typedef cl_int int32;
-typedef cl_short int16;
-typedef cl_ushort uint16;
-typedef cl_uint uint32;
-typedef cl_float float32;
+typedef cl_int i32;
+typedef cl_short i16;
+typedef cl_ushort u16;
+typedef cl_uint u32;
+typedef cl_float f32;
 #else
-typedef int int32;
-typedef short int16;
-typedef ushort uint16;
-typedef uint uint32;
-typedef float float32;
+typedef int i32;
+typedef short i16;
+typedef ushort u16;
+typedef uint u32;
+typedef float f32;
 #endif
 
 // A pixel without a disparity; include/egosgm/image.h says the same to users.
@@ -35,49 +38,54 @@ typedef float float32;
 #define EGOSGM_BLOCK 8
 
 typedef struct {
-  int32 width, height;
+  i32 width, height;
 } ImageSize;
 
 // Disparities [min, min + count).
 typedef struct {
-  int32 min, count;
+  i32 min, count;
 } DisparityRange;
 
 // What a pixel searches. Lanes origin .. origin + chunks * EGOSGM_LANES - 1 are computed; first .. last (inclusive) can
 // win.
 typedef struct {
-  int16 origin;
-  uint16 chunks;
-  int16 first, last;
+  i16 origin;
+  u16 chunks;
+  i16 first, last;
 } Band;
 
 // What a row of a view searches: cells that can win, lanes that are computed, pixels that were predicted.
 typedef struct {
-  uint32 searched, computed, predicted;
+  u32 searched, computed, predicted;
 } RowSum;
 
 // The predictions in a block of EGOSGM_BLOCK x EGOSGM_BLOCK pixels; count 0: none.
 typedef struct {
-  float32 min, max;
-  uint32 count;
+  f32 min, max;
+  u32 count;
 } BlockRange;
 
 // What a sweep of BandedSgm needs to know.
 typedef struct {
-  int32 width, height;
-  int32 min_disparity, disparities;
-  int32 padding;  // of the census codes' rows
-  int32 p1, p2, s_max;
-  float32 variance_floor, variance_per_step;
+  i32 width, height;
+  i32 min_disparity, disparities;
+  i32 padding;  // of the census codes' rows
+  i32 p1, p2, s_max;
+  f32 variance_floor, variance_per_step;
 } SgmParameters;
+
+// A point whose depth shrinks to less than this part of itself is as good as behind the camera.
+#define EGOSGM_MIN_DEPTH_RATIO 1e-6f
+// A predicted variance is cut off here: with a deviation of 1000 px nothing is known.
+#define EGOSGM_MAX_VARIANCE_PX2 1e6f
 
 // How a view's disparity space moves (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
 // noise: variance of the depth's error Z' as a form in (1, X', Y'), from the motion's covariance (see forward_warp.cl).
 typedef struct {
-  float32 x[4], y[4], w[4];
-  float32 cx, cy, doffs;
-  float32 fx, fy, fx_baseline;
-  float32 noise_1, noise_x, noise_y, noise_xx, noise_xy, noise_yy;
+  f32 x[4], y[4], w[4];
+  f32 cx, cy, doffs;
+  f32 fx, fy, fx_baseline;
+  f32 noise_1, noise_x, noise_y, noise_xx, noise_xy, noise_yy;
 } DisparityMotion;
 
 #ifdef __cplusplus

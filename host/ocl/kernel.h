@@ -24,6 +24,17 @@ inline Range every_row(shared::ImageSize size, int views = 2) {
   return {cl::NDRange(size.height, views), cl::NullRange};
 }
 
+/// A work-group of `work_items` a row and view: local id 0 is the lane, global ids 1 and 2 are y and view.
+inline Range group_a_row(shared::ImageSize size, int work_items, int views = 2) {
+  return {cl::NDRange(work_items, size.height, views), cl::NDRange(work_items, 1, 1)};
+}
+
+/// How many work-items share a row whose values build on one another: many where a work-item is slow, else one.
+inline int row_group(const Context& context) {
+  const bool is_gpu = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU;
+  return is_gpu ? static_cast<int>(std::min<std::size_t>(128, context.max_work_group_size())) : 1;
+}
+
 /// A kernel with its C++ signature: `Buffer<T>` for `global T*`, `const Buffer<T>` for
 /// `global const T*`, anything else by value. tests/signatures_test.cpp checks it against the .cl.
 template <typename... Params>
