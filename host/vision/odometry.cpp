@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/odometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <utility>
+
+#include "egosgm/error.h"
+#include "host/vision/odometry_features.h"
+#include "host/vision/odometry_matching.h"
+#include "host/vision/odometry_motion.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr int kFeatureCell_px = 64;
+constexpr int kRoughCell_px = 80, kRoughPerCell = 8;  // few strong features find the motion roughly
+constexpr SearchWindow kPriorWindow{40, 24};
+constexpr SearchWindow kGuidedWindow{5, 4};
+constexpr double kRoughThreshold_px = 2.5;
+
+void require(bool condition, const char* what) {
+  if (!condition) throw InvalidArgument(std::string("stereo odometry: ") + what);
+}
+
+void check_images(const ImageView& left, const ImageView& right) {
+  require(left.data && right.data && left.width > 0 && left.height > 0, "image is empty; give both images of a frame");
+  if (left.width != right.width || left.height != right.height || left.type != right.type) {
+    std::ostringstream text;
+    text << "stereo odometry: left image is " << left.width << "x" << left.height << ", right image is " << right.width
+         << "x" << right.height << "; give a rectified pair of one size and type";
+    throw InvalidArgument(text.str());
+  }
+}
+
+}  // namespace
+
+void StereoOdometryOptions::validate() const {
+  const auto positive = [](double value) { return std::isfinite(value) && value > 0; };
+  require(positive(max_translation_m), "max_translation_m must be positive");
+  require(positive(max_rotation_deg) && max_rotation_deg <= 180, "max_rotation_deg must be in (0, 180]");
+  require(corner_threshold > 0 && corner_threshold <= 4000, "corner_threshold must be in 1..4000");
+  require(max_features > 0, "max_features must be positive");
+  require(std::isfinite(max_disparity_px) && max_disparity_px >= 0 && max_disparity_px <= 1e4,
+          "max_disparity_px must be in 0..10000");
+  require(positive(max_flow_x_px) && max_flow_x_px <= 1e4, "max_flow_x_px must be in (0, 10000]");
+  require(positive(max_flow_y_px) && max_flow_y_px <= 1e4, "max_flow_y_px must be in (0, 10000]");
+  require(ransac_iterations > 0, "ransac_iterations must be positive");
+  require(positive(inlier_threshold_px), "inlier_threshold_px must be positive");
+  require(min_inliers >= 6, "min_inliers must be at least 6");
+  require(std::isfinite(min_inlier_ratio) && min_inlier_ratio >= 0 && min_inlier_ratio <= 1,
+          "min_inlier_ratio must be in 0..1");
+}
+
+struct StereoOdometry::State {
+  Calibration calibration;
+  StereoOdometryOptions options;
+  FeatureDetector detector;
+  StereoFrame previous, current;
+  bool has_previous = false;
+  std::optional<Eigen::Isometry3d> last_motion;
+
+  int max_disparity_px(int width) const {
+    return options.max_disparity_px > 0 ? static_cast<int>(std::ceil(options.max_disparity_px)) : width / 5;
+  }
+
+  void read_frame(const ImageView& left, const ImageView& right);
+  MotionEstimate rough_motion(const std::optional<Eigen::Isometry3d>& prior);
+  OdometryResult estimate(const std::optional<Eigen::Isometry3d>& prior);
+  void keep_tracks(const std::vector<CircularMatch>& matches, const std::vector<int>& inliers);
+};
+
+void StereoOdometry::State::read_frame(const ImageView& left, const ImageView& right) {
+  int shift = 0;
+  if (left.type == PixelType::kU16) {
+    const int largest = std::max(max_value(left), max_value(right));
+    while ((largest >> shift) > 255) ++shift;
+  }
+  to_grey(left, shift, current.left);
+  to_grey(right, shift, current.right);
+  const double cells = std::ceil(left.width / static_cast<double>(kFeatureCell_px)) *
+                       std::ceil(left.height / static_cast<double>(kFeatureCell_px));
+  const int per_cell = static_cast<int>(std::ceil(options.max_features / cells));
+  detector.detect(current.left, options.corner_threshold, per_cell, current.left_features);
+  detector.detect(current.right, options.corner_threshold, per_cell, current.right_features);
+  current.reset_matches();
+}
+
+// From few features: near the prior, and where that fails, anywhere.
+MotionEstimate StereoOdometry::State::rough_motion(const std::optional<Eigen::Isometry3d>& prior) {
+  const std::vector<int> queries = select_spread(previous, kRoughCell_px, kRoughPerCell);
+  const int disparity = max_disparity_px(current.left.width);
+  const auto attempt = [&](const Eigen::Isometry3d* motion, const SearchWindow& window) {
+    const auto matches = match_circle(calibration, previous, current, queries, motion, window, disparity);
+    return estimate_motion(calibration, options, pixel_matches(previous, current, matches),
+                           motion ? *motion : Eigen::Isometry3d::Identity(), kRoughThreshold_px);
+  };
+  if (prior && out_of_bounds(options, *prior).empty()) {
+    MotionEstimate estimate = attempt(&*prior, kPriorWindow);
+    if (estimate.reason.empty()) return estimate;
+  }
+  return attempt(nullptr, {options.max_flow_x_px, options.max_flow_y_px});
+}
+
+OdometryResult StereoOdometry::State::estimate(const std::optional<Eigen::Isometry3d>& prior) {
+  OdometryResult result;
+  result.features = current.left_features.size();
+  const MotionEstimate rough = rough_motion(prior ? prior : last_motion);
+  result.reason = rough.reason;
+  if (!rough.reason.empty()) return result;
+
+  std::vector<CircularMatch> refined;
+  const auto candidates =
+      match_circle(calibration, previous, current, select_spread(previous, kFeatureCell_px, 1 << 20),
+                   &rough.motion.current_from_previous, kGuidedWindow, max_disparity_px(current.left.width));
+  const auto points =
+      refine_matches(calibration, previous, current, candidates, rough.motion.current_from_previous, refined);
+  const MotionEstimate fine =
+      refine_motion(calibration, options, MatchNoise{}, points, rough.motion.current_from_previous);
+  result.matches = static_cast<int>(points.size());
+  result.inliers = static_cast<int>(fine.inliers.size());
+  result.reprojection_rms_px = fine.rms_px;
+  result.reason = fine.reason;
+  keep_tracks(refined, fine.inliers);
+  if (fine.reason.empty()) result.motion = fine.motion;
+  return result;
+}
+
+// What agrees with the motion goes on as a track; all else starts anew at its pixel.
+void StereoOdometry::State::keep_tracks(const std::vector<CircularMatch>& matches, const std::vector<int>& inliers) {
+  std::vector<bool> tracked(current.left_features.size(), false);
+  for (const int k : inliers) {
+    tracked[matches[k].current_left] = true;
+    current.age[matches[k].current_left] = previous.age[matches[k].previous_left] + 1;
+  }
+  for (int i = 0; i < current.left_features.size(); ++i) {
+    if (tracked[i]) continue;
+    current.u[i] = current.left_features.features[i].x;
+    current.v[i] = current.left_features.features[i].y;
+    current.disparity[i] = std::numeric_limits<float>::quiet_NaN();
+  }
+}
+
+StereoOdometry::StereoOdometry(const Calibration& calibration, const StereoOdometryOptions& options)
+    : state_(std::make_unique<State>()) {
+  calibration.validate();
+  options.validate();
+  state_->calibration = calibration;
+  state_->options = options;
+}
+
+StereoOdometry::~StereoOdometry() = default;
+StereoOdometry::StereoOdometry(StereoOdometry&&) noexcept = default;
+StereoOdometry& StereoOdometry::operator=(StereoOdometry&&) noexcept = default;
+
+OdometryResult StereoOdometry::process(const ImageView& left, const ImageView& right,
+                                       const std::optional<Eigen::Isometry3d>& prior) {
+  check_images(left, right);
+  State& state = *state_;
+  if (state.has_previous && (left.width != state.previous.left.width || left.height != state.previous.left.height)) {
+    std::ostringstream text;
+    text << "stereo odometry: image size changed from " << state.previous.left.width << "x"
+         << state.previous.left.height << " to " << left.width << "x" << left.height << "; call reset() first";
+    throw InvalidArgument(text.str());
+  }
+  state.read_frame(left, right);
+  OdometryResult result;
+  if (state.has_previous) {
+    result = state.estimate(prior);
+  } else {
+    result.features = state.current.left_features.size();
+    result.reason = "first frame";
+  }
+  state.last_motion.reset();
+  if (result.motion) state.last_motion = result.motion->current_from_previous;
+  std::swap(state.previous, state.current);
+  state.has_previous = true;
+  return result;
+}
+
+void StereoOdometry::reset() {
+  state_->has_previous = false;
+  state_->last_motion.reset();
+}
+
+}  // namespace egosgm::vision

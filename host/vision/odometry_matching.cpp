@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/vision/odometry_matching.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "host/vision/odometry_subpixel.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr int kMaxDistance = 20 * kDescriptorSize;  // of descriptors; unrelated ones differ by 34 a sample
+constexpr int kStereoRows_px = 1;                   // rectification error
+constexpr int kBeyondInfinity_px = 2;               // and in the direction of the search
+constexpr float kMinCorrelation = 0.8f;
+constexpr float kMaxRowError_px = 1.5f;
+constexpr float kCannot = -std::numeric_limits<float>::infinity();
+
+struct Box {
+  int x0, x1, y0, y1;  // inclusive
+};
+
+int best_match(const FeatureSet& set, int feature_class, const Descriptor& descriptor, const Box& box) {
+  int best = kNoMatch, least = kMaxDistance;
+  const int last_row = std::min(box.y1, set.height - 1);
+  for (int y = std::max(box.y0, 0); y <= last_row; ++y) {
+    const int end = set.first_of_row(feature_class, y + 1);
+    for (int k = set.first_of_row(feature_class, y); k < end; ++k) {
+      const int x = set.features[k].x;
+      if (x < box.x0) continue;
+      if (x > box.x1) break;
+      const int distance = descriptor_distance(set.descriptors[k], descriptor);
+      if (distance < least) {
+        least = distance;
+        best = k;
+      }
+    }
+  }
+  return best;
+}
+
+Box around(double x, double y, const SearchWindow& window) {
+  return {static_cast<int>(std::ceil(x - window.x_px)), static_cast<int>(std::floor(x + window.x_px)),
+          static_cast<int>(std::ceil(y - window.y_px)), static_cast<int>(std::floor(y + window.y_px))};
+}
+
+int match_to_left(StereoFrame& frame, int right, int max_disparity_px) {
+  int& known = frame.left_of_right[right];
+  if (known == kUnknown) {
+    const Feature& f = frame.right_features.features[right];
+    known =
+        best_match(frame.left_features, frame.right_features.classes[right], frame.right_features.descriptors[right],
+                   {f.x - kBeyondInfinity_px, f.x + max_disparity_px, f.y - kStereoRows_px, f.y + kStereoRows_px});
+  }
+  return known;
+}
+
+// Where a static point goes, as a shift of its two images.
+struct Flow {
+  double left_x, right_x, y;
+};
+
+Flow predict_flow(const Calibration& c, const Eigen::Isometry3d& motion, double x, double y, double disparity) {
+  const double d = std::max(disparity + c.doffs_px, 0.5);
+  const double z = c.fx * c.baseline_m / d;
+  const Eigen::Vector3d p = motion * Eigen::Vector3d((x - c.cx) * z / c.fx, (y - c.cy) * z / c.fy, z);
+  if (p.z() < 0.1) return {1e6, 1e6, 1e6};
+  const double u = c.fx * p.x() / p.z() + c.cx, v = c.fy * p.y() / p.z() + c.cy;
+  return {u - x, u - x - (c.fx * c.baseline_m / p.z() - d), v - y};
+}
+
+// Of left feature `i` at its refined place.
+float refined_disparity(StereoFrame& frame, int i) {
+  float& disparity = frame.disparity[i];
+  if (!std::isnan(disparity)) return disparity;
+  disparity = kCannot;
+  const Feature& left = frame.left_features.features[i];
+  const Feature& right = frame.right_features.features[frame.right_of_left[i]];
+  Patch patch;
+  if (!make_patch(frame.left, frame.u[i], frame.v[i], 1.0f, patch)) return disparity;
+  float x = frame.u[i] - (left.x - right.x), y = frame.v[i] + (right.y - left.y);
+  if (!align_patch(patch, frame.right, kMinCorrelation, x, y)) return disparity;
+  if (std::abs(y - frame.v[i]) > kMaxRowError_px) return disparity;
+  disparity = frame.u[i] - x;
+  return disparity;
+}
+
+}  // namespace
+
+void StereoFrame::reset_matches() {
+  const int count = left_features.size();
+  right_of_left.assign(count, kUnknown);
+  left_of_right.assign(right_features.size(), kUnknown);
+  disparity.assign(count, std::numeric_limits<float>::quiet_NaN());
+  age.assign(count, 0);
+  u.resize(count);
+  v.resize(count);
+  for (int i = 0; i < count; ++i) {
+    u[i] = left_features.features[i].x;
+    v[i] = left_features.features[i].y;
+  }
+}
+
+int stereo_match(StereoFrame& frame, int i, int max_disparity_px) {
+  int& known = frame.right_of_left[i];
+  if (known == kUnknown) {
+    const Feature& f = frame.left_features.features[i];
+    known = best_match(frame.right_features, frame.left_features.classes[i], frame.left_features.descriptors[i],
+                       {f.x - max_disparity_px, f.x + kBeyondInfinity_px, f.y - kStereoRows_px, f.y + kStereoRows_px});
+    if (known != kNoMatch && match_to_left(frame, known, max_disparity_px) != i) known = kNoMatch;
+  }
+  return known;
+}
+
+std::vector<CircularMatch> match_circle(const Calibration& calibration, StereoFrame& previous, StereoFrame& current,
+                                        const std::vector<int>& queries, const Eigen::Isometry3d* motion,
+                                        const SearchWindow& window, int max_disparity_px) {
+  std::vector<CircularMatch> matches;
+  matches.reserve(queries.size());
+  for (const int i : queries) {
+    const int previous_right = stereo_match(previous, i, max_disparity_px);
+    if (previous_right == kNoMatch) continue;
+    const Feature& left = previous.left_features.features[i];
+    const int feature_class = previous.left_features.classes[i];
+    const double disparity = left.x - previous.right_features.features[previous_right].x;
+    const Flow flow = motion ? predict_flow(calibration, *motion, left.x, left.y, disparity) : Flow{0, 0, 0};
+    if (std::abs(flow.left_x) > current.left.width || std::abs(flow.y) > current.left.height) continue;
+    const int j = best_match(current.left_features, feature_class, previous.left_features.descriptors[i],
+                             around(left.x + flow.left_x, left.y + flow.y, window));
+    if (j == kNoMatch) continue;
+    const int current_right = stereo_match(current, j, max_disparity_px);
+    if (current_right == kNoMatch) continue;
+    const Feature& right = current.right_features.features[current_right];
+    const int back =
+        best_match(previous.right_features, feature_class, current.right_features.descriptors[current_right],
+                   around(right.x - flow.right_x, right.y - flow.y, window));
+    if (back == previous_right) matches.push_back({i, j, current_right, previous_right});
+  }
+  return matches;
+}
+
+std::vector<int> select_spread(const StereoFrame& frame, int cell_px, int per_cell) {
+  const int columns = (frame.left.width + cell_px - 1) / cell_px, rows = (frame.left.height + cell_px - 1) / cell_px;
+  std::vector<std::vector<int>> cells(static_cast<std::size_t>(columns) * rows);
+  const auto& features = frame.left_features.features;
+  for (int i = 0; i < frame.left_features.size(); ++i) {
+    cells[(features[i].y / cell_px) * columns + features[i].x / cell_px].push_back(i);
+  }
+  const auto before = [&](int a, int b) {
+    if (frame.age[a] != frame.age[b]) return frame.age[a] > frame.age[b];
+    if (features[a].strength != features[b].strength) return features[a].strength > features[b].strength;
+    return a < b;
+  };
+  std::vector<int> selected;
+  for (auto& cell : cells) {
+    const std::size_t count = std::min<std::size_t>(per_cell, cell.size());
+    std::partial_sort(cell.begin(), cell.begin() + count, cell.end(), before);
+    selected.insert(selected.end(), cell.begin(), cell.begin() + count);
+  }
+  std::sort(selected.begin(), selected.end());
+  return selected;
+}
+
+std::vector<PointMatch> refine_matches(const Calibration& calibration, StereoFrame& previous, StereoFrame& current,
+                                       const std::vector<CircularMatch>& matches, const Eigen::Isometry3d& motion,
+                                       std::vector<CircularMatch>& kept) {
+  std::vector<PointMatch> points;
+  points.reserve(matches.size());
+  kept.clear();
+  for (const CircularMatch& match : matches) {
+    const int i = match.previous_left, j = match.current_left;
+    const float d1 = refined_disparity(previous, i);
+    if (d1 == kCannot || d1 + calibration.doffs_px < 0.2) continue;
+    const Feature& feature = current.left_features.features[j];
+    // A patch looks larger by the ratio of its depths, that is, of its disparities.
+    const double z = calibration.fx * calibration.baseline_m / (d1 + calibration.doffs_px);
+    const Eigen::Vector3d p = motion * Eigen::Vector3d((previous.u[i] - calibration.cx) * z / calibration.fx,
+                                                       (previous.v[i] - calibration.cy) * z / calibration.fy, z);
+    const double scale = std::clamp(z / std::max(p.z(), 0.1), 0.5, 2.0);
+    Patch patch;
+    if (!make_patch(previous.left, previous.u[i], previous.v[i], static_cast<float>(scale), patch)) continue;
+    float u = feature.x, v = feature.y;
+    if (!align_patch(patch, current.left, kMinCorrelation, u, v)) continue;
+    current.u[j] = u;
+    current.v[j] = v;
+    current.disparity[j] = std::numeric_limits<float>::quiet_NaN();
+    current.right_of_left[j] = match.current_right;
+    const float d2 = refined_disparity(current, j);
+    if (d2 == kCannot) continue;
+    points.push_back({previous.u[i], previous.v[i], d1, u, v, d2});
+    kept.push_back(match);
+  }
+  return points;
+}
+
+std::vector<PointMatch> pixel_matches(const StereoFrame& previous, const StereoFrame& current,
+                                      const std::vector<CircularMatch>& matches) {
+  std::vector<PointMatch> points;
+  points.reserve(matches.size());
+  for (const CircularMatch& match : matches) {
+    const Feature& a = previous.left_features.features[match.previous_left];
+    const Feature& b = current.left_features.features[match.current_left];
+    points.push_back({static_cast<double>(a.x), static_cast<double>(a.y),
+                      static_cast<double>(a.x - previous.right_features.features[match.previous_right].x),
+                      static_cast<double>(b.x), static_cast<double>(b.y),
+                      static_cast<double>(b.x - current.right_features.features[match.current_right].x)});
+  }
+  return points;
+}
+
+}  // namespace egosgm::vision

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "egosgm/calibration.h"
+#include "egosgm/vision/odometry.h"
+#include "host/vision/odometry_features.h"
+#include "host/vision/odometry_motion.h"
+
+namespace egosgm::vision {
+
+/// A frame, and what is known of its left features so far. Stereo matches are found when they are asked for.
+struct StereoFrame {
+  GreyImage left, right;
+  FeatureSet left_features, right_features;
+  std::vector<int> right_of_left;  // index, kNoMatch or kUnknown
+  std::vector<int> left_of_right;
+  std::vector<float> u, v;       // refined position of a left feature; its pixel until a track refines it
+  std::vector<float> disparity;  // refined at (u, v); NaN: not yet, negative infinity: cannot be
+  std::vector<int> age;          // frames that the feature was tracked for
+
+  void reset_matches();
+};
+
+inline constexpr int kNoMatch = -1;
+inline constexpr int kUnknown = -2;
+
+/// left k-1, left k, right k and right k-1.
+struct CircularMatch {
+  int previous_left, current_left, current_right, previous_right;
+};
+
+struct SearchWindow {
+  double x_px, y_px;  // farthest from the predicted place
+};
+
+/// The right feature that best matches left feature `i`, and whose best match `i` is.
+int stereo_match(StereoFrame& frame, int i, int max_disparity_px);
+
+/// Closes the circle for each of the previous frame's left features in `queries`. With `motion`, the search is
+/// around the place where it takes a static point; without, around the last place.
+std::vector<CircularMatch> match_circle(const Calibration& calibration, StereoFrame& previous, StereoFrame& current,
+                                        const std::vector<int>& queries, const Eigen::Isometry3d* motion,
+                                        const SearchWindow& window, int max_disparity_px);
+
+/// The strongest `per_cell` of every cell of `cell_px` (older tracks first), by index.
+std::vector<int> select_spread(const StereoFrame& frame, int cell_px, int per_cell);
+
+/// Matches to a fraction of a pixel. `kept` are those that could be refined, one for each point.
+std::vector<PointMatch> refine_matches(const Calibration& calibration, StereoFrame& previous, StereoFrame& current,
+                                       const std::vector<CircularMatch>& matches, const Eigen::Isometry3d& motion,
+                                       std::vector<CircularMatch>& kept);
+
+/// Matches to a pixel.
+std::vector<PointMatch> pixel_matches(const StereoFrame& previous, const StereoFrame& current,
+                                      const std::vector<CircularMatch>& matches);
+
+}  // namespace egosgm::vision

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/vision/odometry_subpixel.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace egosgm::vision {
+namespace {
+
+constexpr int kReach = 4;  // farthest move [px]
+constexpr int kIterations = 10;
+constexpr float kSettled_px = 0.01f;
+constexpr float kMinEigenvalue = 400.0f;  // of the normal equations [grey value^2 / px^2]
+constexpr int kRegion = kPatchRows + 2 * kReach + 1;
+constexpr int kRegionStride = 24;
+constexpr int kSource = kPatchRows + 2;
+
+// `image` at integer offsets from (x0, y0), the border repeated.
+void load(const GreyImage& image, int x0, int y0, int rows, int columns, float* out, int stride) {
+  const bool inside = x0 >= 0 && y0 >= 0 && x0 + columns <= image.width && y0 + rows <= image.height;
+  for (int i = 0; i < rows; ++i) {
+    const std::uint8_t* row = image.row(std::clamp(y0 + i, 0, image.height - 1));
+    float* to = out + i * stride;
+    if (inside) {
+      for (int j = 0; j < columns; ++j) to[j] = row[x0 + j];
+    } else {
+      for (int j = 0; j < columns; ++j) to[j] = row[std::clamp(x0 + j, 0, image.width - 1)];
+    }
+  }
+}
+
+float bilinear(const GreyImage& image, float x, float y) {
+  x = std::clamp(x, 0.0f, static_cast<float>(image.width - 1));
+  y = std::clamp(y, 0.0f, static_cast<float>(image.height - 1));
+  const int x0 = std::min(static_cast<int>(x), image.width - 2), y0 = std::min(static_cast<int>(y), image.height - 2);
+  const float a = x - x0, b = y - y0;
+  const std::uint8_t *upper = image.row(y0) + x0, *lower = image.row(y0 + 1) + x0;
+  return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
+}
+
+void sample(const GreyImage& image, float x, float y, float scale, float source[kSource][kSource]) {
+  const float step = 1 / scale;
+  if (scale == 1.0f && x == std::floor(x) && y == std::floor(y)) {
+    const int reach = kPatchRadius + 1;
+    load(image, static_cast<int>(x) - reach, static_cast<int>(y) - reach, kSource, kSource, source[0], kSource);
+    return;
+  }
+  for (int i = 0; i < kSource; ++i) {
+    for (int j = 0; j < kSource; ++j) {
+      source[i][j] = bilinear(image, x + (j - kPatchRadius - 1) * step, y + (i - kPatchRadius - 1) * step);
+    }
+  }
+}
+
+// Removes from `gradient` its mean and its part along `values`, which have zero mean and squared norm `norm2`.
+void make_orthogonal(const float values[kPatchRows][kPatchColumns], float norm2,
+                     float gradient[kPatchRows][kPatchColumns]) {
+  float mean = 0, along = 0;
+  for (int i = 0; i < kPatchRows; ++i) {
+    for (int j = 0; j < kPatchRows; ++j) {
+      mean += gradient[i][j];
+      along += gradient[i][j] * values[i][j];
+    }
+  }
+  mean /= kPatchRows * kPatchRows;
+  along /= norm2;
+  for (int i = 0; i < kPatchRows; ++i) {
+    for (int j = 0; j < kPatchRows; ++j) gradient[i][j] -= mean + along * values[i][j];
+    gradient[i][kPatchRows] = 0;
+  }
+}
+
+struct Sums {
+  float x, y;
+};
+
+// Products of the gradients with the image shifted to (column, row) of the region.
+Sums correlate(const Patch& patch, const float* region, float column, float row) {
+  const int j0 = static_cast<int>(column), i0 = static_cast<int>(row);
+  const float a = column - j0, b = row - i0;
+  const float w00 = (1 - a) * (1 - b), w01 = a * (1 - b), w10 = (1 - a) * b, w11 = a * b;
+  float sum_x[kPatchColumns] = {}, sum_y[kPatchColumns] = {};
+  for (int i = 0; i < kPatchRows; ++i) {
+    const float* __restrict upper = region + (i0 + i) * kRegionStride + j0;
+    const float* __restrict lower = upper + kRegionStride;
+    for (int j = 0; j < kPatchColumns; ++j) {
+      const float value = w00 * upper[j] + w01 * upper[j + 1] + w10 * lower[j] + w11 * lower[j + 1];
+      sum_x[j] += patch.gradient_x[i][j] * value;
+      sum_y[j] += patch.gradient_y[i][j] * value;
+    }
+  }
+  Sums sums{0, 0};
+  for (int j = 0; j < kPatchColumns; ++j) {
+    sums.x += sum_x[j];
+    sums.y += sum_y[j];
+  }
+  return sums;
+}
+
+float correlation(const Patch& patch, const float* region, float column, float row) {
+  const int j0 = static_cast<int>(column), i0 = static_cast<int>(row);
+  const float a = column - j0, b = row - i0;
+  float sum = 0, sum2 = 0, product = 0;
+  for (int i = 0; i < kPatchRows; ++i) {
+    const float* upper = region + (i0 + i) * kRegionStride + j0;
+    const float* lower = upper + kRegionStride;
+    for (int j = 0; j < kPatchRows; ++j) {
+      const float value =
+          (1 - b) * ((1 - a) * upper[j] + a * upper[j + 1]) + b * ((1 - a) * lower[j] + a * lower[j + 1]);
+      sum += value;
+      sum2 += value * value;
+      product += value * patch.values[i][j];
+    }
+  }
+  const float variance = sum2 - sum * sum / (kPatchRows * kPatchRows);
+  return variance > 1.0f ? product / (std::sqrt(variance) * patch.deviation) : 0.0f;
+}
+
+}  // namespace
+
+bool make_patch(const GreyImage& image, float x, float y, float scale, Patch& patch) {
+  float source[kSource][kSource];
+  sample(image, x, y, scale, source);
+  float mean = 0;
+  for (int i = 0; i < kPatchRows; ++i) {
+    for (int j = 0; j < kPatchRows; ++j) {
+      mean += source[i + 1][j + 1];
+      patch.gradient_x[i][j] = 0.5f * (source[i + 1][j + 2] - source[i + 1][j]);
+      patch.gradient_y[i][j] = 0.5f * (source[i + 2][j + 1] - source[i][j + 1]);
+    }
+  }
+  mean /= kPatchRows * kPatchRows;
+  float norm2 = 0;
+  for (int i = 0; i < kPatchRows; ++i) {
+    for (int j = 0; j < kPatchRows; ++j) {
+      patch.values[i][j] = source[i + 1][j + 1] - mean;
+      norm2 += patch.values[i][j] * patch.values[i][j];
+    }
+  }
+  if (norm2 < kMinEigenvalue) return false;
+  patch.deviation = std::sqrt(norm2);
+  make_orthogonal(patch.values, norm2, patch.gradient_x);
+  make_orthogonal(patch.values, norm2, patch.gradient_y);
+  float xx = 0, xy = 0, yy = 0;
+  for (int i = 0; i < kPatchRows; ++i) {
+    for (int j = 0; j < kPatchRows; ++j) {
+      xx += patch.gradient_x[i][j] * patch.gradient_x[i][j];
+      xy += patch.gradient_x[i][j] * patch.gradient_y[i][j];
+      yy += patch.gradient_y[i][j] * patch.gradient_y[i][j];
+    }
+  }
+  const float smaller = 0.5f * (xx + yy - std::sqrt((xx - yy) * (xx - yy) + 4 * xy * xy));
+  if (smaller < kMinEigenvalue) return false;
+  const float determinant = xx * yy - xy * xy;
+  patch.inverse_xx = yy / determinant;
+  patch.inverse_xy = -xy / determinant;
+  patch.inverse_yy = xx / determinant;
+  return true;
+}
+
+bool align_patch(const Patch& patch, const GreyImage& image, float min_correlation, float& x, float& y) {
+  const int x0 = static_cast<int>(std::floor(x + 0.5f)) - kPatchRadius - kReach;
+  const int y0 = static_cast<int>(std::floor(y + 0.5f)) - kPatchRadius - kReach;
+  float region[kRegion * kRegionStride];
+  load(image, x0, y0, kRegion, kRegionStride, region, kRegionStride);
+  float column = x - kPatchRadius - x0, row = y - kPatchRadius - y0;
+  bool settled = false;
+  for (int k = 0; k < kIterations && !settled; ++k) {
+    const Sums sums = correlate(patch, region, column, row);
+    const float dx = patch.inverse_xx * sums.x + patch.inverse_xy * sums.y;
+    const float dy = patch.inverse_xy * sums.x + patch.inverse_yy * sums.y;
+    column -= dx;
+    row -= dy;
+    if (!(column >= 0 && row >= 0 && column < 2 * kReach && row < 2 * kReach)) return false;
+    settled = dx * dx + dy * dy < kSettled_px * kSettled_px;
+  }
+  if (!settled || correlation(patch, region, column, row) < min_correlation) return false;
+  x = column + kPatchRadius + x0;
+  y = row + kPatchRadius + y0;
+  return true;
+}
+
+}  // namespace egosgm::vision
