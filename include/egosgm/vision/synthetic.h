@@ -24,7 +24,7 @@ struct SyntheticOptions {
   double wobble = 1.0;      // scale of pitch, roll, sway and heave (1: 0.25 deg, 0.15 deg, 6 cm, 2 cm), 0..3
   double noise_grey = 1.5;  // standard deviation of the sensor noise, independent in both images, 0..20
   double pole_width_px = 3.0;  // mean width of a pole 10 m ahead [px], 1..20; single ones from 2/3 to 4/3 of it
-  int supersampling = 3;       // rays per pixel and axis for the intensity, 1..8
+  int supersampling = 3;       // rays per pixel and axis at the edges of surfaces, 1..8
 
   /// Throws InvalidArgument, naming the value.
   void validate() const;
