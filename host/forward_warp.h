@@ -35,12 +35,12 @@ class ForwardWarp {
   const Calibration calibration_;
   const float process_noise_px2_;
   const shared::DisparityRange range_;
-  ocl::Buffer<cl_uint> zbuffer_;
   WarpKernel<const ocl::Buffer<float>, ocl::Buffer<cl_uint>> splat_disparity_;
   WarpKernel<const float, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<cl_uint>,
              ocl::Buffer<float>>
       splat_variance_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uint>, ocl::Buffer<float>> decode_;
+  ocl::Buffer<cl_uint> zbuffer_;
 };
 
 }  // namespace egosgm

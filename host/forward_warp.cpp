@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/forward_warp.h"
+
+namespace egosgm {
+namespace {
+
+const cl::Program& build(ocl::Context& context) {
+  context.enter("ForwardWarp");
+  return context.program("forward_warp.cl", {});
+}
+
+// Gamma of eq. 1: (x - cx, y - cy, d + doffs, 1) ~ Gamma (X, Y, Z, 1).
+Eigen::Matrix4d disparity_from_space(const Calibration& calibration) {
+  Eigen::Matrix4d gamma = Eigen::Matrix4d::Zero();
+  gamma(0, 0) = calibration.fx;
+  gamma(1, 1) = calibration.fy;
+  gamma(2, 3) = calibration.fx * calibration.baseline_m;
+  gamma(3, 2) = 1;
+  return gamma;
+}
+
+// The motion as the view's own camera sees it: B^-1 T B for the right one.
+Eigen::Isometry3d motion_of_view(const Calibration& calibration, const Eigen::Isometry3d& current_from_previous,
+                                 int view) {
+  if (view == EGOSGM_LEFT) return current_from_previous;
+  const Eigen::Translation3d left_from_right(calibration.baseline_m, 0, 0);
+  return left_from_right.inverse() * current_from_previous * left_from_right;
+}
+
+void set_row(shared::f32 (&row)[4], const Eigen::Matrix4d& h, int index) {
+  for (int column = 0; column < 4; ++column) row[column] = static_cast<float>(h(index, column));
+}
+
+// A left perturbation moves the depth by dZ' = dt_z + w_x Y' - w_y X'. X' is the left camera's; the right one's is
+// smaller by b.
+void set_noise(shared::DisparityMotion& motion, const Eigen::Matrix<double, 6, 6>& covariance, double shift_m) {
+  constexpr int kTz = 2, kWx = 3, kWy = 4;
+  const double one = covariance(kTz, kTz), x = -2 * covariance(kTz, kWy), y = 2 * covariance(kTz, kWx);
+  const double xx = covariance(kWy, kWy), xy = -2 * covariance(kWx, kWy), yy = covariance(kWx, kWx);
+  motion.noise_1 = static_cast<float>(one + x * shift_m + xx * shift_m * shift_m);
+  motion.noise_x = static_cast<float>(x + 2 * xx * shift_m);
+  motion.noise_y = static_cast<float>(y + xy * shift_m);
+  motion.noise_xx = static_cast<float>(xx);
+  motion.noise_xy = static_cast<float>(xy);
+  motion.noise_yy = static_cast<float>(yy);
+}
+
+}  // namespace
+
+shared::DisparityMotion disparity_motion(const Calibration& calibration, const Motion& current_from_previous,
+                                         int view) {
+  const Eigen::Matrix4d gamma = disparity_from_space(calibration);
+  const Eigen::Isometry3d motion = motion_of_view(calibration, current_from_previous.current_from_previous, view);
+  const Eigen::Matrix4d h = gamma * motion.matrix() * gamma.inverse();
+  const bool is_right = view == EGOSGM_RIGHT;
+
+  shared::DisparityMotion result{};
+  set_row(result.x, h, 0);
+  set_row(result.y, h, 1);
+  set_row(result.w, h, 3);
+  result.cx = static_cast<float>(calibration.cx + (is_right ? calibration.doffs_px : 0));
+  result.cy = static_cast<float>(calibration.cy);
+  result.doffs = static_cast<float>(calibration.doffs_px);
+  result.fx = static_cast<float>(calibration.fx);
+  result.fy = static_cast<float>(calibration.fy);
+  result.fx_baseline = static_cast<float>(calibration.fx * calibration.baseline_m);
+  set_noise(result, current_from_previous.covariance, is_right ? calibration.baseline_m : 0);
+  return result;
+}
+
+ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
+                         const ForwardWarpOptions& options, shared::DisparityRange range)
+    : context_(context),
+      size_(size),
+      calibration_(calibration),
+      process_noise_px2_(options.process_noise_px2),
+      range_(range),
+      splat_disparity_(build(context), "splat_disparity"),
+      splat_variance_(build(context), "splat_variance"),
+      decode_(build(context), "decode"),
+      zbuffer_(context, 2 * pixel_count(size)) {}
+
+void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted) {
+  context_.enter("ForwardWarp");
+  const shared::DisparityMotion left = disparity_motion(calibration_, current_from_previous, EGOSGM_LEFT);
+  const shared::DisparityMotion right = disparity_motion(calibration_, current_from_previous, EGOSGM_RIGHT);
+  const ocl::Range pixels = ocl::every_pixel(context_, size_);
+  zbuffer_.fill(context_, 0);
+  predicted.variance.fill(context_, 0.0f);
+  splat_disparity_(context_, pixels, size_, range_, left, right, belief.disparity, zbuffer_);
+  splat_variance_(context_, pixels, size_, range_, left, right, process_noise_px2_, belief.disparity, belief.variance,
+                  zbuffer_, predicted.variance);
+  decode_(context_, pixels, size_, zbuffer_, predicted.disparity);
+}
+
+}  // namespace egosgm

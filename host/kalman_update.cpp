@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/kalman_update.h"
+
+#include <limits>
+
+namespace egosgm {
+namespace {
+
+const cl::Program& build(ocl::Context& context) {
+  context.enter("KalmanUpdate");
+  return context.program("kalman_update.cl", {});
+}
+
+}  // namespace
+
+KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options)
+    : context_(context),
+      size_(size),
+      gate_px_(options.gate_px > 0 ? options.gate_px : std::numeric_limits<float>::max()),
+      keep_predicted_(options.keep_predicted),
+      min_variance_px2_(options.min_variance_px2),
+      update_(build(context), "update") {}
+
+void KalmanUpdate::operator()(const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated) {
+  context_.enter("KalmanUpdate");
+  update_(context_, ocl::every_pixel(context_, size_), size_, gate_px_, keep_predicted_, min_variance_px2_,
+          predicted.disparity, predicted.variance, measured.disparity, measured.variance, updated.disparity,
+          updated.variance);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "kernels/shared.h"
+#include "tests/support/random_maps.h"
+
+namespace egosgm::reference {
+
+/// max_jump_px 0 keeps all.
+testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in);
+
+}  // namespace egosgm::reference

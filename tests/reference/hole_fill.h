@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "kernels/shared.h"
+#include "tests/support/random_maps.h"
+
+namespace egosgm::reference {
+
+testing::HostMaps hole_fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in);
+
+}  // namespace egosgm::reference
