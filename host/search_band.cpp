@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/search_band.h"
+
+#include <algorithm>
+
+namespace egosgm {
+namespace {
+
+shared::ImageSize blocks_of(shared::ImageSize size) {
+  return {(size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK, (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK};
+}
+
+shared::Band whole(shared::DisparityRange range) {
+  return {static_cast<cl_short>(range.min), static_cast<cl_ushort>(SearchBand::max_chunks(range)),
+          static_cast<cl_short>(range.min), static_cast<cl_short>(range.min + range.count - 1)};
+}
+
+const cl::Program& build(ocl::Context& context, int row_group) {
+  context.enter("SearchBand");
+  return context.program("search_band.cl", ocl::Defines().set("ROW_GROUP", row_group));
+}
+
+}  // namespace
+
+SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                       const SearchBandOptions& options, int row_group)
+    : context_((context.enter("SearchBand"), context)),
+      size_(size),
+      blocks_(blocks_of(size)),
+      range_(range),
+      options_(options),
+      row_group_(row_group > 0 ? row_group : ocl::row_group(context)),
+      block_ranges_(context, 2 * pixel_count(blocks_)),
+      block_bands_(context, 2 * pixel_count(blocks_)),
+      bands_(context, 2 * pixel_count(size)),
+      cell_offsets_(context, 2 * pixel_count(size)),
+      row_sums_(context, 2 * static_cast<std::size_t>(size.height)),
+      gather_blocks_(build(context, row_group_), "gather_blocks"),
+      bands_of_blocks_(build(context, row_group_), "bands_of_blocks"),
+      bands_of_pixels_(build(context, row_group_), "bands_of_pixels"),
+      sum_rows_(build(context, row_group_), "sum_rows"),
+      full_range_(build(context, row_group_), "full_range") {
+  if (!options.from_neighbours) block_bands_.write(context, std::vector(block_bands_.size(), whole(range)));
+}
+
+void SearchBand::operator()(const StereoMaps& predicted) {
+  context_.enter("SearchBand");
+  if (options_.from_neighbours) {
+    const ocl::Range blocks = ocl::every_pixel(context_, blocks_);
+    gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
+    bands_of_blocks_(context_, blocks, size_, range_, options_.neighbour_margin_px, options_.neighbour_min_count,
+                     block_ranges_, block_bands_);
+  }
+  bands_of_pixels_(context_, ocl::every_pixel(context_, size_), size_, range_, options_.sigmas,
+                   options_.min_half_width_px, predicted.disparity, predicted.variance, block_bands_, bands_);
+  sum_rows_(context_, ocl::group_a_row(size_, row_group_), size_, predicted.disparity, bands_, cell_offsets_,
+            row_sums_);
+}
+
+void SearchBand::full_range() {
+  context_.enter("SearchBand");
+  full_range_(context_, ocl::every_pixel(context_, size_), size_, range_, bands_, cell_offsets_, row_sums_);
+}
+
+}  // namespace egosgm

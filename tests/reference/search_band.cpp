@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/reference/search_band.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace egosgm::reference {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// By trial: the fewest chunks that an allowed origin exists for, and of those origins the nearest to the centred one.
+shared::Band band_of(shared::DisparityRange range, float from, float to) {
+  const float lowest = static_cast<float>(range.min), highest = static_cast<float>(range.min + range.count - 1);
+  const int first = static_cast<int>(std::floor(std::clamp(from, lowest, highest)));
+  const int last = static_cast<int>(std::ceil(std::clamp(to, lowest, highest)));
+  for (int chunks = 1;; ++chunks) {
+    const int lanes = chunks * EGOSGM_LANES;
+    const int slack = lanes - (last - first + 1);
+    if (slack < 0) continue;
+    int best = -1;
+    for (int origin = 0; range.min + origin <= first; origin += EGOSGM_BAND_STEP) {
+      if (range.min + origin + lanes <= last) continue;
+      if (origin > 0 && origin + lanes >= range.count + EGOSGM_BAND_STEP) continue;
+      if (best < 0 || range.min + origin <= first - slack / 2) best = origin;
+    }
+    if (best < 0) continue;
+    return {static_cast<cl_short>(range.min + best), static_cast<cl_ushort>(chunks), static_cast<cl_short>(first),
+            static_cast<cl_short>(last)};
+  }
+}
+
+bool is_valid(float disparity) { return disparity > EGOSGM_INVALID_DISPARITY; }
+
+shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
+                             const testing::HostMaps& predicted, int view, int block_x, int block_y) {
+  float least = kInfinity, most = -kInfinity;
+  int count = 0;
+  for (int y = std::max(0, (block_y - 1) * EGOSGM_BLOCK); y < std::min(size.height, (block_y + 2) * EGOSGM_BLOCK);
+       ++y) {
+    for (int x = std::max(0, (block_x - 1) * EGOSGM_BLOCK); x < std::min(size.width, (block_x + 2) * EGOSGM_BLOCK);
+         ++x) {
+      const float d = predicted.disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
+      if (!is_valid(d)) continue;
+      least = std::min(least, d), most = std::max(most, d), ++count;
+    }
+  }
+  if (count == 0 || count < options.neighbour_min_count) return band_of(range, -kInfinity, kInfinity);
+  return band_of(range, least - options.neighbour_margin_px, most + options.neighbour_margin_px);
+}
+
+shared::Band of_prediction(shared::DisparityRange range, const SearchBandOptions& options, float d, float p) {
+  float half_width = options.sigmas * std::sqrt(p);
+  if (half_width <= options.min_half_width_px) half_width = options.min_half_width_px;
+  if (!(half_width <= static_cast<float>(range.count))) half_width = static_cast<float>(range.count);
+  return band_of(range, d - half_width, d + half_width);
+}
+
+void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, SearchBands& result) {
+  result.cell_offsets.resize(result.bands.size());
+  for (std::size_t row = 0; row < 2 * static_cast<std::size_t>(size.height); ++row) {
+    shared::RowSum sum{};
+    cl_uint chunks = 0;
+    for (std::size_t i = row * size.width; i < (row + 1) * size.width; ++i) {
+      const shared::Band& band = result.bands[i];
+      result.cell_offsets[i] = chunks;
+      chunks += band.chunks;
+      sum.searched += static_cast<cl_uint>(band.last - band.first + 1);
+      sum.computed += static_cast<cl_uint>(band.chunks) * EGOSGM_LANES;
+      sum.predicted += is_valid(disparity[i]);
+    }
+    result.row_sums.push_back(sum);
+  }
+}
+
+}  // namespace
+
+SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
+                        const testing::HostMaps& predicted) {
+  const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  std::vector<shared::Band> of_blocks;
+  for (int view = 0; view < 2; ++view) {
+    for (int y = 0; y < blocks_y; ++y) {
+      for (int x = 0; x < blocks_x; ++x) {
+        of_blocks.push_back(options.from_neighbours ? from_neighbours(size, range, options, predicted, view, x, y)
+                                                    : band_of(range, -kInfinity, kInfinity));
+      }
+    }
+  }
+  SearchBands result;
+  for (int view = 0; view < 2; ++view) {
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const std::size_t i = (static_cast<std::size_t>(view) * size.height + y) * size.width + x;
+        const float d = predicted.disparity[i];
+        result.bands.push_back(
+            is_valid(d) ? of_prediction(range, options, d, predicted.variance[i])
+                        : of_blocks[(static_cast<std::size_t>(view) * blocks_y + y / EGOSGM_BLOCK) * blocks_x +
+                                    x / EGOSGM_BLOCK]);
+      }
+    }
+  }
+  sum_rows(size, predicted.disparity, result);
+  return result;
+}
+
+SearchBands full_range(shared::ImageSize size, shared::DisparityRange range) {
+  const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
+  SearchBands result{std::vector(pixels, band_of(range, -kInfinity, kInfinity)), {}, {}};
+  sum_rows(size, std::vector<float>(pixels, EGOSGM_INVALID_DISPARITY), result);
+  return result;
+}
+
+}  // namespace egosgm::reference

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "egosgm/options.h"
+#include "kernels/shared.h"
+#include "tests/support/random_maps.h"
+
+namespace egosgm::reference {
+
+struct SearchBands {
+  std::vector<shared::Band> bands;
+  std::vector<cl_uint> cell_offsets;
+  std::vector<shared::RowSum> row_sums;
+};
+
+SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
+                        const testing::HostMaps& predicted);
+SearchBands full_range(shared::ImageSize size, shared::DisparityRange range);
+
+}  // namespace egosgm::reference

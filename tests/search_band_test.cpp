@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/search_band.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/reference/search_band.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/random_maps.h"
+
+namespace egosgm {
+namespace {
+
+using testing::HostMaps;
+using testing::same_bits;
+
+constexpr shared::DisparityRange kRanges[] = {{0, 1}, {0, 16}, {-20, 37}, {0, 128}, {3, 1027}};
+
+reference::SearchBands read(ocl::Context& context, const SearchBand& stage) {
+  return {stage.bands().read(context), stage.cell_offsets().read(context), stage.row_sums().read(context)};
+}
+
+reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
+                           const HostMaps& maps, int row_group = 0) {
+  ocl::Context context(testing::any_device());
+  SearchBand stage(context, size, range, options, row_group);
+  StereoMaps predicted(context, size);
+  predicted.disparity.write(context, maps.disparity);
+  predicted.variance.write(context, maps.variance);
+  stage(predicted);
+  return read(context, stage);
+}
+
+void expect_same(const reference::SearchBands& actual, const reference::SearchBands& expected, shared::ImageSize size) {
+  EXPECT_TRUE(same_bits(actual.bands, expected.bands, size));
+  EXPECT_TRUE(same_bits(actual.cell_offsets, expected.cell_offsets, size));
+  EXPECT_TRUE(same_bits(actual.row_sums, expected.row_sums, {1, size.height}));
+}
+
+class SearchBandTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(SearchBandTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const shared::DisparityRange range : kRanges) {
+    SCOPED_TRACE("min " + std::to_string(range.min) + ", count " + std::to_string(range.count));
+    // Some predictions lie outside of the range, as a warp can leave them.
+    const auto maps = testing::random_maps(size, static_cast<float>(range.min - 3),
+                                           static_cast<float>(range.min + range.count + 3), 0.6, 31);
+    expect_same(run(size, range, {}, maps), reference::search_band(size, range, {}, maps), size);
+  }
+}
+
+TEST_P(SearchBandTest, EqualsReferenceWithoutNeighbours) {
+  const shared::ImageSize size = GetParam();
+  const SearchBandOptions options{.sigmas = 1.5f, .min_half_width_px = 0.0f, .from_neighbours = false};
+  const auto maps = testing::random_maps(size, 0, 127, 0.4, 32);
+  expect_same(run(size, {0, 128}, options, maps), reference::search_band(size, {0, 128}, options, maps), size);
+}
+
+TEST_P(SearchBandTest, RowsAreSummedAlikeByAnyGroup) {
+  const shared::ImageSize size = GetParam();
+  const auto maps = testing::random_maps(size, 0, 127, 0.6, 33);
+  const auto expected = reference::search_band(size, {0, 128}, {}, maps);
+  for (const int row_group : {1, 7, 64}) expect_same(run(size, {0, 128}, {}, maps, row_group), expected, size);
+}
+
+TEST_P(SearchBandTest, FullRangeEqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const shared::DisparityRange range : kRanges) {
+    ocl::Context context(testing::any_device());
+    SearchBand stage(context, size, range, {});
+    stage.full_range();
+    expect_same(read(context, stage), reference::full_range(size, range), size);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, SearchBandTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+/// Two views of `size` without a prediction.
+HostMaps nothing(shared::ImageSize size) {
+  const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
+  return {std::vector(pixels, EGOSGM_INVALID_DISPARITY), std::vector(pixels, 0.0f)};
+}
+
+TEST(SearchBand, CoversWhatItSearchesWithTheFewestChunks) {
+  std::mt19937 random(34);
+  for (const shared::DisparityRange range : kRanges) {
+    const shared::ImageSize size{200, 1};
+    auto maps = nothing(size);
+    for (std::size_t i = 0; i < maps.disparity.size(); ++i) {
+      maps.disparity[i] = std::uniform_real_distribution<float>(range.min, range.min + range.count - 1)(random);
+      maps.variance[i] = std::pow(std::uniform_real_distribution<float>(0, std::sqrt(range.count) / 3)(random), 4.0f);
+    }
+    for (const shared::Band& band : run(size, range, {}, maps).bands) {
+      const int end = band.origin + EGOSGM_LANES * band.chunks;
+      ASSERT_GE(band.first, range.min);
+      ASSERT_LE(band.first, band.last);
+      ASSERT_LT(band.last, range.min + range.count);
+      ASSERT_GE(band.origin, range.min);
+      ASSERT_EQ((band.origin - range.min) % EGOSGM_BAND_STEP, 0);
+      ASSERT_LE(band.origin, band.first);
+      ASSERT_GT(end, band.last);
+      ASSERT_LE(band.chunks, SearchBand::max_chunks(range));
+      ASSERT_LE(band.chunks, (band.last - band.first + EGOSGM_LANES) / EGOSGM_LANES + 1);
+      ASSERT_TRUE(band.origin == range.min || end < range.min + range.count + EGOSGM_BAND_STEP);
+    }
+  }
+}
+
+TEST(SearchBand, PredictedPixelSearchesItsDeviations) {
+  const shared::ImageSize size{2, 1};
+  auto maps = nothing(size);
+  maps.disparity[0] = 40.25f, maps.variance[0] = 4.0f;  // +- 3 * 2
+  maps.disparity[1] = 60.5f, maps.variance[1] = 0.01f;  // +- the minimum
+  const auto bands = run(size, {0, 128}, {.sigmas = 3, .min_half_width_px = 2}, maps).bands;
+  EXPECT_EQ(bands[0].first, 34);  // 34.25
+  EXPECT_EQ(bands[0].last, 47);   // 46.25
+  EXPECT_EQ(bands[1].first, 58);  // 58.5
+  EXPECT_EQ(bands[1].last, 63);   // 62.5
+  EXPECT_EQ(bands[1].chunks, 1);
+  EXPECT_EQ(bands[1].origin, 52);  // five of ten spare lanes below, down to the next step
+}
+
+TEST(SearchBand, AbsurdVarianceSearchesEverything) {
+  const shared::ImageSize size{4, 1};
+  auto maps = nothing(size);
+  for (int x = 0; x < 3; ++x) maps.disparity[x] = 10;
+  maps.variance = {1e30f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN(), 0, 0, 0, 0,
+                   0};
+  const auto bands = run(size, {-8, 100}, {}, maps).bands;
+  for (int x = 0; x < 3; ++x) {
+    EXPECT_EQ(bands[x].first, -8) << x;
+    EXPECT_EQ(bands[x].last, 91) << x;
+  }
+}
+
+TEST(SearchBand, UnpredictedPixelSearchesWhatItsNeighboursSpan) {
+  const shared::ImageSize size{64, 64};
+  auto maps = nothing(size);
+  for (int x = 16; x < 32; ++x) maps.disparity[20 * 64 + x] = x == 20 ? 50.5f : 40.25f;
+  const SearchBandOptions options{.neighbour_min_count = 8, .neighbour_margin_px = 4};
+  const auto bands = run(size, {0, 128}, options, maps).bands;
+  EXPECT_EQ(bands[25 * 64 + 24].first, 36);
+  EXPECT_EQ(bands[25 * 64 + 24].last, 55);
+  EXPECT_EQ(bands[25 * 64 + 24].chunks, 2);
+  EXPECT_EQ(bands[40 * 64 + 24].last - bands[40 * 64 + 24].first, 127) << "two blocks below: none near";
+  EXPECT_EQ(bands[25 * 64 + 32].first, 36) << "beside the block of x 24..31";
+  EXPECT_EQ(bands[25 * 64 + 32].last, 45);
+  EXPECT_EQ(bands[4096 + 25 * 64 + 24].last, 127) << "the right view has no predictions";
+
+  maps.disparity[20 * 64 + 31] = EGOSGM_INVALID_DISPARITY;  // seven left around (32, 25)
+  EXPECT_EQ(run(size, {0, 128}, options, maps).bands[25 * 64 + 32].last, 127);
+}
+
+TEST(SearchBand, CountsCellsAndLanesOfARow) {
+  const shared::ImageSize size{3, 2};
+  auto maps = nothing(size);
+  maps.disparity[0] = 50, maps.disparity[2] = 60;
+  const auto result = run(size, {0, 100}, {.sigmas = 0, .min_half_width_px = 2, .from_neighbours = false}, maps);
+  EXPECT_EQ(result.row_sums[0].searched, 5u + 100 + 5);
+  EXPECT_EQ(result.row_sums[0].computed, 16u + 112 + 16);
+  EXPECT_EQ(result.row_sums[0].predicted, 2u);
+  EXPECT_EQ(result.row_sums[1].predicted, 0u);
+  EXPECT_EQ(result.cell_offsets, (std::vector<cl_uint>{0, 1, 8, 0, 7, 14, 0, 7, 14, 0, 7, 14}));
+}
+
+}  // namespace
+}  // namespace egosgm
