@@ -59,14 +59,15 @@ inline ushort minimum_of_16(const ushort16 v) {
   return min(c.x, c.y);
 }
 
-// Matching cost of 16 disparities. `own` and `other` point at the pixel's code and at the first disparity's in their padded rows.
+// Matching cost of 16 disparities. `own` and `other` point at the pixel's code and at the first disparity's in their padded rows, which run in
+// opposite directions.
 inline uchar16 matching_cost(global const ulong* own, global const ulong* other, const long above, const long below) {
 #if COST_SAD
   ushort16 sum = 0;
   for (int dy = -1; dy <= 1; ++dy) {
     const long row = dy < 0 ? above : dy > 0 ? below : 0;
     for (int dx = -1; dx <= 1; ++dx) {
-      sum += convert_ushort16(abs_diff((ulong16)(own[row + dx]), vload16(0, other + row + dx)));
+      sum += convert_ushort16(abs_diff((ulong16)(own[row + dx]), vload16(0, other + row - dx)));
     }
   }
   return convert_uchar16(min(sum / (ushort)9, (ushort16)(MAX_COST)));
@@ -85,8 +86,8 @@ inline uchar16 path_cost(const uchar16 cost, global const uchar* from, const uch
 // Steps from the winner in one direction until the sums above the minimum add up to `limit`; `sums` are those of the steps.
 inline int count_steps(const ushort8 sums, const ushort winner, const ushort limit) {
   ushort8 total = sub_sat(sums, (ushort8)(winner));
-  total = add_sat(total, (ushort8)(0, total.s0123456));
-  total = add_sat(total, (ushort8)((ushort2)(0), total.s012345));
+  total = add_sat(total, total.s00123456 & (ushort8)(0, -1, -1, -1, -1, -1, -1, -1));
+  total = add_sat(total, total.s00012345 & (ushort8)(0, 0, -1, -1, -1, -1, -1, -1));
   total = add_sat(total, (ushort8)((ushort4)(0), total.s0123));
   const short8 counted = total < (ushort8)(limit);
   const short4 a = counted.lo + counted.hi;

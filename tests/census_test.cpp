@@ -12,7 +12,15 @@
 namespace egosgm {
 namespace {
 
-class CensusTest : public ::testing::TestWithParam<std::tuple<shared::ImageSize, PixelType, MatchingCost>> {};
+using Case = std::tuple<shared::ImageSize, PixelType, MatchingCost>;
+
+std::string name(const ::testing::TestParamInfo<Case>& info) {
+  const auto [size, type, window] = info.param;
+  return std::to_string(size.width) + "x" + std::to_string(size.height) + (type == PixelType::kU8 ? "_8bit" : "_16bit") +
+         (window == MatchingCost::kCensus9x7 ? "_9x7" : "_5x5");
+}
+
+class CensusTest : public ::testing::TestWithParam<Case> {};
 
 TEST_P(CensusTest, EqualsReference) {
   const auto [size, type, window] = GetParam();
@@ -46,12 +54,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
                          ::testing::Combine(::testing::ValuesIn(testing::kSizes),
                                             ::testing::Values(PixelType::kU8, PixelType::kU16),
                                             ::testing::Values(MatchingCost::kCensus9x7, MatchingCost::kCensus5x5)),
-                         [](const auto& info) {
-                           const auto [size, type, window] = info.param;
-                           return std::to_string(size.width) + "x" + std::to_string(size.height) +
-                                  (type == PixelType::kU8 ? "_8bit" : "_16bit") +
-                                  (window == MatchingCost::kCensus9x7 ? "_9x7" : "_5x5");
-                         });
+                         name);
 
 }  // namespace
 }  // namespace egosgm
