@@ -51,7 +51,7 @@ void SearchBand::operator()(const StereoMaps& predicted) {
     bands_of_blocks_(context_, blocks, size_, range_, options_.neighbour_margin_px, options_.neighbour_min_count,
                      block_ranges_, block_bands_);
   }
-  bands_of_pixels_(context_, ocl::every_pixel(context_, size_), size_, range_, options_.sigmas,
+  bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}), size_, range_, options_.sigmas,
                    options_.min_half_width_px, predicted.disparity, predicted.variance, block_bands_, bands_);
   sum_rows_(context_, ocl::group_a_row(size_, row_group_), size_, predicted.disparity, bands_, cell_offsets_,
             row_sums_);

@@ -6,36 +6,61 @@
 #error "ROW_GROUP: work-items that share a row"
 #endif
 
-int floor_to_step(int lane) { return lane & ~(EGOSGM_BAND_STEP - 1); }
-int ceil_to_step(int lane) { return (lane + EGOSGM_BAND_STEP - 1) & ~(EGOSGM_BAND_STEP - 1); }
+#ifndef __ENDIAN_LITTLE__
+#error "bands are written as words: a little-endian device"
+#endif
 
-// The band that searches [from, to], cut to the range. It has as few chunks as cover that: with begin and end counted
-// from range.min, its origin is a multiple of the step in [end - lanes, begin], and not above ceil_to_step(count) -
-// lanes, so that hardly a lane lies beyond the range. If there is none, one chunk more has one. Slack is shared out to
-// both sides, as far as this allows. Chunks never exceed ceil(count / EGOSGM_LANES), because from the origin range.min
-// that many cover everything.
-Band band_of(const DisparityRange range, float from, float to) {
-  const float lowest = range.min;
-  const float highest = range.min + range.count - 1;
+// Eight bands at a time: PoCL's compiler does not vectorise this over work-items by itself.
+typedef struct {
+  int8 origin, chunks, first, last;
+} Bands;
+
+int8 floor_to_step(int8 lane) { return lane & ~(EGOSGM_BAND_STEP - 1); }
+int8 ceil_to_step(int8 lane) { return floor_to_step(lane + (EGOSGM_BAND_STEP - 1)); }
+
+// convert_int8_rtn for what fits, in instructions that every device has.
+int8 floor_int(float8 value) {
+  const int8 towards_zero = convert_int8(value);
+  return towards_zero + (value < convert_float8(towards_zero));
+}
+
+// The bands that search [from, to], cut to the range. A band has as few chunks as cover that: with begin and end
+// counted from range.min, its origin is a multiple of the step in [end - lanes, begin], and not above
+// ceil_to_step(count) - lanes, so that hardly a lane lies beyond the range. If there is none, one chunk more has one.
+// Slack is shared out to both sides, as far as this allows. Chunks never exceed ceil(count / EGOSGM_LANES), because
+// from the origin range.min that many cover everything.
+Bands bands_of(const DisparityRange range, float8 from, float8 to) {
+  const float8 lowest = range.min;
+  const float8 highest = range.min + range.count - 1;
   from = from < lowest ? lowest : from > highest ? highest : from;
   to = to < lowest ? lowest : to > highest ? highest : to;
 
-  const int begin = convert_int_rtn(from) - range.min;
-  const int end = convert_int_rtp(to) - range.min + 1;
-  int lanes = (end - begin + EGOSGM_LANES - 1) / EGOSGM_LANES * EGOSGM_LANES;
-  const int last_origin = floor_to_step(begin);
-  lanes += ceil_to_step(end - lanes) > last_origin ? EGOSGM_LANES : 0;
+  const int8 begin = floor_int(from) - range.min;
+  const int8 end = 1 - floor_int(-to) - range.min;
+  const int8 last_origin = floor_to_step(begin);
+  int8 chunks = (end - begin + (EGOSGM_LANES - 1)) / EGOSGM_LANES;
+  chunks -= ceil_to_step(end - chunks * EGOSGM_LANES) > last_origin;
 
-  const int centred = floor_to_step(begin - (lanes - (end - begin)) / 2);
-  const int first_origin = max(ceil_to_step(end - lanes), 0);
-  const int limit = max(ceil_to_step(range.count) - lanes, 0);
-  const int origin = max(min(centred, min(last_origin, limit)), first_origin);
+  const int8 lanes = chunks * EGOSGM_LANES;
+  const int8 centred = floor_to_step(begin - (lanes - (end - begin)) / 2);
+  const int8 first_origin = max(ceil_to_step(end - lanes), 0);
+  const int8 limit = max(ceil_to_step(range.count) - lanes, 0);
+  const int8 origin = max(min(centred, min(last_origin, limit)), first_origin);
 
+  Bands bands;
+  bands.origin = range.min + origin;
+  bands.chunks = chunks;
+  bands.first = range.min + begin;
+  bands.last = range.min + end - 1;
+  return bands;
+}
+
+Band first_of(const Bands bands) {
   Band band;
-  band.origin = range.min + origin;
-  band.chunks = lanes / EGOSGM_LANES;
-  band.first = range.min + begin;
-  band.last = range.min + end - 1;
+  band.origin = bands.origin.s0;
+  band.chunks = bands.chunks.s0;
+  band.first = bands.first.s0;
+  band.last = bands.last.s0;
   return band;
 }
 
@@ -45,6 +70,18 @@ float8 eight(global const float* row, int x, int width) {
   float values[EGOSGM_BLOCK];
   for (int i = 0; i < EGOSGM_BLOCK; ++i) values[i] = x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
   return vload8(0, values);
+}
+
+// Writes eight bands of two words each, as far as the row goes.
+void store_eight(global Band* row, int x, int width, uint16 words) {
+  global uint* to = (global uint*)(row + x);
+  if (x + EGOSGM_BLOCK <= width) {
+    vstore16(words, 0, to);
+    return;
+  }
+  uint values[2 * EGOSGM_BLOCK];
+  vstore16(words, 0, values);
+  for (int i = 0; i < 2 * (width - x); ++i) to[i] = values[i];
 }
 
 // A work-item a block and view.
@@ -100,32 +137,41 @@ kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, co
   }
   const bool enough = count > 0 && count >= (uint)max(min_count, 0);
   bands[((size_t)view * blocks_y + y) * blocks_x + x] =
-      band_of(range, enough ? least - margin : -INFINITY, enough ? most + margin : INFINITY);
+      first_of(bands_of(range, enough ? least - margin : -INFINITY, enough ? most + margin : INFINITY));
 }
 
+// A work-item a block's row of pixels and view.
 kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
                             global const Band* block_bands, global Band* bands) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
-  const int x = get_global_id(0);
+  const int block = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= size.width) return;
+  if (block >= blocks_x) return;
 
-  const size_t pixel = ((size_t)view * size.height + y) * size.width + x;
-  const float d = disparity[pixel];
-  const float deviation = sigmas * sqrt(variance[pixel]);
+  const int x = block * EGOSGM_BLOCK;
+  const size_t row = ((size_t)view * size.height + y) * size.width;
+  const float8 d = eight(disparity + row, x, size.width);
+  const float8 deviation = sigmas * sqrt(eight(variance + row, x, size.width));
+  const int8 predicted = d > EGOSGM_INVALID_DISPARITY;
   // A variance that is not a number searches everything.
-  const float half_width = deviation <= min_half_width ? min_half_width : deviation;
-  const float reach = half_width <= range.count ? half_width : range.count;
-  const bool predicted = d > EGOSGM_INVALID_DISPARITY;
-  const Band own = band_of(range, predicted ? d - reach : 0.0f, predicted ? d + reach : 0.0f);
-  const Band around = block_bands[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + x / EGOSGM_BLOCK];
-  bands[pixel].origin = predicted ? own.origin : around.origin;
-  bands[pixel].chunks = predicted ? own.chunks : around.chunks;
-  bands[pixel].first = predicted ? own.first : around.first;
-  bands[pixel].last = predicted ? own.last : around.last;
+  const float8 half_width = deviation <= min_half_width ? (float8)min_half_width : deviation;
+  const float8 reach = half_width <= (float)range.count ? half_width : (float8)range.count;
+  const Bands own = bands_of(range, predicted ? d - reach : 0.0f, predicted ? d + reach : 0.0f);
+  const Band around = block_bands[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + block];
+
+  const uint8 origin = as_uint8(predicted ? own.origin : around.origin) & 0xffff;
+  const uint8 chunks = as_uint8(predicted ? own.chunks : around.chunks);
+  const uint8 first = as_uint8(predicted ? own.first : around.first) & 0xffff;
+  const uint8 last = as_uint8(predicted ? own.last : around.last);
+  const uint8 low = origin | chunks << 16;
+  const uint8 high = first | last << 16;
+  uint16 words;
+  words.even = low;
+  words.odd = high;
+  store_eight(bands + row, x, size.width, words);
 }
 
 // Sums up each row: a work-group of ROW_GROUP a row and view goes over it in tiles, with an inclusive scan of a tile at
@@ -196,7 +242,7 @@ kernel void full_range(const ImageSize size, const DisparityRange range, global 
   const int view = get_global_id(2);
   if (x >= size.width) return;
 
-  const Band band = band_of(range, -INFINITY, INFINITY);
+  const Band band = first_of(bands_of(range, -INFINITY, INFINITY));
   const size_t row = (size_t)view * size.height + y;
   bands[row * size.width + x] = band;
   cell_offsets[row * size.width + x] = (uint)x * band.chunks;
