@@ -3,8 +3,8 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
-#include <limits>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,10 +29,9 @@ struct StereoSequence {
   std::filesystem::path poses_file;  // the true poses, empty where there are none
 };
 
-/// Frame numbers first..last, both included. Open ends take what there is.
+/// Frame numbers first..last, both included. An open end takes what there is.
 struct FrameRange {
-  int first = 0;
-  int last = std::numeric_limits<int>::max();
+  std::optional<int> first, last;
 };
 
 /// "7:10", "7:", ":10" or "7". Throws InvalidArgument.
@@ -62,6 +61,7 @@ StereoSequence open_middlebury(const std::filesystem::path& folder);
 /// Any pair of PNG files or patterns. A pattern's file name holds one `%d`, `%06d`, ... (the frame's number) or one `*`
 /// (left and right files with equal text there belong together; the text is the frame's number if all of them are
 /// numbers, else frames are counted from 0 in the order of names). Without either it names one pair, number 0.
+/// A left folder called image_2 or image_02 takes the colour cameras of KITTI's calibration, any other the grey ones.
 StereoSequence open_patterns(const std::string& left, const std::string& right,
                              const std::filesystem::path& calibration_file, FrameRange range = {});
 

@@ -14,8 +14,8 @@ inline constexpr int kMaxImageSide = 16384;
 inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 28;
 
 /// Reads a PNG of any colour type as grey: CV_8UC1, or CV_16UC1 where the file has 16 bits a channel. Colour is
-/// weighted as cv::COLOR_RGB2GRAY does; alpha and gamma are ignored. The memory it takes is bounded by kMaxImagePixels
-/// and by about 1,100 times the file's size. Nothing is printed. Throws InvalidArgument, naming the file, where it is
+/// weighted as cv::COLOR_RGB2GRAY does; alpha and gamma are ignored. A file too short for the size in its header is
+/// refused before its pixels are allocated. Nothing is printed. Throws InvalidArgument, naming the file, where it is
 /// missing, too large, truncated, damaged or no PNG. Thread-safe.
 cv::Mat read_grey_png(const std::filesystem::path& file);
 

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/calibration_io.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+#include "host/vision/text_rows.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr std::size_t kMaxCalibrationBytes = std::size_t{1} << 20;
+constexpr double kMaxRelativeFocalDifference = 1e-3;
+constexpr std::array<std::string_view, 6> kOwnKeys = {"fx", "fy", "cx", "cy", "baseline_m", "doffs_px"};
+
+struct Entry {
+  int row = 0;
+  std::string_view key, value;
+};
+
+/// A calibration file as keys and values.
+class Entries {
+ public:
+  Entries(const std::filesystem::path& file, std::string_view text) : file_(file) {
+    for (const TextRow& row : split_rows(text)) add(row);
+  }
+
+  const std::filesystem::path& file() const { return file_; }
+  const std::vector<Entry>& all() const { return entries_; }
+  bool has(std::string_view key) const { return find(key) != nullptr; }
+
+  bool has_prefix(std::string_view prefix) const {
+    return std::any_of(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key.starts_with(prefix); });
+  }
+
+  const Entry& at(std::string_view key, const std::string& remedy) const {
+    if (const Entry* entry = find(key)) return *entry;
+    throw InvalidArgument(file_.string() + ": has no row " + std::string(key) + "; " + remedy);
+  }
+
+ private:
+  void add(const TextRow& row) {
+    const std::string_view text = trim(row.text.substr(0, row.text.find('#')));
+    if (text.empty() || text.starts_with('%') || text == "---") return;
+    const std::size_t separator = text.find_first_of(":=");
+    if (separator == std::string_view::npos) {
+      refuse_row(file_, row.number, quoted(text) + " is not `key: value` or `key = value`; give a calibration file");
+    }
+    const Entry entry{row.number, trim(text.substr(0, separator)), trim(text.substr(separator + 1))};
+    if (const Entry* first = find(entry.key)) {
+      refuse_row(
+          file_, row.number,
+          quoted(entry.key) + " was given in row " + std::to_string(first->row) + " already; remove one of them");
+    }
+    entries_.push_back(entry);
+  }
+
+  const Entry* find(std::string_view key) const {
+    const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key == key; });
+    return found == entries_.end() ? nullptr : &*found;
+  }
+
+  std::filesystem::path file_;
+  std::vector<Entry> entries_;
+};
+
+double parse_finite(const Entries& entries, const Entry& entry, std::string_view token) {
+  const std::optional<double> number = parse_number(token);
+  if (!number || !std::isfinite(*number)) {
+    refuse_row(entries.file(), entry.row,
+               std::string(entry.key) + ": " + quoted(token) + " is not a finite number; correct it");
+  }
+  return *number;
+}
+
+std::vector<double> parse_numbers(const Entries& entries, const Entry& entry, std::string_view text,
+                                  std::size_t count) {
+  const std::vector<std::string_view> tokens = split_tokens(text);
+  if (tokens.size() != count) {
+    refuse_row(entries.file(), entry.row,
+               std::string(entry.key) + " has " + std::to_string(tokens.size()) + " numbers instead of " +
+                   std::to_string(count) + "; is the row complete?");
+  }
+  std::vector<double> numbers;
+  for (std::string_view token : tokens) numbers.push_back(parse_finite(entries, entry, token));
+  return numbers;
+}
+
+void check_focal_length(const Entries& entries, const Entry& entry, double fx, double fy) {
+  if (fx > 0 && fy > 0) return;
+  refuse_row(entries.file(), entry.row,
+             std::string(entry.key) + ": the focal length is " + std::to_string(fx > 0 ? fy : fx) +
+                 " px; it must be positive");
+}
+
+void check_same_focal_length(const Entries& entries, const Entry& right, double left_f, double right_f) {
+  if (std::abs(left_f - right_f) <= kMaxRelativeFocalDifference * left_f) return;
+  refuse_row(entries.file(), right.row,
+             std::string(right.key) + ": the focal lengths of left and right, " + std::to_string(left_f) + " and " +
+                 std::to_string(right_f) + " px, differ; give the calibration of a rectified pair");
+}
+
+void check_baseline(const Entries& entries, const Entry& entry, double baseline_m) {
+  if (baseline_m > 0 && std::isfinite(baseline_m)) return;
+  refuse_row(entries.file(), entry.row,
+             std::string(entry.key) + ": the baseline is " + std::to_string(baseline_m) +
+                 " m; it must be positive (are left and right swapped?)");
+}
+
+Calibration from_projections(const Entries& entries, const std::string& left_key, const std::string& right_key) {
+  const std::string remedy = "give the calibration of cameras " + left_key + " and " + right_key;
+  const Entry& left = entries.at(left_key, remedy);
+  const Entry& right = entries.at(right_key, remedy);
+  const std::vector<double> p_left = parse_numbers(entries, left, left.value, 12);
+  const std::vector<double> p_right = parse_numbers(entries, right, right.value, 12);
+  check_focal_length(entries, left, p_left[0], p_left[5]);
+  check_focal_length(entries, right, p_right[0], p_right[5]);
+  check_same_focal_length(entries, right, p_left[0], p_right[0]);
+  const double baseline_m = (p_left[3] - p_right[3]) / p_left[0];
+  check_baseline(entries, right, baseline_m);
+  return {.fx = p_left[0],
+          .fy = p_left[5],
+          .cx = p_left[2],
+          .cy = p_left[6],
+          .baseline_m = baseline_m,
+          .doffs_px = p_right[2] - p_left[2]};
+}
+
+Calibration from_kitti(const Entries& entries, KittiCameras cameras, const std::string& prefix) {
+  const bool grey = cameras == KittiCameras::kGrey ||
+                    (cameras == KittiCameras::kAny && (entries.has(prefix + "0") || !entries.has(prefix + "2")));
+  return grey ? from_projections(entries, prefix + "0", prefix + "1")
+              : from_projections(entries, prefix + "2", prefix + "3");
+}
+
+std::vector<double> parse_middlebury_matrix(const Entries& entries, const Entry& entry) {
+  std::string text(entry.value);
+  for (char& c : text) c = c == '[' || c == ']' || c == ';' || c == ',' ? ' ' : c;
+  return parse_numbers(entries, entry, text, 9);
+}
+
+Calibration from_middlebury(const Entries& entries) {
+  const std::string remedy = "give a complete calib.txt";
+  const Entry& left = entries.at("cam0", remedy);
+  const Entry& right = entries.at("cam1", remedy);
+  const Entry& baseline = entries.at("baseline", remedy);
+  const std::vector<double> k_left = parse_middlebury_matrix(entries, left);
+  const std::vector<double> k_right = parse_middlebury_matrix(entries, right);
+  check_focal_length(entries, left, k_left[0], k_left[4]);
+  check_focal_length(entries, right, k_right[0], k_right[4]);
+  check_same_focal_length(entries, right, k_left[0], k_right[0]);
+  const double baseline_m = parse_finite(entries, baseline, baseline.value) / 1000.0;
+  check_baseline(entries, baseline, baseline_m);
+  const double doffs_px = entries.has("doffs")
+                              ? parse_finite(entries, entries.at("doffs", remedy), entries.at("doffs", remedy).value)
+                              : k_right[2] - k_left[2];
+  return {.fx = k_left[0],
+          .fy = k_left[4],
+          .cx = k_left[2],
+          .cy = k_left[5],
+          .baseline_m = baseline_m,
+          .doffs_px = doffs_px};
+}
+
+Calibration from_own(const Entries& entries) {
+  for (const Entry& entry : entries.all()) {
+    if (std::find(kOwnKeys.begin(), kOwnKeys.end(), entry.key) != kOwnKeys.end()) continue;
+    refuse_row(entries.file(), entry.row,
+               "unknown key " + quoted(entry.key) + "; the keys are fx, fy, cx, cy, baseline_m and doffs_px");
+  }
+  const auto number = [&](std::string_view key) {
+    const Entry& entry = entries.at(key, "the keys are fx, fy, cx, cy, baseline_m and, if not zero, doffs_px");
+    return parse_finite(entries, entry, entry.value);
+  };
+  Calibration calibration{.fx = number("fx"),
+                          .fy = number("fy"),
+                          .cx = number("cx"),
+                          .cy = number("cy"),
+                          .baseline_m = number("baseline_m"),
+                          .doffs_px = entries.has("doffs_px") ? number("doffs_px") : 0.0};
+  check_focal_length(entries, entries.at("fx", ""), calibration.fx, calibration.fx);
+  check_focal_length(entries, entries.at("fy", ""), calibration.fy, calibration.fy);
+  check_baseline(entries, entries.at("baseline_m", ""), calibration.baseline_m);
+  return calibration;
+}
+
+}  // namespace
+
+Calibration read_calibration(const std::filesystem::path& file, KittiCameras cameras) {
+  const std::string text = read_file(file, kMaxCalibrationBytes);
+  const Entries entries(file, text);
+  if (entries.has_prefix("P_rect_")) return from_kitti(entries, cameras, "P_rect_0");
+  if (entries.has("cam0") || entries.has("cam1")) return from_middlebury(entries);
+  if (std::any_of(kOwnKeys.begin(), kOwnKeys.end(), [&](std::string_view key) { return entries.has(key); })) {
+    return from_own(entries);
+  }
+  for (const char* key : {"P0", "P1", "P2", "P3"}) {
+    if (entries.has(key)) return from_kitti(entries, cameras, "P");
+  }
+  throw InvalidArgument(
+      file.string() +
+      ": holds no calibration; give KITTI's (P0: or P_rect_00:), Middlebury's (cam0=) or rows of fx, fy, "
+      "cx, cy, baseline_m");
+}
+
+void write_calibration(const std::filesystem::path& file, const Calibration& calibration) {
+  const std::array<double, 6> values = {calibration.fx, calibration.fy,         calibration.cx,
+                                        calibration.cy, calibration.baseline_m, calibration.doffs_px};
+  std::string text;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    text.append(kOwnKeys[i]).append(" = ");
+    append_number(text, values[i], 16);
+    text += '\n';
+  }
+  write_file(file, text);
+}
+
+}  // namespace egosgm::vision

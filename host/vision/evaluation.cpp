@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/evaluation.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <system_error>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/disparity_io.h"
+
+namespace egosgm::vision {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float kBad_px = 3.0f;
+constexpr float kBadRelative = 0.05f;
+
+void require_map(const cv::Mat& map, const char* name) {
+  if (map.empty() || map.type() != CV_32FC1) {
+    throw InvalidArgument(std::string(name) + ": a disparity map must be CV_32FC1 and not empty");
+  }
+}
+
+bool is_bad(float estimate, float truth) { return std::abs(truth - estimate) > kBad_px; }
+
+bool is_d1(float estimate, float truth) {
+  const float error = std::abs(truth - estimate);
+  return error > kBad_px && error > kBadRelative * std::abs(truth);
+}
+
+double percent(std::int64_t part, std::int64_t whole) {
+  return whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole)
+                   : std::numeric_limits<double>::quiet_NaN();
+}
+
+void interpolate_row(float* row, int width) {
+  int previous = -1;  // last valid pixel
+  for (int x = 0; x <= width; ++x) {
+    const bool at_end = x == width;
+    if (!at_end && !is_valid_disparity(row[x])) continue;
+    if (previous >= 0 || !at_end) {
+      const float fill = previous < 0 ? row[x] : at_end ? row[previous] : std::min(row[previous], row[x]);
+      std::fill(row + previous + 1, row + x, fill);
+    }
+    previous = x;
+  }
+}
+
+void extend_columns(cv::Mat& map) {
+  for (int x = 0; x < map.cols; ++x) {
+    int top = 0, bottom = map.rows - 1;
+    while (top < map.rows && !is_valid_disparity(map.at<float>(top, x))) ++top;
+    if (top == map.rows) continue;
+    while (!is_valid_disparity(map.at<float>(bottom, x))) --bottom;
+    for (int y = 0; y < top; ++y) map.at<float>(y, x) = map.at<float>(top, x);
+    for (int y = bottom + 1; y < map.rows; ++y) map.at<float>(y, x) = map.at<float>(bottom, x);
+  }
+}
+
+bool is_map_file(const fs::path& file) { return file.extension() == ".png" || file.extension() == ".pfm"; }
+
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+/// Name without extension -> file.
+std::map<std::string, fs::path> list_maps(const fs::path& folder) {
+  std::map<std::string, fs::path> maps;
+  std::error_code error;
+  fs::directory_iterator entry(folder, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    if (is_map_file(entry->path()) && !entry->path().filename().string().starts_with('.')) {
+      maps[entry->path().stem().string()] = entry->path();
+    }
+  }
+  if (error)
+    throw InvalidArgument(folder.string() + ": cannot be listed: " + error.message() + "; give a readable folder");
+  if (maps.empty()) throw InvalidArgument(folder.string() + ": holds no .png or .pfm; give a folder of disparity maps");
+  return maps;
+}
+
+/// A file, or the maps of a folder; an output folder stands for its `disparity`.
+std::map<std::string, fs::path> list_estimates(const fs::path& path) {
+  if (!is_folder(path)) return {{path.stem().string(), path}};
+  return list_maps(is_folder(path / "disparity") ? path / "disparity" : path);
+}
+
+/// The digits at the end of a name: 10 for 000010 and for 000151_10.
+std::optional<int> frame_number(const std::string& name) {
+  std::size_t begin = name.size();
+  while (begin > 0 && name[begin - 1] >= '0' && name[begin - 1] <= '9') --begin;
+  int number = 0;
+  const auto [end, error] = std::from_chars(name.data() + begin, name.data() + name.size(), number);
+  if (begin == name.size() || error != std::errc()) return std::nullopt;
+  return number;
+}
+
+EvaluationPairs pair_equal_names(const std::map<std::string, fs::path>& estimates,
+                                 const std::map<std::string, fs::path>& truths) {
+  EvaluationPairs result;
+  for (const auto& [name, truth] : truths) {
+    const auto estimate = estimates.find(name);
+    if (estimate == estimates.end()) {
+      result.without_estimate.push_back(truth);
+    } else {
+      result.pairs.push_back({estimate->second, truth});
+    }
+  }
+  return result;
+}
+
+EvaluationPairs pair_frame_numbers(const std::map<std::string, fs::path>& estimates,
+                                   const std::map<std::string, fs::path>& truths) {
+  std::map<int, fs::path> estimate_of;
+  for (const auto& [name, file] : estimates) {
+    if (const auto number = frame_number(name)) estimate_of[*number] = file;
+  }
+  EvaluationPairs result;
+  std::map<int, fs::path> used;
+  for (const auto& [name, truth] : truths) {
+    const auto number = frame_number(name);
+    const auto estimate = number ? estimate_of.find(*number) : estimate_of.end();
+    if (estimate == estimate_of.end()) {
+      result.without_estimate.push_back(truth);
+      continue;
+    }
+    if (const auto [other, is_new] = used.emplace(*number, truth); !is_new) {
+      throw InvalidArgument(estimate->second.string() + ": belongs to " + other->second.filename().string() +
+                            " or to " + truth.filename().string() + " of " + truth.parent_path().string() +
+                            "; give one truth file instead of the folder");
+    }
+    result.pairs.push_back({estimate->second, truth});
+  }
+  return result;
+}
+
+/// The mean of the values that are not NaN.
+class Mean {
+ public:
+  void add(double value) {
+    if (std::isnan(value)) return;
+    sum_ += value;
+    ++count_;
+  }
+  double value() const { return count_ > 0 ? sum_ / count_ : std::numeric_limits<double>::quiet_NaN(); }
+
+ private:
+  double sum_ = 0;
+  int count_ = 0;
+};
+
+}  // namespace
+
+DisparityCounts& DisparityCounts::operator+=(const DisparityCounts& other) {
+  truth += other.truth;
+  valid += other.valid;
+  bad += other.bad;
+  d1 += other.d1;
+  bad_interpolated += other.bad_interpolated;
+  d1_interpolated += other.d1_interpolated;
+  absolute_error_px += other.absolute_error_px;
+  return *this;
+}
+
+DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth) {
+  require_map(estimate, "estimate");
+  require_map(truth, "truth");
+  if (estimate.size() != truth.size()) {
+    throw InvalidArgument("the estimate has " + std::to_string(estimate.cols) + "x" + std::to_string(estimate.rows) +
+                          " pixels, its truth " + std::to_string(truth.cols) + "x" + std::to_string(truth.rows) +
+                          "; give maps of one size");
+  }
+  const cv::Mat interpolated = interpolate_background(estimate);
+  DisparityCounts counts;
+  for (int y = 0; y < truth.rows; ++y) {
+    for (int x = 0; x < truth.cols; ++x) {
+      const float t = truth.at<float>(y, x);
+      if (!is_valid_disparity(t)) continue;
+      const float e = estimate.at<float>(y, x);
+      const float filled = interpolated.at<float>(y, x);
+      ++counts.truth;
+      counts.bad_interpolated += !is_valid_disparity(filled) || is_bad(filled, t);
+      counts.d1_interpolated += !is_valid_disparity(filled) || is_d1(filled, t);
+      if (!is_valid_disparity(e)) continue;
+      ++counts.valid;
+      counts.bad += is_bad(e, t);
+      counts.d1 += is_d1(e, t);
+      counts.absolute_error_px += std::abs(static_cast<double>(t) - e);
+    }
+  }
+  return counts;
+}
+
+DisparityMetrics metrics_of(const DisparityCounts& counts) {
+  const std::int64_t missing = counts.truth - counts.valid;
+  return {.bad_or_missing = percent(counts.bad + missing, counts.truth),
+          .bad_of_valid = percent(counts.bad, counts.valid),
+          .density = percent(counts.valid, counts.truth),
+          .interpolated = percent(counts.bad_interpolated, counts.truth),
+          .d1 = percent(counts.d1 + missing, counts.truth),
+          .d1_interpolated = percent(counts.d1_interpolated, counts.truth),
+          .mae_px = counts.valid > 0 ? counts.absolute_error_px / static_cast<double>(counts.valid)
+                                     : std::numeric_limits<double>::quiet_NaN()};
+}
+
+DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images) {
+  const auto mean = [&](double DisparityMetrics::*figure) {
+    Mean result;
+    for (const DisparityMetrics& image : images) result.add(image.*figure);
+    return result.value();
+  };
+  return {.bad_or_missing = mean(&DisparityMetrics::bad_or_missing),
+          .bad_of_valid = mean(&DisparityMetrics::bad_of_valid),
+          .density = mean(&DisparityMetrics::density),
+          .interpolated = mean(&DisparityMetrics::interpolated),
+          .d1 = mean(&DisparityMetrics::d1),
+          .d1_interpolated = mean(&DisparityMetrics::d1_interpolated),
+          .mae_px = mean(&DisparityMetrics::mae_px)};
+}
+
+cv::Mat interpolate_background(const cv::Mat& disparity) {
+  require_map(disparity, "interpolate_background");
+  cv::Mat filled = disparity.clone();
+  for (int y = 0; y < filled.rows; ++y) interpolate_row(filled.ptr<float>(y), filled.cols);
+  extend_columns(filled);
+  return filled;
+}
+
+EvaluationPairs pair_with_truth(const fs::path& estimate, const fs::path& truth) {
+  std::error_code error;
+  for (const fs::path& path : {estimate, truth}) {
+    if (!fs::exists(path, error)) {
+      throw InvalidArgument(path.string() +
+                            ": no such file or folder; give a disparity map (.png, .pfm) or a folder of them");
+    }
+  }
+  const bool one_estimate = !is_folder(estimate), one_truth = !is_folder(truth);
+  if (one_estimate && one_truth) return {.pairs = {{estimate, truth}}, .without_estimate = {}};
+  const std::map<std::string, fs::path> estimates = list_estimates(estimate);
+  const std::map<std::string, fs::path> truths =
+      one_truth ? std::map<std::string, fs::path>{{truth.stem().string(), truth}} : list_maps(truth);
+  EvaluationPairs result = pair_equal_names(estimates, truths);
+  if (result.pairs.empty()) result = pair_frame_numbers(estimates, truths);
+  if (result.pairs.empty()) {
+    throw InvalidArgument(estimate.string() + ": nothing there belongs to " + truth.string() +
+                          " by name or frame number; give FILE and FILE, or folders with equal names");
+  }
+  if (one_estimate) result.without_estimate.clear();
+  return result;
+}
+
+}  // namespace egosgm::vision

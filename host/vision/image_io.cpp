@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/image_io.h"
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+#include "host/vision/png.h"
+
+namespace egosgm::vision {
+
+cv::Mat read_grey_png(const std::filesystem::path& file) {
+  cv::Mat pixels = decode_png(read_file(file, kMaxImageFileBytes), file);
+  if (pixels.channels() == 1) return pixels;
+  cv::Mat grey;
+  cv::cvtColor(pixels, grey, cv::COLOR_RGB2GRAY);
+  return grey;
+}
+
+cv::Size read_png_size(const std::filesystem::path& file) {
+  return parse_png_size(read_file_start(file, kPngHeaderBytes), file);
+}
+
+void write_png(const std::filesystem::path& file, const cv::Mat& image) {
+  const int type = image.type();
+  if (image.empty() || (type != CV_8UC1 && type != CV_8UC3 && type != CV_16UC1)) {
+    throw InvalidArgument(file.string() +
+                          ": only non-empty images of 8 or 16 bit grey or 8 bit BGR are written as PNG");
+  }
+  std::vector<std::uint8_t> bytes;
+  try {
+    if (!cv::imencode(".png", image, bytes)) throw IoError(file.string() + ": cannot be encoded as PNG");
+  } catch (const cv::Exception& error) {
+    throw IoError(file.string() + ": cannot be encoded as PNG: " + error.err);
+  }
+  write_file(file, std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+}
+
+ImageView image_view(const cv::Mat& grey) {
+  if (grey.type() != CV_8UC1 && grey.type() != CV_16UC1) {
+    throw InvalidArgument("image_view: the image must be grey, CV_8UC1 or CV_16UC1");
+  }
+  return {.data = grey.data,
+          .width = grey.cols,
+          .height = grey.rows,
+          .stride_bytes = static_cast<std::ptrdiff_t>(grey.step[0]),
+          .type = grey.depth() == CV_8U ? PixelType::kU8 : PixelType::kU16};
+}
+
+MapView<float> map_view(cv::Mat& map) {
+  if (map.type() != CV_32FC1) throw InvalidArgument("map_view: the map must be CV_32FC1");
+  return {.data = map.ptr<float>(),
+          .width = map.cols,
+          .height = map.rows,
+          .stride_bytes = static_cast<std::ptrdiff_t>(map.step[0])};
+}
+
+}  // namespace egosgm::vision

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/vision/png.h"
+
+#include <png.h>
+
+#include <bit>
+#include <csetjmp>
+#include <cstdint>
+#include <cstring>
+#include <string>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/image_io.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr std::string_view kSignature("\x89PNG\r\n\x1a\n", 8);
+constexpr std::int64_t kMaxDeflateRatio = 1032;  // zlib's "Maximum Expansion Factor"
+constexpr png_alloc_size_t kMaxAncillaryBytes = 4 << 20;
+
+[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
+  throw InvalidArgument(file.string() + ": not a readable image (truncated?): " + why + "; give an intact PNG file");
+}
+
+std::uint32_t big_endian_at(std::string_view bytes, std::size_t offset) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<std::uint8_t>(bytes[offset + i]);
+  return value;
+}
+
+/// What libpng's callbacks reach. libpng leaves an error by longjmp: no object with a destructor may live in the frames
+/// between.
+struct Decoder {
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  const char* next = nullptr;
+  std::size_t left = 0;
+  std::jmp_buf on_error;
+  char message[128] = "";
+
+  Decoder() = default;
+  Decoder(const Decoder&) = delete;
+  Decoder& operator=(const Decoder&) = delete;
+  ~Decoder() { png_destroy_read_struct(&png, &info, nullptr); }
+};
+
+void handle_error(png_structp png, png_const_charp message) {
+  auto* decoder = static_cast<Decoder*>(png_get_error_ptr(png));
+  std::strncpy(decoder->message, message, sizeof decoder->message - 1);
+  std::longjmp(decoder->on_error, 1);
+}
+
+void ignore_warning(png_structp, png_const_charp) {}
+
+void read_bytes(png_structp png, png_bytep out, std::size_t count) {
+  auto* decoder = static_cast<Decoder*>(png_get_io_ptr(png));
+  if (count > decoder->left) png_error(png, "the file ends too early");
+  std::memcpy(out, decoder->next, count);
+  decoder->next += count;
+  decoder->left -= count;
+}
+
+struct Layout {
+  int channels = 0;
+  int bit_depth = 0;
+  int passes = 0;
+  std::int64_t packed_bytes = 0;  // of the decompressed file, without filter bytes
+};
+
+bool read_layout(Decoder& decoder, Layout& layout) {
+  if (setjmp(decoder.on_error)) return false;
+  png_set_user_limits(decoder.png, kMaxImageSide, kMaxImageSide);
+  png_set_chunk_malloc_max(decoder.png, kMaxAncillaryBytes);
+  png_set_read_fn(decoder.png, &decoder, read_bytes);
+  png_read_info(decoder.png, decoder.info);
+  layout.packed_bytes = static_cast<std::int64_t>(png_get_rowbytes(decoder.png, decoder.info)) *
+                        png_get_image_height(decoder.png, decoder.info);
+  png_set_expand(decoder.png);
+  png_set_strip_alpha(decoder.png);
+  if constexpr (std::endian::native == std::endian::little) {
+    if (png_get_bit_depth(decoder.png, decoder.info) == 16) png_set_swap(decoder.png);
+  }
+  layout.passes = png_set_interlace_handling(decoder.png);
+  png_read_update_info(decoder.png, decoder.info);
+  layout.channels = png_get_channels(decoder.png, decoder.info);
+  layout.bit_depth = png_get_bit_depth(decoder.png, decoder.info);
+  return true;
+}
+
+bool read_rows(Decoder& decoder, const Layout& layout, std::uint8_t* rows, std::size_t stride_bytes, int height) {
+  if (setjmp(decoder.on_error)) return false;
+  for (int pass = 0; pass < layout.passes; ++pass) {
+    for (int y = 0; y < height; ++y) png_read_row(decoder.png, rows + y * stride_bytes, nullptr);
+  }
+  png_read_end(decoder.png, nullptr);
+  return true;
+}
+
+}  // namespace
+
+bool starts_like_png(std::string_view bytes) { return bytes.starts_with(kSignature); }
+
+cv::Size parse_png_size(std::string_view bytes, const std::filesystem::path& file) {
+  if (!starts_like_png(bytes)) refuse(file, bytes.empty() ? "the file is empty" : "it does not start like a PNG");
+  if (bytes.size() < kPngHeaderBytes) refuse(file, "the file ends in its header");
+  if (bytes.substr(12, 4) != "IHDR") refuse(file, "its header is damaged");
+  const std::int64_t width = big_endian_at(bytes, 16);
+  const std::int64_t height = big_endian_at(bytes, 20);
+  if (width == 0 || height == 0) refuse(file, "its width or height is zero");
+  if (width > kMaxImageSide || height > kMaxImageSide || width * height > kMaxImagePixels) {
+    throw InvalidArgument(file.string() + ": an image of " + std::to_string(width) + "x" + std::to_string(height) +
+                          " is larger than the limit of " + std::to_string(kMaxImageSide) + " a side and " +
+                          std::to_string(kMaxImagePixels) + " pixels; give a smaller one");
+  }
+  return cv::Size(static_cast<int>(width), static_cast<int>(height));
+}
+
+cv::Mat decode_png(std::string_view bytes, const std::filesystem::path& file) {
+  const cv::Size size = parse_png_size(bytes, file);
+  Decoder decoder;
+  decoder.next = bytes.data();
+  decoder.left = bytes.size();
+  decoder.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &decoder, handle_error, ignore_warning);
+  if (decoder.png) decoder.info = png_create_info_struct(decoder.png);
+  if (!decoder.info) throw std::bad_alloc();
+  Layout layout;
+  if (!read_layout(decoder, layout)) refuse(file, decoder.message);
+  if (layout.packed_bytes > kMaxDeflateRatio * static_cast<std::int64_t>(bytes.size())) {
+    refuse(file, "it is too short for " + std::to_string(size.width) + "x" + std::to_string(size.height) + " pixels");
+  }
+  cv::Mat pixels(size, CV_MAKETYPE(layout.bit_depth == 16 ? CV_16U : CV_8U, layout.channels));
+  if (!read_rows(decoder, layout, pixels.data, pixels.step, size.height)) refuse(file, decoder.message);
+  return pixels;
+}
+
+}  // namespace egosgm::vision

@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/render.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <opencv2/imgproc.hpp>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/disparity_io.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr int kBarHeight = 40, kBarColors = 22;  // [px]; below the colours stands the text
+constexpr int kCaptionHeight = 24;
+constexpr int kMaxPictureSide = 32768;
+const cv::Scalar kBlack(0, 0, 0), kWhite(255, 255, 255);
+const cv::Vec3b kMissing(128, 128, 128);
+
+/// |error| below limit_px has this colour: ColorBrewer's RdYlBu in ten classes, BGR.
+struct ErrorStep {
+  float limit_px;
+  const char* label;
+  cv::Vec3b color;
+};
+const std::array<ErrorStep, 10> kErrorSteps = {{{0.1875f, "0.19", {149, 54, 49}},
+                                                {0.375f, "0.38", {180, 117, 69}},
+                                                {0.75f, "0.75", {209, 173, 116}},
+                                                {1.5f, "1.5", {233, 217, 171}},
+                                                {3.0f, "3 px", {248, 243, 224}},
+                                                {6.0f, "6", {144, 224, 254}},
+                                                {12.0f, "12", {97, 174, 253}},
+                                                {24.0f, "24", {67, 109, 244}},
+                                                {48.0f, "48", {39, 48, 215}},
+                                                {INFINITY, "", {38, 0, 165}}}};
+
+void require_map(const cv::Mat& map, const char* name) {
+  if (map.empty() || map.type() != CV_32FC1) {
+    throw InvalidArgument(std::string(name) + ": the map must be CV_32FC1 and not empty");
+  }
+}
+
+void require_same_size(const cv::Mat& a, const cv::Mat& b, const char* name) {
+  if (a.size() != b.size()) throw InvalidArgument(std::string(name) + ": both maps must have the same size");
+}
+
+void require_range(const ColorRange& range) {
+  if (!(range.low < range.high) || !std::isfinite(range.low) || !std::isfinite(range.high) ||
+      (range.logarithmic && !(range.low > 0))) {
+    throw InvalidArgument(
+        "color range: low must be less than high, both finite, and low positive on a logarithmic scale");
+  }
+}
+
+void require_width(int width) {
+  if (width < 1 || width > kMaxPictureSide) throw InvalidArgument("picture width: must be in 1..32768 px");
+}
+
+/// Where a value stands in the range, 0..1.
+double position_in(const ColorRange& range, double value) {
+  const double position = range.logarithmic
+                              ? std::log(std::max(value, range.low) / range.low) / std::log(range.high / range.low)
+                              : (value - range.low) / (range.high - range.low);
+  return std::clamp(position, 0.0, 1.0);
+}
+
+double value_at(const ColorRange& range, double position) {
+  return range.logarithmic ? range.low * std::pow(range.high / range.low, position)
+                           : range.low + position * (range.high - range.low);
+}
+
+cv::Mat turbo_colors() {
+  cv::Mat steps(1, 256, CV_8UC1), colors;
+  for (int i = 0; i < 256; ++i) steps.at<std::uint8_t>(i) = static_cast<std::uint8_t>(i);
+  cv::applyColorMap(steps, colors, cv::COLORMAP_TURBO);
+  return colors;
+}
+
+cv::Vec3b color_at(const cv::Mat& colors, double position) {
+  return colors.at<cv::Vec3b>(static_cast<int>(std::lround(255.0 * position)));
+}
+
+cv::Vec3b error_color(float error_px) {
+  for (const ErrorStep& step : kErrorSteps) {
+    if (error_px < step.limit_px) return step.color;
+  }
+  return kErrorSteps.back().color;
+}
+
+void put_text(cv::Mat& picture, const std::string& text, cv::Point left_baseline, double scale = 0.4) {
+  cv::putText(picture, text, left_baseline, cv::FONT_HERSHEY_SIMPLEX, scale, kWhite, 1, cv::LINE_AA);
+}
+
+int text_width(const std::string& text, double scale = 0.4) {
+  int baseline = 0;
+  return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, 1, &baseline).width;
+}
+
+/// Text centred at x, moved so far that it stays in the picture.
+void put_label(cv::Mat& picture, const std::string& text, double center_x) {
+  const int width = text_width(text);
+  const int left = std::clamp(static_cast<int>(center_x) - width / 2, 1, std::max(1, picture.cols - width - 1));
+  put_text(picture, text, {left, kBarHeight - 6});
+}
+
+std::string format_value(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.3g", value);
+  return buffer;
+}
+
+cv::Mat scaled_to(const cv::Mat& picture, int cell_width) {
+  if (picture.cols <= cell_width) return picture;
+  cv::Mat scaled;
+  const int height = std::max(1, static_cast<int>(std::lround(1.0 * picture.rows * cell_width / picture.cols)));
+  cv::resize(picture, scaled, cv::Size(cell_width, height), 0, 0, cv::INTER_AREA);
+  return scaled;
+}
+
+cv::Mat with_caption(const CaptionedPicture& item, int cell_width) {
+  const cv::Mat picture = scaled_to(item.picture, cell_width);
+  const int top = item.caption.empty() ? 0 : kCaptionHeight;
+  cv::Mat cell(picture.rows + top, picture.cols, CV_8UC3, kBlack);
+  picture.copyTo(cell(cv::Rect(0, top, picture.cols, picture.rows)));
+  if (top > 0) put_text(cell, item.caption, {4, kCaptionHeight - 7}, 0.5);
+  return cell;
+}
+
+}  // namespace
+
+ColorRange disparity_range(const cv::Mat& disparity) {
+  require_map(disparity, "disparity_range");
+  constexpr double kQuantile = 0.995;
+  std::vector<float> values;
+  for (int y = 0; y < disparity.rows; ++y) {
+    const auto* row = disparity.ptr<float>(y);
+    std::copy_if(row, row + disparity.cols, std::back_inserter(values), is_valid_disparity);
+  }
+  if (values.empty()) return {.low = 0, .high = 1};
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  const double high = *at;
+  const double low = std::min(0.0, static_cast<double>(*std::min_element(values.begin(), values.end())));
+  return {.low = low, .high = std::max(high, low + 1.0)};
+}
+
+cv::Mat color_map(const cv::Mat& map, ColorRange range) {
+  require_map(map, "color_map");
+  require_range(range);
+  const cv::Mat colors = turbo_colors();
+  cv::Mat picture(map.size(), CV_8UC3, kBlack);
+  for (int y = 0; y < map.rows; ++y) {
+    const auto* row = map.ptr<float>(y);
+    for (int x = 0; x < map.cols; ++x) {
+      if (is_valid_disparity(row[x])) picture.at<cv::Vec3b>(y, x) = color_at(colors, position_in(range, row[x]));
+    }
+  }
+  return picture;
+}
+
+cv::Mat color_disparity(const cv::Mat& disparity) { return color_map(disparity, disparity_range(disparity)); }
+
+cv::Mat color_disparity(const cv::Mat& disparity, ColorRange range) { return color_map(disparity, range); }
+
+cv::Mat color_variance(const cv::Mat& variance, const cv::Mat& disparity, ColorRange range) {
+  require_map(variance, "color_variance");
+  require_map(disparity, "color_variance");
+  require_same_size(variance, disparity, "color_variance");
+  cv::Mat picture = color_map(variance, range);
+  for (int y = 0; y < picture.rows; ++y) {
+    for (int x = 0; x < picture.cols; ++x) {
+      if (!is_valid_disparity(disparity.at<float>(y, x))) picture.at<cv::Vec3b>(y, x) = cv::Vec3b(0, 0, 0);
+    }
+  }
+  return picture;
+}
+
+cv::Mat color_error(const cv::Mat& estimate, const cv::Mat& truth) {
+  require_map(estimate, "color_error");
+  require_map(truth, "color_error");
+  require_same_size(estimate, truth, "color_error");
+  cv::Mat picture(truth.size(), CV_8UC3, kBlack);
+  const cv::Rect bounds(0, 0, truth.cols, truth.rows);
+  for (int y = 0; y < truth.rows; ++y) {
+    for (int x = 0; x < truth.cols; ++x) {
+      const float t = truth.at<float>(y, x);
+      if (!is_valid_disparity(t)) continue;
+      const float e = estimate.at<float>(y, x);
+      const cv::Vec3b color = is_valid_disparity(e) ? error_color(std::abs(t - e)) : kMissing;
+      const cv::Rect block = cv::Rect(x - 1, y - 1, 3, 3) & bounds;
+      for (int v = block.y; v < block.br().y; ++v) {
+        for (int u = block.x; u < block.br().x; ++u) {
+          const bool own = u == x && v == y;
+          if (own || !is_valid_disparity(truth.at<float>(v, u))) picture.at<cv::Vec3b>(v, u) = color;
+        }
+      }
+    }
+  }
+  return picture;
+}
+
+cv::Mat color_bar(int width, ColorRange range, const std::string& unit) {
+  require_width(width);
+  require_range(range);
+  constexpr int kIntervals = 4;
+  const cv::Mat colors = turbo_colors();
+  cv::Mat bar(kBarHeight, width, CV_8UC3, kBlack);
+  for (int x = 0; x < width; ++x) {
+    const cv::Vec3b color = color_at(colors, static_cast<double>(x) / std::max(1, width - 1));
+    bar(cv::Rect(x, 0, 1, kBarColors)).setTo(cv::Scalar(color));
+  }
+  for (int i = 0; i <= kIntervals; ++i) {
+    const double position = static_cast<double>(i) / kIntervals;
+    put_label(bar, format_value(value_at(range, position)) + (i == kIntervals ? " " + unit : ""), position * width);
+  }
+  return bar;
+}
+
+cv::Mat error_bar(int width) {
+  require_width(width);
+  constexpr int kFields = static_cast<int>(kErrorSteps.size()) + 1;
+  cv::Mat bar(kBarHeight, width, CV_8UC3, kBlack);
+  for (int x = 0; x < width; ++x) {
+    const auto field = static_cast<std::size_t>(static_cast<std::int64_t>(x) * kFields / width);
+    const cv::Vec3b color = field < kErrorSteps.size() ? kErrorSteps[field].color : kMissing;
+    bar(cv::Rect(x, 0, 1, kBarColors)).setTo(cv::Scalar(color));
+  }
+  for (std::size_t i = 0; i + 1 < kErrorSteps.size(); ++i) {
+    put_label(bar, kErrorSteps[i].label, static_cast<double>(i + 1) * width / kFields);
+  }
+  put_label(bar, "none", (kFields - 0.5) * width / kFields);
+  return bar;
+}
+
+cv::Mat color_grey(const cv::Mat& grey) {
+  if (grey.empty() || (grey.type() != CV_8UC1 && grey.type() != CV_16UC1)) {
+    throw InvalidArgument("color_grey: the image must be CV_8UC1 or CV_16UC1 and not empty");
+  }
+  cv::Mat bytes = grey, picture;
+  if (grey.depth() == CV_16U) {
+    double highest = 0;
+    cv::minMaxLoc(grey, nullptr, &highest);
+    grey.convertTo(bytes, CV_8U, highest > 0 ? 255.0 / highest : 1.0);
+  }
+  cv::cvtColor(bytes, picture, cv::COLOR_GRAY2BGR);
+  return picture;
+}
+
+cv::Mat compose(const std::vector<CaptionedPicture>& pictures, int columns, int cell_width) {
+  require_width(cell_width);
+  if (pictures.empty() || columns < 1) throw InvalidArgument("compose: at least one picture and one column are needed");
+  std::vector<cv::Mat> cells;
+  for (const CaptionedPicture& item : pictures) {
+    if (item.picture.empty() || item.picture.type() != CV_8UC3)
+      throw InvalidArgument("compose: pictures must be CV_8UC3");
+    cells.push_back(with_caption(item, cell_width));
+  }
+  constexpr int kGap = 4;
+  const int used_columns = std::min(columns, static_cast<int>(cells.size()));
+  int column_width = 0;
+  for (const cv::Mat& cell : cells) column_width = std::max(column_width, cell.cols);
+  const int width = used_columns * (column_width + kGap) - kGap;
+  require_width(width);
+  cv::Mat sheet;
+  for (std::size_t begin = 0; begin < cells.size(); begin += static_cast<std::size_t>(used_columns)) {
+    const std::size_t end = std::min(cells.size(), begin + static_cast<std::size_t>(used_columns));
+    int height = 0;
+    for (std::size_t i = begin; i < end; ++i) height = std::max(height, cells[i].rows);
+    cv::Mat row(height + (begin > 0 ? kGap : 0), width, CV_8UC3, kBlack);
+    for (std::size_t i = begin; i < end; ++i) {
+      const int left = static_cast<int>(i - begin) * (column_width + kGap);
+      cells[i].copyTo(row(cv::Rect(left, row.rows - height, cells[i].cols, cells[i].rows)));
+    }
+    if (sheet.empty()) {
+      sheet = row;
+    } else {
+      sheet.push_back(row);
+    }
+  }
+  return sheet;
+}
+
+cv::Mat depth_from_disparity(const cv::Mat& disparity, const Calibration& calibration) {
+  require_map(disparity, "depth_from_disparity");
+  const double numerator = calibration.fx * calibration.baseline_m;
+  cv::Mat depth_m(disparity.size(), CV_32FC1, cv::Scalar(kInvalidDisparity));
+  for (int y = 0; y < disparity.rows; ++y) {
+    const auto* row = disparity.ptr<float>(y);
+    for (int x = 0; x < disparity.cols; ++x) {
+      const double d = row[x] + calibration.doffs_px;
+      if (is_valid_disparity(row[x]) && d > 0) depth_m.at<float>(y, x) = static_cast<float>(numerator / d);
+    }
+  }
+  return depth_m;
+}
+
+}  // namespace egosgm::vision
