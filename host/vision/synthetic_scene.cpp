@@ -161,11 +161,11 @@ void Street::add_cars(int side, double begin, double end) {
 
 void Street::add_poles(int side, double begin, double end) {
   uint32_t h = mix(options.seed, 300 + side);
-  for (double s = begin; s < end; s += 5.5) {
+  for (double s = begin; s < end; s += 4.5) {
     h = mix(h, 1);
-    if (unit(mix(h, 2)) < 0.2) continue;
+    if (unit(mix(h, 2)) < 0.1) continue;
     const bool kerbside = unit(mix(h, 3)) < 0.5;
-    const double at = s + range(mix(h, 4), 0, 4), lateral = side * (kerbside ? 6.2 : 3.9);
+    const double at = s + range(mix(h, 4), 0, 3.5), lateral = side * (kerbside ? 6.2 : 3.9);
     const double height = kerbside ? range(mix(h, 5), 3.0, 6.5) : range(mix(h, 5), 2.2, 3.4);
     const double width = std::min(0.25, options.pole_width_px * range(mix(h, 6), 0.667, 1.333) * 10 / focal_px);
     static_solids_.push_back(
@@ -187,8 +187,14 @@ void Street::add_trees(int side, double begin, double end) {
     const double stem = range(mix(h, 6), 0.2, 0.34);
     static_solids_.push_back(
         place(Shape::kCylinder, Material::kTrunk, mix(h, 7), at, side * 6.7, 0, {stem, trunk + 0.5, stem}));
-    static_solids_.push_back(place(Shape::kEllipsoid, Material::kCrown, mix(h, 8), at, side * 6.7, trunk,
-                                   {crown, crown * range(mix(h, 9), 0.9, 1.4), crown}));
+    for (uint32_t bough = 0; bough < 7; ++bough) {
+      h = mix(h, 20 + bough);
+      const double size = crown * range(mix(h, 8), 0.45, 0.7), spread = 0.3 * crown;
+      static_solids_.push_back(place(Shape::kEllipsoid, Material::kCrown, mix(h, 9),
+                                     at + spread * range(mix(h, 10), -1, 1),
+                                     side * 6.7 + spread * range(mix(h, 11), -1, 1),
+                                     trunk + 0.5 * crown * unit(mix(h, 12)), {size, 0.9 * size, size}));
+    }
   }
 }
 
@@ -224,7 +230,7 @@ std::vector<Solid> Street::solids(int frame) const {
 void Street::add_moving(int frame, std::vector<Solid>& out) const {
   constexpr int kCrossingFrames = 25;
   const double s = frame * options.speed_m, scale = options.moving_object_scale, length = 4.2;
-  const double gap = 14 + 3 * std::sin(kTwoPi * frame / 45), weave = 1.2 * std::sin(kTwoPi * frame / 33);
+  const double gap = 11 + 2 * std::sin(kTwoPi * frame / 45), weave = 1.2 * std::sin(kTwoPi * frame / 33);
   Solid ahead = place(Shape::kBox, Material::kVan, mix(options.seed, 31), s + gap + length / 2, weave, 0,
                       {1.9 * scale, 1.9 * scale, length});
   ahead.moving = true;
@@ -233,10 +239,16 @@ void Street::add_moving(int frame, std::vector<Solid>& out) const {
   const int round = frame / kCrossingFrames;
   const double part = static_cast<double>(frame % kCrossingFrames) / kCrossingFrames;
   const int side = (mix(options.seed, 32) + round) % 2 ? 1 : -1;
-  Solid crossing = place(Shape::kBox, Material::kBody, mix(options.seed, 33 + round), s + 13 - 7 * part,
-                         side * (-10 + 17 * part), 0, {2.0, 1.3, 0.9});
-  crossing.moving = true;
-  out.push_back(crossing);
+  const double at = s + 10 - 4 * part, lateral = side * (-10 + 17 * part);
+  const uint32_t seed = mix(options.seed, 33 + round);
+  Solid body = place(Shape::kBox, Material::kBody, seed, at, lateral, 0, {1.6, 0.85, 3.4});
+  Solid cabin = place(Shape::kBox, Material::kCabin, seed, at, lateral, 0.85, {1.4, 0.55, 1.9});
+  for (Solid* solid : {&body, &cabin}) {
+    solid->moving = true;
+    const double sine = solid->sin_heading, cosine = solid->cos_heading;
+    solid->sin_heading = side * cosine, solid->cos_heading = -side * sine;  // turned by a right angle
+    out.push_back(*solid);
+  }
 }
 
 }  // namespace egosgm::vision::synthetic

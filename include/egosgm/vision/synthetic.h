@@ -18,7 +18,7 @@ struct SyntheticOptions {
   int width = 640, height = 240;   // [px], 1..8192 each
   unsigned seed = 1;               // of street, texture and sensor noise
   bool moving_object = false;      // a vehicle ahead, and from time to time one that crosses the road
-  double moving_object_scale = 1;  // size of the vehicle ahead, 0.5..8; at 5 it covers about 40 % of the image
+  double moving_object_scale = 1;  // size of the vehicle ahead, 0.5..8; 5 covers 30 to 45 % of the image
   double speed_m = 0.8;            // forward travel per frame [m], 0..3
   double turn_deg = 1.0;    // largest turn per frame [deg], -4..4, positive: to the right first; radius at least 15 m
   double wobble = 1.0;      // scale of pitch, roll, sway and heave (1: 0.25 deg, 0.15 deg, 6 cm, 2 cm), 0..3

@@ -1,0 +1,378 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/synthetic.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+
+#include "egosgm/error.h"
+#include "egosgm/image.h"
+#include "egosgm/vision/calibration_io.h"
+#include "egosgm/vision/disparity_io.h"
+#include "egosgm/vision/poses_io.h"
+
+namespace egosgm::vision {
+namespace {
+
+SyntheticOptions small_options() {
+  SyntheticOptions options;
+  options.frames = 12, options.width = 320, options.height = 120;
+  return options;
+}
+
+bool same_bits(const cv::Mat& a, const cv::Mat& b) {
+  if (a.size() != b.size() || a.type() != b.type()) return false;
+  return std::equal(a.begin<uint8_t>(), a.end<uint8_t>(), b.begin<uint8_t>());
+}
+
+struct Range {
+  float low, high;
+};
+/// Over the pixels whose centres surround (x, y); REQUIRES them to be in the map.
+Range around(const cv::Mat& map, double x, double y) {
+  const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
+  const int x1 = std::min(x0 + 1, map.cols - 1), y1 = std::min(y0 + 1, map.rows - 1);
+  const auto [low, high] =
+      std::minmax({map.at<float>(y0, x0), map.at<float>(y0, x1), map.at<float>(y1, x0), map.at<float>(y1, x1)});
+  return {low, high};
+}
+
+/// How a map, moved by the camera's motion alone, agrees with the next frame's map.
+struct WarpCounts {
+  int moved = 0, agree = 0, seen_through = 0;  // seen_through: nothing is there where a surface must be
+};
+WarpCounts warp_left(const SyntheticSequence& sequence, int frame, bool moving_pixels) {
+  const Calibration c = sequence.calibration();
+  const SyntheticFrame from = sequence.render(frame - 1), to = sequence.render(frame);
+  const Eigen::Isometry3d motion = sequence.motion(frame).current_from_previous;
+  const double fb = c.fx * c.baseline_m;
+  WarpCounts counts;
+  for (int y = 0; y < from.left.rows; ++y) {
+    for (int x = 0; x < from.left.cols; ++x) {
+      if ((from.left_moving.at<uint8_t>(y, x) != 0) != moving_pixels) continue;
+      const double depth = fb / from.left_disparity.at<float>(y, x);
+      const Eigen::Vector3d p = motion * (depth * Eigen::Vector3d((x - c.cx) / c.fx, (y - c.cy) / c.fy, 1));
+      const double u = c.cx + c.fx * p.x() / p.z(), v = c.cy + c.fy * p.y() / p.z(), d = fb / p.z();
+      if (p.z() <= 0 || u < 0 || v < 0 || u > from.left.cols - 1 || v > from.left.rows - 1) continue;
+      const Range there = around(to.left_disparity, u, v);
+      ++counts.moved;
+      counts.agree += d > there.low - 0.02 && d < there.high + 0.02;
+      counts.seen_through += d > there.high + 0.02;
+    }
+  }
+  return counts;
+}
+
+TEST(Synthetic, MotionCarriesDisparityIntoTheNextFrame) {
+  SyntheticOptions options = small_options();
+  options.turn_deg = 2.7;
+  const SyntheticSequence sequence(options);
+  for (const int frame : {1, 6, 11}) {
+    const WarpCounts counts = warp_left(sequence, frame, false);
+    EXPECT_GT(counts.moved, 20000) << "frame " << frame;
+    EXPECT_GT(counts.agree, 0.97 * counts.moved) << "frame " << frame;
+    EXPECT_LT(counts.seen_through, 0.005 * counts.moved) << "frame " << frame;
+  }
+}
+
+TEST(Synthetic, MovingVehiclesContradictTheCamerasMotionAndTheRestDoesNot) {
+  SyntheticOptions options = small_options();
+  options.moving_object = true;
+  const SyntheticSequence sequence(options);
+  const WarpCounts moving = warp_left(sequence, 8, true), still = warp_left(sequence, 8, false);
+  EXPECT_GT(moving.moved, 200);
+  EXPECT_LT(moving.agree, 0.5 * moving.moved);
+  EXPECT_GT(still.agree, 0.95 * still.moved);
+}
+
+TEST(Synthetic, MovingMaskIsEmptyWithoutTheOption) {
+  SyntheticOptions options = small_options();
+  const SyntheticFrame still = SyntheticSequence(options).render(4);
+  EXPECT_EQ(cv::countNonZero(still.left_moving), 0);
+  EXPECT_EQ(cv::countNonZero(still.right_moving), 0);
+  options.moving_object = true;
+  const SyntheticFrame moving = SyntheticSequence(options).render(4);
+  EXPECT_GT(cv::countNonZero(moving.left_moving), 200);
+  EXPECT_GT(cv::countNonZero(moving.right_moving), 200);
+  options.moving_object_scale = 5;
+  const SyntheticFrame large = SyntheticSequence(options).render(4);
+  EXPECT_GT(cv::countNonZero(large.left_moving), 0.3 * large.left.total());
+}
+
+/// Mean |left(x) - right(x - d - error)| over pixels that both cameras see, right linearly interpolated.
+double photometric_difference(const SyntheticFrame& frame, double error_px) {
+  double sum = 0;
+  int count = 0;
+  for (int y = 0; y < frame.left.rows; ++y) {
+    for (int x = 0; x < frame.left.cols; ++x) {
+      const double there = x - frame.left_disparity.at<float>(y, x) - error_px;
+      if (!frame.left_noc.at<uint8_t>(y, x) || there < 0 || there >= frame.left.cols - 1) continue;
+      const int x0 = static_cast<int>(there);
+      const double part = there - x0;
+      sum += std::abs(frame.left.at<uint8_t>(y, x) - (1 - part) * frame.right.at<uint8_t>(y, x0) -
+                      part * frame.right.at<uint8_t>(y, x0 + 1));
+      ++count;
+    }
+  }
+  return sum / count;
+}
+
+TEST(Synthetic, ImagesAgreeAtTheTrueDisparity) {
+  SyntheticOptions options = small_options();
+  options.noise_grey = 0;
+  const SyntheticFrame frame = SyntheticSequence(options).render(3);
+  const double at_truth = photometric_difference(frame, 0);
+  EXPECT_LT(at_truth, 5.0);
+  EXPECT_GT(photometric_difference(frame, 1), 1.5 * at_truth);
+  EXPECT_GT(photometric_difference(frame, -1), 1.5 * at_truth);
+  EXPECT_GT(photometric_difference(frame, 3), 2 * at_truth);
+}
+
+void expect_views_agree(const cv::Mat& map, const cv::Mat& noc, const cv::Mat& other, int towards_other) {
+  int seen = 0, agree = 0, hidden = 0, behind = 0;
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      const float d = map.at<float>(y, x);
+      const double there = x + towards_other * d;
+      if (there < 0 || there > map.cols - 1) {
+        if (there < -0.5 || there >= map.cols - 0.5) {
+          ASSERT_EQ(noc.at<uint8_t>(y, x), 0) << "at " << x << ", " << y;
+        }
+        continue;
+      }
+      const Range range = around(other, there, y);
+      const bool noc_here = noc.at<uint8_t>(y, x) != 0;
+      seen += noc_here, agree += noc_here && d > range.low - 0.02 && d < range.high + 0.02;
+      hidden += !noc_here, behind += !noc_here && range.high > d;
+    }
+  }
+  EXPECT_GT(seen, 0.8 * map.total());
+  EXPECT_GT(agree, 0.995 * seen);
+  EXPECT_GT(hidden, 100);
+  EXPECT_GT(behind, 0.97 * hidden);
+}
+
+TEST(Synthetic, LeftAndRightTruthAgreeWhereBothSeeThePoint) {
+  const SyntheticFrame frame = SyntheticSequence(small_options()).render(5);
+  expect_views_agree(frame.left_disparity, frame.left_noc, frame.right_disparity, -1);
+  expect_views_agree(frame.right_disparity, frame.right_noc, frame.left_disparity, 1);
+}
+
+/// Runs of `low` to `high` pixels in a row that stand out from both sides by more than 2 px of disparity.
+int thin_runs(const cv::Mat& map, int low, int high) {
+  int count = 0;
+  for (int y = 0; y < map.rows; ++y) {
+    const float* row = map.ptr<float>(y);
+    for (int x = 1; x < map.cols; ++x) {
+      if (row[x] < row[x - 1] + 2) continue;
+      int end = x;
+      while (end < map.cols && std::abs(row[end] - row[x]) < 1) ++end;
+      if (end < map.cols && row[end] < row[end - 1] - 2) count += end - x >= low && end - x <= high;
+    }
+  }
+  return count;
+}
+
+TEST(Synthetic, ThinPolesStandBeforeTheBackground) {
+  SyntheticOptions options;
+  const SyntheticSequence sequence(options);
+  for (const int frame : {0, 10, 19}) EXPECT_GT(thin_runs(sequence.render(frame).left_disparity, 2, 4), 60) << frame;
+}
+
+TEST(Synthetic, DisparityIsPositiveAndFitsTheDefaultRange) {
+  SyntheticOptions options;
+  options.width = 1242, options.height = 375, options.supersampling = 1;
+  const SyntheticSequence sequence(options);
+  for (const int frame : {0, 7, 19}) {
+    const SyntheticFrame rendered = sequence.render(frame);
+    for (const cv::Mat& map : {rendered.left_disparity, rendered.right_disparity}) {
+      double low, high;
+      cv::minMaxLoc(map, &low, &high);
+      EXPECT_GT(low, 1.0 / 256);
+      EXPECT_LT(high, 110);
+    }
+  }
+}
+
+TEST(Synthetic, SameOptionsGiveTheSameBitsAndLengthDoesNotMatter) {
+  SyntheticOptions options = small_options();
+  const SyntheticFrame first = SyntheticSequence(options).render(7);
+  options.frames = 100;
+  const SyntheticFrame second = SyntheticSequence(options).render(7);
+  EXPECT_TRUE(same_bits(first.left, second.left));
+  EXPECT_TRUE(same_bits(first.right, second.right));
+  EXPECT_EQ(cv::norm(first.left_disparity, second.left_disparity, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(first.right_disparity, second.right_disparity, cv::NORM_INF), 0);
+  EXPECT_TRUE(same_bits(first.left_noc, second.left_noc));
+  options.seed = 2;
+  EXPECT_FALSE(same_bits(first.left, SyntheticSequence(options).render(7).left));
+}
+
+TEST(Synthetic, NoiseHasItsStandardDeviationAndDiffersBetweenTheImages) {
+  SyntheticOptions options = small_options();
+  options.noise_grey = 0;
+  const SyntheticFrame clean = SyntheticSequence(options).render(0);
+  options.noise_grey = 4;
+  const SyntheticFrame noisy = SyntheticSequence(options).render(0);
+  cv::Mat left, right, mean, deviation;
+  cv::subtract(noisy.left, clean.left, left, cv::noArray(), CV_32F);
+  cv::subtract(noisy.right, clean.right, right, cv::noArray(), CV_32F);
+  cv::meanStdDev(left, mean, deviation);
+  EXPECT_NEAR(mean.at<double>(0), 0, 0.1);
+  EXPECT_NEAR(deviation.at<double>(0), 4, 0.2);
+  EXPECT_LT(std::abs(left.dot(right)) / (16.0 * left.total()), 0.03);
+}
+
+TEST(Synthetic, PosesAreRigidStartAtIdentityAndFollowSpeedAndTurn) {
+  SyntheticOptions options = small_options();
+  options.frames = 100, options.turn_deg = 2, options.wobble = 0;
+  const SyntheticSequence sequence(options);
+  EXPECT_TRUE(sequence.world_from_camera(0).isApprox(Eigen::Isometry3d::Identity(), 0));
+  double largest_turn_deg = 0;
+  for (int k = 1; k < options.frames; ++k) {
+    const Eigen::Isometry3d pose = sequence.world_from_camera(k), motion = sequence.motion(k).current_from_previous;
+    ASSERT_LT((pose.linear() * pose.linear().transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-12);
+    ASSERT_GT(pose.linear().determinant(), 0);
+    ASSERT_TRUE((pose * motion).isApprox(sequence.world_from_camera(k - 1), 1e-9));
+    ASSERT_NEAR(motion.translation().norm(), options.speed_m, 0.01);
+    ASSERT_LT(motion.translation().z(), 0);
+    largest_turn_deg = std::max(largest_turn_deg, Eigen::AngleAxisd(motion.linear()).angle() * 57.29577951308232);
+  }
+  EXPECT_LE(largest_turn_deg, 2.0);
+  EXPECT_GT(largest_turn_deg, 1.4);
+}
+
+TEST(Synthetic, StandstillWithoutWobbleIsIdentity) {
+  SyntheticOptions options = small_options();
+  options.speed_m = 0, options.wobble = 0;
+  const SyntheticSequence sequence(options);
+  EXPECT_TRUE(sequence.motion(5).current_from_previous.isApprox(Eigen::Isometry3d::Identity(), 0));
+  EXPECT_EQ(cv::norm(sequence.render(1).left_disparity, sequence.render(5).left_disparity, cv::NORM_INF), 0);
+}
+
+TEST(Synthetic, AnySizeRenders) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {1, 5}, {7, 1}, {7, 5}, {65, 3}, {33, 127}}) {
+    SyntheticOptions options;
+    options.width = width, options.height = height, options.frames = 2, options.moving_object = true;
+    const SyntheticFrame frame = SyntheticSequence(options).render(1);
+    const cv::Size size(width, height);
+    EXPECT_EQ(frame.left.size(), size);
+    EXPECT_EQ(frame.right_noc.size(), size);
+    double low, high;
+    cv::minMaxLoc(frame.left_disparity, &low, &high);
+    EXPECT_GT(low, 0) << width << "x" << height;
+    EXPECT_TRUE(std::isfinite(high)) << width << "x" << height;
+  }
+}
+
+void expect_refused(const char* name, void (*spoil)(SyntheticOptions&)) {
+  SyntheticOptions options;
+  spoil(options);
+  try {
+    SyntheticSequence sequence(options);
+    ADD_FAILURE() << name << " was accepted";
+  } catch (const InvalidArgument& error) {
+    EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+  }
+}
+
+TEST(Synthetic, BadOptionsAreRefusedByName) {
+  expect_refused("frames", [](SyntheticOptions& o) { o.frames = 0; });
+  expect_refused("width", [](SyntheticOptions& o) { o.width = 0; });
+  expect_refused("width", [](SyntheticOptions& o) { o.width = 8193; });
+  expect_refused("height", [](SyntheticOptions& o) { o.height = -3; });
+  expect_refused("speed_m", [](SyntheticOptions& o) { o.speed_m = std::nan(""); });
+  expect_refused("turn_deg", [](SyntheticOptions& o) { o.turn_deg = 90; });
+  expect_refused("turn_deg", [](SyntheticOptions& o) { o.turn_deg = 3, o.speed_m = 0.2; });
+  expect_refused("noise_grey", [](SyntheticOptions& o) { o.noise_grey = -1; });
+  expect_refused("wobble", [](SyntheticOptions& o) { o.wobble = 1e9; });
+  expect_refused("pole_width_px", [](SyntheticOptions& o) { o.pole_width_px = 0; });
+  expect_refused("supersampling", [](SyntheticOptions& o) { o.supersampling = 0; });
+  expect_refused("moving_object_scale", [](SyntheticOptions& o) { o.moving_object_scale = 0; });
+  const SyntheticSequence sequence(small_options());
+  EXPECT_THROW(sequence.render(-1), InvalidArgument);
+  EXPECT_THROW(sequence.motion(12), InvalidArgument);
+}
+
+class SyntheticFiles : public testing::Test {
+ protected:
+  void SetUp() override {
+    const testing::TestInfo& info = *testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::path(testing::TempDir()) / ("egosgm_" + std::string(info.name()));
+    std::filesystem::remove_all(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::filesystem::path folder_;
+};
+
+TEST_F(SyntheticFiles, SequenceReadsBackAsItWasRendered) {
+  SyntheticOptions options;
+  options.frames = 2, options.width = 97, options.height = 41, options.moving_object = true;
+  int done = 0;
+  write_sequence(options, folder_, [&](int count, int) { done = count; });
+  EXPECT_EQ(done, 2);
+
+  const SyntheticSequence sequence(options);
+  const SyntheticFrame frame = sequence.render(1);
+  const std::string name = "000001.png";
+  EXPECT_TRUE(same_bits(cv::imread((folder_ / "image_0" / name).string(), cv::IMREAD_UNCHANGED), frame.left));
+  EXPECT_TRUE(same_bits(cv::imread((folder_ / "image_1" / name).string(), cv::IMREAD_UNCHANGED), frame.right));
+  EXPECT_TRUE(
+      same_bits(cv::imread((folder_ / "truth/left_moving" / name).string(), cv::IMREAD_UNCHANGED), frame.left_moving));
+  const cv::Mat occ = read_disparity_png(folder_ / "truth/right_disp_occ" / name);
+  const cv::Mat noc = read_disparity_png(folder_ / "truth/right_disp_noc" / name);
+  EXPECT_LE(cv::norm(occ, frame.right_disparity, cv::NORM_INF), 1.0 / 256);
+  for (int y = 0; y < noc.rows; ++y) {
+    for (int x = 0; x < noc.cols; ++x) {
+      const float expected = frame.right_noc.at<uint8_t>(y, x) ? occ.at<float>(y, x) : kInvalidDisparity;
+      ASSERT_EQ(noc.at<float>(y, x), expected) << "at " << x << ", " << y;
+    }
+  }
+
+  const Calibration read = read_calibration(folder_ / "calib.txt"), truth = sequence.calibration();
+  EXPECT_NEAR(read.fx, truth.fx, 1e-9);
+  EXPECT_NEAR(read.cy, truth.cy, 1e-9);
+  EXPECT_NEAR(read.baseline_m, truth.baseline_m, 1e-9);
+  EXPECT_NEAR(read.doffs_px, 0, 1e-9);
+  const std::vector<Eigen::Isometry3d> poses = read_poses(folder_ / "poses.txt");
+  ASSERT_EQ(poses.size(), 2u);
+  EXPECT_TRUE(poses[1].isApprox(sequence.world_from_camera(1), 1e-8));
+}
+
+TEST_F(SyntheticFiles, FolderHoldsWhatIsPromisedAndNothingElse) {
+  SyntheticOptions options;
+  options.frames = 1, options.width = 16, options.height = 9;
+  write_sequence(options, folder_);
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_)) {
+    if (entry.is_regular_file()) names.push_back(std::filesystem::relative(entry.path(), folder_).string());
+  }
+  std::sort(names.begin(), names.end());
+  const std::vector<std::string> expected = {"calib.txt",
+                                             "image_0/000000.png",
+                                             "image_1/000000.png",
+                                             "poses.txt",
+                                             "times.txt",
+                                             "truth/left_disp_noc/000000.png",
+                                             "truth/left_disp_occ/000000.png",
+                                             "truth/right_disp_noc/000000.png",
+                                             "truth/right_disp_occ/000000.png"};
+  EXPECT_EQ(names, expected);
+}
+
+TEST_F(SyntheticFiles, FolderThatCannotBeMadeIsNamed) {
+  std::ofstream(folder_) << "a file, not a folder";
+  try {
+    write_sequence(small_options(), folder_);
+    ADD_FAILURE() << "was accepted";
+  } catch (const IoError& error) {
+    EXPECT_NE(std::string(error.what()).find(folder_.filename().string()), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace egosgm::vision
