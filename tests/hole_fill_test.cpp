@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/hole_fill.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/reference/hole_fill.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+
+testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps) {
+  ocl::Context context(testing::any_device());
+  HoleFill fill(context, size, {.max_difference_px = max_difference_px});
+  const StereoMaps in = testing::upload(context, size, maps);
+  StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
+  fill(in, out);
+  return testing::download(context, out);
+}
+
+// The left view; the right one is empty.
+testing::HostMaps left_view(shared::ImageSize size, const std::vector<float>& disparity,
+                            const std::vector<float>& variance) {
+  testing::HostMaps maps = testing::empty_maps(size);
+  std::copy(disparity.begin(), disparity.end(), maps.disparity.begin());
+  std::copy(variance.begin(), variance.end(), maps.variance.begin());
+  return maps;
+}
+
+std::vector<float> fill_left(shared::ImageSize size, const std::vector<float>& disparity) {
+  const std::vector<float> variance(disparity.size(), 1.0f);
+  std::vector<float> filled = fill(size, 1, left_view(size, disparity, variance)).disparity;
+  filled.resize(disparity.size());
+  return filled;
+}
+
+class HoleFillTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(HoleFillTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const float max_difference_px : {0.0f, 1.0f, 100.0f}) {
+    const testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.4, 4);
+    const testing::HostMaps expected = reference::hole_fill(size, max_difference_px, maps);
+    const testing::HostMaps actual = fill(size, max_difference_px, maps);
+    EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << "gamma " << max_difference_px;
+    EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << "gamma " << max_difference_px;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, HoleFillTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+TEST(HoleFill, FillsAGapWithTheMeanAndTheLargerVariance) {
+  for (const shared::ImageSize size : {shared::ImageSize{3, 1}, shared::ImageSize{1, 3}}) {
+    const testing::HostMaps filled = fill(size, 1, left_view(size, {10, kNone, 10.5f}, {0.5f, 0, 0.25f}));
+    EXPECT_EQ(filled.disparity, (std::vector<float>{10, 10.25f, 10.5f, kNone, kNone, kNone}));
+    EXPECT_EQ(filled.variance, (std::vector<float>{0.5f, 0.5f, 0.25f, 0, 0, 0}));
+  }
+}
+
+TEST(HoleFill, LeavesJumpsWideGapsAndBorders) {
+  for (const std::vector<float>& line : std::vector<std::vector<float>>{
+           {10, kNone, 11, 11, 11}, {10, kNone, kNone, 10, 10}, {kNone, 10, 10, 10, kNone}, {10, 10, 10, 10, 10}}) {
+    EXPECT_EQ(fill_left({5, 1}, line), line);
+    EXPECT_EQ(fill_left({1, 5}, line), line);
+  }
+}
+
+// No hole of the middle row has valid neighbours in its row; the one in the middle gets them in its column by the first
+// pass. own.
+TEST(HoleFill, FillsRowsThenColumnsOnTheirResult) {
+  EXPECT_EQ(fill_left({3, 3}, {8, kNone, 8,      //
+                               9, kNone, kNone,  //
+                               8.5f, kNone, 8.5f}),
+            (std::vector<float>{8, 8, 8,          //
+                                9, 8.25f, 8.25f,  //
+                                8.5f, 8.5f, 8.5f}));
+}
+
+TEST(HoleFill, DoesNotReachIntoTheOtherView) {
+  const shared::ImageSize size{1, 2};
+  testing::HostMaps maps = testing::empty_maps(size);
+  maps.disparity = {10, kNone, 10, 10};
+  EXPECT_EQ(fill(size, 1, maps).disparity, maps.disparity);
+}
+
+}  // namespace
+}  // namespace egosgm

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/maps.h"
+#include "tests/support/random_maps.h"
+
+namespace egosgm::testing {
+
+inline StereoMaps upload(ocl::Context& context, shared::ImageSize size, const HostMaps& maps) {
+  StereoMaps on_device(context, size);
+  on_device.disparity.write(context, maps.disparity);
+  on_device.variance.write(context, maps.variance);
+  return on_device;
+}
+
+inline HostMaps download(ocl::Context& context, const StereoMaps& maps) {
+  return {maps.disparity.read(context), maps.variance.read(context)};
+}
+
+/// Both views without any value.
+inline HostMaps empty_maps(shared::ImageSize size) {
+  const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
+  return {std::vector<float>(pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(pixels, 0.0f)};
+}
+
+}  // namespace egosgm::testing
