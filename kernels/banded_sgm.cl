@@ -8,7 +8,7 @@
 //
 // Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d +- 1) + P1, P2), which is
 // the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of q, or outside the disparity range.
-// The forward sweep leaves the saturated sum of its four paths in `sums`; the backward sweep adds its own and finds the winner.
+// The forward sweep leaves half the sum of its four paths, in 8 bits, in `sums`; the backward sweep adds its own and finds the winner.
 //
 // A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a pixel reads
 // its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them before it writes its own.
@@ -76,11 +76,37 @@ inline uchar16 matching_cost(global const ulong* own, global const ulong* other,
 #endif
 }
 
-// t(d) of one path. `from` points into the predecessor's slot, at the first of the 16 disparities.
-inline uchar16 path_cost(const uchar16 cost, global const uchar* from, const uchar16 p1, const uchar16 p2) {
-  const uchar16 same = vload16(0, from);
-  const uchar16 beside = add_sat(min(vload16(0, from - 1), vload16(0, from + 1)), p1);
-  return add_sat(cost, min(min(same, beside), p2));
+// t(d) of one path, from the predecessor's costs at the same 16 disparities and at those one below and one above.
+inline uchar16 path_cost(const uchar16 cost, const uchar16 same, const uchar16 below, const uchar16 above, const uchar16 p1, const uchar16 p2) {
+  return add_sat(cost, min(min(same, add_sat(min(below, above), p1)), p2));
+}
+
+// The same where the predecessor's costs lie in a slot, `from` at the first of the 16 disparities.
+inline uchar16 path_cost_from(global const uchar* from, const uchar16 cost, const uchar16 p1, const uchar16 p2) {
+  return path_cost(cost, vload16(0, from), vload16(0, from - 1), vload16(0, from + 1), p1, p2);
+}
+
+// The same where they are at hand and nothing lies beside them.
+inline uchar16 path_cost_beside(const uchar16 before, const uchar16 cost, const uchar16 p1, const uchar16 p2) {
+  const uchar16 below = before.s00123456789abcde | (uchar16)(ABSENT, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+  const uchar16 above = before.s123456789abcdeff | (uchar16)(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, ABSENT);
+  return path_cost(cost, before, below, above, p1, p2);
+}
+
+// Half of the sum over all paths, in 8 bits: (L0 + L1 + 1) / 2 + (L2 + L3 + 1) / 2, at most 255.
+inline uchar16 half_sum(const uchar16* r) {
+#if PATHS == 8
+  return add_sat(rhadd(r[0], r[1]), rhadd(r[2], r[3]));
+#else
+  return add_sat(r[0], r[1]);
+#endif
+}
+
+// Makes what a predecessor with `band` left in a slot absent; `slot` at the range's first disparity.
+inline void wipe(global uchar* slot, const Band band, const int min_disparity) {
+  global uchar* at = slot + (band.origin - min_disparity);
+  vstore16((uchar16)(ABSENT), 0, at);
+  for (int v = 1; v < band.chunks; ++v) vstore16((uchar16)(ABSENT), v, at);
 }
 
 // Steps from the winner in one direction until the sums above the minimum add up to `limit`; `sums` are those of the steps.
@@ -110,6 +136,12 @@ inline void write_winner(const SgmParameters q, const Band band, const ushort* t
   *variance = q.variance_floor + q.variance_per_step * (float)steps;
 }
 
+// The lane of the least total among [first, last] in its upper bits, the total in its lower: the smallest disparity wins a tie.
+inline int ranked(const ushort16 totals, const int first, const int last) {
+  const ushort16 barred = widened(~lanes_from(first) | lanes_from(last + 1));
+  return minimum_of_16((totals << (ushort16)(4)) | convert_ushort16(kLane) | barred);
+}
+
 inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns, global const ulong* codes,
                   global const Band* bands, global const uint* offsets, global uchar* slots, global uchar* sums, global float* disparities,
                   global float* variances) {
@@ -127,82 +159,113 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
   uchar16 t[DIRECTIONS][MAX_CHUNKS];
   ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS];
   vstore8((ushort8)(65535), 0, totals);
+  const int step = backward ? -1 : 1;
 
   for (int row = 0; row < TILE_HEIGHT; ++row) {
     const int y = tile_y * TILE_HEIGHT + row;
     const int from = max(0, tile_x * TILE_WIDTH - row), to = min(width, (tile_x + 1) * TILE_WIDTH - row);
     if (y >= height || from >= to) continue;
     const int image_y = backward ? height - 1 - y : y;
-    const size_t row_cells = (first_pixel + (size_t)image_y * width) * MAX_CHUNKS;
+    const size_t row_start = first_pixel + (size_t)image_y * width;
     global const ulong* own_codes = codes + ((size_t)view * height + image_y) * code_stride + q.padding;
-    global const ulong* other_codes = codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding;
+    global const ulong* other_codes = codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding + (width - 1);
     const long above = image_y > 0 ? -(long)code_stride : 0, below = image_y + 1 < height ? (long)code_stride : 0;
-    const int towards = backward ? -1 : 1;
+    global const Band* row_bands = bands + row_start;
+    global uchar* row_sums = sums + row_start * (MAX_CHUNKS * EGOSGM_LANES);
+
+    // Slots of the paths from the left, from above, from the upper left and from the upper right.
+    global uchar* slot[4] = {slots + (size_t)y * SLOT, slots + (size_t)(height + from) * SLOT,
+                             slots + (size_t)(2 * height + width + from - y) * SLOT,
+                             slots + (size_t)(2 * height + 2 * width + from + y) * SLOT};
+    uchar16 last = (uchar16)(ABSENT);
+    int last_origin = -1;  // lane of `last`, or -1 where the path from the left must be read from its slot
 
     for (int x = from; x < to; ++x) {
       const int image_x = backward ? width - 1 - x : x;
       const int along = view == EGOSGM_LEFT ? image_x : width - 1 - image_x;
-      const size_t pixel = first_pixel + (size_t)image_y * width + image_x;
-      const Band band = bands[pixel];
+      global const Band* band_at = row_bands + image_x;
+      const Band band = *band_at;
       const int lane = band.origin - q.min_disparity;
+      global uchar* cells = row_sums + (size_t)offsets[row_start + image_x] * EGOSGM_LANES;
+      global const ulong* own = own_codes + along;
+      global const ulong* other = other_codes - along + band.origin;
 
-      global uchar* path[4];
-      path[0] = slots + (size_t)y * SLOT;
-      path[1] = slots + (size_t)(height + x) * SLOT;
-      path[2] = slots + (size_t)(height + width + x - y + height - 1) * SLOT;
-      path[3] = slots + (size_t)(2 * height + 2 * width + x + y) * SLOT;
-      const bool has[4] = {x > 0, y > 0, x > 0 && y > 0, x + 1 < width && y > 0};
-      const long before[4] = {-towards, -towards * (long)width, -towards * ((long)width + 1), -towards * ((long)width - 1)};
+      // Where there is no predecessor, wiping at the pixel's own band does no harm.
+      const long up = y > 0 ? -step * (long)width : 0;
+      const Band wiped[4] = {band_at[x > 0 ? -step : 0], band_at[up], band_at[x > 0 && y > 0 ? up - step : 0],
+                             band_at[x + 1 < width && y > 0 ? up + step : 0]};
 
-      uchar16 least[DIRECTIONS];
-      for (int r = 0; r < DIRECTIONS; ++r) least[r] = (uchar16)(ABSENT);
-      for (int v = 0; v < band.chunks; ++v) {
-        const int at = lane + EGOSGM_LANES * v;
-        const uchar16 absent = lanes_from(q.disparities - at);
-        const uchar16 cost = absent | matching_cost(own_codes + along, other_codes + (width - 1 - along) + band.origin + EGOSGM_LANES * v, above, below);
-        for (int r = 0; r < DIRECTIONS; ++r) {
-          t[r][v] = path_cost(cost, path[r] + at, p1, p2);
-          least[r] = min(least[r], t[r][v]);
-        }
-      }
-
-      for (int r = 0; r < DIRECTIONS; ++r) {
-        least[r] = (uchar16)(minimum(least[r]));
-        if (!has[r]) continue;
-        const Band wiped = bands[pixel + before[r]];
-        for (int v = 0; v < wiped.chunks; ++v) {
-          vstore16((uchar16)(ABSENT), 0, path[r] + (wiped.origin - q.min_disparity) + EGOSGM_LANES * v);
-        }
-      }
-
-      global uchar* cells = sums + (row_cells + offsets[pixel]) * EGOSGM_LANES;
       int best = INT_MAX;
-      for (int v = 0; v < band.chunks; ++v) {
-        const int at = lane + EGOSGM_LANES * v;
-        const uchar16 absent = lanes_from(q.disparities - at);
-        uchar16 sum = 0;
-        for (int r = 0; r < DIRECTIONS; ++r) {
-          const uchar16 costs = (t[r][v] - least[r]) | absent;
-          sum = add_sat(sum, costs);
-          vstore16(costs, 0, path[r] + at);
+      if (band.chunks == 1) {
+        const uchar16 absent = lanes_from(q.disparities - lane);
+        const uchar16 cost = absent | matching_cost(own, other, above, below);
+        uchar16 r[DIRECTIONS];
+        r[0] = lane == last_origin ? path_cost_beside(last, cost, p1, p2) : path_cost_from(slot[0] + lane, cost, p1, p2);
+#pragma unroll
+        for (int i = 1; i < DIRECTIONS; ++i) r[i] = path_cost_from(slot[i] + lane, cost, p1, p2);
+#pragma unroll
+        for (int i = 0; i < DIRECTIONS; ++i) {
+          r[i] = (r[i] - (uchar16)(minimum(r[i]))) | absent;
+          if (i > 0 || lane != last_origin) wipe(slot[i], wiped[i], q.min_disparity);
+          vstore16(r[i], 0, slot[i] + lane);
         }
+        last = r[0];
+        last_origin = lane;
+        const uchar16 sum = half_sum(r);
         if (!backward) {
-          vstore16(sum, v, cells);
+          vstore16(sum, 0, cells);
         } else {
-          const ushort16 total = (convert_ushort16(sum) + convert_ushort16(vload16(v, cells))) | widened(absent);
-          vstore16(total, 0, totals + MAX_STEPS + EGOSGM_LANES * v);
-          // The lane in the low bits: the smallest disparity wins a tie.
-          const int first = band.first - band.origin - EGOSGM_LANES * v;
-          const ushort16 barred = widened(~lanes_from(first) | lanes_from(band.last - band.first + 1 + first));
-          const int key = minimum_of_16((total << (ushort16)(4)) | convert_ushort16(kLane) | barred);
-          const int ranked = (key >> 4) * (MAX_CHUNKS * EGOSGM_LANES) + EGOSGM_LANES * v + (key & 15);
-          best = min(best, ranked);
+          const ushort16 total = (convert_ushort16(sum) + convert_ushort16(vload16(0, cells))) | widened(absent);
+          vstore16(total, 0, totals + MAX_STEPS);
+          best = ranked(total, band.first - band.origin, band.last - band.origin) & 15;
         }
+      } else {
+        uchar16 least[DIRECTIONS];
+#pragma unroll
+        for (int i = 0; i < DIRECTIONS; ++i) least[i] = (uchar16)(ABSENT);
+        for (int v = 0; v < band.chunks; ++v) {
+          const int at = lane + EGOSGM_LANES * v;
+          const uchar16 cost = lanes_from(q.disparities - at) | matching_cost(own, other + EGOSGM_LANES * v, above, below);
+#pragma unroll
+          for (int i = 0; i < DIRECTIONS; ++i) {
+            t[i][v] = path_cost_from(slot[i] + at, cost, p1, p2);
+            least[i] = min(least[i], t[i][v]);
+          }
+        }
+#pragma unroll
+        for (int i = 0; i < DIRECTIONS; ++i) {
+          least[i] = (uchar16)(minimum(least[i]));
+          wipe(slot[i], wiped[i], q.min_disparity);
+        }
+        last_origin = -1;
+        for (int v = 0; v < band.chunks; ++v) {
+          const int at = lane + EGOSGM_LANES * v;
+          const uchar16 absent = lanes_from(q.disparities - at);
+          uchar16 r[DIRECTIONS];
+#pragma unroll
+          for (int i = 0; i < DIRECTIONS; ++i) {
+            r[i] = (t[i][v] - least[i]) | absent;
+            vstore16(r[i], 0, slot[i] + at);
+          }
+          const uchar16 sum = half_sum(r);
+          if (!backward) {
+            vstore16(sum, v, cells);
+          } else {
+            const ushort16 total = (convert_ushort16(sum) + convert_ushort16(vload16(v, cells))) | widened(absent);
+            vstore16(total, 0, totals + MAX_STEPS + EGOSGM_LANES * v);
+            const int first = band.first - band.origin - EGOSGM_LANES * v;
+            const int key = ranked(total, first, first + band.last - band.first);
+            best = min(best, (key >> 4) * (MAX_CHUNKS * EGOSGM_LANES) + EGOSGM_LANES * v + (key & 15));
+          }
+        }
+        best %= MAX_CHUNKS * EGOSGM_LANES;
       }
       if (backward) {
         vstore8((ushort8)(65535), 0, totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
-        write_winner(q, band, totals, best % (MAX_CHUNKS * EGOSGM_LANES), disparities + pixel, variances + pixel);
+        write_winner(q, band, totals, best, disparities + row_start + image_x, variances + row_start + image_x);
       }
+#pragma unroll
+      for (int i = 1; i < 4; ++i) slot[i] += SLOT;
     }
   }
 }

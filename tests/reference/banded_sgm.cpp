@@ -80,15 +80,19 @@ void aggregate(const View& v, int dx, int dy, Cells& costs) {
   }
 }
 
-/// The paths of one sweep, summed up to at most 255.
+/// The paths of one sweep: half the sum of four, rounded as pairs; the sum of two; at most 255.
 Cells half_sum(const View& v, const shared::Band* bands, int paths, int sign) {
-  Cells sum(v.q, bands);
   const int directions[4][2] = {{1, 0}, {0, 1}, {1, 1}, {-1, 1}};
+  std::vector<Cells> costs;
   for (int r = 0; r < paths / 2; ++r) {
-    Cells costs(v.q, bands);
-    aggregate(v, sign * directions[r][0], sign * directions[r][1], costs);
-    for (int p = 0; p < v.q.width * v.q.height; ++p) {
-      for (int d = sum.first(p); d <= sum.last(p); ++d) sum.at(p, d) = std::min(255, sum.at(p, d) + costs.at(p, d));
+    costs.emplace_back(v.q, bands);
+    aggregate(v, sign * directions[r][0], sign * directions[r][1], costs.back());
+  }
+  Cells sum(v.q, bands);
+  for (int p = 0; p < v.q.width * v.q.height; ++p) {
+    for (int d = sum.first(p); d <= sum.last(p); ++d) {
+      const auto half = [&](int r) { return (costs[r].at(p, d) + costs[r + 1].at(p, d) + 1) / 2; };
+      sum.at(p, d) = std::min(255, paths == 8 ? half(0) + half(2) : costs[0].at(p, d) + costs[1].at(p, d));
     }
   }
   return sum;
