@@ -80,6 +80,7 @@ void SyntheticOptions::validate() const {
   require_range("wobble", wobble, 0, 3);
   require_range("noise_grey", noise_grey, 0, 20);
   require_range("pole_width_px", pole_width_px, 1, 20);
+  require_range("pole_spacing_m", pole_spacing_m, 1, 1000);
   require_range("supersampling", supersampling, 1, 8);
   if (speed_m > 0 && speed_m < kSmallestRadius_m * std::abs(turn_deg) * synthetic::kDegrees) {
     throw InvalidArgument(text("synthetic turn_deg = ", turn_deg, " at speed_m = ", speed_m, " turns on less than ",

@@ -161,11 +161,11 @@ void Street::add_cars(int side, double begin, double end) {
 
 void Street::add_poles(int side, double begin, double end) {
   uint32_t h = mix(options.seed, 300 + side);
-  for (double s = begin; s < end; s += 4.5) {
+  for (double s = begin; s < end; s += options.pole_spacing_m) {
     h = mix(h, 1);
     if (unit(mix(h, 2)) < 0.1) continue;
     const bool kerbside = unit(mix(h, 3)) < 0.5;
-    const double at = s + range(mix(h, 4), 0, 3.5), lateral = side * (kerbside ? 6.2 : 3.9);
+    const double at = s + range(mix(h, 4), 0, 0.7 * options.pole_spacing_m), lateral = side * (kerbside ? 6.2 : 3.9);
     const double height = kerbside ? range(mix(h, 5), 3.0, 6.5) : range(mix(h, 5), 2.2, 3.4);
     const double width = std::min(0.25, options.pole_width_px * range(mix(h, 6), 0.667, 1.333) * 10 / focal_px);
     static_solids_.push_back(

@@ -51,7 +51,7 @@ double facade(const Solid& solid, const SurfacePoint& at) {
   constexpr double kStorey_m = 2.9;
   const uint32_t h = solid.seed;
   const double wall = uniform_in(mix(h, 1), 0.34, 0.85), height = 2 * solid.half.y();
-  double tone = wall * (1 + 0.30 * fractal_noise(at, 1.3, mix(h, 2)));
+  double tone = wall * (1 + 0.36 * fractal_noise(at, 1.3, mix(h, 2)));
   tone *= 1 - 0.35 * stripe(at.v, 0.7, at.dv);  // plinth
   tone =
       blend(tone, 0.85 * wall + 0.12, 0.8 * stripe(in_cell(at.v + 0.5 * kStorey_m, kStorey_m), 0.09, at.dv));  // ledges
@@ -70,7 +70,8 @@ double facade(const Solid& solid, const SurfacePoint& at) {
   const double glass = stripe(u, half_width, at.du) * stripe(v - centre, half_height, at.dv);
   const double bars = std::max(stripe(u, 0.03, at.du), door ? 0.0 : stripe(v - centre - 0.25, 0.03, at.dv));
   const double pane =
-      uniform_in(mix(w, 2), 0.06, unit(mix(w, 3)) < 0.25 ? 0.65 : 0.3) * (1 + 0.5 * fractal_noise(at, 0.5, mix(w, 4)));
+      uniform_in(mix(w, 2), 0.06, unit(mix(w, 3)) < 0.25 ? 0.65 : 0.3) * (1 + 0.4 * fractal_noise(at, 0.5, mix(w, 4))) +
+      0.05 * fractal_noise(at, 0.5, mix(w, 5));
   const double border = std::min(0.95, wall + (wall > 0.6 ? -0.25 : 0.25));
   return blend(tone, blend(border, pane, glass * (1 - 0.8 * bars)), frame);
 }
@@ -78,7 +79,7 @@ double facade(const Solid& solid, const SurfacePoint& at) {
 double car_body(const Solid& solid, int face, const SurfacePoint& at) {
   const uint32_t h = solid.seed;
   const double paint = uniform_in(mix(h, 1), 0.08, 0.9), height = 2 * solid.half.y();
-  double tone = paint * (1 + 0.18 * fractal_noise(at, 0.4, mix(h, 2))) + 0.05 * (at.v / height - 0.5);
+  double tone = paint * (1 + 0.25 * fractal_noise(at, 0.4, mix(h, 2))) + 0.05 * (at.v / height - 0.5);
   tone = blend(tone, 0.04, stripe(at.v, 0.22, at.dv));  // the gap above the ground
   if (face == 0) {
     const double length = solid.half.z(),
@@ -165,13 +166,13 @@ double fractal_noise(const SurfacePoint& at, double cell_m, uint32_t seed) {
 double road_reflectance(const SurfacePoint& at, uint32_t seed) {
   const double lateral = std::abs(at.u), kerb = 6.05;
   const double grain = fractal_noise(at, 1.6, mix(seed, 51));
-  double asphalt = 0.30 * (1 + 0.34 * grain);
+  double asphalt = 0.32 * (1 + 0.5 * grain);
   const double dash = stripe(in_cell(at.v, 6.0), 1.5, at.dv);
   asphalt = blend(asphalt, 0.85 + 0.1 * grain, 0.9 * stripe(at.u, 0.07, at.du) * dash);
   asphalt = blend(asphalt, 0.75 + 0.1 * grain, 0.8 * stripe(lateral - 3.6, 0.05, at.du));
   if (lateral + at.du < kerb) return asphalt;
   const double joints = std::max(stripe(in_cell(at.u, 0.6), 0.02, at.du), stripe(in_cell(at.v, 0.6), 0.02, at.dv));
-  double pavement = 0.55 * (1 + 0.26 * grain) * (1 - 0.4 * joints);
+  double pavement = 0.55 * (1 + 0.38 * grain) * (1 - 0.4 * joints);
   pavement = blend(pavement, 0.8 + 0.08 * grain, stripe(lateral - kerb - 0.08, 0.08, at.du));
   const double grass = 0.36 * (1 + 0.5 * grain);
   return blend(blend(pavement, grass, std::clamp((lateral - 8.0) / 0.4, 0.0, 1.0)), asphalt,
@@ -181,7 +182,7 @@ double road_reflectance(const SurfacePoint& at, uint32_t seed) {
 double sky_brightness(const SurfacePoint& at, uint32_t seed) {
   SurfacePoint cloud = at;
   cloud.v *= 2.2, cloud.dv *= 2.2;
-  return 0.80 + 0.13 * fractal_noise(cloud, 160, mix(seed, 61)) - 0.06 * std::min(1.0, at.v / 300);
+  return 0.80 + 0.16 * fractal_noise(cloud, 160, mix(seed, 61)) - 0.06 * std::min(1.0, at.v / 300);
 }
 
 double solid_reflectance(const Solid& solid, int face, const SurfacePoint& at) {
@@ -200,7 +201,7 @@ double solid_reflectance(const Solid& solid, int face, const SurfacePoint& at) {
     case Material::kSign:
       return sign(solid, at);
     case Material::kPole:
-      return (unit(mix(h, 1)) < 0.5 ? 0.16 : 0.8) * (1 + 0.25 * fractal_noise(at, 0.6, mix(h, 2)));
+      return (unit(mix(h, 1)) < 0.5 ? 0.12 : 0.92) * (1 + 0.25 * fractal_noise(at, 0.6, mix(h, 2)));
     case Material::kTrunk:
       return 0.25 * (1 + 0.5 * fractal_noise({at.u * 3, at.v, at.du * 3, at.dv}, 0.5, mix(h, 2)));
     case Material::kCrown:

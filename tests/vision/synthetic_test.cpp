@@ -180,7 +180,13 @@ int thin_runs(const cv::Mat& map, int low, int high) {
 TEST(Synthetic, ThinPolesStandBeforeTheBackground) {
   SyntheticOptions options;
   const SyntheticSequence sequence(options);
-  for (const int frame : {0, 10, 19}) EXPECT_GT(thin_runs(sequence.render(frame).left_disparity, 2, 4), 60) << frame;
+  options.pole_spacing_m = 1000;
+  const SyntheticSequence bare(options);
+  for (const int frame : {0, 10, 19}) {
+    const int with_poles = thin_runs(sequence.render(frame).left_disparity, 2, 4);
+    EXPECT_GT(with_poles, 60) << "frame " << frame;
+    EXPECT_LT(thin_runs(bare.render(frame).left_disparity, 2, 4), 0.3 * with_poles) << "frame " << frame;
+  }
 }
 
 TEST(Synthetic, DisparityIsPositiveAndFitsTheDefaultRange) {
@@ -291,6 +297,7 @@ TEST(Synthetic, BadOptionsAreRefusedByName) {
   expect_refused("noise_grey", [](SyntheticOptions& o) { o.noise_grey = -1; });
   expect_refused("wobble", [](SyntheticOptions& o) { o.wobble = 1e9; });
   expect_refused("pole_width_px", [](SyntheticOptions& o) { o.pole_width_px = 0; });
+  expect_refused("pole_spacing_m", [](SyntheticOptions& o) { o.pole_spacing_m = 0; });
   expect_refused("supersampling", [](SyntheticOptions& o) { o.supersampling = 0; });
   expect_refused("moving_object_scale", [](SyntheticOptions& o) { o.moving_object_scale = 0; });
   const SyntheticSequence sequence(small_options());
