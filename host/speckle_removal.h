@@ -30,7 +30,8 @@ class SpeckleRemoval {
   ocl::Context& context_;
   const shared::ImageSize size_;
   const SpeckleRemovalOptions options_;
-  const int strip_rows_, row_group_;
+  const cl_uint max_size_;
+  const int row_group_, strip_rows_;
   Runs runs_;                        // column where the pixel's run begins
   Indices parents_, roots_, sizes_;  // of runs, at the index of their first pixel
   ocl::Kernel<const shared::ImageSize, const float, Disparities, Runs, Indices, Indices> find_runs_;

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// Small regions by union-find over runs (connected pixels in a row). A run is known by the index of its first pixel;
+// parents[run] is never above run, so that the root of a region is its first run, whatever the order in which runs are
+// joined.
+#include "shared.h"
+
+#ifndef ROW_GROUP
+#error "ROW_GROUP: work-items that share a row"
+#endif
+
+#define NO_RUN 0xffff  // of an invalid pixel
+
+bool is_connected(float a, float b, float max_difference) {
+  return a > EGOSGM_INVALID_DISPARITY && b > EGOSGM_INVALID_DISPARITY && fabs(a - b) <= max_difference;
+}
+
+// Where the run of each pixel begins, and the length of each run. A work-group of ROW_GROUP a row and view.
+kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void find_runs(const ImageSize size,
+                                                                             const float max_difference,
+                                                                             global const float* disparity,
+                                                                             global ushort* runs, global uint* parents,
+                                                                             global uint* sizes) {
+  const int lane = get_local_id(0);
+  const int y = get_global_id(1);
+  const int view = get_global_id(2);
+  const size_t row = ((size_t)view * size.height + y) * size.width;
+  int begin_before = 0;
+#if ROW_GROUP > 1
+  local int begins[ROW_GROUP];
+#endif
+  for (int tile = 0; tile < size.width; tile += ROW_GROUP) {
+    const int x = tile + lane;
+    const float d = x < size.width ? disparity[row + x] : EGOSGM_INVALID_DISPARITY;
+    const float left = x > 0 && x <= size.width ? disparity[row + x - 1] : EGOSGM_INVALID_DISPARITY;
+    const float right = x + 1 < size.width ? disparity[row + x + 1] : EGOSGM_INVALID_DISPARITY;
+    int begin = is_connected(left, d, max_difference) ? begin_before : x;
+#if ROW_GROUP > 1
+    begins[lane] = begin;
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (int step = 1; step < ROW_GROUP; step *= 2) {
+      const int before = lane >= step ? begins[lane - step] : 0;
+      barrier(CLK_LOCAL_MEM_FENCE);
+      begins[lane] = max(begins[lane], before);
+      barrier(CLK_LOCAL_MEM_FENCE);
+    }
+    begin = begins[lane];
+    begin_before = begins[ROW_GROUP - 1];
+    barrier(CLK_LOCAL_MEM_FENCE);
+#else
+    begin_before = begin;
+#endif
+    if (x < size.width) {
+      const bool is_valid = d > EGOSGM_INVALID_DISPARITY;
+      runs[row + x] = is_valid ? begin : NO_RUN;
+      if (is_valid && !is_connected(d, right, max_difference)) {
+        parents[row + begin] = row + begin;
+        sizes[row + begin] = x - begin + 1;
+      }
+    }
+  }
+}
+
+// Joins each row from a strip with the one above; the strip's own runs are touched by no other work-item. A work-item a
+// strip and view.
+kernel void join_strips(const ImageSize size, const float max_difference, const int strip_rows,
+                        global const float* disparity, global const ushort* runs, global uint* parents) {
+  const int strip = get_global_id(0);
+  const int view = get_global_id(1);
+  const int end = min((strip + 1) * strip_rows, size.height);
+  for (int y = strip * strip_rows + 1; y < end; ++y) {
+    const size_t row = ((size_t)view * size.height + y) * size.width;
+    const size_t above = row - size.width;
+    int run_before = NO_RUN;
+    int above_before = NO_RUN;
+    for (int x = 0; x < size.width; ++x) {
+      const bool joined = is_connected(disparity[row + x], disparity[above + x], max_difference);
+      const int run = joined ? runs[row + x] : NO_RUN;
+      const int run_above = joined ? runs[above + x] : NO_RUN;
+      if (joined && (run != run_before || run_above != above_before)) {
+        uint a = row + run;
+        uint b = above + run_above;
+        while (parents[a] != a) a = parents[a] = parents[parents[a]];
+        while (parents[b] != b) b = parents[b] = parents[parents[b]];
+        parents[max(a, b)] = min(a, b);
+      }
+      run_before = run;
+      above_before = run_above;
+    }
+  }
+}
+
+uint root_now(volatile global uint* parents, uint run) {
+  for (uint parent = atomic_or(&parents[run], 0u); parent != run; parent = atomic_or(&parents[run], 0u)) run = parent;
+  return run;
+}
+
+// Joins the first row of each strip but the first with the one above. A work-item a pixel of such rows.
+kernel void join_seams(const ImageSize size, const float max_difference, const int strip_rows,
+                       global const float* disparity, global const ushort* runs, volatile global uint* parents) {
+  const int x = get_global_id(0);
+  const int y = (get_global_id(1) + 1) * strip_rows;
+  const int view = get_global_id(2);
+  if (x >= size.width || y >= size.height) return;
+
+  const size_t row = ((size_t)view * size.height + y) * size.width;
+  const size_t above = row - size.width;
+  if (!is_connected(disparity[row + x], disparity[above + x], max_difference)) return;
+  const int run = runs[row + x];
+  const int run_above = runs[above + x];
+  if (x > 0 && runs[row + x - 1] == run && runs[above + x - 1] == run_above &&
+      is_connected(disparity[row + x - 1], disparity[above + x - 1], max_difference)) {
+    return;  // the pixel to the left joins the same two
+  }
+  // The larger root is hung below the smaller one; if another work-item has hung it elsewhere meanwhile, that is joined
+  // next.
+  uint a = row + run;
+  uint b = above + run_above;
+  while (true) {
+    a = root_now(parents, a);
+    b = root_now(parents, b);
+    if (a == b) break;
+    const uint larger = max(a, b);
+    const uint smaller = min(a, b);
+    const uint parent = atomic_min(&parents[larger], smaller);
+    if (parent == larger) break;
+    a = parent;
+    b = smaller;
+  }
+}
+
+// Adds every run to its root. Only roots are added to, and only others are read.
+kernel void measure(const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
+                    volatile global uint* sizes) {
+  const int x = get_global_id(0);
+  const int y = get_global_id(1);
+  const int view = get_global_id(2);
+  if (x >= size.width) return;
+
+  const size_t pixel = ((size_t)view * size.height + y) * size.width + x;
+  if (runs[pixel] != x) return;
+  uint root = pixel;
+  while (parents[root] != root) root = parents[root];
+  roots[pixel] = root;
+  if (root != pixel) atomic_add(&sizes[root], sizes[pixel]);
+}
+
+kernel void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
+                 global const uint* sizes, global float* disparity, global float* variance) {
+  const int x = get_global_id(0);
+  const int y = get_global_id(1);
+  const int view = get_global_id(2);
+  if (x >= size.width) return;
+
+  const size_t row = ((size_t)view * size.height + y) * size.width;
+  const int run = runs[row + x];
+  if (run == NO_RUN || sizes[roots[row + run]] > max_size) return;
+  disparity[row + x] = EGOSGM_INVALID_DISPARITY;
+  variance[row + x] = 0.0f;
+}
