@@ -69,8 +69,8 @@ TEST(HoleFill, LeavesJumpsWideGapsAndBorders) {
   }
 }
 
-// No hole of the middle row has valid neighbours in its row; the one in the middle gets them in its column by the first
-// pass. own.
+// The middle row has no hole with two neighbours of its own; those above and below are filled first, then its column
+// is.
 TEST(HoleFill, FillsRowsThenColumnsOnTheirResult) {
   EXPECT_EQ(fill_left({3, 3}, {8, kNone, 8,      //
                                9, kNone, kNone,  //
