@@ -37,13 +37,35 @@
 #define DIRECTIONS (PATHS / 2)
 #define MAX_STEPS 8
 
+// vload16 and vstore16 go byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on all.
+typedef struct __attribute__((packed)) {
+  uchar16 lanes;
+} Lanes;
+typedef struct __attribute__((packed)) {
+  ulong16 codes;
+} Codes;
+typedef struct __attribute__((packed)) {
+  ushort16 totals;
+} Totals;
+typedef struct __attribute__((packed)) {
+  ushort8 totals;
+} HalfTotals;
+
+inline uchar16 load(global const uchar* from) { return ((global const Lanes*)from)->lanes; }
+inline void store(const uchar16 lanes, global uchar* to) { ((global Lanes*)to)->lanes = lanes; }
+inline ulong16 load_codes(global const ulong* from) { return ((global const Codes*)from)->codes; }
+inline ushort8 load_totals(const ushort* from) { return ((const HalfTotals*)from)->totals; }
+inline void store_totals(const ushort16 totals, ushort* to) { ((Totals*)to)->totals = totals; }
+inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535); }
+
 constant uchar16 kLane = (uchar16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 
-inline uchar minimum(const uchar16 v) {
-  const uchar8 a = min(v.lo, v.hi);
-  const uchar4 b = min(a.lo, a.hi);
-  const uchar2 c = min(b.lo, b.hi);
-  return min(c.x, c.y);
+inline uchar minimum(uchar16 v) {
+  v = min(v, v.s89abcdef89abcdef);
+  v = min(v, v.s4567456745674567);
+  v = min(v, v.s2323232323232323);
+  v = min(v, v.s1111111111111111);
+  return v.s0;
 }
 
 // 255 in the lanes from `first` on, 0 in those before it.
@@ -52,11 +74,20 @@ inline uchar16 lanes_from(const int first) { return as_uchar16(kLane >= (uchar16
 // 65535 where a lane is 255; lanes are 0 or 255.
 inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
 
-inline ushort minimum_of_16(const ushort16 v) {
-  const ushort8 a = min(v.lo, v.hi);
-  const ushort4 b = min(a.lo, a.hi);
-  const ushort2 c = min(b.lo, b.hi);
-  return min(c.x, c.y);
+inline ushort minimum_of_totals(const ushort16 totals) {
+  ushort8 v = min(totals.lo, totals.hi);
+  v = min(v, v.s45674567);
+  v = min(v, v.s23232323);
+  v = min(v, v.s11111111);
+  return v.s0;
+}
+
+// Bits set in each code; compilers know this form and use what the device has.
+inline ulong16 bit_count(ulong16 x) {
+  x -= x >> (ulong16)(1) & (ulong16)(0x5555555555555555ul);
+  x = (x & (ulong16)(0x3333333333333333ul)) + (x >> (ulong16)(2) & (ulong16)(0x3333333333333333ul));
+  x = (x + (x >> (ulong16)(4))) & (ulong16)(0x0f0f0f0f0f0f0f0ful);
+  return x * (ulong16)(0x0101010101010101ul) >> (ulong16)(56);
 }
 
 // Matching cost of 16 disparities. `own` and `other` point at the pixel's code and at the first disparity's in their padded rows, which run in
@@ -67,12 +98,12 @@ inline uchar16 matching_cost(global const ulong* own, global const ulong* other,
   for (int dy = -1; dy <= 1; ++dy) {
     const long row = dy < 0 ? above : dy > 0 ? below : 0;
     for (int dx = -1; dx <= 1; ++dx) {
-      sum += convert_ushort16(abs_diff((ulong16)(own[row + dx]), vload16(0, other + row - dx)));
+      sum += convert_ushort16(abs_diff((ulong16)(own[row + dx]), load_codes(other + row - dx)));
     }
   }
   return convert_uchar16(min(sum / (ushort)9, (ushort16)(MAX_COST)));
 #else
-  return convert_uchar16(popcount((ulong16)(own[0]) ^ vload16(0, other)));
+  return convert_uchar16(bit_count((ulong16)(own[0]) ^ load_codes(other)));
 #endif
 }
 
@@ -83,7 +114,7 @@ inline uchar16 path_cost(const uchar16 cost, const uchar16 same, const uchar16 b
 
 // The same where the predecessor's costs lie in a slot, `from` at the first of the 16 disparities.
 inline uchar16 path_cost_from(global const uchar* from, const uchar16 cost, const uchar16 p1, const uchar16 p2) {
-  return path_cost(cost, vload16(0, from), vload16(0, from - 1), vload16(0, from + 1), p1, p2);
+  return path_cost(cost, load(from), load(from - 1), load(from + 1), p1, p2);
 }
 
 // The same where they are at hand and nothing lies beside them.
@@ -105,8 +136,8 @@ inline uchar16 half_sum(const uchar16* r) {
 // Makes what a predecessor with `band` left in a slot absent; `slot` at the range's first disparity.
 inline void wipe(global uchar* slot, const Band band, const int min_disparity) {
   global uchar* at = slot + (band.origin - min_disparity);
-  vstore16((uchar16)(ABSENT), 0, at);
-  for (int v = 1; v < band.chunks; ++v) vstore16((uchar16)(ABSENT), v, at);
+  store((uchar16)(ABSENT), at);
+  for (int v = 1; v < band.chunks; ++v) store((uchar16)(ABSENT), at + EGOSGM_LANES * v);
 }
 
 // Steps from the winner in one direction until the sums above the minimum add up to `limit`; `sums` are those of the steps.
@@ -132,14 +163,14 @@ inline void write_winner(const SgmParameters q, const Band band, const ushort* t
   const float offset = fits ? clamp((before - after) / (2.0f * slope), -0.5f, 0.5f) : 0.0f;
   *disparity = (float)(band.origin + lane) + offset;
 
-  const int steps = count_steps(vload8(0, at + 1), at[0], (ushort)q.s_max) + count_steps(vload8(0, at - 8).s76543210, at[0], (ushort)q.s_max);
+  const int steps = count_steps(load_totals(at + 1), at[0], (ushort)q.s_max) + count_steps(load_totals(at - MAX_STEPS).s76543210, at[0], (ushort)q.s_max);
   *variance = q.variance_floor + q.variance_per_step * (float)steps;
 }
 
 // The lane of the least total among [first, last] in its upper bits, the total in its lower: the smallest disparity wins a tie.
 inline int ranked(const ushort16 totals, const int first, const int last) {
   const ushort16 barred = widened(~lanes_from(first) | lanes_from(last + 1));
-  return minimum_of_16((totals << (ushort16)(4)) | convert_ushort16(kLane) | barred);
+  return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane) | barred);
 }
 
 inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns, global const ulong* codes,
@@ -158,7 +189,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
 
   uchar16 t[DIRECTIONS][MAX_CHUNKS];
   ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS];
-  vstore8((ushort8)(65535), 0, totals);
+  store_end(totals);
   const int step = backward ? -1 : 1;
 
   for (int row = 0; row < TILE_HEIGHT; ++row) {
@@ -207,16 +238,16 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
         for (int i = 0; i < DIRECTIONS; ++i) {
           r[i] = (r[i] - (uchar16)(minimum(r[i]))) | absent;
           if (i > 0 || lane != last_origin) wipe(slot[i], wiped[i], q.min_disparity);
-          vstore16(r[i], 0, slot[i] + lane);
+          store(r[i], slot[i] + lane);
         }
         last = r[0];
         last_origin = lane;
         const uchar16 sum = half_sum(r);
         if (!backward) {
-          vstore16(sum, 0, cells);
+          store(sum, cells);
         } else {
-          const ushort16 total = (convert_ushort16(sum) + convert_ushort16(vload16(0, cells))) | widened(absent);
-          vstore16(total, 0, totals + MAX_STEPS);
+          const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells))) | widened(absent);
+          store_totals(total, totals + MAX_STEPS);
           best = ranked(total, band.first - band.origin, band.last - band.origin) & 15;
         }
       } else {
@@ -245,14 +276,14 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
 #pragma unroll
           for (int i = 0; i < DIRECTIONS; ++i) {
             r[i] = (t[i][v] - least[i]) | absent;
-            vstore16(r[i], 0, slot[i] + at);
+            store(r[i], slot[i] + at);
           }
           const uchar16 sum = half_sum(r);
           if (!backward) {
-            vstore16(sum, v, cells);
+            store(sum, cells + EGOSGM_LANES * v);
           } else {
-            const ushort16 total = (convert_ushort16(sum) + convert_ushort16(vload16(v, cells))) | widened(absent);
-            vstore16(total, 0, totals + MAX_STEPS + EGOSGM_LANES * v);
+            const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells + EGOSGM_LANES * v))) | widened(absent);
+            store_totals(total, totals + MAX_STEPS + EGOSGM_LANES * v);
             const int first = band.first - band.origin - EGOSGM_LANES * v;
             const int key = ranked(total, first, first + band.last - band.first);
             best = min(best, (key >> 4) * (MAX_CHUNKS * EGOSGM_LANES) + EGOSGM_LANES * v + (key & 15));
@@ -261,7 +292,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
         best %= MAX_CHUNKS * EGOSGM_LANES;
       }
       if (backward) {
-        vstore8((ushort8)(65535), 0, totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
+        store_end(totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
         write_winner(q, band, totals, best, disparities + row_start + image_x, variances + row_start + image_x);
       }
 #pragma unroll
