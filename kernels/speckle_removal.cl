@@ -60,8 +60,29 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void find_runs(con
   }
 }
 
-// Joins each row from a strip with the one above; the strip's own runs are touched by no other work-item. A work-item a
-// strip and view.
+int16 are_connected(float16 a, float16 b, float max_difference) {
+  return a > EGOSGM_INVALID_DISPARITY & b > EGOSGM_INVALID_DISPARITY & fabs(a - b) <= max_difference;
+}
+
+// Bit i is set where lane i is.
+uint bits_of(int16 lanes) {
+  const int16 bits = lanes & (int16)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768);
+  const int8 bits8 = bits.lo | bits.hi;
+  const int4 bits4 = bits8.lo | bits8.hi;
+  return bits4.x | bits4.y | bits4.z | bits4.w;
+}
+
+int lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
+
+// Hangs the larger root below the smaller one.
+void join(global uint* parents, uint a, uint b) {
+  while (parents[a] != a) a = parents[a] = parents[parents[a]];
+  while (parents[b] != b) b = parents[b] = parents[parents[b]];
+  parents[max(a, b)] = min(a, b);
+}
+
+// Joins each row of a strip with the one above; the strip's own runs are touched by no other work-item. A work-item a
+// strip and view. Sixteen pixels at a time: few of them join what their left neighbour has not joined before them.
 kernel void join_strips(const ImageSize size, const float max_difference, const int strip_rows,
                         global const float* disparity, global const ushort* runs, global uint* parents) {
   const int strip = get_global_id(0);
@@ -70,21 +91,25 @@ kernel void join_strips(const ImageSize size, const float max_difference, const 
   for (int y = strip * strip_rows + 1; y < end; ++y) {
     const size_t row = ((size_t)view * size.height + y) * size.width;
     const size_t above = row - size.width;
-    int run_before = NO_RUN;
-    int above_before = NO_RUN;
-    for (int x = 0; x < size.width; ++x) {
-      const bool joined = is_connected(disparity[row + x], disparity[above + x], max_difference);
-      const int run = joined ? runs[row + x] : NO_RUN;
-      const int run_above = joined ? runs[above + x] : NO_RUN;
-      if (joined && (run != run_before || run_above != above_before)) {
-        uint a = row + run;
-        uint b = above + run_above;
-        while (parents[a] != a) a = parents[a] = parents[parents[a]];
-        while (parents[b] != b) b = parents[b] = parents[parents[b]];
-        parents[max(a, b)] = min(a, b);
+    int x = 0;
+    if (is_connected(disparity[row], disparity[above], max_difference))
+      join(parents, row + runs[row], above + runs[above]);
+    for (x = 1; x + 16 <= size.width; x += 16) {
+      const int16 joins =
+          are_connected(vload16(0, disparity + row + x), vload16(0, disparity + above + x), max_difference);
+      const int16 left_joins =
+          are_connected(vload16(0, disparity + row + x - 1), vload16(0, disparity + above + x - 1), max_difference);
+      const short16 same = vload16(0, runs + row + x) == vload16(0, runs + row + x - 1) &
+                           vload16(0, runs + above + x) == vload16(0, runs + above + x - 1);
+      for (uint left = bits_of(joins & ~(left_joins & convert_int16(same))); left != 0; left &= left - 1) {
+        const size_t lane = x + lowest_bit(left);
+        join(parents, row + runs[row + lane], above + runs[above + lane]);
       }
-      run_before = run;
-      above_before = run_above;
+    }
+    for (; x < size.width; ++x) {
+      if (is_connected(disparity[row + x], disparity[above + x], max_difference)) {
+        join(parents, row + runs[row + x], above + runs[above + x]);
+      }
     }
   }
 }
