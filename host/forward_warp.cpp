@@ -75,21 +75,27 @@ ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Ca
       calibration_(calibration),
       process_noise_px2_(options.process_noise_px2),
       range_(range),
+      move_(build(context), "move"),
       splat_disparity_(build(context), "splat_disparity"),
       splat_variance_(build(context), "splat_variance"),
       decode_(build(context), "decode"),
+      landed_(context, 2 * pixel_count(size)),
+      moved_key_(context, 2 * pixel_count(size)),
+      moved_variance_(context, 2 * pixel_count(size)),
       zbuffer_(context, 2 * pixel_count(size)) {}
 
 void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted) {
   context_.enter("ForwardWarp");
-  const shared::DisparityMotion left = disparity_motion(calibration_, current_from_previous, EGOSGM_LEFT);
-  const shared::DisparityMotion right = disparity_motion(calibration_, current_from_previous, EGOSGM_RIGHT);
   const ocl::Range pixels = ocl::every_pixel(context_, size_);
   zbuffer_.fill(context_, 0);
   predicted.variance.fill(context_, 0.0f);
-  splat_disparity_(context_, pixels, size_, range_, left, right, belief.disparity, zbuffer_);
-  splat_variance_(context_, pixels, size_, range_, left, right, process_noise_px2_, belief.disparity, belief.variance,
-                  zbuffer_, predicted.variance);
+  for (const cl_int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
+    const shared::DisparityMotion motion = disparity_motion(calibration_, current_from_previous, view);
+    move_(context_, ocl::every_pixel(context_, size_, 1), size_, range_, view, motion, process_noise_px2_,
+          belief.disparity, belief.variance, landed_, moved_key_, moved_variance_);
+  }
+  splat_disparity_(context_, pixels, size_, landed_, moved_key_, zbuffer_);
+  splat_variance_(context_, pixels, size_, landed_, moved_key_, moved_variance_, zbuffer_, predicted.variance);
   decode_(context_, pixels, size_, zbuffer_, predicted.disparity);
 }
 

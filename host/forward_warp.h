@@ -26,20 +26,24 @@ class ForwardWarp {
   void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted);
 
  private:
-  template <typename... Params>
-  using WarpKernel = ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const shared::DisparityMotion,
-                                 const shared::DisparityMotion, Params...>;
-
   ocl::Context& context_;
   const shared::ImageSize size_;
   const Calibration calibration_;
   const float process_noise_px2_;
   const shared::DisparityRange range_;
-  WarpKernel<const ocl::Buffer<float>, ocl::Buffer<cl_uint>> splat_disparity_;
-  WarpKernel<const float, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<cl_uint>,
-             ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const cl_int, const shared::DisparityMotion,
+              const float, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<cl_int>,
+              ocl::Buffer<cl_uint>, ocl::Buffer<float>>
+      move_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uint>>
+      splat_disparity_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, const ocl::Buffer<float>,
+              const ocl::Buffer<cl_uint>, ocl::Buffer<float>>
       splat_variance_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uint>, ocl::Buffer<float>> decode_;
+  ocl::Buffer<cl_int> landed_;
+  ocl::Buffer<cl_uint> moved_key_;
+  ocl::Buffer<float> moved_variance_;
   ocl::Buffer<cl_uint> zbuffer_;
 };
 

@@ -14,10 +14,9 @@ kernel void check(const ImageSize size, const float max_difference, global const
 
   const float d = disparity[i];
   // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
-  const float at = view == EGOSGM_LEFT ? (float)x - d : (float)x + d;
-  const bool near = d > EGOSGM_INVALID_DISPARITY && at > -1.0f && at < (float)size.width;
-  const int other_x = convert_int_rte(near ? at : -1.0f);
-  const bool inside = other_x >= 0 && other_x < size.width;
+  const float at = rint(view == EGOSGM_LEFT ? (float)x - d : (float)x + d);
+  const bool inside = (d > EGOSGM_INVALID_DISPARITY) & (at >= 0.0f) & (at < (float)size.width);
+  const int other_x = (int)(inside ? at : 0.0f);
   const float other = inside ? disparity[other_row + other_x] : EGOSGM_INVALID_DISPARITY;
   const bool agree = other > EGOSGM_INVALID_DISPARITY && fabs(other - d) <= max_difference;
 

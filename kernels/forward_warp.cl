@@ -19,23 +19,23 @@ static inline float row_times(const float* row, const float wx, const float wy, 
 }
 
 // Combines conditions with & for CPUs: without branches, the loop over a work-group's pixels becomes vector code.
-static inline Landing land(const ImageSize size, const DisparityRange range, const DisparityMotion* motion, const int x,
+static inline Landing land(const ImageSize size, const DisparityRange range, const DisparityMotion motion, const int x,
                            const int y, const float disparity) {
-  const float wx = (float)x - motion->cx;
-  const float wy = (float)y - motion->cy;
-  const float wd = disparity + motion->doffs;
-  const float w = row_times(motion->w, wx, wy, wd);
+  const float wx = (float)x - motion.cx;
+  const float wy = (float)y - motion.cy;
+  const float wd = disparity + motion.doffs;
+  const float w = row_times(motion.w, wx, wy, wd);
 
   Landing landing;
   landing.phi = 1.0f / w;
-  landing.u = row_times(motion->x, wx, wy, wd) * landing.phi;
-  landing.v = row_times(motion->y, wx, wy, wd) * landing.phi;
+  landing.u = row_times(motion.x, wx, wy, wd) * landing.phi;
+  landing.v = row_times(motion.y, wx, wy, wd) * landing.phi;
   landing.metric_disparity = wd * landing.phi;
-  landing.disparity = landing.metric_disparity - motion->doffs + 0.0f;  // + 0: there is one zero only
+  landing.disparity = landing.metric_disparity - motion.doffs + 0.0f;  // + 0: there is one zero only
 
   // Asked of the floats, with comparisons that NaN fails, before any of them becomes an integer.
-  const float target_x = rint(landing.u + motion->cx);
-  const float target_y = rint(landing.v + motion->cy);
+  const float target_x = rint(landing.u + motion.cx);
+  const float target_y = rint(landing.v + motion.cy);
   const int lands = (disparity > EGOSGM_INVALID_DISPARITY) & (w > EGOSGM_MIN_DEPTH_RATIO) & (target_x >= 0.0f) &
                     (target_x < (float)size.width) & (target_y >= 0.0f) & (target_y < (float)size.height) &
                     (landing.disparity >= (float)range.min) &
@@ -47,17 +47,17 @@ static inline Landing land(const ImageSize size, const DisparityRange range, con
 
 // Variance of the predicted disparity by the motion's covariance: (d'^2 / (fx b))^2 Var(Z'), Z' = (1, X', Y') form,
 // with X' and Y' multiplied out so that nothing is divided by a disparity near zero.
-static inline float motion_variance(const DisparityMotion* motion, const Landing landing) {
+static inline float motion_variance(const DisparityMotion motion, const Landing landing) {
   const float d = landing.metric_disparity;
-  const float a = d * d / motion->fx_baseline;
-  const float bx = d * landing.u / motion->fx;
-  const float by = d * landing.v / motion->fy;
-  const float q = a * a * motion->noise_1 + a * bx * motion->noise_x + a * by * motion->noise_y +
-                  bx * bx * motion->noise_xx + bx * by * motion->noise_xy + by * by * motion->noise_yy;
+  const float a = d * d / motion.fx_baseline;
+  const float bx = d * landing.u / motion.fx;
+  const float by = d * landing.v / motion.fy;
+  const float q = a * a * motion.noise_1 + a * bx * motion.noise_x + a * by * motion.noise_y +
+                  bx * bx * motion.noise_xx + bx * by * motion.noise_xy + by * by * motion.noise_yy;
   return q < 0.0f ? 0.0f : q;  // rounding
 }
 
-static inline float predicted_variance(const DisparityMotion* motion, const Landing landing, const float variance,
+static inline float predicted_variance(const DisparityMotion motion, const Landing landing, const float variance,
                                        const float process_noise) {
   const float p = landing.phi * landing.phi * variance + process_noise + motion_variance(motion, landing);
   return p < EGOSGM_MAX_VARIANCE_PX2 ? p : EGOSGM_MAX_VARIANCE_PX2;
@@ -71,48 +71,41 @@ static inline uint key_of(const float disparity) {
 
 static inline float disparity_of(const uint key) { return as_float(key >> 31 ? key & 0x7fffffffu : ~key); }
 
-kernel void splat_disparity(const ImageSize size, const DisparityRange range, const DisparityMotion left,
-                            const DisparityMotion right, global const float* disparity, global uint* zbuffer) {
+// landed: the index of a source's target in its view, -1: nowhere. Apart from the atomics, which are no vector code on
+// CPUs.
+kernel void move(const ImageSize size, const DisparityRange range, const int view, const DisparityMotion motion,
+                 const float process_noise, global const float* disparity, global const float* variance,
+                 global int* landed, global uint* moved_key, global float* moved_variance) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);
-  const int view = get_global_id(2);
-  const size_t first = (size_t)view * size.width * size.height;
-
-  int target = -1;
-  uint key = 0;
-  if (x < size.width) {
-    const DisparityMotion* motion = view == EGOSGM_LEFT ? &left : &right;
-    const Landing landing = land(size, range, motion, x, y, disparity[first + (size_t)y * size.width + x]);
-    target = landing.target;
-    key = key_of(landing.disparity);
-  }
-  // For CPUs: what comes before becomes vector code, what comes after cannot.
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (target >= 0) atomic_max(&zbuffer[first + target], key);
+  if (x >= size.width) return;
+  const size_t i = ((size_t)view * size.height + y) * size.width + x;
+  const Landing landing = land(size, range, motion, x, y, disparity[i]);
+  landed[i] = landing.target;
+  moved_key[i] = key_of(landing.disparity);
+  moved_variance[i] = predicted_variance(motion, landing, variance[i], process_noise);
 }
 
-kernel void splat_variance(const ImageSize size, const DisparityRange range, const DisparityMotion left,
-                           const DisparityMotion right, const float process_noise, global const float* disparity,
-                           global const float* variance, global const uint* zbuffer, global float* predicted) {
+kernel void splat_disparity(const ImageSize size, global const int* landed, global const uint* moved_key,
+                            global uint* zbuffer) {
   const int x = get_global_id(0);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
-  const size_t first = (size_t)view * size.width * size.height;
+  if (x >= size.width) return;
+  const size_t first = (size_t)get_global_id(2) * size.width * size.height;
+  const size_t i = first + (size_t)get_global_id(1) * size.width + x;
+  const int target = landed[i];
+  if (target >= 0) atomic_max(&zbuffer[first + target], moved_key[i]);
+}
 
-  int target = -1;
-  uint key = 0;
-  float p = 0.0f;
-  if (x < size.width) {
-    const DisparityMotion* motion = view == EGOSGM_LEFT ? &left : &right;
-    const size_t source = first + (size_t)y * size.width + x;
-    const Landing landing = land(size, range, motion, x, y, disparity[source]);
-    target = landing.target;
-    key = key_of(landing.disparity);
-    p = predicted_variance(motion, landing, variance[source], process_noise);
-  }
-  barrier(CLK_LOCAL_MEM_FENCE);
-  // Positive floats are ordered as their bits are.
-  if (target >= 0 && zbuffer[first + target] == key) atomic_max((global uint*)predicted + first + target, as_uint(p));
+// Positive floats are ordered as their bits are.
+kernel void splat_variance(const ImageSize size, global const int* landed, global const uint* moved_key,
+                           global const float* moved_variance, global const uint* zbuffer, global float* variance) {
+  const int x = get_global_id(0);
+  if (x >= size.width) return;
+  const size_t first = (size_t)get_global_id(2) * size.width * size.height;
+  const size_t i = first + (size_t)get_global_id(1) * size.width + x;
+  const int target = landed[i];
+  if (target < 0 || zbuffer[first + target] != moved_key[i]) return;
+  atomic_max((global uint*)variance + first + target, as_uint(moved_variance[i]));
 }
 
 kernel void decode(const ImageSize size, global const uint* zbuffer, global float* disparity) {
