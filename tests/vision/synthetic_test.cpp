@@ -41,14 +41,22 @@ Range around(const cv::Mat& map, double x, double y) {
   return {low, high};
 }
 
-/// How a map, moved by the camera's motion alone, agrees with the next frame's map.
+double linear(const cv::Mat& image, double x, double y) {
+  const int x0 = std::min(static_cast<int>(x), image.cols - 2), y0 = std::min(static_cast<int>(y), image.rows - 2);
+  const double a = x - x0, b = y - y0;
+  return (1 - b) * ((1 - a) * image.at<uint8_t>(y0, x0) + a * image.at<uint8_t>(y0, x0 + 1)) +
+         b * ((1 - a) * image.at<uint8_t>(y0 + 1, x0) + a * image.at<uint8_t>(y0 + 1, x0 + 1));
+}
+
+/// How a map, moved by the camera's motion alone, agrees with a later frame's map.
 struct WarpCounts {
   int moved = 0, agree = 0, seen_through = 0;  // seen_through: nothing is there where a surface must be
+  double grey_difference = 0;                  // mean over the pixels that agree
 };
-WarpCounts warp_left(const SyntheticSequence& sequence, int frame, bool moving_pixels) {
+WarpCounts warp_left(const SyntheticSequence& sequence, int first, int second, bool moving_pixels) {
   const Calibration c = sequence.calibration();
-  const SyntheticFrame from = sequence.render(frame - 1), to = sequence.render(frame);
-  const Eigen::Isometry3d motion = sequence.motion(frame).current_from_previous;
+  const SyntheticFrame from = sequence.render(first), to = sequence.render(second);
+  const Eigen::Isometry3d motion = sequence.world_from_camera(second).inverse() * sequence.world_from_camera(first);
   const double fb = c.fx * c.baseline_m;
   WarpCounts counts;
   for (int y = 0; y < from.left.rows; ++y) {
@@ -60,30 +68,44 @@ WarpCounts warp_left(const SyntheticSequence& sequence, int frame, bool moving_p
       if (p.z() <= 0 || u < 0 || v < 0 || u > from.left.cols - 1 || v > from.left.rows - 1) continue;
       const Range there = around(to.left_disparity, u, v);
       ++counts.moved;
-      counts.agree += d > there.low - 0.02 && d < there.high + 0.02;
+      if (d > there.low - 0.02 && d < there.high + 0.02) {
+        ++counts.agree;
+        counts.grey_difference += std::abs(from.left.at<uint8_t>(y, x) - linear(to.left, u, v));
+      }
       counts.seen_through += d > there.high + 0.02;
     }
   }
+  counts.grey_difference /= std::max(1, counts.agree);
   return counts;
 }
 
 TEST(Synthetic, MotionCarriesDisparityIntoTheNextFrame) {
   SyntheticOptions options = small_options();
-  options.turn_deg = 2.7;
+  options.turn_deg = 2.7, options.noise_grey = 0;
   const SyntheticSequence sequence(options);
   for (const int frame : {1, 6, 11}) {
-    const WarpCounts counts = warp_left(sequence, frame, false);
+    const WarpCounts counts = warp_left(sequence, frame - 1, frame, false);
     EXPECT_GT(counts.moved, 20000) << "frame " << frame;
     EXPECT_GT(counts.agree, 0.97 * counts.moved) << "frame " << frame;
     EXPECT_LT(counts.seen_through, 0.005 * counts.moved) << "frame " << frame;
+    EXPECT_LT(counts.grey_difference, 6) << "frame " << frame;
+    EXPECT_TRUE(sequence.motion(frame).current_from_previous.isApprox(
+        sequence.world_from_camera(frame).inverse() * sequence.world_from_camera(frame - 1), 1e-9));
   }
+}
+
+TEST(Synthetic, DepthIsMetricOverALongBaseline) {
+  const WarpCounts counts = warp_left(SyntheticSequence(small_options()), 0, 8, false);
+  EXPECT_GT(counts.moved, 10000);
+  EXPECT_GT(counts.agree, 0.88 * counts.moved);
+  EXPECT_LT(counts.seen_through, 0.01 * counts.moved);
 }
 
 TEST(Synthetic, MovingVehiclesContradictTheCamerasMotionAndTheRestDoesNot) {
   SyntheticOptions options = small_options();
   options.moving_object = true;
   const SyntheticSequence sequence(options);
-  const WarpCounts moving = warp_left(sequence, 8, true), still = warp_left(sequence, 8, false);
+  const WarpCounts moving = warp_left(sequence, 7, 8, true), still = warp_left(sequence, 7, 8, false);
   EXPECT_GT(moving.moved, 200);
   EXPECT_LT(moving.agree, 0.5 * moving.moved);
   EXPECT_GT(still.agree, 0.95 * still.moved);
@@ -98,23 +120,24 @@ TEST(Synthetic, MovingMaskIsEmptyWithoutTheOption) {
   const SyntheticFrame moving = SyntheticSequence(options).render(4);
   EXPECT_GT(cv::countNonZero(moving.left_moving), 200);
   EXPECT_GT(cv::countNonZero(moving.right_moving), 200);
+  options.frames = 100;  // one of them stays ahead of the camera
+  for (const int frame : {29, 60, 99}) {
+    EXPECT_GT(cv::countNonZero(SyntheticSequence(options).render(frame).left_moving), 200) << "frame " << frame;
+  }
   options.moving_object_scale = 5;
   const SyntheticFrame large = SyntheticSequence(options).render(4);
   EXPECT_GT(cv::countNonZero(large.left_moving), 0.3 * large.left.total());
 }
 
 /// Mean |left(x) - right(x - d - error)| over pixels that both cameras see, right linearly interpolated.
-double photometric_difference(const SyntheticFrame& frame, double error_px) {
+double photometric_difference(const SyntheticFrame& frame, int first_row, int last_row, double error_px) {
   double sum = 0;
   int count = 0;
-  for (int y = 0; y < frame.left.rows; ++y) {
+  for (int y = first_row; y < last_row; ++y) {
     for (int x = 0; x < frame.left.cols; ++x) {
       const double there = x - frame.left_disparity.at<float>(y, x) - error_px;
       if (!frame.left_noc.at<uint8_t>(y, x) || there < 0 || there >= frame.left.cols - 1) continue;
-      const int x0 = static_cast<int>(there);
-      const double part = there - x0;
-      sum += std::abs(frame.left.at<uint8_t>(y, x) - (1 - part) * frame.right.at<uint8_t>(y, x0) -
-                      part * frame.right.at<uint8_t>(y, x0 + 1));
+      sum += std::abs(frame.left.at<uint8_t>(y, x) - linear(frame.right, there, y));
       ++count;
     }
   }
@@ -125,11 +148,14 @@ TEST(Synthetic, ImagesAgreeAtTheTrueDisparity) {
   SyntheticOptions options = small_options();
   options.noise_grey = 0;
   const SyntheticFrame frame = SyntheticSequence(options).render(3);
-  const double at_truth = photometric_difference(frame, 0);
-  EXPECT_LT(at_truth, 5.0);
-  EXPECT_GT(photometric_difference(frame, 1), 1.5 * at_truth);
-  EXPECT_GT(photometric_difference(frame, -1), 1.5 * at_truth);
-  EXPECT_GT(photometric_difference(frame, 3), 2 * at_truth);
+  for (const int row : {0, 40, 80}) {  // sky and roofs, the far street, the road
+    const double at_truth = photometric_difference(frame, row, row + 40, 0);
+    EXPECT_LT(at_truth, 7.0) << "from row " << row;
+    for (const double error_px : {-3, -1, 1, 3}) {
+      EXPECT_GT(photometric_difference(frame, row, row + 40, error_px), 1.25 * at_truth)
+          << "row " << row << ", " << error_px;
+    }
+  }
 }
 
 void expect_views_agree(const cv::Mat& map, const cv::Mat& noc, const cv::Mat& other, int towards_other) {
