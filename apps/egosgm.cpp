@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program: arguments in, files out. One file a subcommand.
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <new>
+
+#include "apps/command.h"
+#include "apps/suggestion.h"
+#include "egosgm/error.h"
+
+namespace egosgm::app {
+namespace {
+
+int fail(int code, std::string message) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  fmt::print(stderr, "egosgm: error: {}\n", message);
+  return code;
+}
+
+const CLI::App& chosen_command(const CLI::App& program) {
+  const auto chosen = program.get_subcommands();
+  return chosen.empty() ? program : *chosen.front();
+}
+
+std::vector<std::string> names_known_to(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  for (const CLI::App* sub : command.get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(sub->get_name());
+  return names;
+}
+
+std::string help_hint(const CLI::App& command) {
+  return command.get_parent() ? "egosgm " + command.get_name() + " --help" : "egosgm --help";
+}
+
+int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
+  const CLI::App& command = chosen_command(program);
+  const std::vector<std::string> unknown = program.remaining(true);
+  if (unknown.empty()) return fail(kBadInput, fmt::format("{}: see `{}`", error.what(), help_hint(command)));
+  const std::string typed = unknown.front().substr(0, unknown.front().find('='));
+  const std::string nearest = suggestion(typed, names_known_to(command));
+  return fail(kBadInput,
+              fmt::format("{} \"{}\": {}see `{}`", typed.starts_with("-") ? "unknown option" : "unexpected argument",
+                          typed, nearest.empty() ? "" : "did you mean " + nearest + "? ", help_hint(command)));
+}
+
+/// A result that the standard output did not take, for example for a full disk, is no result.
+int flushed(int code) {
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
+  return fail(kFailed, "the standard output cannot be written: is its disk full or its reader gone?");
+}
+
+int run_program(int argc, char** argv) {
+  CLI::App program(
+      "Dense disparity from stereo video: predicts each frame's disparity from the last one and the camera's motion,\n"
+      "searches only where the prediction says, and runs on any OpenCL device.",
+      "egosgm");
+  program.set_version_flag("--version", "egosgm " EGOSGM_VERSION);
+  program.require_subcommand(1);
+  program.get_formatter()->column_width(38);
+  program.footer(
+      "Try it:\n"
+      "  egosgm synth --out street\n"
+      "  egosgm run --odometry street --out result --write color\n"
+      "  egosgm eval --estimate result --truth street/truth/left_disp_noc\n"
+      "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.");
+  const Command commands[] = {add_run(program),   add_eval(program),     add_devices(program),
+                              add_synth(program), add_odometry(program), add_eval_poses(program)};
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() == 0) return flushed(program.exit(error));  // --help, --version
+    return refuse_arguments(program, error);
+  }
+  const auto chosen =
+      std::find_if(std::begin(commands), std::end(commands), [](const Command& c) { return c.arguments->parsed(); });
+  return flushed(chosen->run());
+}
+
+}  // namespace
+}  // namespace egosgm::app
+
+int main(int argc, char** argv) {
+  using namespace egosgm;
+  using namespace egosgm::app;
+  try {
+    return run_program(argc, argv);
+  } catch (const InvalidArgument& error) {
+    return fail(kBadInput, error.what());
+  } catch (const IoError& error) {
+    return fail(kFailed, error.what());
+  } catch (const DeviceError& error) {
+    return fail(kFailed, fmt::format("{} (OpenCL status {})", error.what(), error.code()));
+  } catch (const std::bad_alloc&) {
+    return fail(kFailed, "out of memory: choose smaller images or fewer --disparities");
+  } catch (const std::exception& error) {
+    return fail(kFailed, fmt::format("{} (this is a defect of the program: please report it)", error.what()));
+  }
+}

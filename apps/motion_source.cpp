@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/motion_source.h"
+
+#include <chrono>
+
+#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/poses_io.h"
+
+namespace egosgm::app {
+
+MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file) {
+  if (poses_file.empty()) {
+    odometry_.emplace(sequence.calibration);
+  } else {
+    poses_ = vision::poses_of_frames(sequence, poses_file);
+  }
+}
+
+FrameMotion MotionSource::next(const vision::StereoImages& images) {
+  FrameMotion result;
+  if (odometry_) {
+    estimate(images, result);
+  } else {
+    take_from_file(result);
+  }
+  ++frame_;
+  return result;
+}
+
+void MotionSource::take_from_file(FrameMotion& result) {
+  result.from_file = true;
+  result.first_from_camera = poses_.front().inverse() * poses_[frame_];
+  if (frame_ == 0) return;
+  result.motion.emplace();
+  result.motion->current_from_previous = vision::current_from_previous(poses_[frame_ - 1], poses_[frame_]);
+}
+
+void MotionSource::estimate(const vision::StereoImages& images, FrameMotion& result) {
+  const auto start = std::chrono::steady_clock::now();
+  result.odometry = odometry_->process(vision::image_view(images.left), vision::image_view(images.right));
+  result.odometry_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+  result.motion = result.odometry.motion;
+  if (result.motion) last_motion_ = result.motion->current_from_previous;
+  if (frame_ > 0) first_from_camera_ = first_from_camera_ * last_motion_.inverse();
+  result.first_from_camera = first_from_camera_;
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "egosgm/motion.h"
+#include "egosgm/vision/dataset.h"
+#include "egosgm/vision/odometry.h"
+
+namespace egosgm::app {
+
+/// How the camera came to a frame.
+struct FrameMotion {
+  std::optional<Motion> motion;  // from the previous frame; none in the first frame
+  bool from_file = false;        // else estimated:
+  vision::OdometryResult odometry;
+  double odometry_ms = 0;
+  Eigen::Isometry3d first_from_camera = Eigen::Isometry3d::Identity();  // the pose in the first frame's system
+};
+
+/// The motion of one frame after the other: from a file of poses, or by stereo odometry. A frame where odometry found
+/// none repeats the last motion in its pose, and only there. Not thread-safe.
+class MotionSource {
+ public:
+  /// Reads `poses_file`; empty: estimates. Throws InvalidArgument.
+  MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file);
+
+  /// REQUIRES: called for frames 0, 1, 2, ... of the sequence.
+  FrameMotion next(const vision::StereoImages& images);
+
+ private:
+  void take_from_file(FrameMotion& result);
+  void estimate(const vision::StereoImages& images, FrameMotion& result);
+
+  std::vector<Eigen::Isometry3d> poses_;
+  std::optional<vision::StereoOdometry> odometry_;
+  std::size_t frame_ = 0;
+  Eigen::Isometry3d first_from_camera_ = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d last_motion_ = Eigen::Isometry3d::Identity();
+};
+
+}  // namespace egosgm::app

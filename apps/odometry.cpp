@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/core.h>
+
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/interrupt.h"
+#include "apps/motion_source.h"
+#include "apps/progress.h"
+#include "apps/sequence_arguments.h"
+#include "egosgm/vision/poses_io.h"
+
+namespace egosgm::app {
+namespace {
+
+struct OdometryArguments {
+  SequenceArguments input;
+  std::string out;
+  bool quiet = false;
+};
+
+void tell(const vision::StereoFrame& frame, const FrameMotion& motion, bool first, Progress& progress) {
+  const vision::OdometryResult& odometry = motion.odometry;
+  if (!first && !odometry.motion)
+    progress.note(fmt::format("frame {}: no motion ({}): the last one is repeated", frame.name, odometry.reason));
+  const double travel_m = odometry.motion ? odometry.motion->current_from_previous.translation().norm() : 0;
+  progress.done(fmt::format("frame {}  {:5d} inliers  {:6.3f} m  {:.0f} ms", frame.name, odometry.inliers, travel_m,
+                            motion.odometry_ms));
+}
+
+int estimate(const OdometryArguments& arguments) {
+  const vision::StereoSequence sequence = arguments.input.open();
+  vision::check_image_sizes(sequence);
+  MotionSource motions(sequence, {});
+  std::vector<Eigen::Isometry3d> poses;
+  catch_interrupts();
+  {
+    Progress progress(static_cast<int>(sequence.frames.size()), arguments.quiet);
+    for (const vision::StereoFrame& frame : sequence.frames) {
+      if (interrupted()) break;
+      const FrameMotion motion = motions.next(vision::read_images(frame));
+      tell(frame, motion, poses.empty(), progress);
+      poses.push_back(motion.first_from_camera);
+    }
+  }
+  if (!poses.empty()) vision::write_poses(arguments.out, poses);
+  if (poses.size() == sequence.frames.size()) return kOk;
+  fmt::print(stderr, "egosgm: interrupted after {} of {} frames\n", poses.size(), sequence.frames.size());
+  return kInterrupted;
+}
+
+}  // namespace
+
+Command add_odometry(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("odometry", "Estimate the camera's poses alone, without matching");
+  auto arguments = std::make_shared<OdometryArguments>();
+  arguments->input.add_to_with_positional(*command);
+  command
+      ->add_option("--out", arguments->out, "file to write: KITTI poses, camera-to-world, relative to the first frame")
+      ->type_name("FILE")
+      ->required();
+  command->add_flag("--quiet", arguments->quiet, "no progress, only errors");
+  return {command, [arguments] { return estimate(*arguments); }};
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/option_arguments.h"
+
+#include <fmt/core.h>
+
+#include <sstream>
+#include <utility>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+
+namespace egosgm::app {
+namespace {
+
+constexpr std::size_t kMaxConfigBytes = 1 << 20;
+
+PipelineOptions preset_named(const std::string& name) {
+  if (name == "default") return {};
+  if (name == "paper") return PipelineOptions::paper();
+  throw InvalidArgument("--preset \"" + name + "\": choose default or paper");
+}
+
+/// An option's value as TOML writes it: names are quoted, numbers and truth values are not.
+std::string toml_value(const std::string& value) {
+  const bool bare =
+      value == "true" || value == "false" || value.find_first_not_of("+-.0123456789e") == std::string::npos;
+  return bare ? value : '"' + value + '"';
+}
+
+std::string toml_of(const PipelineOptions& options) {
+  std::string text = "# Options of egosgm run: read back with --config.\n";
+  for (const auto& [name, value] : list_options(options)) text += name + " = " + toml_value(value) + '\n';
+  return text;
+}
+
+void apply_config(PipelineOptions& options, const std::string& file) {
+  std::istringstream text(vision::read_file(file, kMaxConfigBytes));
+  std::vector<CLI::ConfigItem> items;
+  try {
+    items = CLI::ConfigTOML().from_config(text);
+  } catch (const CLI::Error& error) {
+    throw InvalidArgument(file + ": " + error.what() + ": write one `stage.option = value` a line");
+  }
+  for (const CLI::ConfigItem& item : items) {
+    if (item.name == "++" || item.name == "--") continue;  // CLI11's marks of where a section begins and ends
+    if (item.inputs.size() != 1) throw InvalidArgument(file + ": " + item.fullname() + " needs one value");
+    try {
+      set_option(options, item.fullname(), item.inputs.front());
+    } catch (const InvalidArgument& error) {
+      throw InvalidArgument(file + ": " + error.what());
+    }
+  }
+}
+
+void apply_setting(PipelineOptions& options, const std::string& setting) {
+  const auto equals = setting.find('=');
+  if (equals == std::string::npos) throw InvalidArgument("--set " + setting + ": write --set stage.option=value");
+  set_option(options, setting.substr(0, equals), setting.substr(equals + 1));
+}
+
+std::string stage_options_help() {
+  const auto defaults = list_options(PipelineOptions{});
+  const auto paper = list_options(PipelineOptions::paper());
+  std::string text =
+      fmt::format("Options of the stages, for --set and --config:\n  {:<38} {:<12} {}\n", "name", "default", "paper");
+  for (std::size_t i = 0; i < defaults.size(); ++i) {
+    text += fmt::format("  {:<38} {:<12} {}\n", defaults[i].name, defaults[i].value,
+                        paper[i].value == defaults[i].value ? "" : paper[i].value);
+  }
+  return text;
+}
+
+}  // namespace
+
+void OptionArguments::add_to(CLI::App& command) {
+  const char* group = "Method";
+  const PipelineOptions defaults;
+  command.add_option("--preset", preset, "default: the best known; paper: the choices of Fucek et al. 2017 [default]")
+      ->type_name("default|paper")
+      ->group(group);
+  command.add_option("--search", search, "search where the prediction says, or everywhere [band]")
+      ->type_name("band|full")
+      ->group(group);
+  command.add_option("--temporal", temporal, "off: the plain single-frame matcher, full range [on]")
+      ->type_name("on|off")
+      ->group(group);
+  command
+      .add_option("--paths", paths, fmt::format("paths of the semi-global aggregation [{}]", defaults.banded_sgm.paths))
+      ->type_name("4|8")
+      ->group(group);
+  command
+      .add_option("--disparities", disparities,
+                  fmt::format("number D of disparities; the range is [min, min + D) px [{}]", defaults.disparities))
+      ->type_name("N")
+      ->group(group);
+  command
+      .add_option("--min-disparity", min_disparity,
+                  fmt::format("least disparity, of either sign, px [{}]", defaults.min_disparity))
+      ->type_name("N")
+      ->group(group);
+  command.add_option("--set", settings, "set an option of a stage (list below); may be repeated")
+      ->type_name("stage.option=value")
+      ->allow_extra_args(false)
+      ->group(group);
+  command.add_option("--config", config, "read options from a file, `stage.option = value` a line (TOML)")
+      ->type_name("FILE")
+      ->group(group);
+  command.add_option("--save-config", save_config, "write the options in use to such a file")
+      ->type_name("FILE")
+      ->group(group);
+  command.footer([] { return stage_options_help(); });
+}
+
+PipelineOptions OptionArguments::options() const {
+  PipelineOptions options = preset_named(preset);
+  if (!config.empty()) apply_config(options, config);
+  for (const std::string& setting : settings) apply_setting(options, setting);
+  const std::pair<const char*, const std::string&> named[] = {{"search", search},
+                                                              {"temporal", temporal},
+                                                              {"banded_sgm.paths", paths},
+                                                              {"disparities", disparities},
+                                                              {"min_disparity", min_disparity}};
+  for (const auto& [name, value] : named) {
+    if (!value.empty()) set_option(options, name, value);
+  }
+  options.validate();
+  if (!save_config.empty()) vision::write_file(save_config, toml_of(options));
+  return options;
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "egosgm/options.h"
+
+namespace egosgm::app {
+
+/// The arguments that choose the pipeline's options. They apply in this order, the last one wins: --preset, --config,
+/// --set, and those with a name of their own (--search, --disparities, ...).
+struct OptionArguments {
+  std::string preset = "default", config, save_config;
+  std::vector<std::string> settings;
+  std::string search, temporal, paths, disparities, min_disparity;
+
+  void add_to(CLI::App& command);
+  /// Reads --config, writes --save-config. Throws InvalidArgument, naming the option (and the file), or IoError.
+  PipelineOptions options() const;
+};
+
+}  // namespace egosgm::app

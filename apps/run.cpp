@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/core.h>
+
+#include <chrono>
+#include <filesystem>
+#include <future>
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/interrupt.h"
+#include "apps/motion_source.h"
+#include "apps/option_arguments.h"
+#include "apps/progress.h"
+#include "apps/run_outputs.h"
+#include "apps/run_report.h"
+#include "apps/sequence_arguments.h"
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/poses_io.h"
+
+namespace egosgm::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+struct RunArguments {
+  SequenceArguments input;
+  OptionArguments method;
+  std::string out, poses, device, write;
+  bool interpolate = false, quiet = false;
+};
+
+/// What a frame needs before the device can start.
+struct PreparedFrame {
+  vision::StereoImages images;
+  FrameMotion motion;
+  double read_ms = 0;
+};
+
+class Run {
+ public:
+  explicit Run(const RunArguments& arguments)
+      : quiet_(arguments.quiet),
+        folder_(arguments.out),
+        sequence_(arguments.input.open()),
+        size_(vision::check_image_sizes(sequence_)),
+        motions_(sequence_, arguments.poses),
+        options_(arguments.method.options()),
+        device_(Device::select(arguments.device)),
+        outputs_(folder_, kinds_of(arguments), size_),
+        pipeline_(sequence_.calibration, size_.width, size_.height, options_, device_),
+        report_(sequence_, pipeline_, arguments.method.preset, size_.width, size_.height) {}
+
+  int operator()() {
+    catch_interrupts();
+    try {
+      const bool finished = process_all();
+      finish(finished, finished ? "" : "an interrupt");
+      if (!finished) {
+        fmt::print(stderr, "egosgm: interrupted after {} of {} frames: what is in {} is whole\n", poses_.size(),
+                   sequence_.frames.size(), folder_.string());
+      }
+      return finished ? kOk : kInterrupted;
+    } catch (const std::exception& error) {
+      finish_after(error);
+      throw;
+    }
+  }
+
+ private:
+  static std::set<std::string> kinds_of(const RunArguments& arguments) {
+    std::set<std::string> kinds = parse_write_list(arguments.write);
+    if (arguments.interpolate) kinds.insert("interpolated");
+    return kinds;
+  }
+
+  bool process_all() {
+    // On a CPU device the next frame's odometry would only take the kernels' cores, and spoil their times.
+    const bool ahead = pipeline_.device().info().type != "CPU";
+    const auto policy = ahead ? std::launch::async : std::launch::deferred;
+    Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
+    auto next = std::async(policy, [this] { return prepare(0); });
+    for (std::size_t i = 0; i < sequence_.frames.size(); ++i) {
+      if (interrupted()) return false;
+      const auto start = Clock::now();
+      const PreparedFrame frame = next.get();
+      if (i + 1 < sequence_.frames.size()) next = std::async(policy, [this, i] { return prepare(i + 1); });
+      process(sequence_.frames[i], frame, start, progress);
+    }
+    if (!quiet_) summary_ = fmt::format("{:.1f} frames/s", progress.frames_per_second());
+    return true;
+  }
+
+  PreparedFrame prepare(std::size_t i) {
+    const auto start = Clock::now();
+    PreparedFrame frame{.images = vision::read_images(sequence_.frames[i])};
+    frame.read_ms = ms_since(start);
+    if (frame.images.left.size() != size_) {
+      throw InvalidArgument(fmt::format("{} is {}x{} and the sequence {}x{}: all frames need one size",
+                                        sequence_.frames[i].left.string(), frame.images.left.cols,
+                                        frame.images.left.rows, size_.width, size_.height));
+    }
+    frame.motion = motions_.next(frame.images);
+    return frame;
+  }
+
+  void process(const vision::StereoFrame& frame, const PreparedFrame& prepared, Clock::time_point start,
+               Progress& progress) {
+    const FrameReport result =
+        pipeline_.process(vision::image_view(prepared.images.left), vision::image_view(prepared.images.right),
+                          prepared.motion.motion, outputs_.views());
+    const auto before_write = Clock::now();
+    const std::int64_t unstorable = outputs_.write(frame);
+    const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(start)};
+    report_.add(frame, result, prepared.motion, times, unstorable);
+    poses_.push_back(prepared.motion.first_from_camera);
+    tell(frame, result, prepared.motion, unstorable, progress);
+  }
+
+  void tell(const vision::StereoFrame& frame, const FrameReport& result, const FrameMotion& motion,
+            std::int64_t unstorable, Progress& progress) {
+    if (poses_.size() > 1 && !motion.motion) {
+      progress.note(
+          fmt::format("frame {}: no motion ({}): searched the full range", frame.name, motion.odometry.reason));
+    }
+    if (unstorable > 0 && !warned_of_range_) {
+      warned_of_range_ = true;
+      progress.note(fmt::format(
+          "frame {}: {} disparities lie outside KITTI's PNG (0 to 256 px) and are missing there: add --write pfm",
+          frame.name, unstorable));
+    }
+    progress.done(fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms{}", frame.name,
+                              100 * result.search_fraction, 100 * result.density, result.total_ms,
+                              result.full_range ? "  (full range: " + result.full_range_reason + ")" : ""));
+  }
+
+  void finish(bool finished, const std::string& why_not) {
+    if (!poses_.empty()) vision::write_poses(folder_ / "poses.txt", poses_);
+    report_.write(folder_ / "report.json", finished, why_not);
+    if (!finished || quiet_) return;
+    fmt::print("{}, {} frames, {}x{}, on {}\n", sequence_.title, poses_.size(), size_.width, size_.height,
+               pipeline_.device().info().name);
+    fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
+               100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.string());
+  }
+
+  /// The first error counts; that the report cannot be written either adds nothing.
+  void finish_after(const std::exception& error) {
+    try {
+      finish(false, error.what());
+    } catch (const std::exception&) {
+    }
+  }
+
+  const bool quiet_;
+  const std::filesystem::path folder_;
+  const vision::StereoSequence sequence_;
+  const cv::Size size_;
+  MotionSource motions_;
+  const PipelineOptions options_;
+  const Device device_;
+  RunOutputs outputs_;
+  Pipeline pipeline_;
+  RunReport report_;
+  std::vector<Eigen::Isometry3d> poses_;
+  std::string summary_;
+  bool warned_of_range_ = false;
+};
+
+}  // namespace
+
+Command add_run(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("run", "Disparity and variance for every frame of a stereo sequence");
+  auto arguments = std::make_shared<RunArguments>();
+  arguments->input.add_to(*command);
+  const char* group = "Output";
+  command
+      ->add_option("--out", arguments->out,
+                   "folder to write: disparity/NNNNNN.png (KITTI's format), poses.txt, report.json")
+      ->type_name("DIR")
+      ->group(group)
+      ->required();
+  command->add_option("--write", arguments->write, kWriteListHelp)->type_name("LIST")->group(group);
+  command->add_flag("--interpolate", arguments->interpolate, "fill holes from the background, into OUT/interpolated")
+      ->group(group);
+  command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
+  arguments->method.add_to(*command);
+  command
+      ->add_option("--poses", arguments->poses,
+                   "take the motion from KITTI poses (camera-to-world) in place of stereo odometry")
+      ->type_name("FILE")
+      ->group("Method");
+  command
+      ->add_option("--device", arguments->device,
+                   "OpenCL device: number, cpu, gpu, or part of its name; see egosgm devices")
+      ->type_name("NAME")
+      ->group("Method");
+  return {command, [arguments] { return Run(*arguments)(); }};
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/run_outputs.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "apps/suggestion.h"
+#include "egosgm/error.h"
+#include "egosgm/vision/disparity_io.h"
+#include "egosgm/vision/evaluation.h"
+#include "egosgm/vision/file_io.h"
+#include "egosgm/vision/image_io.h"
+
+namespace egosgm::app {
+namespace {
+
+const std::vector<std::string> kKinds{"variance", "color",        "predicted", "measured",
+                                      "right",    "interpolated", "search",    "pfm"};
+
+MapView<std::uint16_t> width_view(cv::Mat& map) {
+  return {map.ptr<std::uint16_t>(), map.cols, map.rows, static_cast<std::ptrdiff_t>(map.step)};
+}
+
+}  // namespace
+
+const char* const kWriteListHelp =
+    "more to write, separated by commas: variance (px^2, PFM), color (pictures), predicted, measured, right, "
+    "interpolated "
+    "(KITTI PNG), search (disparities searched at each pixel, 16-bit PNG), pfm (disparity as float)";
+
+std::set<std::string> parse_write_list(const std::string& list) {
+  std::set<std::string> kinds;
+  std::istringstream stream(list);
+  for (std::string kind; std::getline(stream, kind, ',');) {
+    if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end()) {
+      const std::string nearest = suggestion(kind, kKinds);
+      std::string all;
+      for (const std::string& known : kKinds) all += (all.empty() ? "" : ", ") + known;
+      throw InvalidArgument(fmt::format("--write \"{}\": {}choose from {}", kind,
+                                        nearest.empty() ? "" : "did you mean " + nearest + "? ", all));
+    }
+    kinds.insert(kind);
+  }
+  return kinds;
+}
+
+RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size)
+    : folder_(std::move(folder)), kinds_(std::move(kinds)), disparity_(size, CV_32FC1) {
+  vision::make_folder(folder_ / "disparity");
+  for (const std::string& kind : kinds_) vision::make_folder(folder_ / kind);
+  if (wants("variance")) variance_.create(size, CV_32FC1);
+  if (wants("right")) right_.create(size, CV_32FC1);
+  if (wants("predicted")) predicted_.create(size, CV_32FC1);
+  if (wants("measured")) measured_.create(size, CV_32FC1);
+  if (wants("search")) search_.create(size, CV_16UC1);
+}
+
+FrameOutputs RunOutputs::views() {
+  FrameOutputs outputs;
+  outputs.disparity = vision::map_view(disparity_);
+  if (!variance_.empty()) outputs.variance = vision::map_view(variance_);
+  if (!right_.empty()) outputs.right_disparity = vision::map_view(right_);
+  if (!predicted_.empty()) outputs.predicted = vision::map_view(predicted_);
+  if (!measured_.empty()) outputs.measured = vision::map_view(measured_);
+  if (!search_.empty()) outputs.search_width = width_view(search_);
+  return outputs;
+}
+
+std::int64_t RunOutputs::write(const vision::StereoFrame& frame) {
+  if (wants("variance")) vision::write_pfm(file("variance", frame, ".pfm"), variance_);
+  if (wants("pfm")) vision::write_pfm(file("pfm", frame, ".pfm"), disparity_);
+  if (wants("predicted")) vision::write_disparity_png(file("predicted", frame), predicted_);
+  if (wants("measured")) vision::write_disparity_png(file("measured", frame), measured_);
+  if (wants("right")) vision::write_disparity_png(file("right", frame), right_);
+  if (wants("search")) vision::write_png(file("search", frame), search_);
+  if (wants("interpolated")) {
+    vision::write_disparity_png(file("interpolated", frame), vision::interpolate_background(disparity_));
+  }
+  if (wants("color")) {
+    if (!color_range_) color_range_ = vision::disparity_range(disparity_);
+    vision::write_png(file("color", frame), vision::color_disparity(disparity_, *color_range_));
+  }
+  return vision::write_disparity_png(file("disparity", frame), disparity_);  // last: a frame with it is complete
+}
+
+std::filesystem::path RunOutputs::file(const char* kind, const vision::StereoFrame& frame,
+                                       const char* extension) const {
+  return folder_ / kind / (frame.name + extension);
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "egosgm/pipeline.h"
+#include "egosgm/vision/dataset.h"
+#include "egosgm/vision/render.h"
+
+namespace egosgm::app {
+
+/// What `egosgm run` can write beside OUT/disparity, each into a folder of its own, a file a frame.
+std::set<std::string> parse_write_list(const std::string& list);
+/// The same, as --help and the README describe it.
+extern const char* const kWriteListHelp;
+
+/// The maps of one frame and the files that they go to. Every file appears whole or not at all.
+class RunOutputs {
+ public:
+  /// Makes the folders. Throws IoError.
+  RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size);
+
+  /// Where the pipeline is to write; valid as long as this object lives.
+  FrameOutputs views();
+
+  /// Writes the frame that the views hold. Returns how many disparities KITTI's PNG has no room for.
+  std::int64_t write(const vision::StereoFrame& frame);
+
+ private:
+  bool wants(const char* kind) const { return kinds_.contains(kind); }
+  std::filesystem::path file(const char* kind, const vision::StereoFrame& frame, const char* extension = ".png") const;
+
+  const std::filesystem::path folder_;
+  const std::set<std::string> kinds_;
+  cv::Mat disparity_, variance_, right_, predicted_, measured_, search_;
+  std::optional<vision::ColorRange> color_range_;  // the first frame's, so that colours do not flicker
+};
+
+}  // namespace egosgm::app

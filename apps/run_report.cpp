@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/run_report.h"
+
+#include <fmt/core.h>
+
+#include "egosgm/vision/file_io.h"
+
+namespace egosgm::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json typed(const std::string& value) {
+  Json parsed = Json::parse(value, nullptr, /*allow_exceptions=*/false);
+  return parsed.is_discarded() ? Json(value) : parsed;
+}
+
+Json json_of(const PipelineOptions& options) {
+  Json json = Json::object();
+  for (const auto& [name, value] : list_options(options)) json[name] = typed(value);
+  return json;
+}
+
+Json json_of(const DeviceInfo& info) {
+  return {{"name", info.name},
+          {"type", info.type},
+          {"vendor", info.vendor},
+          {"platform", info.platform},
+          {"version", info.version},
+          {"driver", info.driver},
+          {"compute_units", info.compute_units}};
+}
+
+Json json_of(const Calibration& c) {
+  return {
+      {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}, {"baseline_m", c.baseline_m}, {"doffs_px", c.doffs_px}};
+}
+
+Json odometry_json(const FrameMotion& motion) {
+  Json json{{"source", motion.from_file ? "poses file" : "estimated"}};
+  if (!motion.from_file) {
+    json["features"] = motion.odometry.features;
+    json["matches"] = motion.odometry.matches;
+    json["inliers"] = motion.odometry.inliers;
+    json["reprojection_rms_px"] = motion.odometry.reprojection_rms_px;
+    json["reason"] = motion.odometry.reason;
+  }
+  json["motion"] = motion.motion ? app::json_of(motion.motion->current_from_previous) : Json();
+  return json;
+}
+
+/// A stage that runs more than once in a frame (the consistency checks) has its times added up.
+Json times_json(const FrameReport& report, const FrameMotion& motion, const HostTimes& times) {
+  Json json = Json::object();
+  for (const StageTime& stage : report.stages) json[stage.stage] = json.value(stage.stage, 0.0) + stage.ms;
+  json["total"] = report.total_ms;
+  json["odometry"] = motion.odometry_ms;
+  json["read"] = times.read_ms;
+  json["write"] = times.write_ms;
+  json["wall"] = times.wall_ms;
+  return json;
+}
+
+}  // namespace
+
+nlohmann::ordered_json json_of(const Eigen::Isometry3d& motion) {
+  const Eigen::Vector3d& t = motion.translation();
+  Json matrix = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) matrix.push_back(motion.matrix()(row, column));
+  }
+  constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+  return {{"translation_m", {t.x(), t.y(), t.z()}},
+          {"rotation_deg", Eigen::AngleAxisd(motion.rotation()).angle() * kDegrees},
+          {"current_from_previous", matrix}};
+}
+
+RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& preset,
+                     int width, int height) {
+  const DeviceInfo& device = pipeline.device().info();
+  json_ = {{"program", "egosgm"},
+           {"version", EGOSGM_VERSION},
+           {"input", sequence.title},
+           {"width", width},
+           {"height", height},
+           {"calibration", json_of(sequence.calibration)},
+           {"device", json_of(device)},
+           {"driver", device.driver},
+           {"device_memory_bytes", pipeline.device_memory_bytes()},
+           {"preset", preset},
+           {"options", json_of(pipeline.options())},
+           {"finished", false},
+           {"frames", Json::array()}};
+}
+
+void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
+                    const HostTimes& times, std::int64_t unstorable) {
+  json_["frames"].push_back({{"frame", frame.number},
+                             {"search_fraction", report.search_fraction},
+                             {"computed_fraction", report.computed_fraction},
+                             {"predicted_fraction", report.predicted_fraction},
+                             {"density", report.density},
+                             {"full_range", report.full_range},
+                             {"full_range_reason", report.full_range_reason},
+                             {"odometry", odometry_json(motion)},
+                             {"launches", report.launches},
+                             {"outside_png_range", unstorable},
+                             {"ms", times_json(report, motion, times)}});
+}
+
+void RunReport::write(const std::filesystem::path& file, bool finished, const std::string& why_not) {
+  json_["finished"] = finished;
+  if (!finished) json_["stopped_by"] = why_not;
+  vision::write_file(file, json_.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
+}
+
+double RunReport::mean(const char* figure) const {
+  double sum = 0;
+  for (const Json& frame : json_["frames"]) sum += frame[figure].get<double>();
+  return json_["frames"].empty() ? 0 : sum / static_cast<double>(json_["frames"].size());
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "apps/motion_source.h"
+#include "egosgm/pipeline.h"
+#include "egosgm/vision/dataset.h"
+
+namespace egosgm::app {
+
+/// Host times of a frame beside those of the pipeline.
+struct HostTimes {
+  double read_ms = 0, write_ms = 0;
+  double wall_ms = 0;  // from frame to frame
+};
+
+/// OUT/report.json: what ran, on what, and what every frame gave.
+class RunReport {
+ public:
+  RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& preset, int width,
+            int height);
+
+  void add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
+           const HostTimes& times, std::int64_t unstorable);
+
+  /// `finished`: whether all frames ran; else `why_not` says what stopped them. Throws IoError.
+  void write(const std::filesystem::path& file, bool finished, const std::string& why_not = {});
+
+  double mean(const char* figure) const;
+
+ private:
+  nlohmann::ordered_json json_;
+};
+
+/// A motion as JSON: translation [m], rotation angle [deg], and the 3x4 matrix current_from_previous, row-major.
+nlohmann::ordered_json json_of(const Eigen::Isometry3d& current_from_previous);
+
+}  // namespace egosgm::app

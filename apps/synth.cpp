@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/core.h>
+
+#include "apps/command.h"
+#include "apps/progress.h"
+#include "egosgm/vision/synthetic.h"
+
+namespace egosgm::app {
+namespace {
+
+struct SynthArguments {
+  std::string out;
+  vision::SyntheticOptions options;
+  bool quiet = false;
+};
+
+int render(const SynthArguments& arguments) {
+  arguments.options.validate();
+  {
+    Progress progress(arguments.options.frames, arguments.quiet);
+    vision::write_sequence(arguments.options, arguments.out, [&](int done, int frames) {
+      progress.done(fmt::format("rendered {} of {}", done, frames));
+    });
+  }
+  if (!arguments.quiet) {
+    fmt::print("{} frames in {}: egosgm run --odometry {} --out OUT\n", arguments.options.frames, arguments.out,
+               arguments.out);
+  }
+  return kOk;
+}
+
+}  // namespace
+
+Command add_synth(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("synth", "Render a synthetic stereo sequence with exact disparity, masks and poses");
+  auto arguments = std::make_shared<SynthArguments>();
+  vision::SyntheticOptions& options = arguments->options;
+  command->add_option("--out", arguments->out, "folder to write, in the layout of KITTI odometry, with truth/ beside")
+      ->type_name("DIR")
+      ->required();
+  command->add_option("--frames", options.frames, "number of frames")->type_name("N")->capture_default_str();
+  command->add_option("--width", options.width, "image width [px]")->type_name("W")->capture_default_str();
+  command->add_option("--height", options.height, "image height [px]")->type_name("H")->capture_default_str();
+  command->add_option("--seed", options.seed, "seed of street, texture and noise")
+      ->type_name("S")
+      ->capture_default_str();
+  command->add_flag("--moving-object", options.moving_object, "vehicles that move on their own");
+  command->add_option("--speed", options.speed_m, "travel per frame [m]")->type_name("M")->capture_default_str();
+  command->add_option("--turn", options.turn_deg, "largest turn per frame [deg]")
+      ->type_name("DEG")
+      ->capture_default_str();
+  command->add_option("--noise", options.noise_grey, "sensor noise, standard deviation [grey values]")
+      ->type_name("G")
+      ->capture_default_str();
+  command->add_flag("--quiet", arguments->quiet, "no progress");
+  return {command, [arguments] { return render(*arguments); }};
+}
+
+}  // namespace egosgm::app
