@@ -21,9 +21,10 @@ class HoleFill {
   ocl::Context& context_;
   const shared::ImageSize size_;
   const float max_difference_px_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
-              ocl::Buffer<float>, ocl::Buffer<float>>
-      fill_;
+  using FillKernel = ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>,
+                                 const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>;
+  FillKernel fill_rows_, fill_columns_;
+  StereoMaps rows_filled_;
 };
 
 }  // namespace egosgm

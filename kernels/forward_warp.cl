@@ -6,63 +6,6 @@
 // work-items run.
 #include "shared.h"
 
-// What becomes of a source. target: its index in its view, -1: nowhere. u, v: where it lands, relative to the principal
-// point.
-typedef struct {
-  int target;
-  float u, v;
-  float disparity, metric_disparity, phi;
-} Landing;
-
-static inline float row_times(const float* row, const float wx, const float wy, const float wd) {
-  return row[0] * wx + row[1] * wy + row[2] * wd + row[3];
-}
-
-// Combines conditions with & for CPUs: without branches, the loop over a work-group's pixels becomes vector code.
-static inline Landing land(const ImageSize size, const DisparityRange range, const DisparityMotion motion, const int x,
-                           const int y, const float disparity) {
-  const float wx = (float)x - motion.cx;
-  const float wy = (float)y - motion.cy;
-  const float wd = disparity + motion.doffs;
-  const float w = row_times(motion.w, wx, wy, wd);
-
-  Landing landing;
-  landing.phi = 1.0f / w;
-  landing.u = row_times(motion.x, wx, wy, wd) * landing.phi;
-  landing.v = row_times(motion.y, wx, wy, wd) * landing.phi;
-  landing.metric_disparity = wd * landing.phi;
-  landing.disparity = landing.metric_disparity - motion.doffs + 0.0f;  // + 0: there is one zero only
-
-  // Asked of the floats, with comparisons that NaN fails, before any of them becomes an integer.
-  const float target_x = rint(landing.u + motion.cx);
-  const float target_y = rint(landing.v + motion.cy);
-  const int lands = (disparity > EGOSGM_INVALID_DISPARITY) & (w > EGOSGM_MIN_DEPTH_RATIO) & (target_x >= 0.0f) &
-                    (target_x < (float)size.width) & (target_y >= 0.0f) & (target_y < (float)size.height) &
-                    (landing.disparity >= (float)range.min) &
-                    (landing.disparity <= (float)(range.min + range.count - 1));
-  const int target = (int)(lands ? target_y : 0.0f) * size.width + (int)(lands ? target_x : 0.0f);
-  landing.target = lands ? target : -1;
-  return landing;
-}
-
-// Variance of the predicted disparity by the motion's covariance: (d'^2 / (fx b))^2 Var(Z'), Z' = (1, X', Y') form,
-// with X' and Y' multiplied out so that nothing is divided by a disparity near zero.
-static inline float motion_variance(const DisparityMotion motion, const Landing landing) {
-  const float d = landing.metric_disparity;
-  const float a = d * d / motion.fx_baseline;
-  const float bx = d * landing.u / motion.fx;
-  const float by = d * landing.v / motion.fy;
-  const float q = a * a * motion.noise_1 + a * bx * motion.noise_x + a * by * motion.noise_y +
-                  bx * bx * motion.noise_xx + bx * by * motion.noise_xy + by * by * motion.noise_yy;
-  return q < 0.0f ? 0.0f : q;  // rounding
-}
-
-static inline float predicted_variance(const DisparityMotion motion, const Landing landing, const float variance,
-                                       const float process_noise) {
-  const float p = landing.phi * landing.phi * variance + process_noise + motion_variance(motion, landing);
-  return p < EGOSGM_MAX_VARIANCE_PX2 ? p : EGOSGM_MAX_VARIANCE_PX2;
-}
-
 // Unsigned integers that are ordered as the floats are; 0 is none of them.
 static inline uint key_of(const float disparity) {
   const uint bits = as_uint(disparity);
@@ -71,8 +14,20 @@ static inline uint key_of(const float disparity) {
 
 static inline float disparity_of(const uint key) { return as_float(key >> 31 ? key & 0x7fffffffu : ~key); }
 
-// landed: the index of a source's target in its view, -1: nowhere. Apart from the atomics, which are no vector code on
-// CPUs.
+// Variance of the predicted disparity by the motion's covariance: (d'^2 / (fx b))^2 Var(Z'), a form in (1, X', Y'),
+// with X' and Y' multiplied out so that nothing is divided by a disparity near zero. u, v: relative to the principal
+// point.
+static inline float motion_variance(const DisparityMotion motion, const float u, const float v, const float d) {
+  const float a = d * d / motion.fx_baseline;
+  const float bx = d * u / motion.fx;
+  const float by = d * v / motion.fy;
+  const float q = a * a * motion.noise_1 + a * bx * motion.noise_x + a * by * motion.noise_y +
+                  bx * bx * motion.noise_xx + bx * by * motion.noise_xy + by * by * motion.noise_yy;
+  return q < 0.0f ? 0.0f : q;  // rounding
+}
+
+// Moves a view's disparity space. landed: the index of a source's target in the view, -1: nowhere.
+// For CPUs it is apart from the atomics, which are no vector code, and free of branches.
 kernel void move(const ImageSize size, const DisparityRange range, const int view, const DisparityMotion motion,
                  const float process_noise, global const float* disparity, global const float* variance,
                  global int* landed, global uint* moved_key, global float* moved_variance) {
@@ -80,10 +35,28 @@ kernel void move(const ImageSize size, const DisparityRange range, const int vie
   const int y = get_global_id(1);
   if (x >= size.width) return;
   const size_t i = ((size_t)view * size.height + y) * size.width + x;
-  const Landing landing = land(size, range, motion, x, y, disparity[i]);
-  landed[i] = landing.target;
-  moved_key[i] = key_of(landing.disparity);
-  moved_variance[i] = predicted_variance(motion, landing, variance[i], process_noise);
+
+  const float wx = (float)x - motion.cx;
+  const float wy = (float)y - motion.cy;
+  const float wd = disparity[i] + motion.doffs;
+  const float w = motion.w[0] * wx + motion.w[1] * wy + motion.w[2] * wd + motion.w[3];
+  const float phi = 1.0f / w;
+  const float u = (motion.x[0] * wx + motion.x[1] * wy + motion.x[2] * wd + motion.x[3]) * phi;
+  const float v = (motion.y[0] * wx + motion.y[1] * wy + motion.y[2] * wd + motion.y[3]) * phi;
+  const float metric_disparity = wd * phi;
+  const float moved = metric_disparity - motion.doffs + 0.0f;  // + 0: there is one zero only
+
+  // Asked of the floats, with comparisons that NaN fails, before any of them becomes an integer.
+  const float target_x = rint(u + motion.cx);
+  const float target_y = rint(v + motion.cy);
+  const int lands = (disparity[i] > EGOSGM_INVALID_DISPARITY) & (w > EGOSGM_MIN_DEPTH_RATIO) & (target_x >= 0.0f) &
+                    (target_x < (float)size.width) & (target_y >= 0.0f) & (target_y < (float)size.height) &
+                    (moved >= (float)range.min) & (moved <= (float)(range.min + range.count - 1));
+  const int target = (int)(lands ? target_y : 0.0f) * size.width + (int)(lands ? target_x : 0.0f);
+  landed[i] = lands ? target : -1;
+  moved_key[i] = key_of(moved);
+  const float p = phi * phi * variance[i] + process_noise + motion_variance(motion, u, v, metric_disparity);
+  moved_variance[i] = p < EGOSGM_MAX_VARIANCE_PX2 ? p : EGOSGM_MAX_VARIANCE_PX2;
 }
 
 kernel void splat_disparity(const ImageSize size, global const int* landed, global const uint* moved_key,

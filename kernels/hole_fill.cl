@@ -4,46 +4,42 @@
 // both.
 #include "shared.h"
 
-typedef struct {
-  float disparity, variance;
-} Estimate;
+static inline int is_valid(const float disparity) { return disparity > EGOSGM_INVALID_DISPARITY; }
 
-Estimate estimate_at(global const float* disparity, global const float* variance, const size_t i, const bool exists) {
-  Estimate estimate;
-  estimate.disparity = exists ? disparity[i] : EGOSGM_INVALID_DISPARITY;
-  estimate.variance = exists ? variance[i] : 0.0f;
-  return estimate;
+static inline int is_gap(const float centre, const float before, const float after, const float gamma) {
+  return (centre <= EGOSGM_INVALID_DISPARITY) & is_valid(before) & is_valid(after) & (fabs(before - after) < gamma);
 }
 
-Estimate fill_between(const Estimate centre, const Estimate before, const Estimate after, const float gamma) {
-  const bool fills = !(centre.disparity > EGOSGM_INVALID_DISPARITY) && before.disparity > EGOSGM_INVALID_DISPARITY &&
-                     after.disparity > EGOSGM_INVALID_DISPARITY && fabs(before.disparity - after.disparity) < gamma;
-  Estimate filled;
-  filled.disparity = fills ? 0.5f * (before.disparity + after.disparity) : centre.disparity;
-  const float larger = before.variance > after.variance ? before.variance : after.variance;
-  filled.variance = fills ? larger : centre.variance;
-  return filled;
+static inline float mean_of(const float a, const float b) { return 0.5f * (a + b); }
+static inline float larger_of(const float a, const float b) { return a > b ? a : b; }
+
+kernel void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
+                      global const float* variance, global float* filled_disparity, global float* filled_variance) {
+  const int x = get_global_id(0);
+  if (x >= size.width) return;
+  const size_t i = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width + x;
+  const int has_left = x >= 1;
+  const int has_right = x + 1 < size.width;
+
+  const float left = has_left ? disparity[i - 1] : EGOSGM_INVALID_DISPARITY;
+  const float right = has_right ? disparity[i + 1] : EGOSGM_INVALID_DISPARITY;
+  const float left_variance = has_left ? variance[i - 1] : 0.0f;
+  const float right_variance = has_right ? variance[i + 1] : 0.0f;
+  const int fills = is_gap(disparity[i], left, right, gamma);
+  filled_disparity[i] = fills ? mean_of(left, right) : disparity[i];
+  filled_variance[i] = fills ? larger_of(left_variance, right_variance) : variance[i];
 }
 
-Estimate fill_in_row(const ImageSize size, const float gamma, global const float* disparity,
-                     global const float* variance, const size_t i, const int x, const bool exists) {
-  return fill_between(estimate_at(disparity, variance, i, exists),
-                      estimate_at(disparity, variance, i - 1, exists && x >= 1),
-                      estimate_at(disparity, variance, i + 1, exists && x + 1 < size.width), gamma);
-}
-
-kernel void fill(const ImageSize size, const float gamma, global const float* disparity, global const float* variance,
-                 global float* filled_disparity, global float* filled_variance) {
+kernel void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
+                         global const float* variance, global float* filled_disparity, global float* filled_variance) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   if (x >= size.width) return;
   const size_t i = ((size_t)get_global_id(2) * size.height + y) * size.width + x;
-  const size_t row = size.width;
+  const size_t above = y >= 1 ? i - size.width : i;  // at the border the pixel itself, which is valid or no neighbour
+  const size_t below = y + 1 < size.height ? i + size.width : i;
 
-  const Estimate above = fill_in_row(size, gamma, disparity, variance, i - row, x, y >= 1);
-  const Estimate centre = fill_in_row(size, gamma, disparity, variance, i, x, true);
-  const Estimate below = fill_in_row(size, gamma, disparity, variance, i + row, x, y + 1 < size.height);
-  const Estimate filled = fill_between(centre, above, below, gamma);
-  filled_disparity[i] = filled.disparity;
-  filled_variance[i] = filled.variance;
+  const int fills = is_gap(disparity[i], disparity[above], disparity[below], gamma);
+  filled_disparity[i] = fills ? mean_of(disparity[above], disparity[below]) : disparity[i];
+  filled_variance[i] = fills ? larger_of(variance[above], variance[below]) : variance[i];
 }
