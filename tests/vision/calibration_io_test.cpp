@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/calibration_io.h"
+
+#include <gtest/gtest.h>
+
+#include "egosgm/vision/file_io.h"
+#include "tests/vision/data_folder.h"
+#include "tests/vision/expect_refused.h"
+#include "tests/vision/temporary_folder.h"
+
+namespace egosgm::vision {
+namespace {
+
+const std::string kP0 = "700 0 600 0 0 710 180 0 0 0 1 0";
+const std::string kP1 = "700 0 600 -350 0 710 180 0 0 0 1 0";
+const std::string kP2 = "700 0 610 70 0 710 190 0.2 0 0 1 0.003";
+const std::string kP3 = "700 0 615 -210 0 710 190 2.1 0 0 1 0.003";
+const std::string kOwn = "fx = 700\nfy = 710\ncx = 600\ncy = 180\nbaseline_m = 0.5\n";
+
+void expect_calibration(const Calibration& c, double cx, double cy, double baseline_m, double doffs_px) {
+  EXPECT_DOUBLE_EQ(c.fx, 700);
+  EXPECT_DOUBLE_EQ(c.fy, 710);
+  EXPECT_DOUBLE_EQ(c.cx, cx);
+  EXPECT_DOUBLE_EQ(c.cy, cy);
+  EXPECT_DOUBLE_EQ(c.baseline_m, baseline_m);
+  EXPECT_DOUBLE_EQ(c.doffs_px, doffs_px);
+}
+
+class CalibrationIo : public ::testing::Test {
+ protected:
+  Calibration read(const std::string& text, KittiCameras cameras = KittiCameras::kAny) {
+    write_file(file_, text);
+    return read_calibration(file_, cameras);
+  }
+  void expect_text_refused(const std::string& text, std::initializer_list<std::string> parts) {
+    expect_refused([&] { read(text); }, parts);
+    expect_refused([&] { read(text); }, {file_.string()});
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path file_ = folder_ / "calib.txt";
+};
+
+TEST_F(CalibrationIo, OdometryRowsChooseTheCameras) {
+  const std::string text = "P0: " + kP0 + "\r\nP1: " + kP1 + "\r\nP2: " + kP2 + "\nP3: " + kP3 + "\nTr: 1 2 3\n";
+  expect_calibration(read(text), 600, 180, 0.5, 0);
+  expect_calibration(read(text, KittiCameras::kGrey), 600, 180, 0.5, 0);
+  expect_calibration(read(text, KittiCameras::kColor), 610, 190, 0.4, 5);
+  expect_calibration(read("P2: " + kP2 + "\nP3: " + kP3), 610, 190, 0.4, 5);
+}
+
+TEST_F(CalibrationIo, RawRowsChooseTheCameras) {
+  const std::string text = "calib_time: 09-Jan-2012 13:57:47\nP_rect_00: " + kP0 + "\nR_00: 1 2\nP_rect_01: " + kP1 +
+                           "\nP_rect_02: " + kP2 + "\nP_rect_03: " + kP3 + "\n";
+  expect_calibration(read(text), 600, 180, 0.5, 0);
+  expect_calibration(read(text, KittiCameras::kColor), 610, 190, 0.4, 5);
+}
+
+TEST_F(CalibrationIo, MiddleburyIsInMillimetres) {
+  const std::string text =
+      "cam0=[700 0 600; 0 710 180; 0 0 1]\ncam1=[700 0 630.5; 0 710 180; 0 0 1]\ndoffs=30.5\nbaseline=500\nwidth=10\n";
+  expect_calibration(read(text), 600, 180, 0.5, 30.5);
+}
+
+TEST_F(CalibrationIo, OwnFormatIsTomlOrYaml) {
+  expect_calibration(read(kOwn), 600, 180, 0.5, 0);
+  expect_calibration(
+      read("%YAML:1.0\n---\n# made by hand\nfx: 700\nfy: 710.0\ncx: 6e2\ncy: +180\nbaseline_m: .5  # half\n"
+           "doffs_px: -2\n"),
+      600, 180, 0.5, -2);
+}
+
+TEST_F(CalibrationIo, WrittenCalibrationIsReadBackExactly) {
+  const Calibration written{721.5377, 1.0 / 3, 609.5593, -172.854, 0.53715, 1e-7};
+  write_calibration(file_, written);
+  const Calibration read_back = read_calibration(file_);
+  EXPECT_EQ(read_back.fx, written.fx);
+  EXPECT_EQ(read_back.fy, written.fy);
+  EXPECT_EQ(read_back.cx, written.cx);
+  EXPECT_EQ(read_back.cy, written.cy);
+  EXPECT_EQ(read_back.baseline_m, written.baseline_m);
+  EXPECT_EQ(read_back.doffs_px, written.doffs_px);
+}
+
+TEST_F(CalibrationIo, BrokenFilesAreNamedWithTheirRow) {
+  expect_text_refused("P0: 1 2 3\nP1: " + kP1, {":1:", "P0 has 3 numbers instead of 12"});
+  expect_text_refused("\nP0: " + kP0 + " 5\nP1: " + kP1, {":2:", "P0 has 13 numbers"});
+  expect_text_refused("P0: " + kP0 + "\n", {"has no row P1"});
+  expect_text_refused("P1: " + kP1 + "\n", {"has no row P0"});
+  expect_text_refused("P0: " + kP0 + "\nP0: " + kP0, {":2:", "row 1 already"});
+  expect_text_refused("P0: 0 0 600 0 0 710 180 0 0 0 1 0\nP1: " + kP1, {":1:", "focal length is 0.0"});
+  expect_text_refused("P0: 700 0 600 0 0 -710 180 0 0 0 1 0\nP1: " + kP1, {":1:", "focal length is -710.0"});
+  expect_text_refused("P0: nan 0 600 0 0 710 180 0 0 0 1 0\nP1: " + kP1, {":1:", "'nan' is not a finite number"});
+  expect_text_refused("P0: 700 0 600 0 0 710 180 0 0 0 1 x\nP1: " + kP1, {":1:", "'x' is not a finite number"});
+  expect_text_refused("P0: 700 0 600 0 0 710 180 0 0 0 1 1e999\nP1: " + kP1, {"'1e999'"});
+  expect_text_refused("P0: " + kP0 + "\nP1: " + kP0, {":2:", "baseline is 0.0", "must be positive"});
+  expect_text_refused("P0: " + kP1 + "\nP1: " + kP0, {":2:", "baseline is -0.5", "swapped"});
+  expect_text_refused("P0: " + kP0 + "\nP1: 800 0 600 -350 0 710 180 0 0 0 1 0", {":2:", "differ", "rectified"});
+  expect_text_refused("cam0=[700 0 600; 0 710 180]\ncam1=[700 0 600; 0 710 180; 0 0 1]\nbaseline=1",
+                      {":1:", "6 numbers"});
+  expect_text_refused("cam0=[700 0 600; 0 710 180; 0 0 1]\ncam1=[700 0 600; 0 710 180; 0 0 1]\n", {"no row baseline"});
+  expect_text_refused(kOwn + "fz = 3\n", {":6:", "unknown key 'fz'"});
+  expect_text_refused("fx = 700\n", {"no row fy"});
+  expect_text_refused("fx = seven\n" + kOwn.substr(9), {":1:", "'seven'"});
+  expect_text_refused("fx = 0\n" + kOwn.substr(9), {":1:", "focal length is 0.0"});
+  expect_text_refused("fx = 700\nfy = 710\ncx = 600\ncy = 180\nbaseline_m = -0.5\n", {":5:", "baseline is -0.5"});
+  expect_text_refused("fx = inf\n" + kOwn.substr(9), {":1:", "finite"});
+  expect_text_refused("", {"holds no calibration"});
+  expect_text_refused("hello", {":1:", "'hello'"});
+  expect_text_refused("a: b\n", {"holds no calibration"});
+  expect_text_refused(std::string("\x01\x02\x00\xff", 4), {":1:", "is not `key: value`"});
+}
+
+TEST_F(CalibrationIo, MissingCamerasAreNamed) {
+  expect_refused([&] { read("P0: " + kP0 + "\nP1: " + kP1, KittiCameras::kColor); }, {"has no row P2"});
+  expect_refused([&] { read_calibration(folder_ / "none.txt"); }, {"none.txt", "No such file"});
+}
+
+TEST(CalibrationData, RealFiles) {
+  EGOSGM_REQUIRE_DATA(data);
+  const Calibration grey = read_calibration(data / "kitti2012/training/calib/000151.txt");
+  EXPECT_NEAR(grey.fx, 721.5377, 1e-9);
+  EXPECT_NEAR(grey.cx, 609.5593, 1e-9);
+  EXPECT_NEAR(grey.baseline_m, 0.537, 5e-4);
+  const auto both = data / "kitti2015/training/calib_cam_to_cam/000002.txt";
+  EXPECT_NEAR(read_calibration(both, KittiCameras::kColor).baseline_m, 0.533, 5e-4);
+  EXPECT_NEAR(read_calibration(both, KittiCameras::kGrey).baseline_m, 0.537, 5e-4);
+  const Calibration middlebury = read_calibration(data / "middlebury/Motorcycle/calib.txt");
+  EXPECT_NEAR(middlebury.baseline_m, 0.193001, 1e-12);
+  EXPECT_NEAR(middlebury.doffs_px, 32.778, 1e-12);
+}
+
+}  // namespace
+}  // namespace egosgm::vision

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/disparity_io.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <random>
+
+#include "egosgm/vision/file_io.h"
+#include "egosgm/vision/image_io.h"
+#include "tests/vision/data_folder.h"
+#include "tests/vision/expect_refused.h"
+#include "tests/vision/temporary_folder.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+cv::Mat row_map(const std::vector<float>& values) { return cv::Mat(values, true).reshape(1, 1); }
+
+void expect_equal(const cv::Mat& a, const cv::Mat& b) {
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_EQ(a.type(), b.type());
+  for (int y = 0; y < a.rows; ++y) {
+    for (int x = 0; x < a.cols; ++x) {
+      ASSERT_EQ(a.at<float>(y, x), b.at<float>(y, x)) << "first at " << x << ", " << y;
+    }
+  }
+}
+
+TEST(DisparityIo, PngStoresAsTheDevelopmentKit) {
+  const TemporaryFolder folder;
+  const std::vector<float> values = {kInvalidDisparity, 0.0f,   0.001f, 1.0f / 256, 1.999f / 256, 1.0f,  100.5f,
+                                     255.99f,           256.0f, -1.0f,  NAN,        kInf,         -kInf, 1e30f};
+  const std::vector<int> stored = {0, 1, 1, 1, 1, 256, 25728, 65533, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(write_disparity_png(folder / "d.png", row_map(values)), 3);  // 256, -1, 1e30
+  const cv::Mat png = cv::imread((folder / "d.png").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(png.type(), CV_16UC1);
+  for (int x = 0; x < png.cols; ++x) EXPECT_EQ(png.at<std::uint16_t>(0, x), stored[static_cast<std::size_t>(x)]) << x;
+}
+
+TEST(DisparityIo, PngReadsValueBy256) {
+  const TemporaryFolder folder;
+  cv::Mat stored(1, 4, CV_16UC1);
+  const std::uint16_t values[] = {0, 1, 25728, 65535};
+  std::copy(values, values + 4, stored.ptr<std::uint16_t>());
+  write_png(folder / "d.png", stored);
+  expect_equal(read_disparity(folder / "d.png"), row_map({kInvalidDisparity, 1.0f / 256, 100.5f, 65535.0f / 256}));
+}
+
+TEST(DisparityIo, PngRoundTripIsExactOnItsGrid) {
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> value(0, 65535);
+  const TemporaryFolder folder;
+  cv::Mat map(33, 127, CV_32FC1);
+  for (float& d : cv::Mat_<float>(map)) {
+    const int v = value(random);
+    d = v < 1000 ? kInvalidDisparity : static_cast<float>(v) / 256.0f;
+  }
+  EXPECT_EQ(write_disparity(folder / "d.png", map), 0);
+  expect_equal(read_disparity(folder / "d.png"), map);
+}
+
+TEST(DisparityIo, OtherPngsAreNoDisparity) {
+  const TemporaryFolder folder;
+  write_png(folder / "grey.png", cv::Mat(3, 3, CV_8UC1, cv::Scalar(7)));
+  expect_refused([&] { read_disparity(folder / "grey.png"); }, {"grey.png", "16-bit grey", "8 bit"});
+  ASSERT_TRUE(cv::imwrite((folder / "flow.png").string(), cv::Mat(3, 3, CV_16UC3, cv::Scalar(1, 2, 3))));
+  expect_refused([&] { read_disparity_png(folder / "flow.png"); }, {"flow.png", "3 channel"});
+}
+
+TEST(DisparityIo, PfmRoundTripKeepsEveryBit) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<float> value(-500.0f, 2000.0f);
+  const TemporaryFolder folder;
+  for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {65, 3}}) {
+    cv::Mat map(height, width, CV_32FC1);
+    for (float& d : cv::Mat_<float>(map)) d = random() % 4 == 0 ? kInvalidDisparity : value(random);
+    EXPECT_EQ(write_disparity(folder / "d.PFM", map), 0);
+    expect_equal(read_disparity(folder / "d.PFM"), map);
+  }
+}
+
+TEST(DisparityIo, PfmIsBottomUpInBothByteOrders) {
+  const TemporaryFolder folder;
+  const std::string little("Pf\n1 3\n-0.5\n\x00\x00\x80\x3f\x00\x00\x00\x40\x00\x00\x80\x7f", 24);
+  const std::string big("Pf 1 3 1\n\x3f\x80\x00\x00\x40\x00\x00\x00\x7f\xc0\x00\x00", 21);
+  write_file(folder / "little.pfm", little);
+  write_file(folder / "big.pfm", big);
+  const cv::Mat expected = (cv::Mat_<float>(3, 1) << kInvalidDisparity, 2.0f, 1.0f);
+  expect_equal(read_pfm(folder / "little.pfm"), expected);
+  expect_equal(read_pfm(folder / "big.pfm"), expected);
+}
+
+TEST(DisparityIo, WrittenPfmHoldsInfinityAndStartsAtTheBottom) {
+  const TemporaryFolder folder;
+  write_pfm(folder / "d.pfm", (cv::Mat_<float>(2, 1) << kInvalidDisparity, 1.0f));
+  EXPECT_EQ(read_file(folder / "d.pfm", 100), std::string("Pf\n1 2\n-1.0\n\x00\x00\x80\x3f\x00\x00\x80\x7f", 20));
+}
+
+TEST(DisparityIo, BrokenPfmIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "d.pfm";
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"", "neither PNG nor PFM"},
+      {"Pf", "header"},
+      {"Pf\n2 2\n", "header"},
+      {"Pf\n2 2\n-1", "header"},
+      {"Pf22-1\n", "header"},
+      {"PF\n1 1\n-1\n000011112222", "three channels"},
+      {"Pf\n2 2\n-1\n0123", "4 bytes of pixels instead of 16"},
+      {"Pf\n1 1\n-1\n01234567", "8 bytes of pixels instead of 4"},
+      {"Pf\n0 2\n-1\n", "not positive"},
+      {"Pf\n-2 2\n-1\n", "not positive"},
+      {"Pf\n1 1\n0\n0123", "scale"},
+      {"Pf\n1 1\nnan\n0123", "scale"},
+      {"Pf\n16385 1\n-1\n", "larger than the limit"},
+      {"Pf\n99999999999999999999 1\n-1\n", "header"},
+      {"Pf\n4294967297 4294967297\n-1\n", "larger than the limit"},
+      {"Pf\n16384 16384\n-1\n0123", "instead of 1073741824"},
+  };
+  for (const auto& [bytes, why] : cases) {
+    write_file(file, bytes);
+    expect_refused([&] { read_disparity(file); }, {file.string(), why});
+  }
+}
+
+TEST(DisparityIo, WrongTypesAndNamesAreRefused) {
+  const TemporaryFolder folder;
+  const cv::Mat map(2, 2, CV_32FC1, cv::Scalar(1));
+  expect_refused([&] { write_disparity(folder / "d.tiff", map); }, {"d.tiff", ".png or .pfm"});
+  expect_refused([&] { write_disparity(folder / "d.png", cv::Mat(2, 2, CV_64FC1)); }, {"d.png", "CV_32FC1"});
+  expect_refused([&] { write_disparity(folder / "d.pfm", cv::Mat()); }, {"d.pfm", "CV_32FC1"});
+  expect_refused<IoError>([&] { write_disparity(folder / "none/d.png", map); }, {"none/d.png", "No such file"});
+}
+
+TEST(DisparityIo, MiddleburyTruthIsRead) {
+  EGOSGM_REQUIRE_DATA(data);
+  const cv::Mat truth = read_disparity(data / "middlebury/Motorcycle/disp0GT.pfm");
+  ASSERT_EQ(truth.size(), cv::Size(741, 497));
+  const cv::Mat valid = truth > kInvalidDisparity;
+  double low = 0, high = 0;
+  cv::minMaxLoc(truth, &low, &high, nullptr, nullptr, valid);
+  EXPECT_GT(cv::countNonZero(valid), 300000);
+  EXPECT_LT(cv::countNonZero(valid), 741 * 497);
+  EXPECT_GT(low, 5.0);                                            // vmin=7 in its calib.txt
+  EXPECT_LT(high, 67.0);                                          // vmax=65
+  EXPECT_GT(truth.at<float>(490, 370), truth.at<float>(20, 20));  // the floor in front is nearer than the wall behind
+}
+
+}  // namespace
+}  // namespace egosgm::vision

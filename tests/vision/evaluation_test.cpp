@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/evaluation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "egosgm/vision/disparity_io.h"
+#include "egosgm/vision/file_io.h"
+#include "tests/vision/data_folder.h"
+#include "tests/vision/expect_refused.h"
+#include "tests/vision/temporary_folder.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr float kNo = kInvalidDisparity;
+
+TEST(Evaluation, CountsByTheRules) {
+  // Errors: 3 (good), 3.5 of 100 (bad, not D1), 6 of 100 (bad and D1), missing (filled with 106: 6, bad), no truth.
+  const cv::Mat truth = (cv::Mat_<float>(1, 5) << 100, 100, 100, 112, kNo);
+  const cv::Mat estimate = (cv::Mat_<float>(1, 5) << 97, 103.5f, 106, kNo, 200);
+  const DisparityCounts counts = compare_disparity(estimate, truth);
+  EXPECT_EQ(counts.truth, 4);
+  EXPECT_EQ(counts.valid, 3);
+  EXPECT_EQ(counts.bad, 2);
+  EXPECT_EQ(counts.d1, 1);
+  EXPECT_EQ(counts.bad_interpolated, 3);
+  EXPECT_EQ(counts.d1_interpolated, 2);
+  EXPECT_DOUBLE_EQ(counts.absolute_error_px, 12.5);
+  const DisparityMetrics metrics = metrics_of(counts);
+  EXPECT_DOUBLE_EQ(metrics.bad_or_missing, 75);
+  EXPECT_DOUBLE_EQ(metrics.bad_of_valid, 200.0 / 3);
+  EXPECT_DOUBLE_EQ(metrics.density, 75);
+  EXPECT_DOUBLE_EQ(metrics.interpolated, 75);
+  EXPECT_DOUBLE_EQ(metrics.d1, 50);
+  EXPECT_DOUBLE_EQ(metrics.d1_interpolated, 50);
+  EXPECT_DOUBLE_EQ(metrics.mae_px, 12.5 / 3);
+}
+
+TEST(Evaluation, PoolingDiffersFromAveraging) {
+  const DisparityCounts a{.truth = 10, .valid = 10, .bad = 1}, b{.truth = 90, .valid = 45, .bad = 45};
+  DisparityCounts pooled = a;
+  pooled += b;
+  EXPECT_DOUBLE_EQ(metrics_of(pooled).bad_or_missing, 91);
+  const DisparityMetrics mean = mean_of({metrics_of(a), metrics_of(b), metrics_of({})});
+  EXPECT_DOUBLE_EQ(mean.bad_or_missing, 55);
+  EXPECT_DOUBLE_EQ(mean.density, 75);
+}
+
+TEST(Evaluation, NothingToDivideByIsNan) {
+  const cv::Mat none(3, 4, CV_32FC1, cv::Scalar(kNo)), some(3, 4, CV_32FC1, cv::Scalar(5));
+  EXPECT_TRUE(std::isnan(metrics_of(compare_disparity(some, none)).density));
+  const DisparityMetrics empty = metrics_of(compare_disparity(none, some));
+  EXPECT_EQ(empty.density, 0);
+  EXPECT_EQ(empty.bad_or_missing, 100);
+  EXPECT_EQ(empty.interpolated, 100);
+  EXPECT_EQ(empty.d1_interpolated, 100);
+  EXPECT_TRUE(std::isnan(empty.bad_of_valid));
+  EXPECT_TRUE(std::isnan(empty.mae_px));
+  EXPECT_TRUE(std::isnan(mean_of({}).density));
+}
+
+TEST(Evaluation, SizesAndTypesMustFit) {
+  const cv::Mat a(3, 4, CV_32FC1, cv::Scalar(1)), b(4, 3, CV_32FC1, cv::Scalar(1)), c(3, 4, CV_64FC1, cv::Scalar(1));
+  expect_refused([&] { compare_disparity(a, b); }, {"4x3", "3x4"});
+  expect_refused([&] { compare_disparity(c, a); }, {"estimate", "CV_32FC1"});
+  expect_refused([&] { compare_disparity(a, cv::Mat()); }, {"truth", "CV_32FC1"});
+}
+
+TEST(Evaluation, HolesAreFilledFromTheBackground) {
+  const cv::Mat map = (cv::Mat_<float>(4, 6) << kNo, kNo, kNo, kNo, kNo, kNo,  //
+                       kNo, 5, kNo, kNo, 3, kNo,                               //
+                       2, kNo, 7, kNo, kNo, kNo,                               //
+                       kNo, kNo, kNo, kNo, kNo, kNo);
+  const cv::Mat expected = (cv::Mat_<float>(4, 6) << 5, 5, 3, 3, 3, 3,  //
+                            5, 5, 3, 3, 3, 3,                           //
+                            2, 2, 7, 7, 7, 7,                           //
+                            2, 2, 7, 7, 7, 7);
+  EXPECT_EQ(cv::norm(interpolate_background(map), expected, cv::NORM_INF), 0);
+  const cv::Mat none(3, 4, CV_32FC1, cv::Scalar(kNo));
+  EXPECT_EQ(cv::norm(interpolate_background(none), none, cv::NORM_INF), 0);
+  const cv::Mat one(1, 1, CV_32FC1, cv::Scalar(4));
+  EXPECT_EQ(interpolate_background(one).at<float>(0, 0), 4);
+}
+
+TEST(Evaluation, GoldenFiguresOfTheDevelopmentKit) {
+  EGOSGM_REQUIRE_DATA(data);
+  const DisparityMetrics metrics = metrics_of(compare_disparity(read_disparity(data / "devkit2012/disp_est.png"),
+                                                                read_disparity(data / "devkit2012/disp_gt.png")));
+  EXPECT_NEAR(metrics.density, 96.337, 5e-4);
+  EXPECT_NEAR(metrics.interpolated, 5.186, 5e-4);
+  EXPECT_NEAR(metrics.bad_of_valid, 4.393, 5e-4);
+  EXPECT_NEAR(metrics.bad_or_missing, 7.894, 5e-4);
+  EXPECT_NEAR(metrics.d1_interpolated, 5.185, 5e-4);
+}
+
+class PairWithTruth : public ::testing::Test {
+ protected:
+  void add(const std::string& name) {
+    make_folder((folder_ / name).parent_path());
+    write_file(folder_ / name, "x");
+  }
+  EvaluationPairs pair(const std::string& estimate, const std::string& truth) {
+    return pair_with_truth(folder_ / estimate, folder_ / truth);
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(PairWithTruth, FileAndFile) {
+  add("a.png"), add("b.pfm");
+  const EvaluationPairs result = pair("a.png", "b.pfm");
+  ASSERT_EQ(result.pairs.size(), 1u);
+  EXPECT_EQ(result.pairs[0].estimate, folder_ / "a.png");
+  EXPECT_EQ(result.pairs[0].truth, folder_ / "b.pfm");
+}
+
+TEST_F(PairWithTruth, EqualNames) {
+  add("e/000001.png"), add("e/000002.png"), add("e/notes.txt"), add("e/.egosgm-1-1.part");
+  add("t/000002.pfm"), add("t/000003.png");
+  const EvaluationPairs result = pair("e", "t");
+  ASSERT_EQ(result.pairs.size(), 1u);
+  EXPECT_EQ(result.pairs[0].truth, folder_ / "t/000002.pfm");
+  EXPECT_EQ(result.without_estimate, (std::vector<std::filesystem::path>{folder_ / "t/000003.png"}));
+  EXPECT_EQ(pair("e/000002.png", "t").pairs.size(), 1u);
+  EXPECT_TRUE(pair("e/000002.png", "t").without_estimate.empty());
+}
+
+TEST_F(PairWithTruth, FrameNumberWhereNoNamesAreEqual) {
+  add("out/disparity/000009.png"), add("out/disparity/000010.png");
+  add("t/000151_10.png");
+  for (const char* truth : {"t", "t/000151_10.png"}) {
+    const EvaluationPairs result = pair("out", truth);
+    ASSERT_EQ(result.pairs.size(), 1u);
+    EXPECT_EQ(result.pairs[0].estimate, folder_ / "out/disparity/000010.png");
+  }
+  add("t/000138_10.png");
+  expect_refused([&] { pair("out", "t"); }, {"000010.png", "000138_10.png", "000151_10.png", "one truth file"});
+}
+
+TEST_F(PairWithTruth, NothingThatFits) {
+  add("e/000001.png"), add("t/000002.png");
+  make_folder(folder_ / "empty");
+  expect_refused([&] { pair("e", "t"); }, {"nothing there belongs"});
+  expect_refused([&] { pair("e", "empty"); }, {"empty", "holds no .png or .pfm"});
+  expect_refused([&] { pair("none", "t"); }, {"none", "no such file"});
+}
+
+}  // namespace
+}  // namespace egosgm::vision

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/file_io.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+
+#include "tests/vision/expect_refused.h"
+#include "tests/vision/temporary_folder.h"
+
+namespace egosgm::vision {
+namespace {
+
+std::size_t count_entries(const std::filesystem::path& folder) {
+  return static_cast<std::size_t>(
+      std::distance(std::filesystem::directory_iterator(folder), std::filesystem::directory_iterator()));
+}
+
+/// No file may grow beyond `bytes` while this lives: the way a full disk shows.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    handler_ = ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    ::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = SIG_DFL;
+};
+
+TEST(FileIo, WrittenBytesAreReadBack) {
+  const TemporaryFolder folder;
+  const std::string bytes("a\0b\nc", 5);
+  write_file(folder / "file", bytes);
+  EXPECT_EQ(read_file(folder / "file", 5), bytes);
+  EXPECT_EQ(read_file_start(folder / "file", 2), bytes.substr(0, 2));
+  write_file(folder / "file", "");
+  EXPECT_EQ(read_file(folder / "file", 5), "");
+  EXPECT_EQ(count_entries(folder.path()), 1u);
+}
+
+TEST(FileIo, NewFilesObeyTheUmask) {
+  const TemporaryFolder folder;
+  const mode_t before = ::umask(027);
+  write_file(folder / "file", "x");
+  ::umask(before);
+  struct stat status {};
+  ASSERT_EQ(::stat((folder / "file").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0640u);
+}
+
+TEST(FileIo, FullDiskLeavesTheOldFileAndNothingElse) {
+  const TemporaryFolder folder;
+  write_file(folder / "file", "old");
+  {
+    const FileSizeLimit limit(1000);
+    expect_refused<IoError>([&] { write_file(folder / "file", std::string(5000, 'x')); },
+                            {(folder / "file").string(), "cannot be written", "File too large"});
+  }
+  EXPECT_EQ(read_file(folder / "file", 100), "old");
+  EXPECT_EQ(count_entries(folder.path()), 1u);
+}
+
+TEST(FileIo, KillWhileWritingLeavesOnlyWholeFiles) {
+  const TemporaryFolder folder;
+  const std::string bytes(std::size_t{4} << 20, 'x');
+  for (int delay_us : {200, 1000, 3000, 7000}) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      for (int i = 0;; ++i) write_file(folder / ("file" + std::to_string(i % 3)), bytes);
+    }
+    ::usleep(static_cast<useconds_t>(delay_us));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
+    EXPECT_EQ(entry.file_size(), bytes.size()) << entry.path();
+  }
+}
+
+TEST(FileIo, UnwritablePlacesAreNamedWithTheReason) {
+  const TemporaryFolder folder;
+  write_file(folder / "file", "old");
+  expect_refused<IoError>([&] { write_file(folder / "none/file", "x"); }, {"none/file", "No such file or directory"});
+  expect_refused<IoError>([&] { write_file(folder / "file/x", "x"); }, {"file/x", "Not a directory"});
+  expect_refused<IoError>([&] { write_file(folder.path(), "x"); }, {folder.path().string(), "directory"});
+  expect_refused<IoError>([&] { write_file("", "x"); }, {"cannot be written"});
+  expect_refused<IoError>([&] { make_folder(folder / "file/sub"); }, {"file/sub", "Not a directory"});
+  expect_refused<IoError>([&] { make_folder(folder / "file"); }, {"file", "Not a directory"});
+  make_folder(folder / "a/b/c");
+  make_folder(folder / "a/b/c");
+  EXPECT_TRUE(std::filesystem::is_directory(folder / "a/b/c"));
+}
+
+TEST(FileIo, UnreadablePlacesAreNamedWithTheReason) {
+  const TemporaryFolder folder;
+  expect_refused([&] { read_file(folder / "none", 10); }, {"none", "No such file or directory"});
+  expect_refused([&] { read_file(folder.path(), 10); }, {folder.path().string(), "Is a directory"});
+  expect_refused([&] { read_file("/dev/zero", 10); }, {"/dev/zero", "device"});
+  write_file(folder / "file", "12345");
+  expect_refused([&] { read_file(folder / "file", 4); }, {"file", "larger than 4 bytes"});
+}
+
+}  // namespace
+}  // namespace egosgm::vision

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/image_io.h"
+
+#include <gtest/gtest.h>
+#include <png.h>
+
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "egosgm/vision/file_io.h"
+#include "tests/vision/expect_refused.h"
+#include "tests/vision/temporary_folder.h"
+
+namespace egosgm::vision {
+namespace {
+
+cv::Mat random_image(std::mt19937& random, int width, int height, int type) {
+  cv::Mat image(height, width, type);
+  for (int y = 0; y < height; ++y) {
+    auto* row = image.ptr<std::uint8_t>(y);
+    for (std::size_t i = 0; i < image.cols * image.elemSize(); ++i) row[i] = static_cast<std::uint8_t>(random());
+  }
+  return image;
+}
+
+void expect_equal(const cv::Mat& a, const cv::Mat& b) {
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_EQ(a.type(), b.type());
+  EXPECT_EQ(cv::norm(a, b, cv::NORM_INF), 0.0);
+}
+
+/// OpenCV writes neither palettes nor interlaced files.
+void write_with_libpng(const std::filesystem::path& file, const cv::Mat& image, int color_type, int interlace) {
+  std::FILE* stream = std::fopen(file.c_str(), "wb");
+  ASSERT_NE(stream, nullptr);
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  png_init_io(png, stream);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(image.cols), static_cast<png_uint_32>(image.rows), 8, color_type,
+               interlace, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_color palette[256];
+  for (int i = 0; i < 256; ++i) palette[i] = {static_cast<png_byte>(i), static_cast<png_byte>(255 - i), 7};
+  if (color_type == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette, 256);
+  png_write_info(png, info);
+  std::vector<png_bytep> rows;
+  for (int y = 0; y < image.rows; ++y) rows.push_back(const_cast<png_bytep>(image.ptr(y)));
+  png_write_image(png, rows.data());
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
+  std::fclose(stream);
+}
+
+TEST(ImageIo, GreyImagesKeepEveryBit) {
+  std::mt19937 random(1);
+  const TemporaryFolder folder;
+  for (int type : {CV_8UC1, CV_16UC1}) {
+    for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {65, 3}, {127, 33}}) {
+      const cv::Mat image = random_image(random, width, height, type);
+      write_png(folder / "image.png", image);
+      expect_equal(read_grey_png(folder / "image.png"), image);
+      EXPECT_EQ(read_png_size(folder / "image.png"), image.size());
+    }
+  }
+}
+
+TEST(ImageIo, ColorBecomesGreyAsInOpenCv) {
+  std::mt19937 random(2);
+  const TemporaryFolder folder;
+  for (int depth : {CV_8U, CV_16U}) {
+    for (int channels : {3, 4}) {
+      const cv::Mat image = random_image(random, 31, 17, CV_MAKETYPE(depth, channels));
+      ASSERT_TRUE(cv::imwrite((folder / "image.png").string(), image));
+      cv::Mat expected;
+      cv::cvtColor(image, expected, channels == 3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
+      expect_equal(read_grey_png(folder / "image.png"), expected);
+    }
+  }
+}
+
+TEST(ImageIo, ColorIsWrittenAsBgr) {
+  const TemporaryFolder folder;
+  write_png(folder / "image.png", cv::Mat(2, 3, CV_8UC3, cv::Scalar(10, 20, 200)));
+  expect_equal(cv::imread((folder / "image.png").string(), cv::IMREAD_COLOR),
+               cv::Mat(2, 3, CV_8UC3, cv::Scalar(10, 20, 200)));
+}
+
+TEST(ImageIo, InterlacedAndPaletteAndBilevelFilesAreRead) {
+  std::mt19937 random(3);
+  const TemporaryFolder folder;
+  const cv::Mat image = random_image(random, 29, 19, CV_8UC1);
+  write_with_libpng(folder / "interlaced.png", image, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7);
+  expect_equal(read_grey_png(folder / "interlaced.png"), image);
+
+  write_with_libpng(folder / "palette.png", image, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE);
+  cv::Mat expected;
+  cv::cvtColor(cv::imread((folder / "palette.png").string(), cv::IMREAD_COLOR), expected, cv::COLOR_BGR2GRAY);
+  expect_equal(read_grey_png(folder / "palette.png"), expected);
+
+  const cv::Mat bilevel = image > 128;
+  ASSERT_TRUE(cv::imwrite((folder / "bilevel.png").string(), bilevel, {cv::IMWRITE_PNG_BILEVEL, 1}));
+  expect_equal(read_grey_png(folder / "bilevel.png"), bilevel);
+}
+
+TEST(ImageIo, EveryTruncationIsRefusedInSilence) {
+  std::mt19937 random(4);
+  const TemporaryFolder folder;
+  const auto file = folder / "image.png";
+  write_png(file, random_image(random, 23, 11, CV_8UC1));
+  const std::string whole = read_file(file, 1 << 20);
+  ::testing::internal::CaptureStderr();
+  for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
+    write_file(file, whole.substr(0, bytes));
+    expect_refused([&] { read_grey_png(file); }, {file.string(), "not a readable image (truncated?)"});
+  }
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(ImageIo, DamagedPixelsAreRefused) {
+  std::mt19937 random(5);
+  const TemporaryFolder folder;
+  const auto file = folder / "image.png";
+  write_png(file, random_image(random, 40, 40, CV_8UC1));
+  std::string bytes = read_file(file, 1 << 20);
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+  write_file(file, bytes);
+  expect_refused([&] { read_grey_png(file); }, {file.string(), "not a readable image (truncated?)"});
+}
+
+std::string with_header_size(std::string png, std::uint32_t width, std::uint32_t height) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    png[16 + i] = static_cast<char>(width >> (24 - 8 * i));
+    png[20 + i] = static_cast<char>(height >> (24 - 8 * i));
+  }
+  const auto table = [](std::uint32_t c) {
+    for (int k = 0; k < 8; ++k) c = c & 1 ? 0xedb88320u ^ (c >> 1) : c >> 1;
+    return c;
+  };
+  std::uint32_t crc = 0xffffffffu;
+  for (std::size_t i = 12; i < 29; ++i) crc = table((crc ^ static_cast<std::uint8_t>(png[i])) & 0xff) ^ (crc >> 8);
+  crc ^= 0xffffffffu;
+  for (std::size_t i = 0; i < 4; ++i) png[29 + i] = static_cast<char>(crc >> (24 - 8 * i));
+  return png;
+}
+
+TEST(ImageIo, HugeSizesAreRefusedFromTheHeader) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.png";
+  write_png(file, cv::Mat(2, 2, CV_8UC1, cv::Scalar(0)));
+  const std::string small = read_file(file, 1000);
+  ASSERT_LT(small.size(), 100u);
+  for (const auto& [width, height] : {std::pair{16385u, 1u}, {1u, 16385u}, {0x7fffffffu, 0x7fffffffu}}) {
+    write_file(file, with_header_size(small, width, height));
+    expect_refused([&] { read_grey_png(file); }, {file.string(), "larger than the limit"});
+    expect_refused([&] { read_png_size(file); }, {file.string(), "larger than the limit"});
+  }
+  // Within the limits, but no 100 bytes hold so many pixels.
+  write_file(file, with_header_size(small, 16384, 16384));
+  expect_refused([&] { read_grey_png(file); }, {file.string(), "too short for 16384x16384"});
+  write_file(file, with_header_size(small, 0, 5));
+  expect_refused([&] { read_grey_png(file); }, {file.string(), "zero"});
+}
+
+TEST(ImageIo, NonImagesAreRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.png";
+  for (const std::string text : {"", "hello", "\xff\xd8\xff\xe0 JFIF"}) {
+    write_file(file, text);
+    expect_refused([&] { read_grey_png(file); }, {file.string(), "not a readable image"});
+  }
+  expect_refused([&] { read_grey_png(folder / "none.png"); }, {"none.png", "No such file"});
+  expect_refused([&] { write_png(file, cv::Mat()); }, {file.string()});
+  expect_refused([&] { write_png(file, cv::Mat(1, 1, CV_32FC1)); }, {file.string()});
+}
+
+TEST(ImageIo, ViewsKeepTheStride) {
+  cv::Mat image(10, 20, CV_16UC1);
+  const ImageView view = image_view(image(cv::Rect(3, 2, 5, 4)));
+  EXPECT_EQ(view.data, image.ptr<std::uint16_t>(2) + 3);
+  EXPECT_EQ(view.width, 5);
+  EXPECT_EQ(view.height, 4);
+  EXPECT_EQ(view.stride_bytes, 40);
+  EXPECT_EQ(view.type, PixelType::kU16);
+  cv::Mat map(4, 5, CV_32FC1);
+  EXPECT_EQ(map_view(map).data, map.ptr<float>());
+  EXPECT_EQ(map_view(map).stride_bytes, 20);
+  expect_refused([&] { image_view(map); }, {"CV_8UC1"});
+  expect_refused([&] { map_view(image); }, {"CV_32FC1"});
+}
+
+}  // namespace
+}  // namespace egosgm::vision

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/poses_io.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "egosgm/vision/file_io.h"
+#include "tests/vision/data_folder.h"
+#include "tests/vision/expect_refused.h"
+#include "tests/vision/temporary_folder.h"
+
+namespace egosgm::vision {
+namespace {
+
+const std::string kIdentity = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+
+TEST(PosesIo, RoundTrip) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> value(-3, 3);
+  std::vector<Eigen::Isometry3d> poses;
+  for (int k = 0; k < 20; ++k) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.linear() = Eigen::AngleAxisd(value(random), Eigen::Vector3d(value(random), value(random), 1).normalized())
+                        .toRotationMatrix();
+    pose.translation() = 100 * Eigen::Vector3d(value(random), value(random), value(random));
+    poses.push_back(pose);
+  }
+  const TemporaryFolder folder;
+  write_poses(folder / "poses.txt", poses);
+  const auto read_back = read_poses(folder / "poses.txt");
+  ASSERT_EQ(read_back.size(), poses.size());
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    EXPECT_LT((read_back[k].matrix() - poses[k].matrix()).cwiseAbs().maxCoeff(), 1e-6) << k;
+    const Eigen::Matrix3d r = read_back[k].linear();
+    EXPECT_LT((r * r.transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-13) << k;
+  }
+}
+
+TEST(PosesIo, RowMajorCameraToWorld) {
+  const TemporaryFolder folder;
+  // A turn to the right by 90 degrees: the camera's z axis is the world's x axis.
+  write_file(folder / "poses.txt", kIdentity + "0 0 1 5  0 1 0 6\t-1 0 0 7\r\n\n");
+  const auto poses = read_poses(folder / "poses.txt");
+  ASSERT_EQ(poses.size(), 2u);
+  EXPECT_TRUE((poses[1] * Eigen::Vector3d(0, 0, 2)).isApprox(Eigen::Vector3d(7, 6, 7)));
+  const Eigen::Isometry3d motion = current_from_previous(poses[0], poses[1]);
+  EXPECT_TRUE((motion * Eigen::Vector3d(7, 6, 7)).isApprox(Eigen::Vector3d(0, 0, 2)));
+}
+
+TEST(PosesIo, BadRowsAreNamed) {
+  const TemporaryFolder folder;
+  const auto file = folder / "poses.txt";
+  const std::vector<std::pair<std::string, std::vector<std::string>>> cases = {
+      {"", {"holds no poses"}},
+      {"\n\n", {"holds no poses"}},
+      {kIdentity + "1 2 3\n", {":2:", "this one has 3"}},
+      {kIdentity + "\n" + kIdentity, {":2:", "this one has 0"}},
+      {kIdentity + kIdentity + "1 0 0 0 0 1 0 0 0 0 1 0 0\n", {":3:", "this one has 13"}},
+      {kIdentity + "1 0 0 x 0 1 0 0 0 0 1 0\n", {":2:", "'x' (number 4)"}},
+      {"1 0 0 nan 0 1 0 0 0 0 1 0\n", {":1:", "'nan'"}},
+      {"1 0 0 1e999 0 1 0 0 0 0 1 0\n", {":1:", "'1e999'"}},
+      {"1e200 0 0 0 0 1 0 0 0 0 1 0\n", {":1:", "not a rotation"}},
+      {"1.001 0 0 0 0 1 0 0 0 0 1 0\n", {":1:", "not a rotation"}},
+      {"1 0 0 0 0 1 0 0 0 0 -1 0\n", {":1:", "not a rotation"}},
+      {"0 0 0 0 0 0 0 0 0 0 0 0\n", {":1:", "not a rotation"}},
+  };
+  for (const auto& [text, parts] : cases) {
+    write_file(file, text);
+    for (const std::string& part : parts) expect_refused([&] { read_poses(file); }, {file.string(), part});
+  }
+  expect_refused<IoError>([&] { write_poses(folder / "none/poses.txt", {}); }, {"none/poses.txt", "No such file"});
+}
+
+TEST(PosesIo, RealPoses) {
+  EGOSGM_REQUIRE_DATA(data);
+  const auto poses = read_poses(data / "odometry/sequences/A/poses.txt");
+  ASSERT_EQ(poses.size(), 51u);
+  const Eigen::Isometry3d motion = current_from_previous(poses[0], poses[1]);
+  EXPECT_NEAR(motion.translation().z(), -1.199, 0.01);  // forward: points come nearer
+}
+
+}  // namespace
+}  // namespace egosgm::vision
