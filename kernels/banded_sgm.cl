@@ -307,7 +307,7 @@ kernel void sweep_forward(const SgmParameters q, const int wave, const int tile_
 }
 
 kernel void sweep_backward(const SgmParameters q, const int wave, const int tile_columns, global const ulong* codes, global const Band* bands,
-                           global const uint* offsets, global uchar* slots, global uchar* sums, global float* disparities,
+                           global const uint* offsets, global uchar* slots, global const uchar* sums, global float* disparities,
                            global float* variances) {
-  sweep(true, q, wave, tile_columns, codes, bands, offsets, slots, sums, disparities, variances);
+  sweep(true, q, wave, tile_columns, codes, bands, offsets, slots, (global uchar*)sums, disparities, variances);
 }
