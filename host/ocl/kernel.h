@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/ocl/buffer.h"
+#include "host/ocl/signature.h"
 #include "kernels/shared.h"
 
 namespace egosgm::ocl {
@@ -36,11 +37,14 @@ inline int row_group(const Context& context) {
 }
 
 /// A kernel with its C++ signature: `Buffer<T>` for `global T*`, `const Buffer<T>` for
-/// `global const T*`, anything else by value. tests/signatures_test.cpp checks it against the .cl.
+/// `global const T*`, anything else by value.
 template <typename... Params>
 class Kernel {
  public:
-  Kernel(const cl::Program& program, const char* name) : kernel_(program, name) {}
+  /// Throws std::logic_error where the .cl does not fit the signature.
+  Kernel(const cl::Program& program, const char* name) : kernel_(program, name) {
+    expect_signature(kernel_, {KernelParameter<Params>::text()...});
+  }
 
   void operator()(Context& context, const Range& range, Params&... args) {
     cl_uint index = 0;
