@@ -29,6 +29,8 @@ void for_each(Options& o, Visit&& visit) {
   visit("search_band.from_neighbours", o.search_band.from_neighbours);
   visit("search_band.neighbour_min_count", o.search_band.neighbour_min_count);
   visit("search_band.neighbour_margin_px", o.search_band.neighbour_margin_px);
+  visit("vertical_alignment.enabled", o.vertical_alignment.enabled);
+  visit("vertical_alignment.gain", o.vertical_alignment.gain);
   visit("banded_sgm.cost", o.banded_sgm.cost);
   visit("banded_sgm.paths", o.banded_sgm.paths);
   visit("banded_sgm.p1", o.banded_sgm.p1);
@@ -37,6 +39,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("banded_sgm.variance_per_step_px2", o.banded_sgm.variance_per_step_px2);
   visit("banded_sgm.variance_floor_px2", o.banded_sgm.variance_floor_px2);
   visit("banded_sgm.scheduling", o.banded_sgm.scheduling);
+  visit("median_filter.enabled", o.median_filter.enabled);
   visit("sad_check.max_difference", o.sad_check.max_difference);
   visit("speckle_removal.max_size_px", o.speckle_removal.max_size_px);
   visit("speckle_removal.max_difference_px", o.speckle_removal.max_difference_px);
@@ -147,6 +150,8 @@ PipelineOptions PipelineOptions::paper() {
   options.consistency = {.prediction_px = 1.0f, .measurement_px = 1.0f, .update_px = 1.0f};
   options.search_band.min_half_width_px = 0.0f;
   options.search_band.from_neighbours = false;
+  options.vertical_alignment.enabled = false;
+  options.median_filter.enabled = false;
   options.kalman_update.gate_px = 0.0f;
   return options;
 }
@@ -158,6 +163,7 @@ void PipelineOptions::validate() const {
     if constexpr (std::is_same_v<std::decay_t<decltype(value)>, float>) expect_not_negative(name, value);
   });
   expect("search_band.neighbour_min_count", search_band.neighbour_min_count, search_band.neighbour_min_count >= 1, "choose 1 or more");
+  expect("vertical_alignment.gain", vertical_alignment.gain, vertical_alignment.gain <= 1, "choose 0 to 1");
   expect("banded_sgm.paths", banded_sgm.paths, banded_sgm.paths == 4 || banded_sgm.paths == 8, "choose 4 or 8");
   expect("banded_sgm.p2", banded_sgm.p2, banded_sgm.p2 >= 0 && banded_sgm.p2 <= 190, "choose 0 to 190: path costs have 8 bits");
   expect("banded_sgm.p1", banded_sgm.p1, banded_sgm.p1 >= 0 && banded_sgm.p1 <= banded_sgm.p2, "choose 0 to banded_sgm.p2");

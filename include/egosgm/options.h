@@ -53,6 +53,15 @@ struct BandedSgmOptions {
   Scheduling scheduling = Scheduling::kAutomatic;
 };
 
+struct VerticalAlignmentOptions {
+  bool enabled = true;  // estimate one vertical offset between the views, and resample the right image by it
+  float gain = 0.25f;   // part of what a frame finds that is added to the offset, once it is known; 0 to 1
+};
+
+struct MedianFilterOptions {
+  bool enabled = true;  // 3x3 median of the disparities, before the left-right check
+};
+
 struct SadCheckOptions {
   float max_difference = 0.0f;  // mean absolute grey difference of the 3x3 windows (8-bit scale); 0: no check
 };
@@ -79,7 +88,9 @@ struct PipelineOptions {
   HoleFillOptions hole_fill;
   ConsistencyCheckOptions consistency;
   SearchBandOptions search_band;
+  VerticalAlignmentOptions vertical_alignment;
   BandedSgmOptions banded_sgm;
+  MedianFilterOptions median_filter;
   SadCheckOptions sad_check;
   SpeckleRemovalOptions speckle_removal;
   KalmanUpdateOptions kalman_update;
