@@ -31,18 +31,23 @@ void set_row(shared::f32 (&row)[4], const Eigen::Matrix4d& h, int index) {
   for (int column = 0; column < 4; ++column) row[column] = static_cast<float>(h(index, column));
 }
 
-// A left perturbation moves the depth by dZ' = dt_z + w_x Y' - w_y X'. X' is the left camera's; the right one's is
-// smaller by b.
-void set_noise(shared::DisparityMotion& motion, const Eigen::Matrix<double, 6, 6>& covariance, double shift_m) {
+// A left perturbation moves the depth by dZ' = dt_z + w_x Y' - w_y X', and the disparity by -(d'^2 / (fx b)) dZ', where
+// X' d' = (x' - cx) b and Y' d' = (y' - cy) b fx / fy: so a disparity near zero divides nothing. X' is the left
+// camera's; the right one's is smaller by b.
+void set_noise(shared::DisparityMotion& motion, const Calibration& calibration,
+               const Eigen::Matrix<double, 6, 6>& covariance, double shift_m) {
   constexpr int kTz = 2, kWx = 3, kWy = 4;
-  const double one = covariance(kTz, kTz), x = -2 * covariance(kTz, kWy), y = 2 * covariance(kTz, kWx);
+  const double x = -2 * covariance(kTz, kWy), y = 2 * covariance(kTz, kWx);
   const double xx = covariance(kWy, kWy), xy = -2 * covariance(kWx, kWy), yy = covariance(kWx, kWx);
-  motion.noise_1 = static_cast<float>(one + x * shift_m + xx * shift_m * shift_m);
-  motion.noise_x = static_cast<float>(x + 2 * xx * shift_m);
-  motion.noise_y = static_cast<float>(y + xy * shift_m);
-  motion.noise_xx = static_cast<float>(xx);
-  motion.noise_xy = static_cast<float>(xy);
-  motion.noise_yy = static_cast<float>(yy);
+  const double one = covariance(kTz, kTz) + x * shift_m + xx * shift_m * shift_m;
+  const double by_d = 1 / (calibration.fx * calibration.baseline_m), by_u = 1 / calibration.fx,
+               by_v = 1 / calibration.fy;
+  motion.noise_dd = static_cast<float>(one * by_d * by_d);
+  motion.noise_dx = static_cast<float>((x + 2 * xx * shift_m) * by_d * by_u);
+  motion.noise_dy = static_cast<float>((y + xy * shift_m) * by_d * by_v);
+  motion.noise_xx = static_cast<float>(xx * by_u * by_u);
+  motion.noise_xy = static_cast<float>(xy * by_u * by_v);
+  motion.noise_yy = static_cast<float>(yy * by_v * by_v);
 }
 
 }  // namespace
@@ -61,10 +66,7 @@ shared::DisparityMotion disparity_motion(const Calibration& calibration, const M
   result.cx = static_cast<float>(calibration.cx + (is_right ? calibration.doffs_px : 0));
   result.cy = static_cast<float>(calibration.cy);
   result.doffs = static_cast<float>(calibration.doffs_px);
-  result.fx = static_cast<float>(calibration.fx);
-  result.fy = static_cast<float>(calibration.fy);
-  result.fx_baseline = static_cast<float>(calibration.fx * calibration.baseline_m);
-  set_noise(result, current_from_previous.covariance, is_right ? calibration.baseline_m : 0);
+  set_noise(result, calibration, current_from_previous.covariance, is_right ? calibration.baseline_m : 0);
   return result;
 }
 

@@ -14,15 +14,11 @@ static inline uint key_of(const float disparity) {
 
 static inline float disparity_of(const uint key) { return as_float(key >> 31 ? key & 0x7fffffffu : ~key); }
 
-// Variance of the predicted disparity by the motion's covariance: (d'^2 / (fx b))^2 Var(Z'), a form in (1, X', Y'),
-// with X' and Y' multiplied out so that nothing is divided by a disparity near zero. u, v: relative to the principal
-// point.
+// Variance of the predicted disparity by the motion's covariance. u, v: relative to the principal point.
 static inline float motion_variance(const DisparityMotion motion, const float u, const float v, const float d) {
-  const float a = d * d / motion.fx_baseline;
-  const float bx = d * u / motion.fx;
-  const float by = d * v / motion.fy;
-  const float q = a * a * motion.noise_1 + a * bx * motion.noise_x + a * by * motion.noise_y +
-                  bx * bx * motion.noise_xx + bx * by * motion.noise_xy + by * by * motion.noise_yy;
+  const float by_disparity = motion.noise_dd * d + motion.noise_dx * u + motion.noise_dy * v;
+  const float by_place = u * (motion.noise_xx * u + motion.noise_xy * v) + motion.noise_yy * v * v;
+  const float q = d * d * (d * by_disparity + by_place);
   return q < 0.0f ? 0.0f : q;  // rounding
 }
 

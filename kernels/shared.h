@@ -80,17 +80,16 @@ typedef struct {
 #define EGOSGM_MAX_VARIANCE_PX2 1e6f
 
 // How a view's disparity space moves (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
-// noise: variance of the depth's error Z' as a form in (1, X', Y'), from the motion's covariance (see forward_warp.cl).
+// noise_*: variance of d' by the motion's covariance, over d'^2, as a form in (d', x' - cx, y' - cy).
 typedef struct {
   f32 x[4], y[4], w[4];
   f32 cx, cy, doffs;
-  f32 fx, fy, fx_baseline;
-  f32 noise_1, noise_x, noise_y, noise_xx, noise_xy, noise_yy;
+  f32 noise_dd, noise_dx, noise_dy, noise_xx, noise_xy, noise_yy;
 } DisparityMotion;
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 12 &&
-                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 40 && sizeof(DisparityMotion) == 96,
+                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 40 && sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

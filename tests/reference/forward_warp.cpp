@@ -11,9 +11,9 @@ float row_times(const float (&row)[4], float wx, float wy, float wd) {
 }
 
 float variance_of_motion(const shared::DisparityMotion& m, float u, float v, float d) {
-  const float a = d * d / m.fx_baseline, bx = d * u / m.fx, by = d * v / m.fy;
-  const float q = a * a * m.noise_1 + a * bx * m.noise_x + a * by * m.noise_y + bx * bx * m.noise_xx +
-                  bx * by * m.noise_xy + by * by * m.noise_yy;
+  const float by_disparity = m.noise_dd * d + m.noise_dx * u + m.noise_dy * v;
+  const float by_place = u * (m.noise_xx * u + m.noise_xy * v) + m.noise_yy * v * v;
+  const float q = d * d * (d * by_disparity + by_place);
   return q < 0 ? 0 : q;
 }
 
