@@ -3,6 +3,7 @@
 
 #include "egosgm/options.h"
 #include "host/maps.h"
+#include "host/ocl/kernel.h"
 #include "host/search_band.h"
 
 namespace egosgm {

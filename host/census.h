@@ -4,6 +4,7 @@
 #include "egosgm/image.h"
 #include "egosgm/options.h"
 #include "host/maps.h"
+#include "host/ocl/kernel.h"
 
 namespace egosgm {
 
