@@ -10,6 +10,7 @@
 #include "host/vision/odometry_features.h"
 #include "host/vision/odometry_matching.h"
 #include "host/vision/odometry_motion.h"
+#include "host/vision/odometry_rectification.h"
 
 namespace egosgm::vision {
 namespace {
@@ -59,6 +60,7 @@ struct StereoOdometry::State {
   FeatureDetector detector;
   StereoFrame previous, current;
   bool has_previous = false;
+  RectificationError rectification;
   std::optional<Eigen::Isometry3d> last_motion;
 
   int max_disparity_px(int width) const {
@@ -114,8 +116,8 @@ OdometryResult StereoOdometry::State::estimate(const std::optional<Eigen::Isomet
   const auto candidates =
       match_circle(calibration, previous, current, select_spread(previous, kFeatureCell_px, 1 << 20),
                    &rough.motion.current_from_previous, kGuidedWindow, max_disparity_px(current.left.width));
-  const auto points =
-      refine_matches(calibration, previous, current, candidates, rough.motion.current_from_previous, refined);
+  auto points = refine_matches(calibration, previous, current, candidates, rough.motion.current_from_previous, refined);
+  if (options.learn_rectification) rectification.correct(calibration, points);
   const MotionEstimate fine =
       refine_motion(calibration, options, MatchNoise{}, points, rough.motion.current_from_previous);
   result.matches = static_cast<int>(points.size());
@@ -123,7 +125,10 @@ OdometryResult StereoOdometry::State::estimate(const std::optional<Eigen::Isomet
   result.reprojection_rms_px = fine.rms_px;
   result.reason = fine.reason;
   keep_tracks(refined, fine.inliers);
-  if (fine.reason.empty()) result.motion = fine.motion;
+  if (!fine.reason.empty()) return result;
+  result.motion = fine.motion;
+  if (options.learn_rectification)
+    rectification.update(calibration, MatchNoise{}, points, fine.inliers, fine.motion.current_from_previous);
   return result;
 }
 
@@ -182,6 +187,7 @@ OdometryResult StereoOdometry::process(const ImageView& left, const ImageView& r
 void StereoOdometry::reset() {
   state_->has_previous = false;
   state_->last_motion.reset();
+  state_->rectification = {};
 }
 
 }  // namespace egosgm::vision

@@ -11,10 +11,10 @@ namespace egosgm::vision {
 namespace {
 
 constexpr int kMaxDistance = 20 * kDescriptorSize;  // of descriptors; unrelated ones differ by 34 a sample
-constexpr int kStereoRows_px = 1;                   // rectification error
+constexpr int kStereoRows_px = 2;                   // rectification error
 constexpr int kBeyondInfinity_px = 2;               // and in the direction of the search
 constexpr float kMinCorrelation = 0.8f;
-constexpr float kMaxRowError_px = 1.5f;
+constexpr float kMaxRowError_px = 2.5f;
 constexpr float kCannot = -std::numeric_limits<float>::infinity();
 
 struct Box {
@@ -83,6 +83,7 @@ float refined_disparity(StereoFrame& frame, int i) {
   if (!align_patch(patch, frame.right, kMinCorrelation, x, y)) return disparity;
   if (std::abs(y - frame.v[i]) > kMaxRowError_px) return disparity;
   disparity = frame.u[i] - x;
+  frame.row_error[i] = y - frame.v[i];
   return disparity;
 }
 
@@ -93,6 +94,7 @@ void StereoFrame::reset_matches() {
   right_of_left.assign(count, kUnknown);
   left_of_right.assign(right_features.size(), kUnknown);
   disparity.assign(count, std::numeric_limits<float>::quiet_NaN());
+  row_error.assign(count, 0);
   age.assign(count, 0);
   u.resize(count);
   v.resize(count);
@@ -188,7 +190,7 @@ std::vector<PointMatch> refine_matches(const Calibration& calibration, StereoFra
     current.right_of_left[j] = match.current_right;
     const float d2 = refined_disparity(current, j);
     if (d2 == kCannot) continue;
-    points.push_back({previous.u[i], previous.v[i], d1, u, v, d2});
+    points.push_back({previous.u[i], previous.v[i], d1, u, v, d2, current.row_error[j]});
     kept.push_back(match);
   }
   return points;
@@ -204,7 +206,7 @@ std::vector<PointMatch> pixel_matches(const StereoFrame& previous, const StereoF
     points.push_back({static_cast<double>(a.x), static_cast<double>(a.y),
                       static_cast<double>(a.x - previous.right_features.features[match.previous_right].x),
                       static_cast<double>(b.x), static_cast<double>(b.y),
-                      static_cast<double>(b.x - current.right_features.features[match.current_right].x)});
+                      static_cast<double>(b.x - current.right_features.features[match.current_right].x), 0});
   }
   return points;
 }

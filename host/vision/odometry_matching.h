@@ -19,6 +19,7 @@ struct StereoFrame {
   std::vector<int> left_of_right;
   std::vector<float> u, v;       // refined position of a left feature; its pixel until a track refines it
   std::vector<float> disparity;  // refined at (u, v); NaN: not yet, negative infinity: cannot be
+  std::vector<float> row_error;  // right less left row, where the disparity is known
   std::vector<int> age;          // frames that the feature was tracked for
 
   void reset_matches();

@@ -12,13 +12,10 @@
 namespace egosgm::vision {
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-using Jacobian = Eigen::Matrix<double, 3, 6>;
-
-constexpr double kMinDisparity_px = 0.1;
+// Matches on one surface share errors of their patches' shape: on rendered scenes, whose motion is known, squared
+// errors are this many times what independent residuals would give.
+constexpr double kCorrelated = 3;
 constexpr double kPart_px = 80;  // side of a part of the image in RANSAC
-constexpr double kMinDepth_m = 0.1;
 
 // SplitMix64 (Steele et al., OOPSLA 2014): the same numbers on every platform.
 class Generator {
@@ -36,33 +33,6 @@ class Generator {
  private:
   std::uint64_t state_;
 };
-
-Eigen::Vector3d triangulate(const Calibration& c, double u, double v, double d) {
-  const double z = c.fx * c.baseline_m / std::max(d + c.doffs_px, kMinDisparity_px);
-  return {(u - c.cx) * z / c.fx, (v - c.cy) * z / c.fy, z};
-}
-
-// (u, v, d) of a point in the left camera's frame.
-Eigen::Vector3d project(const Calibration& c, const Eigen::Vector3d& p) {
-  const double inverse = 1 / p.z();
-  return {c.fx * p.x() * inverse + c.cx, c.fy * p.y() * inverse + c.cy, c.fx * c.baseline_m * inverse - c.doffs_px};
-}
-
-Eigen::Matrix3d projection_jacobian(const Calibration& c, const Eigen::Vector3d& p) {
-  const double i = 1 / p.z(), i2 = i * i;
-  Eigen::Matrix3d j;
-  j << c.fx * i, 0, -c.fx * p.x() * i2, 0, c.fy * i, -c.fy * p.y() * i2, 0, 0, -c.fx * c.baseline_m * i2;
-  return j;
-}
-
-// Of (u, v, d) by a left perturbation (translation, rotation).
-Jacobian motion_jacobian(const Eigen::Matrix3d& projection, const Eigen::Vector3d& p) {
-  Eigen::Matrix3d rotation;  // -[p]x
-  rotation << 0, p.z(), -p.y(), -p.z(), 0, p.x(), p.y(), -p.x(), 0;
-  Jacobian j;
-  j << projection, projection * rotation;
-  return j;
-}
 
 Eigen::Isometry3d perturb(const Vector6& xi, const Eigen::Isometry3d& motion) {
   const Eigen::Vector3d w = xi.tail<3>();
@@ -114,7 +84,7 @@ bool solve_sample(const Calibration& calibration, const Scene& scene, const int 
       const Eigen::Vector3d p = motion * scene.points[sample[s]];
       if (p.z() < kMinDepth_m) return false;
       const Eigen::Vector3d residual = scene.measured[sample[s]] - project(calibration, p);
-      const Jacobian j = motion_jacobian(projection_jacobian(calibration, p), p);
+      const MotionJacobian j = motion_jacobian(projection_jacobian(calibration, p), p);
       normal.noalias() += j.transpose() * j;
       right.noalias() += j.transpose() * residual;
     }
@@ -208,18 +178,6 @@ std::string too_few(const StereoOdometryOptions& options, std::size_t inliers, s
   return {};
 }
 
-// Inverse of the covariance of (u2, v2, d2) - project(p): the noise of the measurement, and that of d1, which moves
-// the point along its ray.
-Eigen::Matrix3d information(const Calibration& calibration, const MatchNoise& noise, const PointMatch& match,
-                            const Eigen::Matrix3d& projection, const Eigen::Vector3d& rotated) {
-  const double d1 = std::max(match.d1 + calibration.doffs_px, kMinDisparity_px);
-  const Eigen::Vector3d by_disparity = projection * rotated * (-noise.disparity_px / d1);
-  Eigen::Matrix3d covariance = by_disparity * by_disparity.transpose();
-  const double position2 = noise.position_px * noise.position_px;
-  covariance.diagonal() += Eigen::Vector3d(position2, position2, noise.disparity_px * noise.disparity_px);
-  return covariance.inverse();
-}
-
 struct NormalEquations {
   Matrix6 normal = Matrix6::Zero();
   Vector6 right = Vector6::Zero();
@@ -227,24 +185,17 @@ struct NormalEquations {
   double weight = 0;  // sum of the weights
 };
 
-// Cauchy's weight on the Mahalanobis norm of each residual.
 NormalEquations accumulate(const Calibration& calibration, const MatchNoise& noise,
                            const std::vector<PointMatch>& matches, const Scene& scene, const std::vector<int>& inliers,
                            const Eigen::Isometry3d& motion) {
-  constexpr double kCauchy2 = 2.5 * 2.5 * 3;
   NormalEquations sums;
   for (const int i : inliers) {
-    const Eigen::Vector3d rotated = motion.linear() * scene.points[i];
-    const Eigen::Vector3d p = rotated + motion.translation();
-    const Eigen::Matrix3d projection = projection_jacobian(calibration, p);
-    const Eigen::Vector3d residual = scene.measured[i] - project(calibration, p);
-    const Eigen::Matrix3d inverse = information(calibration, noise, matches[i], projection, rotated);
-    const double squared = residual.dot(inverse * residual);
-    const double weight = 1 / (1 + squared / kCauchy2);
-    const Jacobian j = motion_jacobian(projection, p);
-    const Eigen::Matrix<double, 6, 3> weighted = weight * j.transpose() * inverse;
-    sums.normal.noalias() += weighted * j;
-    sums.right.noalias() += weighted * residual;
+    const Residual residual = linearise(calibration, noise, matches[i], scene.points[i], motion);
+    const double squared = residual.value.dot(residual.information * residual.value);
+    const double weight = robust_weight(squared);
+    const Eigen::Matrix<double, 6, 3> weighted = weight * residual.by_motion.transpose() * residual.information;
+    sums.normal.noalias() += weighted * residual.by_motion;
+    sums.right.noalias() += weighted * residual.value;
     sums.cost += weight * squared;
     sums.weight += weight;
   }
@@ -328,7 +279,7 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
   if (!estimate.reason.empty()) return estimate;
   sums = accumulate(calibration, noise, matches, scene, estimate.inliers, estimate.motion.current_from_previous);
   const double variance = sums.cost / std::max(1.0, 3 * sums.weight - 6);
-  const Matrix6 covariance = variance * sums.normal.inverse();
+  const Matrix6 covariance = kCorrelated * variance * sums.normal.inverse();
   const double sigma_m = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   const double sigma_deg = std::sqrt(covariance.bottomRightCorner<3, 3>().trace()) * 180 / 3.14159265358979323846;
   if (!(sigma_m < 0.5 && sigma_deg < 2)) {

@@ -7,20 +7,9 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/vision/odometry.h"
+#include "host/vision/odometry_geometry.h"
 
 namespace egosgm::vision {
-
-/// A static point seen by both cameras at two times [px]. `u` and `v` are of the left image, `d` is the disparity.
-struct PointMatch {
-  double u1, v1, d1;  // previous frame
-  double u2, v2, d2;  // current frame
-};
-
-/// The standard deviation of what was measured [px].
-struct MatchNoise {
-  double position_px = 0.25;   // of (u2, v2) against (u1, v1)
-  double disparity_px = 0.25;  // of d1 and of d2
-};
 
 struct MotionEstimate {
   Motion motion;

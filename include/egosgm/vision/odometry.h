@@ -24,6 +24,10 @@ struct StereoOdometryOptions {
   double max_flow_x_px = 180;   // widest search in time without a prior
   double max_flow_y_px = 90;
 
+  // Learn, from the odometry's own residuals, what is left of rotation and distortion in the rectified images.
+  // Off: the calibration is taken as it is.
+  bool learn_rectification = true;
+
   // Motion.
   int ransac_iterations = 150;
   double inlier_threshold_px = 1.5;  // reprojection error
@@ -65,7 +69,7 @@ class StereoOdometry {
   OdometryResult process(const ImageView& left, const ImageView& right,
                          const std::optional<Eigen::Isometry3d>& prior = std::nullopt);
 
-  /// Forgets the last frame: the next one is a first frame.
+  /// Forgets all frames: the next one is a first frame.
   void reset();
 
  private:
