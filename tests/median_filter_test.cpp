@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/median_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/reference/median_filter.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+
+testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, const MedianFilterOptions& options = {}) {
+  ocl::Context context(testing::any_device());
+  MedianFilter filter(context, size, options);
+  StereoMaps maps = testing::upload(context, size, in);
+  filter(maps);
+  return testing::download(context, maps);
+}
+
+// The left view's disparities; the right view is the left one, plus 100.
+std::vector<float> filter_left(shared::ImageSize size, const std::vector<float>& left) {
+  testing::HostMaps maps{left, std::vector<float>(2 * left.size(), 1.0f)};
+  for (const float d : left) maps.disparity.push_back(d == kNone ? kNone : d + 100);
+  const std::vector<float> both = filter(size, maps).disparity;
+  const std::vector<float> filtered(both.begin(), both.begin() + static_cast<std::ptrdiff_t>(left.size()));
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    EXPECT_EQ(both[left.size() + i], left[i] == kNone ? kNone : filtered[i] + 100) << "right view, pixel " << i;
+  }
+  return filtered;
+}
+
+class MedianFilterTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(MedianFilterTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const double holes : {0.0, 0.3, 1.0}) {
+    const testing::HostMaps maps = testing::random_maps(size, -40, 90, holes, 7);
+    const testing::HostMaps expected = reference::median_filter(size, maps), actual = filter(size, maps);
+    EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << holes << " holes";
+    EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << holes << " holes";
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, MedianFilterTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+TEST(MedianFilter, TakesTheMiddleOfEveryOrder) {
+  std::vector<float> window{1, 2, 3, 4, 5, 6, 7, 8, 9};
+  std::mt19937 random(3);
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_EQ(filter_left({3, 3}, window)[4], 5) << "order " << i;
+    std::shuffle(window.begin(), window.end(), random);
+  }
+}
+
+TEST(MedianFilter, RemovesASpikeAndKeepsAStep) {
+  EXPECT_EQ(filter_left({5, 3}, {2, 2, 2, 9, 9,  //
+                                 2, 7, 2, 9, 9,  //
+                                 2, 2, 2, 9, 9}),
+            (std::vector<float>{2, 2, 2, 9, 9,  //
+                                2, 2, 2, 9, 9,  //
+                                2, 2, 2, 9, 9}));
+}
+
+TEST(MedianFilter, LeavesHolesAndLetsThemVoteForTheCentre) {
+  // The centre has four neighbours that say 1 and four holes: with its own vote, 5 wins. One more 1 outvotes it.
+  EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, 5, kNone, kNone, kNone, kNone})[4], 5);
+  EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, 5, 1, kNone, kNone, kNone})[4], 1);
+  EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, kNone, 1, 1, 1, 1})[4], kNone);
+}
+
+TEST(MedianFilter, TheBorderVotesForTheCentre) {
+  // A corner has three neighbours, an edge five.
+  EXPECT_EQ(filter_left({3, 2}, {5, 1, 1, 1, 1, 1}), (std::vector<float>{5, 1, 1, 1, 1, 1}));
+  EXPECT_EQ(filter_left({3, 2}, {1, 5, 1, 1, 1, 1}), (std::vector<float>{1, 1, 1, 1, 1, 1}));
+}
+
+TEST(MedianFilter, DoesNotMixTheViews) {
+  // The last row of the left view lies beside the first of the right one.
+  const testing::HostMaps maps{{1, 2, 3, 7, 7, 7}, std::vector<float>(6, 1.0f)};
+  EXPECT_EQ(filter({3, 1}, maps).disparity, maps.disparity);
+}
+
+TEST(MedianFilter, DoesNothingWhenOff) {
+  const testing::HostMaps maps = testing::random_maps({65, 3}, 0, 9, 0.1, 11);
+  EXPECT_EQ(filter({65, 3}, maps, {.enabled = false}).disparity, maps.disparity);
+}
+
+}  // namespace
+}  // namespace egosgm
