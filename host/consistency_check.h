@@ -6,19 +6,22 @@
 
 namespace egosgm {
 
-/// Keeps what both views agree on: the pixel that a disparity points to in the other view must be inside of it, valid,
-/// and within a tolerance. Each view is checked against the other as it came in.
+/// What becomes of a disparity that points to a place outside of the other image, where nothing can contradict it.
+enum class OutsideView { kDrop, kKeep };
+
+/// Keeps what both views agree on: the pixel that a disparity points to in the other view must be valid and within a
+/// tolerance. Each view is checked against the other as it came in.
 class ConsistencyCheck {
  public:
   ConsistencyCheck(ocl::Context& context, shared::ImageSize size);
 
   /// REQUIRES: `out` is not `in`.
-  void operator()(const StereoMaps& in, float max_difference_px, StereoMaps& out);
+  void operator()(const StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>, const ocl::Buffer<float>,
               ocl::Buffer<float>, ocl::Buffer<float>>
       check_;
 };

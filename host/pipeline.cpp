@@ -91,7 +91,7 @@ struct Pipeline::Impl {
     forward_warp(belief, motion, scratch);
     edge_rejection(scratch, predicted);
     hole_fill(predicted, scratch);
-    consistency(scratch, options.consistency.prediction_px, predicted);
+    consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);
   }
 
   void match(const FrameImages& images, bool full_range) {
@@ -102,13 +102,13 @@ struct Pipeline::Impl {
     }
     stages_of(images.type).census(images.pixels, codes);
     banded_sgm(codes, search_band, scratch);
-    consistency(scratch, options.consistency.measurement_px, measured);
+    consistency(scratch, options.consistency.measurement_px, OutsideView::kDrop, measured);
     speckle_removal(measured);
   }
 
   void update(const FrameImages& images) {
     kalman_update(predicted, measured, updated);
-    consistency(updated, options.consistency.update_px, scratch);
+    consistency(updated, options.consistency.update_px, OutsideView::kKeep, scratch);
     stages_of(images.type).sad_check(images.pixels, scratch, updated);
   }
 

@@ -3,7 +3,7 @@
 // x + d sees.
 #include "shared.h"
 
-kernel void check(const ImageSize size, const float max_difference, global const float* disparity,
+kernel void check(const ImageSize size, const float max_difference, const int keep_outside, global const float* disparity,
                   global const float* variance, global float* kept_disparity, global float* kept_variance) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);
@@ -15,10 +15,11 @@ kernel void check(const ImageSize size, const float max_difference, global const
   const float d = disparity[i];
   // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
   const float at = rint(view == EGOSGM_LEFT ? (float)x - d : (float)x + d);
-  const bool inside = (d > EGOSGM_INVALID_DISPARITY) & (at >= 0.0f) & (at < (float)size.width);
+  const bool valid = d > EGOSGM_INVALID_DISPARITY;
+  const bool inside = valid & (at >= 0.0f) & (at < (float)size.width);
   const int other_x = (int)(inside ? at : 0.0f);
   const float other = inside ? disparity[other_row + other_x] : EGOSGM_INVALID_DISPARITY;
-  const bool agree = other > EGOSGM_INVALID_DISPARITY && fabs(other - d) <= max_difference;
+  const bool agree = inside ? (other > EGOSGM_INVALID_DISPARITY) & (fabs(other - d) <= max_difference) : valid & (keep_outside != 0);
 
   kept_disparity[i] = agree ? d : EGOSGM_INVALID_DISPARITY;
   kept_variance[i] = agree ? variance[i] : 0.0f;

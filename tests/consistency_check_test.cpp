@@ -13,33 +13,38 @@ namespace {
 
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
-testing::HostMaps check(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps) {
+testing::HostMaps check(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps,
+                        OutsideView outside = OutsideView::kDrop) {
   ocl::Context context(testing::any_device());
   ConsistencyCheck check(context, size);
   const StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  check(in, max_difference_px, out);
+  check(in, max_difference_px, outside, out);
   return testing::download(context, out);
 }
 
 // A row of both views.
-std::vector<float> check_row(const std::vector<float>& left, const std::vector<float>& right, float max_difference_px) {
+std::vector<float> check_row(const std::vector<float>& left, const std::vector<float>& right, float max_difference_px,
+                             OutsideView outside = OutsideView::kDrop) {
   const shared::ImageSize size{static_cast<int>(left.size()), 1};
   testing::HostMaps maps{left, std::vector<float>(2 * left.size(), 1.0f)};
   maps.disparity.insert(maps.disparity.end(), right.begin(), right.end());
-  return check(size, max_difference_px, maps).disparity;
+  return check(size, max_difference_px, maps, outside).disparity;
 }
 
 class ConsistencyCheckTest : public ::testing::TestWithParam<shared::ImageSize> {};
 
 TEST_P(ConsistencyCheckTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
-  for (const float max_difference_px : {0.5f, 3.0f, 40.0f}) {
-    const testing::HostMaps maps = testing::random_maps(size, -4, 12, 0.2, 5);
-    const testing::HostMaps expected = reference::consistency_check(size, max_difference_px, maps);
-    const testing::HostMaps actual = check(size, max_difference_px, maps);
-    EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << max_difference_px << " px";
-    EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << max_difference_px << " px";
+  const testing::HostMaps maps = testing::random_maps(size, -4, 12, 0.2, 5);
+  for (const OutsideView outside : {OutsideView::kDrop, OutsideView::kKeep}) {
+    for (const float max_difference_px : {0.5f, 3.0f, 40.0f}) {
+      const testing::HostMaps expected =
+          reference::consistency_check(size, max_difference_px, outside == OutsideView::kKeep, maps);
+      const testing::HostMaps actual = check(size, max_difference_px, maps, outside);
+      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << max_difference_px << " px";
+      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << max_difference_px << " px";
+    }
   }
 }
 
@@ -55,6 +60,11 @@ TEST(ConsistencyCheck, DropsWhatLeavesTheImageMeetsAHoleOrDisagrees) {
   // Left 0 points out of the image, left 1 to a hole, left 3 to a right pixel that says 3; that one points to left 5:
   // outside.
   EXPECT_EQ(check_row({1, 1, kNone, 1, kNone}, {kNone, kNone, 3, kNone, kNone}, 1.5f), (std::vector<float>(10, kNone)));
+}
+
+TEST(ConsistencyCheck, KeepsWhatLeavesTheImageIfAskedTo) {
+  EXPECT_EQ(check_row({1, 1, kNone, 1, kNone}, {kNone, kNone, 3, kNone, kNone}, 1.5f, OutsideView::kKeep),
+            (std::vector<float>{1, kNone, kNone, kNone, kNone, kNone, kNone, 3, kNone, kNone}));
 }
 
 TEST(ConsistencyCheck, ToleratesADifferenceUpToTheLimit) {

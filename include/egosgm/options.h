@@ -46,7 +46,7 @@ struct BandedSgmOptions {
   MatchingCost cost = MatchingCost::kCensus9x7;
   int paths = 8;  // 4 (horizontal and vertical) or 8
   int p1 = 10;    // penalty of a step of one disparity
-  int p2 = 120;   // penalty of a larger step; p1 <= p2, at most 190
+  int p2 = 160;   // penalty of a larger step; p1 <= p2, at most 190
   int s_max = 120;  // matching variance: steps are counted until the path sums above the minimum add up to this
   float variance_per_step_px2 = 0.1f;  // r = floor + this * (n_l + n_r)
   float variance_floor_px2 = 0.05f;

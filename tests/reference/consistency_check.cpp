@@ -5,7 +5,8 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps consistency_check(shared::ImageSize size, float max_difference_px, const testing::HostMaps& in) {
+testing::HostMaps consistency_check(shared::ImageSize size, float max_difference_px, bool keep_outside,
+                                    const testing::HostMaps& in) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f)};
   for (std::size_t i = 0; i < 2 * pixels; ++i) {
@@ -14,9 +15,12 @@ testing::HostMaps consistency_check(shared::ImageSize size, float max_difference
     const float d = in.disparity[i];
     if (d == EGOSGM_INVALID_DISPARITY) continue;
     const float other_x = std::nearbyint(is_left ? static_cast<float>(x) - d : static_cast<float>(x) + d);
-    if (!(other_x >= 0 && other_x < static_cast<float>(size.width))) continue;
-    const float other = in.disparity[(is_left ? pixels : 0) + y * size.width + static_cast<std::size_t>(other_x)];
-    if (other == EGOSGM_INVALID_DISPARITY || std::abs(other - d) > max_difference_px) continue;
+    const bool inside = other_x >= 0 && other_x < static_cast<float>(size.width);
+    if (!inside && !keep_outside) continue;
+    if (inside) {
+      const float other = in.disparity[(is_left ? pixels : 0) + y * size.width + static_cast<std::size_t>(other_x)];
+      if (other == EGOSGM_INVALID_DISPARITY || std::abs(other - d) > max_difference_px) continue;
+    }
     out.disparity[i] = d;
     out.variance[i] = in.variance[i];
   }
