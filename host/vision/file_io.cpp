@@ -128,8 +128,15 @@ int rename_or_remove(const std::filesystem::path& from, const std::filesystem::p
 }
 
 void write_named(const std::filesystem::path& file, std::string_view bytes) {
-  const std::filesystem::path hidden = hidden_name(file);
-  Descriptor descriptor(::open(hidden.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  // A killed process with this one's number may have left a file behind.
+  constexpr int kMostTries = 1000;
+  std::filesystem::path hidden;
+  Descriptor descriptor(-1);
+  for (int i = 0; i < kMostTries && !descriptor.is_open(); ++i) {
+    hidden = hidden_name(file);
+    descriptor = Descriptor(::open(hidden.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    if (!descriptor.is_open() && errno != EEXIST) break;
+  }
   if (!descriptor.is_open()) fail_writing(file, errno);
   int error = write_all(descriptor, bytes);
   if (descriptor.close() != 0 && error == 0) error = errno;
