@@ -97,7 +97,8 @@ class Run {
 
   PreparedFrame prepare(std::size_t i) {
     const auto start = Clock::now();
-    PreparedFrame frame{.images = vision::read_images(sequence_.frames[i])};
+    PreparedFrame frame;
+    frame.images = vision::read_images(sequence_.frames[i]);
     frame.read_ms = ms_since(start);
     if (frame.images.left.size() != size_) {
       throw InvalidArgument(fmt::format("{} is {}x{} and the sequence {}x{}: all frames need one size",

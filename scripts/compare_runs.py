@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Prints the figures of several outputs of `egosgm run` side by side: compare_runs.py FOLDER..."""
+import json
+import pathlib
+import statistics
+import sys
+
+STEADY_FROM = 3  # frames; the first ones search everything and warm the device up
+
+
+def figures(folder):
+    """The rows of one column: name -> text."""
+    report = json.loads((folder / "report.json").read_text())
+    frames = report["frames"]
+    steady = frames[STEADY_FROM:] or frames
+
+    def mean(key):
+        return 100 * statistics.mean(frame[key] for frame in steady)
+
+    total_ms = statistics.median(frame["ms"]["total"] for frame in steady)
+    rows = {
+        "searched": f"{mean('search_fraction'):.1f} %",
+        "dense": f"{mean('density'):.1f} %",
+    }
+    accuracy = folder / "accuracy.json"
+    if accuracy.exists():
+        pooled = json.loads(accuracy.read_text())["pooled"]
+        rows["bad or missing"] = f"{pooled['bad_or_missing']:.2f} %"
+        rows["bad of valid"] = f"{pooled['bad_of_valid']:.2f} %"
+        rows["bad, interpolated"] = f"{pooled['interpolated']:.2f} %"
+        rows["mean error"] = f"{pooled['mae']:.3f} px"
+    rows["time per frame"] = f"{total_ms:.1f} ms"
+    rows["frames per second"] = f"{1000 / total_ms:.1f}"
+    return report, rows
+
+
+def main(folders):
+    columns = [(folder.name.replace("_", " "), *figures(folder)) for folder in folders]
+    report = columns[0][1]
+    print(f"{len(report['frames'])} frames of {report['width']}x{report['height']}, D = {report['options']['disparities']}, "
+          f"{report['device']['name']}")
+    print(f"{'':<20}" + "".join(f"{name:>16}" for name, _, _ in columns))
+    for row in columns[0][2]:
+        print(f"{row:<20}" + "".join(f"{rows.get(row, '-'):>16}" for _, _, rows in columns))
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2:
+        sys.exit("usage: compare_runs.py FOLDER...")
+    main([pathlib.Path(argument) for argument in sys.argv[1:]])
