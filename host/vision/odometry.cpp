@@ -13,6 +13,9 @@
 #include "host/vision/odometry_rectification.h"
 
 namespace egosgm::vision {
+
+using namespace odometry;
+
 namespace {
 
 constexpr int kFeatureCell_px = 64;
@@ -58,7 +61,7 @@ struct StereoOdometry::State {
   Calibration calibration;
   StereoOdometryOptions options;
   FeatureDetector detector;
-  StereoFrame previous, current;
+  TrackedFrame previous, current;
   bool has_previous = false;
   RectificationError rectification;
   std::optional<Eigen::Isometry3d> last_motion;
@@ -93,9 +96,12 @@ void StereoOdometry::State::read_frame(const ImageView& left, const ImageView& r
 MotionEstimate StereoOdometry::State::rough_motion(const std::optional<Eigen::Isometry3d>& prior) {
   const std::vector<int> queries = select_spread(previous, kRoughCell_px, kRoughPerCell);
   const int disparity = max_disparity_px(current.left.width);
+  // Wide windows let in more false matches; whether the motion holds is seen on the refined ones.
+  StereoOdometryOptions lenient = options;
+  lenient.min_inlier_ratio *= 0.5;
   const auto attempt = [&](const Eigen::Isometry3d* motion, const SearchWindow& window) {
     const auto matches = match_circle(calibration, previous, current, queries, motion, window, disparity);
-    return estimate_motion(calibration, options, pixel_matches(previous, current, matches),
+    return estimate_motion(calibration, lenient, pixel_matches(previous, current, matches),
                            motion ? *motion : Eigen::Isometry3d::Identity(), kRoughThreshold_px);
   };
   if (prior && out_of_bounds(options, *prior).empty()) {
@@ -127,8 +133,9 @@ OdometryResult StereoOdometry::State::estimate(const std::optional<Eigen::Isomet
   keep_tracks(refined, fine.inliers);
   if (!fine.reason.empty()) return result;
   result.motion = fine.motion;
-  if (options.learn_rectification)
+  if (options.learn_rectification) {
     rectification.update(calibration, MatchNoise{}, points, fine.inliers, fine.motion.current_from_previous);
+  }
   return result;
 }
 

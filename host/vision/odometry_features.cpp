@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 
-namespace egosgm::vision {
+namespace egosgm::vision::odometry {
 namespace {
 
 constexpr int kSuppressionRadius = 3;
@@ -222,4 +222,4 @@ void FeatureDetector::detect(const GreyImage& image, int threshold, int per_cell
   }
 }
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::vision::odometry

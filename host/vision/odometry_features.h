@@ -7,7 +7,7 @@
 
 #include "egosgm/image.h"
 
-namespace egosgm::vision {
+namespace egosgm::vision::odometry {
 
 /// The working copy of a frame: 8 bit, rows `width` apart.
 struct GreyImage {
@@ -80,4 +80,4 @@ inline int descriptor_distance(const Descriptor& a, const Descriptor& b) {
   return sum;
 }
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::vision::odometry

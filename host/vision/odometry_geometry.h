@@ -7,7 +7,7 @@
 
 #include "egosgm/calibration.h"
 
-namespace egosgm::vision {
+namespace egosgm::vision::odometry {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -93,4 +93,4 @@ inline double robust_weight(double squared) {
   return 1 / (1 + squared / kCauchy2);
 }
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::vision::odometry

@@ -7,7 +7,7 @@
 
 #include "host/vision/odometry_subpixel.h"
 
-namespace egosgm::vision {
+namespace egosgm::vision::odometry {
 namespace {
 
 constexpr int kMaxDistance = 20 * kDescriptorSize;  // of descriptors; unrelated ones differ by 34 a sample
@@ -45,7 +45,7 @@ Box around(double x, double y, const SearchWindow& window) {
           static_cast<int>(std::ceil(y - window.y_px)), static_cast<int>(std::floor(y + window.y_px))};
 }
 
-int match_to_left(StereoFrame& frame, int right, int max_disparity_px) {
+int match_to_left(TrackedFrame& frame, int right, int max_disparity_px) {
   int& known = frame.left_of_right[right];
   if (known == kUnknown) {
     const Feature& f = frame.right_features.features[right];
@@ -71,7 +71,7 @@ Flow predict_flow(const Calibration& c, const Eigen::Isometry3d& motion, double 
 }
 
 // Of left feature `i` at its refined place.
-float refined_disparity(StereoFrame& frame, int i) {
+float refined_disparity(TrackedFrame& frame, int i) {
   float& disparity = frame.disparity[i];
   if (!std::isnan(disparity)) return disparity;
   disparity = kCannot;
@@ -89,7 +89,7 @@ float refined_disparity(StereoFrame& frame, int i) {
 
 }  // namespace
 
-void StereoFrame::reset_matches() {
+void TrackedFrame::reset_matches() {
   const int count = left_features.size();
   right_of_left.assign(count, kUnknown);
   left_of_right.assign(right_features.size(), kUnknown);
@@ -104,7 +104,7 @@ void StereoFrame::reset_matches() {
   }
 }
 
-int stereo_match(StereoFrame& frame, int i, int max_disparity_px) {
+int stereo_match(TrackedFrame& frame, int i, int max_disparity_px) {
   int& known = frame.right_of_left[i];
   if (known == kUnknown) {
     const Feature& f = frame.left_features.features[i];
@@ -115,7 +115,7 @@ int stereo_match(StereoFrame& frame, int i, int max_disparity_px) {
   return known;
 }
 
-std::vector<CircularMatch> match_circle(const Calibration& calibration, StereoFrame& previous, StereoFrame& current,
+std::vector<CircularMatch> match_circle(const Calibration& calibration, TrackedFrame& previous, TrackedFrame& current,
                                         const std::vector<int>& queries, const Eigen::Isometry3d* motion,
                                         const SearchWindow& window, int max_disparity_px) {
   std::vector<CircularMatch> matches;
@@ -142,7 +142,7 @@ std::vector<CircularMatch> match_circle(const Calibration& calibration, StereoFr
   return matches;
 }
 
-std::vector<int> select_spread(const StereoFrame& frame, int cell_px, int per_cell) {
+std::vector<int> select_spread(const TrackedFrame& frame, int cell_px, int per_cell) {
   const int columns = (frame.left.width + cell_px - 1) / cell_px, rows = (frame.left.height + cell_px - 1) / cell_px;
   std::vector<std::vector<int>> cells(static_cast<std::size_t>(columns) * rows);
   const auto& features = frame.left_features.features;
@@ -164,7 +164,7 @@ std::vector<int> select_spread(const StereoFrame& frame, int cell_px, int per_ce
   return selected;
 }
 
-std::vector<PointMatch> refine_matches(const Calibration& calibration, StereoFrame& previous, StereoFrame& current,
+std::vector<PointMatch> refine_matches(const Calibration& calibration, TrackedFrame& previous, TrackedFrame& current,
                                        const std::vector<CircularMatch>& matches, const Eigen::Isometry3d& motion,
                                        std::vector<CircularMatch>& kept) {
   std::vector<PointMatch> points;
@@ -196,7 +196,7 @@ std::vector<PointMatch> refine_matches(const Calibration& calibration, StereoFra
   return points;
 }
 
-std::vector<PointMatch> pixel_matches(const StereoFrame& previous, const StereoFrame& current,
+std::vector<PointMatch> pixel_matches(const TrackedFrame& previous, const TrackedFrame& current,
                                       const std::vector<CircularMatch>& matches) {
   std::vector<PointMatch> points;
   points.reserve(matches.size());
@@ -211,4 +211,4 @@ std::vector<PointMatch> pixel_matches(const StereoFrame& previous, const StereoF
   return points;
 }
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::vision::odometry

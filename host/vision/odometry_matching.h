@@ -9,10 +9,10 @@
 #include "host/vision/odometry_features.h"
 #include "host/vision/odometry_motion.h"
 
-namespace egosgm::vision {
+namespace egosgm::vision::odometry {
 
 /// A frame, and what is known of its left features so far. Stereo matches are found when they are asked for.
-struct StereoFrame {
+struct TrackedFrame {
   GreyImage left, right;
   FeatureSet left_features, right_features;
   std::vector<int> right_of_left;  // index, kNoMatch or kUnknown
@@ -38,24 +38,24 @@ struct SearchWindow {
 };
 
 /// The right feature that best matches left feature `i`, and whose best match `i` is.
-int stereo_match(StereoFrame& frame, int i, int max_disparity_px);
+int stereo_match(TrackedFrame& frame, int i, int max_disparity_px);
 
 /// Closes the circle for each of the previous frame's left features in `queries`. With `motion`, the search is
 /// around the place where it takes a static point; without, around the last place.
-std::vector<CircularMatch> match_circle(const Calibration& calibration, StereoFrame& previous, StereoFrame& current,
+std::vector<CircularMatch> match_circle(const Calibration& calibration, TrackedFrame& previous, TrackedFrame& current,
                                         const std::vector<int>& queries, const Eigen::Isometry3d* motion,
                                         const SearchWindow& window, int max_disparity_px);
 
 /// The strongest `per_cell` of every cell of `cell_px` (older tracks first), by index.
-std::vector<int> select_spread(const StereoFrame& frame, int cell_px, int per_cell);
+std::vector<int> select_spread(const TrackedFrame& frame, int cell_px, int per_cell);
 
 /// Matches to a fraction of a pixel. `kept` are those that could be refined, one for each point.
-std::vector<PointMatch> refine_matches(const Calibration& calibration, StereoFrame& previous, StereoFrame& current,
+std::vector<PointMatch> refine_matches(const Calibration& calibration, TrackedFrame& previous, TrackedFrame& current,
                                        const std::vector<CircularMatch>& matches, const Eigen::Isometry3d& motion,
                                        std::vector<CircularMatch>& kept);
 
 /// Matches to a pixel.
-std::vector<PointMatch> pixel_matches(const StereoFrame& previous, const StereoFrame& current,
+std::vector<PointMatch> pixel_matches(const TrackedFrame& previous, const TrackedFrame& current,
                                       const std::vector<CircularMatch>& matches);
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::vision::odometry

@@ -9,7 +9,7 @@
 #include <limits>
 #include <map>
 
-namespace egosgm::vision {
+namespace egosgm::vision::odometry {
 namespace {
 
 // Matches on one surface share errors of their patches' shape: on rendered scenes, whose motion is known, squared
@@ -291,4 +291,4 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
   return estimate;
 }
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::vision::odometry

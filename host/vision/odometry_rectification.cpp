@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace egosgm::vision {
+namespace egosgm::vision::odometry {
 namespace {
 
 using Terms = RectificationError::Terms;
@@ -135,4 +135,4 @@ void RectificationError::update(const Calibration& calibration, const MatchNoise
   if (terms.allFinite()) terms_ = terms;
 }
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::vision::odometry

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace egosgm::vision {
+namespace egosgm::vision::odometry {
 namespace {
 
 constexpr int kReach = 4;  // farthest move [px]
@@ -180,4 +180,4 @@ bool align_patch(const Patch& patch, const GreyImage& image, float min_correlati
   return true;
 }
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::vision::odometry

@@ -3,7 +3,7 @@
 
 #include "host/vision/odometry_features.h"
 
-namespace egosgm::vision {
+namespace egosgm::vision::odometry {
 
 inline constexpr int kPatchRadius = 5;
 inline constexpr int kPatchRows = 2 * kPatchRadius + 1;
@@ -26,4 +26,4 @@ bool make_patch(const GreyImage& image, float x, float y, float scale, Patch& pa
 /// settle, or if the correlation stays below `min_correlation`.
 bool align_patch(const Patch& patch, const GreyImage& image, float min_correlation, float& x, float& y);
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::vision::odometry

@@ -29,7 +29,7 @@ struct StereoOdometryOptions {
   bool learn_rectification = true;
 
   // Motion.
-  int ransac_iterations = 150;
+  int ransac_iterations = 500;
   double inlier_threshold_px = 1.5;  // reprojection error
   int min_inliers = 20;
   double min_inlier_ratio = 0.3;  // of the circular matches
