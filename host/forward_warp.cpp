@@ -89,12 +89,10 @@ ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Ca
 void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted) {
   context_.enter("ForwardWarp");
   const ocl::Range pixels = ocl::every_pixel(context_, size_);
-  zbuffer_.fill(context_, 0);
-  predicted.variance.fill(context_, 0.0f);
   for (const cl_int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
     const shared::DisparityMotion motion = disparity_motion(calibration_, current_from_previous, view);
     move_(context_, ocl::every_pixel(context_, size_, 1), size_, range_, view, motion, process_noise_px2_,
-          belief.disparity, belief.variance, landed_, moved_key_, moved_variance_);
+          belief.disparity, belief.variance, landed_, moved_key_, moved_variance_, zbuffer_, predicted.variance);
   }
   splat_disparity_(context_, pixels, size_, landed_, moved_key_, zbuffer_);
   splat_variance_(context_, pixels, size_, landed_, moved_key_, moved_variance_, zbuffer_, predicted.variance);

@@ -10,7 +10,7 @@
 namespace egosgm {
 
 /// How the disparity space of `view` (EGOSGM_LEFT or EGOSGM_RIGHT) moves with the left camera: H = Gamma T Gamma^-1
-/// (eqs. 1-4), and the variance of the depths that the motion's covariance causes.
+/// (eqs. 1-4), and the variance that its covariance adds.
 shared::DisparityMotion disparity_motion(const Calibration& calibration, const Motion& current_from_previous, int view);
 
 /// Predicts the maps of both views by the camera's motion (eqs. 1-6): every disparity lands on the pixel nearest to
@@ -33,7 +33,7 @@ class ForwardWarp {
   const shared::DisparityRange range_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const cl_int, const shared::DisparityMotion,
               const float, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<cl_int>,
-              ocl::Buffer<cl_uint>, ocl::Buffer<float>>
+              ocl::Buffer<cl_uint>, ocl::Buffer<float>, ocl::Buffer<cl_uint>, ocl::Buffer<float>>
       move_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uint>>
       splat_disparity_;

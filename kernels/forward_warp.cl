@@ -22,11 +22,12 @@ static inline float motion_variance(const DisparityMotion motion, const float u,
   return q < 0.0f ? 0.0f : q;  // rounding
 }
 
-// Moves a view's disparity space. landed: the index of a source's target in the view, -1: nowhere.
-// For CPUs it is apart from the atomics, which are no vector code, and free of branches.
+// Moves a view's disparity space. landed: the index of a source's target in the view, -1: nowhere. Also clears what the
+// splats bid on. For CPUs it is apart from the atomics, which are no vector code, and free of branches.
 kernel void move(const ImageSize size, const DisparityRange range, const int view, const DisparityMotion motion,
                  const float process_noise, global const float* disparity, global const float* variance,
-                 global int* landed, global uint* moved_key, global float* moved_variance) {
+                 global int* landed, global uint* moved_key, global float* moved_variance, global uint* zbuffer,
+                 global float* predicted_variance) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   if (x >= size.width) return;
@@ -53,6 +54,8 @@ kernel void move(const ImageSize size, const DisparityRange range, const int vie
   moved_key[i] = key_of(moved);
   const float p = phi * phi * variance[i] + process_noise + motion_variance(motion, u, v, metric_disparity);
   moved_variance[i] = p < EGOSGM_MAX_VARIANCE_PX2 ? p : EGOSGM_MAX_VARIANCE_PX2;
+  zbuffer[i] = 0;
+  predicted_variance[i] = 0.0f;
 }
 
 kernel void splat_disparity(const ImageSize size, global const int* landed, global const uint* moved_key,
@@ -67,14 +70,15 @@ kernel void splat_disparity(const ImageSize size, global const int* landed, glob
 
 // Positive floats are ordered as their bits are.
 kernel void splat_variance(const ImageSize size, global const int* landed, global const uint* moved_key,
-                           global const float* moved_variance, global const uint* zbuffer, global float* variance) {
+                           global const float* moved_variance, global const uint* zbuffer,
+                           global float* predicted_variance) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
   const size_t first = (size_t)get_global_id(2) * size.width * size.height;
   const size_t i = first + (size_t)get_global_id(1) * size.width + x;
   const int target = landed[i];
   if (target < 0 || zbuffer[first + target] != moved_key[i]) return;
-  atomic_max((global uint*)variance + first + target, as_uint(moved_variance[i]));
+  atomic_max((global uint*)predicted_variance + first + target, as_uint(moved_variance[i]));
 }
 
 kernel void decode(const ImageSize size, global const uint* zbuffer, global float* disparity) {

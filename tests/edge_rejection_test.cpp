@@ -75,10 +75,16 @@ TEST(EdgeRejection, LooksUpAndDownButNotIntoTheOtherViewOrRow) {
   EXPECT_EQ(kept.disparity, (std::vector<float>{10, kNone, kNone, 60, 60, 60}));
   EXPECT_EQ(kept.variance, (std::vector<float>{1, 0, 0, 2, 2, 2}));
 
-  maps.disparity = {10, 30, 60, 10, 30, 60};
-  EXPECT_EQ(reject({3, 1}, 100, maps).disparity, maps.disparity);
   maps.disparity = {10, 10, 10, 90, 90, 90};
   EXPECT_EQ(reject({3, 1}, 5, maps).disparity, maps.disparity);
+}
+
+TEST(EdgeRejection, DoesNotLookAroundTheEndOfARow) {
+  const shared::ImageSize size{3, 2};
+  testing::HostMaps maps = testing::empty_maps(size);
+  maps.disparity = {kNone, kNone, 90,    kNone, 10,    kNone,   // left view: left of the 10, over the edge, lies the 90
+                    kNone, 10,    kNone, 90,    kNone, kNone};  // right view: right of the 10
+  EXPECT_EQ(reject(size, 5, maps).disparity, maps.disparity);
 }
 
 }  // namespace

@@ -173,6 +173,10 @@ TEST(ForwardWarp, PointsBehindTheCameraVanish) {
   const testing::HostMaps predicted = warp(belief, translation(0, 0, -6));
   EXPECT_EQ(predicted.disparity, testing::empty_maps(kSize).disparity);
   EXPECT_EQ(predicted.variance, testing::empty_maps(kSize).variance);
+
+  // At infinity the disparity does not tell, and half a turn mirrors the image into itself.
+  for (float& d : belief.disparity) d = 0;
+  EXPECT_EQ(warp(belief, rotation({0, 1, 0}, 3.14159)).disparity, testing::empty_maps(kSize).disparity);
 }
 
 TEST(ForwardWarp, DropsWhatLeavesTheDisparityRange) {
