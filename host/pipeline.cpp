@@ -13,11 +13,13 @@
 #include "host/frame_transfer.h"
 #include "host/hole_fill.h"
 #include "host/kalman_update.h"
+#include "host/median_filter.h"
 #include "host/ocl/device_handle.h"
 #include "host/ocl/errors.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
+#include "host/vertical_alignment.h"
 
 namespace egosgm {
 namespace {
@@ -45,9 +47,11 @@ struct Pipeline::Impl {
   EdgeRejection edge_rejection;
   HoleFill hole_fill;
   ConsistencyCheck consistency;
+  VerticalAlignment vertical_alignment;
   SearchBand search_band;
   PixelStages stages_u8, stages_u16;
   BandedSgm banded_sgm;
+  MedianFilter median_filter;
   SpeckleRemoval speckle_removal;
   KalmanUpdate kalman_update;
   FrameTransfer transfer;
@@ -66,10 +70,12 @@ struct Pipeline::Impl {
         edge_rejection(context, size, options.edge_rejection),
         hole_fill(context, size, options.hole_fill),
         consistency(context, size),
+        vertical_alignment(context, size, options.vertical_alignment),
         search_band(context, size, range_of(options), options.search_band),
         stages_u8(context, size, PixelType::kU8, options, BandedSgm::code_padding(range_of(options))),
         stages_u16(context, size, PixelType::kU16, options, BandedSgm::code_padding(range_of(options))),
         banded_sgm(context, size, range_of(options), options.banded_sgm),
+        median_filter(context, size, options.median_filter),
         speckle_removal(context, size, options.speckle_removal),
         kalman_update(context, size, options.kalman_update),
         transfer(context, size, range_of(options)),
@@ -102,6 +108,7 @@ struct Pipeline::Impl {
     }
     stages_of(images.type).census(images.pixels, codes);
     banded_sgm(codes, search_band, scratch);
+    median_filter(scratch);
     consistency(scratch, options.consistency.measurement_px, OutsideView::kDrop, measured);
     speckle_removal(measured);
   }
@@ -116,10 +123,17 @@ struct Pipeline::Impl {
     const auto start = std::chrono::steady_clock::now();
     const ocl::Drain drain{context};
     const char* reason = full_range_reason(motion);
-    const FrameImages& images = transfer.upload(left, right);
+    const FrameImages& uploaded = transfer.upload(left, right);
+    const FrameImages* images = &vertical_alignment.align(uploaded);
     if (!reason) predict(*motion);
-    match(images, reason);
-    if (!reason) update(images);
+    match(*images, reason);
+    if (vertical_alignment.is_unknown()) {
+      vertical_alignment.estimate(*images, measured);
+      images = &vertical_alignment.realign(uploaded);
+      match(*images, reason);
+    }
+    vertical_alignment.estimate(*images, measured);
+    if (!reason) update(*images);
 
     StereoMaps& result = reason ? measured : updated;
     FrameReport report = transfer.download(result, reason ? nullptr : &predicted, measured, search_band, outputs);
@@ -127,6 +141,7 @@ struct Pipeline::Impl {
     report.full_range_reason = reason ? reason : options.search == SearchMode::kFull ? "search is full" : "";
     std::swap(belief, result);  // only now: a frame that failed has changed nothing
     has_belief = options.temporal;
+    vertical_alignment.commit();
     report.total_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return report;
   }
@@ -157,6 +172,7 @@ FrameReport Pipeline::process(const ImageView& left, const ImageView& right, con
 void Pipeline::reset() {
   impl_->has_belief = false;
   impl_->no_belief_reason = "reset";
+  impl_->vertical_alignment.reset();
 }
 
 const PipelineOptions& Pipeline::options() const { return impl_->options; }
