@@ -139,7 +139,7 @@ void FrameTransfer::fetch_view(const ocl::Buffer<float>& maps, int view, const M
 }
 
 FrameReport FrameTransfer::download(const StereoMaps& result, const StereoMaps* predicted, const StereoMaps& measured, const SearchBand& band,
-                                    const FrameOutputs& outputs) {
+                                    const ocl::Buffer<float>& vertical_offset_px, const FrameOutputs& outputs) {
   context_.enter("download");
   fetch(result.disparity, 0, pixel_count(size_), staged_maps_[0]);  // always: the report counts its valid pixels
   fetch_view(result.variance, EGOSGM_LEFT, outputs.variance, staged_maps_[1]);
@@ -153,6 +153,8 @@ FrameReport FrameTransfer::download(const StereoMaps& result, const StereoMaps* 
   fetch_view(measured.variance, EGOSGM_LEFT, outputs.measured_variance, staged_maps_[7]);
   if (outputs.search_width.data) fetch(band.bands(), 0, pixel_count(size_), staged_bands_);
   fetch(band.row_sums(), 0, row_sums_.size(), row_sums_);
+
+  fetch(vertical_offset_px, 0, 1, staged_offset_);
 
   const auto finished = context_.wait();
 
@@ -179,6 +181,7 @@ FrameReport FrameTransfer::download(const StereoMaps& result, const StereoMaps* 
     if (predicted && row < row_sums_.size() / 2) report.predicted_fraction += row_sums_[row].predicted / pixels;
   }
   report.density = static_cast<double>(std::count_if(staged_maps_[0].begin(), staged_maps_[0].end(), [](float d) { return d > kInvalidDisparity; })) / pixels;
+  report.vertical_offset_px = staged_offset_[0];
   report.launches = static_cast<int>(std::count_if(finished.begin(), finished.end(), [](const auto& f) { return f.is_launch; }));
   report.stages = stage_times(finished);
   return report;

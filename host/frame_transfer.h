@@ -30,7 +30,7 @@ class FrameTransfer {
 
   /// Waits for the frame and fills the outputs, all of them or, if it throws, none. `predicted`: null where there is no prediction.
   FrameReport download(const StereoMaps& result, const StereoMaps* predicted, const StereoMaps& measured, const SearchBand& band,
-                       const FrameOutputs& outputs);
+                       const ocl::Buffer<float>& vertical_offset_px, const FrameOutputs& outputs);
 
  private:
   template <typename T>
@@ -43,6 +43,7 @@ class FrameTransfer {
   FrameImages images_;
   std::vector<cl_uchar> staged_images_;
   std::vector<float> staged_maps_[8];
+  std::vector<float> staged_offset_;
   std::vector<shared::Band> staged_bands_;
   std::vector<shared::RowSum> row_sums_;
 };

@@ -136,7 +136,7 @@ struct Pipeline::Impl {
     if (!reason) update(*images);
 
     StereoMaps& result = reason ? measured : updated;
-    FrameReport report = transfer.download(result, reason ? nullptr : &predicted, measured, search_band, outputs);
+    FrameReport report = transfer.download(result, reason ? nullptr : &predicted, measured, search_band, vertical_alignment.offset_px(), outputs);
     report.full_range = reason || options.search == SearchMode::kFull;
     report.full_range_reason = reason ? reason : options.search == SearchMode::kFull ? "search is full" : "";
     std::swap(belief, result);  // only now: a frame that failed has changed nothing

@@ -39,6 +39,7 @@ struct FrameReport {
   double computed_fraction = 0;   // with the lanes that were computed and cannot win
   double predicted_fraction = 0;  // left pixels with a prediction
   double density = 0;             // left pixels with a disparity
+  double vertical_offset_px = 0;  // by which the right image was resampled (vertical_alignment)
   int launches = 0;               // kernels enqueued
   std::vector<StageTime> stages;  // in the order in which they ran
   double total_ms = 0;            // wall clock, upload to download
