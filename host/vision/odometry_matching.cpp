@@ -173,7 +173,7 @@ std::vector<PointMatch> refine_matches(const Calibration& calibration, TrackedFr
   for (const CircularMatch& match : matches) {
     const int i = match.previous_left, j = match.current_left;
     const float d1 = refined_disparity(previous, i);
-    if (d1 == kCannot || d1 + calibration.doffs_px < 0.2) continue;
+    if (d1 == kCannot || d1 + calibration.doffs_px < -1) continue;
     const Feature& feature = current.left_features.features[j];
     // A patch looks larger by the ratio of its depths, that is, of its disparities.
     const double z = calibration.fx * calibration.baseline_m / (d1 + calibration.doffs_px);

@@ -15,7 +15,8 @@ namespace {
 // Matches on one surface share errors of their patches' shape: on rendered scenes, whose motion is known, squared
 // errors are this many times what independent residuals would give.
 constexpr double kCorrelated = 3;
-constexpr double kPart_px = 80;  // side of a part of the image in RANSAC
+constexpr std::size_t kFullPart = 3;  // matches from which on a part of the image counts in full
+constexpr double kPart_px = 80;       // side of a part of the image in RANSAC
 
 // SplitMix64 (Steele et al., OOPSLA 2014): the same numbers on every platform.
 class Generator {
@@ -113,8 +114,9 @@ Parts divide(const std::vector<PointMatch>& matches) {
   Parts parts;
   parts.weights.resize(matches.size());
   for (auto& [place, members] : by_place) {
-    for (const int i : members) parts.weights[i] = 1 / std::sqrt(static_cast<double>(members.size()));
-    parts.total += std::sqrt(static_cast<double>(members.size()));
+    const double weight = 1.0 / std::max<std::size_t>(members.size(), kFullPart);
+    for (const int i : members) parts.weights[i] = weight;
+    parts.total += weight * members.size();
     parts.members.push_back(std::move(members));
   }
   return parts;

@@ -97,6 +97,25 @@ Sums correlate(const Patch& patch, const float* region, float column, float row)
   return sums;
 }
 
+// Root of the summed squared deviation of the region's values, whole pixels from (column, row).
+float deviation(const float* region, float column, float row) {
+  const float* first = region + static_cast<int>(row + 0.5f) * kRegionStride + static_cast<int>(column + 0.5f);
+  float sum[kPatchRows] = {}, sum2[kPatchRows] = {};
+  for (int i = 0; i < kPatchRows; ++i) {
+    const float* values = first + i * kRegionStride;
+    for (int j = 0; j < kPatchRows; ++j) {
+      sum[j] += values[j];
+      sum2[j] += values[j] * values[j];
+    }
+  }
+  float total = 0, total2 = 0;
+  for (int j = 0; j < kPatchRows; ++j) {
+    total += sum[j];
+    total2 += sum2[j];
+  }
+  return std::sqrt(std::max(0.0f, total2 - total * total / (kPatchRows * kPatchRows)));
+}
+
 float correlation(const Patch& patch, const float* region, float column, float row) {
   const int j0 = static_cast<int>(column), i0 = static_cast<int>(row);
   const float a = column - j0, b = row - i0;
@@ -164,11 +183,13 @@ bool align_patch(const Patch& patch, const GreyImage& image, float min_correlati
   float region[kRegion * kRegionStride];
   load(image, x0, y0, kRegion, kRegionStride, region, kRegionStride);
   float column = x - kPatchRadius - x0, row = y - kPatchRadius - y0;
+  // With more contrast than in the patch, a step would overshoot by as much.
+  const float contrast = std::max(0.1f, deviation(region, column, row) / patch.deviation);
   bool settled = false;
   for (int k = 0; k < kIterations && !settled; ++k) {
     const Sums sums = correlate(patch, region, column, row);
-    const float dx = patch.inverse_xx * sums.x + patch.inverse_xy * sums.y;
-    const float dy = patch.inverse_xy * sums.x + patch.inverse_yy * sums.y;
+    const float dx = (patch.inverse_xx * sums.x + patch.inverse_xy * sums.y) / contrast;
+    const float dy = (patch.inverse_xy * sums.x + patch.inverse_yy * sums.y) / contrast;
     column -= dx;
     row -= dy;
     if (!(column >= 0 && row >= 0 && column < 2 * kReach && row < 2 * kReach)) return false;
