@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <new>
 
@@ -41,7 +42,12 @@ std::string help_hint(const CLI::App& command) {
 int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
   const CLI::App& command = chosen_command(program);
   const std::vector<std::string> unknown = program.remaining(true);
-  if (unknown.empty()) return fail(kBadInput, fmt::format("{}: see `{}`", error.what(), help_hint(command)));
+  if (unknown.empty()) {
+    std::string what = error.what();
+    if (const std::string prefix = "Could not convert: "; what.starts_with(prefix))
+      what = what.substr(prefix.size()) + " is not a number";
+    return fail(kBadInput, fmt::format("{}: see `{}`", what, help_hint(command)));
+  }
   const std::string typed = unknown.front().substr(0, unknown.front().find('='));
   const std::string nearest = suggestion(typed, names_known_to(command));
   return fail(kBadInput,
@@ -88,6 +94,7 @@ int run_program(int argc, char** argv) {
 int main(int argc, char** argv) {
   using namespace egosgm;
   using namespace egosgm::app;
+  std::signal(SIGXFSZ, SIG_IGN);  // a file beyond `ulimit -f` is to be an error of its write, as a full disk is
   try {
     return run_program(argc, argv);
   } catch (const InvalidArgument& error) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
 
+#include <filesystem>
 #include <memory>
 
 #include "apps/command.h"
@@ -8,6 +9,7 @@
 #include "apps/motion_source.h"
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
+#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/poses_io.h"
 
 namespace egosgm::app {
@@ -32,6 +34,7 @@ int estimate(const OdometryArguments& arguments) {
   const vision::StereoSequence sequence = arguments.input.open();
   vision::check_image_sizes(sequence);
   MotionSource motions(sequence, {});
+  vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
   std::vector<Eigen::Isometry3d> poses;
   catch_interrupts();
   {

@@ -51,7 +51,7 @@ class Run {
         motions_(sequence_, arguments.poses),
         options_(arguments.method.options()),
         device_(Device::select(arguments.device)),
-        outputs_(folder_, kinds_of(arguments), size_),
+        outputs_(folder_, kinds_of(arguments), size_, options_.disparities),
         pipeline_(sequence_.calibration, size_.width, size_.height, options_, device_),
         report_(sequence_, pipeline_, arguments.method.preset, size_.width, size_.height) {}
 
@@ -115,7 +115,7 @@ class Run {
         pipeline_.process(vision::image_view(prepared.images.left), vision::image_view(prepared.images.right),
                           prepared.motion.motion, outputs_.views());
     const auto before_write = Clock::now();
-    const std::int64_t unstorable = outputs_.write(frame);
+    const std::int64_t unstorable = outputs_.write(frame, prepared.images.left);
     const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(start)};
     report_.add(frame, result, prepared.motion, times, unstorable);
     poses_.push_back(prepared.motion.first_from_camera);

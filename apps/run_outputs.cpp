@@ -18,8 +18,16 @@
 namespace egosgm::app {
 namespace {
 
-const std::vector<std::string> kKinds{"variance", "color",        "predicted", "measured",
-                                      "right",    "interpolated", "search",    "pfm"};
+const std::vector<std::string> kKinds{"variance",     "color",  "predicted", "measured", "right",
+                                      "interpolated", "search", "pfm",       "overview"};
+
+constexpr int kOverviewCellWidth = 800;
+
+cv::Mat above(const cv::Mat& picture, const cv::Mat& bar) {
+  cv::Mat both;
+  cv::vconcat(picture, bar, both);
+  return both;
+}
 
 MapView<std::uint16_t> width_view(cv::Mat& map) {
   return {map.ptr<std::uint16_t>(), map.cols, map.rows, static_cast<std::ptrdiff_t>(map.step)};
@@ -28,9 +36,14 @@ MapView<std::uint16_t> width_view(cv::Mat& map) {
 }  // namespace
 
 const char* const kWriteListHelp =
-    "more to write, separated by commas: variance (px^2, PFM), color (pictures), predicted, measured, right, "
-    "interpolated "
-    "(KITTI PNG), search (disparities searched at each pixel, 16-bit PNG), pfm (disparity as float)";
+    "more to write, separated by commas:\n"
+    "  variance       variance [px^2], PFM\n"
+    "  pfm            disparity as float, PFM: also negative ones and those above 256\n"
+    "  right, predicted, measured, interpolated\n"
+    "                 these disparity maps, KITTI's PNG\n"
+    "  search         disparities searched at each pixel, 16-bit PNG\n"
+    "  color          disparity in colours, PNG\n"
+    "  overview       image, disparity, search width and error (or variance) in one PNG";
 
 std::set<std::string> parse_write_list(const std::string& list) {
   std::set<std::string> kinds;
@@ -48,15 +61,15 @@ std::set<std::string> parse_write_list(const std::string& list) {
   return kinds;
 }
 
-RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size)
-    : folder_(std::move(folder)), kinds_(std::move(kinds)), disparity_(size, CV_32FC1) {
+RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities)
+    : folder_(std::move(folder)), kinds_(std::move(kinds)), disparities_(disparities), disparity_(size, CV_32FC1) {
   vision::make_folder(folder_ / "disparity");
   for (const std::string& kind : kinds_) vision::make_folder(folder_ / kind);
-  if (wants("variance")) variance_.create(size, CV_32FC1);
+  if (wants("variance") || wants("overview")) variance_.create(size, CV_32FC1);
   if (wants("right")) right_.create(size, CV_32FC1);
   if (wants("predicted")) predicted_.create(size, CV_32FC1);
   if (wants("measured")) measured_.create(size, CV_32FC1);
-  if (wants("search")) search_.create(size, CV_16UC1);
+  if (wants("search") || wants("overview")) search_.create(size, CV_16UC1);
 }
 
 FrameOutputs RunOutputs::views() {
@@ -70,21 +83,43 @@ FrameOutputs RunOutputs::views() {
   return outputs;
 }
 
-std::int64_t RunOutputs::write(const vision::StereoFrame& frame) {
+std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& left) {
+  if (!color_range_) color_range_ = vision::disparity_range(disparity_);
   if (wants("variance")) vision::write_pfm(file("variance", frame, ".pfm"), variance_);
   if (wants("pfm")) vision::write_pfm(file("pfm", frame, ".pfm"), disparity_);
   if (wants("predicted")) vision::write_disparity_png(file("predicted", frame), predicted_);
   if (wants("measured")) vision::write_disparity_png(file("measured", frame), measured_);
   if (wants("right")) vision::write_disparity_png(file("right", frame), right_);
   if (wants("search")) vision::write_png(file("search", frame), search_);
+  if (wants("overview")) vision::write_png(file("overview", frame), overview(frame, left));
   if (wants("interpolated")) {
     vision::write_disparity_png(file("interpolated", frame), vision::interpolate_background(disparity_));
   }
   if (wants("color")) {
-    if (!color_range_) color_range_ = vision::disparity_range(disparity_);
     vision::write_png(file("color", frame), vision::color_disparity(disparity_, *color_range_));
   }
   return vision::write_disparity_png(file("disparity", frame), disparity_);  // last: a frame with it is complete
+}
+
+cv::Mat RunOutputs::overview(const vision::StereoFrame& frame, const cv::Mat& left) const {
+  const int width = left.cols;
+  cv::Mat searched;
+  search_.convertTo(searched, CV_32F);
+  const vision::ColorRange widths{1, std::max(2.0, static_cast<double>(disparities_)), true};
+  std::vector<vision::CaptionedPicture> pictures{
+      {vision::color_grey(left), "left image, frame " + frame.name},
+      {above(vision::color_disparity(disparity_, *color_range_), vision::color_bar(width, *color_range_, "px")),
+       "disparity"},
+      {above(vision::color_map(searched, widths), vision::color_bar(width, widths, "")), "disparities searched"}};
+  if (frame.truth_noc.empty()) {
+    pictures.push_back(
+        {above(vision::color_variance(variance_, disparity_), vision::color_bar(width, vision::kVarianceRange, "px^2")),
+         "variance"});
+  } else {
+    const cv::Mat truth = vision::read_disparity(frame.truth_noc);
+    pictures.push_back({above(vision::color_error(disparity_, truth), vision::error_bar(width)), "error [px]"});
+  }
+  return vision::compose(pictures, 2, kOverviewCellWidth);
 }
 
 std::filesystem::path RunOutputs::file(const char* kind, const vision::StereoFrame& frame,

@@ -23,20 +23,26 @@ extern const char* const kWriteListHelp;
 class RunOutputs {
  public:
   /// Makes the folders. Throws IoError.
-  RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size);
+  RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities);
 
   /// Where the pipeline is to write; valid as long as this object lives.
   FrameOutputs views();
 
-  /// Writes the frame that the views hold. Returns how many disparities KITTI's PNG has no room for.
-  std::int64_t write(const vision::StereoFrame& frame);
+  /// Writes the frame that the views hold; `left` is its left image. Returns how many disparities KITTI's PNG has no
+  /// room for.
+  std::int64_t write(const vision::StereoFrame& frame, const cv::Mat& left);
 
  private:
   bool wants(const char* kind) const { return kinds_.contains(kind); }
   std::filesystem::path file(const char* kind, const vision::StereoFrame& frame, const char* extension = ".png") const;
 
+  /// Left image, disparity, search width, and the error where there is truth (else the standard deviation), with their
+  /// scales.
+  cv::Mat overview(const vision::StereoFrame& frame, const cv::Mat& left) const;
+
   const std::filesystem::path folder_;
   const std::set<std::string> kinds_;
+  const int disparities_;
   cv::Mat disparity_, variance_, right_, predicted_, measured_, search_;
   std::optional<vision::ColorRange> color_range_;  // the first frame's, so that colours do not flicker
 };

@@ -1,0 +1,554 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The program from outside: every subcommand, wrong arguments, broken input, interrupts, full disks.
+
+EGOSGM_PROGRAM names the program; EGOSGM_DATA the folder of real data (tests that need it are skipped without).
+"""
+import json
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import struct
+import subprocess
+import tempfile
+import unittest
+import zlib
+
+PROGRAM = os.environ["EGOSGM_PROGRAM"]
+DATA = os.environ.get("EGOSGM_DATA", "")
+WIDTH, HEIGHT, FRAMES = 320, 96, 4
+
+
+def egosgm(*arguments, **options):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=240, **options)
+
+
+def grey_png(width, height, depth=8):
+    """A textured PNG, built here so that sizes and depths are free."""
+    rows = b"".join(b"\0" + bytes((x * 7 + y * 13 + x * y) % 256 for x in range(width * depth // 8)) for y in range(height))
+
+    def chunk(kind, body):
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+    header = struct.pack(">IIBBBBB", width, height, depth, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+
+
+class ProgramTest(unittest.TestCase):
+    """A folder with a small synthetic sequence for each class, and a copy of it for each test that breaks it."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder_holder = tempfile.TemporaryDirectory(prefix="egosgm_program_")
+        cls.folder = pathlib.Path(cls.folder_holder.name)
+        cls.street = cls.folder / "street"
+        done = egosgm("synth", "--out", cls.street, "--frames", FRAMES, "--width", WIDTH, "--height", HEIGHT, "--seed", 7, "--quiet")
+        assert done.returncode == 0, done.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder_holder.cleanup()
+
+    def new_folder(self):
+        return pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+
+    def broken_street(self):
+        copy = self.new_folder() / "street"
+        shutil.copytree(self.street, copy)
+        return copy
+
+    def assert_works(self, *arguments, **options):
+        done = egosgm(*arguments, **options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, "")
+        return done.stdout
+
+    def assert_refused(self, arguments, *named, code=2, **options):
+        """One line on the standard error that holds every text of `named`, and the exit code."""
+        done = egosgm(*arguments, **options)
+        lines = [line for line in done.stderr.splitlines() if line]
+        self.assertEqual(done.returncode, code, f"{arguments}: {done.stdout}{done.stderr}")
+        self.assertEqual(len(lines), 1, done.stderr)
+        self.assertTrue(lines[0].startswith("egosgm: error: "), lines[0])
+        for text in named:
+            self.assertIn(str(text), lines[0])
+
+    def report(self, out):
+        return json.loads((out / "report.json").read_text())
+
+    def assert_whole(self, out, at_least=0):
+        """Everything in `out` can be read, and nothing temporary is left."""
+        maps = sorted((out / "disparity").glob("*"))
+        self.assertGreaterEqual(len(maps), at_least)
+        for file in maps:
+            self.assertRegex(file.name, r"^\d{6}\.png$")
+            self.assert_works("eval", "--estimate", file, "--truth", file)
+        return len(maps)
+
+
+class Help(ProgramTest):
+    def test_every_subcommand_explains_itself(self):
+        for command in ("run", "eval", "devices", "synth", "odometry", "eval-poses"):
+            self.assertIn("--help", self.assert_works(command, "--help"))
+            self.assertIn(command, self.assert_works("--help"))
+
+    def test_run_lists_all_its_options_and_those_of_the_stages(self):
+        text = self.assert_works("run", "--help")
+        for option in ("--kitti", "--scene", "--odometry", "--left", "--right", "--calib", "--frames", "--out", "--poses", "--preset",
+                       "--search", "--temporal", "--paths", "--disparities", "--min-disparity", "--device", "--interpolate",
+                       "--write", "--set", "--config", "--save-config", "--quiet", "banded_sgm.p2", "kalman_update.gate_px"):
+            self.assertIn(option, text)
+
+    def test_version(self):
+        self.assertRegex(self.assert_works("--version"), r"^egosgm \d+\.\d+\.\d+\n$")
+
+    def test_devices_names_the_default_and_why(self):
+        text = self.assert_works("devices")
+        self.assertIn("* 0", text)
+        self.assertIn("is taken by default", text)
+        devices = json.loads(self.assert_works("devices", "--json"))
+        self.assertEqual(sum(device["default"] for device in devices), 1)
+
+    def test_without_a_device_it_says_how_to_install_one(self):
+        nothing = dict(os.environ, OCL_ICD_VENDORS="/nonexistent")
+        self.assert_refused(["devices"], "pocl-opencl-icd", env=nothing)
+        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder()], "pocl-opencl-icd", env=nothing)
+
+
+class Run(ProgramTest):
+    def test_writes_maps_poses_and_report(self):
+        out = self.new_folder()
+        text = self.assert_works("run", "--odometry", self.street, "--out", out)
+        self.assertEqual(self.assert_whole(out), FRAMES)
+        self.assertEqual(len((out / "poses.txt").read_text().splitlines()), FRAMES)
+        self.assertIn("frame 000003", text)
+        report = self.report(out)
+        self.assertTrue(report["finished"])
+        for key in ("device", "driver", "version", "options"):
+            self.assertTrue(report[key])
+        self.assertEqual([frame["frame"] for frame in report["frames"]], list(range(FRAMES)))
+        for frame in report["frames"]:
+            for fraction in ("search_fraction", "computed_fraction", "predicted_fraction", "density"):
+                self.assertTrue(0 <= frame[fraction] <= 1, fraction)
+            self.assertGreater(frame["ms"]["total"], 0)
+            self.assertIn("BandedSgm", frame["ms"])
+        first, later = report["frames"][0], report["frames"][-1]
+        self.assertEqual((first["search_fraction"], first["full_range"], first["full_range_reason"]), (1, True, "first frame"))
+        self.assertIsNone(first["odometry"]["motion"])
+        self.assertLess(later["search_fraction"], 0.5)
+        self.assertGreater(later["odometry"]["inliers"], 10)
+        self.assertAlmostEqual(later["odometry"]["motion"]["translation_m"][2], -0.8, delta=0.1)
+
+    def test_writes_what_is_asked_for(self):
+        out = self.new_folder()
+        kinds = "variance,color,predicted,measured,right,interpolated,search,pfm,overview"
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", kinds, "--frames", "1:2", "--quiet")
+        for kind in kinds.split(","):
+            extension = "pfm" if kind in ("variance", "pfm") else "png"
+            self.assertEqual([f.name for f in sorted((out / kind).iterdir())], [f"00000{i}.{extension}" for i in (1, 2)])
+        text = json.loads(self.assert_works("eval", "--estimate", out / "interpolated", "--truth",
+                                            self.street / "truth/left_disp_occ", "--json"))
+        self.assertEqual(text["pooled"]["density"], 100)
+
+    def test_interpolate_fills_a_folder_of_its_own(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--interpolate", "--frames", "0")
+        self.assertTrue((out / "interpolated/000000.png").exists())
+
+    def test_frames_keep_their_own_numbers(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "2:3")
+        self.assertEqual([f.name for f in sorted((out / "disparity").iterdir())], ["000002.png", "000003.png"])
+        self.assertEqual([frame["frame"] for frame in self.report(out)["frames"]], [2, 3])
+        self.assertTrue((out / "poses.txt").read_text().startswith("1.0000"))
+
+    def test_same_bits_twice_and_quiet_says_nothing(self):
+        first, second = self.new_folder(), self.new_folder()
+        for out in (first, second):
+            self.assertEqual(self.assert_works("run", "--odometry", self.street, "--out", out, "--quiet", "--write", "variance"), "")
+        for file in [*first.glob("disparity/*"), *first.glob("variance/*"), first / "poses.txt"]:
+            self.assertEqual(file.read_bytes(), (second / file.relative_to(first)).read_bytes(), file.name)
+
+    def test_temporal_off_searches_everything(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--temporal", "off")
+        for frame in self.report(out)["frames"]:
+            self.assertEqual((frame["search_fraction"], frame["full_range"], frame["predicted_fraction"]), (1, True, 0))
+
+    def test_search_full_still_predicts(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--search", "full")
+        last = self.report(out)["frames"][-1]
+        self.assertEqual(last["search_fraction"], 1)
+        self.assertGreater(last["predicted_fraction"], 0.5)
+
+    def test_poses_take_the_place_of_odometry(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--poses", self.street / "poses.txt")
+        self.assertEqual(self.report(out)["frames"][-1]["odometry"]["source"], "poses file")
+        drift = json.loads(self.assert_works("eval-poses", "--estimate", out / "poses.txt", "--truth", self.street / "poses.txt",
+                                             "--json"))
+        self.assertLess(drift["end_drift_m"], 1e-6)
+
+    def test_patterns_and_16_bit_images_and_odd_sizes(self):
+        folder = self.new_folder()
+        for side in ("left", "right"):
+            for i in (1, 2):
+                (folder / f"{side}_{i}.png").write_bytes(grey_png(65, 31, depth=16))
+        (folder / "calib.toml").write_text("fx = 100\nfy = 100\ncx = 32\ncy = 15\nbaseline_m = 0.5\n")
+        out = self.new_folder()
+        self.assert_works("run", "--left", folder / "left_%d.png", "--right", folder / "right_%d.png", "--calib",
+                          folder / "calib.toml", "--out", out, "--disparities", 19, "--min-disparity", "-3", "--paths", 4)
+        self.assertEqual(self.assert_whole(out), 2)
+        options = self.report(out)["options"]
+        self.assertEqual((options["disparities"], options["min_disparity"], options["banded_sgm.paths"]), (19, -3, 4))
+
+    def test_a_saved_configuration_gives_the_same_bits(self):
+        first, second = self.new_folder(), self.new_folder()
+        saved, again = first / "saved.toml", second / "again.toml"
+        self.assert_works("run", "--odometry", self.street, "--out", first, "--preset", "paper", "--set", "banded_sgm.p2=97",
+                          "--set", "search_band.sigmas=2.7", "--disparities", 50, "--save-config", saved)
+        self.assert_works("run", "--odometry", self.street, "--out", second, "--config", saved, "--save-config", again)
+        self.assertEqual(saved.read_text(), again.read_text())
+        for file in first.glob("disparity/*"):
+            self.assertEqual(file.read_bytes(), (second / "disparity" / file.name).read_bytes())
+
+    def test_the_last_choice_wins_preset_config_set_named(self):
+        folder = self.new_folder()
+        config = folder / "config.toml"
+        config.write_text("# a comment\ndisparities = 40\n[banded_sgm]\np1 = 7\np2 = 77\n")
+        self.assert_works("run", "--odometry", self.street, "--out", folder / "out", "--frames", "0", "--config", config, "--set",
+                          "banded_sgm.p2=88", "--set", "disparities=41", "--disparities", 42)
+        options = self.report(folder / "out")["options"]
+        self.assertEqual((options["disparities"], options["banded_sgm.p1"], options["banded_sgm.p2"]), (42, 7, 88))
+
+    def test_paper_preset_searches_everything_that_is_not_predicted(self):
+        default, paper = self.new_folder(), self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", default)
+        self.assert_works("run", "--odometry", self.street, "--out", paper, "--preset", "paper")
+        self.assertGreater(self.report(paper)["frames"][-1]["search_fraction"],
+                           self.report(default)["frames"][-1]["search_fraction"])
+
+
+class Accuracy(ProgramTest):
+    def test_synthetic_sequence_with_true_poses(self):
+        street, out = self.new_folder(), self.new_folder()
+        self.assert_works("synth", "--out", street, "--frames", 20, "--quiet")
+        self.assert_works("run", "--odometry", street, "--poses", street / "poses.txt", "--out", out, "--quiet")
+        for i in range(3):
+            (out / f"disparity/00000{i}.png").unlink()
+        result = json.loads(self.assert_works("eval", "--estimate", out, "--truth", street / "truth/left_disp_noc", "--json"))
+        self.assertEqual(len(result["pairs"]), 17)
+        self.assertEqual(len(result["without_estimate"]), 3)
+        self.assertLessEqual(result["pooled"]["bad_or_missing"], 2.0)
+
+    def test_odometry_of_a_synthetic_sequence(self):
+        street, poses = self.new_folder(), self.new_folder() / "poses.txt"
+        self.assert_works("synth", "--out", street, "--frames", 8, "--quiet")
+        self.assert_works("odometry", street, "--out", poses)
+        drift = json.loads(self.assert_works("eval-poses", "--estimate", poses, "--truth", street / "poses.txt", "--json"))
+        self.assertEqual(drift["frames"], 8)
+        self.assertLess(drift["end_drift_percent"], 1.5)
+
+
+class Eval(ProgramTest):
+    def test_an_estimate_against_itself_is_perfect(self):
+        truth = self.street / "truth/left_disp_occ"
+        result = json.loads(self.assert_works("eval", "--estimate", truth, "--truth", truth, "--json"))
+        self.assertEqual(len(result["pairs"]), FRAMES)
+        for key, value in {"bad_or_missing": 0, "bad_of_valid": 0, "density": 100, "interpolated": 0, "d1": 0,
+                           "d1_interpolated": 0, "mae": 0}.items():
+            self.assertEqual(result["pooled"][key], value, key)
+        table = self.assert_works("eval", "--estimate", truth, "--truth", truth)
+        self.assertIn("pooled", table)
+        self.assertIn("000003", table)
+
+    def test_refuses_what_cannot_be_compared(self):
+        truth = self.street / "truth/left_disp_occ"
+        small = self.new_folder() / "000000.png"
+        small.write_bytes(grey_png(20, 10, depth=16))
+        self.assert_refused(["eval", "--estimate", small, "--truth", truth / "000000.png"], small)
+        self.assert_refused(["eval", "--estimate", self.street / "calib.txt", "--truth", truth / "000000.png"], "calib.txt")
+        self.assert_refused(["eval", "--estimate", self.new_folder(), "--truth", truth])
+        self.assert_refused(["eval", "--estimate", "nowhere", "--truth", truth], "nowhere")
+
+    def test_a_full_disk_under_the_standard_output_is_an_error(self):
+        truth = self.street / "truth/left_disp_occ/000000.png"
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([PROGRAM, "eval", "--estimate", truth, "--truth", truth], stdout=full, stderr=subprocess.PIPE,
+                                  text=True, timeout=60)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("standard output", done.stderr)
+
+
+class WrongArguments(ProgramTest):
+    def run_with(self, *arguments):
+        return ["run", "--odometry", self.street, "--out", self.folder / "never", *arguments]
+
+    def tearDown(self):
+        self.assertFalse((self.folder / "never").exists(), "refused, but wrote")
+
+    def test_mistyped_names_get_a_suggestion(self):
+        self.assert_refused(["rnu"], "rnu", "did you mean run?")
+        self.assert_refused(["--versoin"], "--version")
+        self.assert_refused(self.run_with("--disparites", 64), "--disparites", "did you mean --disparities?")
+        self.assert_refused(self.run_with("--disparites=64"), "did you mean --disparities?")
+        self.assert_refused(self.run_with("--set", "banded_sgm.p_2=64"), "banded_sgm.p_2", "banded_sgm.p2")
+        self.assert_refused(self.run_with("--write", "colour"), "colour", "did you mean color?")
+
+    def test_missing_and_contradicting_arguments(self):
+        self.assert_refused([], "subcommand")
+        self.assert_refused(["run"], "--out")
+        self.assert_refused(["run", "--out", self.folder / "never"], "--odometry")
+        self.assert_refused(self.run_with("--kitti", self.street, "--scene", 1), "more than one input")
+        self.assert_refused(self.run_with("--scene", 1), "--scene")
+        self.assert_refused(["run", "--left", "a.png", "--out", self.folder / "never"], "--right")
+        self.assert_refused(["run", "--kitti", self.street, "--out", self.folder / "never"], "--scene")
+        self.assert_refused(self.run_with("--device"), "--device")
+        self.assert_refused(self.run_with("surplus"), "surplus")
+
+    def test_values_out_of_range(self):
+        self.assert_refused(self.run_with("--disparities", 0), "disparities", "0")
+        self.assert_refused(self.run_with("--disparities", "many"), "many")
+        self.assert_refused(self.run_with("--paths", 5), "paths", "5")
+        self.assert_refused(self.run_with("--preset", "best"), "best")
+        self.assert_refused(self.run_with("--search", "some"), "some")
+        self.assert_refused(self.run_with("--temporal", "maybe"), "maybe")
+        self.assert_refused(self.run_with("--frames", "a:b"), "a:b")
+        self.assert_refused(self.run_with("--frames", "3:1"), "3:1")
+        self.assert_refused(self.run_with("--set", "banded_sgm.p2"), "stage.option=value")
+        self.assert_refused(self.run_with("--set", "forward_warp.process_noise_px2=nan"), "process_noise_px2")
+        self.assert_refused(self.run_with("--device", "abacus"), "abacus")
+        self.assert_refused(["synth", "--out", self.folder / "never", "--frames", 0], "frames")
+        self.assert_refused(["synth", "--out", self.folder / "never", "--width", "wide"], "wide")
+
+    def test_configuration_files(self):
+        config = self.new_folder() / "config.toml"
+        self.assert_refused(self.run_with("--config", config), config)
+        config.write_text("banded_sgm.p_1 = 3\n")
+        self.assert_refused(self.run_with("--config", config), config, "banded_sgm.p1")
+        config.write_bytes(bytes(range(256)))
+        self.assert_refused(self.run_with("--config", config), config)
+
+    def test_scenes_that_do_not_exist(self):
+        folder = self.new_folder()
+        for name in ("image_0", "image_1", "calib"):
+            (folder / name).mkdir()
+        (folder / "image_0/000007_10.png").write_bytes(grey_png(8, 8))
+        self.assert_refused(["run", "--kitti", folder, "--scene", 8, "--out", self.folder / "never"], "8", "000007")
+
+
+class BrokenInput(ProgramTest):
+    def assert_sequence_refused(self, street, *named, code=2, frames_left=None, options=()):
+        out = self.new_folder() / "out"
+        self.assert_refused(["run", "--odometry", street, "--out", out, *options], *named, code=code)
+        if frames_left is None:
+            self.assertFalse(out.exists(), "refused before the run, but wrote")
+        else:
+            self.assertEqual(self.assert_whole(out), frames_left)
+            report = self.report(out)
+            self.assertFalse(report["finished"])
+            self.assertEqual(len(report["frames"]), frames_left)
+
+    def test_empty_folder(self):
+        empty = self.new_folder()
+        self.assert_sequence_refused(empty, empty, "image_0")
+
+    def test_missing_frame(self):
+        street = self.broken_street()
+        (street / "image_0/000002.png").unlink()
+        (street / "image_1/000002.png").unlink()
+        self.assert_sequence_refused(street, "000002.png", "--frames")
+
+    def test_missing_right_image(self):
+        street = self.broken_street()
+        (street / "image_1/000002.png").unlink()
+        self.assert_sequence_refused(street, "000002.png")
+
+    def test_truncated_image(self):
+        street = self.broken_street()
+        file = street / "image_1/000002.png"
+        file.write_bytes(file.read_bytes()[:-1500])
+        self.assert_sequence_refused(street, file, frames_left=2)
+
+    def test_image_that_is_none(self):
+        street = self.broken_street()
+        file = street / "image_0/000001.png"
+        file.write_text("not an image")
+        self.assert_sequence_refused(street, file)
+        file.write_bytes(b"")
+        self.assert_sequence_refused(street, file)
+
+    def test_sizes_that_differ(self):
+        street = self.broken_street()
+        file = street / "image_1/000000.png"
+        file.write_bytes(grey_png(WIDTH - 1, HEIGHT))
+        self.assert_sequence_refused(street, file)
+
+    def test_size_that_changes(self):
+        street = self.broken_street()
+        for side in (0, 1):
+            (street / f"image_{side}/000003.png").write_bytes(grey_png(WIDTH, HEIGHT + 1))
+        self.assert_sequence_refused(street, "000003.png", f"{WIDTH}x{HEIGHT}")
+
+    def test_a_header_that_promises_gigabytes(self):
+        street = self.broken_street()
+        for side in (0, 1):
+            for file in (street / f"image_{side}").iterdir():
+                data = bytearray(grey_png(8, 8))
+                data[16:24] = struct.pack(">II", 100000, 100000)
+                data[29:33] = struct.pack(">I", zlib.crc32(bytes(data[12:29])))
+                file.write_bytes(bytes(data))
+        self.assert_sequence_refused(street, "000000.png")
+
+    def test_calibrations(self):
+        good = (self.street / "calib.txt").read_text().splitlines()
+        left = good[0].split()
+
+        def with_left(index, value):
+            return " ".join(left[:index] + [value] + left[index + 1:])
+
+        def with_right_shift(value):
+            row = good[1].split()
+            row[4] = value
+            return " ".join(row)
+
+        for name, rows in {
+                "zero focal length": [with_left(1, "0"), good[1]],
+                "NaN": [with_left(1, "nan"), good[1]],
+                "too few numbers": [" ".join(left[:-1]), good[1]],
+                "no number": [with_left(3, "wide"), good[1]],
+                "zero baseline": [good[0], with_right_shift("0")],
+                "negative baseline": [good[0], with_right_shift("100")],
+                "one camera": [good[0]],
+                "empty": [],
+        }.items():
+            with self.subTest(name):
+                street = self.broken_street()
+                (street / "calib.txt").write_text("\n".join(rows) + "\n")
+                self.assert_sequence_refused(street, "calib.txt")
+        street = self.broken_street()
+        (street / "calib.txt").unlink()
+        self.assert_sequence_refused(street, "calib.txt")
+
+    def test_poses(self):
+        rows = (self.street / "poses.txt").read_text().splitlines()
+        stretched = "2 0 0 0 0 1 0 0 0 0 1 0"
+        mirrored = "-1 0 0 0 0 1 0 0 0 0 1 0"
+        for name, bad in {"too few numbers": "1 0 0", "not a rotation": stretched, "a reflection": mirrored, "words": "a " * 12,
+                          "NaN": "nan " * 12}.items():
+            with self.subTest(name):
+                poses = self.new_folder() / "poses.txt"
+                poses.write_text("\n".join([rows[0], bad, *rows[2:]]) + "\n")
+                self.assert_sequence_refused(self.street, f"{poses}:2", options=["--poses", poses])
+        poses = self.new_folder() / "poses.txt"
+        poses.write_text(rows[0] + "\n")
+        self.assert_sequence_refused(self.street, poses, options=["--poses", poses])
+        self.assert_sequence_refused(self.street, "nowhere", options=["--poses", "nowhere"])
+        self.assert_refused(["eval-poses", "--estimate", poses, "--truth", self.street / "poses.txt"])
+
+
+class Disk(ProgramTest):
+    LONG = 60
+
+    def long_street(self):
+        """A sequence that takes a while: the first frame, again and again."""
+        street = self.broken_street()
+        for side in (0, 1):
+            first = street / f"image_{side}/000000.png"
+            for i in range(1, self.LONG):
+                shutil.copyfile(first, street / f"image_{side}/{i:06d}.png")
+        return street
+
+    def test_output_folders_that_cannot_be_written(self):
+        below_a_file = self.street / "calib.txt/out"
+        self.assert_refused(["run", "--odometry", self.street, "--out", below_a_file], below_a_file, code=1)
+        self.assert_refused(["synth", "--out", below_a_file], below_a_file, code=1)
+        self.assert_refused(["odometry", self.street, "--out", below_a_file / "poses.txt"], below_a_file, code=1)
+
+    def test_a_full_disk_leaves_whole_files(self):
+        street, out = self.long_street(), self.new_folder()
+        process = subprocess.Popen([PROGRAM, "run", "--odometry", street, "--out", out], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        for _ in range(3):  # by then the driver has written its kernel cache
+            process.stdout.readline()
+        resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (4096, 4096))  # EFBIG: ENOSPC without a file system of its own
+        _, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 1, errors)
+        self.assertRegex(errors, r"^egosgm: error: .*disparity/\d{6}\.png.*\n$")
+        self.assert_whole(out, at_least=3)
+
+    def test_an_interrupt_ends_cleanly(self):
+        street, out = self.long_street(), self.new_folder()
+        for stop in (signal.SIGINT, signal.SIGTERM):
+            process = subprocess.Popen([PROGRAM, "run", "--odometry", street, "--out", out], stdout=subprocess.PIPE,
+                                       stderr=subprocess.PIPE, text=True)
+            process.stdout.readline()
+            process.send_signal(stop)
+            _, errors = process.communicate(timeout=120)
+            self.assertEqual(process.returncode, 130, errors)
+            self.assertIn("interrupted", errors)
+            report = self.report(out)
+            self.assertFalse(report["finished"])
+            self.assertTrue(1 <= len(report["frames"]) < self.LONG)
+            self.assertEqual(len((out / "poses.txt").read_text().splitlines()), len(report["frames"]))
+
+    def test_a_kill_leaves_only_whole_files(self):
+        street, out = self.long_street(), self.new_folder()
+        for lines in (1, 2, 3):
+            process = subprocess.Popen([PROGRAM, "run", "--odometry", street, "--out", out], stdout=subprocess.PIPE, text=True)
+            for _ in range(lines):
+                process.stdout.readline()
+            process.kill()
+            process.communicate()
+            self.assert_whole(out, at_least=lines)
+
+
+@unittest.skipUnless(pathlib.Path(DATA, "README.md").is_file(), f"no real data: EGOSGM_DATA is '{DATA}'")
+class RealData(ProgramTest):
+    data = pathlib.Path(DATA)
+
+    def evaluate(self, estimate, truth):
+        return json.loads(self.assert_works("eval", "--estimate", estimate, "--truth", truth, "--json"))["pooled"]
+
+    def test_evaluation_agrees_with_kittis_kit(self):
+        kit = self.data / "devkit2012"
+        figures = self.evaluate(kit / "disp_est.png", kit / "disp_gt.png")
+        for key, value in {"density": 96.337, "interpolated": 5.186, "bad_of_valid": 4.393, "bad_or_missing": 7.894,
+                           "d1_interpolated": 5.185}.items():
+            self.assertAlmostEqual(figures[key], value, delta=0.0006, msg=key)
+
+    def test_kitti_2012_beats_the_single_frame(self):
+        training = self.data / "kitti2012/training"
+        figures = {}
+        for temporal in ("on", "off"):
+            out = self.new_folder()
+            self.assert_works("run", "--kitti", training, "--scene", "000151", "--frames", "7:10", "--temporal", temporal, "--out", out)
+            figures[temporal] = self.evaluate(out / "disparity/000010.png", training / "disp_noc/000151_10.png")
+            if temporal == "on":
+                self.assertLessEqual(self.report(out)["frames"][-1]["search_fraction"], 0.12)
+        self.assertLessEqual(figures["on"]["bad_or_missing"], 5.0)
+        self.assertLessEqual(figures["on"]["interpolated"], 4.0)
+        self.assertLessEqual(figures["off"]["bad_or_missing"], 10.0)
+        self.assertLess(figures["on"]["interpolated"], figures["off"]["interpolated"])
+
+    def test_kitti_2015_in_colour(self):
+        out = self.new_folder()
+        self.assert_works("run", "--kitti", self.data / "kitti2015/training", "--scene", "2", "--frames", "10:11", "--out", out)
+        self.assertEqual(self.assert_whole(out), 2)
+
+    def test_middlebury_has_an_offset(self):
+        out = self.new_folder()
+        self.assert_works("run", "--dataset", self.data / "middlebury/Motorcycle", "--out", out)
+        self.assertGreater(self.report(out)["calibration"]["doffs_px"], 1)
+
+    def test_odometry_excerpt(self):
+        folder, poses = self.data / "odometry/sequences/A", self.new_folder() / "poses.txt"
+        self.assert_works("odometry", folder, "--out", poses)
+        drift = json.loads(self.assert_works("eval-poses", "--estimate", poses, "--truth", folder / "poses.txt", "--json"))
+        self.assertLessEqual(drift["end_drift_percent"], 1.5)
+
+
+if __name__ == "__main__":
+    unittest.main()
