@@ -7,8 +7,8 @@
 
 namespace egosgm {
 
-/// Every valid disparity becomes the median of its 3x3 window, in both views. A neighbour outside the image or without a
-/// value votes for the centre. Invalid pixels stay invalid; every pixel keeps its variance.
+/// Every valid disparity becomes the median of its 3x3 window, in both views. A neighbour outside the image or without
+/// a value votes for the centre. Invalid pixels stay invalid; every pixel keeps its variance.
 class MedianFilter {
  public:
   MedianFilter(ocl::Context& context, shared::ImageSize size, const MedianFilterOptions& options);

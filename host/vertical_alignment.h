@@ -9,7 +9,7 @@
 namespace egosgm {
 
 /// Takes out what rectification left between the rows of the views. A left pixel (x, y) lies at (x - d, y + dy) in the
-/// right image, with one dy for the whole image; dy is estimated from matched pixels (a Gauss-Newton step of Lucas and
+/// right image, with one dy for the whole image; dy is estimated from matched pixels (a robust step of Lucas and
 /// Kanade 1981 a frame) and the right image resampled, so that rows correspond.
 ///
 /// A steady frame:  images = align(upload); match; estimate(images, measured); ...; commit.
@@ -17,10 +17,12 @@ namespace egosgm {
 /// What a frame estimates is lost unless it commits: a frame that failed has changed nothing.
 class VerticalAlignment {
  public:
-  VerticalAlignment(ocl::Context& context, shared::ImageSize size, const VerticalAlignmentOptions& options);
+  /// `row_group`: how many work-items share a row; 0: what suits the device.
+  VerticalAlignment(ocl::Context& context, shared::ImageSize size, const VerticalAlignmentOptions& options,
+                    int row_group = 0);
 
   /// The images with the right one resampled by the committed offset, in memory of this stage that the next call
-  /// overwrites; `images` itself where the option is off.
+  /// overwrites; `images` itself where nothing is known or the option is off.
   const FrameImages& align(const FrameImages& images);
 
   /// The same with the offset that this frame's last `estimate` gave.
@@ -36,29 +38,31 @@ class VerticalAlignment {
   void reset() { committed_ = working_ = kUnknown; }
 
   /// Whether no frame has committed an estimate yet: a frame that is worth two passes. False where the option is off.
-  bool is_unknown() const { return enabled_ && committed_ == kUnknown; }
+  bool is_unknown() const { return options_.enabled && committed_ == kUnknown; }
 
   /// Element 0: the offset dy [px] by which the last `align` or `realign` resampled the right image.
   const ocl::Buffer<float>& offset_px() const { return states_[applied_]; }
 
  private:
-  static constexpr int kUnknown = 0;  // a state that is never written
+  static constexpr int kUnknown = 0;  // the state that is never written: offset 0, which rests on nothing
 
-  const FrameImages& resample(const FrameImages& images);
+  int free_state() const;
 
   ocl::Context& context_;
   const shared::ImageSize size_;
-  const bool enabled_;
-  const float gain_;
+  const VerticalAlignmentOptions options_;
   const int row_group_;
-  using ResampleKernel = ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
-  using SumKernel = ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, const ocl::Buffer<float>, ocl::Buffer<cl_long>>;
+  using ResampleKernel = ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, const ocl::Buffer<cl_uchar>,
+                                     ocl::Buffer<cl_uchar>>;
+  using SumKernel =
+      ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, const ocl::Buffer<float>, ocl::Buffer<cl_long>>;
   ResampleKernel resample_u8_, resample_u16_;
   SumKernel sum_rows_u8_, sum_rows_u16_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<cl_long>, const ocl::Buffer<float>, ocl::Buffer<float>> step_;
+  ocl::Kernel<const cl_int, const float, const ocl::Buffer<cl_long>, const ocl::Buffer<float>, ocl::Buffer<float>>
+      update_;
   FrameImages aligned_;
-  ocl::Buffer<cl_long> row_sums_;   // of g r, g g and 1, over the samples of each sampled row
-  ocl::Buffer<float> states_[3];    // {dy [px], estimates that it rests on}
+  ocl::Buffer<cl_long> row_sums_;  // of each sampled row: see the kernel
+  ocl::Buffer<float> states_[4];   // offset [px], and the number of estimates that it rests on
   int committed_ = kUnknown, working_ = kUnknown, applied_ = kUnknown;
 };
 

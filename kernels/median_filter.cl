@@ -39,18 +39,18 @@ kernel void filter(const ImageSize size, global const float* disparity, global f
   const float none = EGOSGM_INVALID_DISPARITY;
 
   const float d = disparity[i];
-  const Sorted left = sort(vote(has_above && has_left ? disparity[above - 1] : none, d),
-                           vote(has_left ? disparity[i - 1] : none, d),
-                           vote(has_below && has_left ? disparity[below - 1] : none, d));
-  const Sorted centre = sort(vote(has_above ? disparity[above] : none, d), d,
-                             vote(has_below ? disparity[below] : none, d));
-  const Sorted right = sort(vote(has_above && has_right ? disparity[above + 1] : none, d),
-                            vote(has_right ? disparity[i + 1] : none, d),
-                            vote(has_below && has_right ? disparity[below + 1] : none, d));
+  const Sorted left =
+      sort(vote(has_above && has_left ? disparity[above - 1] : none, d), vote(has_left ? disparity[i - 1] : none, d),
+           vote(has_below && has_left ? disparity[below - 1] : none, d));
+  const Sorted centre =
+      sort(vote(has_above ? disparity[above] : none, d), d, vote(has_below ? disparity[below] : none, d));
+  const Sorted right =
+      sort(vote(has_above && has_right ? disparity[above + 1] : none, d), vote(has_right ? disparity[i + 1] : none, d),
+           vote(has_below && has_right ? disparity[below + 1] : none, d));
   // The median of nine is the median of: the largest of the columns' lowest, the median of their medians, the smallest
   // of their highest.
-  const float middle = median(upper(upper(left.low, centre.low), right.low),
-                              median(left.middle, centre.middle, right.middle),
-                              lower(lower(left.high, centre.high), right.high));
+  const float middle =
+      median(upper(upper(left.low, centre.low), right.low), median(left.middle, centre.middle, right.middle),
+             lower(lower(left.high, centre.high), right.high));
   filtered[i] = d > none ? middle : none;
 }

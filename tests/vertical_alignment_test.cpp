@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/vertical_alignment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/reference/vertical_alignment.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+/// A slanted, textured plane seen by two cameras, the right one's rows `offset_px` further down.
+struct Scene {
+  shared::ImageSize size;
+  PixelType type = PixelType::kU8;
+  std::vector<int> images;     // grey values of both views
+  testing::HostMaps measured;  // of both views; only the left one means something
+
+  Scene(shared::ImageSize scene_size, float offset_px, PixelType pixel_type = PixelType::kU8, float noise_grey = 0)
+      : size(scene_size), type(pixel_type), images(2 * pixel_count(size)), measured(testing::empty_maps(size)) {
+    std::mt19937 random(17);
+    std::normal_distribution<float> noise(0, 1);
+    std::uniform_real_distribution<float> angle(0, 6.2832f), wavelength(8, 40);
+    float waves[6][3];
+    for (auto& [along_x, along_y, phase] : waves) {
+      const float direction = angle(random), frequency = 6.2832f / wavelength(random);
+      along_x = frequency * std::cos(direction), along_y = frequency * std::sin(direction), phase = angle(random);
+    }
+    const auto texture = [&](float x, float y) {
+      float grey = 128;
+      for (const auto& [along_x, along_y, phase] : waves) grey += 18 * std::sin(along_x * x + along_y * y + phase);
+      return static_cast<int>(std::lround((grey + noise_grey * noise(random)) * (type == PixelType::kU8 ? 1 : 257)));
+    };
+    const auto disparity = [](float y) { return 2.3f + 0.02f * y; };
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const std::size_t i = static_cast<std::size_t>(y) * size.width + x;
+        const float row = static_cast<float>(y), column = static_cast<float>(x);
+        images[i] = texture(column, row);
+        images[pixel_count(size) + i] = texture(column + disparity(row - offset_px), row - offset_px);
+        measured.disparity[i] = disparity(row);
+        measured.variance[i] = 1;
+      }
+    }
+  }
+
+  int bytes_per_pixel() const { return type == PixelType::kU8 ? 1 : 2; }
+  int grey() const { return type == PixelType::kU8 ? 1 : 256; }
+};
+
+FrameImages upload(ocl::Context& context, const Scene& scene) {
+  std::vector<cl_uchar> raw;
+  for (const int value : scene.images) {
+    for (int b = 0; b < scene.bytes_per_pixel(); ++b) raw.push_back(static_cast<cl_uchar>(value >> (8 * b)));
+  }
+  FrameImages images{ocl::Buffer<cl_uchar>(context, raw.size()), scene.type};
+  images.pixels.write(context, raw);
+  return images;
+}
+
+std::vector<int> download(ocl::Context& context, const FrameImages& images, const Scene& scene) {
+  const std::vector<cl_uchar> raw = images.pixels.read(context);
+  std::vector<int> values(scene.images.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = scene.type == PixelType::kU8 ? raw[i] : raw[2 * i] | raw[2 * i + 1] << 8;
+  }
+  return values;
+}
+
+/// What a pipeline does, without its matcher.
+struct Video {
+  ocl::Context context{testing::any_device()};
+  VerticalAlignment alignment;
+
+  explicit Video(shared::ImageSize size, const VerticalAlignmentOptions& options = {})
+      : alignment(context, size, options) {}
+
+  /// Returns the offset that the images were resampled by.
+  float frame(const Scene& scene, bool commits = true) {
+    const FrameImages images = upload(context, scene);
+    const StereoMaps measured = testing::upload(context, scene.size, scene.measured);
+    const bool is_first = alignment.is_unknown();
+    alignment.estimate(alignment.align(images), measured);
+    if (is_first) alignment.estimate(alignment.realign(images), measured);
+    const float offset_px = alignment.offset_px().read(context).at(0);
+    if (commits) alignment.commit();
+    return offset_px;
+  }
+
+  /// What the next frame would be resampled by.
+  float next_offset(const Scene& scene) {
+    alignment.align(upload(context, scene));
+    return alignment.offset_px().read(context).at(0);
+  }
+};
+
+using Case = std::tuple<shared::ImageSize, PixelType, int>;
+
+std::string name(const ::testing::TestParamInfo<Case>& info) {
+  const auto [size, type, row_group] = info.param;
+  return std::to_string(size.width) + "x" + std::to_string(size.height) +
+         (type == PixelType::kU8 ? "_8bit" : "_16bit") + "_by_" + std::to_string(row_group);
+}
+
+class VerticalAlignmentTest : public ::testing::TestWithParam<Case> {};
+
+TEST_P(VerticalAlignmentTest, EqualsReference) {
+  const auto [size, type, row_group] = GetParam();
+  Scene scene(size, -0.7f, type, 5.0f);
+  const testing::HostMaps holes = testing::random_maps(size, -20, 30, 0.3, 23);
+  for (std::size_t i = 0; i < scene.measured.disparity.size(); i += 3) scene.measured.disparity[i] = holes.disparity[i];
+
+  ocl::Context context(testing::any_device());
+  VerticalAlignment alignment(context, size, {.gain = 0.3f}, row_group);
+  const FrameImages images = upload(context, scene);
+  const StereoMaps measured = testing::upload(context, size, scene.measured);
+  reference::VerticalOffset expected;
+  const FrameImages* aligned = &alignment.align(images);
+  for (int frame = 0; frame < 5; ++frame) {
+    const std::vector<int> expected_images = reference::resample(size, expected.offset_px, scene.images);
+    EXPECT_TRUE(testing::same_bits(download(context, *aligned, scene), expected_images, size)) << "frame " << frame;
+    expected =
+        reference::estimate_offset(size, 0.3f, expected_images, scene.grey(), scene.measured.disparity, expected);
+    alignment.estimate(*aligned, measured);
+    if (frame != 2) alignment.commit();
+    aligned = frame == 2 ? &alignment.realign(images) : &alignment.align(images);
+    const std::vector<float> state = alignment.offset_px().read(context);
+    EXPECT_EQ(state.at(0), expected.offset_px) << "frame " << frame;
+    EXPECT_EQ(state.at(1), expected.estimates) << "frame " << frame;
+  }
+  EXPECT_EQ(expected.estimates, size.height > 90 ? 5 : 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, VerticalAlignmentTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::kSizes),
+                                            ::testing::Values(PixelType::kU8, PixelType::kU16),
+                                            ::testing::Values(1, 8)),
+                         name);
+
+constexpr shared::ImageSize kSize{320, 97};
+
+TEST(VerticalAlignment, RecoversTheOffset) {
+  for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
+    for (const float offset_px : {-1.2f, -0.41f, -0.1f, 0.0f, 0.18f, 0.5f, 0.9f}) {
+      const Scene scene(kSize, offset_px, type, 1.0f);
+      Video video(kSize);
+      video.frame(scene);
+      EXPECT_NEAR(video.next_offset(scene), offset_px, 0.03) << "after the first frame";
+      video.frame(scene);
+      EXPECT_NEAR(video.next_offset(scene), offset_px, 0.02) << "after the second";
+    }
+  }
+}
+
+TEST(VerticalAlignment, BringsTheRowsTogether) {
+  const Scene scene(kSize, 0.5f), straight(kSize, 0.0f);
+  Video video(kSize);
+  video.frame(scene);
+  const std::vector<int> aligned = download(video.context, video.alignment.align(upload(video.context, scene)), scene);
+  for (int y = 2; y < kSize.height - 2; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      const std::size_t i = pixel_count(kSize) + static_cast<std::size_t>(y) * kSize.width + x;
+      ASSERT_NEAR(aligned[i], straight.images[i], 6) << "at " << x << ", " << y;
+    }
+  }
+}
+
+TEST(VerticalAlignment, ResamplesByRowsFurtherDown) {
+  const std::vector<int> images{7, 8, 9, 10, 0, 10, 20, 40};
+  EXPECT_EQ(reference::resample({1, 4}, 0.5f, images), (std::vector<int>{7, 8, 9, 10, 5, 15, 30, 40}));
+  EXPECT_EQ(reference::resample({1, 4}, -1.25f, images), (std::vector<int>{7, 8, 9, 10, 0, 0, 8, 18}));
+  EXPECT_EQ(reference::resample({1, 4}, 0.0f, images), images);
+}
+
+TEST(VerticalAlignment, IsNotMisledByWrongMatchesOrByExposure) {
+  Scene scene(kSize, -0.4f, PixelType::kU8, 1.0f);
+  const testing::HostMaps wrong = testing::random_maps(kSize, 0, 60, 0, 29);
+  for (std::size_t i = 0; i < scene.measured.disparity.size(); ++i) {
+    if (i % 10 < 3) scene.measured.disparity[i] = wrong.disparity[i];
+  }
+  for (std::size_t i = pixel_count(kSize); i < scene.images.size(); ++i) scene.images[i] += 4;
+  Video video(kSize);
+  for (int frame = 0; frame < 3; ++frame) video.frame(scene);
+  EXPECT_NEAR(video.next_offset(scene), -0.4, 0.06);
+}
+
+TEST(VerticalAlignment, SettlesAndThenFollowsSlowly) {
+  const Scene before(kSize, 0.2f), after(kSize, 0.6f);
+  Video video(kSize, {.gain = 0.25f});
+  for (int frame = 0; frame < 6; ++frame) video.frame(before);
+  const float settled = video.next_offset(before);
+  EXPECT_NEAR(settled, 0.2, 0.01);
+  video.frame(after);
+  EXPECT_NEAR(video.next_offset(after), settled + 0.25 * 0.4, 0.02);
+}
+
+TEST(VerticalAlignment, AFrameThatFailedChangesNothing) {
+  const Scene before(kSize, 0.2f), failed(kSize, 0.9f);
+  Video video(kSize), undisturbed(kSize);
+  video.frame(failed, false);
+  EXPECT_TRUE(video.alignment.is_unknown());
+  for (int frame = 0; frame < 4; ++frame) {
+    EXPECT_EQ(video.frame(before), undisturbed.frame(before)) << "frame " << frame;
+    video.frame(failed, false);
+    EXPECT_FALSE(video.alignment.is_unknown());
+  }
+  EXPECT_EQ(video.next_offset(before), undisturbed.next_offset(before));
+}
+
+TEST(VerticalAlignment, ReportsWhatTheImagesWereResampledBy) {
+  const Scene scene(kSize, 0.5f);
+  Video video(kSize);
+  EXPECT_GT(std::abs(video.frame(scene)), 0.3) << "the second pass of the first frame";
+  const float next = video.next_offset(scene);
+  EXPECT_EQ(video.frame(scene), next) << "not what it estimated for the next";
+}
+
+TEST(VerticalAlignment, ForgetsOnReset) {
+  const Scene scene(kSize, 0.5f);
+  Video video(kSize), fresh(kSize);
+  for (int frame = 0; frame < 3; ++frame) video.frame(scene);
+  video.alignment.reset();
+  EXPECT_TRUE(video.alignment.is_unknown());
+  EXPECT_EQ(video.next_offset(scene), 0);
+  EXPECT_EQ(video.frame(scene), fresh.frame(scene));
+  EXPECT_EQ(video.next_offset(scene), fresh.next_offset(scene));
+}
+
+TEST(VerticalAlignment, KeepsWhatItKnowsWhereAFrameTellsNothing) {
+  const Scene scene(kSize, 0.5f);
+  Scene flat = scene, unmatched = scene;
+  std::fill(flat.images.begin(), flat.images.end(), 90);
+  unmatched.measured = testing::empty_maps(kSize);
+  Video video(kSize);
+  video.frame(flat);
+  EXPECT_EQ(video.next_offset(flat), 0);
+  for (int frame = 0; frame < 3; ++frame) video.frame(scene);
+  const float known = video.next_offset(scene);
+  EXPECT_NEAR(known, 0.5, 0.02) << "the empty frame does not weigh";
+  video.frame(flat);
+  video.frame(unmatched);
+  EXPECT_EQ(video.next_offset(scene), known);
+}
+
+TEST(VerticalAlignment, StopsAtTwoPixels) {
+  const Scene near(kSize, 1.5f), beyond(kSize, 2.4f);
+  Video video(kSize);
+  for (int frame = 0; frame < 2; ++frame) video.frame(near);
+  for (int frame = 0; frame < 8; ++frame) video.frame(beyond);
+  EXPECT_EQ(video.next_offset(beyond), 2);
+}
+
+TEST(VerticalAlignment, DoesNothingWhenOff) {
+  const Scene scene(kSize, 0.5f);
+  Video video(kSize, {.enabled = false});
+  EXPECT_FALSE(video.alignment.is_unknown());
+  video.frame(scene);
+  const FrameImages images = upload(video.context, scene);
+  EXPECT_EQ(&video.alignment.align(images), &images);
+  EXPECT_EQ(video.next_offset(scene), 0);
+}
+
+}  // namespace
+}  // namespace egosgm
