@@ -3,6 +3,8 @@
 
 #include <cstdlib>
 
+#include "host/census.h"
+
 namespace egosgm {
 namespace {
 
@@ -25,7 +27,9 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
   return context.program("banded_sgm.cl", ocl::Defines()
                                               .set("MAX_CHUNKS", SearchBand::max_chunks(range))
                                               .set("PATHS", options.paths)
+                                              .set("CODE_BYTES", 4 * Census::words(options.cost))
                                               .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
+                                              .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
                                               .set("TILE_WIDTH", kTileWidth)
                                               .set("TILE_HEIGHT", kTileHeight));
 }
@@ -44,13 +48,14 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.p2,
                   options.s_max,
                   options.variance_floor_px2,
-                  options.variance_per_step_px2},
+                  options.variance_per_step_px2,
+                  options.variance_per_square_px2},
       slots_(context, slot_bytes(size, range)),
       sums_(context, cell_bytes(size, range)),
       forward_(build(context, range, options), "sweep_forward"),
       backward_(build(context, range, options), "sweep_backward") {}
 
-void BandedSgm::operator()(const ocl::Buffer<cl_ulong>& codes, const SearchBand& band, StereoMaps& measured) {
+void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& band, StereoMaps& measured) {
   context_.enter("BandedSgm");
   const int tile_rows = ceil_div(size_.height, kTileHeight);
   const int tile_columns = ceil_div(size_.width + kTileHeight, kTileWidth) + 1;

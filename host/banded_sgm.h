@@ -14,13 +14,13 @@ class BandedSgm {
   BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options);
 
   /// `codes`: what Census makes with a padding of `code_padding(range)`.
-  void operator()(const ocl::Buffer<cl_ulong>& codes, const SearchBand& band, StereoMaps& measured);
+  void operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& band, StereoMaps& measured);
 
   static int code_padding(shared::DisparityRange range);
 
-  using Forward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_ulong>,
+  using Forward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
-  using Backward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_ulong>,
+  using Backward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
                                const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>,
                                ocl::Buffer<float>, ocl::Buffer<float>>;
 

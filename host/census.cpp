@@ -4,20 +4,37 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, PixelType type, MatchingCost window) {
+struct Comparisons {
+  int kind, radius_x, radius_y;
+};
+
+Comparisons comparisons(MatchingCost cost) {
+  switch (cost) {
+    case MatchingCost::kSad3x3: return {0, 0, 0};
+    case MatchingCost::kCensus5x5: return {1, 2, 2};
+    case MatchingCost::kCensus9x7: return {1, 4, 3};
+    case MatchingCost::kPairs32: return {2, EGOSGM_PAIRS_RADIUS_X, EGOSGM_PAIRS_RADIUS_Y};
+  }
+  return {};
+}
+
+const cl::Program& build(ocl::Context& context, PixelType type, MatchingCost cost) {
   context.enter("Census");
+  const Comparisons chosen = comparisons(cost);
   return context.program("census.cl", ocl::Defines()
                                           .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
-                                          .set("RADIUS_X", window == MatchingCost::kCensus5x5 ? 2 : 4)
-                                          .set("RADIUS_Y", window == MatchingCost::kCensus5x5 ? 2 : 3));
+                                          .set("CODE_BYTES", 4 * Census::words(cost))
+                                          .set("COMPARISONS", chosen.kind)
+                                          .set("RADIUS_X", chosen.radius_x)
+                                          .set("RADIUS_Y", chosen.radius_y));
 }
 
 }  // namespace
 
-Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost window, int padding)
-    : context_(context), size_(size), padding_(padding), census_(build(context, type, window), "census") {}
+Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding)
+    : context_(context), size_(size), padding_(padding), census_(build(context, type, cost), "census") {}
 
-void Census::operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_ulong>& codes) {
+void Census::operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
   context_.enter("Census");
   census_(context_, ocl::every_row(size_), size_, padding_, images, codes);
 }

@@ -36,8 +36,9 @@ void for_each(Options& o, Visit&& visit) {
   visit("banded_sgm.p1", o.banded_sgm.p1);
   visit("banded_sgm.p2", o.banded_sgm.p2);
   visit("banded_sgm.s_max", o.banded_sgm.s_max);
-  visit("banded_sgm.variance_per_step_px2", o.banded_sgm.variance_per_step_px2);
   visit("banded_sgm.variance_floor_px2", o.banded_sgm.variance_floor_px2);
+  visit("banded_sgm.variance_per_step_px2", o.banded_sgm.variance_per_step_px2);
+  visit("banded_sgm.variance_per_square_px2", o.banded_sgm.variance_per_square_px2);
   visit("banded_sgm.scheduling", o.banded_sgm.scheduling);
   visit("median_filter.enabled", o.median_filter.enabled);
   visit("sad_check.max_difference", o.sad_check.max_difference);
@@ -55,8 +56,11 @@ struct Choice {
 };
 constexpr Choice<MatchingCost> kChoices(MatchingCost, int i) {
   constexpr Choice<MatchingCost> choices[] = {
-      {"census9x7", MatchingCost::kCensus9x7}, {"census5x5", MatchingCost::kCensus5x5}, {"sad3x3", MatchingCost::kSad3x3}};
-  return i < 3 ? choices[i] : Choice<MatchingCost>{nullptr, {}};
+      {"pairs32", MatchingCost::kPairs32},
+      {"census9x7", MatchingCost::kCensus9x7},
+      {"census5x5", MatchingCost::kCensus5x5},
+      {"sad3x3", MatchingCost::kSad3x3}};
+  return i < 4 ? choices[i] : Choice<MatchingCost>{nullptr, {}};
 }
 constexpr Choice<SearchMode> kChoices(SearchMode, int i) {
   constexpr Choice<SearchMode> choices[] = {{"band", SearchMode::kBand}, {"full", SearchMode::kFull}};
@@ -148,9 +152,15 @@ PipelineOptions PipelineOptions::paper() {
   options.forward_warp.process_noise_px2 = 0.5f;
   options.edge_rejection.max_jump_px = 3.0f;
   options.consistency = {.prediction_px = 1.0f, .measurement_px = 1.0f, .update_px = 1.0f};
+  options.search_band.sigmas = 3.0f;
   options.search_band.min_half_width_px = 0.0f;
   options.search_band.from_neighbours = false;
   options.vertical_alignment.enabled = false;
+  options.banded_sgm.cost = MatchingCost::kCensus9x7;
+  options.banded_sgm.p2 = 120;
+  options.banded_sgm.s_max = 120;
+  options.banded_sgm.variance_floor_px2 = 0.05f;
+  options.banded_sgm.variance_per_square_px2 = 0.0f;
   options.median_filter.enabled = false;
   options.kalman_update.gate_px = 0.0f;
   return options;

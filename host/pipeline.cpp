@@ -56,7 +56,7 @@ struct Pipeline::Impl {
   KalmanUpdate kalman_update;
   FrameTransfer transfer;
 
-  ocl::Buffer<cl_ulong> codes;
+  ocl::Buffer<cl_uint> codes;
   StereoMaps predicted, measured, scratch, updated, belief;
   bool has_belief = false;
   const char* no_belief_reason = "first frame";
@@ -79,7 +79,7 @@ struct Pipeline::Impl {
         speckle_removal(context, size, options.speckle_removal),
         kalman_update(context, size, options.kalman_update),
         transfer(context, size, range_of(options)),
-        codes(context, Census::code_count(size, BandedSgm::code_padding(range_of(options)))),
+        codes(context, Census::words(options.banded_sgm.cost, size, BandedSgm::code_padding(range_of(options)))),
         predicted(context, size),
         measured(context, size),
         scratch(context, size),

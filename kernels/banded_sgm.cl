@@ -20,8 +20,14 @@
 #ifndef PATHS
 #error "PATHS: 4 or 8"
 #endif
+#ifndef CODE_BYTES
+#error "CODE_BYTES: 4 or 8, the size of a code"
+#endif
+#ifndef COST_SCALE
+#error "COST_SCALE: what a bit of Hamming distance costs"
+#endif
 #ifndef COST_SAD
-#error "COST_SAD: 0 for the Hamming distance of census codes, 1 for a 3x3 sum of absolute differences of grey values"
+#error "COST_SAD: 0 for the Hamming distance of codes, 1 for a 3x3 sum of absolute differences of grey values"
 #endif
 #ifndef TILE_WIDTH
 #error "TILE_WIDTH: columns of a tile"
@@ -41,9 +47,16 @@
 typedef struct __attribute__((packed)) {
   uchar16 lanes;
 } Lanes;
+#if CODE_BYTES == 4
+typedef uint Code;
+typedef uint16 Codes;
+#else
+typedef ulong Code;
+typedef ulong16 Codes;
+#endif
 typedef struct __attribute__((packed)) {
-  ulong16 codes;
-} Codes;
+  Codes codes;
+} PackedCodes;
 typedef struct __attribute__((packed)) {
   ushort16 totals;
 } Totals;
@@ -53,7 +66,7 @@ typedef struct __attribute__((packed)) {
 
 inline uchar16 load(global const uchar* from) { return ((global const Lanes*)from)->lanes; }
 inline void store(const uchar16 lanes, global uchar* to) { ((global Lanes*)to)->lanes = lanes; }
-inline ulong16 load_codes(global const ulong* from) { return ((global const Codes*)from)->codes; }
+inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
 inline ushort8 load_totals(const ushort* from) { return ((const HalfTotals*)from)->totals; }
 inline void store_totals(const ushort16 totals, ushort* to) { ((Totals*)to)->totals = totals; }
 inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535); }
@@ -83,27 +96,28 @@ inline ushort minimum_of_totals(const ushort16 totals) {
 }
 
 // Bits set in each code; compilers know this form and use what the device has.
-inline ulong16 bit_count(ulong16 x) {
-  x -= x >> (ulong16)(1) & (ulong16)(0x5555555555555555ul);
-  x = (x & (ulong16)(0x3333333333333333ul)) + (x >> (ulong16)(2) & (ulong16)(0x3333333333333333ul));
-  x = (x + (x >> (ulong16)(4))) & (ulong16)(0x0f0f0f0f0f0f0f0ful);
-  return x * (ulong16)(0x0101010101010101ul) >> (ulong16)(56);
+#define REPEATED(byte) ((Codes)(~(Code)0 / 255 * (byte)))
+inline Codes bit_count(Codes x) {
+  x -= x >> (Codes)(1) & REPEATED(0x55);
+  x = (x & REPEATED(0x33)) + (x >> (Codes)(2) & REPEATED(0x33));
+  x = (x + (x >> (Codes)(4))) & REPEATED(0x0f);
+  return x * REPEATED(0x01) >> (Codes)(8 * CODE_BYTES - 8);
 }
 
 // Matching cost of 16 disparities. `own` and `other` point at the pixel's code and at the first disparity's in their padded rows, which run in
 // opposite directions.
-inline uchar16 matching_cost(global const ulong* own, global const ulong* other, const long above, const long below) {
+inline uchar16 matching_cost(global const Code* own, global const Code* other, const long above, const long below) {
 #if COST_SAD
   ushort16 sum = 0;
   for (int dy = -1; dy <= 1; ++dy) {
     const long row = dy < 0 ? above : dy > 0 ? below : 0;
     for (int dx = -1; dx <= 1; ++dx) {
-      sum += convert_ushort16(abs_diff((ulong16)(own[row + dx]), load_codes(other + row - dx)));
+      sum += convert_ushort16(abs_diff((Codes)(own[row + dx]), load_codes(other + row - dx)));
     }
   }
   return convert_uchar16(min(sum / (ushort)9, (ushort16)(MAX_COST)));
 #else
-  return convert_uchar16(bit_count((ulong16)(own[0]) ^ load_codes(other)));
+  return convert_uchar16(bit_count((Codes)(own[0]) ^ load_codes(other))) * (uchar16)(COST_SCALE);
 #endif
 }
 
@@ -164,7 +178,7 @@ inline void write_winner(const SgmParameters q, const Band band, const ushort* t
   *disparity = (float)(band.origin + lane) + offset;
 
   const int steps = count_steps(load_totals(at + 1), at[0], (ushort)q.s_max) + count_steps(load_totals(at - MAX_STEPS).s76543210, at[0], (ushort)q.s_max);
-  *variance = q.variance_floor + q.variance_per_step * (float)steps;
+  *variance = q.variance_floor + (float)steps * (q.variance_per_step + q.variance_per_square * (float)steps);
 }
 
 // The lane of the least total among [first, last] in its upper bits, the total in its lower: the smallest disparity wins a tie.
@@ -173,7 +187,7 @@ inline int ranked(const ushort16 totals, const int first, const int last) {
   return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane) | barred);
 }
 
-inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns, global const ulong* codes,
+inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
                   global const Band* bands, global const uint* offsets, global uchar* slots, global uchar* sums, global float* disparities,
                   global float* variances) {
   const int tile_y = get_global_id(0);
@@ -183,6 +197,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
 
   const int width = q.width, height = q.height;
   const size_t first_pixel = (size_t)view * width * height;
+  global const Code* codes = (global const Code*)all_codes;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
   const uchar16 p1 = (uchar16)((uchar)q.p1), p2 = (uchar16)((uchar)q.p2);
   slots += (size_t)view * 3 * (width + height) * SLOT + SLOT_PADDING;
@@ -198,8 +213,8 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
     if (y >= height || from >= to) continue;
     const int image_y = backward ? height - 1 - y : y;
     const size_t row_start = first_pixel + (size_t)image_y * width;
-    global const ulong* own_codes = codes + ((size_t)view * height + image_y) * code_stride + q.padding;
-    global const ulong* other_codes = codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding + (width - 1);
+    global const Code* own_codes = codes + ((size_t)view * height + image_y) * code_stride + q.padding;
+    global const Code* other_codes = codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding + (width - 1);
     const long above = image_y > 0 ? -(long)code_stride : 0, below = image_y + 1 < height ? (long)code_stride : 0;
     global const Band* row_bands = bands + row_start;
     global uchar* row_sums = sums + row_start * (MAX_CHUNKS * EGOSGM_LANES);
@@ -218,8 +233,8 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
       const Band band = *band_at;
       const int lane = band.origin - q.min_disparity;
       global uchar* cells = row_sums + (size_t)offsets[row_start + image_x] * EGOSGM_LANES;
-      global const ulong* own = own_codes + along;
-      global const ulong* other = other_codes - along + band.origin;
+      global const Code* own = own_codes + along;
+      global const Code* other = other_codes - along + band.origin;
 
       // Where there is no predecessor, wiping at the pixel's own band does no harm.
       const long up = y > 0 ? -step * (long)width : 0;
@@ -301,13 +316,13 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
   }
 }
 
-kernel void sweep_forward(const SgmParameters q, const int wave, const int tile_columns, global const ulong* codes, global const Band* bands,
+kernel void sweep_forward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes, global const Band* bands,
                           global const uint* offsets, global uchar* slots, global uchar* sums) {
-  sweep(false, q, wave, tile_columns, codes, bands, offsets, slots, sums, 0, 0);
+  sweep(false, q, wave, tile_columns, all_codes, bands, offsets, slots, sums, 0, 0);
 }
 
-kernel void sweep_backward(const SgmParameters q, const int wave, const int tile_columns, global const ulong* codes, global const Band* bands,
+kernel void sweep_backward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes, global const Band* bands,
                            global const uint* offsets, global uchar* slots, global const uchar* sums, global float* disparities,
                            global float* variances) {
-  sweep(true, q, wave, tile_columns, codes, bands, offsets, slots, (global uchar*)sums, disparities, variances);
+  sweep(true, q, wave, tile_columns, all_codes, bands, offsets, slots, (global uchar*)sums, disparities, variances);
 }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Census transform (Zabih and Woodfill 1994): a bit for every pixel of the window around the centre, row by row, set where that pixel
-// is darker. Pixels outside the image are those of its border.
+// What matching compares, a code a pixel: a bit for each comparison of two grey values in a window around it.
+// - Census transform (Zabih and Woodfill 1994): every pixel of the window, row by row, against the centre.
+// - Pairs: 32 pairs of pixels drawn once from a normal distribution (after Calonder et al., BRIEF, 2010; EGOSGM_PAIRS).
+// - The grey value itself (8 bits), for sums of absolute differences.
+// Pixels outside the image are those of its border.
 //
 // A view's codes lie in rows of `stride` = padding + width + padding, the right view's from right to left, so that the codes a pixel is
 // compared with at growing disparities lie at growing addresses in both views. The padding repeats the border's codes.
@@ -8,6 +11,12 @@
 
 #ifndef PIXEL_BYTES
 #error "PIXEL_BYTES: 1 or 2, the size of a grey value"
+#endif
+#ifndef CODE_BYTES
+#error "CODE_BYTES: 4 or 8, the size of a code"
+#endif
+#ifndef COMPARISONS
+#error "COMPARISONS: 0 for the grey value, 1 for a census window, 2 for pairs"
 #endif
 #ifndef RADIUS_X
 #error "RADIUS_X: half the window's width"
@@ -19,43 +28,92 @@
 #if PIXEL_BYTES == 1
 typedef uchar Pixel;
 typedef uchar16 Pixels;
+#define to_8_bit(value) (value)
 #else
 typedef ushort Pixel;
 typedef ushort16 Pixels;
+#define to_8_bit(value) ((value) >> 8)
+#endif
+#if CODE_BYTES == 4
+typedef uint Code;
+typedef uint16 Codes;
+#define convert_codes convert_uint16
+#else
+typedef ulong Code;
+typedef ulong16 Codes;
+#define convert_codes convert_ulong16
 #endif
 
-inline ulong code_at(const ImageSize size, global const Pixel* image, const int x, const int y) {
-  const Pixel centre = image[(size_t)y * size.width + x];
-  ulong code = 0;
+typedef struct __attribute__((packed)) {
+  Pixels pixels;
+} PackedPixels;
+typedef struct __attribute__((packed)) {
+  Codes codes;
+} PackedCodes;
+
+#if COMPARISONS == 2
+constant char kPairs[32][4] = EGOSGM_PAIRS;
+#endif
+
+inline Code code_at(const ImageSize size, global const Pixel* image, const int x, const int y) {
+#define AT(dx, dy) image[(size_t)clamp(y + (dy), 0, size.height - 1) * size.width + clamp(x + (dx), 0, size.width - 1)]
+#if COMPARISONS == 0
+  return to_8_bit(AT(0, 0));
+#elif COMPARISONS == 1
+  Code code = 0;
   for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) {
-    global const Pixel* row = image + (size_t)clamp(y + dy, 0, size.height - 1) * size.width;
     for (int dx = -RADIUS_X; dx <= RADIUS_X; ++dx) {
-      if (dx == 0 && dy == 0) continue;
-      code = code << 1 | (row[clamp(x + dx, 0, size.width - 1)] < centre ? 1 : 0);
+      if (dx != 0 || dy != 0) code = code << 1 | (AT(dx, dy) < AT(0, 0) ? 1 : 0);
     }
   }
   return code;
+#else
+  Code code = 0;
+  for (int i = 0; i < 32; ++i) {
+    constant char* pair = kPairs[i];
+    code = code << 1 | (AT(pair[0], pair[1]) < AT(pair[2], pair[3]) ? 1 : 0);
+  }
+  return code;
+#endif
 }
 
+inline Codes append(const Codes codes, const Pixels first, const Pixels second) {
+  return (codes << (Codes)(1)) | (convert_codes(first < second) & (Codes)(1));
+}
+
+inline Pixels load(global const Pixel* from) { return ((global const PackedPixels*)from)->pixels; }
+
 // 16 pixels at once, where no column needs clamping.
-inline ulong16 codes_at(const ImageSize size, global const Pixel* image, const int x, const int y) {
-  const Pixels centre = vload16(0, image + (size_t)y * size.width + x);
-  ulong16 codes = 0;
+inline Codes codes_at(const ImageSize size, global const Pixel* image, const int x, const int y) {
+#define ROW(dy) (image + (size_t)clamp(y + (dy), 0, size.height - 1) * size.width + x)
+  Codes codes = 0;
+#if COMPARISONS == 0
+  codes = convert_codes(to_8_bit(load(ROW(0))));
+#elif COMPARISONS == 1
+  const Pixels centre = load(ROW(0));
 #pragma unroll
   for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) {
-    global const Pixel* row = image + (size_t)clamp(y + dy, 0, size.height - 1) * size.width + x;
+    global const Pixel* row = ROW(dy);
 #pragma unroll
     for (int dx = -RADIUS_X; dx <= RADIUS_X; ++dx) {
-      if (dx == 0 && dy == 0) continue;
-      codes = (codes << (ulong16)(1)) |
-              (convert_ulong16(vload16(0, row + dx) < centre) & (ulong16)(1));
+      if (dx != 0 || dy != 0) codes = append(codes, load(row + dx), centre);
     }
   }
+#else
+  global const Pixel* rows[2 * RADIUS_Y + 1];
+#pragma unroll
+  for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) rows[RADIUS_Y + dy] = ROW(dy);
+#pragma unroll
+  for (int i = 0; i < 32; ++i) {
+    constant char* pair = kPairs[i];
+    codes = append(codes, load(rows[RADIUS_Y + pair[1]] + pair[0]), load(rows[RADIUS_Y + pair[3]] + pair[2]));
+  }
+#endif
   return codes;
 }
 
 // A work-item a row and view.
-kernel void census(const ImageSize size, const int padding, global const uchar* images, global ulong* codes) {
+kernel void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
   const int y = get_global_id(0);
   const int view = get_global_id(1);
   if (y >= size.height) return;
@@ -63,14 +121,21 @@ kernel void census(const ImageSize size, const int padding, global const uchar* 
   const int width = size.width;
   const size_t stride = (size_t)width + 2 * (size_t)padding;
   global const Pixel* image = (global const Pixel*)images + (size_t)view * size.height * width;
-  global ulong* row = codes + ((size_t)view * size.height + y) * stride + padding;
+  global Code* row = (global Code*)all_codes + ((size_t)view * size.height + y) * stride + padding;
 
   int x = 0;
   while (x < width) {
     const bool inside = x >= RADIUS_X && x + 15 + RADIUS_X < width;
-    if (inside && view == EGOSGM_LEFT) vstore16(codes_at(size, image, x, y), 0, row + x);
-    if (inside && view == EGOSGM_RIGHT) vstore16(codes_at(size, image, x, y).sfedcba9876543210, 0, row + width - 16 - x);
-    if (!inside) row[view == EGOSGM_LEFT ? x : width - 1 - x] = code_at(size, image, x, y);
+    if (inside) {
+      const Codes codes = codes_at(size, image, x, y);
+      if (view == EGOSGM_LEFT) {
+        ((global PackedCodes*)(row + x))->codes = codes;
+      } else {
+        ((global PackedCodes*)(row + width - 16 - x))->codes = codes.sfedcba9876543210;
+      }
+    } else {
+      row[view == EGOSGM_LEFT ? x : width - 1 - x] = code_at(size, image, x, y);
+    }
     x += inside ? 16 : 1;
   }
   for (int i = 1; i <= padding; ++i) {

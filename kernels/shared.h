@@ -37,6 +37,19 @@ typedef float f32;
 // Predictions are summed up over blocks of this many pixels a side, for the bands of pixels without one.
 #define EGOSGM_BLOCK 8
 
+// The 32 pairs of pixels that MatchingCost::kPairs32 compares: dx, dy of the first and of the second, drawn from a normal distribution.
+#define EGOSGM_PAIRS_RADIUS_X 6
+#define EGOSGM_PAIRS_RADIUS_Y 5
+#define EGOSGM_PAIRS \
+  { \
+    {-3, 0, 0, -1}, {-2, 1, -3, 0}, {-3, -1, 0, 2}, {-6, 3, -5, 2}, {-5, -1, 2, 2}, {-1, 1, -2, -1}, \
+    {4, -1, -5, -4}, {3, 2, 1, 3}, {1, -3, 4, 3}, {1, 1, -1, -1}, {2, 1, -2, -5}, {3, 0, 0, 3}, \
+    {0, -3, -2, 2}, {0, -1, 0, 2}, {-2, -2, 1, -1}, {-2, 1, -4, -3}, {1, 0, -2, 3}, {1, 0, -1, 1}, \
+    {1, 3, -2, -2}, {-4, 0, 0, -3}, {-3, -2, 3, 0}, {2, -4, 1, -2}, {-6, 1, 0, -2}, {1, -1, -1, 4}, \
+    {-3, 3, 2, 2}, {3, -3, 4, 0}, {3, 2, -1, 1}, {-1, -1, -3, 2}, {-3, 2, -2, 3}, {4, 2, -4, -1}, \
+    {2, 3, 4, -1}, {-1, -2, -1, 2} \
+  }
+
 typedef struct {
   i32 width, height;
 } ImageSize;
@@ -71,7 +84,7 @@ typedef struct {
   i32 min_disparity, disparities;
   i32 padding;  // of the census codes' rows
   i32 p1, p2, s_max;
-  f32 variance_floor, variance_per_step;
+  f32 variance_floor, variance_per_step, variance_per_square;
 } SgmParameters;
 
 // A point whose depth shrinks to less than this part of itself is as good as behind the camera.
@@ -89,7 +102,7 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 12 &&
-                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 40 && sizeof(DisparityMotion) == 84,
+                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 44 && sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

@@ -16,7 +16,7 @@ namespace {
 struct Case {
   shared::ImageSize size;
   shared::DisparityRange range;
-  MatchingCost cost = MatchingCost::kCensus9x7;
+  MatchingCost cost = MatchingCost::kPairs32;
   int paths = 8;
   bool banded = true;
 };
@@ -26,13 +26,15 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   std::string text = std::to_string(c.size.width) + "x" + std::to_string(c.size.height) + "_D" + std::to_string(c.range.count) + "_from" +
                      (c.range.min < 0 ? "minus" : "") + std::to_string(std::abs(c.range.min)) + "_paths" + std::to_string(c.paths);
   if (c.cost == MatchingCost::kSad3x3) text += "_sad";
+  if (c.cost == MatchingCost::kCensus9x7) text += "_census9x7";
   return text + (c.banded ? "_banded" : "_full");
 }
 
 /// Codes with some structure: the right view's are the left's, shifted by a few pixels, with noise.
 void random_codes(const Case& c, std::mt19937& random, std::vector<std::uint64_t> (&codes)[2]) {
   const bool sad = c.cost == MatchingCost::kSad3x3;
-  const auto code = [&] { return sad ? random() & 255 : (std::uint64_t{random()} << 32 | random()) & random() * 0x100000001ull & ((1ull << 62) - 1); };
+  const std::uint64_t bits = c.cost == MatchingCost::kCensus9x7 ? (1ull << 62) - 1 : 0xffffffffu;
+  const auto code = [&] { return sad ? random() & 255 : (std::uint64_t{random()} << 32 | random()) & random() * 0x100000001ull & bits; };
   const std::size_t pixels = pixel_count(c.size);
   for (std::size_t i = 0; i < pixels; ++i) codes[0].push_back(code());
   for (std::size_t i = 0; i < pixels; ++i) {
@@ -62,8 +64,8 @@ TEST_P(BandedSgmTest, EqualsReference) {
   const BandedSgmOptions options{.cost = c.cost, .paths = c.paths};
   SearchBand band(context, c.size, c.range, {.min_half_width_px = 1});
   BandedSgm sgm(context, c.size, c.range, options);
-  const auto padded = reference::padded_codes(c.size, codes[0], codes[1], padding);
-  ocl::Buffer<cl_ulong> device_codes(context, padded.size());
+  const auto padded = reference::padded_codes(c.size, codes[0], codes[1], padding, c.cost);
+  ocl::Buffer<cl_uint> device_codes(context, padded.size());
   device_codes.write(context, {padded.begin(), padded.end()});
   StereoMaps predicted(context, c.size), measured(context, c.size);
   if (c.banded) {
@@ -77,8 +79,9 @@ TEST_P(BandedSgmTest, EqualsReference) {
   sgm(device_codes, band, measured);
 
   const shared::SgmParameters parameters{c.size.width, c.size.height, c.range.min, c.range.count, padding, options.p1, options.p2,
-                                         options.s_max, options.variance_floor_px2, options.variance_per_step_px2};
-  const auto expected = reference::banded_sgm(parameters, c.paths, c.cost == MatchingCost::kSad3x3, codes, band.bands().read(context));
+                                         options.s_max, options.variance_floor_px2, options.variance_per_step_px2,
+                                         options.variance_per_square_px2};
+  const auto expected = reference::banded_sgm(parameters, c.paths, c.cost, codes, band.bands().read(context));
   EXPECT_TRUE(testing::same_bits(measured.disparity.read(context), expected.disparity, c.size));
   EXPECT_TRUE(testing::same_bits(measured.variance.read(context), expected.variance, c.size));
 }
@@ -86,7 +89,7 @@ TEST_P(BandedSgmTest, EqualsReference) {
 INSTANTIATE_TEST_SUITE_P(Banded, BandedSgmTest,
                          ::testing::Values(Case{{1, 1}, {0, 1}}, Case{{1, 1}, {0, 128}}, Case{{7, 5}, {0, 16}}, Case{{7, 5}, {-3, 37}},
                                            Case{{65, 3}, {0, 37}}, Case{{3, 65}, {0, 16}}, Case{{127, 33}, {0, 1}}, Case{{127, 33}, {0, 16}},
-                                           Case{{127, 33}, {-20, 37}}, Case{{127, 97}, {0, 128}}, Case{{127, 33}, {0, 128}, MatchingCost::kSad3x3},
+                                           Case{{127, 33}, {-20, 37}}, Case{{127, 97}, {0, 128}}, Case{{127, 97}, {0, 128}, MatchingCost::kCensus9x7}, Case{{127, 33}, {0, 128}, MatchingCost::kSad3x3},
                                            Case{{127, 33}, {-7, 37}, MatchingCost::kCensus9x7, 4}, Case{{127, 33}, {0, 64}, MatchingCost::kSad3x3, 4},
                                            Case{{320, 97}, {0, 37}}, Case{{320, 97}, {-50, 128}}, Case{{40, 30}, {0, 1024}}, Case{{1242, 375}, {0, 128}}),
                          name);

@@ -15,15 +15,18 @@ namespace {
 using Case = std::tuple<shared::ImageSize, PixelType, MatchingCost>;
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
-  const auto [size, type, window] = info.param;
+  const auto [size, type, cost] = info.param;
   return std::to_string(size.width) + "x" + std::to_string(size.height) + (type == PixelType::kU8 ? "_8bit" : "_16bit") +
-         (window == MatchingCost::kCensus9x7 ? "_9x7" : "_5x5");
+         (cost == MatchingCost::kPairs32     ? "_pairs32"
+          : cost == MatchingCost::kCensus9x7 ? "_census9x7"
+          : cost == MatchingCost::kCensus5x5 ? "_census5x5"
+                                             : "_grey");
 }
 
 class CensusTest : public ::testing::TestWithParam<Case> {};
 
 TEST_P(CensusTest, EqualsReference) {
-  const auto [size, type, window] = GetParam();
+  const auto [size, type, cost] = GetParam();
   const int padding = 19, bytes = type == PixelType::kU8 ? 1 : 2;
   std::mt19937 random(1);
   std::uniform_int_distribution<int> grey(0, type == PixelType::kU8 ? 255 : 65535);
@@ -37,23 +40,24 @@ TEST_P(CensusTest, EqualsReference) {
   }
 
   ocl::Context context(testing::any_device());
-  Census census(context, size, type, window, padding);
+  Census census(context, size, type, cost, padding);
   ocl::Buffer<cl_uchar> images(context, raw.size());
-  ocl::Buffer<cl_ulong> codes(context, Census::code_count(size, padding));
+  ocl::Buffer<cl_uint> codes(context, Census::words(cost, size, padding));
   images.write(context, raw);
   census(images, codes);
 
-  const int radius_x = window == MatchingCost::kCensus5x5 ? 2 : 4, radius_y = window == MatchingCost::kCensus5x5 ? 2 : 3;
-  const auto expected = reference::padded_codes(size, reference::census(size, views[0], radius_x, radius_y),
-                                                reference::census(size, views[1], radius_x, radius_y), padding);
+  const auto expected = reference::padded_codes(size, reference::codes(size, views[0], 8 * bytes, cost),
+                                                reference::codes(size, views[1], 8 * bytes, cost), padding, cost);
   const auto actual = codes.read(context);
-  EXPECT_TRUE(testing::same_bits(std::vector<std::uint64_t>(actual.begin(), actual.end()), expected, {size.width + 2 * padding, size.height}));
+  EXPECT_TRUE(testing::same_bits(std::vector<std::uint32_t>(actual.begin(), actual.end()), expected,
+                                 {(size.width + 2 * padding) * Census::words(cost), size.height}));
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
                          ::testing::Combine(::testing::ValuesIn(testing::kSizes),
                                             ::testing::Values(PixelType::kU8, PixelType::kU16),
-                                            ::testing::Values(MatchingCost::kCensus9x7, MatchingCost::kCensus5x5)),
+                                            ::testing::Values(MatchingCost::kPairs32, MatchingCost::kCensus9x7,
+                                                              MatchingCost::kCensus5x5, MatchingCost::kSad3x3)),
                          name);
 
 }  // namespace

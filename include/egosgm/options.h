@@ -9,15 +9,16 @@
 
 namespace egosgm {
 
-/// Matching cost of a pixel pair: Hamming distance of census codes, or the mean absolute difference of a 3x3 window.
-enum class MatchingCost { kCensus9x7, kCensus5x5, kSad3x3 };
+/// Matching cost of a pixel pair: Hamming distance of 32 comparisons between fixed pairs of pixels in a 13x11 window (counted
+/// twice) or of census codes, or the mean absolute difference of a 3x3 window.
+enum class MatchingCost { kPairs32, kCensus9x7, kCensus5x5, kSad3x3 };
 /// kBand: search where the prediction says (the method). kFull: search the whole range in every frame.
 enum class SearchMode { kBand, kFull };
 /// How the paths of BandedSgm run: diagonal wavefronts of tiles (CPUs, FPGAs) or a work-group a path (GPUs). Same bits.
 enum class Scheduling { kAutomatic, kWavefront, kPaths };
 
 struct ForwardWarpOptions {
-  float process_noise_px2 = 0.25f;  // constant part of q, added to every variance (eq. 6)
+  float process_noise_px2 = 0.05f;  // constant part of q, added to every variance (eq. 6)
 };
 
 struct EdgeRejectionOptions {
@@ -35,7 +36,7 @@ struct ConsistencyCheckOptions {
 };
 
 struct SearchBandOptions {
-  float sigmas = 3.0f;             // half-width of a predicted pixel's band, in standard deviations
+  float sigmas = 2.0f;             // half-width of a predicted pixel's band, in standard deviations
   float min_half_width_px = 2.0f;  // and at least this
   bool from_neighbours = true;     // unpredicted pixels search the range of the predictions around them
   int neighbour_min_count = 8;     // with fewer predictions than this around, the whole range
@@ -43,13 +44,16 @@ struct SearchBandOptions {
 };
 
 struct BandedSgmOptions {
-  MatchingCost cost = MatchingCost::kCensus9x7;
+  MatchingCost cost = MatchingCost::kPairs32;
   int paths = 8;  // 4 (horizontal and vertical) or 8
   int p1 = 10;    // penalty of a step of one disparity
   int p2 = 160;   // penalty of a larger step; p1 <= p2, at most 190
-  int s_max = 120;  // matching variance: steps are counted until the path sums above the minimum add up to this
-  float variance_per_step_px2 = 0.1f;  // r = floor + this * (n_l + n_r)
-  float variance_floor_px2 = 0.05f;
+  // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved) path sums
+  // above the minimum add up to s_max, at most 8 a side.
+  int s_max = 80;
+  float variance_floor_px2 = 0.15f;
+  float variance_per_step_px2 = 0.1f;
+  float variance_per_square_px2 = 0.045f;
   Scheduling scheduling = Scheduling::kAutomatic;
 };
 

@@ -36,7 +36,7 @@ class Cells {
 struct View {
   const shared::SgmParameters& q;
   int view;
-  bool sad;
+  MatchingCost kind;
   const std::vector<std::uint64_t>& own;
   const std::vector<std::uint64_t>& other;
 
@@ -46,7 +46,9 @@ struct View {
   int matched(int x, int d) const { return view == EGOSGM_LEFT ? x - d : x + d; }
 
   int cost(int x, int y, int d) const {
-    if (!sad) return std::popcount(code(own, x, y) ^ code(other, matched(x, d), y));
+    if (kind != MatchingCost::kSad3x3) {
+      return (kind == MatchingCost::kCensus9x7 ? 1 : 2) * std::popcount(code(own, x, y) ^ code(other, matched(x, d), y));
+    }
     int sum = 0;
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
@@ -118,11 +120,11 @@ float offset(Cells& sums, int pixel, int winner) {
 
 }  // namespace
 
-testing::HostMaps banded_sgm(const shared::SgmParameters& q, int paths, bool sad, const std::vector<std::uint64_t> (&codes)[2],
+testing::HostMaps banded_sgm(const shared::SgmParameters& q, int paths, MatchingCost cost, const std::vector<std::uint64_t> (&codes)[2],
                              const std::vector<shared::Band>& bands) {
   testing::HostMaps maps;
   for (int view = 0; view < 2; ++view) {
-    const View v{q, view, sad, codes[view], codes[1 - view]};
+    const View v{q, view, cost, codes[view], codes[1 - view]};
     const shared::Band* band = bands.data() + static_cast<std::size_t>(view) * q.width * q.height;
     Cells sums = half_sum(v, band, paths, 1), backward = half_sum(v, band, paths, -1);
     for (int p = 0; p < q.width * q.height; ++p) {
@@ -133,7 +135,8 @@ testing::HostMaps banded_sgm(const shared::SgmParameters& q, int paths, bool sad
       }
       maps.disparity.push_back(static_cast<float>(winner) + offset(sums, p, winner));
       const int steps = count_steps(q, sums, p, winner, 1) + count_steps(q, sums, p, winner, -1);
-      maps.variance.push_back(q.variance_floor + q.variance_per_step * static_cast<float>(steps));
+      const float n = static_cast<float>(steps);
+      maps.variance.push_back(q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n));
     }
   }
   return maps;
