@@ -13,6 +13,7 @@ namespace {
 constexpr int kMaxDistance = 20 * kDescriptorSize;  // of descriptors; unrelated ones differ by 34 a sample
 constexpr int kStereoRows_px = 2;                   // rectification error
 constexpr int kBeyondInfinity_px = 2;               // and in the direction of the search
+constexpr float kFarthestDisparity_px = -1;  // noise and rectification error at infinity
 constexpr float kMinCorrelation = 0.8f;
 constexpr float kMaxRowError_px = 2.5f;
 constexpr float kCannot = -std::numeric_limits<float>::infinity();
@@ -173,13 +174,12 @@ std::vector<PointMatch> refine_matches(const Calibration& calibration, TrackedFr
   for (const CircularMatch& match : matches) {
     const int i = match.previous_left, j = match.current_left;
     const float d1 = refined_disparity(previous, i);
-    if (d1 == kCannot || d1 + calibration.doffs_px < -1) continue;
+    if (d1 == kCannot || d1 + calibration.doffs_px < kFarthestDisparity_px) continue;
     const Feature& feature = current.left_features.features[j];
     // A patch looks larger by the ratio of its depths, that is, of its disparities.
-    const double z = calibration.fx * calibration.baseline_m / (d1 + calibration.doffs_px);
-    const Eigen::Vector3d p = motion * Eigen::Vector3d((previous.u[i] - calibration.cx) * z / calibration.fx,
-                                                       (previous.v[i] - calibration.cy) * z / calibration.fy, z);
-    const double scale = std::clamp(z / std::max(p.z(), 0.1), 0.5, 2.0);
+    const Eigen::Vector3d before = triangulate(calibration, previous.u[i], previous.v[i], d1);
+    const Eigen::Vector3d after = motion * before;
+    const double scale = std::clamp(before.z() / std::max(after.z(), kMinDepth_m), 0.5, 2.0);
     Patch patch;
     if (!make_patch(previous.left, previous.u[i], previous.v[i], static_cast<float>(scale), patch)) continue;
     float u = feature.x, v = feature.y;
