@@ -2,6 +2,9 @@
 // Drops disparities whose 3x3 windows in the two images differ too much: mean absolute difference, on the 8-bit scale.
 #include "shared.h"
 
+// lint: PIXEL_BYTES=1
+// lint: PIXEL_BYTES=2
+
 #ifndef PIXEL_BYTES
 #error "PIXEL_BYTES: 1 or 2"
 #endif

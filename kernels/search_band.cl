@@ -2,6 +2,9 @@
 // What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span.
 #include "shared.h"
 
+// lint: ROW_GROUP=1
+// lint: ROW_GROUP=64
+
 #ifndef ROW_GROUP
 #error "ROW_GROUP: work-items that share a row"
 #endif

@@ -4,6 +4,9 @@
 // joined.
 #include "shared.h"
 
+// lint: ROW_GROUP=1
+// lint: ROW_GROUP=64
+
 #ifndef ROW_GROUP
 #error "ROW_GROUP: work-items that share a row"
 #endif

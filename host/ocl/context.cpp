@@ -2,6 +2,7 @@
 #include "host/ocl/context.h"
 
 #include "egosgm/error.h"
+#include "host/ocl/errors.h"
 #include "host/ocl/sources.h"
 
 namespace egosgm::ocl {
@@ -24,9 +25,16 @@ std::string expand(const std::string& file) {
 }
 
 std::string build_options(const cl::Device& device) {
-  const bool rounds_division =
-      device.getInfo<CL_DEVICE_SINGLE_FP_CONFIG>() & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT;
+  const bool rounds_division = device.getInfo<CL_DEVICE_SINGLE_FP_CONFIG>() & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT;
   return std::string(kBaseOptions) + (rounds_division ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
+}
+
+std::string build_log(const cl::Program& program, const cl::Device& device) {
+  try {
+    return program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device);
+  } catch (const cl::Error&) {
+    return "";  // the compiler never ran
+  }
 }
 
 }  // namespace
@@ -71,12 +79,12 @@ const cl::Program& Context::program(const std::string& file, const Defines& defi
   if (const auto built = programs_.find(key); built != programs_.end()) return built->second;
 
   cl::Program program(context_, std::string(kPreamble) + expand(file));
-  try {
-    program.build({device_}, (build_options_ + key.second).c_str());
-  } catch (const cl::BuildError& error) {
-    const auto logs = error.getBuildLog();
-    throw BuildError(error.err(), std::string(stage_) + ": building " + file + " failed with OpenCL status " +
-                                      std::to_string(error.err()) + "\n" + (logs.empty() ? "" : logs.front().second));
+  const std::string options = build_options_ + key.second;
+  // cl::Program::build asks for the log whatever went wrong, and reports that there is none instead of why.
+  const cl_int status = ::clBuildProgram(program(), 1, &device_(), options.c_str(), nullptr, nullptr);
+  if (status != CL_SUCCESS) {
+    throw BuildError(status, std::string(stage_) + ": building " + file + " failed with OpenCL status " +
+                                 status_name(status) + "\n" + build_log(program, device_));
   }
   return programs_.emplace(key, program).first->second;
 }

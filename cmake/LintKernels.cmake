@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+# A test for every kernel and every set of defines that its file names in a line `// lint: NAME=value ...`: clang must accept it as
+# OpenCL C 1.2, all warnings being errors. Needs no device.
+find_program(EGOSGM_CLANG NAMES clang clang-19 clang-18 clang-17 clang-16 clang-15 clang-14)
+if(NOT EGOSGM_CLANG)
+  message(STATUS "egosgm: no clang, kernels are not linted")
+  return()
+endif()
+
+# What host/ocl/context.cpp puts before every kernel.
+set(preamble ${CMAKE_CURRENT_BINARY_DIR}/kernel_preamble.h)
+file(WRITE ${preamble} "#pragma OPENCL FP_CONTRACT OFF\n")
+
+file(GLOB kernels CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/kernels/*.cl)
+foreach(kernel IN LISTS kernels)
+  cmake_path(GET kernel STEM name)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${kernel})
+  file(STRINGS ${kernel} variants REGEX "^// lint: ")
+  if(NOT variants)
+    set(variants "// lint: EGOSGM_LINT")
+  endif()
+  foreach(variant IN LISTS variants)
+    string(REPLACE "// lint: " "" defines "${variant}")
+    string(REGEX MATCHALL "[^ ]+" defines "${defines}")
+    list(JOIN defines "," test)
+    string(REPLACE "EGOSGM_LINT" "lint" test "kernels.${name}.lint.${test}")
+    string(REPLACE "lint.lint" "lint" test "${test}")
+    list(TRANSFORM defines PREPEND -D)
+    add_test(NAME ${test}
+             COMMAND ${EGOSGM_CLANG} -x cl -cl-std=CL1.2 -target spir64-unknown-unknown -Xclang -finclude-default-header
+                     -include ${preamble} -Wall -Wextra -Werror ${defines} -fsyntax-only ${kernel})
+    set_tests_properties(${test} PROPERTIES TIMEOUT 60)
+  endforeach()
+endforeach()

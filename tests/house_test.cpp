@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+// The rules of the house that a machine can read off the sources.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <set>
+#include <sstream>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kSource = EGOSGM_SOURCE_DIR;
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+std::string without_comments(const std::string& text) {
+  return std::regex_replace(text, std::regex(R"(//[^\n]*)"), "");
+}
+
+/// The project's own files with one of these endings, in its folders.
+std::vector<fs::path> files(const std::set<std::string>& endings,
+                            const std::vector<std::string>& folders = {"apps", "bench", "cmake", "host", "include",
+                                                                       "kernels", "scripts", "tests"}) {
+  std::vector<fs::path> found;
+  for (const std::string& folder : folders) {
+    if (!fs::exists(kSource / folder)) continue;
+    for (const auto& entry : fs::recursive_directory_iterator(kSource / folder)) {
+      if (entry.is_regular_file() && endings.contains(entry.path().extension())) found.push_back(entry.path());
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<fs::path> kernels() { return files({".cl"}, {"kernels"}); }
+
+/// Bodies of the functions in a kernel file, by name.
+std::vector<std::pair<std::string, std::string>> functions(const std::string& text) {
+  std::vector<std::pair<std::string, std::string>> found;
+  static const std::regex head(R"((\w+)\s*\([^(){};]*\)\s*\{)");
+  for (std::sregex_iterator at(text.begin(), text.end(), head), end; at != end; ++at) {
+    const std::string name = (*at)[1];
+    if (name == "if" || name == "for" || name == "while" || name == "switch") continue;
+    const std::size_t begin = at->position() + at->length();
+    std::size_t stop = begin;
+    for (int depth = 1; depth > 0 && stop < text.size(); ++stop)
+      depth += text[stop] == '{' ? 1 : text[stop] == '}' ? -1 : 0;
+    found.emplace_back(name, text.substr(begin, stop - begin));
+  }
+  return found;
+}
+
+TEST(House, EverySourceNamesItsLicence) {
+  const auto sources = files({".h", ".cpp", ".cl", ".cmake", ".py"});
+  ASSERT_GT(sources.size(), 50u);
+  for (const fs::path& file : sources) {
+    std::istringstream lines(text_of(file));
+    std::string first, second;
+    std::getline(lines, first), std::getline(lines, second);
+    const std::string& line = first.starts_with("#!") ? second : first;
+    EXPECT_TRUE(line.ends_with("SPDX-License-Identifier: Apache-2.0")) << file;
+  }
+}
+
+TEST(House, PublicHeadersOfTheCoreNeedNeitherOpenClNorOpenCv) {
+  const std::regex forbidden(R"(#\s*include\s*[<"](CL/|opencv2?|host/|kernels/))");
+  for (const auto& entry : fs::directory_iterator(kSource / "include/egosgm")) {
+    if (!entry.is_regular_file()) continue;
+    EXPECT_FALSE(std::regex_search(text_of(entry.path()), forbidden)) << entry.path();
+  }
+}
+
+TEST(House, PublicHeadersFitTwoScreens) {
+  for (const fs::path& file : files({".h"}, {"include"})) {
+    const std::string text = text_of(file);
+    EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 130) << file;
+  }
+}
+
+TEST(House, KernelsAndTheirHostKnowNothingOfOpenCv) {
+  for (const fs::path& file : files({".h", ".cpp", ".cl"}, {"host", "kernels"})) {
+    if (file.string().find("/vision/") != std::string::npos) continue;
+    EXPECT_EQ(text_of(file).find("opencv"), std::string::npos) << file;
+  }
+}
+
+TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
+  ASSERT_GE(kernels().size(), 10u);
+  for (const fs::path& kernel : kernels()) {
+    const std::string name = kernel.stem();
+    for (const std::string& file : {"host/" + name + ".h", "host/" + name + ".cpp", "tests/reference/" + name + ".h",
+                                    "tests/reference/" + name + ".cpp", "tests/" + name + "_test.cpp"}) {
+      EXPECT_TRUE(fs::exists(kSource / file)) << file;
+    }
+  }
+}
+
+TEST(House, TwinsShareNothingWithTheKernelsButTheirLayouts) {
+  const std::regex foreign(R"(#\s*include\s*"(host/|CL/))");
+  for (const fs::path& file : files({".h", ".cpp"}, {"tests/reference"})) {
+    EXPECT_FALSE(std::regex_search(text_of(file), foreign)) << file;
+  }
+}
+
+TEST(House, NothingIsNamedAfterNothing) {
+  const std::regex nothing(R"((^|_)(utils?|common|helpers?|managers?|base|misc)(_|$))");
+  for (const fs::path& file : files({".h", ".cpp", ".cl", ".cmake", ".py"})) {
+    EXPECT_FALSE(std::regex_search(file.stem().string(), nothing)) << file;
+    EXPECT_FALSE(std::regex_search(file.parent_path().filename().string(), nothing)) << file;
+  }
+}
+
+TEST(Kernels, UseOnlyWhatEveryDeviceHasAndRoundsAlike) {
+  const std::pair<const char*, std::regex> rules[] = {
+      {"64-bit atomics", std::regex(R"(\batom_\w+|cl_khr_int64)")},
+      {"an extension", std::regex(R"(#pragma\s+OPENCL\s+EXTENSION)")},
+      {"sub-groups", std::regex(R"(\bsub_group_)")},
+      {"double", std::regex(R"(\bdouble\d*\b)")},
+      {"a function that devices round differently",
+       std::regex(
+           R"(\b(native_\w+|half_(sqrt|recip|divide|exp|log)\w*|fma|mad|exp\d*|exp10|log\d*|pow\w?|sin|cos|tan|rsqrt|cbrt)\s*\()")},
+      {"output", std::regex(R"(\bprintf\s*\()")},
+  };
+  for (const fs::path& kernel : kernels()) {
+    const std::string text = without_comments(text_of(kernel));
+    for (const auto& [what, rule] : rules) {
+      std::smatch match;
+      EXPECT_FALSE(std::regex_search(text, match, rule)) << kernel << " uses " << what << ": " << match.str();
+    }
+  }
+}
+
+TEST(Kernels, DoNotReturnBeforeABarrier) {
+  for (const fs::path& kernel : kernels()) {
+    for (const auto& [name, body] : functions(without_comments(text_of(kernel)))) {
+      const std::size_t last = body.rfind("barrier(");
+      if (last == std::string::npos) continue;
+      EXPECT_FALSE(std::regex_search(body.substr(0, last), std::regex(R"(\breturn\b)"))) << kernel << ": " << name;
+    }
+  }
+}
+
+TEST(Kernels, DoNotRecur) {
+  for (const fs::path& kernel : kernels()) {
+    for (const auto& [name, body] : functions(without_comments(text_of(kernel)))) {
+      EXPECT_FALSE(std::regex_search(body, std::regex("\\b" + name + R"(\s*\()"))) << kernel << ": " << name;
+    }
+  }
+}
+
+TEST(Kernels, SayWhichDefinesTheyNeed) {
+  for (const fs::path& kernel : kernels()) {
+    const std::string text = without_comments(text_of(kernel));
+    static const std::regex check(R"(#ifndef\s+(\w+)\s*\n\s*#error\s+"(\w+))");
+    for (std::sregex_iterator at(text.begin(), text.end(), check), end; at != end; ++at) {
+      const std::string name = (*at)[1];
+      if (name.starts_with("__")) continue;
+      EXPECT_EQ(name, (*at)[2].str()) << kernel << ": the error begins with the define's name";
+    }
+  }
+}
+
+}  // namespace

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+// An OpenCL layer that fails the n-th intercepted call, at once, or later, as a kernel fault would; and that counts
+// references to OpenCL objects. OPENCL_LAYERS loads it, tests arm it through the functions of fault_layer.h.
+#define CL_TARGET_OPENCL_VERSION 300
+#include <CL/cl.h>
+#include <CL/cl_icd.h>
+#include <CL/cl_layer.h>
+
+#include <atomic>
+
+namespace {
+
+const cl_icd_dispatch* next = nullptr;
+cl_icd_dispatch layer{};
+
+int calls = 0, enqueues = 0;
+int failing = -1;
+bool later = false;
+cl_int status = CL_OUT_OF_RESOURCES;
+std::atomic<long> references = 0;
+long buffers_created = 0;
+
+// Calls that take part: all of them where the fault is to come at once, enqueues only where it is to come later.
+bool fails() {
+  const bool chosen = !later && calls == failing;
+  ++calls;
+  return chosen;
+}
+
+template <typename Object>
+Object refuse(cl_int* error) {
+  if (error) *error = status;
+  return nullptr;
+}
+
+template <typename Object>
+Object counted(Object object) {
+  if (object) ++references;
+  return object;
+}
+
+// Enqueues by `enqueue(number of events to wait for, those events)`. A fault that comes later: the command waits for an
+// event that then fails, and takes the rest of its queue down with it. That event must not fail before the enqueue:
+// PoCL 3.1 would hang.
+template <typename Enqueue>
+cl_int enqueue(cl_command_queue queue, cl_event* done, Enqueue&& enqueue_with) {
+  const bool fails_later = later && enqueues == failing;
+  ++enqueues;
+  if (fails()) return status;
+  cl_int result;
+  if (fails_later) {
+    cl_context context;
+    next->clGetCommandQueueInfo(queue, CL_QUEUE_CONTEXT, sizeof context, &context, nullptr);
+    cl_event fault = next->clCreateUserEvent(context, nullptr);
+    result = enqueue_with(1, &fault);
+    next->clSetUserEventStatus(fault, status);
+    next->clReleaseEvent(fault);
+  } else {
+    result = enqueue_with(0, nullptr);
+  }
+  if (result == CL_SUCCESS && done) ++references;
+  return result;
+}
+
+cl_context CL_API_CALL create_context(const cl_context_properties* p, cl_uint n, const cl_device_id* d,
+                                      void(CL_CALLBACK* f)(const char*, const void*, size_t, void*), void* u,
+                                      cl_int* e) {
+  return fails() ? refuse<cl_context>(e) : counted(next->clCreateContext(p, n, d, f, u, e));
+}
+cl_command_queue CL_API_CALL create_queue(cl_context c, cl_device_id d, cl_command_queue_properties p, cl_int* e) {
+  return fails() ? refuse<cl_command_queue>(e) : counted(next->clCreateCommandQueue(c, d, p, e));
+}
+cl_mem CL_API_CALL create_buffer(cl_context c, cl_mem_flags f, size_t n, void* p, cl_int* e) {
+  ++buffers_created;
+  return fails() ? refuse<cl_mem>(e) : counted(next->clCreateBuffer(c, f, n, p, e));
+}
+cl_program CL_API_CALL create_program(cl_context c, cl_uint n, const char** s, const size_t* l, cl_int* e) {
+  return fails() ? refuse<cl_program>(e) : counted(next->clCreateProgramWithSource(c, n, s, l, e));
+}
+cl_int CL_API_CALL build(cl_program p, cl_uint n, const cl_device_id* d, const char* o,
+                         void(CL_CALLBACK* f)(cl_program, void*), void* u) {
+  return fails() ? status : next->clBuildProgram(p, n, d, o, f, u);
+}
+cl_kernel CL_API_CALL create_kernel(cl_program p, const char* n, cl_int* e) {
+  return fails() ? refuse<cl_kernel>(e) : counted(next->clCreateKernel(p, n, e));
+}
+cl_int CL_API_CALL device_info(cl_device_id d, cl_device_info i, size_t n, void* v, size_t* s) {
+  return fails() ? status : next->clGetDeviceInfo(d, i, n, v, s);
+}
+cl_int CL_API_CALL kernel_info(cl_kernel k, cl_kernel_info i, size_t n, void* v, size_t* s) {
+  return fails() ? status : next->clGetKernelInfo(k, i, n, v, s);
+}
+cl_int CL_API_CALL set_arg(cl_kernel k, cl_uint i, size_t n, const void* v) {
+  return fails() ? status : next->clSetKernelArg(k, i, n, v);
+}
+cl_int CL_API_CALL fill(cl_command_queue q, cl_mem b, const void* p, size_t pn, size_t o, size_t n, cl_uint,
+                        const cl_event*, cl_event* e) {
+  return enqueue(q, e,
+                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueFillBuffer(q, b, p, pn, o, n, w, l, e); });
+}
+cl_int CL_API_CALL copy(cl_command_queue q, cl_mem from, cl_mem to, size_t fo, size_t o, size_t n, cl_uint,
+                        const cl_event*, cl_event* e) {
+  return enqueue(
+      q, e, [&](cl_uint w, const cl_event* l) { return next->clEnqueueCopyBuffer(q, from, to, fo, o, n, w, l, e); });
+}
+cl_int CL_API_CALL read(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, void* p, cl_uint, const cl_event*,
+                        cl_event* e) {
+  return enqueue(q, e,
+                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueReadBuffer(q, b, bl, o, n, p, w, l, e); });
+}
+cl_int CL_API_CALL write(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, const void* p, cl_uint,
+                         const cl_event*, cl_event* e) {
+  return enqueue(q, e,
+                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueWriteBuffer(q, b, bl, o, n, p, w, l, e); });
+}
+void* CL_API_CALL map(cl_command_queue q, cl_mem b, cl_bool bl, cl_map_flags f, size_t o, size_t n, cl_uint w,
+                      const cl_event* l, cl_event* e, cl_int* error) {
+  if (fails()) return refuse<void*>(error);
+  void* mapped = next->clEnqueueMapBuffer(q, b, bl, f, o, n, w, l, e, error);
+  if (mapped && e) ++references;
+  return mapped;
+}
+cl_int CL_API_CALL unmap(cl_command_queue q, cl_mem b, void* p, cl_uint, const cl_event*, cl_event* e) {
+  return enqueue(q, e, [&](cl_uint w, const cl_event* l) { return next->clEnqueueUnmapMemObject(q, b, p, w, l, e); });
+}
+cl_int CL_API_CALL launch(cl_command_queue q, cl_kernel k, cl_uint d, const size_t* o, const size_t* g, const size_t* l,
+                          cl_uint, const cl_event*, cl_event* e) {
+  return enqueue(
+      q, e, [&](cl_uint w, const cl_event* wl) { return next->clEnqueueNDRangeKernel(q, k, d, o, g, l, w, wl, e); });
+}
+cl_int CL_API_CALL wait(cl_uint n, const cl_event* e) { return fails() ? status : next->clWaitForEvents(n, e); }
+cl_int CL_API_CALL profiling(cl_event e, cl_profiling_info i, size_t n, void* v, size_t* s) {
+  return fails() ? status : next->clGetEventProfilingInfo(e, i, n, v, s);
+}
+
+template <auto Call, typename Object>
+cl_int CL_API_CALL retain(Object object) {
+  ++references;
+  return (next->*Call)(object);
+}
+template <auto Call, typename Object>
+cl_int CL_API_CALL release(Object object) {
+  --references;
+  return (next->*Call)(object);
+}
+
+}  // namespace
+
+extern "C" void fault_arm(int at, int code, int is_late) {
+  calls = enqueues = 0;
+  failing = at;
+  status = code;
+  later = is_late;
+}
+extern "C" int fault_calls() { return calls; }
+extern "C" int fault_enqueues() { return enqueues; }
+extern "C" long fault_references() { return references; }
+extern "C" long fault_buffers_created() { return buffers_created; }
+
+extern "C" cl_int CL_API_CALL clGetLayerInfo(cl_layer_info name, size_t size, void* value, size_t* needed) {
+  if (name != CL_LAYER_API_VERSION) return CL_INVALID_VALUE;
+  if (value && size >= sizeof(cl_layer_api_version))
+    *static_cast<cl_layer_api_version*>(value) = CL_LAYER_API_VERSION_100;
+  if (needed) *needed = sizeof(cl_layer_api_version);
+  return CL_SUCCESS;
+}
+
+extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target, cl_uint* count,
+                                          const cl_icd_dispatch** out) {
+  next = target;
+  layer = *target;
+  layer.clCreateContext = create_context;
+  layer.clCreateCommandQueue = create_queue;
+  layer.clCreateBuffer = create_buffer;
+  layer.clCreateProgramWithSource = create_program;
+  layer.clBuildProgram = build;
+  layer.clCreateKernel = create_kernel;
+  layer.clGetDeviceInfo = device_info;
+  layer.clGetKernelInfo = kernel_info;
+  layer.clSetKernelArg = set_arg;
+  layer.clEnqueueFillBuffer = fill;
+  layer.clEnqueueCopyBuffer = copy;
+  layer.clEnqueueReadBuffer = read;
+  layer.clEnqueueWriteBuffer = write;
+  layer.clEnqueueMapBuffer = map;
+  layer.clEnqueueUnmapMemObject = unmap;
+  layer.clEnqueueNDRangeKernel = launch;
+  layer.clWaitForEvents = wait;
+  layer.clGetEventProfilingInfo = profiling;
+#define COUNT(Name, Object)                                                \
+  layer.clRetain##Name = retain<&cl_icd_dispatch::clRetain##Name, Object>; \
+  layer.clRelease##Name = release<&cl_icd_dispatch::clRelease##Name, Object>
+  COUNT(Context, cl_context);
+  COUNT(CommandQueue, cl_command_queue);
+  COUNT(MemObject, cl_mem);
+  COUNT(Program, cl_program);
+  COUNT(Kernel, cl_kernel);
+  COUNT(Event, cl_event);
+#undef COUNT
+  *count = sizeof(layer) / sizeof(void*);
+  *out = &layer;
+  return CL_SUCCESS;
+}

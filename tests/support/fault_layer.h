@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#ifndef CL_TARGET_OPENCL_VERSION
+#define CL_TARGET_OPENCL_VERSION 120
+#endif
+#include <CL/cl.h>
+#include <dlfcn.h>
+
+#include <stdexcept>
+#include <string>
+
+namespace egosgm::testing {
+
+/// The layer between this program and its OpenCL driver. Exists only where OPENCL_LAYERS named it before the first
+/// OpenCL call.
+struct FaultLayer {
+  /// Counts from zero; lets call `at` return `code`, or, if `is_late`, command `at` fail after it was enqueued. -1:
+  /// none.
+  void (*arm)(int at, int code, int is_late);
+  int (*calls)();        // since `arm`: calls that can fail,
+  int (*enqueues)();     // and commands among them
+  long (*references)();  // to contexts, queues, buffers, programs, kernels and events: created + retained - released
+  long (*buffers_created)();  // ever
+
+  explicit FaultLayer(const char* file) {
+    cl_uint platforms = 0;
+    clGetPlatformIDs(0, nullptr, &platforms);  // the loader loads layers with the first call
+    void* layer = dlopen(file, RTLD_NOW | RTLD_NOLOAD);
+    if (!layer) throw std::runtime_error(std::string("run this test with OPENCL_LAYERS=") + file);
+    find(layer, "fault_arm", arm);
+    find(layer, "fault_calls", calls);
+    find(layer, "fault_enqueues", enqueues);
+    find(layer, "fault_references", references);
+    find(layer, "fault_buffers_created", buffers_created);
+    disarm();
+  }
+
+  void disarm() const { arm(-1, 0, 0); }
+
+ private:
+  template <typename Function>
+  static void find(void* layer, const char* name, Function& function) {
+    function = reinterpret_cast<Function>(dlsym(layer, name));
+  }
+};
+
+}  // namespace egosgm::testing
