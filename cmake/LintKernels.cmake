@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # A test for every kernel and every set of defines that its file names in a line `// lint: NAME=value ...`: clang must accept it as
-# OpenCL C 1.2, all warnings being errors. Needs no device.
+# OpenCL C 1.2, all warnings being errors (a variant may leave a parameter unused). Needs no device.
 find_program(EGOSGM_CLANG NAMES clang clang-19 clang-18 clang-17 clang-16 clang-15 clang-14)
 if(NOT EGOSGM_CLANG)
   message(STATUS "egosgm: no clang, kernels are not linted")
@@ -28,7 +28,7 @@ foreach(kernel IN LISTS kernels)
     list(TRANSFORM defines PREPEND -D)
     add_test(NAME ${test}
              COMMAND ${EGOSGM_CLANG} -x cl -cl-std=CL1.2 -target spir64-unknown-unknown -Xclang -finclude-default-header
-                     -include ${preamble} -Wall -Wextra -Werror ${defines} -fsyntax-only ${kernel})
+                     -include ${preamble} -Wall -Wextra -Wno-unused-parameter -Werror ${defines} -fsyntax-only ${kernel})
     set_tests_properties(${test} PROPERTIES TIMEOUT 60)
   endforeach()
 endforeach()

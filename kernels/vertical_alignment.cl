@@ -8,6 +8,9 @@
 // neither sum. All sums are of integers, so their order does not matter.
 #include "shared.h"
 
+// lint: PIXEL_BYTES=1 ROW_GROUP=1
+// lint: PIXEL_BYTES=2 ROW_GROUP=64
+
 #ifndef PIXEL_BYTES
 #error "PIXEL_BYTES: 1 or 2, the size of a grey value"
 #endif
