@@ -17,13 +17,47 @@ const std::uint8_t* view_row(const ImageView& image, int y) {
   return static_cast<const std::uint8_t*>(image.data) + image.stride_bytes * y;
 }
 
-// Two rows' maximum of `count` values; the compiler vectorises this.
-void max_into(std::int16_t* __restrict out, const std::int16_t* __restrict in, int count) {
-  for (int x = 0; x < count; ++x) out[x] = std::max(out[x], in[x]);
+// The row loops are functions of their own: the compiler vectorises over pointers that it knows to be apart, and it
+// knows that of parameters only.
+
+// Sums of three and of five rows, and the step between the upper and the lower two.
+void sum_columns(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b, const std::uint8_t* __restrict c,
+                 const std::uint8_t* __restrict d, const std::uint8_t* __restrict e, std::uint16_t* __restrict column3,
+                 std::uint16_t* __restrict column5, std::int16_t* __restrict step, int width) {
+  for (int x = 0; x < width; ++x) {
+    const std::uint16_t inner = b[x] + c[x] + d[x];
+    column3[x] = inner;
+    column5[x] = inner + a[x] + e[x];
+    step[x] = static_cast<std::int16_t>(a[x] + b[x] - d[x] - e[x]);
+  }
 }
 
-void min_into(std::int16_t* __restrict out, const std::int16_t* __restrict in, int count) {
-  for (int x = 0; x < count; ++x) out[x] = std::min(out[x], in[x]);
+// Blob: 2 box3 + 7 centre - box5; corner: the step's difference from left to right; smoothed: box3 / 9.
+void filter_columns(const std::uint16_t* __restrict column3, const std::uint16_t* __restrict column5,
+                    const std::int16_t* __restrict step, const std::uint8_t* __restrict centre,
+                    std::int16_t* __restrict blob, std::int16_t* __restrict corner, std::uint8_t* __restrict smooth,
+                    int width) {
+  for (int x = 2; x < width - 2; ++x) {
+    const std::uint16_t box3 = column3[x - 1] + column3[x] + column3[x + 1];
+    const std::uint16_t box5 = column5[x - 2] + column5[x - 1] + column5[x] + column5[x + 1] + column5[x + 2];
+    blob[x] = static_cast<std::int16_t>(2 * box3 + 7 * centre[x] - box5);
+    corner[x] = static_cast<std::int16_t>(step[x - 2] + step[x - 1] - step[x + 1] - step[x + 2]);
+    smooth[x] = static_cast<std::uint8_t>(static_cast<std::uint16_t>((box3 >> 1) * 57) >> 8);
+  }
+}
+
+using Row = const std::int16_t* __restrict;
+
+void column_maxima(Row a, Row b, Row c, Row d, Row e, Row f, Row g, std::int16_t* __restrict out, int width) {
+  for (int x = 0; x < width; ++x) {
+    out[x] = std::max(std::max(std::max(a[x], b[x]), std::max(c[x], d[x])), std::max(std::max(e[x], f[x]), g[x]));
+  }
+}
+
+void column_minima(Row a, Row b, Row c, Row d, Row e, Row f, Row g, std::int16_t* __restrict out, int width) {
+  for (int x = 0; x < width; ++x) {
+    out[x] = std::min(std::min(std::min(a[x], b[x]), std::min(c[x], d[x])), std::min(std::min(e[x], f[x]), g[x]));
+  }
 }
 
 // Extrema over x - 3 .. x + 3.
@@ -102,28 +136,11 @@ void to_grey(const ImageView& image, int shift, GreyImage& grey) {
 
 void FeatureDetector::filter_row(const GreyImage& image, int y) {
   const int width = image.width;
-  const std::uint8_t *a = image.row(y - 2), *b = image.row(y - 1), *c = image.row(y), *d = image.row(y + 1),
-                     *e = image.row(y + 2);
-  std::uint16_t* __restrict column5 = column5_.data();
-  std::uint16_t* __restrict column3 = column3_.data();
-  std::int16_t* __restrict step = column_step_.data();
-  for (int x = 0; x < width; ++x) {
-    const std::uint16_t inner = b[x] + c[x] + d[x];
-    column3[x] = inner;
-    column5[x] = inner + a[x] + e[x];
-    step[x] = static_cast<std::int16_t>(a[x] + b[x] - d[x] - e[x]);
-  }
   const std::size_t ring = static_cast<std::size_t>(y % kRingRows) * width;
-  std::int16_t* __restrict blob = response_[0].data() + ring;
-  std::int16_t* __restrict corner = response_[1].data() + ring;
-  std::uint8_t* __restrict smooth = smooth_.row(y);
-  for (int x = 2; x < width - 2; ++x) {
-    const std::uint16_t box3 = column3[x - 1] + column3[x] + column3[x + 1];
-    const std::uint16_t box5 = column5[x - 2] + column5[x - 1] + column5[x] + column5[x + 1] + column5[x + 2];
-    blob[x] = static_cast<std::int16_t>(2 * box3 + 7 * c[x] - box5);
-    corner[x] = static_cast<std::int16_t>(step[x - 2] + step[x - 1] - step[x + 1] - step[x + 2]);
-    smooth[x] = static_cast<std::uint8_t>(static_cast<std::uint16_t>((box3 >> 1) * 57) >> 8);  // box3 / 9
-  }
+  sum_columns(image.row(y - 2), image.row(y - 1), image.row(y), image.row(y + 1), image.row(y + 2), column3_.data(),
+              column5_.data(), column_step_.data(), width);
+  filter_columns(column3_.data(), column5_.data(), column_step_.data(), image.row(y), response_[0].data() + ring,
+                 response_[1].data() + ring, smooth_.row(y), width);
   for (int f = 0; f < 2; ++f) {
     row_extrema(response_[f].data() + ring, row_max_[f].data() + ring, row_min_[f].data() + ring, width);
   }
@@ -132,14 +149,11 @@ void FeatureDetector::filter_row(const GreyImage& image, int y) {
 void FeatureDetector::suppress_row(int y, int threshold, int width) {
   const auto ring = [width](int row) { return static_cast<std::size_t>(row % kRingRows) * width; };
   for (int f = 0; f < 2; ++f) {
-    std::memcpy(maximum_.data(), row_max_[f].data() + ring(y), sizeof(std::int16_t) * width);
-    std::memcpy(minimum_.data(), row_min_[f].data() + ring(y), sizeof(std::int16_t) * width);
-    for (int k = 1; k <= kSuppressionRadius; ++k) {
-      for (const int row : {y - k, y + k}) {
-        max_into(maximum_.data(), row_max_[f].data() + ring(row), width);
-        min_into(minimum_.data(), row_min_[f].data() + ring(row), width);
-      }
-    }
+    const std::int16_t *high = row_max_[f].data(), *low = row_min_[f].data();
+    column_maxima(high + ring(y - 3), high + ring(y - 2), high + ring(y - 1), high + ring(y), high + ring(y + 1),
+                  high + ring(y + 2), high + ring(y + 3), maximum_.data(), width);
+    column_minima(low + ring(y - 3), low + ring(y - 2), low + ring(y - 1), low + ring(y), low + ring(y + 1),
+                  low + ring(y + 2), low + ring(y + 3), minimum_.data(), width);
     const std::int16_t* response = response_[f].data() + ring(y);
     flag_extrema(response, maximum_.data(), minimum_.data(), static_cast<std::int16_t>(threshold), flags_.data(),
                  width);

@@ -13,7 +13,7 @@ namespace {
 constexpr int kMaxDistance = 20 * kDescriptorSize;  // of descriptors; unrelated ones differ by 34 a sample
 constexpr int kStereoRows_px = 2;                   // rectification error
 constexpr int kBeyondInfinity_px = 2;               // and in the direction of the search
-constexpr float kFarthestDisparity_px = -1;  // noise and rectification error at infinity
+constexpr float kFarthestDisparity_px = -1;         // noise and rectification error at infinity
 constexpr float kMinCorrelation = 0.8f;
 constexpr float kMaxRowError_px = 2.5f;
 constexpr float kCannot = -std::numeric_limits<float>::infinity();
