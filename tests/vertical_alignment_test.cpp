@@ -111,7 +111,7 @@ class VerticalAlignmentTest : public ::testing::TestWithParam<Case> {};
 
 TEST_P(VerticalAlignmentTest, EqualsReference) {
   const auto [size, type, row_group] = GetParam();
-  Scene scene(size, -0.7f, type, 5.0f);
+  Scene scene(size, -1.3f, type, 5.0f);
   const testing::HostMaps holes = testing::random_maps(size, -20, 30, 0.3, 23);
   for (std::size_t i = 0; i < scene.measured.disparity.size(); i += 3) scene.measured.disparity[i] = holes.disparity[i];
 
