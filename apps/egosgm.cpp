@@ -102,7 +102,7 @@ int main(int argc, char** argv) {
   } catch (const IoError& error) {
     return fail(kFailed, error.what());
   } catch (const DeviceError& error) {
-    return fail(kFailed, fmt::format("{} (OpenCL status {})", error.what(), error.code()));
+    return fail(kFailed, error.what());
   } catch (const std::bad_alloc&) {
     return fail(kFailed, "out of memory: choose smaller images or fewer --disparities");
   } catch (const std::exception& error) {
