@@ -6,6 +6,8 @@
 namespace egosgm {
 namespace {
 
+constexpr cl_int kFillFrom = 6;
+
 const cl::Program& build(ocl::Context& context) {
   context.enter("MedianFilter");
   return context.program("median_filter.cl", {});
@@ -20,10 +22,11 @@ MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, const 
       filter_(build(context), "filter"),
       filtered_(context, enabled_ ? 2 * pixel_count(size) : 0) {}
 
-void MedianFilter::operator()(StereoMaps& maps) {
+void MedianFilter::operator()(StereoMaps& maps, Holes holes) {
   if (!enabled_) return;
   context_.enter("MedianFilter");
-  filter_(context_, ocl::every_pixel(context_, size_), size_, maps.disparity, filtered_);
+  const cl_int fill_from = holes == Holes::kFill ? kFillFrom : 9;  // of eight neighbours: never
+  filter_(context_, ocl::every_pixel(context_, size_), size_, fill_from, maps.disparity, filtered_, maps.variance);
   std::swap(maps.disparity, filtered_);
 }
 

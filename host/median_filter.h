@@ -7,20 +7,25 @@
 
 namespace egosgm {
 
-/// Every valid disparity becomes the median of its 3x3 window, in both views. A neighbour outside the image or without
-/// a value votes for the centre. Invalid pixels stay invalid; every pixel keeps its variance.
+/// What becomes of a pixel without a disparity: it stays one, or takes the median of its neighbours, with a variance of
+/// 1 px^2, if at least six of the eight have a value.
+enum class Holes { kLeave, kFill };
+
+/// Every valid disparity becomes the median of its 3x3 window, in both views, and keeps its variance. A neighbour
+/// outside the image or without a value votes for the centre.
 class MedianFilter {
  public:
   MedianFilter(ocl::Context& context, shared::ImageSize size, const MedianFilterOptions& options);
 
   /// Replaces the disparities of `maps`; nothing happens where the option is off.
-  void operator()(StereoMaps& maps);
+  void operator()(StereoMaps& maps, Holes holes);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const bool enabled_;
-  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, ocl::Buffer<float>> filter_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
+      filter_;
   ocl::Buffer<float> filtered_;
 };
 

@@ -108,13 +108,14 @@ struct Pipeline::Impl {
     }
     stages_of(images.type).census(images.pixels, codes);
     banded_sgm(codes, search_band, scratch);
-    median_filter(scratch);
+    median_filter(scratch, Holes::kLeave);
     consistency(scratch, options.consistency.measurement_px, OutsideView::kDrop, measured);
     speckle_removal(measured);
   }
 
   void update(const FrameImages& images) {
     kalman_update(predicted, measured, updated);
+    median_filter(updated, Holes::kFill);
     consistency(updated, options.consistency.update_px, OutsideView::kKeep, scratch);
     stages_of(images.type).sad_check(images.pixels, scratch, updated);
   }

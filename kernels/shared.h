@@ -37,6 +37,9 @@ typedef float f32;
 // Predictions are summed up over blocks of this many pixels a side, for the bands of pixels without one.
 #define EGOSGM_BLOCK 8
 
+// The variance of a hole that MedianFilter fills.
+#define EGOSGM_FILLED_VARIANCE_PX2 1.0f
+
 // The 32 pairs of pixels that MatchingCost::kPairs32 compares: dx, dy of the first and of the second, drawn from a normal distribution.
 #define EGOSGM_PAIRS_RADIUS_X 6
 #define EGOSGM_PAIRS_RADIUS_Y 5

@@ -15,11 +15,12 @@ namespace {
 
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
-testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, const MedianFilterOptions& options = {}) {
+testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, Holes holes = Holes::kLeave,
+                         const MedianFilterOptions& options = {}) {
   ocl::Context context(testing::any_device());
   MedianFilter filter(context, size, options);
   StereoMaps maps = testing::upload(context, size, in);
-  filter(maps);
+  filter(maps, holes);
   return testing::download(context, maps);
 }
 
@@ -41,9 +42,12 @@ TEST_P(MedianFilterTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const double holes : {0.0, 0.3, 1.0}) {
     const testing::HostMaps maps = testing::random_maps(size, -40, 90, holes, 7);
-    const testing::HostMaps expected = reference::median_filter(size, maps), actual = filter(size, maps);
-    EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << holes << " holes";
-    EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << holes << " holes";
+    for (const Holes policy : {Holes::kLeave, Holes::kFill}) {
+      const testing::HostMaps expected = reference::median_filter(size, policy == Holes::kFill, maps);
+      const testing::HostMaps actual = filter(size, maps, policy);
+      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << holes << " holes";
+      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << holes << " holes";
+    }
   }
 }
 
@@ -74,6 +78,20 @@ TEST(MedianFilter, LeavesHolesAndLetsThemVoteForTheCentre) {
   EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, kNone, 1, 1, 1, 1})[4], kNone);
 }
 
+TEST(MedianFilter, FillsAHoleThatSixNeighboursSurround) {
+  const auto centre = [](const std::vector<float>& left) {
+    testing::HostMaps maps{left, std::vector<float>(18, 0.25f)};
+    maps.disparity.insert(maps.disparity.end(), left.begin(), left.end());
+    const testing::HostMaps filled = filter({3, 3}, maps, Holes::kFill);
+    EXPECT_EQ(filled.variance[4], filled.disparity[4] == kNone ? 0.25f : 1.0f);
+    return filled.disparity[4];
+  };
+  EXPECT_EQ(centre({1, 2, 3, 4, kNone, 5, 6, 7, 8}), 5);
+  EXPECT_EQ(centre({1, kNone, 3, 4, kNone, 5, 6, 7, 8}), 5);
+  EXPECT_EQ(centre({1, kNone, 3, 4, kNone, 5, 6, kNone, 8}), 5);
+  EXPECT_EQ(centre({1, kNone, kNone, 4, kNone, 5, 6, kNone, 8}), kNone);
+}
+
 TEST(MedianFilter, TheBorderVotesForTheCentre) {
   // A corner has three neighbours, an edge five.
   EXPECT_EQ(filter_left({3, 2}, {5, 1, 1, 1, 1, 1}), (std::vector<float>{5, 1, 1, 1, 1, 1}));
@@ -88,7 +106,7 @@ TEST(MedianFilter, DoesNotMixTheViews) {
 
 TEST(MedianFilter, DoesNothingWhenOff) {
   const testing::HostMaps maps = testing::random_maps({65, 3}, 0, 9, 0.1, 11);
-  EXPECT_EQ(filter({65, 3}, maps, {.enabled = false}).disparity, maps.disparity);
+  EXPECT_EQ(filter({65, 3}, maps, Holes::kFill, {.enabled = false}).disparity, maps.disparity);
 }
 
 }  // namespace
