@@ -16,6 +16,8 @@ import unittest
 import zlib
 
 PROGRAM = os.environ["EGOSGM_PROGRAM"]
+EXAMPLE = os.environ.get("EGOSGM_EXAMPLE", "")
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = os.environ.get("EGOSGM_DATA", "")
 WIDTH, HEIGHT, FRAMES = 320, 96, 4
 
@@ -114,6 +116,25 @@ class Help(ProgramTest):
         nothing = dict(os.environ, OCL_ICD_VENDORS="/nonexistent")
         self.assert_refused(["devices"], "pocl-opencl-icd", env=nothing)
         self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder()], "pocl-opencl-icd", env=nothing)
+
+
+class Example(ProgramTest):
+    def test_the_example_gives_what_the_program_gives(self):
+        out, own = self.new_folder(), self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out)
+        subprocess.run([EXAMPLE, self.street], cwd=own, check=True, timeout=240)
+        for file in (out / "disparity").iterdir():
+            self.assertEqual(file.read_bytes(), (own / file.name).read_bytes(), file.name)
+
+    def test_the_readme_shows_it(self):
+        shown = (SOURCE / "README.md").read_text().split("```cpp\n")[1].split("```")[0]
+        self.assertIn(shown.strip(), (SOURCE / "examples/minimal.cpp").read_text())
+
+    def test_the_readme_names_every_subcommand_and_exit_code(self):
+        text = (SOURCE / "README.md").read_text()
+        for name in ("run", "eval", "devices", "synth", "odometry", "eval-poses"):
+            self.assertIn(f"`{name}`", text)
+        self.assertIn("130", text)
 
 
 class Run(ProgramTest):

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// minimal SEQUENCE: writes 000000.png, ... (KITTI's disparity format) for a folder in a layout of KITTI's or
+// Middlebury's.
+#include <egosgm/pipeline.h>
+#include <egosgm/vision/dataset.h>
+#include <egosgm/vision/disparity_io.h>
+#include <egosgm/vision/image_io.h>
+#include <egosgm/vision/odometry.h>
+
+#include <cstdio>
+#include <stdexcept>
+
+using namespace egosgm;
+
+void run(const char* folder) {
+  const vision::StereoSequence sequence = vision::open_folder(folder);
+  const cv::Size size = vision::check_image_sizes(sequence);
+  Pipeline pipeline(sequence.calibration, size.width, size.height);
+  vision::StereoOdometry odometry(sequence.calibration);
+  cv::Mat disparity(size, CV_32FC1);
+  FrameOutputs outputs;
+  outputs.disparity = vision::map_view(disparity);
+  for (const vision::StereoFrame& frame : sequence.frames) {
+    const vision::StereoImages images = vision::read_images(frame);
+    const ImageView left = vision::image_view(images.left), right = vision::image_view(images.right);
+    pipeline.process(left, right, odometry.process(left, right).motion, outputs);
+    vision::write_disparity(frame.name + ".png", disparity);
+  }
+}
+
+int main(int argc, char** argv) try {
+  if (argc != 2) throw std::runtime_error("usage: minimal SEQUENCE");
+  run(argv[1]);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "%s\n", error.what());
+  return 1;
+}
