@@ -6,6 +6,7 @@ EGOSGM_PROGRAM names the program; EGOSGM_DATA the folder of real data (tests tha
 import json
 import os
 import pathlib
+import pty
 import resource
 import shutil
 import signal
@@ -190,6 +191,22 @@ class Run(ProgramTest):
             self.assertEqual(self.assert_works("run", "--odometry", self.street, "--out", out, "--quiet", "--write", "variance"), "")
         for file in [*first.glob("disparity/*"), *first.glob("variance/*"), first / "poses.txt"]:
             self.assertEqual(file.read_bytes(), (second / file.relative_to(first)).read_bytes(), file.name)
+
+    def test_a_terminal_gets_a_bar(self):
+        terminal, side = pty.openpty()
+        with subprocess.Popen([PROGRAM, "run", "--odometry", self.street, "--out", self.new_folder()], stdout=side) as process:
+            os.close(side)
+            text = b""
+            try:
+                while part := os.read(terminal, 4096):
+                    text += part
+            except OSError:  # the program has closed its end
+                pass
+        os.close(terminal)
+        self.assertEqual(process.returncode, 0)
+        self.assertIn(b"frames/s", text)
+        self.assertIn(f"{FRAMES}/{FRAMES}".encode(), text)
+        self.assertGreaterEqual(text.count(b"\r\x1b[K"), FRAMES)
 
     def test_temporal_off_searches_everything(self):
         out = self.new_folder()
