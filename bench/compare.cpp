@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: Apache-2.0
+// This library and OpenCV's four semi-global matchers on the same images, in one process, in turns.
+#include <chrono>
+#include <functional>
+#include <future>
+#include <map>
+#include <memory>
+#include <opencv2/core/utility.hpp>
+
+#include "bench/inputs.h"
+#include "bench/opencv_matcher.h"
+#include "bench/report.h"
+#include "egosgm/pipeline.h"
+#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/odometry.h"
+
+namespace egosgm::bench {
+namespace {
+
+constexpr const char* kHelp =
+    "egosgm_compare: this library and OpenCV's StereoSGBM modes on the same pair, in random turns, medians.\n"
+    "  --size WxH        only this size (else 640x480, 1242x375, 1920x1080)\n"
+    "  --disparities N   only this range (else 64, 128, 256)\n"
+    "  --rounds N        turns (11)\n"
+    "  --threads N       of PoCL and of OpenCV (2)\n"
+    "  --json FILE       write the rows\n"
+    "  --benchmark_filter=REGEX and what else Google Benchmark knows\n"
+    "opencv_*: left view, blockSize 3, P1 = 8*9, P2 = 32*9, disp12MaxDiff 1, nothing padded.\n"
+    "egosgm_full_both: both views on the full range, checked, upload to download. egosgm_banded_frame: a steady frame "
+    "of the method, both\n"
+    "views, upload to download, motion given. egosgm_video_frame: the same as a stream, with odometry. The last two "
+    "play KITTI 2012\n"
+    "000151, frames 07..11, from the start in each turn and give the mean of the last two frames.\n";
+
+using Clock = std::chrono::steady_clock;
+
+/// What one turn of a contender gave.
+struct Turn {
+  double seconds = 0;
+  std::map<std::string, double> more;
+};
+
+struct Contender {
+  std::string name;
+  std::function<Turn()> turn;
+};
+
+template <typename Body>
+double seconds_of(Body&& body) {
+  const auto start = Clock::now();
+  body();
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// A pipeline with the maps that a caller takes from it.
+class Matcher {
+ public:
+  Matcher(const Clip& clip, const PipelineOptions& options, const Device& device)
+      : pipeline_(clip.calibration, clip.frames.front().left.cols, clip.frames.front().left.rows, options, device),
+        disparity_(clip.frames.front().left.size(), CV_32FC1),
+        variance_(disparity_.size(), CV_32FC1) {}
+
+  FrameReport operator()(const ClipFrame& frame, const std::optional<Motion>& motion) {
+    FrameOutputs outputs;
+    outputs.disparity = vision::map_view(disparity_);
+    outputs.variance = vision::map_view(variance_);
+    return pipeline_.process(vision::image_view(frame.left), vision::image_view(frame.right), motion, outputs);
+  }
+
+  void reset() { pipeline_.reset(); }
+  bool shares_cores() const { return pipeline_.device().info().type == "CPU"; }
+
+  Turn turn(double seconds, const FrameReport& last) const {
+    double device_ms = 0;
+    for (const StageTime& stage : last.stages) device_ms += stage.ms;
+    return {seconds,
+            {{"device_ms", device_ms},
+             {"search_fraction", last.search_fraction},
+             {"density", last.density},
+             {"launches", last.launches},
+             {"device_memory_bytes", static_cast<double>(pipeline_.device_memory_bytes())}}};
+  }
+
+ private:
+  Pipeline pipeline_;
+  cv::Mat disparity_, variance_;
+};
+
+Contender opencv(const OpencvMode& mode, const Clip& clip, int disparities) {
+  const auto matcher = make_opencv_matcher(mode.mode, disparities);
+  const auto disparity = std::make_shared<cv::Mat>();
+  return {mode.name, [&clip, matcher, disparity] {
+            const ClipFrame& frame = clip.frames.back();
+            return Turn{seconds_of([&] { matcher->compute(frame.left, frame.right, *disparity); }), {}};
+          }};
+}
+
+Contender full_both(const Clip& clip, PipelineOptions options, const Device& device) {
+  options.temporal = false;
+  const auto matcher = std::make_shared<Matcher>(clip, options, device);
+  return {"egosgm_full_both", [&clip, matcher] {
+            FrameReport report;
+            const double seconds = seconds_of([&] { report = (*matcher)(clip.frames.back(), std::nullopt); });
+            return matcher->turn(seconds, report);
+          }};
+}
+
+Contender banded_frame(const Clip& clip, const PipelineOptions& options, const Device& device) {
+  const auto matcher = std::make_shared<Matcher>(clip, options, device);
+  return {"egosgm_banded_frame", [&clip, matcher] {
+            matcher->reset();
+            for (std::size_t i = 0; i < Clip::kSteadyFrom; ++i) (*matcher)(clip.frames[i], clip.frames[i].motion);
+            FrameReport report;
+            const double seconds = seconds_of([&] {
+              for (std::size_t i = Clip::kSteadyFrom; i < clip.frames.size(); ++i) {
+                report = (*matcher)(clip.frames[i], clip.frames[i].motion);
+              }
+            });
+            return matcher->turn(seconds / static_cast<double>(clip.frames.size() - Clip::kSteadyFrom), report);
+          }};
+}
+
+/// As `egosgm run` does it: the next frame's odometry beside the device's work, unless the device is the CPU itself.
+class Stream {
+ public:
+  Stream(const Clip& clip, const PipelineOptions& options, const Device& device)
+      : clip_(clip), matcher_(clip, options, device), odometry_(clip.calibration) {}
+
+  Turn operator()() {
+    matcher_.reset();
+    odometry_.reset();
+    FrameReport report;
+    Clock::time_point steady;
+    auto motion = estimate(0);
+    for (std::size_t i = 0; i < clip_.frames.size(); ++i) {
+      if (i == Clip::kSteadyFrom) steady = Clock::now();
+      const std::optional<Motion> current = motion.get();
+      if (i + 1 < clip_.frames.size()) motion = estimate(i + 1);
+      report = matcher_(clip_.frames[i], current);
+    }
+    const double seconds = std::chrono::duration<double>(Clock::now() - steady).count();
+    return matcher_.turn(seconds / static_cast<double>(clip_.frames.size() - Clip::kSteadyFrom), report);
+  }
+
+ private:
+  std::future<std::optional<Motion>> estimate(std::size_t i) {
+    return std::async(matcher_.shares_cores() ? std::launch::deferred : std::launch::async, [this, i] {
+      const ClipFrame& frame = clip_.frames[i];
+      return odometry_.process(vision::image_view(frame.left), vision::image_view(frame.right)).motion;
+    });
+  }
+
+  const Clip& clip_;
+  Matcher matcher_;
+  vision::StereoOdometry odometry_;
+};
+
+Contender video_frame(const Clip& clip, const PipelineOptions& options, const Device& device) {
+  const auto stream = std::make_shared<Stream>(clip, options, device);
+  return {"egosgm_video_frame", [stream] { return (*stream)(); }};
+}
+
+// egosgm_full_left (one view, census to disparity) joins here when BandedSgm can match one view alone.
+std::vector<Contender> contenders(const Clip& clip, int disparities, const Device& device) {
+  PipelineOptions options;
+  options.disparities = disparities;
+  std::vector<Contender> list;
+  for (const OpencvMode& mode : kOpencvModes) list.push_back(opencv(mode, clip, disparities));
+  list.push_back(full_both(clip, options, device));
+  list.push_back(banded_frame(clip, options, device));
+  list.push_back(video_frame(clip, options, device));
+  return list;
+}
+
+void take_turn(benchmark::State& state, const Contender& contender) {
+  for (auto _ : state) {
+    const Turn turn = contender.turn();
+    state.SetIterationTime(turn.seconds);
+    for (const auto& [name, value] : turn.more) state.counters[name] = value;
+  }
+}
+
+void compare(const Clip& clip, int disparities, const Device& device, int rounds, std::vector<Row>& rows) {
+  const shared::ImageSize size{clip.frames.front().left.cols, clip.frames.front().left.rows};
+  const std::vector<Contender> list = contenders(clip, disparities, device);
+  for (const Contender& contender : list) {
+    contender.turn();  // pays for what only a first turn costs
+    benchmark::RegisterBenchmark(benchmark_name(contender.name, size, disparities).c_str(),
+                                 [&contender](benchmark::State& state) { take_turn(state, contender); })
+        ->UseManualTime()
+        ->Iterations(1)
+        ->Repetitions(rounds);
+  }
+  std::vector<Row> found;
+  run_registered(found);
+  for (const Contender& contender : list) {  // turns were random, the table is not
+    for (const Row& row : found) {
+      if (row.name == contender.name) rows.push_back(row);
+    }
+  }
+}
+
+const Row* find(const std::vector<Row>& rows, const char* name, shared::ImageSize size, int disparities) {
+  for (const Row& row : rows) {
+    if (row.name == name && row.size.width == size.width && row.size.height == size.height &&
+        row.disparities == disparities)
+      return &row;
+  }
+  return nullptr;
+}
+
+void print_ratios(const std::vector<Row>& rows) {
+  std::printf("\n%-20s %10s %5s %10s %12s %14s\n", "", "size", "D", "ms", "/ opencv_hh", "/ opencv_3way");
+  for (const Row& row : rows) {
+    std::printf("%-20s %5dx%-4d %5d %10.2f", row.name.c_str(), row.size.width, row.size.height, row.disparities,
+                row.median_ms);
+    for (const char* other : {"opencv_hh", "opencv_3way"}) {
+      const Row* reference = find(rows, other, row.size, row.disparities);
+      if (reference) std::printf(" %12.3f", row.median_ms / reference->median_ms);
+    }
+    std::printf("\n");
+  }
+}
+
+int run(int argc, char** argv) {
+  const Arguments arguments = parse_arguments(argc, argv, kHelp, 11, Turns::kRandom);
+  cv::setNumThreads(arguments.threads);
+  const Device device = Device::select();
+  const std::vector<shared::ImageSize> all_sizes{{640, 480}, {1242, 375}, {1920, 1080}};
+  const std::vector<int> all_ranges{64, 128, 256};
+  Machine machine{device.info(), 0, {}, arguments.threads};
+  std::vector<Row> rows;
+  for (const shared::ImageSize size : arguments.size ? std::vector{*arguments.size} : all_sizes) {
+    const Clip clip = load_clip({size.width, size.height});
+    if (machine.input.empty()) {
+      machine.input = clip.title;
+      print_machine(machine);
+      std::printf("OpenCV %s, %d threads each\n", CV_VERSION, arguments.threads);
+    }
+    for (const int disparities : arguments.disparities ? std::vector{*arguments.disparities} : all_ranges) {
+      compare(clip, disparities, device, arguments.rounds, rows);
+    }
+  }
+  print_ratios(rows);
+  if (!arguments.json.empty()) write_json(arguments.json, machine, rows);
+  return rows.empty() ? 1 : 0;
+}
+
+}  // namespace
+}  // namespace egosgm::bench
+
+int main(int argc, char** argv) { return egosgm::bench::guarded("egosgm_compare", egosgm::bench::run, argc, argv); }

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/report.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <fstream>
+#include <map>
+#include <stdexcept>
+
+#include "commit.h"  // written by the build
+
+namespace egosgm::bench {
+namespace {
+
+[[noreturn]] void refuse(const std::string& message) {
+  std::fprintf(stderr, "%s\n", message.c_str());
+  std::exit(2);
+}
+
+int positive(const std::string& name, const std::string& text) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || value < 1) {
+    refuse(name + " " + text + ": give a whole number, 1 or more");
+  }
+  return value;
+}
+
+shared::ImageSize parse_size(const std::string& text) {
+  shared::ImageSize size{};
+  int read = 0;
+  if (std::sscanf(text.c_str(), "%dx%d%n", &size.width, &size.height, &read) != 2 ||
+      static_cast<std::size_t>(read) != text.size() || size.width < 1 || size.height < 1) {
+    refuse("--size " + text + ": write WIDTHxHEIGHT, for example 1242x375");
+  }
+  return size;
+}
+
+/// "--name=value", or "--name" and the next argument.
+std::optional<std::string> value_of(const char* name, int argc, char** argv, int& i) {
+  const std::size_t length = std::strlen(name);
+  if (std::strncmp(argv[i], name, length) != 0) return std::nullopt;
+  if (argv[i][length] == '=') return argv[i] + length + 1;
+  if (argv[i][length] != '\0') return std::nullopt;
+  if (i + 1 == argc) refuse(std::string(name) + ": its value is missing");
+  return argv[++i];
+}
+
+/// Keeps Google Benchmark's runs as rows and prints a line each.
+class RowReporter : public benchmark::BenchmarkReporter {
+ public:
+  explicit RowReporter(std::vector<Row>& rows) : rows_(rows) {}
+
+  bool ReportContext(const Context&) override { return true; }
+
+  void ReportRuns(const std::vector<Run>& runs) override {
+    if (runs.empty() || runs.front().run_type == Run::RT_Aggregate) return;
+    Row row;
+    char name[128];
+    if (std::sscanf(runs.front().run_name.function_name.c_str(), "%127[^/]/%dx%d/%d", name, &row.size.width,
+                    &row.size.height, &row.disparities) != 4) {
+      throw std::logic_error("not a name of bench/: " + runs.front().run_name.function_name);
+    }
+    row.name = name;
+    std::vector<double> ms;
+    std::map<std::string, std::vector<double>> counters;
+    for (const Run& run : runs) {
+      ms.push_back(1e3 * run.real_accumulated_time / static_cast<double>(run.iterations));
+      for (const auto& [counter, value] : run.counters) counters[counter].push_back(value);
+    }
+    row.median_ms = median(ms);
+    for (auto& [counter, values] : counters) row.more.emplace_back(counter, median(values));
+    print(row);
+    rows_.push_back(std::move(row));
+  }
+
+ private:
+  static void print(const Row& row) {
+    std::printf("%-20s %5dx%-5d D %4d %10.3f ms", row.name.c_str(), row.size.width, row.size.height, row.disparities,
+                row.median_ms);
+    for (const auto& [counter, value] : row.more) std::printf("  %s %.4g", counter.c_str(), value);
+    std::printf("\n");
+    std::fflush(stdout);
+  }
+
+  std::vector<Row>& rows_;
+};
+
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return result + '"';
+}
+
+std::string number(double value) {
+  if (!std::isfinite(value)) return "null";
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.9g", value);
+  return buffer;
+}
+
+std::string json_of(const Row& row) {
+  std::string text = "{\"name\": " + quoted(row.name) + ", \"width\": " + std::to_string(row.size.width) +
+                     ", \"height\": " + std::to_string(row.size.height) +
+                     ", \"disparities\": " + std::to_string(row.disparities) +
+                     ", \"median_ms\": " + number(row.median_ms);
+  for (const auto& [counter, value] : row.more) text += ", " + quoted(counter) + ": " + number(value);
+  return text + "}";
+}
+
+std::string now() {
+  const std::time_t time = std::time(nullptr);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", std::gmtime(&time));
+  return text;
+}
+
+}  // namespace
+
+Arguments parse_arguments(int argc, char** argv, const char* help, int default_rounds, Turns turns) {
+  Arguments arguments;
+  arguments.rounds = default_rounds;
+  char random_turns[] = "--benchmark_enable_random_interleaving=true";
+  std::vector<char*> rest{argv[0]};
+  if (turns == Turns::kRandom) rest.push_back(random_turns);
+  for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--help") == 0) {
+      std::fputs(help, stdout);
+      std::exit(0);
+    }
+    if (const auto text = value_of("--size", argc, argv, i)) {
+      arguments.size = parse_size(*text);
+    } else if (const auto count = value_of("--disparities", argc, argv, i)) {
+      arguments.disparities = positive("--disparities", *count);
+    } else if (const auto rounds = value_of("--rounds", argc, argv, i)) {
+      arguments.rounds = positive("--rounds", *rounds);
+    } else if (const auto threads = value_of("--threads", argc, argv, i)) {
+      arguments.threads = positive("--threads", *threads);
+    } else if (const auto json = value_of("--json", argc, argv, i)) {
+      arguments.json = *json;
+    } else if (const auto sweep = value_of("--sweep", argc, argv, i)) {
+      arguments.sweep = *sweep;
+    } else {
+      rest.push_back(argv[i]);
+    }
+  }
+  int count = static_cast<int>(rest.size());
+  benchmark::Initialize(&count, rest.data());
+  if (count > 1) refuse(std::string(rest[1]) + ": no such argument: see --help");
+  // PoCL 3 reads the first, later ones the second. What the caller has set stays.
+  const std::string threads = std::to_string(arguments.threads);
+  setenv("POCL_MAX_PTHREAD_COUNT", threads.c_str(), 0);
+  setenv("POCL_CPU_MAX_CU_COUNT", threads.c_str(), 0);
+  return arguments;
+}
+
+std::string benchmark_name(const std::string& name, shared::ImageSize size, int disparities) {
+  return name + "/" + std::to_string(size.width) + "x" + std::to_string(size.height) + "/" +
+         std::to_string(disparities);
+}
+
+void run_registered(std::vector<Row>& rows) {
+  RowReporter reporter(rows);
+  benchmark::RunSpecifiedBenchmarks(&reporter);
+  benchmark::ClearRegisteredBenchmarks();
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
+}
+
+void print_machine(const Machine& machine) {
+  std::printf("%s (%s), driver %s, %d compute units, commit %s\n", machine.device.name.c_str(),
+              machine.device.version.c_str(), machine.device.driver.c_str(), machine.device.compute_units,
+              EGOSGM_COMMIT);
+  if (!machine.input.empty()) std::printf("input: %s\n", machine.input.c_str());
+  if (machine.copy_gb_s > 0) std::printf("device copy: %.1f GB/s, read and written\n", machine.copy_gb_s);
+}
+
+void write_json(const std::string& file, const Machine& machine, const std::vector<Row>& rows) {
+  const std::string unfinished = file + ".part";
+  {
+    std::ofstream out(unfinished);
+    out << "{\"device\": " << quoted(machine.device.name) << ",\n \"driver\": " << quoted(machine.device.driver)
+        << ",\n \"version\": " << quoted(machine.device.version)
+        << ",\n \"compute_units\": " << machine.device.compute_units << ",\n \"threads\": " << machine.threads
+        << ",\n \"commit\": " << quoted(EGOSGM_COMMIT) << ",\n \"date\": " << quoted(now())
+        << ",\n \"input\": " << quoted(machine.input) << ",\n \"copy_gb_s\": " << number(machine.copy_gb_s)
+        << ",\n \"rows\": [";
+    for (std::size_t i = 0; i < rows.size(); ++i) out << (i ? ",\n  " : "\n  ") << json_of(rows[i]);
+    out << "]}\n";
+    out.close();
+    if (!out) throw std::runtime_error(file + ": cannot be written: choose another --json FILE");
+  }
+  if (std::rename(unfinished.c_str(), file.c_str()) != 0)
+    throw std::runtime_error(file + ": cannot be written: " + std::strerror(errno));
+}
+
+int guarded(const char* program, int (*main_body)(int, char**), int argc, char** argv) {
+  try {
+    return main_body(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: %s\n", program, error.what());
+    return 1;
+  }
+}
+
+}  // namespace egosgm::bench
