@@ -290,6 +290,24 @@ class Accuracy(ProgramTest):
         self.assertLess(drift["end_drift_percent"], 1.5)
 
 
+class Synth(ProgramTest):
+    def test_moving_objects_have_masks(self):
+        street = self.new_folder() / "street"
+        self.assert_works("synth", "--out", street, "--frames", 2, "--width", 160, "--height", 64, "--moving-object")
+        for folder in ("image_0", "image_1", "truth/left_disp_occ", "truth/right_disp_noc", "truth/left_moving"):
+            self.assertEqual([f.name for f in sorted((street / folder).iterdir())], ["000000.png", "000001.png"], folder)
+        for file in ("calib.txt", "poses.txt", "times.txt"):
+            self.assertTrue((street / file).read_text().strip(), file)
+
+    def test_a_seed_is_a_street(self):
+        first, same, other = (self.new_folder() / "street" for _ in range(3))
+        for street, seed in ((first, 3), (same, 3), (other, 4)):
+            self.assert_works("synth", "--out", street, "--frames", 1, "--width", 80, "--height", 40, "--seed", seed, "--quiet")
+        image = "image_0/000000.png"
+        self.assertEqual((first / image).read_bytes(), (same / image).read_bytes())
+        self.assertNotEqual((first / image).read_bytes(), (other / image).read_bytes())
+
+
 class Eval(ProgramTest):
     def test_an_estimate_against_itself_is_perfect(self):
         truth = self.street / "truth/left_disp_occ"
