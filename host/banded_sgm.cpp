@@ -52,8 +52,10 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.variance_per_square_px2},
       slots_(context, slot_bytes(size, range)),
       sums_(context, cell_bytes(size, range)),
+      winners_(context, 2 * pixel_count(size)),
       forward_(build(context, range, options), "sweep_forward"),
-      backward_(build(context, range, options), "sweep_backward") {}
+      backward_(build(context, range, options), "sweep_backward"),
+      refine_(build(context, range, options), "refine") {}
 
 void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& band, StereoMaps& measured) {
   context_.enter("BandedSgm");
@@ -68,9 +70,9 @@ void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& 
   }
   slots_.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
-    backward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), slots_, sums_,
-              measured.disparity, measured.variance);
+    backward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), slots_, sums_, winners_);
   }
+  refine_(context_, ocl::every_pixel(context_, size_), parameters_, winners_, measured.disparity, measured.variance);
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {

@@ -22,7 +22,8 @@ class BandedSgm {
                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
   using Backward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
                                const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>,
-                               ocl::Buffer<float>, ocl::Buffer<float>>;
+                               ocl::Buffer<cl_ulong>>;
+  using Refine = ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
 
  private:
   ocl::Context& context_;
@@ -30,8 +31,10 @@ class BandedSgm {
   const shared::SgmParameters parameters_;
   ocl::Buffer<cl_uchar> slots_;  // path costs under way, one row of disparities a path and view
   ocl::Buffer<cl_uchar> sums_;   // the forward sweep's sums, 8 bits a cell
+  ocl::Buffer<cl_ulong> winners_;
   Forward forward_;
   Backward backward_;
+  Refine refine_;
 };
 
 }  // namespace egosgm

@@ -76,6 +76,10 @@ inline void store(const uchar16 lanes, global uchar* to) { ((global Lanes*)to)->
 inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
 inline ushort8 load_totals(const ushort* from) { return ((const HalfTotals*)from)->totals; }
 inline void store_totals(const ushort16 totals, ushort* to) { ((Totals*)to)->totals = totals; }
+// The same between MAX_STEPS of 65535 on both sides, in one store, so that what is read next comes from one store.
+inline void store_window(const ushort16 totals, ushort* to) {
+  *(ulong8*)to = (ulong8)(~0ul, ~0ul, as_ulong4(totals), ~0ul, ~0ul);
+}
 inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535); }
 
 constant uchar16 kLane = (uchar16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
@@ -161,31 +165,29 @@ inline void wipe(global uchar* slot, const Band band, const int min_disparity) {
   for (int v = 1; v < band.chunks; ++v) store((uchar16)(ABSENT), at + EGOSGM_LANES * v);
 }
 
-// Steps from the winner in one direction until the sums above the minimum add up to `limit`; `sums` are those of the steps.
-inline int count_steps(const ushort8 sums, const ushort winner, const ushort limit) {
-  ushort8 total = sub_sat(sums, (ushort8)(winner));
-  total = add_sat(total, total.s00123456 & (ushort8)(0, -1, -1, -1, -1, -1, -1, -1));
-  total = add_sat(total, total.s00012345 & (ushort8)(0, 0, -1, -1, -1, -1, -1, -1));
-  total = add_sat(total, (ushort8)((ushort4)(0), total.s0123));
-  const short8 counted = total < (ushort8)(limit);
-  const short4 a = counted.lo + counted.hi;
-  const short2 b = a.lo + a.hi;
-  return -(b.x + b.y);
+// Both together: steps to the left and to the right of the winner until the sums above its own add up to `limit`. `beside` holds the sums of
+// the eight lanes before the winner, the nearest first, and of the eight after it.
+inline uint count_steps(const ushort16 beside, const ushort winner, const ushort limit) {
+  const ushort16 from_1 = (ushort16)(0, -1, -1, -1, -1, -1, -1, -1, 0, -1, -1, -1, -1, -1, -1, -1);
+  const ushort16 from_2 = (ushort16)(0, 0, -1, -1, -1, -1, -1, -1, 0, 0, -1, -1, -1, -1, -1, -1);
+  const ushort16 from_4 = (ushort16)(0, 0, 0, 0, -1, -1, -1, -1, 0, 0, 0, 0, -1, -1, -1, -1);
+  ushort16 total = sub_sat(beside, (ushort16)(winner));
+  total = add_sat(total, total.s00123456889abcde & from_1);
+  total = add_sat(total, total.s000123458889abcd & from_2);
+  total = add_sat(total, total.s00000123888889ab & from_4);
+  const ulong2 counted = as_ulong2(convert_uchar16(as_ushort16(total < (ushort16)(limit))) & (uchar16)(1));
+  return (uint)((counted.x + counted.y) * 0x0101010101010101ul >> 56);
 }
 
-// The winner among first..last by the sums, its sub-pixel place by a symmetric V through its neighbours, and the matching variance
-// (algorithm.md; the paper's n_l + n_r). `totals` holds the sums of all computed lanes, with MAX_STEPS of 65535 on both sides.
-inline void write_winner(const SgmParameters q, const Band band, const ushort* totals, const int lane, global float* disparity,
-                         global float* variance) {
+// What `refine` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one is missing), steps; 16 bits each.
+inline ulong winner_of(const SgmParameters q, const Band band, const ushort* totals, const int lane, const int here) {
   const ushort* at = totals + MAX_STEPS + lane;
-  const float before = at[-1], here = at[0], after = at[1];
-  const float slope = max(before, after) - here;
-  const bool fits = at[-1] != 65535 && at[1] != 65535 && slope > 0.0f;
-  const float offset = fits ? clamp((before - after) / (2.0f * slope), -0.5f, 0.5f) : 0.0f;
-  *disparity = (float)(band.origin + lane) + offset;
-
-  const int steps = count_steps(load_totals(at + 1), at[0], (ushort)q.s_max) + count_steps(load_totals(at - MAX_STEPS).s76543210, at[0], (ushort)q.s_max);
-  *variance = q.variance_floor + (float)steps * (q.variance_per_step + q.variance_per_square * (float)steps);
+  const int before = at[-1], after = at[1];
+  const ushort16 beside = (ushort16)(load_totals(at - MAX_STEPS).s76543210, load_totals(at + 1));
+  const uint steps = count_steps(beside, (ushort)here, (ushort)q.s_max);
+  const bool fits = before != 65535 && after != 65535;
+  const ushort rise_before = fits ? (ushort)(before - here) : (ushort)0, rise_after = fits ? (ushort)(after - here) : (ushort)0;
+  return (ulong)(ushort)(band.origin + lane) | (ulong)rise_before << 16 | (ulong)rise_after << 32 | (ulong)steps << 48;
 }
 
 // The lane of the least total among [first, last] in its upper bits, the total in its lower: the smallest disparity wins a tie.
@@ -195,8 +197,7 @@ inline int ranked(const ushort16 totals, const int first, const int last) {
 }
 
 inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
-                  global const Band* bands, global const uint* offsets, global uchar* slots, global uchar* sums, global float* disparities,
-                  global float* variances) {
+                  global const Band* bands, global const uint* offsets, global uchar* slots, global uchar* sums, global ulong* winners) {
   const int tile_y = get_global_id(0);
   const int view = get_global_id(1);
   const int tile_x = wave - 2 * tile_y;
@@ -210,7 +211,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
   slots += (size_t)view * 3 * (width + height) * SLOT + SLOT_PADDING;
 
   uchar16 t[DIRECTIONS][MAX_CHUNKS];
-  ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS];
+  ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS] __attribute__((aligned(64)));
   store_end(totals);
   const int step = backward ? -1 : 1;
 
@@ -248,7 +249,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
       const Band wiped[4] = {band_at[x > 0 ? -step : 0], band_at[up], band_at[x > 0 && y > 0 ? up - step : 0],
                              band_at[x + 1 < width && y > 0 ? up + step : 0]};
 
-      int best = INT_MAX;
+      int best = INT_MAX, best_lane = 0;
       if (band.chunks == 1) {
         const uchar16 absent = lanes_from(q.disparities - lane);
         const uchar16 cost = absent | matching_cost(own, other, above, below);
@@ -269,8 +270,8 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
           store(sum, cells);
         } else {
           const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells))) | widened(absent);
-          store_totals(total, totals + MAX_STEPS);
-          best = ranked(total, band.first - band.origin, band.last - band.origin) & 15;
+          store_window(total, totals);
+          best = ranked(total, band.first - band.origin, band.last - band.origin);
         }
       } else {
         uchar16 least[DIRECTIONS];
@@ -308,15 +309,15 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
             store_totals(total, totals + MAX_STEPS + EGOSGM_LANES * v);
             const int first = band.first - band.origin - EGOSGM_LANES * v;
             const int key = ranked(total, first, first + band.last - band.first);
-            best = min(best, (key >> 4) * (MAX_CHUNKS * EGOSGM_LANES) + EGOSGM_LANES * v + (key & 15));
+            if (key >> 4 < best >> 4) {
+              best = key;
+              best_lane = EGOSGM_LANES * v + (key & 15);
+            }
           }
         }
-        best %= MAX_CHUNKS * EGOSGM_LANES;
+        if (backward) store_end(totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
       }
-      if (backward) {
-        store_end(totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
-        write_winner(q, band, totals, best, disparities + row_start + image_x, variances + row_start + image_x);
-      }
+      if (backward) winners[row_start + image_x] = winner_of(q, band, totals, band.chunks == 1 ? best & 15 : best_lane, best >> 4);
 #pragma unroll
       for (int i = 1; i < 4; ++i) slot[i] += SLOT;
     }
@@ -325,11 +326,23 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
 
 kernel void sweep_forward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes, global const Band* bands,
                           global const uint* offsets, global uchar* slots, global uchar* sums) {
-  sweep(false, q, wave, tile_columns, all_codes, bands, offsets, slots, sums, 0, 0);
+  sweep(false, q, wave, tile_columns, all_codes, bands, offsets, slots, sums, 0);
 }
 
 kernel void sweep_backward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes, global const Band* bands,
-                           global const uint* offsets, global uchar* slots, global const uchar* sums, global float* disparities,
-                           global float* variances) {
-  sweep(true, q, wave, tile_columns, all_codes, bands, offsets, slots, (global uchar*)sums, disparities, variances);
+                           global const uint* offsets, global uchar* slots, global const uchar* sums, global ulong* winners) {
+  sweep(true, q, wave, tile_columns, all_codes, bands, offsets, slots, (global uchar*)sums, winners);
+}
+
+// Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, and the matching variance (options.h).
+kernel void refine(const SgmParameters q, global const ulong* winners, global float* disparities, global float* variances) {
+  const int x = get_global_id(0);
+  if (x >= q.width) return;
+  const size_t i = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width + x;
+  const ulong winner = winners[i];
+  const float before = (float)(short)(winner >> 16), after = (float)(short)(winner >> 32), steps = (float)(short)(winner >> 48);
+  const float slope = max(before, after);
+  const float offset = (before - after) / (2.0f * (slope > 0.0f ? slope : 1.0f));
+  disparities[i] = (float)(short)winner + (slope > 0.0f ? clamp(offset, -0.5f, 0.5f) : 0.0f);
+  variances[i] = q.variance_floor + steps * (q.variance_per_step + q.variance_per_square * steps);
 }
