@@ -145,15 +145,16 @@ INSTANTIATE_TEST_SUITE_P(Sizes, VerticalAlignmentTest,
 constexpr shared::ImageSize kSize{320, 97};
 
 TEST(VerticalAlignment, RecoversTheOffset) {
-  for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
-    for (const float offset_px : {-1.2f, -0.41f, -0.1f, 0.0f, 0.18f, 0.5f, 0.9f}) {
-      const Scene scene(kSize, offset_px, type, 1.0f);
-      Video video(kSize);
-      video.frame(scene);
-      EXPECT_NEAR(video.next_offset(scene), offset_px, 0.03) << "after the first frame";
-      video.frame(scene);
-      EXPECT_NEAR(video.next_offset(scene), offset_px, 0.02) << "after the second";
-    }
+  const std::pair<float, PixelType> cases[] = {{-1.2f, PixelType::kU8},  {-0.41f, PixelType::kU16},
+                                               {-0.1f, PixelType::kU8},  {0.0f, PixelType::kU8},
+                                               {0.18f, PixelType::kU16}, {0.9f, PixelType::kU8}};
+  for (const auto& [offset_px, type] : cases) {
+    const Scene scene(kSize, offset_px, type, 1.0f);
+    Video video(kSize);
+    video.frame(scene);
+    EXPECT_NEAR(video.next_offset(scene), offset_px, 0.03) << "after the first frame";
+    video.frame(scene);
+    EXPECT_NEAR(video.next_offset(scene), offset_px, 0.02) << "after the second";
   }
 }
 
@@ -218,6 +219,25 @@ TEST(VerticalAlignment, ReportsWhatTheImagesWereResampledBy) {
   EXPECT_GT(std::abs(video.frame(scene)), 0.3) << "the second pass of the first frame";
   const float next = video.next_offset(scene);
   EXPECT_EQ(video.frame(scene), next) << "not what it estimated for the next";
+}
+
+TEST(VerticalAlignment, OverwritesNothingThatIsStillNeeded) {
+  const Scene before(kSize, 0.2f), after(kSize, 0.6f);
+  Video video(kSize);
+  const auto offset_px = [&] { return video.alignment.offset_px().read(video.context).at(0); };
+  for (int frame = 0; frame < 2; ++frame) {
+    const FrameImages images = upload(video.context, after);
+    const StereoMaps measured = testing::upload(video.context, kSize, after.measured);
+    video.alignment.align(images);
+    const float committed = offset_px();
+    video.alignment.estimate(images, measured);
+    video.alignment.realign(images);
+    const float applied = offset_px();
+    for (int i = 0; i < 3; ++i) video.alignment.estimate(images, measured);
+    EXPECT_EQ(offset_px(), applied);
+    EXPECT_EQ(video.next_offset(after), committed);
+    video.frame(before);
+  }
 }
 
 TEST(VerticalAlignment, ForgetsOnReset) {
