@@ -9,8 +9,8 @@ namespace egosgm {
 namespace {
 
 // Tiles of a wavefront; measured best on two cores (bench/NOTES.md).
-constexpr int kTileWidth = 64;
-constexpr int kTileHeight = 47;
+constexpr int kTileWidth = 128;
+constexpr int kTileHeight = 24;
 
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
 
