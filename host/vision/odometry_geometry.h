@@ -87,10 +87,7 @@ inline Residual linearise(const Calibration& c, const MatchNoise& noise, const P
   return residual;
 }
 
-/// Cauchy's weight of a squared Mahalanobis distance of three dimensions.
-inline double robust_weight(double squared) {
-  constexpr double kCauchy2 = 2.5 * 2.5 * 3;
-  return 1 / (1 + squared / kCauchy2);
-}
+/// Cauchy's weight of a squared Mahalanobis distance.
+inline double cauchy_weight(double squared, double scale2) { return 1 / (1 + squared / scale2); }
 
 }  // namespace egosgm::vision::odometry

@@ -12,6 +12,8 @@
 namespace egosgm::vision::odometry {
 namespace {
 
+// Narrow: patches across a depth edge follow neither surface, and pull all one way.
+constexpr double kCauchy2 = 2;
 // Matches on one surface share errors of their patches' shape: on rendered scenes, whose motion is known, squared
 // errors are this many times what independent residuals would give.
 constexpr double kCorrelated = 3;
@@ -194,7 +196,7 @@ NormalEquations accumulate(const Calibration& calibration, const MatchNoise& noi
   for (const int i : inliers) {
     const Residual residual = linearise(calibration, noise, matches[i], scene.points[i], motion);
     const double squared = residual.value.dot(residual.information * residual.value);
-    const double weight = robust_weight(squared);
+    const double weight = cauchy_weight(squared, kCauchy2);
     const Eigen::Matrix<double, 6, 3> weighted = weight * residual.by_motion.transpose() * residual.information;
     sums.normal.noalias() += weighted * residual.by_motion;
     sums.right.noalias() += weighted * residual.value;

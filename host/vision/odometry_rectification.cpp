@@ -11,6 +11,7 @@ namespace {
 using Terms = RectificationError::Terms;
 using Square = Eigen::Matrix<double, RectificationError::kTerms, RectificationError::kTerms>;
 
+constexpr double kCauchy2 = 18;  // wide: until it is learnt, the error itself makes residuals large
 constexpr double kRowNoise_px = 0.15;
 constexpr double kClearRowError_px = 0.15;
 // Successive frames measure much the same points with much the same error: each counts for a part of its information.
@@ -101,7 +102,7 @@ void RectificationError::update(const Calibration& calibration, const MatchNoise
     const PointMatch& m = corrected[i];
     const Residual r = linearise(calibration, noise, m, triangulate(calibration, m.u1, m.v1, m.d1), motion);
     const double squared = r.value.dot(r.information * r.value);
-    const double weight = robust_weight(squared);
+    const double weight = cauchy_weight(squared, kCauchy2);
     // A positive term lowers both disparities; measured less predicted changes the other way as each is corrected.
     Eigen::Matrix<double, 3, kTerms> by_terms = r.by_disparity * column_basis(calibration, m.u1, m.v1).transpose();
     by_terms.row(2) -= column_basis(calibration, m.u2, m.v2).transpose();

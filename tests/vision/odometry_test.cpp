@@ -16,6 +16,7 @@
 #include "egosgm/vision/poses_io.h"
 #include "egosgm/vision/synthetic.h"
 #include "host/vision/odometry_features.h"
+#include "host/vision/odometry_matching.h"
 #include "host/vision/odometry_motion.h"
 #include "host/vision/odometry_rectification.h"
 #include "host/vision/odometry_subpixel.h"
@@ -195,6 +196,49 @@ TEST(OdometrySubpixel, RefusesFlatPatchAndFarMove) {
   EXPECT_FALSE(odometry::make_patch(edge, 20, 20, 1.0f, patch));
 }
 
+// One image's features, all of class 0, in the order of their rows.
+odometry::FeatureSet feature_set(const std::vector<odometry::Feature>& features,
+                                 const std::vector<odometry::Descriptor>& descriptors, int height) {
+  odometry::FeatureSet set;
+  set.height = height;
+  set.features = features;
+  set.descriptors = descriptors;
+  set.classes.assign(features.size(), 0);
+  set.row_begin.assign(odometry::kFeatureClasses * (height + 1), static_cast<int>(features.size()));
+  for (int y = 0; y <= height; ++y) {
+    set.row_begin[y] = static_cast<int>(
+        std::count_if(features.begin(), features.end(), [y](const odometry::Feature& f) { return f.y < y; }));
+  }
+  return set;
+}
+
+// The last leg leads to another feature of the previous right image when that one looks more alike.
+TEST(OdometryMatching, KeepsClosedCirclesOnly) {
+  odometry::Descriptor grey, brighter;
+  grey.fill(100);
+  brighter.fill(108);
+  for (const bool closes : {true, false}) {
+    odometry::TrackedFrame previous, current;
+    for (auto* frame : {&previous, &current}) {
+      for (auto* image : {&frame->left, &frame->right}) {
+        image->width = 200;
+        image->height = 60;
+      }
+    }
+    previous.left_features = feature_set({{100, 30, 50}}, {grey}, 60);
+    previous.right_features = feature_set({{90, 30, 50}, {93, 33, 50}}, {grey, closes ? grey : brighter}, 60);
+    current.left_features = feature_set({{104, 31, 50}}, {grey}, 60);
+    current.right_features = feature_set({{94, 31, 50}}, {brighter}, 60);
+    previous.reset_matches();
+    current.reset_matches();
+    const auto matches = odometry::match_circle(kitti_calibration(), previous, current, {0}, nullptr, {20, 10}, 60);
+    ASSERT_EQ(matches.size(), closes ? 1u : 0u);
+    if (closes) {
+      EXPECT_EQ(matches[0].previous_right, 0);
+    }
+  }
+}
+
 TEST(OdometryMotion, RecoversExactMotion) {
   std::mt19937 generator(1);
   const Calibration calibration = kitti_calibration();
@@ -260,6 +304,8 @@ TEST(OdometryMotion, SaysWhyThereIsNone) {
   slow.max_translation_m = 0.5;
   const auto fast = random_matches(generator, calibration, make_motion(0, 0, -1, 0), 200, 0);
   EXPECT_NE(estimate(calibration, fast, slow).reason, "");
+  const auto refined = odometry::refine_motion(calibration, slow, {}, fast, make_motion(0, 0, -1, 0));
+  EXPECT_NE(refined.reason.find("exceeds the bound of 0.50 m"), std::string::npos) << refined.reason;
   EXPECT_NE(odometry::out_of_bounds(slow, make_motion(0, 0, -1, 0)).find("translation of 1.00 m"), std::string::npos);
   EXPECT_NE(odometry::out_of_bounds({}, make_motion(0, 0, -1, 20)).find("rotation of 20.00 deg"), std::string::npos);
   EXPECT_EQ(odometry::out_of_bounds({}, make_motion(0, 0, -1, 10)), "");
