@@ -46,8 +46,8 @@ Bands bands_of(const DisparityRange range, float8 from, float8 to) {
 
   const int8 lanes = chunks * EGOSGM_LANES;
   const int8 centred = floor_to_step(begin - (lanes - (end - begin)) / 2);
-  const int8 first_origin = max(ceil_to_step(end - lanes), 0);
-  const int8 limit = max(ceil_to_step(range.count) - lanes, 0);
+  const int8 first_origin = max(ceil_to_step(end - lanes), (int8)(0));
+  const int8 limit = max(ceil_to_step(range.count) - lanes, (int8)(0));
   const int8 origin = max(min(centred, min(last_origin, limit)), first_origin);
 
   Bands bands;
