@@ -76,10 +76,6 @@ inline void store(const uchar16 lanes, global uchar* to) { ((global Lanes*)to)->
 inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
 inline ushort8 load_totals(const ushort* from) { return ((const HalfTotals*)from)->totals; }
 inline void store_totals(const ushort16 totals, ushort* to) { ((Totals*)to)->totals = totals; }
-// The same between MAX_STEPS of 65535 on both sides, in one store, so that what is read next comes from one store.
-inline void store_window(const ushort16 totals, ushort* to) {
-  *(ulong8*)to = (ulong8)(~0ul, ~0ul, as_ulong4(totals), ~0ul, ~0ul);
-}
 inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535); }
 
 constant uchar16 kLane = (uchar16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
@@ -184,15 +180,24 @@ inline uint count_steps(const ushort16 beside, const ushort winner, const ushort
   return (uint)((counted.x + counted.y) * 0x0101010101010101ul >> 56);
 }
 
+// A winner before its neighbourhood is looked at: the sums of 16 lanes between MAX_STEPS of 65535 on both sides, the winner's total and lane
+// (see `ranked`), and its disparity.
+typedef struct {
+  ulong8 totals;
+  int rank;
+  int disparity;
+} Candidate;
+
 // What `refine` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one is missing), steps; 16 bits each.
-inline ulong winner_of(const SgmParameters q, const Band band, const ushort* totals, const int lane, const int here) {
-  const ushort* at = totals + MAX_STEPS + lane;
+inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
+  const int here = candidate->rank >> 4;
+  const ushort* at = (const ushort*)&candidate->totals + MAX_STEPS + (candidate->rank & 15);
   const int before = at[-1], after = at[1];
   const ushort16 beside = (ushort16)(load_totals(at - MAX_STEPS).s76543210, load_totals(at + 1));
   const uint steps = count_steps(beside, (ushort)here, (ushort)q.s_max);
   const bool fits = before != 65535 && after != 65535;
   const ushort rise_before = fits ? (ushort)(before - here) : (ushort)0, rise_after = fits ? (ushort)(after - here) : (ushort)0;
-  return (ulong)(ushort)(band.origin + lane) | (ulong)rise_before << 16 | (ulong)rise_after << 32 | (ulong)steps << 48;
+  return (ulong)(ushort)candidate->disparity | (ulong)rise_before << 16 | (ulong)rise_after << 32 | (ulong)steps << 48;
 }
 
 // The lane of the least total among [first, last] in its upper bits, the total in its lower: the smallest disparity wins a tie.
@@ -218,6 +223,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
   uchar16 t[DIRECTIONS][MAX_CHUNKS];
   ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS] __attribute__((aligned(64)));
   store_end(totals);
+  Candidate candidates[TILE_WIDTH];
   const int step = backward ? -1 : 1;
 
   for (int row = 0; row < TILE_HEIGHT; ++row) {
@@ -254,7 +260,6 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
       const Band wiped[4] = {band_at[x > 0 ? -step : 0], band_at[up], band_at[x > 0 && y > 0 ? up - step : 0],
                              band_at[x + 1 < width && y > 0 ? up + step : 0]};
 
-      int best = INT_MAX, best_lane = 0;
       if (band.chunks == 1) {
         const uchar16 absent = lanes_from(q.disparities - lane);
         const uchar16 cost = absent | matching_cost(own, other, above, below);
@@ -275,8 +280,10 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
           store(sum, cells);
         } else {
           const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells))) | widened(absent);
-          store_window(total, totals);
-          best = ranked(total, band.first - band.origin, band.last - band.origin);
+          const int rank = ranked(total, band.first - band.origin, band.last - band.origin);
+          candidates[x - from].totals = (ulong8)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
+          candidates[x - from].rank = rank;
+          candidates[x - from].disparity = band.origin + (rank & 15);
         }
       } else {
         uchar16 least[DIRECTIONS];
@@ -297,6 +304,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
           wipe(slot[i], wiped[i], q.min_disparity);
         }
         last_origin = -1;
+        int best = INT_MAX, best_lane = 0;
         for (int v = 0; v < band.chunks; ++v) {
           const int at = lane + EGOSGM_LANES * v;
           const uchar16 absent = lanes_from(q.disparities - at);
@@ -320,11 +328,22 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
             }
           }
         }
-        if (backward) store_end(totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
+        if (backward) {
+          store_end(totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
+          // The winner's neighbourhood, with the winner in lane 0.
+          ushort* window = (ushort*)&candidates[x - from].totals;
+          store_totals(((const Totals*)(totals + best_lane))->totals, window);
+          window[2 * MAX_STEPS] = totals[best_lane + 2 * MAX_STEPS];
+          candidates[x - from].rank = best & ~15;
+          candidates[x - from].disparity = band.origin + best_lane;
+        }
       }
-      if (backward) winners[row_start + image_x] = winner_of(q, band, totals, band.chunks == 1 ? best & 15 : best_lane, best >> 4);
 #pragma unroll
       for (int i = 1; i < 4; ++i) slot[i] += SLOT;
+    }
+    // Apart from the sweep, whose pixels wait for each other: these do not.
+    if (backward) {
+      for (int x = from; x < to; ++x) winners[row_start + width - 1 - x] = winner_of(q, &candidates[x - from]);
     }
   }
 }
