@@ -30,6 +30,7 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
                                               .set("CODE_BYTES", 4 * Census::words(options.cost))
                                               .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
                                               .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
+                                              .set("PARTIAL_CHUNKS", range.count % EGOSGM_LANES != 0)
                                               .set("TILE_WIDTH", kTileWidth)
                                               .set("TILE_HEIGHT", kTileHeight));
 }

@@ -14,12 +14,13 @@
 // its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them before it writes its own.
 #include "shared.h"
 
-// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 TILE_WIDTH=64 TILE_HEIGHT=47
-// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 TILE_WIDTH=64 TILE_HEIGHT=47
-// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 TILE_WIDTH=64 TILE_HEIGHT=47
-// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 TILE_WIDTH=64 TILE_HEIGHT=47
-// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 TILE_WIDTH=64 TILE_HEIGHT=47
-// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 TILE_WIDTH=64 TILE_HEIGHT=47
+// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
+// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
+// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=0 TILE_WIDTH=128 TILE_HEIGHT=24
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
 
 #ifndef MAX_CHUNKS
 #error "MAX_CHUNKS: chunks of EGOSGM_LANES disparities in the whole range"
@@ -35,6 +36,9 @@
 #endif
 #ifndef COST_SAD
 #error "COST_SAD: 0 for the Hamming distance of codes, 1 for a 3x3 sum of absolute differences of grey values"
+#endif
+#ifndef PARTIAL_CHUNKS
+#error "PARTIAL_CHUNKS: 1 if the range is not a multiple of EGOSGM_LANES"
 #endif
 #ifndef TILE_WIDTH
 #error "TILE_WIDTH: columns of a tile"
@@ -90,6 +94,13 @@ inline uchar minimum(uchar16 v) {
 
 // 255 in the lanes from `first` on, 0 in those before it.
 inline uchar16 lanes_from(const int first) { return as_uchar16(kLane >= (uchar16)((uchar)clamp(first, 0, EGOSGM_LANES))); }
+
+// The lanes that lie outside of the disparity range, `first` being its end. Bands of whole chunks in a range of whole chunks have none.
+#if PARTIAL_CHUNKS
+#define absent_from(first) lanes_from(first)
+#else
+#define absent_from(first) ((uchar16)(0))
+#endif
 
 // 65535 where a lane is 255; lanes are 0 or 255.
 inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
@@ -221,60 +232,65 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
   slots += (size_t)view * 3 * (width + height) * SLOT + SLOT_PADDING;
 
   uchar16 t[DIRECTIONS][MAX_CHUNKS];
-  ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS] __attribute__((aligned(64)));
-  store_end(totals);
+  ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS];
   Candidate candidates[TILE_WIDTH];
   const int step = backward ? -1 : 1;
+  const int code_step = view == EGOSGM_LEFT ? step : -step;
 
   for (int row = 0; row < TILE_HEIGHT; ++row) {
     const int y = tile_y * TILE_HEIGHT + row;
     const int from = max(0, tile_x * TILE_WIDTH - row), to = min(width, (tile_x + 1) * TILE_WIDTH - row);
     if (y >= height || from >= to) continue;
-    const int image_y = backward ? height - 1 - y : y;
+    const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
     const size_t row_start = first_pixel + (size_t)image_y * width;
-    global const Code* own_codes = codes + ((size_t)view * height + image_y) * code_stride + q.padding;
-    global const Code* other_codes = codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding + (width - 1);
+    const long up = y > 0 ? -step * (long)width : 0;
+
+    const int along = view == EGOSGM_LEFT ? image_x : width - 1 - image_x;
+    global const Code* own = codes + ((size_t)view * height + image_y) * code_stride + q.padding + along;
+    global const Code* other = codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding + (width - 1 - along);
     const long above = image_y > 0 ? -(long)code_stride : 0, below = image_y + 1 < height ? (long)code_stride : 0;
-    global const Band* row_bands = bands + row_start;
-    global uchar* row_sums = sums + row_start * (MAX_CHUNKS * EGOSGM_LANES);
 
-    // Slots of the paths from the left, from above, from the upper left and from the upper right.
-    global uchar* slot[4] = {slots + (size_t)y * SLOT, slots + (size_t)(height + from) * SLOT,
-                             slots + (size_t)(2 * height + width + from - y) * SLOT,
-                             slots + (size_t)(2 * height + 2 * width + from + y) * SLOT};
+    // Cells lie in the image's order: a backward sweep comes to a pixel's cells from their end.
+    global const Band* band_at = bands + row_start + image_x;
+    global uchar* cells = sums + (row_start * MAX_CHUNKS + offsets[row_start + image_x] + (backward ? band_at->chunks : 0)) * EGOSGM_LANES;
+
+    // Slots of the paths from the left, from above, from the upper left and from the upper right; the latter three move on with x.
+    global uchar* slot[4] = {slots + (size_t)y * SLOT, slots + (size_t)height * SLOT,
+                             slots + ((long)2 * height + width - y) * SLOT, slots + (size_t)(2 * height + 2 * width + y) * SLOT};
     uchar16 last = (uchar16)(ABSENT);
-    int last_origin = -1;  // lane of `last`, or -1 where the path from the left must be read from its slot
+    int last_lane = -1;  // of `last`, or -1 where the path from the left must be read from its slot
 
-    for (int x = from; x < to; ++x) {
-      const int image_x = backward ? width - 1 - x : x;
-      const int along = view == EGOSGM_LEFT ? image_x : width - 1 - image_x;
-      global const Band* band_at = row_bands + image_x;
+    for (int x = from; x < to; ++x, band_at += step, own += code_step, other -= code_step) {
       const Band band = *band_at;
       const int lane = band.origin - q.min_disparity;
-      global uchar* cells = row_sums + (size_t)offsets[row_start + image_x] * EGOSGM_LANES;
-      global const Code* own = own_codes + along;
-      global const Code* other = other_codes - along + band.origin;
-
-      // Where there is no predecessor, wiping at the pixel's own band does no harm.
-      const long up = y > 0 ? -step * (long)width : 0;
-      const Band wiped[4] = {band_at[x > 0 ? -step : 0], band_at[up], band_at[x > 0 && y > 0 ? up - step : 0],
-                             band_at[x + 1 < width && y > 0 ? up + step : 0]};
+      const long moved = (long)x * SLOT;
+      // The bands before this one on the three paths from above. Where there is none, wiping some place in the slot does no harm.
+      const Band wiped[4] = {band_at[x > 0 ? -step : 0], band_at[up], band_at[x > 0 ? up - step : up],
+                             band_at[x + 1 < width ? up + step : up]};
+      if (backward) cells -= EGOSGM_LANES * band.chunks;
 
       if (band.chunks == 1) {
-        const uchar16 absent = lanes_from(q.disparities - lane);
-        const uchar16 cost = absent | matching_cost(own, other, above, below);
+        const uchar16 absent = absent_from(q.disparities - lane);
+        const uchar16 cost = absent | matching_cost(own, other + band.origin, above, below);
         uchar16 r[DIRECTIONS];
-        r[0] = lane == last_origin ? path_cost_beside(last, cost, p1, p2) : path_cost_from(slot[0] + lane, cost, p1, p2);
+        if (lane == last_lane) {
+          r[0] = path_cost_beside(last, cost, p1, p2);
+        } else {
+          r[0] = path_cost_from(slot[0] + lane, cost, p1, p2);
+          wipe(slot[0], wiped[0], q.min_disparity);
+        }
 #pragma unroll
-        for (int i = 1; i < DIRECTIONS; ++i) r[i] = path_cost_from(slot[i] + lane, cost, p1, p2);
+        for (int i = 1; i < DIRECTIONS; ++i) {
+          r[i] = path_cost_from(slot[i] + (moved + lane), cost, p1, p2);
+          wipe(slot[i] + moved, wiped[i], q.min_disparity);
+        }
 #pragma unroll
         for (int i = 0; i < DIRECTIONS; ++i) {
           r[i] = (r[i] - (uchar16)(minimum(r[i]))) | absent;
-          if (i > 0 || lane != last_origin) wipe(slot[i], wiped[i], q.min_disparity);
-          store(r[i], slot[i] + lane);
+          store(r[i], slot[i] + (i > 0 ? moved + lane : lane));
         }
         last = r[0];
-        last_origin = lane;
+        last_lane = lane;
         const uchar16 sum = half_sum(r);
         if (!backward) {
           store(sum, cells);
@@ -291,28 +307,30 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
         for (int i = 0; i < DIRECTIONS; ++i) least[i] = (uchar16)(ABSENT);
         for (int v = 0; v < band.chunks; ++v) {
           const int at = lane + EGOSGM_LANES * v;
-          const uchar16 cost = lanes_from(q.disparities - at) | matching_cost(own, other + EGOSGM_LANES * v, above, below);
+          const uchar16 cost = absent_from(q.disparities - at) | matching_cost(own, other + band.origin + EGOSGM_LANES * v, above, below);
 #pragma unroll
           for (int i = 0; i < DIRECTIONS; ++i) {
-            t[i][v] = path_cost_from(slot[i] + at, cost, p1, p2);
+            t[i][v] = path_cost_from(slot[i] + (i > 0 ? moved + at : at), cost, p1, p2);
             least[i] = min(least[i], t[i][v]);
           }
         }
 #pragma unroll
         for (int i = 0; i < DIRECTIONS; ++i) {
           least[i] = (uchar16)(minimum(least[i]));
-          wipe(slot[i], wiped[i], q.min_disparity);
+          wipe(slot[i] + (i > 0 ? moved : 0), wiped[i], q.min_disparity);
         }
-        last_origin = -1;
+        last_lane = -1;
         int best = INT_MAX, best_lane = 0;
+        store_end(totals);
+        store_end(totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
         for (int v = 0; v < band.chunks; ++v) {
           const int at = lane + EGOSGM_LANES * v;
-          const uchar16 absent = lanes_from(q.disparities - at);
+          const uchar16 absent = absent_from(q.disparities - at);
           uchar16 r[DIRECTIONS];
 #pragma unroll
           for (int i = 0; i < DIRECTIONS; ++i) {
             r[i] = (t[i][v] - least[i]) | absent;
-            store(r[i], slot[i] + at);
+            store(r[i], slot[i] + (i > 0 ? moved + at : at));
           }
           const uchar16 sum = half_sum(r);
           if (!backward) {
@@ -321,15 +339,14 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
             const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells + EGOSGM_LANES * v))) | widened(absent);
             store_totals(total, totals + MAX_STEPS + EGOSGM_LANES * v);
             const int first = band.first - band.origin - EGOSGM_LANES * v;
-            const int key = ranked(total, first, first + band.last - band.first);
-            if (key >> 4 < best >> 4) {
-              best = key;
-              best_lane = EGOSGM_LANES * v + (key & 15);
+            const int rank = ranked(total, first, first + band.last - band.first);
+            if (rank >> 4 < best >> 4) {
+              best = rank;
+              best_lane = EGOSGM_LANES * v + (rank & 15);
             }
           }
         }
         if (backward) {
-          store_end(totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
           // The winner's neighbourhood, with the winner in lane 0.
           ushort* window = (ushort*)&candidates[x - from].totals;
           store_totals(((const Totals*)(totals + best_lane))->totals, window);
@@ -338,8 +355,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
           candidates[x - from].disparity = band.origin + best_lane;
         }
       }
-#pragma unroll
-      for (int i = 1; i < 4; ++i) slot[i] += SLOT;
+      if (!backward) cells += EGOSGM_LANES * band.chunks;
     }
     // Apart from the sweep, whose pixels wait for each other: these do not.
     if (backward) {
