@@ -58,12 +58,12 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
       backward_(build(context, range, options), "sweep_backward"),
       refine_(build(context, range, options), "refine") {}
 
-void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& band, StereoMaps& measured) {
+void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& band, StereoMaps& measured, int views) {
   context_.enter("BandedSgm");
   const int tile_rows = ceil_div(size_.height, kTileHeight);
   const int tile_columns = ceil_div(size_.width + kTileHeight, kTileWidth) + 1;
   const int waves = tile_columns + 2 * (tile_rows - 1);
-  const ocl::Range tiles{cl::NDRange(tile_rows, 2), cl::NDRange(1, 1)};
+  const ocl::Range tiles{cl::NDRange(tile_rows, views), cl::NDRange(1, 1)};
 
   slots_.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
@@ -73,7 +73,7 @@ void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& 
   for (cl_int wave = 0; wave < waves; ++wave) {
     backward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), slots_, sums_, winners_);
   }
-  refine_(context_, ocl::every_pixel(context_, size_), parameters_, winners_, measured.disparity, measured.variance);
+  refine_(context_, ocl::every_pixel(context_, size_, views), parameters_, winners_, measured.disparity, measured.variance);
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {

@@ -13,8 +13,8 @@ class BandedSgm {
  public:
   BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options);
 
-  /// `codes`: what Census makes with a padding of `code_padding(range)`.
-  void operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& band, StereoMaps& measured);
+  /// `codes`: what Census makes with a padding of `code_padding(range)`. `views`: 1 matches the left view only.
+  void operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& band, StereoMaps& measured, int views = 2);
 
   static int code_padding(shared::DisparityRange range);
 

@@ -211,11 +211,11 @@ inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
   return (ulong)(ushort)candidate->disparity | (ulong)rise_before << 16 | (ulong)rise_after << 32 | (ulong)steps << 48;
 }
 
-// The lane of the least total among [first, last] in its upper bits, the total in its lower: the smallest disparity wins a tie.
-inline int ranked(const ushort16 totals, const int first, const int last) {
-  const ushort16 barred = widened(~lanes_from(first) | lanes_from(last + 1));
-  return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane) | barred);
-}
+// 65535 in the lanes outside of [first, last].
+inline ushort16 barred(const int first, const int last) { return widened(~lanes_from(first) | lanes_from(last + 1)); }
+
+// The least total of 16 lanes in its upper bits, its lane in the lower four: the smallest disparity wins a tie.
+inline int ranked(const ushort16 totals) { return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane)); }
 
 inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
                   global const Band* bands, global const uint* offsets, global uchar* slots, global uchar* sums, global ulong* winners) {
@@ -296,7 +296,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
           store(sum, cells);
         } else {
           const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells))) | widened(absent);
-          const int rank = ranked(total, band.first - band.origin, band.last - band.origin);
+          const int rank = ranked(total | barred(band.first - band.origin, band.last - band.origin));
           candidates[x - from].totals = (ulong8)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
           candidates[x - from].rank = rank;
           candidates[x - from].disparity = band.origin + (rank & 15);
@@ -320,7 +320,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
           wipe(slot[i] + (i > 0 ? moved : 0), wiped[i], q.min_disparity);
         }
         last_lane = -1;
-        int best = INT_MAX, best_lane = 0;
+        ushort16 best = (ushort16)(65535), best_chunk = 0;
         store_end(totals);
         store_end(totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
         for (int v = 0; v < band.chunks; ++v) {
@@ -338,20 +338,22 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
           } else {
             const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells + EGOSGM_LANES * v))) | widened(absent);
             store_totals(total, totals + MAX_STEPS + EGOSGM_LANES * v);
-            const int first = band.first - band.origin - EGOSGM_LANES * v;
-            const int rank = ranked(total, first, first + band.last - band.first);
-            if (rank >> 4 < best >> 4) {
-              best = rank;
-              best_lane = EGOSGM_LANES * v + (rank & 15);
-            }
+            const int first = band.first - band.origin - EGOSGM_LANES * v, last_of_band = first + band.last - band.first;
+            const bool is_inner = first <= 0 && last_of_band >= EGOSGM_LANES - 1;
+            const ushort16 allowed = is_inner ? total : total | barred(first, last_of_band);
+            best_chunk = select(best_chunk, (ushort16)((ushort)v), allowed < best);
+            best = min(best, allowed);
           }
         }
         if (backward) {
+          const ushort winner_total = minimum_of_totals(best);
+          const ushort16 lanes = best_chunk * (ushort16)(EGOSGM_LANES) + convert_ushort16(kLane);
+          const int best_lane = minimum_of_totals(lanes | as_ushort16(best != (ushort16)(winner_total)));
           // The winner's neighbourhood, with the winner in lane 0.
           ushort* window = (ushort*)&candidates[x - from].totals;
           store_totals(((const Totals*)(totals + best_lane))->totals, window);
           window[2 * MAX_STEPS] = totals[best_lane + 2 * MAX_STEPS];
-          candidates[x - from].rank = best & ~15;
+          candidates[x - from].rank = winner_total << 4;
           candidates[x - from].disparity = band.origin + best_lane;
         }
       }
