@@ -9,12 +9,6 @@
 
 namespace egosgm {
 
-/// Both views' pixels on the device, the left view first, without gaps.
-struct FrameImages {
-  ocl::Buffer<cl_uchar> pixels;
-  PixelType type = PixelType::kU8;
-};
-
 /// Checks what the caller gave, brings the images to the device and the results back.
 class FrameTransfer {
  public:

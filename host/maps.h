@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "egosgm/image.h"
 #include "host/ocl/buffer.h"
 #include "kernels/shared.h"
 
 namespace egosgm {
 
 inline std::size_t pixel_count(shared::ImageSize size) { return static_cast<std::size_t>(size.width) * size.height; }
+
+/// Both views' pixels on the device, the left view first, without gaps; 1 or 2 bytes each.
+struct FrameImages {
+  ocl::Buffer<cl_uchar> pixels;
+  PixelType type = PixelType::kU8;
+};
 
 /// Disparity [px] and variance [px^2] of both views, the left one first. Variance is 0 where the disparity is invalid.
 struct StereoMaps {

@@ -100,7 +100,7 @@ struct Pipeline::Impl {
     consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);
   }
 
-  void match(const FrameImages& images, bool full_range) {
+  void match_aligned(const FrameImages& images, bool full_range) {
     if (full_range || options.search == SearchMode::kFull) {
       search_band.full_range();
     } else {
@@ -111,6 +111,19 @@ struct Pipeline::Impl {
     median_filter(scratch, Holes::kLeave);
     consistency(scratch, options.consistency.measurement_px, OutsideView::kDrop, measured);
     speckle_removal(measured);
+  }
+
+  /// Returns the images that were matched.
+  const FrameImages& match(const FrameImages& uploaded, bool full_range) {
+    const FrameImages* images = &vertical_alignment.align(uploaded);
+    match_aligned(*images, full_range);
+    if (vertical_alignment.is_unknown()) {
+      vertical_alignment.estimate(*images, measured);
+      images = &vertical_alignment.realign(uploaded);
+      match_aligned(*images, full_range);
+    }
+    vertical_alignment.estimate(*images, measured);
+    return *images;
   }
 
   void update(const FrameImages& images) {
@@ -125,16 +138,9 @@ struct Pipeline::Impl {
     const ocl::Drain drain{context};
     const char* reason = full_range_reason(motion);
     const FrameImages& uploaded = transfer.upload(left, right);
-    const FrameImages* images = &vertical_alignment.align(uploaded);
     if (!reason) predict(*motion);
-    match(*images, reason);
-    if (vertical_alignment.is_unknown()) {
-      vertical_alignment.estimate(*images, measured);
-      images = &vertical_alignment.realign(uploaded);
-      match(*images, reason);
-    }
-    vertical_alignment.estimate(*images, measured);
-    if (!reason) update(*images);
+    const FrameImages& images = match(uploaded, reason);
+    if (!reason) update(images);
 
     StereoMaps& result = reason ? measured : updated;
     FrameReport report = transfer.download(result, reason ? nullptr : &predicted, measured, search_band, vertical_alignment.offset_px(), outputs);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "egosgm/options.h"
-#include "host/frame_transfer.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
 
