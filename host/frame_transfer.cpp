@@ -175,11 +175,15 @@ FrameReport FrameTransfer::download(const StereoMaps& result, const StereoMaps* 
 
   FrameReport report;
   const double pixels = static_cast<double>(pixel_count(size_)), cells = 2 * pixels * range_.count;
+  std::uint64_t searched = 0, computed = 0, predicted_pixels = 0;
   for (std::size_t row = 0; row < row_sums_.size(); ++row) {
-    report.search_fraction += row_sums_[row].searched / cells;
-    report.computed_fraction += row_sums_[row].computed / cells;
-    if (predicted && row < row_sums_.size() / 2) report.predicted_fraction += row_sums_[row].predicted / pixels;
+    searched += row_sums_[row].searched;
+    computed += row_sums_[row].computed;
+    if (predicted && row < row_sums_.size() / 2) predicted_pixels += row_sums_[row].predicted;
   }
+  report.search_fraction = static_cast<double>(searched) / cells;
+  report.computed_fraction = static_cast<double>(computed) / cells;
+  report.predicted_fraction = static_cast<double>(predicted_pixels) / pixels;
   report.density = static_cast<double>(std::count_if(staged_maps_[0].begin(), staged_maps_[0].end(), [](float d) { return d > kInvalidDisparity; })) / pixels;
   report.vertical_offset_px = staged_offset_[0];
   report.launches = static_cast<int>(std::count_if(finished.begin(), finished.end(), [](const auto& f) { return f.is_launch; }));
