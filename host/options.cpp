@@ -168,7 +168,7 @@ PipelineOptions PipelineOptions::paper() {
 
 void PipelineOptions::validate() const {
   expect("disparities", disparities, disparities >= 1 && disparities <= 4096, "choose 1 to 4096");
-  expect("min_disparity", min_disparity, std::abs(min_disparity) <= 16384, "choose -16384 to 16384");
+  expect("min_disparity", min_disparity, min_disparity >= -16384 && min_disparity <= 16384, "choose -16384 to 16384");
   for_each(*this, [](const char* name, const auto& value) {
     if constexpr (std::is_same_v<std::decay_t<decltype(value)>, float>) expect_not_negative(name, value);
   });
