@@ -96,7 +96,8 @@ Device Device::select(const std::string& wanted) {
     throw InvalidArgument("no OpenCL device: install one, on Debian and Ubuntu `apt install pocl-opencl-icd` for the CPU");
   }
   const char* from_environment = std::getenv("EGOSGM_DEVICE");
-  const std::string name = lower(!wanted.empty() ? wanted : from_environment ? from_environment : "");
+  const std::string given = !wanted.empty() ? wanted : from_environment ? from_environment : "";
+  const std::string name = lower(given);
   if (name.empty()) return devices.front();
 
   std::size_t index = 0;
@@ -105,7 +106,8 @@ Device Device::select(const std::string& wanted) {
   for (const Device& device : devices) {
     if (fits(device.info(), name)) return device;
   }
-  throw InvalidArgument("no OpenCL device fits \"" + name + "\": choose one of " + numbered(devices));
+  throw InvalidArgument("no OpenCL device fits \"" + given + "\"" + (wanted.empty() ? " (EGOSGM_DEVICE)" : "") + ": choose one of " +
+                        numbered(devices));
 }
 
 const DeviceInfo& Device::info() const { return handle_->info; }
