@@ -15,7 +15,7 @@ struct Motion {
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 
   /// Throws InvalidArgument unless all values are finite, the rotation is one (R R^T = I within 1e-4,
-  /// det R > 0) and the covariance is symmetric with a non-negative diagonal.
+  /// det R > 0), the last row 0 0 0 1, and the covariance symmetric with a non-negative diagonal.
   void validate() const;
 };
 
