@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// What calibrations and motions are refused.
+#include "egosgm/calibration.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "egosgm/motion.h"
+#include "tests/support/expect_refused.h"
+
+namespace egosgm {
+namespace {
+
+using testing::expect_refused;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
+
+Calibration good_calibration() { return {.fx = 700, .fy = 710, .cx = 600, .cy = 180, .baseline_m = 0.54}; }
+
+TEST(Calibration, TakesWhatACameraCanBe) {
+  Calibration calibration = good_calibration();
+  EXPECT_NO_THROW(calibration.validate());
+  calibration.cx = -5, calibration.cy = 1e4, calibration.doffs_px = -30;  // a crop's principal point may lie outside
+  EXPECT_NO_THROW(calibration.validate());
+}
+
+TEST(Calibration, RefusesEachValueByItsName) {
+  const std::pair<const char*, double Calibration::*> values[] = {{"fx", &Calibration::fx},
+                                                                  {"fy", &Calibration::fy},
+                                                                  {"cx", &Calibration::cx},
+                                                                  {"cy", &Calibration::cy},
+                                                                  {"baseline_m", &Calibration::baseline_m},
+                                                                  {"doffs_px", &Calibration::doffs_px}};
+  for (const auto& [name, value] : values) {
+    for (const double bad : {kNan, kInfinity, -kInfinity}) {
+      Calibration calibration = good_calibration();
+      calibration.*value = bad;
+      expect_refused([&] { calibration.validate(); },
+                     {"calibration: " + std::string(name) + " is ", ": give a finite number"});
+    }
+  }
+  for (const auto& [name, value] : {values[0], values[1], values[4]}) {
+    for (const double bad : {0.0, -1.0}) {
+      Calibration calibration = good_calibration();
+      calibration.*value = bad;
+      expect_refused([&] { calibration.validate(); }, {"calibration: " + std::string(name) + " is ", "is positive"});
+    }
+  }
+  Calibration swapped = good_calibration();
+  swapped.baseline_m = -0.54;
+  expect_refused([&] { swapped.validate(); }, {"are left and right swapped?"});
+  expect_refused([] { Calibration().validate(); }, {"fx is 0"});
+}
+
+Motion turned(double angle) {
+  Motion motion;
+  motion.current_from_previous.rotate(Eigen::AngleAxisd(angle, Eigen::Vector3d(0.2, 0.9, -0.3).normalized()));
+  motion.current_from_previous.translation() = Eigen::Vector3d(0.1, -0.02, -1.4);
+  return motion;
+}
+
+TEST(Motion, TakesAnyRigidOne) {
+  EXPECT_NO_THROW(Motion().validate());
+  for (const double angle : {-3.1, -0.01, 0.5, 2.0}) EXPECT_NO_THROW(turned(angle).validate()) << angle;
+  Motion rounded = turned(0.3);
+  rounded.current_from_previous.linear().array() += 2e-5;  // as a text file rounds
+  EXPECT_NO_THROW(rounded.validate());
+  Motion known = turned(0.1);
+  known.covariance.setConstant(0.25);
+  EXPECT_NO_THROW(known.validate());
+}
+
+TEST(Motion, RefusesWhatIsNotFinite) {
+  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 4; ++column) {
+        Motion motion = turned(0.2);
+        motion.current_from_previous.matrix()(row, column) = bad;
+        expect_refused([&] { motion.validate(); }, {"motion: not all values are finite"});
+      }
+    }
+    for (int row = 0; row < 6; ++row) {
+      Motion motion = turned(0.2);
+      motion.covariance(row, 5) = motion.covariance(5, row) = bad;
+      expect_refused([&] { motion.validate(); }, {"motion: the covariance"});
+    }
+  }
+}
+
+TEST(Motion, RefusesWhatIsNoRotation) {
+  Motion motion = turned(0.2);
+  motion.current_from_previous.linear() *= 1.001;
+  expect_refused([&] { motion.validate(); }, {"motion: its 3x3 part is not a rotation", "give an orthonormal"});
+  motion = turned(0.2);
+  motion.current_from_previous.linear().col(0) *= -1;  // a mirror
+  expect_refused([&] { motion.validate(); }, {"motion: its 3x3 part is not a rotation"});
+  motion = turned(0.2);
+  motion.current_from_previous.linear()(0, 1) += 0.01;
+  expect_refused([&] { motion.validate(); }, {"motion: its 3x3 part is not a rotation"});
+  motion.current_from_previous.linear().setZero();
+  expect_refused([&] { motion.validate(); }, {"motion: its 3x3 part is not a rotation"});
+}
+
+TEST(Motion, RefusesAMatrixThatIsNotAffine) {
+  Motion motion = turned(0.2);
+  motion.current_from_previous.matrix()(3, 3) = 2;
+  expect_refused([&] { motion.validate(); }, {"motion: ", "0 0 0 1"});
+  motion = turned(0.2);
+  motion.current_from_previous.matrix().row(3).setZero();
+  expect_refused([&] { motion.validate(); }, {"motion: ", "0 0 0 1"});
+}
+
+TEST(Motion, RefusesWhatIsNoCovariance) {
+  Motion motion = turned(0.2);
+  motion.covariance(4, 4) = -1e-9;
+  expect_refused([&] { motion.validate(); }, {"motion: the covariance", "give zero if it is not known"});
+  motion.covariance.setIdentity();
+  motion.covariance(0, 3) = 0.01;
+  expect_refused([&] { motion.validate(); }, {"motion: the covariance is not symmetric"});
+}
+
+}  // namespace
+}  // namespace egosgm

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/device.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+
+#include "tests/support/expect_refused.h"
+
+namespace egosgm {
+namespace {
+
+using testing::expect_refused;
+
+/// EGOSGM_DEVICE as the test wants it, and as it was when the test is over.
+class DeviceTest : public ::testing::Test {
+ protected:
+  DeviceTest() {
+    if (const char* value = std::getenv(kName)) before_ = value;
+    unsetenv(kName);
+  }
+  ~DeviceTest() override {
+    if (before_) {
+      setenv(kName, before_->c_str(), 1);
+    } else {
+      unsetenv(kName);
+    }
+  }
+  static void set_wanted(const std::string& value) { setenv(kName, value.c_str(), 1); }
+
+ private:
+  static constexpr const char* kName = "EGOSGM_DEVICE";
+  std::optional<std::string> before_;
+};
+
+bool is_same(const Device& a, const Device& b) {
+  return a.info().name == b.info().name && a.info().platform == b.info().platform &&
+         a.info().version == b.info().version;
+}
+
+std::string changed_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::isupper(c) ? std::tolower(c) : std::toupper(c));
+  return text;
+}
+
+int preference(const Device& device) {
+  return device.info().type == "GPU" ? 0 : device.info().type == "accelerator" ? 1 : 2;
+}
+
+TEST_F(DeviceTest, ListsThemWithWhatTheySayOfThemselves) {
+  const std::vector<Device> devices = Device::list();
+  ASSERT_FALSE(devices.empty());
+  for (const Device& device : devices) {
+    const DeviceInfo& info = device.info();
+    for (const std::string& text : {info.name, info.vendor, info.platform, info.version, info.driver}) {
+      EXPECT_FALSE(text.empty());
+      EXPECT_EQ(text.find('\0'), std::string::npos);
+    }
+    EXPECT_TRUE(info.version.starts_with("OpenCL ")) << info.version;
+    EXPECT_TRUE(info.type == "GPU" || info.type == "accelerator" || info.type == "CPU") << info.type;
+    EXPECT_GT(info.compute_units, 0);
+    EXPECT_GT(info.memory_bytes, 1u << 20);
+    EXPECT_GT(info.max_allocation_bytes, 1u << 20);
+    EXPECT_LE(info.max_allocation_bytes, info.memory_bytes);
+  }
+  EXPECT_TRUE(std::is_sorted(devices.begin(), devices.end(),
+                             [](const Device& a, const Device& b) { return preference(a) < preference(b); }));
+}
+
+TEST_F(DeviceTest, TakesTheFirstByDefault) {
+  EXPECT_TRUE(is_same(Device::select(), Device::list().front()));
+  set_wanted("");
+  EXPECT_TRUE(is_same(Device::select(), Device::list().front()));
+}
+
+TEST_F(DeviceTest, IsSelectedByIndex) {
+  const std::vector<Device> devices = Device::list();
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    EXPECT_TRUE(is_same(Device::select(std::to_string(i)), devices[i])) << i;
+  }
+}
+
+TEST_F(DeviceTest, IsSelectedByType) {
+  for (const std::string type : {"GPU", "accelerator", "CPU"}) {
+    const std::vector<Device> devices = Device::list();
+    const auto first =
+        std::find_if(devices.begin(), devices.end(), [&](const Device& device) { return device.info().type == type; });
+    for (const std::string& wanted : {type, changed_case(type)}) {
+      if (first != devices.end()) {
+        EXPECT_TRUE(is_same(Device::select(wanted), *first)) << wanted;
+      } else if (type == "accelerator") {  // "gpu" may be a part of a name
+        expect_refused([&] { Device::select(wanted); }, {"no OpenCL device fits"});
+      }
+    }
+  }
+}
+
+TEST_F(DeviceTest, IsSelectedByAPartOfItsNameVendorOrPlatform) {
+  const std::vector<Device> devices = Device::list();
+  const DeviceInfo& info = devices.front().info();
+  for (const std::string& text : {info.name, info.vendor, info.platform}) {
+    EXPECT_TRUE(is_same(Device::select(text), devices.front())) << text;
+    EXPECT_TRUE(is_same(Device::select(changed_case(text)), devices.front())) << text;
+    const std::string part = text.substr(text.size() / 4, std::max<std::size_t>(3, text.size() / 2));
+    EXPECT_NO_THROW(Device::select(part)) << part;
+  }
+}
+
+TEST_F(DeviceTest, IsSelectedByPlatformAndName) {
+  for (const Device& device : Device::list()) {
+    const DeviceInfo& info = device.info();
+    if (info.name.find(':') != std::string::npos || info.platform.find(':') != std::string::npos) continue;
+    const Device selected = Device::select(info.platform + ":" + changed_case(info.name));
+    EXPECT_EQ(selected.info().name, info.name);
+    EXPECT_EQ(selected.info().platform, info.platform);
+    EXPECT_TRUE(is_same(Device::select(":" + info.name), selected));
+    expect_refused([&] { Device::select("no such platform:" + info.name); }, {"no OpenCL device fits", info.name});
+    expect_refused([&] { Device::select(info.platform + ":no such device"); }, {"no OpenCL device fits", info.name});
+  }
+}
+
+TEST_F(DeviceTest, IsSelectedByTheEnvironmentUnlessTheCallerNamesOne) {
+  const std::vector<Device> devices = Device::list();
+  set_wanted(devices.back().info().name);
+  EXPECT_EQ(Device::select().info().name, devices.back().info().name);
+  set_wanted("no such device");
+  expect_refused([] { Device::select(); }, {"no OpenCL device fits \"no such device\"", "EGOSGM_DEVICE"});
+  EXPECT_TRUE(is_same(Device::select("0"), devices.front()));
+}
+
+TEST_F(DeviceTest, RefusesUnknownNamesWithTheList) {
+  for (const std::string wanted : {"No Such Device", "4711", "-1", "0x0", ":::"}) {
+    for (const Device& device : Device::list()) {
+      expect_refused([&] { Device::select(wanted); }, {"no OpenCL device fits \"" + wanted + "\"", "choose one of 0 = ",
+                                                       device.info().name, device.info().platform, device.info().type});
+    }
+  }
+}
+
+// The loader looks for drivers once in a process, so that takes one of its own.
+TEST(DeviceDeathTest, TellsHowToInstallOneWhereThereIsNone) {
+  ::testing::FLAGS_gtest_death_test_style = "threadsafe";
+  EXPECT_EXIT(
+      {
+        const std::filesystem::path folder =
+            std::filesystem::path(::testing::TempDir()) / ("egosgm_no_drivers_" + std::to_string(getpid()));
+        std::filesystem::create_directory(folder);
+        setenv("OCL_ICD_VENDORS", folder.c_str(), 1);
+        unsetenv("OCL_ICD_FILENAMES");
+        const bool none = Device::list().empty();
+        std::string line;
+        try {
+          Device::select("0");
+        } catch (const InvalidArgument& error) {
+          line = error.what();
+        }
+        std::filesystem::remove(folder);
+        std::fprintf(stderr, "%s\n", line.c_str());
+        std::exit(none && line.find('\n') == std::string::npos ? 0 : 1);
+      },
+      ::testing::ExitedWithCode(0), "no OpenCL device: install one, .*apt install pocl-opencl-icd");
+}
+
+}  // namespace
+}  // namespace egosgm

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/reference/pipeline.h"
+
+#include "tests/reference/banded_sgm.h"
+#include "tests/reference/census.h"
+#include "tests/reference/consistency_check.h"
+#include "tests/reference/edge_rejection.h"
+#include "tests/reference/forward_warp.h"
+#include "tests/reference/hole_fill.h"
+#include "tests/reference/kalman_update.h"
+#include "tests/reference/median_filter.h"
+#include "tests/reference/sad_check.h"
+#include "tests/reference/speckle_removal.h"
+
+namespace egosgm::reference {
+
+Pipeline::Pipeline(shared::ImageSize size, const PipelineOptions& options, int code_padding)
+    : size_(size), range_{options.min_disparity, options.disparities}, options_(options), code_padding_(code_padding) {}
+
+void Pipeline::reset() {
+  belief_.reset();
+  no_belief_reason_ = "reset";
+  offset_ = {};
+  has_offset_ = false;
+}
+
+Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& motions) {
+  Frame frame;
+  frame.full_range_reason = !options_.temporal ? "not temporal"
+                            : !belief_         ? no_belief_reason_
+                            : !motions         ? "no motion"
+                                               : "";
+  const bool has_prediction = frame.full_range_reason.empty();
+  if (has_prediction) predict(*motions, frame);
+
+  const int passes = options_.vertical_alignment.enabled && !has_offset_ ? 2 : 1;
+  for (int pass = 0; pass < passes; ++pass) {
+    const VerticalOffset known = pass == 0 ? offset_ : frame.passes.back().offset;
+    frame.vertical_offset_px = known.offset_px;
+    frame.passes.push_back(match(images, frame, known));
+  }
+  if (has_prediction) update(images, frame);
+
+  frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
+  if (has_prediction && options_.search == SearchMode::kFull) frame.full_range_reason = "search is full";
+  offset_ = frame.passes.back().offset;
+  has_offset_ = true;
+  if (options_.temporal) belief_ = frame.result;
+  return frame;
+}
+
+void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
+  frame.warped =
+      forward_warp(size_, range_, motions.left, motions.right, options_.forward_warp.process_noise_px2, *belief_);
+  frame.without_edges = edge_rejection(size_, options_.edge_rejection.max_jump_px, frame.warped);
+  frame.filled = hole_fill(size_, options_.hole_fill.max_difference_px, frame.without_edges);
+  frame.predicted = consistency_check(size_, options_.consistency.prediction_px, true, frame.filled);
+}
+
+Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset known) const {
+  const BandedSgmOptions& sgm = options_.banded_sgm;
+  const bool everything = frame.predicted.disparity.empty() || options_.search == SearchMode::kFull;
+  Pass pass;
+  pass.images = resample(size_, known.offset_px, images.greys);
+  pass.band =
+      everything ? full_range(size_, range_) : search_band(size_, range_, options_.search_band, frame.predicted);
+
+  const auto middle = pass.images.begin() + static_cast<std::ptrdiff_t>(pass.images.size() / 2);
+  const std::vector<std::uint64_t> both[2] = {codes(size_, {pass.images.begin(), middle}, images.bits, sgm.cost),
+                                              codes(size_, {middle, pass.images.end()}, images.bits, sgm.cost)};
+  pass.codes = padded_codes(size_, both[0], both[1], code_padding_, sgm.cost);
+  const shared::SgmParameters parameters{size_.width,
+                                         size_.height,
+                                         range_.min,
+                                         range_.count,
+                                         code_padding_,
+                                         sgm.p1,
+                                         sgm.p2,
+                                         sgm.s_max,
+                                         sgm.variance_floor_px2,
+                                         sgm.variance_per_step_px2,
+                                         sgm.variance_per_square_px2};
+  pass.matched = banded_sgm(parameters, sgm.paths, sgm.cost, both, pass.band.bands);
+  pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
+  pass.consistent = consistency_check(size_, options_.consistency.measurement_px, false, pass.smoothed);
+  pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
+  pass.offset = known;
+  if (options_.vertical_alignment.enabled) {
+    pass.offset = estimate_offset(size_, options_.vertical_alignment.gain, pass.images, images.bits == 8 ? 1 : 256,
+                                  pass.measured.disparity, known);
+  }
+  return pass;
+}
+
+void Pipeline::update(const Images& images, Frame& frame) const {
+  const Pass& pass = frame.passes.back();
+  const KalmanUpdateOptions& kalman = options_.kalman_update;
+  frame.fused =
+      kalman_update(kalman.gate_px, kalman.keep_predicted, kalman.min_variance_px2, frame.predicted, pass.measured);
+  frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
+  frame.fused_consistent = consistency_check(size_, options_.consistency.update_px, true, frame.fused_smoothed);
+  frame.updated = options_.sad_check.max_difference > 0 ? sad_check(size_, options_.sad_check, pass.images,
+                                                                    images.bits == 8 ? 1 : 257, frame.fused_consistent)
+                                                        : frame.fused_consistent;
+}
+
+}  // namespace egosgm::reference

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "egosgm/options.h"
+#include "kernels/shared.h"
+#include "tests/reference/search_band.h"
+#include "tests/reference/vertical_alignment.h"
+#include "tests/support/random_maps.h"
+
+namespace egosgm::reference {
+
+/// The grey values of both views, of 8 or 16 bits.
+struct Images {
+  std::vector<int> greys;
+  int bits = 8;
+};
+
+/// How the disparity spaces of both views move.
+struct ViewMotions {
+  shared::DisparityMotion left, right;
+};
+
+/// A matching pass: of the resampled images, in their bands, and what each stage left of it.
+struct Pass {
+  std::vector<int> images;
+  SearchBands band;
+  std::vector<std::uint32_t> codes;  // as kernels/census.cl lays them out
+  testing::HostMaps matched, smoothed, consistent, measured;
+  VerticalOffset offset;  // after this pass; by it the next one is resampled
+};
+
+/// What every stage of a frame gave. Maps of stages that did not run are empty.
+struct Frame {
+  std::string full_range_reason;
+  testing::HostMaps warped, without_edges, filled, predicted;
+  std::vector<Pass> passes;  // two where nothing was known of the vertical offset
+  testing::HostMaps fused, fused_smoothed, fused_consistent, updated;
+  testing::HostMaps result;
+  float vertical_offset_px = 0;  // that the last pass was resampled by
+};
+
+/// The twins of the stages, in the order of host/pipeline.cpp.
+class Pipeline {
+ public:
+  /// `code_padding`: of the rows of `Pass::codes`.
+  Pipeline(shared::ImageSize size, const PipelineOptions& options, int code_padding);
+
+  Frame process(const Images& images, const std::optional<ViewMotions>& motions);
+  void reset();
+
+ private:
+  void predict(const ViewMotions& motions, Frame& frame) const;
+  Pass match(const Images& images, const Frame& frame, VerticalOffset known) const;
+  void update(const Images& images, Frame& frame) const;
+
+  shared::ImageSize size_;
+  shared::DisparityRange range_;
+  PipelineOptions options_;
+  int code_padding_;
+  std::optional<testing::HostMaps> belief_;
+  std::string no_belief_reason_ = "first frame";
+  VerticalOffset offset_;
+  bool has_offset_ = false;
+};
+
+}  // namespace egosgm::reference

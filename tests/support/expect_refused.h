@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <initializer_list>
+#include <string>
+
+#include "egosgm/error.h"
+
+namespace egosgm::testing {
+
+/// `call` must throw InvalidArgument, with one line that holds every one of `parts`.
+template <typename Call>
+void expect_refused(Call&& call, std::initializer_list<std::string> parts) {
+  try {
+    call();
+    ADD_FAILURE() << "nothing was thrown; expected " << (parts.size() > 0 ? *parts.begin() : "a refusal");
+  } catch (const InvalidArgument& error) {
+    const std::string line = error.what();
+    EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+    for (const std::string& part : parts) EXPECT_NE(line.find(part), std::string::npos) << line << "\nlacks: " << part;
+  }
+}
+
+}  // namespace egosgm::testing

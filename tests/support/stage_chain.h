@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <utility>
+
+#include "host/banded_sgm.h"
+#include "host/census.h"
+#include "host/consistency_check.h"
+#include "host/edge_rejection.h"
+#include "host/forward_warp.h"
+#include "host/frame_transfer.h"
+#include "host/hole_fill.h"
+#include "host/kalman_update.h"
+#include "host/median_filter.h"
+#include "host/sad_check.h"
+#include "host/search_band.h"
+#include "host/speckle_removal.h"
+#include "host/vertical_alignment.h"
+#include "tests/reference/pipeline.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm::testing {
+
+inline shared::DisparityRange range_of(const PipelineOptions& options) {
+  return {options.min_disparity, options.disparities};
+}
+
+/// The device's stages, wired as in host/pipeline.cpp, and read back after every one of them.
+class StageChain {
+ public:
+  StageChain(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options, PixelType type)
+      : options_(options),
+        size_(size),
+        type_(type),
+        forward_warp_(context_, size, calibration, options.forward_warp, range_of(options)),
+        edge_rejection_(context_, size, options.edge_rejection),
+        hole_fill_(context_, size, options.hole_fill),
+        consistency_(context_, size),
+        vertical_alignment_(context_, size, options.vertical_alignment),
+        search_band_(context_, size, range_of(options), options.search_band),
+        census_(context_, size, type, options.banded_sgm.cost, code_padding()),
+        banded_sgm_(context_, size, range_of(options), options.banded_sgm),
+        median_filter_(context_, size, options.median_filter),
+        speckle_removal_(context_, size, options.speckle_removal),
+        kalman_update_(context_, size, options.kalman_update),
+        sad_check_(context_, size, type, options.sad_check),
+        transfer_(context_, size, range_of(options)),
+        codes_(context_, Census::words(options.banded_sgm.cost, size, code_padding())) {}
+
+  reference::Frame process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion) {
+    reference::Frame frame;
+    const FrameImages& uploaded = transfer_.upload(left, right);
+    const bool has_prediction = options_.temporal && has_belief_ && motion;
+    if (has_prediction) predict(*motion, frame);
+    frame.passes.push_back(match(vertical_alignment_.align(uploaded), has_prediction));
+    if (options_.vertical_alignment.enabled && frames_ == 0) {
+      frame.passes.push_back(match(vertical_alignment_.realign(uploaded), has_prediction));
+    }
+    vertical_alignment_.commit();
+    ++frames_;
+    if (has_prediction) update(frame);
+    StereoMaps& result = has_prediction ? updated_ : measured_;
+    frame.result = download(context_, result);
+    std::swap(belief_, result);
+    has_belief_ = true;
+    return frame;
+  }
+
+ private:
+  int code_padding() const { return BandedSgm::code_padding(range_of(options_)); }
+
+  void predict(const Motion& motion, reference::Frame& frame) {
+    forward_warp_(belief_, motion, scratch_);
+    frame.warped = download(context_, scratch_);
+    edge_rejection_(scratch_, predicted_);
+    frame.without_edges = download(context_, predicted_);
+    hole_fill_(predicted_, scratch_);
+    frame.filled = download(context_, scratch_);
+    consistency_(scratch_, options_.consistency.prediction_px, OutsideView::kKeep, predicted_);
+    frame.predicted = download(context_, predicted_);
+  }
+
+  reference::Pass match(const FrameImages& images, bool has_prediction) {
+    images_ = &images;
+    reference::Pass pass;
+    pass.images = greys(images);
+    if (has_prediction && options_.search == SearchMode::kBand) {
+      search_band_(predicted_);
+    } else {
+      search_band_.full_range();
+    }
+    pass.band = {search_band_.bands().read(context_), search_band_.cell_offsets().read(context_),
+                 search_band_.row_sums().read(context_)};
+    census_(images.pixels, codes_);
+    const std::vector<cl_uint> codes = codes_.read(context_);
+    pass.codes.assign(codes.begin(), codes.end());
+    banded_sgm_(codes_, search_band_, scratch_);
+    pass.matched = download(context_, scratch_);
+    median_filter_(scratch_, Holes::kLeave);
+    pass.smoothed = download(context_, scratch_);
+    consistency_(scratch_, options_.consistency.measurement_px, OutsideView::kDrop, measured_);
+    pass.consistent = download(context_, measured_);
+    speckle_removal_(measured_);
+    pass.measured = download(context_, measured_);
+    vertical_alignment_.estimate(images, measured_);
+    return pass;
+  }
+
+  void update(reference::Frame& frame) {
+    kalman_update_(predicted_, measured_, updated_);
+    frame.fused = download(context_, updated_);
+    median_filter_(updated_, Holes::kFill);
+    frame.fused_smoothed = download(context_, updated_);
+    consistency_(updated_, options_.consistency.update_px, OutsideView::kKeep, scratch_);
+    frame.fused_consistent = download(context_, scratch_);
+    sad_check_(images_->pixels, scratch_, updated_);
+    frame.updated = download(context_, updated_);
+  }
+
+  std::vector<int> greys(const FrameImages& images) {
+    const std::vector<cl_uchar> bytes = images.pixels.read(context_);
+    std::vector<int> greys(2 * pixel_count(size_));
+    for (std::size_t i = 0; i < greys.size(); ++i) {
+      greys[i] = type_ == PixelType::kU8 ? bytes[i] : bytes[2 * i] | bytes[2 * i + 1] << 8;
+    }
+    return greys;
+  }
+
+  const PipelineOptions options_;
+  const shared::ImageSize size_;
+  const PixelType type_;
+  ocl::Context context_{any_device()};
+  ForwardWarp forward_warp_;
+  EdgeRejection edge_rejection_;
+  HoleFill hole_fill_;
+  ConsistencyCheck consistency_;
+  VerticalAlignment vertical_alignment_;
+  SearchBand search_band_;
+  Census census_;
+  BandedSgm banded_sgm_;
+  MedianFilter median_filter_;
+  SpeckleRemoval speckle_removal_;
+  KalmanUpdate kalman_update_;
+  SadCheck sad_check_;
+  FrameTransfer transfer_;
+  ocl::Buffer<cl_uint> codes_;
+  StereoMaps predicted_{context_, size_}, measured_{context_, size_}, scratch_{context_, size_},
+      updated_{context_, size_}, belief_{context_, size_};
+  const FrameImages* images_ = nullptr;
+  bool has_belief_ = false;
+  int frames_ = 0;
+};
+
+}  // namespace egosgm::testing
