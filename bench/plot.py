@@ -164,6 +164,7 @@ def draw_scaling(plt, content):
         sweeps.setdefault(row["name"].split("_", 1)[0], {}).setdefault(row["name"].split("_", 1)[1], []).append(row)
 
     def line(axes, sweep, x, y, x_label, y_label, log=True):
+        axes.set_visible(sweep in sweeps)
         for kind, rows in sweeps.get(sweep, {}).items():
             points = sorted((x(row), y(row)) for row in rows)
             axes.plot(*zip(*points), "o-", ms=4, label=SCALING_LABELS[kind], color=OURS if kind == "banded_frame" else THEIRS)
@@ -173,7 +174,7 @@ def draw_scaling(plt, content):
         axes.set_xlabel(x_label)
         axes.set_ylabel(y_label)
         tidy(axes)
-        if sweeps.get(sweep):
+        if sweep in sweeps:
             axes.legend(fontsize=8)
 
     megapixels = lambda row: 1e-6 * row["width"] * row["height"]
@@ -195,12 +196,13 @@ def draw_error_against_search(plt, content):
     for axes, title in zip(panels[0], inputs):
         points = sorted((p["search"], p["bad_or_missing"]) for p in content["curves"]["error_against_search"] if p["input"] == title)
         axes.plot(*zip(*points), "o-", color=OURS, ms=4, label="least half-width of the band, 0.5 to 32 px")
-        for row in content.get("ablation", []):
-            figures = row["inputs"].get(title, {})
-            if "search" in figures and "bad_or_missing" in figures:
-                opencv = row["name"].startswith("opencv")
-                axes.plot(figures["search"], figures["bad_or_missing"], "s" if opencv else "x", color=THEIRS if opencv else ACCENT, ms=5)
-                axes.annotate(row["name"], (figures["search"], figures["bad_or_missing"]), fontsize=6, xytext=(3, 2), textcoords="offset points")
+        configurations = {row["name"]: (row["inputs"][title]["search"], row["inputs"][title]["bad_or_missing"])
+                          for row in content.get("ablation", []) if "bad_or_missing" in row["inputs"].get(title, {})}
+        for name, at in configurations.items():
+            opencv = name.startswith("opencv")
+            axes.plot(*at, "s" if opencv else "x", color=THEIRS if opencv else ACCENT, ms=5)
+            if name == "default" or any(max(a, b) > 1.2 * min(a, b) for a, b in zip(at, configurations["default"])):  # else they overlap
+                axes.annotate(name, at, fontsize=6, xytext=(3, 2), textcoords="offset points")
         axes.set_title(title, fontsize=10)
         axes.set_xscale("log")
         axes.set_xlabel("search [% of all cells]")
@@ -220,6 +222,7 @@ def draw_error_over_frames(plt, content):
                 axes.plot(curve["frames"], curve["bad_or_missing"], "o-", ms=3, label=curve["name"], color=colors[curve["name"]])
         axes.set_title(title, fontsize=10)
         axes.set_ylim(bottom=0)
+        axes.xaxis.get_major_locator().set_params(integer=True)
         axes.set_xlabel("frame")
         axes.set_ylabel("bad or missing, non-occluded [%]")
         axes.legend(fontsize=8)
@@ -293,7 +296,7 @@ def main():
     (out / "tables.md").write_text("\n".join(text))
     print(out / "tables.md")
     if not plt:
-        sys.exit("plot.py: tables only: no matplotlib for this python3: apt install python3-matplotlib draws the plots too")
+        sys.exit("plot.py: tables only: no matplotlib for this python3: apt install python3-matplotlib, then /usr/bin/python3 bench/plot.py, draws the plots too")
 
 
 if __name__ == "__main__":
