@@ -614,8 +614,8 @@ TEST(Pipeline, ReportsWhatItDid) {
     return names;
   };
   const std::vector<std::string> steady{
-      "upload", "VerticalAlignment", "ForwardWarp",  "EdgeRejection",  "HoleFill",     "ConsistencyCheck", "SearchBand",
-      "Census", "BandedSgm",         "MedianFilter", "SpeckleRemoval", "KalmanUpdate", "SadCheck",         "download"};
+      "upload", "ForwardWarp", "EdgeRejection", "HoleFill",       "ConsistencyCheck", "VerticalAlignment", "SearchBand",
+      "Census", "BandedSgm",   "MedianFilter",  "SpeckleRemoval", "KalmanUpdate",     "SadCheck",          "download"};
   EXPECT_EQ(stages(reports[3]), steady);
   for (const FrameReport& report : reports) {
     EXPECT_GT(report.total_ms, 0);
