@@ -187,6 +187,7 @@ def draw_scaling(plt, content):
     line(panels[1][0], "pixels", megapixels, megabytes, "megapixels", "device memory [MB]")
     line(panels[1][1], "disparities", disparities, megabytes, "disparities", "device memory [MB]")
     line(panels[1][2], "units", lambda row: row["compute_units"], ms, "compute units", "ms", log=False)
+    panels[1][2].xaxis.get_major_locator().set_params(integer=True)
     return figure
 
 
