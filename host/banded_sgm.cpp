@@ -46,7 +46,6 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   range.count,
                   code_padding(range),
                   options.p1,
-                  options.p2,
                   options.s_max,
                   options.variance_floor_px2,
                   options.variance_per_step_px2,
@@ -58,7 +57,8 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
       backward_(build(context, range, options), "sweep_backward"),
       refine_(build(context, range, options), "refine") {}
 
-void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& band, StereoMaps& measured, int views) {
+void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band,
+                           StereoMaps& measured, int views) {
   context_.enter("BandedSgm");
   const int tile_rows = ceil_div(size_.height, kTileHeight);
   const int tile_columns = ceil_div(size_.width + kTileHeight, kTileWidth) + 1;
@@ -67,11 +67,11 @@ void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& 
 
   slots_.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
-    forward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), slots_, sums_);
+    forward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), penalties, slots_, sums_);
   }
   slots_.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
-    backward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), slots_, sums_, winners_);
+    backward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), penalties, slots_, sums_, winners_);
   }
   refine_(context_, ocl::every_pixel(context_, size_, views), parameters_, winners_, measured.disparity, measured.variance);
 }

@@ -14,14 +14,17 @@ class BandedSgm {
   BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options);
 
   /// `codes`: what Census makes with a padding of `code_padding(range)`. `views`: 1 matches the left view only.
-  void operator()(const ocl::Buffer<cl_uint>& codes, const SearchBand& band, StereoMaps& measured, int views = 2);
+  /// `penalties`: what StepPenalties makes.
+  void operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band, StereoMaps& measured,
+                  int views = 2);
 
   static int code_padding(shared::DisparityRange range);
 
   using Forward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
-                              const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
+                              const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>,
+                              ocl::Buffer<cl_uchar>>;
   using Backward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
-                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>,
+                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>,
                                ocl::Buffer<cl_ulong>>;
   using Refine = ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
 

@@ -35,6 +35,8 @@ void for_each(Options& o, Visit&& visit) {
   visit("banded_sgm.paths", o.banded_sgm.paths);
   visit("banded_sgm.p1", o.banded_sgm.p1);
   visit("banded_sgm.p2", o.banded_sgm.p2);
+  visit("banded_sgm.p2_at_edges", o.banded_sgm.p2_at_edges);
+  visit("banded_sgm.p2_slope", o.banded_sgm.p2_slope);
   visit("banded_sgm.s_max", o.banded_sgm.s_max);
   visit("banded_sgm.variance_floor_px2", o.banded_sgm.variance_floor_px2);
   visit("banded_sgm.variance_per_step_px2", o.banded_sgm.variance_per_step_px2);
@@ -158,6 +160,8 @@ PipelineOptions PipelineOptions::paper() {
   options.vertical_alignment.enabled = false;
   options.banded_sgm.cost = MatchingCost::kCensus9x7;
   options.banded_sgm.p2 = 120;
+  options.banded_sgm.p2_at_edges = 120;
+  options.banded_sgm.p2_slope = 0;
   options.banded_sgm.s_max = 120;
   options.banded_sgm.variance_floor_px2 = 0.05f;
   options.banded_sgm.variance_per_square_px2 = 0.0f;
@@ -176,7 +180,9 @@ void PipelineOptions::validate() const {
   expect("vertical_alignment.gain", vertical_alignment.gain, vertical_alignment.gain <= 1, "choose 0 to 1");
   expect("banded_sgm.paths", banded_sgm.paths, banded_sgm.paths == 4 || banded_sgm.paths == 8, "choose 4 or 8");
   expect("banded_sgm.p2", banded_sgm.p2, banded_sgm.p2 >= 0 && banded_sgm.p2 <= 190, "choose 0 to 190: path costs have 8 bits");
-  expect("banded_sgm.p1", banded_sgm.p1, banded_sgm.p1 >= 0 && banded_sgm.p1 <= banded_sgm.p2, "choose 0 to banded_sgm.p2");
+  expect("banded_sgm.p2_at_edges", banded_sgm.p2_at_edges, banded_sgm.p2_at_edges >= 0 && banded_sgm.p2_at_edges <= banded_sgm.p2, "choose 0 to banded_sgm.p2");
+  expect("banded_sgm.p2_slope", banded_sgm.p2_slope, banded_sgm.p2_slope >= 0 && banded_sgm.p2_slope <= 255, "choose 0 (the same penalty everywhere) to 255");
+  expect("banded_sgm.p1", banded_sgm.p1, banded_sgm.p1 >= 0 && banded_sgm.p1 <= banded_sgm.p2_at_edges, "choose 0 to banded_sgm.p2_at_edges");
   expect("banded_sgm.s_max", banded_sgm.s_max, banded_sgm.s_max >= 1 && banded_sgm.s_max <= 32767, "choose 1 to 32767");
   expect("banded_sgm.variance_floor_px2", banded_sgm.variance_floor_px2, banded_sgm.variance_floor_px2 > 0, "choose a positive number");
   expect("speckle_removal.max_size_px", speckle_removal.max_size_px, speckle_removal.max_size_px >= 0, "choose 0 (off) or more");

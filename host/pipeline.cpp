@@ -19,6 +19,7 @@
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
+#include "host/step_penalties.h"
 #include "host/vertical_alignment.h"
 
 namespace egosgm {
@@ -27,10 +28,13 @@ namespace {
 /// The stages that depend on the type of a grey value.
 struct PixelStages {
   Census census;
+  StepPenalties step_penalties;
   SadCheck sad_check;
 
   PixelStages(ocl::Context& context, shared::ImageSize size, PixelType type, const PipelineOptions& options, int code_padding)
-      : census(context, size, type, options.banded_sgm.cost, code_padding), sad_check(context, size, type, options.sad_check) {}
+      : census(context, size, type, options.banded_sgm.cost, code_padding),
+        step_penalties(context, size, type, options.banded_sgm),
+        sad_check(context, size, type, options.sad_check) {}
 };
 
 shared::DisparityRange range_of(const PipelineOptions& options) { return {options.min_disparity, options.disparities}; }
@@ -57,6 +61,7 @@ struct Pipeline::Impl {
   FrameTransfer transfer;
 
   ocl::Buffer<cl_uint> codes;
+  ocl::Buffer<cl_uchar> penalties;
   StereoMaps predicted, measured, scratch, updated, belief;
   bool has_belief = false;
   const char* no_belief_reason = "first frame";
@@ -80,6 +85,7 @@ struct Pipeline::Impl {
         kalman_update(context, size, options.kalman_update),
         transfer(context, size, range_of(options)),
         codes(context, Census::words(options.banded_sgm.cost, size, BandedSgm::code_padding(range_of(options)))),
+        penalties(context, StepPenalties::plane_count(size)),
         predicted(context, size),
         measured(context, size),
         scratch(context, size),
@@ -107,7 +113,8 @@ struct Pipeline::Impl {
       search_band(predicted);
     }
     stages_of(images.type).census(images.pixels, codes);
-    banded_sgm(codes, search_band, scratch);
+    stages_of(images.type).step_penalties(images.pixels, penalties);
+    banded_sgm(codes, penalties, search_band, scratch);
     median_filter(scratch, Holes::kLeave);
     consistency(scratch, options.consistency.measurement_px, OutsideView::kDrop, measured);
     speckle_removal(measured);

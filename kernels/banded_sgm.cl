@@ -6,7 +6,7 @@
 // and three of the row above; tiles skewed by a column a row need the tiles to the left, above and to the upper right, so all tiles (i, j) with
 // j + 2 i = wave run at once: a launch a wave, a work-item a tile.
 //
-// Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d +- 1) + P1, P2), which is
+// Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d +- 1) + P1, P2(p, q)), which is
 // the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of q, or outside the disparity range.
 // The forward sweep leaves half the sum of its four paths, in 8 bits, in `sums`; the backward sweep adds its own and finds the winner.
 //
@@ -218,7 +218,7 @@ inline ushort16 barred(const int first, const int last) { return widened(~lanes_
 inline int ranked(const ushort16 totals) { return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane)); }
 
 inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
-                  global const Band* bands, global const uint* offsets, global uchar* slots, global uchar* sums, global ulong* winners) {
+                  global const Band* bands, global const uint* offsets, global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners) {
   const int tile_y = get_global_id(0);
   const int view = get_global_id(1);
   const int tile_x = wave - 2 * tile_y;
@@ -228,7 +228,8 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
   const size_t first_pixel = (size_t)view * width * height;
   global const Code* codes = (global const Code*)all_codes;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
-  const uchar16 p1 = (uchar16)((uchar)q.p1), p2 = (uchar16)((uchar)q.p2);
+  const uchar16 p1 = (uchar16)((uchar)q.p1);
+  const size_t plane = 2 * (size_t)width * height;
   slots += (size_t)view * 3 * (width + height) * SLOT + SLOT_PADDING;
 
   uchar16 t[DIRECTIONS][MAX_CHUNKS];
@@ -254,19 +255,25 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
     global const Band* band_at = bands + row_start + image_x;
     global uchar* cells = sums + (row_start * MAX_CHUNKS + offsets[row_start + image_x] + (backward ? band_at->chunks : 0)) * EGOSGM_LANES;
 
+    // P2 of a step lies at its lower or right pixel.
+    global const uchar* penalty_at = penalties + row_start + image_x;
+
     // Slots of the paths from the left, from above, from the upper left and from the upper right; the latter three move on with x.
     global uchar* slot[4] = {slots + (size_t)y * SLOT, slots + (size_t)height * SLOT,
                              slots + ((long)2 * height + width - y) * SLOT, slots + (size_t)(2 * height + 2 * width + y) * SLOT};
     uchar16 last = (uchar16)(ABSENT);
     int last_lane = -1;  // of `last`, or -1 where the path from the left must be read from its slot
 
-    for (int x = from; x < to; ++x, band_at += step, own += code_step, other -= code_step) {
+    for (int x = from; x < to; ++x, band_at += step, penalty_at += step, own += code_step, other -= code_step) {
       const Band band = *band_at;
       const int lane = band.origin - q.min_disparity;
       const long moved = (long)x * SLOT;
       // The bands before this one on the three paths from above. Where there is none, wiping some place in the slot does no harm.
-      const Band wiped[4] = {band_at[x > 0 ? -step : 0], band_at[up], band_at[x > 0 ? up - step : up],
-                             band_at[x + 1 < width ? up + step : up]};
+      const long before[4] = {x > 0 ? -step : 0, up, x > 0 ? up - step : up, x + 1 < width ? up + step : up};
+      const Band wiped[4] = {band_at[before[0]], band_at[before[1]], band_at[before[2]], band_at[before[3]]};
+      uchar16 p2[DIRECTIONS];
+#pragma unroll
+      for (int i = 0; i < DIRECTIONS; ++i) p2[i] = (uchar16)(penalty_at[i * plane + (backward ? before[i] : 0)]);
       if (backward) cells -= EGOSGM_LANES * band.chunks;
 
       if (band.chunks == 1) {
@@ -274,14 +281,14 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
         const uchar16 cost = absent | matching_cost(own, other + band.origin, above, below);
         uchar16 r[DIRECTIONS];
         if (lane == last_lane) {
-          r[0] = path_cost_beside(last, cost, p1, p2);
+          r[0] = path_cost_beside(last, cost, p1, p2[0]);
         } else {
-          r[0] = path_cost_from(slot[0] + lane, cost, p1, p2);
+          r[0] = path_cost_from(slot[0] + lane, cost, p1, p2[0]);
           wipe(slot[0], wiped[0], q.min_disparity);
         }
 #pragma unroll
         for (int i = 1; i < DIRECTIONS; ++i) {
-          r[i] = path_cost_from(slot[i] + (moved + lane), cost, p1, p2);
+          r[i] = path_cost_from(slot[i] + (moved + lane), cost, p1, p2[i]);
           wipe(slot[i] + moved, wiped[i], q.min_disparity);
         }
 #pragma unroll
@@ -310,7 +317,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
           const uchar16 cost = absent_from(q.disparities - at) | matching_cost(own, other + band.origin + EGOSGM_LANES * v, above, below);
 #pragma unroll
           for (int i = 0; i < DIRECTIONS; ++i) {
-            t[i][v] = path_cost_from(slot[i] + (i > 0 ? moved + at : at), cost, p1, p2);
+            t[i][v] = path_cost_from(slot[i] + (i > 0 ? moved + at : at), cost, p1, p2[i]);
             least[i] = min(least[i], t[i][v]);
           }
         }
@@ -367,13 +374,13 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
 }
 
 kernel void sweep_forward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes, global const Band* bands,
-                          global const uint* offsets, global uchar* slots, global uchar* sums) {
-  sweep(false, q, wave, tile_columns, all_codes, bands, offsets, slots, sums, 0);
+                          global const uint* offsets, global const uchar* penalties, global uchar* slots, global uchar* sums) {
+  sweep(false, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0);
 }
 
 kernel void sweep_backward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes, global const Band* bands,
-                           global const uint* offsets, global uchar* slots, global const uchar* sums, global ulong* winners) {
-  sweep(true, q, wave, tile_columns, all_codes, bands, offsets, slots, (global uchar*)sums, winners);
+                           global const uint* offsets, global const uchar* penalties, global uchar* slots, global const uchar* sums, global ulong* winners) {
+  sweep(true, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, (global uchar*)sums, winners);
 }
 
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, and the matching variance (options.h).

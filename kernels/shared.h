@@ -86,7 +86,7 @@ typedef struct {
   i32 width, height;
   i32 min_disparity, disparities;
   i32 padding;  // of the census codes' rows
-  i32 p1, p2, s_max;
+  i32 p1, s_max;
   f32 variance_floor, variance_per_step, variance_per_square;
 } SgmParameters;
 
@@ -105,7 +105,7 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 12 &&
-                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 44 && sizeof(DisparityMotion) == 84,
+                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 40 && sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

@@ -7,6 +7,7 @@
 
 #include "tests/reference/banded_sgm.h"
 #include "tests/reference/census.h"
+#include "tests/reference/step_penalties.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
 
@@ -58,6 +59,8 @@ TEST_P(BandedSgmTest, EqualsReference) {
   std::mt19937 random(1);
   std::vector<std::uint64_t> codes[2];
   random_codes(c, random, codes);
+  std::vector<std::uint16_t> grey;
+  for (std::size_t i = 0; i < 2 * pixel_count(c.size); ++i) grey.push_back(static_cast<std::uint16_t>(random() & 127));
 
   ocl::Context context(testing::any_device());
   const int padding = BandedSgm::code_padding(c.range);
@@ -76,12 +79,15 @@ TEST_P(BandedSgmTest, EqualsReference) {
   } else {
     band.full_range();
   }
-  sgm(device_codes, band, measured);
+  const auto planes = reference::step_penalties(c.size, grey, 8, options);
+  ocl::Buffer<cl_uchar> penalties(context, planes.size());
+  penalties.write(context, {planes.begin(), planes.end()});
+  sgm(device_codes, penalties, band, measured);
 
-  const shared::SgmParameters parameters{c.size.width, c.size.height, c.range.min, c.range.count, padding, options.p1, options.p2,
+  const shared::SgmParameters parameters{c.size.width, c.size.height, c.range.min, c.range.count, padding, options.p1,
                                          options.s_max, options.variance_floor_px2, options.variance_per_step_px2,
                                          options.variance_per_square_px2};
-  const auto expected = reference::banded_sgm(parameters, c.paths, c.cost, codes, band.bands().read(context));
+  const auto expected = reference::banded_sgm(parameters, options, codes, grey, band.bands().read(context));
   EXPECT_TRUE(testing::same_bits(measured.disparity.read(context), expected.disparity, c.size));
   EXPECT_TRUE(testing::same_bits(measured.variance.read(context), expected.variance, c.size));
 }

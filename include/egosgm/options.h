@@ -47,7 +47,10 @@ struct BandedSgmOptions {
   MatchingCost cost = MatchingCost::kPairs32;
   int paths = 8;  // 4 (horizontal and vertical) or 8
   int p1 = 10;    // penalty of a step of one disparity
-  int p2 = 160;   // penalty of a larger step; p1 <= p2, at most 190
+  // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: max(p2_at_edges, p2 - p2_slope * g).
+  int p2 = 160;
+  int p2_at_edges = 60;  // p1 <= p2_at_edges <= p2 <= 190
+  int p2_slope = 2;
   // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved) path sums
   // above the minimum add up to s_max, at most 8 a side.
   int s_max = 80;

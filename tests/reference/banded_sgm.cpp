@@ -5,6 +5,8 @@
 #include <bit>
 #include <cstdlib>
 
+#include "tests/reference/step_penalties.h"
+
 namespace egosgm::reference {
 namespace {
 
@@ -36,7 +38,8 @@ class Cells {
 struct View {
   const shared::SgmParameters& q;
   int view;
-  MatchingCost kind;
+  const BandedSgmOptions& options;
+  const std::uint16_t* grey;
   const std::vector<std::uint64_t>& own;
   const std::vector<std::uint64_t>& other;
 
@@ -46,8 +49,8 @@ struct View {
   int matched(int x, int d) const { return view == EGOSGM_LEFT ? x - d : x + d; }
 
   int cost(int x, int y, int d) const {
-    if (kind != MatchingCost::kSad3x3) {
-      return (kind == MatchingCost::kCensus9x7 ? 1 : 2) * std::popcount(code(own, x, y) ^ code(other, matched(x, d), y));
+    if (options.cost != MatchingCost::kSad3x3) {
+      return (options.cost == MatchingCost::kCensus9x7 ? 1 : 2) * std::popcount(code(own, x, y) ^ code(other, matched(x, d), y));
     }
     int sum = 0;
     for (int dy = -1; dy <= 1; ++dy) {
@@ -68,9 +71,10 @@ void aggregate(const View& v, int dx, int dy, Cells& costs) {
       const int pixel = y * q.width + x;
       const bool starts = x - dx < 0 || x - dx >= q.width || y - dy < 0 || y - dy >= q.height;
       const int before = (y - dy) * q.width + x - dx;
+      const int p2 = starts ? v.options.p2 : step_penalty(v.options, v.grey[pixel], v.grey[before]);
       int least = 1 << 20;
       for (int d = costs.first(pixel); d <= costs.last(pixel); ++d) {
-        int transition = q.p2;
+        int transition = p2;
         if (!starts && costs.has(before, d)) transition = std::min(transition, costs.at(before, d));
         if (!starts && costs.has(before, d - 1)) transition = std::min(transition, costs.at(before, d - 1) + q.p1);
         if (!starts && costs.has(before, d + 1)) transition = std::min(transition, costs.at(before, d + 1) + q.p1);
@@ -120,13 +124,13 @@ float offset(Cells& sums, int pixel, int winner) {
 
 }  // namespace
 
-testing::HostMaps banded_sgm(const shared::SgmParameters& q, int paths, MatchingCost cost, const std::vector<std::uint64_t> (&codes)[2],
-                             const std::vector<shared::Band>& bands) {
+testing::HostMaps banded_sgm(const shared::SgmParameters& q, const BandedSgmOptions& options, const std::vector<std::uint64_t> (&codes)[2],
+                             const std::vector<std::uint16_t>& grey, const std::vector<shared::Band>& bands) {
   testing::HostMaps maps;
   for (int view = 0; view < 2; ++view) {
-    const View v{q, view, cost, codes[view], codes[1 - view]};
+    const View v{q, view, options, grey.data() + static_cast<std::size_t>(view) * q.width * q.height, codes[view], codes[1 - view]};
     const shared::Band* band = bands.data() + static_cast<std::size_t>(view) * q.width * q.height;
-    Cells sums = half_sum(v, band, paths, 1), backward = half_sum(v, band, paths, -1);
+    Cells sums = half_sum(v, band, options.paths, 1), backward = half_sum(v, band, options.paths, -1);
     for (int p = 0; p < q.width * q.height; ++p) {
       for (int d = sums.first(p); d <= sums.last(p); ++d) sums.at(p, d) += backward.at(p, d);
       int winner = band[p].first;

@@ -11,7 +11,9 @@
 namespace egosgm::reference {
 
 /// Disparity and matching variance of both views. `codes`: what reference::codes gives, per view. `bands`: per view and pixel.
-testing::HostMaps banded_sgm(const shared::SgmParameters& parameters, int paths, MatchingCost cost,
-                             const std::vector<std::uint64_t> (&codes)[2], const std::vector<shared::Band>& bands);
+/// `grey`: both views' grey values of 8 bits, for the penalties of `options`.
+testing::HostMaps banded_sgm(const shared::SgmParameters& parameters, const BandedSgmOptions& options,
+                             const std::vector<std::uint64_t> (&codes)[2], const std::vector<std::uint16_t>& grey,
+                             const std::vector<shared::Band>& bands);
 
 }  // namespace egosgm::reference

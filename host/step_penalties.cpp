@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/step_penalties.h"
+
+namespace egosgm {
+namespace {
+
+const cl::Program& build(ocl::Context& context, PixelType type) {
+  context.enter("StepPenalties");
+  return context.program("step_penalties.cl", ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2));
+}
+
+}  // namespace
+
+StepPenalties::StepPenalties(ocl::Context& context, shared::ImageSize size, PixelType type, const BandedSgmOptions& options)
+    : context_(context),
+      size_(size),
+      most_(options.p2),
+      least_(options.p2_at_edges),
+      slope_(options.p2_slope),
+      penalties_(build(context, type), "penalties") {}
+
+void StepPenalties::operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& planes) {
+  context_.enter("StepPenalties");
+  penalties_(context_, ocl::every_pixel(context_, size_), size_, most_, least_, slope_, images, planes);
+}
+
+}  // namespace egosgm

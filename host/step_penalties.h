@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// The penalty of a disparity jump between neighbouring pixels, by the grey values between them (see kernels/step_penalties.cl).
+class StepPenalties {
+ public:
+  StepPenalties(ocl::Context& context, shared::ImageSize size, PixelType type, const BandedSgmOptions& options);
+
+  /// `images`: both views' pixels. `planes`: `plane_count(size)` bytes.
+  void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& planes);
+
+  static std::size_t plane_count(shared::ImageSize size) { return 4 * 2 * pixel_count(size); }
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const cl_int most_, least_, slope_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const cl_int, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>> penalties_;
+};
+
+}  // namespace egosgm

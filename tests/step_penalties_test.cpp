@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/step_penalties.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/reference/step_penalties.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+
+namespace egosgm {
+namespace {
+
+std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<std::uint16_t>& grey, PixelType type,
+                                    const BandedSgmOptions& options) {
+  std::vector<cl_uchar> raw;
+  for (const std::uint16_t value : grey) {
+    raw.push_back(static_cast<cl_uchar>(value));
+    if (type == PixelType::kU16) raw.push_back(static_cast<cl_uchar>(value >> 8));
+  }
+  ocl::Context context(testing::any_device());
+  StepPenalties penalties(context, size, type, options);
+  ocl::Buffer<cl_uchar> images(context, raw.size()), planes(context, StepPenalties::plane_count(size));
+  images.write(context, raw);
+  penalties(images, planes);
+  return planes.read(context);
+}
+
+class StepPenaltiesTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(StepPenaltiesTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  std::mt19937 random(1);
+  for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
+    const int bits = type == PixelType::kU8 ? 8 : 16;
+    std::vector<std::uint16_t> grey;
+    for (std::size_t i = 0; i < 2 * pixel_count(size); ++i) grey.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
+    const BandedSgmOptions options{.p2 = 180, .p2_at_edges = 33, .p2_slope = 2};
+    EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, options), reference::step_penalties(size, grey, bits, options), size));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, StepPenaltiesTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+TEST(StepPenalties, FallWithTheStepInGrey) {
+  // One row in each view; plane 0 holds the steps to the left.
+  const std::vector<std::uint8_t> planes = penalties({4, 1}, {10, 10, 40, 240, 0, 0, 0, 0}, PixelType::kU8, {.p2 = 100, .p2_at_edges = 20, .p2_slope = 2});
+  EXPECT_EQ(std::vector<std::uint8_t>(planes.begin(), planes.begin() + 8), (std::vector<std::uint8_t>{100, 100, 40, 20, 100, 100, 100, 100}));
+  // With a row alone, the steps to the upper left and right meet its own pixels, those to above none.
+  EXPECT_EQ(std::vector<std::uint8_t>(planes.begin() + 8, planes.begin() + 12), (std::vector<std::uint8_t>{100, 100, 100, 100}));
+}
+
+}  // namespace
+}  // namespace egosgm
