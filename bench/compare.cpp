@@ -25,7 +25,7 @@ constexpr const char* kHelp =
     "  --threads N       of PoCL and of OpenCV (2)\n"
     "  --json FILE       write the rows\n"
     "  --benchmark_filter=REGEX and what else Google Benchmark knows\n"
-    "opencv_*: left view, blockSize 3, P1 = 8*9, P2 = 32*9, disp12MaxDiff 1, nothing padded.\n"
+    "opencv_*: left view, blockSize 5, P1 = 8*25, P2 = 32*25, disp12MaxDiff 1, nothing padded.\n"
     "egosgm_full_both: both views on the full range, checked, upload to download. egosgm_banded_frame: a steady frame "
     "of the method, both\n"
     "views, upload to download, motion given. egosgm_video_frame: the same as a stream, with odometry. The last two "

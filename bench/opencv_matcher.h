@@ -19,7 +19,7 @@ inline constexpr OpencvMode kOpencvModes[] = {{"opencv_hh", cv::StereoSGBM::MODE
 /// With the penalties that OpenCV's documentation gives and the other settings of its sample stereo_match, but without
 /// speckle removal.
 inline cv::Ptr<cv::StereoSGBM> make_opencv_matcher(int mode, int disparities) {
-  constexpr int kBlock = 3, kDisp12MaxDiff = 1, kPreFilterCap = 63, kUniquenessRatio = 10;
+  constexpr int kBlock = 5, kDisp12MaxDiff = 1, kPreFilterCap = 63, kUniquenessRatio = 10;
   return cv::StereoSGBM::create(/*minDisparity=*/0, (disparities + 15) / 16 * 16, kBlock, 8 * kBlock * kBlock,
                                 32 * kBlock * kBlock, kDisp12MaxDiff, kPreFilterCap, kUniquenessRatio,
                                 /*speckleWindowSize=*/0, /*speckleRange=*/0, mode);

@@ -21,6 +21,7 @@
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
+#include "host/step_penalties.h"
 #include "host/vertical_alignment.h"
 
 namespace egosgm::bench {
@@ -59,6 +60,7 @@ class Chain {
         motion_(street.motion),
         images_{ocl::Buffer<cl_uchar>(context, street.images.size()), PixelType::kU8},
         codes_(context, Census::words(kCost, size_, padding())),
+        penalties_(context, StepPenalties::plane_count(size_)),
         belief_(context, size_),
         warped_(context, size_),
         rejected_(context, size_),
@@ -76,6 +78,7 @@ class Chain {
         full_band_(context, size_, range_, {}),
         vertical_alignment_(context, size_, {}),
         census_(context, size_, PixelType::kU8, kCost, padding()),
+        step_penalties_(context, size_, PixelType::kU8, {}),
         banded_sgm_(context, size_, range_, {.cost = kCost}),
         median_filter_(context, size_, {}),
         speckle_removal_(context, size_, {}),
@@ -107,10 +110,12 @@ class Chain {
         // Resampling both images, and the estimate on every fourth row of the left view.
         {"VerticalAlignment", [this] { align(); }, 2 * grey + (grey + map / 2) / 4},
         {"Census", [this] { census_(images_.pixels, codes_); }, grey + codes},
-        {"BandedSgm_full", [this] { banded_sgm_(codes_, full_band_, measured_); }, sgm + 2 * computed_full,
+        {"StepPenalties", [this] { step_penalties_(images_.pixels, penalties_); }, grey + 8 * pixels},
+        {"BandedSgm_full", [this] { banded_sgm_(codes_, penalties_, full_band_, measured_); }, sgm + 2 * computed_full,
          searched_full},
-        {"BandedSgm_banded", [this] { banded_sgm_(codes_, search_band_, matched_); }, sgm + 2 * computed, searched},
-        {"MedianFilter", [this] { median_filter_(matched_); }, 2 * map},
+        {"BandedSgm_banded", [this] { banded_sgm_(codes_, penalties_, search_band_, matched_); }, sgm + 2 * computed,
+         searched},
+        {"MedianFilter", [this] { median_filter_(matched_, Holes::kLeave); }, 2 * map},
         {"SpeckleRemoval", [this] { speckle_removal_(matched_); }, map},
         {"KalmanUpdate", [this] { kalman_update_(predicted_, matched_, updated_); }, 3 * maps},
         {"SadCheck", [this] { sad_check_(images_.pixels, updated_, checked_); }, grey + 2 * maps},
@@ -135,6 +140,7 @@ class Chain {
   const Motion motion_;
   FrameImages images_;
   ocl::Buffer<cl_uint> codes_;
+  ocl::Buffer<cl_uchar> penalties_;
   StereoMaps belief_, warped_, rejected_, filled_, predicted_, matched_, measured_, updated_, checked_;
   ForwardWarp forward_warp_;
   EdgeRejection edge_rejection_;
@@ -143,6 +149,7 @@ class Chain {
   SearchBand search_band_, full_band_;
   VerticalAlignment vertical_alignment_;
   Census census_;
+  StepPenalties step_penalties_;
   BandedSgm banded_sgm_;
   MedianFilter median_filter_;
   SpeckleRemoval speckle_removal_;
