@@ -209,6 +209,7 @@ void expect_same(const reference::Pass& actual, const reference::Pass& expected,
   EXPECT_TRUE(testing::same_bits(actual.band.row_sums, expected.band.row_sums, {1, size.height})) << "row sums";
   EXPECT_TRUE(testing::same_bits(actual.codes, expected.codes, {(size.width + 2 * padding) * words, size.height}))
       << "codes";
+  EXPECT_TRUE(testing::same_bits(actual.penalties, expected.penalties, size)) << "penalties";
   expect_same("matched", actual.matched, expected.matched, size);
   expect_same("smoothed", actual.smoothed, expected.smoothed, size);
   expect_same("consistent", actual.consistent, expected.consistent, size);

@@ -11,6 +11,7 @@
 #include "tests/reference/median_filter.h"
 #include "tests/reference/sad_check.h"
 #include "tests/reference/speckle_removal.h"
+#include "tests/reference/step_penalties.h"
 
 namespace egosgm::reference {
 
@@ -75,12 +76,15 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
                                          range_.count,
                                          code_padding_,
                                          sgm.p1,
-                                         sgm.p2,
                                          sgm.s_max,
                                          sgm.variance_floor_px2,
                                          sgm.variance_per_step_px2,
                                          sgm.variance_per_square_px2};
-  pass.matched = banded_sgm(parameters, sgm.paths, sgm.cost, both, pass.band.bands);
+  const std::vector<std::uint16_t> values(pass.images.begin(), pass.images.end());
+  pass.penalties = step_penalties(size_, values, images.bits, sgm);
+  std::vector<std::uint16_t> grey = values;
+  for (std::uint16_t& value : grey) value = static_cast<std::uint16_t>(value >> (images.bits - 8));
+  pass.matched = banded_sgm(parameters, sgm, both, grey, pass.band.bands);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
   pass.consistent = consistency_check(size_, options_.consistency.measurement_px, false, pass.smoothed);
   pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);

@@ -29,7 +29,8 @@ struct ViewMotions {
 struct Pass {
   std::vector<int> images;
   SearchBands band;
-  std::vector<std::uint32_t> codes;  // as kernels/census.cl lays them out
+  std::vector<std::uint32_t> codes;     // as kernels/census.cl lays them out
+  std::vector<std::uint8_t> penalties;  // as kernels/step_penalties.cl does
   testing::HostMaps matched, smoothed, consistent, measured;
   VerticalOffset offset;  // after this pass; by it the next one is resampled
 };

@@ -15,6 +15,7 @@
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
+#include "host/step_penalties.h"
 #include "host/vertical_alignment.h"
 #include "tests/reference/pipeline.h"
 #include "tests/support/device.h"
@@ -40,13 +41,15 @@ class StageChain {
         vertical_alignment_(context_, size, options.vertical_alignment),
         search_band_(context_, size, range_of(options), options.search_band),
         census_(context_, size, type, options.banded_sgm.cost, code_padding()),
+        step_penalties_(context_, size, type, options.banded_sgm),
         banded_sgm_(context_, size, range_of(options), options.banded_sgm),
         median_filter_(context_, size, options.median_filter),
         speckle_removal_(context_, size, options.speckle_removal),
         kalman_update_(context_, size, options.kalman_update),
         sad_check_(context_, size, type, options.sad_check),
         transfer_(context_, size, range_of(options)),
-        codes_(context_, Census::words(options.banded_sgm.cost, size, code_padding())) {}
+        codes_(context_, Census::words(options.banded_sgm.cost, size, code_padding())),
+        penalties_(context_, StepPenalties::plane_count(size)) {}
 
   reference::Frame process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion) {
     reference::Frame frame;
@@ -95,7 +98,10 @@ class StageChain {
     census_(images.pixels, codes_);
     const std::vector<cl_uint> codes = codes_.read(context_);
     pass.codes.assign(codes.begin(), codes.end());
-    banded_sgm_(codes_, search_band_, scratch_);
+    step_penalties_(images.pixels, penalties_);
+    const std::vector<cl_uchar> penalties = penalties_.read(context_);
+    pass.penalties.assign(penalties.begin(), penalties.end());
+    banded_sgm_(codes_, penalties_, search_band_, scratch_);
     pass.matched = download(context_, scratch_);
     median_filter_(scratch_, Holes::kLeave);
     pass.smoothed = download(context_, scratch_);
@@ -138,6 +144,7 @@ class StageChain {
   VerticalAlignment vertical_alignment_;
   SearchBand search_band_;
   Census census_;
+  StepPenalties step_penalties_;
   BandedSgm banded_sgm_;
   MedianFilter median_filter_;
   SpeckleRemoval speckle_removal_;
@@ -145,6 +152,7 @@ class StageChain {
   SadCheck sad_check_;
   FrameTransfer transfer_;
   ocl::Buffer<cl_uint> codes_;
+  ocl::Buffer<cl_uchar> penalties_;
   StereoMaps predicted_{context_, size_}, measured_{context_, size_}, scratch_{context_, size_},
       updated_{context_, size_}, belief_{context_, size_};
   const FrameImages* images_ = nullptr;
