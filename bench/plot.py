@@ -191,10 +191,22 @@ def draw_scaling(plt, content):
     return figure
 
 
+def grid(plt, titles, height):
+    """A panel a title, three in a row."""
+    columns = min(3, len(titles))
+    rows = -(-len(titles) // columns)
+    figure, panels = plt.subplots(rows, columns, figsize=(5.2 * columns, height * rows), squeeze=False)
+    for axes in panels.flat[len(titles):]:
+        axes.set_visible(False)
+    for axes, title in zip(panels.flat, titles):
+        axes.set_title(title, fontsize=10)
+    return figure, panels.flat
+
+
 def draw_error_against_search(plt, content):
     inputs = sorted({point["input"] for point in content["curves"]["error_against_search"]})
-    figure, panels = plt.subplots(1, max(1, len(inputs)), figsize=(5.2 * max(1, len(inputs)), 4), squeeze=False)
-    for axes, title in zip(panels[0], inputs):
+    figure, panels = grid(plt, inputs, height=4)
+    for axes, title in zip(panels, inputs):
         points = sorted((p["search"], p["bad_or_missing"]) for p in content["curves"]["error_against_search"] if p["input"] == title)
         axes.plot(*zip(*points), "o-", color=OURS, ms=4, label="least half-width of the band, 0.5 to 32 px")
         configurations = {row["name"]: (row["inputs"][title]["search"], row["inputs"][title]["bad_or_missing"])
@@ -204,7 +216,6 @@ def draw_error_against_search(plt, content):
             axes.plot(*at, "s" if opencv else "x", color=THEIRS if opencv else ACCENT, ms=5)
             if name == "default" or any(max(a, b) > 1.2 * min(a, b) for a, b in zip(at, configurations["default"])):  # else they overlap
                 axes.annotate(name, at, fontsize=6, xytext=(3, 2), textcoords="offset points")
-        axes.set_title(title, fontsize=10)
         axes.set_xscale("log")
         axes.set_xlabel("search [% of all cells]")
         axes.set_ylabel("bad or missing, non-occluded [%]")
@@ -215,13 +226,12 @@ def draw_error_against_search(plt, content):
 
 def draw_error_over_frames(plt, content):
     inputs = sorted({curve["input"] for curve in content["curves"]["error_over_frames"]})
-    figure, panels = plt.subplots(1, max(1, len(inputs)), figsize=(5.2 * max(1, len(inputs)), 3.6), squeeze=False)
+    figure, panels = grid(plt, inputs, height=3.6)
     colors = {"default": OURS, "single frame": THEIRS, "paper": ACCENT}
-    for axes, title in zip(panels[0], inputs):
+    for axes, title in zip(panels, inputs):
         for curve in content["curves"]["error_over_frames"]:
             if curve["input"] == title:
                 axes.plot(curve["frames"], curve["bad_or_missing"], "o-", ms=3, label=curve["name"], color=colors[curve["name"]])
-        axes.set_title(title, fontsize=10)
         axes.set_ylim(bottom=0)
         axes.xaxis.get_major_locator().set_params(integer=True)
         axes.set_xlabel("frame")
