@@ -4,21 +4,24 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context) {
+const cl::Program& build(ocl::Context& context, int pixels) {
   context.enter("ConsistencyCheck");
-  return context.program("consistency_check.cl", {});
+  return context.program("consistency_check.cl", ocl::Defines().set("PIXELS", pixels));
 }
 
 }  // namespace
 
-ConsistencyCheck::ConsistencyCheck(ocl::Context& context, shared::ImageSize size)
-    : context_(context), size_(size), check_(build(context), "check") {}
+ConsistencyCheck::ConsistencyCheck(ocl::Context& context, shared::ImageSize size, int pixels)
+    : context_((context.enter("ConsistencyCheck"), context)),
+      size_(size),
+      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
+      check_(build(context, pixels_), "check") {}
 
 void ConsistencyCheck::operator()(const StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out) {
   context_.enter("ConsistencyCheck");
   const cl_int keep_outside = outside == OutsideView::kKeep;
-  check_(context_, ocl::every_pixel(context_, size_), size_, max_difference_px, keep_outside, in.disparity, in.variance,
-         out.disparity, out.variance);
+  check_(context_, ocl::every_pixels(context_, size_, pixels_), size_, max_difference_px, keep_outside, in.disparity,
+         in.variance, out.disparity, out.variance);
 }
 
 }  // namespace egosgm

@@ -13,7 +13,8 @@ enum class OutsideView { kDrop, kKeep };
 /// tolerance. Each view is checked against the other as it came in.
 class ConsistencyCheck {
  public:
-  ConsistencyCheck(ocl::Context& context, shared::ImageSize size);
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  ConsistencyCheck(ocl::Context& context, shared::ImageSize size, int pixels = 0);
 
   /// REQUIRES: `out` is not `in`.
   void operator()(const StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out);
@@ -21,6 +22,7 @@ class ConsistencyCheck {
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
+  const int pixels_;
   ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>, const ocl::Buffer<float>,
               ocl::Buffer<float>, ocl::Buffer<float>>
       check_;

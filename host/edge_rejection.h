@@ -12,7 +12,8 @@ namespace egosgm {
 /// above and below.
 class EdgeRejection {
  public:
-  EdgeRejection(ocl::Context& context, shared::ImageSize size, const EdgeRejectionOptions& options);
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  EdgeRejection(ocl::Context& context, shared::ImageSize size, const EdgeRejectionOptions& options, int pixels = 0);
 
   /// REQUIRES: `out` is not `in`.
   void operator()(const StereoMaps& in, StereoMaps& out);
@@ -20,6 +21,7 @@ class EdgeRejection {
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
+  const int pixels_;
   const float max_jump_px_;
   ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
               ocl::Buffer<float>, ocl::Buffer<float>>

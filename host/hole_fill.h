@@ -12,7 +12,8 @@ namespace egosgm {
 /// 7-8).
 class HoleFill {
  public:
-  HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFillOptions& options);
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFillOptions& options, int pixels = 0);
 
   /// REQUIRES: `out` is not `in`.
   void operator()(const StereoMaps& in, StereoMaps& out);
@@ -20,6 +21,7 @@ class HoleFill {
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
+  const int pixels_;
   const float max_difference_px_;
   using FillKernel = ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>,
                                  const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>;

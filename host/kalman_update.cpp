@@ -6,24 +6,26 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context) {
+const cl::Program& build(ocl::Context& context, int pixels) {
   context.enter("KalmanUpdate");
-  return context.program("kalman_update.cl", {});
+  return context.program("kalman_update.cl", ocl::Defines().set("PIXELS", pixels));
 }
 
 }  // namespace
 
-KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options)
-    : context_(context),
+KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options,
+                           int pixels)
+    : context_((context.enter("KalmanUpdate"), context)),
       size_(size),
+      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       gate_px_(options.gate_px > 0 ? options.gate_px : std::numeric_limits<float>::max()),
       keep_predicted_(options.keep_predicted),
       min_variance_px2_(options.min_variance_px2),
-      update_(build(context), "update") {}
+      update_(build(context, pixels_), "update") {}
 
 void KalmanUpdate::operator()(const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated) {
   context_.enter("KalmanUpdate");
-  update_(context_, ocl::every_pixel(context_, size_), size_, gate_px_, keep_predicted_, min_variance_px2_,
+  update_(context_, ocl::every_pixels(context_, size_, pixels_), size_, gate_px_, keep_predicted_, min_variance_px2_,
           predicted.disparity, predicted.variance, measured.disparity, measured.variance, updated.disparity,
           updated.variance);
 }

@@ -11,7 +11,8 @@ namespace egosgm {
 /// two differ by more than the gate, or only the measurement is there, the measurement is taken.
 class KalmanUpdate {
  public:
-  KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options);
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
 
   /// REQUIRES: `updated` is neither `predicted` nor `measured`.
   void operator()(const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated);
@@ -19,6 +20,7 @@ class KalmanUpdate {
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
+  const int pixels_;
   const float gate_px_;
   const cl_int keep_predicted_;
   const float min_variance_px2_;

@@ -8,25 +8,28 @@ namespace {
 
 constexpr cl_int kFillFrom = 6;
 
-const cl::Program& build(ocl::Context& context) {
+const cl::Program& build(ocl::Context& context, int pixels) {
   context.enter("MedianFilter");
-  return context.program("median_filter.cl", {});
+  return context.program("median_filter.cl", ocl::Defines().set("PIXELS", pixels));
 }
 
 }  // namespace
 
-MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, const MedianFilterOptions& options)
-    : context_(context),
+MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, const MedianFilterOptions& options,
+                           int pixels)
+    : context_((context.enter("MedianFilter"), context)),
       size_(size),
+      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       enabled_(options.enabled),
-      filter_(build(context), "filter"),
+      filter_(build(context, pixels_), "filter"),
       filtered_(context, enabled_ ? 2 * pixel_count(size) : 0) {}
 
 void MedianFilter::operator()(StereoMaps& maps, Holes holes) {
   if (!enabled_) return;
   context_.enter("MedianFilter");
   const cl_int fill_from = holes == Holes::kFill ? kFillFrom : 9;  // of eight neighbours: never
-  filter_(context_, ocl::every_pixel(context_, size_), size_, fill_from, maps.disparity, filtered_, maps.variance);
+  filter_(context_, ocl::every_pixels(context_, size_, pixels_), size_, fill_from, maps.disparity, filtered_,
+          maps.variance);
   std::swap(maps.disparity, filtered_);
 }
 

@@ -15,7 +15,8 @@ enum class Holes { kLeave, kFill };
 /// outside the image or without a value votes for the centre.
 class MedianFilter {
  public:
-  MedianFilter(ocl::Context& context, shared::ImageSize size, const MedianFilterOptions& options);
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  MedianFilter(ocl::Context& context, shared::ImageSize size, const MedianFilterOptions& options, int pixels = 0);
 
   /// Replaces the disparities of `maps`; nothing happens where the option is off.
   void operator()(StereoMaps& maps, Holes holes);
@@ -23,6 +24,7 @@ class MedianFilter {
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
+  const int pixels_;
   const bool enabled_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       filter_;

@@ -1,26 +1,42 @@
 // SPDX-License-Identifier: Apache-2.0
 // Left-right consistency: the left pixel x sees what the right pixel x - d sees, the right pixel x what the left pixel
 // x + d sees.
-#include "shared.h"
+#include "pixels.h"
 
-kernel void check(const ImageSize size, const float max_difference, const int keep_outside, global const float* disparity,
-                  global const float* variance, global float* kept_disparity, global float* kept_variance) {
-  const int x = get_global_id(0);
+// lint: PIXELS=1
+// lint: PIXELS=16
+
+// Lane by lane: gather instructions are slower (and what a compiler makes of a loop).
+static inline Floats gather(global const float* row, const Ints x) {
+#if PIXELS == 1
+  return row[x];
+#else
+  return (float16)(row[x.s0], row[x.s1], row[x.s2], row[x.s3], row[x.s4], row[x.s5], row[x.s6], row[x.s7], row[x.s8],
+                   row[x.s9], row[x.sa], row[x.sb], row[x.sc], row[x.sd], row[x.se], row[x.sf]);
+#endif
+}
+
+kernel void check(const ImageSize size, const float max_difference, const int keep_outside,
+                  global const float* disparity, global const float* variance, global float* kept_disparity,
+                  global float* kept_variance) {
+  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= size.width) return;
-  const size_t i = ((size_t)view * size.height + y) * size.width + x;
-  const size_t other_row = ((size_t)(1 - view) * size.height + y) * size.width;
+  const int width = size.width;
+  if (x >= width) return;
+  const size_t row = ((size_t)view * size.height + y) * width;
+  const size_t other_row = ((size_t)(1 - view) * size.height + y) * width;
 
-  const float d = disparity[i];
-  // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
-  const float at = rint(view == EGOSGM_LEFT ? (float)x - d : (float)x + d);
-  const bool valid = d > EGOSGM_INVALID_DISPARITY;
-  const bool inside = valid & (at >= 0.0f) & (at < (float)size.width);
-  const int other_x = (int)(inside ? at : 0.0f);
-  const float other = inside ? disparity[other_row + other_x] : EGOSGM_INVALID_DISPARITY;
-  const bool agree = inside ? (other > EGOSGM_INVALID_DISPARITY) & (fabs(other - d) <= max_difference) : valid & (keep_outside != 0);
+  const Floats d = load_pixels(disparity + row, x, width);
+  const Floats zero = 0.0f;
+  // Asked of the floats, with comparisons that NaN fails, before they become integers.
+  const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + (view == EGOSGM_LEFT ? -d : d));
+  const Ints valid = d > INVALID;
+  const Ints inside = valid & (at >= zero) & (at < (Floats)(width));
+  const Floats other = gather(disparity + other_row, INTS_OF_FLOATS(inside ? at : zero));
+  const Ints agree = (other > INVALID) & (fabs(other - d) <= max_difference);
+  const Ints keeps = inside ? agree : valid & ((Ints)(keep_outside) != 0);
 
-  kept_disparity[i] = agree ? d : EGOSGM_INVALID_DISPARITY;
-  kept_variance[i] = agree ? variance[i] : 0.0f;
+  store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);
+  store_pixels(keeps ? load_pixels(variance + row, x, width) : zero, kept_variance + row, x, width);
 }

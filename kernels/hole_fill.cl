@@ -1,45 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
 // Hole fill (eqs. 7-8): gaps of a pixel between horizontal neighbours that differ by less than gamma, then, on that
-// result, between vertical ones. Each work-item fills the three pixels of its column that it needs, so one pass does
-// both.
-#include "shared.h"
+// result, between vertical ones.
+#include "pixels.h"
 
-static inline int is_valid(const float disparity) { return disparity > EGOSGM_INVALID_DISPARITY; }
+// lint: PIXELS=1
+// lint: PIXELS=16
 
-static inline int is_gap(const float centre, const float before, const float after, const float gamma) {
-  return (centre <= EGOSGM_INVALID_DISPARITY) & is_valid(before) & is_valid(after) & (fabs(before - after) < gamma);
+static inline Ints is_gap(const Floats centre, const Floats before, const Floats after, const float gamma) {
+  return (centre <= INVALID) & (before > INVALID) & (after > INVALID) & (fabs(before - after) < gamma);
 }
 
-static inline float mean_of(const float a, const float b) { return 0.5f * (a + b); }
-static inline float larger_of(const float a, const float b) { return a > b ? a : b; }
+static inline Floats mean_of(const Floats a, const Floats b) { return 0.5f * (a + b); }
+static inline Floats larger_of(const Floats a, const Floats b) { return a > b ? a : b; }
 
 kernel void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
                       global const float* variance, global float* filled_disparity, global float* filled_variance) {
-  const int x = get_global_id(0);
-  if (x >= size.width) return;
-  const size_t i = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width + x;
-  const int has_left = x >= 1;
-  const int has_right = x + 1 < size.width;
+  const int x = get_global_id(0) * PIXELS;
+  const int width = size.width;
+  if (x >= width) return;
+  const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
 
-  const float left = has_left ? disparity[i - 1] : EGOSGM_INVALID_DISPARITY;
-  const float right = has_right ? disparity[i + 1] : EGOSGM_INVALID_DISPARITY;
-  const float left_variance = has_left ? variance[i - 1] : 0.0f;
-  const float right_variance = has_right ? variance[i + 1] : 0.0f;
-  const int fills = is_gap(disparity[i], left, right, gamma);
-  filled_disparity[i] = fills ? mean_of(left, right) : disparity[i];
-  filled_variance[i] = fills ? larger_of(left_variance, right_variance) : variance[i];
+  const Floats d = load_pixels(disparity + row, x, width);
+  const Floats left = load_pixels(disparity + row, x - 1, width);
+  const Floats right = load_pixels(disparity + row, x + 1, width);
+  const Ints fills = is_gap(d, left, right, gamma);
+  const Floats filled = larger_of(load_pixels(variance + row, x - 1, width), load_pixels(variance + row, x + 1, width));
+  store_pixels(fills ? mean_of(left, right) : d, filled_disparity + row, x, width);
+  store_pixels(fills ? filled : load_pixels(variance + row, x, width), filled_variance + row, x, width);
 }
 
 kernel void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
                          global const float* variance, global float* filled_disparity, global float* filled_variance) {
-  const int x = get_global_id(0);
+  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
-  if (x >= size.width) return;
-  const size_t i = ((size_t)get_global_id(2) * size.height + y) * size.width + x;
-  const size_t above = y >= 1 ? i - size.width : i;  // at the border the pixel itself, which is valid or no neighbour
-  const size_t below = y + 1 < size.height ? i + size.width : i;
+  const int width = size.width;
+  if (x >= width) return;
+  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  // At the border the row itself, whose pixels are valid or no neighbours.
+  const size_t row_above = y >= 1 ? row - width : row;
+  const size_t row_below = y + 1 < size.height ? row + width : row;
 
-  const int fills = is_gap(disparity[i], disparity[above], disparity[below], gamma);
-  filled_disparity[i] = fills ? mean_of(disparity[above], disparity[below]) : disparity[i];
-  filled_variance[i] = fills ? larger_of(variance[above], variance[below]) : variance[i];
+  const Floats d = load_pixels(disparity + row, x, width);
+  const Floats above = load_pixels(disparity + row_above, x, width);
+  const Floats below = load_pixels(disparity + row_below, x, width);
+  const Ints fills = is_gap(d, above, below, gamma);
+  const Floats filled =
+      larger_of(load_pixels(variance + row_above, x, width), load_pixels(variance + row_below, x, width));
+  store_pixels(fills ? mean_of(above, below) : d, filled_disparity + row, x, width);
+  store_pixels(fills ? filled : load_pixels(variance + row, x, width), filled_variance + row, x, width);
 }

@@ -14,9 +14,9 @@ namespace {
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
 testing::HostMaps check(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps,
-                        OutsideView outside = OutsideView::kDrop) {
+                        OutsideView outside = OutsideView::kDrop, int pixels = 0) {
   ocl::Context context(testing::any_device());
-  ConsistencyCheck check(context, size);
+  ConsistencyCheck check(context, size, pixels);
   const StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
   check(in, max_difference_px, outside, out);
@@ -41,9 +41,13 @@ TEST_P(ConsistencyCheckTest, EqualsReference) {
     for (const float max_difference_px : {0.5f, 3.0f, 40.0f}) {
       const testing::HostMaps expected =
           reference::consistency_check(size, max_difference_px, outside == OutsideView::kKeep, maps);
-      const testing::HostMaps actual = check(size, max_difference_px, maps, outside);
-      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << max_difference_px << " px";
-      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << max_difference_px << " px";
+      for (const int pixels : {1, 16}) {
+        const testing::HostMaps actual = check(size, max_difference_px, maps, outside, pixels);
+        EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+            << max_difference_px << " px, by " << pixels;
+        EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
+            << max_difference_px << " px, by " << pixels;
+      }
     }
   }
 }

@@ -13,9 +13,9 @@ namespace {
 
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
-testing::HostMaps reject(shared::ImageSize size, float max_jump_px, const testing::HostMaps& maps) {
+testing::HostMaps reject(shared::ImageSize size, float max_jump_px, const testing::HostMaps& maps, int pixels = 0) {
   ocl::Context context(testing::any_device());
-  EdgeRejection reject(context, size, {.max_jump_px = max_jump_px});
+  EdgeRejection reject(context, size, {.max_jump_px = max_jump_px}, pixels);
   const StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
   reject(in, out);
@@ -38,9 +38,12 @@ TEST_P(EdgeRejectionTest, EqualsReference) {
   for (const float max_jump_px : {0.0f, 1.0f, 5.0f}) {
     const testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.2, 3);
     const testing::HostMaps expected = reference::edge_rejection(size, max_jump_px, maps);
-    const testing::HostMaps actual = reject(size, max_jump_px, maps);
-    EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << "max_jump_px " << max_jump_px;
-    EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << "max_jump_px " << max_jump_px;
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps actual = reject(size, max_jump_px, maps, pixels);
+      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+          << max_jump_px << " px, by " << pixels;
+      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << max_jump_px << " px, by " << pixels;
+    }
   }
 }
 

@@ -13,9 +13,9 @@ namespace {
 
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
-testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps) {
+testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps, int pixels = 0) {
   ocl::Context context(testing::any_device());
-  HoleFill fill(context, size, {.max_difference_px = max_difference_px});
+  HoleFill fill(context, size, {.max_difference_px = max_difference_px}, pixels);
   const StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
   fill(in, out);
@@ -45,9 +45,13 @@ TEST_P(HoleFillTest, EqualsReference) {
   for (const float max_difference_px : {0.0f, 1.0f, 100.0f}) {
     const testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.4, 4);
     const testing::HostMaps expected = reference::hole_fill(size, max_difference_px, maps);
-    const testing::HostMaps actual = fill(size, max_difference_px, maps);
-    EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << "gamma " << max_difference_px;
-    EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << "gamma " << max_difference_px;
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps actual = fill(size, max_difference_px, maps, pixels);
+      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+          << max_difference_px << " px, by " << pixels;
+      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
+          << max_difference_px << " px, by " << pixels;
+    }
   }
 }
 

@@ -14,9 +14,9 @@ namespace {
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
 testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& predicted,
-                         const testing::HostMaps& measured) {
+                         const testing::HostMaps& measured, int pixels = 0) {
   ocl::Context context(testing::any_device());
-  KalmanUpdate update(context, size, options);
+  KalmanUpdate update(context, size, options, pixels);
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const StereoMaps measurement = testing::upload(context, size, measured);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
@@ -53,9 +53,13 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
        {KalmanUpdateOptions{}, KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
     const testing::HostMaps expected = reference::kalman_update(options.gate_px, options.keep_predicted,
                                                                 options.min_variance_px2, predicted, measured);
-    const testing::HostMaps actual = update(size, options, predicted, measured);
-    EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << "gate " << options.gate_px;
-    EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << "gate " << options.gate_px;
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps actual = update(size, options, predicted, measured, pixels);
+      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+          << "gate " << options.gate_px << ", by " << pixels;
+      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
+          << "gate " << options.gate_px << ", by " << pixels;
+    }
   }
 }
 

@@ -16,9 +16,9 @@ namespace {
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
 testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, Holes holes = Holes::kLeave,
-                         const MedianFilterOptions& options = {}) {
+                         const MedianFilterOptions& options = {}, int pixels = 0) {
   ocl::Context context(testing::any_device());
-  MedianFilter filter(context, size, options);
+  MedianFilter filter(context, size, options, pixels);
   StereoMaps maps = testing::upload(context, size, in);
   filter(maps, holes);
   return testing::download(context, maps);
@@ -44,9 +44,11 @@ TEST_P(MedianFilterTest, EqualsReference) {
     const testing::HostMaps maps = testing::random_maps(size, -40, 90, holes, 7);
     for (const Holes policy : {Holes::kLeave, Holes::kFill}) {
       const testing::HostMaps expected = reference::median_filter(size, policy == Holes::kFill, maps);
-      const testing::HostMaps actual = filter(size, maps, policy);
-      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << holes << " holes";
-      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << holes << " holes";
+      for (const int pixels : {1, 16}) {
+        const testing::HostMaps actual = filter(size, maps, policy, {}, pixels);
+        EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << holes << " holes, by " << pixels;
+        EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << holes << " holes, by " << pixels;
+      }
     }
   }
 }

@@ -20,6 +20,14 @@ inline Range every_pixel(const Context& context, shared::ImageSize size, int vie
   return {cl::NDRange((size.width + local - 1) / local * local, size.height, views), cl::NDRange(local, 1, 1)};
 }
 
+/// A work-item `pixels` neighbours in a row (kernels/pixels.h) and view, the same ids otherwise.
+inline Range every_pixels(const Context& context, shared::ImageSize size, int pixels, int views = 2) {
+  std::size_t local = pixels > 1 ? 16 : 64;
+  while (local > context.max_work_group_size()) local /= 2;
+  const std::size_t columns = (size.width + pixels - 1) / pixels;
+  return {cl::NDRange((columns + local - 1) / local * local, size.height, views), cl::NDRange(local, 1, 1)};
+}
+
 /// A work-item a row and view: global ids are y, view.
 inline Range every_row(shared::ImageSize size, int views = 2) {
   return {cl::NDRange(size.height, views), cl::NullRange};
@@ -34,6 +42,11 @@ inline Range group_a_row(shared::ImageSize size, int work_items, int views = 2) 
 inline int row_group(const Context& context) {
   const bool is_gpu = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU;
   return is_gpu ? static_cast<int>(std::min<std::size_t>(128, context.max_work_group_size())) : 1;
+}
+
+/// PIXELS of kernels/pixels.h: one where work-items are lanes, else a vector.
+inline int pixels_a_work_item(const Context& context) {
+  return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU ? 1 : 16;
 }
 
 /// A kernel with its C++ signature: `Buffer<T>` for `global T*`, `const Buffer<T>` for

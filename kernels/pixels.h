@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// PIXELS neighbouring pixels of a row as one value: 1 for GPUs, whose work-items are lanes themselves; 16 for CPUs,
+// whose compilers make masked, slow vectors of work-items that guard their bounds. What is written once with these
+// types is right for both if it chooses by ?: only, and joins comparisons by & and | only.
+#ifndef EGOSGM_KERNELS_PIXELS_H
+#define EGOSGM_KERNELS_PIXELS_H
+
+#include "shared.h"
+
+#ifndef PIXELS
+#error "PIXELS: of a work-item, 1 or 16"
+#endif
+
+#if PIXELS == 1
+typedef float Floats;
+typedef int Ints;
+#define FLOATS_OF_INTS convert_float
+#define INTS_OF_FLOATS convert_int
+#define LANE_INDICES 0
+#else
+typedef float16 Floats;
+typedef int16 Ints;
+#define FLOATS_OF_INTS convert_float16
+#define INTS_OF_FLOATS convert_int16
+#define LANE_INDICES (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+#endif
+
+#define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
+
+// Pixels x .. x + PIXELS - 1 of a row; what lies outside of it is invalid.
+static inline Floats load_pixels(global const float* row, const int x, const int width) {
+#if PIXELS == 1
+  return x >= 0 && x < width ? row[x] : EGOSGM_INVALID_DISPARITY;
+#else
+  if (x >= 0 && x + PIXELS <= width) return vload16(0, row + x);
+  float lanes[PIXELS];
+  for (int i = 0; i < PIXELS; ++i) lanes[i] = x + i >= 0 && x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
+  return vload16(0, lanes);
+#endif
+}
+
+// Writes pixels x .. x + PIXELS - 1, as far as the row goes. REQUIRES: x lies in it.
+static inline void store_pixels(const Floats pixels, global float* row, const int x, const int width) {
+#if PIXELS == 1
+  row[x] = pixels;
+#else
+  if (x + PIXELS <= width) {
+    vstore16(pixels, 0, row + x);
+    return;
+  }
+  float lanes[PIXELS];
+  vstore16(pixels, 0, lanes);
+  for (int i = 0; i < width - x; ++i) row[x + i] = lanes[i];
+#endif
+}
+
+// rint below 2^22, in instructions that every compiler vectorises; what is larger stays as large.
+static inline Floats nearest(const Floats value) {
+  const Floats shift = 12582912.0f;  // 1.5 * 2^23
+  return (value + shift) - shift;
+}
+
+#endif
