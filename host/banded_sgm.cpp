@@ -35,9 +35,24 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
                                               .set("TILE_HEIGHT", kTileHeight));
 }
 
+bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
+  if (scheduling != Scheduling::kAutomatic) return scheduling == Scheduling::kPaths;
+  return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
+}
+
 }  // namespace
 
-BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options)
+BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                                const BandedSgmOptions& options)
+    : slots(context, slot_bytes(size, range)),
+      sums(context, cell_bytes(size, range)),
+      winners(context, 2 * pixel_count(size)),
+      forward(build(context, range, options), "sweep_forward"),
+      backward(build(context, range, options), "sweep_backward"),
+      refine(build(context, range, options), "refine") {}
+
+BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
+                     std::optional<BandedSgmPaths::Group> group)
     : context_((context.enter("BandedSgm"), context)),
       size_(size),
       parameters_{size.width,
@@ -49,31 +64,42 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.s_max,
                   options.variance_floor_px2,
                   options.variance_per_step_px2,
-                  options.variance_per_square_px2},
-      slots_(context, slot_bytes(size, range)),
-      sums_(context, cell_bytes(size, range)),
-      winners_(context, 2 * pixel_count(size)),
-      forward_(build(context, range, options), "sweep_forward"),
-      backward_(build(context, range, options), "sweep_backward"),
-      refine_(build(context, range, options), "refine") {}
+                  options.variance_per_square_px2} {
+  if (follows_paths(context, options.scheduling)) {
+    paths_.emplace(context, size, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
+  } else {
+    wavefront_.emplace(context, size, range, options);
+  }
+}
 
 void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band,
                            StereoMaps& measured, int views) {
   context_.enter("BandedSgm");
+  if (paths_) {
+    (*paths_)(parameters_, codes, penalties, band, measured, views);
+  } else {
+    sweep(*wavefront_, codes, penalties, band, measured, views);
+  }
+}
+
+void BandedSgm::sweep(Wavefront& wavefront, const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties,
+                      const SearchBand& band, StereoMaps& measured, int views) {
   const int tile_rows = ceil_div(size_.height, kTileHeight);
   const int tile_columns = ceil_div(size_.width + kTileHeight, kTileWidth) + 1;
   const int waves = tile_columns + 2 * (tile_rows - 1);
   const ocl::Range tiles{cl::NDRange(tile_rows, views), cl::NDRange(1, 1)};
 
-  slots_.fill(context_, 255);
+  wavefront.slots.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
-    forward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), penalties, slots_, sums_);
+    wavefront.forward(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), penalties, wavefront.slots,
+                      wavefront.sums);
   }
-  slots_.fill(context_, 255);
+  wavefront.slots.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
-    backward_(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), penalties, slots_, sums_, winners_);
+    wavefront.backward(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), penalties, wavefront.slots,
+                       wavefront.sums, wavefront.winners);
   }
-  refine_(context_, ocl::every_pixel(context_, size_, views), parameters_, winners_, measured.disparity, measured.variance);
+  wavefront.refine(context_, ocl::every_pixel(context_, size_, views), parameters_, wavefront.winners, measured.disparity, measured.variance);
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {

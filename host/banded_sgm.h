@@ -1,17 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+
 #include "egosgm/options.h"
+#include "host/banded_sgm_paths.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
 #include "host/search_band.h"
 
 namespace egosgm {
 
-/// Semi-global matching of both views in their bands: disparity and matching variance (see kernels/banded_sgm.cl).
+/// Semi-global matching of both views in their bands: disparity and matching variance. Two ways to the same bits: diagonal wavefronts (see
+/// kernels/banded_sgm.cl) and a few work-items a path (see kernels/banded_sgm_paths.cl).
 class BandedSgm {
  public:
-  BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options);
+  /// `group`: how paths share work-groups, where they do; by default what suits the device.
+  BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
+            std::optional<BandedSgmPaths::Group> group = {});
 
   /// `codes`: what Census makes with a padding of `code_padding(range)`. `views`: 1 matches the left view only.
   /// `penalties`: what StepPenalties makes.
@@ -29,15 +35,25 @@ class BandedSgm {
   using Refine = ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
 
  private:
+  struct Wavefront {
+    Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options);
+
+    ocl::Buffer<cl_uchar> slots;  // path costs under way, one row of disparities a path and view
+    ocl::Buffer<cl_uchar> sums;   // the forward sweep's sums, 8 bits a cell
+    ocl::Buffer<cl_ulong> winners;
+    Forward forward;
+    Backward backward;
+    Refine refine;
+  };
+
+  void sweep(Wavefront& wavefront, const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band,
+             StereoMaps& measured, int views);
+
   ocl::Context& context_;
   const shared::ImageSize size_;
   const shared::SgmParameters parameters_;
-  ocl::Buffer<cl_uchar> slots_;  // path costs under way, one row of disparities a path and view
-  ocl::Buffer<cl_uchar> sums_;   // the forward sweep's sums, 8 bits a cell
-  ocl::Buffer<cl_ulong> winners_;
-  Forward forward_;
-  Backward backward_;
-  Refine refine_;
+  std::optional<Wavefront> wavefront_;  // one of the two
+  std::optional<BandedSgmPaths> paths_;
 };
 
 }  // namespace egosgm

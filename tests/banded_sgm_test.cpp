@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <random>
 
 #include "tests/reference/banded_sgm.h"
@@ -20,6 +21,8 @@ struct Case {
   MatchingCost cost = MatchingCost::kPairs32;
   int paths = 8;
   bool banded = true;
+  Scheduling scheduling = Scheduling::kWavefront;
+  std::optional<BandedSgmPaths::Group> group = {};
 };
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
@@ -28,7 +31,9 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
                      (c.range.min < 0 ? "minus" : "") + std::to_string(std::abs(c.range.min)) + "_paths" + std::to_string(c.paths);
   if (c.cost == MatchingCost::kSad3x3) text += "_sad";
   if (c.cost == MatchingCost::kCensus9x7) text += "_census9x7";
-  return text + (c.banded ? "_banded" : "_full");
+  text += c.banded ? "_banded" : "_full";
+  if (c.group) text += "_lanes" + std::to_string(c.group->lanes) + "_lines" + std::to_string(c.group->lines);
+  return text;
 }
 
 /// Codes with some structure: the right view's are the left's, shifted by a few pixels, with noise.
@@ -64,9 +69,9 @@ TEST_P(BandedSgmTest, EqualsReference) {
 
   ocl::Context context(testing::any_device());
   const int padding = BandedSgm::code_padding(c.range);
-  const BandedSgmOptions options{.cost = c.cost, .paths = c.paths};
+  const BandedSgmOptions options{.cost = c.cost, .paths = c.paths, .scheduling = c.scheduling};
   SearchBand band(context, c.size, c.range, {.min_half_width_px = 1});
-  BandedSgm sgm(context, c.size, c.range, options);
+  BandedSgm sgm(context, c.size, c.range, options, c.group);
   const auto padded = reference::padded_codes(c.size, codes[0], codes[1], padding, c.cost);
   ocl::Buffer<cl_uint> device_codes(context, padded.size());
   device_codes.write(context, {padded.begin(), padded.end()});
@@ -92,20 +97,63 @@ TEST_P(BandedSgmTest, EqualsReference) {
   EXPECT_TRUE(testing::same_bits(measured.variance.read(context), expected.variance, c.size));
 }
 
-INSTANTIATE_TEST_SUITE_P(Banded, BandedSgmTest,
-                         ::testing::Values(Case{{1, 1}, {0, 1}}, Case{{1, 1}, {0, 128}}, Case{{7, 5}, {0, 16}}, Case{{7, 5}, {-3, 37}},
-                                           Case{{65, 3}, {0, 37}}, Case{{3, 65}, {0, 16}}, Case{{127, 33}, {0, 1}}, Case{{127, 33}, {0, 16}},
-                                           Case{{127, 33}, {-20, 37}}, Case{{127, 97}, {0, 128}}, Case{{127, 97}, {0, 128}, MatchingCost::kCensus9x7}, Case{{127, 33}, {0, 128}, MatchingCost::kSad3x3},
-                                           Case{{127, 33}, {-7, 37}, MatchingCost::kCensus9x7, 4}, Case{{127, 33}, {0, 64}, MatchingCost::kSad3x3, 4},
-                                           Case{{320, 97}, {0, 37}}, Case{{320, 97}, {-50, 128}}, Case{{40, 30}, {0, 1024}}, Case{{1242, 375}, {0, 128}}),
-                         name);
+const std::vector<Case> kBanded{{{1, 1}, {0, 1}},
+                                {{1, 1}, {0, 128}},
+                                {{7, 5}, {0, 16}},
+                                {{7, 5}, {-3, 37}},
+                                {{65, 3}, {0, 37}},
+                                {{3, 65}, {0, 16}},
+                                {{127, 33}, {0, 1}},
+                                {{127, 33}, {0, 16}},
+                                {{127, 33}, {-20, 37}},
+                                {{127, 97}, {0, 128}},
+                                {{127, 97}, {0, 128}, MatchingCost::kCensus9x7},
+                                {{127, 33}, {0, 128}, MatchingCost::kSad3x3},
+                                {{127, 33}, {-7, 37}, MatchingCost::kCensus9x7, 4},
+                                {{127, 33}, {0, 64}, MatchingCost::kSad3x3, 4},
+                                {{320, 97}, {0, 37}},
+                                {{320, 97}, {-50, 128}},
+                                {{40, 30}, {0, 1024}},
+                                {{1242, 375}, {0, 128}}};
 
-INSTANTIATE_TEST_SUITE_P(FullRange, BandedSgmTest,
-                         ::testing::Values(Case{.size = {1, 1}, .range = {0, 16}, .banded = false}, Case{.size = {65, 3}, .range = {-9, 37}, .banded = false},
-                                           Case{.size = {127, 33}, .range = {0, 1}, .banded = false}, Case{.size = {127, 97}, .range = {0, 128}, .banded = false},
-                                           Case{.size = {320, 97}, .range = {0, 16}, .banded = false},
-                                           Case{.size = {127, 33}, .range = {0, 64}, .paths = 4, .banded = false}),
-                         name);
+const std::vector<Case> kFullRange{{.size = {1, 1}, .range = {0, 16}, .banded = false},
+                                   {.size = {65, 3}, .range = {-9, 37}, .banded = false},
+                                   {.size = {127, 33}, .range = {0, 1}, .banded = false},
+                                   {.size = {127, 97}, .range = {0, 128}, .banded = false},
+                                   {.size = {320, 97}, .range = {0, 16}, .banded = false},
+                                   {.size = {127, 33}, .range = {0, 64}, .paths = 4, .banded = false}};
+
+/// The same cases along paths; the largest is left to the wavefronts, work-items of a CPU being slow at this.
+std::vector<Case> along_paths(const std::vector<Case>& cases) {
+  std::vector<Case> found;
+  for (Case c : cases) {
+    if (pixel_count(c.size) > 100000) continue;
+    c.scheduling = Scheduling::kPaths;
+    found.push_back(c);
+  }
+  return found;
+}
+
+/// Groups of other shapes than the default: single work-items, paths that do not share out evenly, more lanes than quads, a minimum in one, two
+/// and three steps.
+std::vector<Case> in_groups() {
+  std::vector<Case> cases;
+  for (const auto& [lanes, lines] : {std::pair{1, 1}, {1, 5}, {2, 3}, {16, 1}, {32, 2}, {128, 1}}) {
+    for (const shared::DisparityRange range : {shared::DisparityRange{-3, 37}, {0, 128}}) {
+      for (const shared::ImageSize size : {shared::ImageSize{7, 5}, {50, 21}}) {
+        cases.push_back({.size = size, .range = range, .scheduling = Scheduling::kPaths, .group = {{lanes, lines}}});
+      }
+    }
+  }
+  return cases;
+}
+
+using ::testing::ValuesIn;
+INSTANTIATE_TEST_SUITE_P(Banded, BandedSgmTest, ValuesIn(kBanded), name);
+INSTANTIATE_TEST_SUITE_P(FullRange, BandedSgmTest, ValuesIn(kFullRange), name);
+INSTANTIATE_TEST_SUITE_P(BandedPaths, BandedSgmTest, ValuesIn(along_paths(kBanded)), name);
+INSTANTIATE_TEST_SUITE_P(FullRangePaths, BandedSgmTest, ValuesIn(along_paths(kFullRange)), name);
+INSTANTIATE_TEST_SUITE_P(GroupedPaths, BandedSgmTest, ValuesIn(in_groups()), name);
 
 }  // namespace
 }  // namespace egosgm

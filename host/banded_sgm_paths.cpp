@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/banded_sgm_paths.h"
+
+#include <algorithm>
+
+#include "host/census.h"
+
+namespace egosgm {
+namespace {
+
+// Stages of kernels/banded_sgm_paths.cl.
+constexpr int kStraight = 0;
+constexpr int kDiagonals[] = {1, 2};
+
+constexpr int kQuadsALane = 4;
+constexpr int kGroupSize = 32;
+
+int groups_of(int lines, int lines_a_group) { return (lines + lines_a_group - 1) / lines_a_group; }
+
+std::size_t cell_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  return 2 * pixel_count(size) * SearchBand::max_chunks(range) * EGOSGM_LANES;
+}
+
+const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+                         BandedSgmPaths::Group group) {
+  return context.program("banded_sgm_paths.cl", ocl::Defines()
+                                                    .set("MAX_CHUNKS", SearchBand::max_chunks(range))
+                                                    .set("PATHS", options.paths)
+                                                    .set("CODE_BYTES", 4 * Census::words(options.cost))
+                                                    .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
+                                                    .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
+                                                    .set("LANES", group.lanes)
+                                                    .set("LINES", group.lines));
+}
+
+}  // namespace
+
+BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range) {
+  const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), 256));
+  const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / 4;
+  int lanes = 1;
+  while (lanes * kQuadsALane < quads && 2 * lanes <= limit) lanes *= 2;
+  return {lanes, std::max(1, std::min(limit, kGroupSize) / lanes)};
+}
+
+BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                               const BandedSgmOptions& options, Group group)
+    : context_(context),
+      size_(size),
+      paths_(options.paths),
+      group_(group),
+      forward_first_(context, cell_bytes(size, range)),
+      forward_second_(context, cell_bytes(size, range)),
+      backward_first_(context, cell_bytes(size, range)),
+      backward_second_(context, cell_bytes(size, range)),
+      follow_paths_(build(context, range, options, group), "follow_paths"),
+      find_winners_(build(context, range, options, group), "find_winners") {}
+
+void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, const ocl::Buffer<cl_uint>& codes,
+                            const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band, int views) {
+  const int groups = stage == kStraight ? groups_of(size_.height, group_.lines) + groups_of(size_.width, group_.lines)
+                                        : groups_of(size_.width + size_.height - 1, group_.lines);
+  const int work_items = group_.lanes * group_.lines;
+  const ocl::Range lines{cl::NDRange(work_items, groups, 2 * views), cl::NDRange(work_items, 1, 1)};
+  follow_paths_(context_, lines, parameters, stage, views, codes, penalties, band.bands(), band.cell_offsets(),
+                forward_first_, forward_second_, backward_first_, backward_second_);
+}
+
+void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const ocl::Buffer<cl_uint>& codes,
+                                const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band, StereoMaps& measured,
+                                int views) {
+  follow(kStraight, parameters, codes, penalties, band, views);
+  if (paths_ == 8) {
+    for (const int diagonal : kDiagonals) follow(diagonal, parameters, codes, penalties, band, views);
+  }
+  const int work_items = group_.lanes * group_.lines;
+  const ocl::Range pixels{
+      cl::NDRange(static_cast<std::size_t>(groups_of(size_.width, group_.lines)) * work_items, size_.height, views),
+      cl::NDRange(work_items, 1, 1)};
+  find_winners_(context_, pixels, parameters, band.bands(), band.cell_offsets(), forward_first_, forward_second_,
+                backward_first_, backward_second_, measured.disparity, measured.variance);
+}
+
+}  // namespace egosgm

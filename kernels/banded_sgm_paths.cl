@@ -1,0 +1,378 @@
+// SPDX-License-Identifier: Apache-2.0
+// Semi-global matching in a band per pixel, the way for GPUs: LANES work-items follow a path across the image, LINES
+// paths a work-group. The same bits as banded_sgm.cl, whose head explains the recurrence and the sums.
+//
+// Disparities are dealt out in quads of four: quad k of the range belongs to lane k % LANES, whatever the band (bands
+// begin at quads). So a lane keeps the costs of its quads in registers from pixel to pixel, gives its neighbours only
+// the first and the last of each, and asks the others for nothing but the minimum. Costs come from the codes; there is
+// no cost volume.
+//
+// Three launches one after another: horizontal and vertical paths, one diagonal, the other; forward and backward paths
+// in the same launch. What a launch does to a cell's two partial sums: first = L0, second = L1; first = mean(first,
+// second), second = L2; first += mean(second, L3).
+#include "sgm_cells.h"
+#include "shared.h"
+
+// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 LANES=8 LINES=4
+// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 LANES=1 LINES=1
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 LANES=32 LINES=1
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 LANES=8 LINES=4
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 LANES=8 LINES=4
+
+#ifndef MAX_CHUNKS
+#error "MAX_CHUNKS: chunks of EGOSGM_LANES disparities in the whole range"
+#endif
+#ifndef PATHS
+#error "PATHS: 4 or 8"
+#endif
+#ifndef CODE_BYTES
+#error "CODE_BYTES: 4 or 8, the size of a code"
+#endif
+#ifndef COST_SCALE
+#error "COST_SCALE: what a bit of Hamming distance costs"
+#endif
+#ifndef COST_SAD
+#error "COST_SAD: 0 for the Hamming distance of codes, 1 for a 3x3 sum of absolute differences of grey values"
+#endif
+#ifndef LANES
+#error "LANES: work-items a path, a power of two"
+#endif
+#ifndef LINES
+#error "LINES: paths a work-group"
+#endif
+
+#define QUAD 4
+#define QUADS (MAX_CHUNKS * EGOSGM_LANES / QUAD)
+#define QUADS_A_LANE ((QUADS + LANES - 1) / LANES)
+#define SLOT (QUADS_A_LANE * LANES + 2)
+#define MAX_COST 63
+#define MAX_STEPS 8
+// A cost that is absent: less the largest minimum (254), it still exceeds the largest P2 (190) and what 8 bits hold.
+#define ABSENT 511
+#define NO_WINNER 0xffffffffu
+
+#if QUADS_A_LANE <= 8
+#define UNROLLED _Pragma("unroll")
+#else
+#define UNROLLED
+#endif
+
+#if CODE_BYTES == 4
+typedef uint Code;
+typedef uint4 Codes;
+#else
+typedef ulong Code;
+typedef ulong4 Codes;
+#endif
+
+// A way across the image: first pixel and number of pixels, seen in the direction of a forward sweep.
+typedef struct {
+  int x, y, length;
+} Line;
+
+// The same with its place in memory: first pixel (of both views), its column, its and its matches' codes, and what a
+// step adds to each.
+typedef struct {
+  int length;
+  size_t pixel;
+  long pixel_step;
+  int x, x_step;
+  int y, y_step;
+  global const Code* own;
+  global const Code* other;  // at the range's first disparity
+  long own_step, other_step;
+  global const uchar* penalties;  // P2 of a step at the pixel it leads to, in a backward sweep at the one it comes from
+  long penalty_offset;
+} Path;
+
+// A pixel on it: P2 of the step to it, which quads of the range its band holds, none beyond the end of the path, and
+// the place of their cells.
+typedef struct {
+  int p2;
+  int first_quad, quads;
+  size_t cells;
+} Pixel;
+
+// A pixel's code and those of what it may match; with COST_SAD, the costs themselves in `others`.
+typedef struct {
+  Code own;
+  Codes others[QUADS_A_LANE];
+} Matches;
+
+// Directions: 0 from the left, 1 from above, 2 from the upper left, 3 from the upper right.
+inline Line line_of(const SgmParameters q, const int direction, const int index) {
+  const int lines = direction == 0 ? q.height : direction == 1 ? q.width : q.width + q.height - 1;
+  const int diagonal = index - (q.height - 1);
+  Line line = {0, 0, 0};
+  if (index < lines) {
+    line.x = direction == 0 ? 0 : direction == 1 ? index : direction == 2 ? max(0, diagonal) : min(index, q.width - 1);
+    line.y = direction == 0 ? index : direction == 1 ? 0 : direction == 2 ? max(0, -diagonal) : index - line.x;
+    const int across = direction == 3 ? line.x + 1 : q.width - line.x, down = q.height - line.y;
+    line.length = direction == 0 ? across : direction == 1 ? down : min(across, down);
+  }
+  return line;
+}
+
+// Backward sweeps see the image turned by 180 degrees; codes of the right view lie mirrored.
+inline Path path_of(const SgmParameters q, const int direction, const bool backward, const int view, const Line line,
+                    global const uint* all_codes, global const uchar* penalties) {
+  const int sign = backward ? -1 : 1, view_sign = view == EGOSGM_LEFT ? 1 : -1;
+  const long stride = (long)q.width + 2 * (long)q.padding;
+  Path path;
+  path.length = line.length;
+  path.x = backward ? q.width - 1 - line.x : line.x;
+  path.y = backward ? q.height - 1 - line.y : line.y;
+  path.x_step = direction == 1 ? 0 : direction == 3 ? -sign : sign;
+  path.y_step = direction == 0 ? 0 : sign;
+  path.pixel = ((size_t)view * q.height + path.y) * q.width + path.x;
+  path.pixel_step = path.y_step * (long)q.width + path.x_step;
+  const int along = view == EGOSGM_LEFT ? path.x : q.width - 1 - path.x;
+  global const Code* codes = (global const Code*)all_codes + q.padding;
+  path.own = codes + ((size_t)view * q.height + path.y) * stride + along;
+  path.other = codes + ((size_t)(1 - view) * q.height + path.y) * stride + (q.width - 1 - along) + q.min_disparity;
+  path.own_step = path.y_step * stride + view_sign * path.x_step;
+  path.other_step = path.y_step * stride - view_sign * path.x_step;
+  path.penalties = penalties + (size_t)direction * 2 * q.width * q.height;
+  path.penalty_offset = backward ? -path.pixel_step : 0;
+  return path;
+}
+
+inline Pixel pixel_at(const SgmParameters q, const Path path, const int i, global const Band* bands,
+                      global const uint* offsets) {
+  Pixel pixel = {0, 0, 0, 0};
+  if (i < path.length) {
+    const size_t at = path.pixel + i * path.pixel_step;
+    const size_t row_start = at - (path.x + i * path.x_step);
+    pixel.p2 = path.penalties[i > 0 ? at + path.penalty_offset : at];  // where a path begins, any P2 gives the same
+    pixel.first_quad = (bands[at].origin - q.min_disparity) / QUAD;
+    pixel.quads = bands[at].chunks * (EGOSGM_LANES / QUAD);
+    pixel.cells = (row_start * MAX_CHUNKS + offsets[at]) * EGOSGM_LANES;
+  }
+  return pixel;
+}
+
+inline bool holds(const Pixel pixel, const int quad) {
+  return quad >= pixel.first_quad && quad < pixel.first_quad + pixel.quads;
+}
+
+// A quad's place in the sums.
+inline size_t cell_of(const Pixel pixel, const int quad) { return pixel.cells + QUAD * (quad - pixel.first_quad); }
+
+#if COST_SAD
+inline uint difference(global const Code* own, global const Code* other, const long above, const long below) {
+  uint sum = 0;
+  for (int dx = -1; dx <= 1; ++dx) {
+    sum += abs_diff(own[above + dx], other[above - dx]) + abs_diff(own[dx], other[-dx]) +
+           abs_diff(own[below + dx], other[below - dx]);
+  }
+  return min(sum / 9, (uint)MAX_COST);
+}
+#endif
+
+inline Matches fetch(const SgmParameters q, const Path path, const int i, const Pixel pixel, const int lane) {
+  Matches matches;
+  global const Code* own = path.own + i * path.own_step;
+  matches.own = pixel.quads > 0 ? own[0] : 0;
+  UNROLLED for (int v = 0; v < QUADS_A_LANE; ++v) {
+    const int quad = lane + v * LANES;
+    matches.others[v] = 0;
+    if (holds(pixel, quad)) {
+      global const Code* other = path.other + i * path.other_step + QUAD * quad;
+#if COST_SAD
+      const long stride = (long)q.width + 2 * (long)q.padding;
+      const int y = path.y + i * path.y_step;
+      const long above = y > 0 ? -stride : 0, below = y + 1 < q.height ? stride : 0;
+      matches.others[v] = (Codes)(difference(own, other, above, below), difference(own, other + 1, above, below),
+                                  difference(own, other + 2, above, below), difference(own, other + 3, above, below));
+#else
+      matches.others[v] = (Codes)(other[0], other[1], other[2], other[3]);
+#endif
+    }
+  }
+  return matches;
+}
+
+inline int4 costs_of(const Matches* matches, const int v) {
+#if COST_SAD
+  return convert_int4(matches->others[v]);
+#else
+  return convert_int4(popcount((Codes)(matches->own) ^ matches->others[v])) * COST_SCALE;
+#endif
+}
+
+// The least value of a line's lanes, by one barrier or more for all work-items of the group. `minima`: 2 * LANES
+// values, others than the call before was given.
+inline uint minimum_of_line(local uint* minima, const int lane, const uint value) {
+  minima[lane] = value;
+  int count = LANES;
+  for (; count > 8; count /= 8) {
+    barrier(CLK_LOCAL_MEM_FENCE);
+    if (lane < count / 8) {
+      uint least = minima[8 * lane];
+      for (int i = 1; i < 8; ++i) least = min(least, minima[8 * lane + i]);
+      minima[count + lane] = least;
+    }
+    minima += count;
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  uint least = minima[0];
+  for (int i = 1; i < count; ++i) least = min(least, minima[i]);
+  return least;
+}
+
+// Adds a path's costs to the partial sums of a cell; `stage` 0: horizontal (and `vertical`) paths, 1 and 2: the
+// diagonals.
+inline void add_path(const int stage, const bool vertical, const uchar4 costs, const size_t cell, global uchar* first,
+                     global uchar* second) {
+  global uchar4* to_first = (global uchar4*)(first + cell);
+  global uchar4* to_second = (global uchar4*)(second + cell);
+  if (stage == 0) {
+    *(vertical ? to_second : to_first) = costs;
+  } else if (stage == 1) {
+    *to_first = rhadd(*to_first, *to_second);
+    *to_second = costs;
+  } else {
+    *to_first = add_sat(*to_first, rhadd(*to_second, costs));
+  }
+}
+
+// Group ids 1 and 2: the lines, LINES at a time; views, and after them the same views backward.
+kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_paths(
+    const SgmParameters q, const int stage, const int views, global const uint* codes, global const uchar* penalties,
+    global const Band* bands, global const uint* offsets, global uchar* forward_first, global uchar* forward_second,
+    global uchar* backward_first, global uchar* backward_second) {
+  // Of each quad the first cost and, in the upper 16 bits, the last; of this pixel and of the one before.
+  local uint edges[2][LINES][SLOT];
+  local uint minima[2][LINES][2 * LANES];
+  const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
+  const bool backward = (int)get_group_id(2) >= views;
+  const int view = (int)get_group_id(2) - (backward ? views : 0);
+  global uchar* first = backward ? backward_first : forward_first;
+  global uchar* second = backward ? backward_second : forward_second;
+
+  const int group = get_group_id(1), row_groups = (q.height + LINES - 1) / LINES;
+  const bool vertical = stage == 0 && group >= row_groups;
+  const int direction = stage > 0 ? stage + 1 : vertical ? 1 : 0;
+  const int first_line = (vertical ? group - row_groups : group) * LINES;
+  int longest = 0;
+  for (int i = 0; i < LINES; ++i) longest = max(longest, line_of(q, direction, first_line + i).length);
+  const Path path = path_of(q, direction, backward, view, line_of(q, direction, first_line + line), codes, penalties);
+
+  for (int i = lane; i < SLOT; i += LANES) edges[0][line][i] = edges[1][line][i] = ABSENT << 16 | ABSENT;
+  barrier(CLK_LOCAL_MEM_FENCE);
+
+  int4 costs[QUADS_A_LANE];
+  UNROLLED for (int v = 0; v < QUADS_A_LANE; ++v) costs[v] = ABSENT;
+  // What a pixel needs is loaded while the one before is under way, its band one pixel earlier still.
+  Pixel pixel = pixel_at(q, path, 0, bands, offsets), next = pixel_at(q, path, 1, bands, offsets);
+  Matches matches = fetch(q, path, 0, pixel, lane);
+  int least = 0;
+  for (int i = 0; i < longest; ++i) {
+    local const uint* before = edges[(i + 1) % 2][line];
+    local uint* after = edges[i % 2][line];
+    int4 lowest = ABSENT;
+    UNROLLED for (int v = 0; v < QUADS_A_LANE; ++v) {
+      const int quad = lane + v * LANES;
+      int4 path_costs = ABSENT;
+      if (holds(pixel, quad)) {
+        const int4 same = costs[v];
+        const int4 below = (int4)((int)(before[quad] >> 16) - least, same.xyz),
+                   above = (int4)(same.yzw, (int)(before[quad + 2] & 0xffff) - least);
+        path_costs = costs_of(&matches, v) + min(min(same, min(below, above) + q.p1), (int4)(pixel.p2));
+        path_costs = select(path_costs, (int4)(ABSENT),
+                            (int4)(QUAD * quad, QUAD * quad + 1, QUAD * quad + 2, QUAD * quad + 3) >= q.disparities);
+      }
+      after[quad + 1] = (uint)path_costs.w << 16 | (uint)path_costs.x;
+      lowest = min(lowest, path_costs);
+      costs[v] = path_costs;
+    }
+    matches = fetch(q, path, i + 1, next, lane);
+    const Pixel after_next = pixel_at(q, path, i + 2, bands, offsets);
+    least = minimum_of_line(minima[i % 2][line], lane, min(min(lowest.x, lowest.y), min(lowest.z, lowest.w)));
+    UNROLLED for (int v = 0; v < QUADS_A_LANE; ++v) {
+      const int quad = lane + v * LANES;
+      costs[v] -= least;
+      if (holds(pixel, quad))
+        add_path(stage, vertical, convert_uchar4_sat(costs[v]), cell_of(pixel, quad), first, second);
+    }
+    pixel = next;
+    next = after_next;
+  }
+}
+
+// The partial sums of a pixel's cells, and the cells that exist.
+typedef struct {
+  global const uchar *forward_first, *forward_second, *backward_first, *backward_second;
+  int count;
+} Cells;
+
+// Half the sums over all paths, of four cells.
+inline ushort4 totals_of(const Cells cells, const int at) {
+  uchar4 forward = *(global const uchar4*)(cells.forward_first + at),
+         backward = *(global const uchar4*)(cells.backward_first + at);
+#if PATHS == 4
+  forward = add_sat(forward, *(global const uchar4*)(cells.forward_second + at));
+  backward = add_sat(backward, *(global const uchar4*)(cells.backward_second + at));
+#endif
+  return convert_ushort4(forward) + convert_ushort4(backward);
+}
+
+// The same of one.
+inline int total_of(const Cells cells, const int at) {
+  uchar forward = cells.forward_first[at], backward = cells.backward_first[at];
+#if PATHS == 4
+  forward = add_sat(forward, cells.forward_second[at]);
+  backward = add_sat(backward, cells.backward_second[at]);
+#endif
+  return (int)forward + backward;
+}
+
+// Steps to one side of the winner until the sums above its own add up to `limit`.
+inline int count_steps(const Cells cells, const int winner, const int total, const int step, const int limit) {
+  int sum = 0, steps = 0;
+  for (int at = winner + step; steps < MAX_STEPS && at >= 0 && at < cells.count; at += step) {
+    sum += max(0, total_of(cells, at) - total);
+    if (sum >= limit) break;
+    ++steps;
+  }
+  return steps;
+}
+
+// LANES work-items look at a pixel's cells, one of them at the winner's neighbours. Group ids: LINES pixels of a row,
+// row, view.
+kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winners(
+    const SgmParameters q, global const Band* bands, global const uint* offsets, global const uchar* forward_first,
+    global const uchar* forward_second, global const uchar* backward_first, global const uchar* backward_second,
+    global float* disparities, global float* variances) {
+  local uint minima[LINES][2 * LANES];
+  const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
+  const int x = get_group_id(0) * LINES + line;
+  const size_t row_start = ((size_t)get_group_id(2) * q.height + get_group_id(1)) * q.width;
+  const bool is_inside = x < q.width;
+  const size_t pixel = row_start + (is_inside ? x : 0);
+  const Band band = bands[pixel];
+  const size_t first_cell = (row_start * MAX_CHUNKS + offsets[pixel]) * EGOSGM_LANES;
+  const Cells cells = {forward_first + first_cell, forward_second + first_cell, backward_first + first_cell,
+                       backward_second + first_cell,
+                       min(band.chunks * EGOSGM_LANES, q.min_disparity + q.disparities - band.origin)};
+
+  // The total in the upper half, so that the smallest disparity wins a tie.
+  uint best = NO_WINNER;
+  const int first = band.first - band.origin, last = band.last - band.origin;
+  for (int at = QUAD * lane; is_inside && at <= last; at += QUAD * LANES) {
+    const int4 index = at + (int4)(0, 1, 2, 3);
+    const uint4 ranked = convert_uint4(totals_of(cells, at)) << 16 | as_uint4(index);
+    const uint4 allowed = select(ranked, (uint4)(NO_WINNER), index < first || index > last);
+    best = min(best, min(min(allowed.x, allowed.y), min(allowed.z, allowed.w)));
+  }
+  best = minimum_of_line(minima[line], lane, best);
+  if (is_inside && lane == 0) {
+    const int total = best >> 16, winner = best & 0xffff;
+    const bool fits = winner > 0 && winner + 1 < cells.count;
+    const int rise_before = fits ? total_of(cells, winner - 1) - total : 0,
+              rise_after = fits ? total_of(cells, winner + 1) - total : 0;
+    const int steps = count_steps(cells, winner, total, -1, q.s_max) + count_steps(cells, winner, total, 1, q.s_max);
+    disparities[pixel] = refined(band.origin + winner, rise_before, rise_after);
+    variances[pixel] = matching_variance(q, steps);
+  }
+}
