@@ -11,7 +11,6 @@
 // in the same launch. What a launch does to a cell's two partial sums: first = L0, second = L1; first = mean(first,
 // second), second = L2; first += mean(second, L3).
 #include "sgm_cells.h"
-#include "shared.h"
 
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 LANES=8 LINES=4
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 LANES=1 LINES=1

@@ -3,6 +3,8 @@
 #ifndef EGOSGM_KERNELS_SGM_CELLS_H
 #define EGOSGM_KERNELS_SGM_CELLS_H
 
+#include "shared.h"
+
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, whose sums lie that much
 // above its own; 0 both where one is missing.
 inline float refined(const int winner, const int rise_before, const int rise_after) {
