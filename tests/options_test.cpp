@@ -54,6 +54,8 @@ TEST(Options, HasANameForEveryMember) {
       {"banded_sgm.paths", [](auto& o) { o.banded_sgm.paths = 4; }},
       {"banded_sgm.p1", [](auto& o) { o.banded_sgm.p1 = 77; }},
       {"banded_sgm.p2", [](auto& o) { o.banded_sgm.p2 = 77; }},
+      {"banded_sgm.p2_at_edges", [](auto& o) { o.banded_sgm.p2_at_edges = 77; }},
+      {"banded_sgm.p2_slope", [](auto& o) { o.banded_sgm.p2_slope = 77; }},
       {"banded_sgm.s_max", [](auto& o) { o.banded_sgm.s_max = 77; }},
       {"banded_sgm.variance_floor_px2", [](auto& o) { o.banded_sgm.variance_floor_px2 = 77; }},
       {"banded_sgm.variance_per_step_px2", [](auto& o) { o.banded_sgm.variance_per_step_px2 = 77; }},
@@ -189,6 +191,7 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
   EXPECT_EQ(paper.search_band.sigmas, 3);
   EXPECT_EQ(paper.search_band.min_half_width_px, 0);
   EXPECT_GT(paper.forward_warp.process_noise_px2, 0) << "a constant q";
+  EXPECT_EQ(paper.banded_sgm.p2_slope, 0) << "one penalty everywhere";
   EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged";
   EXPECT_FALSE(paper.median_filter.enabled);
   EXPECT_FALSE(paper.vertical_alignment.enabled);
@@ -204,8 +207,10 @@ TEST(Options, RangesEndWhereTheyAreSaidTo) {
       {"search_band.neighbour_min_count", {"1", "2147483647"}},
       {"vertical_alignment.gain", {"0", "1"}},
       {"banded_sgm.paths", {"4", "8"}},
-      {"banded_sgm.p1", {"0", "160"}},
-      {"banded_sgm.p2", {"10", "190"}},
+      {"banded_sgm.p1", {"0", "60"}},
+      {"banded_sgm.p2", {"60", "190"}},
+      {"banded_sgm.p2_at_edges", {"10", "160"}},
+      {"banded_sgm.p2_slope", {"0", "255"}},
       {"banded_sgm.s_max", {"1", "32767"}},
       {"speckle_removal.max_size_px", {"0", "2147483647"}}};
   for (const auto& [name, values] : allowed) {
@@ -221,8 +226,10 @@ TEST(Options, RangesEndWhereTheyAreSaidTo) {
       {"search_band.neighbour_min_count", {"0", "-1"}},
       {"vertical_alignment.gain", {"1.0001"}},
       {"banded_sgm.paths", {"0", "1", "5", "16", "-8"}},
-      {"banded_sgm.p1", {"-1", "161"}},
+      {"banded_sgm.p1", {"-1", "61"}},
       {"banded_sgm.p2", {"-1", "191"}},
+      {"banded_sgm.p2_at_edges", {"-1", "161"}},
+      {"banded_sgm.p2_slope", {"-1", "256"}},
       {"banded_sgm.s_max", {"0", "32768"}},
       {"banded_sgm.variance_floor_px2", {"0"}},
       {"speckle_removal.max_size_px", {"-1"}}};

@@ -87,10 +87,12 @@ std::vector<Setting> settings() {
                    o.median_filter.enabled = false;
                    o.forward_warp.process_noise_px2 = 0.4f;
                    o.vertical_alignment.gain = 1;
+                   o.banded_sgm.p2_at_edges = 25;
+                   o.banded_sgm.p2_slope = 9;
                  })});
   all.push_back({"full_search", kSize, options(24, 0, [](PipelineOptions& o) { o.search = SearchMode::kFull; })});
   all.push_back({"not_temporal", kSize, options(24, 0, [](PipelineOptions& o) { o.temporal = false; })});
-  all.push_back({"not_aligned_wide_blocks", kSize, options(24, 0, [](PipelineOptions& o) {
+  all.push_back({"not_aligned_sharp_jumps", kSize, options(24, 0, [](PipelineOptions& o) {
                    o.vertical_alignment.enabled = false;
                    o.banded_sgm.p1 = 3;
                    o.banded_sgm.p2 = 190;
@@ -614,9 +616,10 @@ TEST(Pipeline, ReportsWhatItDid) {
     }
     return names;
   };
-  const std::vector<std::string> steady{
-      "upload", "ForwardWarp", "EdgeRejection", "HoleFill",       "ConsistencyCheck", "VerticalAlignment", "SearchBand",
-      "Census", "BandedSgm",   "MedianFilter",  "SpeckleRemoval", "KalmanUpdate",     "SadCheck",          "download"};
+  const std::vector<std::string> steady{"upload",           "ForwardWarp",       "EdgeRejection", "HoleFill",
+                                        "ConsistencyCheck", "VerticalAlignment", "SearchBand",    "Census",
+                                        "StepPenalties",    "BandedSgm",         "MedianFilter",  "SpeckleRemoval",
+                                        "KalmanUpdate",     "SadCheck",          "download"};
   EXPECT_EQ(stages(reports[3]), steady);
   for (const FrameReport& report : reports) {
     EXPECT_GT(report.total_ms, 0);
