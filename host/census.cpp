@@ -36,7 +36,7 @@ Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, Ma
 
 void Census::operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
   context_.enter("Census");
-  census_(context_, ocl::every_row(size_), size_, padding_, images, codes);
+  census_(context_, ocl::every_row(context_, size_), size_, padding_, images, codes);
 }
 
 }  // namespace egosgm

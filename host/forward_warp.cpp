@@ -4,9 +4,11 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context) {
+constexpr cl_int kRowsOfABand = 32;  // more move fewer sources twice, fewer balance better
+
+const cl::Program& build(ocl::Context& context, int pixels) {
   context.enter("ForwardWarp");
-  return context.program("forward_warp.cl", {});
+  return context.program("forward_warp.cl", ocl::Defines().set("PIXELS", pixels));
 }
 
 // Gamma of eq. 1: (x - cx, y - cy, d + doffs, 1) ~ Gamma (X, Y, Z, 1).
@@ -70,33 +72,54 @@ shared::DisparityMotion disparity_motion(const Calibration& calibration, const M
   return result;
 }
 
+ForwardWarp::Atomics::Atomics(ocl::Context& context, shared::ImageSize size)
+    : move(build(context, 1), "move"),
+      splat_disparity(build(context, 1), "splat_disparity"),
+      splat_variance(build(context, 1), "splat_variance"),
+      decode(build(context, 1), "decode"),
+      landed(context, 2 * pixel_count(size)),
+      moved_key(context, 2 * pixel_count(size)),
+      moved_variance(context, 2 * pixel_count(size)),
+      zbuffer(context, 2 * pixel_count(size)) {}
+
+ForwardWarp::Bands::Bands(ocl::Context& context, shared::ImageSize size)
+    : find_spans(build(context, 16), "find_spans"),
+      splat_bands(build(context, 16), "splat_bands"),
+      spans(context, 4 * static_cast<std::size_t>(size.height)) {}
+
 ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
-                         const ForwardWarpOptions& options, shared::DisparityRange range)
-    : context_(context),
+                         const ForwardWarpOptions& options, shared::DisparityRange range, int pixels)
+    : context_((context.enter("ForwardWarp"), context)),
       size_(size),
       calibration_(calibration),
       process_noise_px2_(options.process_noise_px2),
-      range_(range),
-      move_(build(context), "move"),
-      splat_disparity_(build(context), "splat_disparity"),
-      splat_variance_(build(context), "splat_variance"),
-      decode_(build(context), "decode"),
-      landed_(context, 2 * pixel_count(size)),
-      moved_key_(context, 2 * pixel_count(size)),
-      moved_variance_(context, 2 * pixel_count(size)),
-      zbuffer_(context, 2 * pixel_count(size)) {}
+      range_(range) {
+  if (pixels == 1 || (pixels == 0 && ocl::pixels_a_work_item(context) == 1)) {
+    atomics_.emplace(context, size);
+  } else {
+    bands_.emplace(context, size);
+  }
+}
 
 void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted) {
   context_.enter("ForwardWarp");
-  const ocl::Range pixels = ocl::every_pixel(context_, size_);
-  for (const cl_int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
-    const shared::DisparityMotion motion = disparity_motion(calibration_, current_from_previous, view);
-    move_(context_, ocl::every_pixel(context_, size_, 1), size_, range_, view, motion, process_noise_px2_,
-          belief.disparity, belief.variance, landed_, moved_key_, moved_variance_, zbuffer_, predicted.variance);
+  const shared::DisparityMotion left = disparity_motion(calibration_, current_from_previous, EGOSGM_LEFT);
+  const shared::DisparityMotion right = disparity_motion(calibration_, current_from_previous, EGOSGM_RIGHT);
+  if (bands_) {
+    auto& [find_spans, splat_bands, spans] = *bands_;
+    const int bands = (size_.height + kRowsOfABand - 1) / kRowsOfABand;
+    find_spans(context_, ocl::every_row(context_, size_), size_, range_, left, right, belief.disparity, spans);
+    splat_bands(context_, ocl::every_row(context_, {1, bands}), size_, range_, left, right, process_noise_px2_,
+                kRowsOfABand, spans, belief.disparity, belief.variance, predicted.disparity, predicted.variance);
+    return;
   }
-  splat_disparity_(context_, pixels, size_, landed_, moved_key_, zbuffer_);
-  splat_variance_(context_, pixels, size_, landed_, moved_key_, moved_variance_, zbuffer_, predicted.variance);
-  decode_(context_, pixels, size_, zbuffer_, predicted.disparity);
+  const ocl::Range pixels = ocl::every_pixel(context_, size_);
+  auto& [move, splat_disparity, splat_variance, decode, landed, moved_key, moved_variance, zbuffer] = *atomics_;
+  move(context_, pixels, size_, range_, left, right, process_noise_px2_, belief.disparity, belief.variance, landed,
+       moved_key, moved_variance, zbuffer, predicted.variance);
+  splat_disparity(context_, pixels, size_, landed, moved_key, zbuffer);
+  splat_variance(context_, pixels, size_, landed, moved_key, moved_variance, zbuffer, predicted.variance);
+  decode(context_, pixels, size_, zbuffer, predicted.disparity);
 }
 
 }  // namespace egosgm

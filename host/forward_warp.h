@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+
 #include "egosgm/calibration.h"
 #include "egosgm/motion.h"
 #include "egosgm/options.h"
@@ -19,32 +21,50 @@ shared::DisparityMotion disparity_motion(const Calibration& calibration, const M
 /// dropped.
 class ForwardWarp {
  public:
+  /// `pixels` of a work-item: 1 (and atomics) or 16 (and bands of rows); 0: by the device. Same bits.
   ForwardWarp(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
-              const ForwardWarpOptions& options, shared::DisparityRange range);
+              const ForwardWarpOptions& options, shared::DisparityRange range, int pixels = 0);
 
   /// REQUIRES: `motion` is valid; `predicted` is not `belief`.
   void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted);
 
  private:
+  using Size = const shared::ImageSize;
+  using Range = const shared::DisparityRange;
+  using ViewMotion = const shared::DisparityMotion;
+  using In = const ocl::Buffer<float>;
+  using Out = ocl::Buffer<float>;
+
+  struct Atomics {
+    ocl::Kernel<Size, Range, ViewMotion, ViewMotion, const float, In, In, ocl::Buffer<cl_int>, ocl::Buffer<cl_uint>,
+                Out, ocl::Buffer<cl_uint>, Out>
+        move;
+    ocl::Kernel<Size, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uint>> splat_disparity;
+    ocl::Kernel<Size, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, In, const ocl::Buffer<cl_uint>, Out>
+        splat_variance;
+    ocl::Kernel<Size, const ocl::Buffer<cl_uint>, Out> decode;
+    ocl::Buffer<cl_int> landed;
+    ocl::Buffer<cl_uint> moved_key;
+    ocl::Buffer<float> moved_variance;
+    ocl::Buffer<cl_uint> zbuffer;
+    Atomics(ocl::Context& context, shared::ImageSize size);
+  };
+  struct Bands {
+    ocl::Kernel<Size, Range, ViewMotion, ViewMotion, In, ocl::Buffer<cl_int>> find_spans;
+    ocl::Kernel<Size, Range, ViewMotion, ViewMotion, const float, const cl_int, const ocl::Buffer<cl_int>, In, In, Out,
+                Out>
+        splat_bands;
+    ocl::Buffer<cl_int> spans;
+    Bands(ocl::Context& context, shared::ImageSize size);
+  };
+
   ocl::Context& context_;
   const shared::ImageSize size_;
   const Calibration calibration_;
   const float process_noise_px2_;
   const shared::DisparityRange range_;
-  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const cl_int, const shared::DisparityMotion,
-              const float, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<cl_int>,
-              ocl::Buffer<cl_uint>, ocl::Buffer<float>, ocl::Buffer<cl_uint>, ocl::Buffer<float>>
-      move_;
-  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uint>>
-      splat_disparity_;
-  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, const ocl::Buffer<float>,
-              const ocl::Buffer<cl_uint>, ocl::Buffer<float>>
-      splat_variance_;
-  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uint>, ocl::Buffer<float>> decode_;
-  ocl::Buffer<cl_int> landed_;
-  ocl::Buffer<cl_uint> moved_key_;
-  ocl::Buffer<float> moved_variance_;
-  ocl::Buffer<cl_uint> zbuffer_;
+  std::optional<Atomics> atomics_;  // one of the two
+  std::optional<Bands> bands_;
 };
 
 }  // namespace egosgm

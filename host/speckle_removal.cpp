@@ -41,8 +41,8 @@ void SpeckleRemoval::operator()(StereoMaps& maps) {
   find_runs_(context_, ocl::group_a_row(size_, row_group_), size_, options_.max_difference_px, maps.disparity, runs_,
              parents_, sizes_);
   if (strip_rows_ > 1) {
-    join_strips_(context_, ocl::every_row({1, strips}), size_, options_.max_difference_px, strip_rows_, maps.disparity,
-                 runs_, parents_);
+    join_strips_(context_, ocl::every_row(context_, {1, strips}), size_, options_.max_difference_px, strip_rows_,
+                 maps.disparity, runs_, parents_);
   }
   if (strips > 1) {
     join_seams_(context_, ocl::every_pixel(context_, {size_.width, strips - 1}), size_, options_.max_difference_px,

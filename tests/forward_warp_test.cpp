@@ -21,9 +21,9 @@ constexpr shared::DisparityRange kRange{0, 64};
 const Calibration kCalibration{.fx = 100, .fy = 100, .cx = 50, .cy = 30, .baseline_m = 0.5};  // Z = 50 / d
 
 testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, shared::DisparityRange range,
-                       float process_noise_px2, const testing::HostMaps& belief, const Motion& motion) {
+                       float process_noise_px2, const testing::HostMaps& belief, const Motion& motion, int pixels = 0) {
   ocl::Context context(testing::any_device());
-  ForwardWarp warp(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range);
+  ForwardWarp warp(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
   warp(in, motion, out);
@@ -89,9 +89,13 @@ TEST_P(ForwardWarpTest, EqualsReference) {
       const testing::HostMaps expected =
           reference::forward_warp(size, range, disparity_motion(calibration, motion, EGOSGM_LEFT),
                                   disparity_motion(calibration, motion, EGOSGM_RIGHT), 0.25f, belief);
-      const testing::HostMaps actual = warp(size, calibration, range, 0.25f, belief, motion);
-      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << "min " << range.min;
-      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << "min " << range.min;
+      for (const int pixels : {1, 16}) {
+        const testing::HostMaps actual = warp(size, calibration, range, 0.25f, belief, motion, pixels);
+        EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+            << "min " << range.min << ", by " << pixels;
+        EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
+            << "min " << range.min << ", by " << pixels;
+      }
     }
   }
 }

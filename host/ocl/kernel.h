@@ -28,9 +28,11 @@ inline Range every_pixels(const Context& context, shared::ImageSize size, int pi
   return {cl::NDRange((columns + local - 1) / local * local, size.height, views), cl::NDRange(local, 1, 1)};
 }
 
-/// A work-item a row and view: global ids are y, view.
-inline Range every_row(shared::ImageSize size, int views = 2) {
-  return {cl::NDRange(size.height, views), cl::NullRange};
+/// A work-item a row and view: global ids are y, view. A CPU's work-groups hold one: it deals out groups, and rows are
+/// long.
+inline Range every_row(const Context& context, shared::ImageSize size, int views = 2) {
+  const bool is_gpu = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU;
+  return {cl::NDRange(size.height, views), is_gpu ? cl::NullRange : cl::NDRange(1, 1)};
 }
 
 /// A work-group of `work_items` a row and view: local id 0 is the lane, global ids 1 and 2 are y and view.
