@@ -107,8 +107,10 @@ struct Pipeline::Impl {
   }
 
   void match_aligned(const FrameImages& images, bool full_range) {
-    if (full_range || options.search == SearchMode::kFull) {
+    if (full_range) {
       search_band.full_range();
+    } else if (options.search == SearchMode::kFull) {
+      search_band.full_range(predicted);
     } else {
       search_band(predicted);
     }

@@ -62,4 +62,10 @@ void SearchBand::full_range() {
   full_range_(context_, ocl::every_pixel(context_, size_), size_, range_, bands_, cell_offsets_, row_sums_);
 }
 
+void SearchBand::full_range(const StereoMaps& predicted) {
+  full_range();
+  sum_rows_(context_, ocl::group_a_row(size_, row_group_), size_, predicted.disparity, bands_, cell_offsets_,
+            row_sums_);
+}
+
 }  // namespace egosgm

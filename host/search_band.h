@@ -22,6 +22,8 @@ class SearchBand {
   void operator()(const StereoMaps& predicted);
   /// Every pixel searches everything.
   void full_range();
+  /// The same where there is a prediction that is not searched by: `row_sums` counts its pixels.
+  void full_range(const StereoMaps& predicted);
 
   /// One a pixel and view.
   const ocl::Buffer<shared::Band>& bands() const { return bands_; }

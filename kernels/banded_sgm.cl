@@ -12,7 +12,7 @@
 //
 // A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a pixel reads
 // its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them before it writes its own.
-#include "shared.h"
+#include "sgm_cells.h"
 
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
@@ -389,9 +389,7 @@ kernel void refine(const SgmParameters q, global const ulong* winners, global fl
   if (x >= q.width) return;
   const size_t i = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width + x;
   const ulong winner = winners[i];
-  const float before = (float)(short)(winner >> 16), after = (float)(short)(winner >> 32), steps = (float)(short)(winner >> 48);
-  const float slope = max(before, after);
-  const float offset = (before - after) / (2.0f * (slope > 0.0f ? slope : 1.0f));
-  disparities[i] = (float)(short)winner + (slope > 0.0f ? clamp(offset, -0.5f, 0.5f) : 0.0f);
-  variances[i] = q.variance_floor + steps * (q.variance_per_step + q.variance_per_square * steps);
+  const int rise_before = (short)(winner >> 16), rise_after = (short)(winner >> 32);
+  disparities[i] = refined((short)winner, rise_before, rise_after);
+  variances[i] = matching_variance(q, (int)(winner >> 48), rise_before, rise_after);
 }

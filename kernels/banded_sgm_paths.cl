@@ -372,6 +372,6 @@ kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winn
               rise_after = fits ? total_of(cells, winner + 1) - total : 0;
     const int steps = count_steps(cells, winner, total, -1, q.s_max) + count_steps(cells, winner, total, 1, q.s_max);
     disparities[pixel] = refined(band.origin + winner, rise_before, rise_after);
-    variances[pixel] = matching_variance(q, steps);
+    variances[pixel] = matching_variance(q, steps, rise_before, rise_after);
   }
 }

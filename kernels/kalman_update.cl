@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Beyond the gate the measurement
-// is taken.
+// Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Beyond the gate, and
+// where the matching says that the prediction was wrong (EGOSGM_ESCAPED_VARIANCE_PX2), the measurement is taken.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -19,7 +19,7 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
   const Floats r = load_pixels(measured_variance + row, x, size.width);
   const Ints has_prediction = d > INVALID;
   const Ints has_measurement = z > INVALID;
-  const Ints fuses = has_prediction & has_measurement & (fabs(z - d) <= gate);
+  const Ints fuses = has_prediction & has_measurement & (fabs(z - d) <= gate) & (r < (Floats)(EGOSGM_ESCAPED_VARIANCE_PX2));
   const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
 
   const Floats zero = 0.0f;

@@ -14,10 +14,11 @@ inline float refined(const int winner, const int rise_before, const int rise_aft
   return (float)winner + (slope > 0.0f ? clamp(offset, -0.5f, 0.5f) : 0.0f);
 }
 
-// The matching variance (options.h).
-inline float matching_variance(const SgmParameters q, const int steps) {
+// The matching variance (options.h), or that of a winner beyond which the sums fall on.
+inline float matching_variance(const SgmParameters q, const int steps, const int rise_before, const int rise_after) {
   const float n = (float)steps;
-  return q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n);
+  const float counted = q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n);
+  return rise_before < 0 || rise_after < 0 ? EGOSGM_ESCAPED_VARIANCE_PX2 : counted;
 }
 
 #endif

@@ -37,6 +37,10 @@ typedef float f32;
 // Predictions are summed up over blocks of this many pixels a side, for the bands of pixels without one.
 #define EGOSGM_BLOCK 8
 
+// The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside. KalmanUpdate then
+// takes the measurement instead of fusing it, and the next frame searches wide around it.
+#define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
+
 // The variance of a hole that MedianFilter fills.
 #define EGOSGM_FILLED_VARIANCE_PX2 1.0f
 

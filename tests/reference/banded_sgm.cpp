@@ -140,7 +140,10 @@ testing::HostMaps banded_sgm(const shared::SgmParameters& q, const BandedSgmOpti
       maps.disparity.push_back(static_cast<float>(winner) + offset(sums, p, winner));
       const int steps = count_steps(q, sums, p, winner, 1) + count_steps(q, sums, p, winner, -1);
       const float n = static_cast<float>(steps);
-      maps.variance.push_back(q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n));
+      const bool has_both = sums.has(p, winner - 1) && sums.has(p, winner + 1);
+      const bool escaped = has_both && std::min(sums.at(p, winner - 1), sums.at(p, winner + 1)) < sums.at(p, winner);
+      maps.variance.push_back(escaped ? EGOSGM_ESCAPED_VARIANCE_PX2
+                                      : q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n));
     }
   }
   return maps;

@@ -25,6 +25,7 @@ Estimate update(float gate_px, bool keep_predicted, const Estimate& predicted, c
   if (!is_valid(measured)) return keep_predicted ? predicted : kNone;
   if (!is_valid(predicted)) return measured;
   if (gate_px > 0 && std::abs(measured.disparity - predicted.disparity) > gate_px) return measured;
+  if (measured.variance >= EGOSGM_ESCAPED_VARIANCE_PX2) return measured;
   return fuse(predicted, measured);
 }
 

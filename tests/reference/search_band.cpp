@@ -106,10 +106,10 @@ SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, co
   return result;
 }
 
-SearchBands full_range(shared::ImageSize size, shared::DisparityRange range) {
+SearchBands full_range(shared::ImageSize size, shared::DisparityRange range, const std::vector<float>& predicted) {
   const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
   SearchBands result{std::vector(pixels, band_of(range, -kInfinity, kInfinity)), {}, {}};
-  sum_rows(size, std::vector<float>(pixels, EGOSGM_INVALID_DISPARITY), result);
+  sum_rows(size, predicted.empty() ? std::vector<float>(pixels, EGOSGM_INVALID_DISPARITY) : predicted, result);
   return result;
 }
 

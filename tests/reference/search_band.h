@@ -17,6 +17,6 @@ struct SearchBands {
 
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
                         const testing::HostMaps& predicted);
-SearchBands full_range(shared::ImageSize size, shared::DisparityRange range);
+SearchBands full_range(shared::ImageSize size, shared::DisparityRange range, const std::vector<float>& predicted = {});
 
 }  // namespace egosgm::reference

@@ -91,7 +91,7 @@ class StageChain {
     if (has_prediction && options_.search == SearchMode::kBand) {
       search_band_(predicted_);
     } else {
-      search_band_.full_range();
+      has_prediction ? search_band_.full_range(predicted_) : search_band_.full_range();
     }
     pass.band = {search_band_.bands().read(context_), search_band_.cell_offsets().read(context_),
                  search_band_.row_sums().read(context_)};
