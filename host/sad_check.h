@@ -14,9 +14,8 @@ class SadCheck {
   SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type, const SadCheckOptions& options);
 
   /// `images`: the pixels of both views without padding, the left view first, one or two bytes each.
-  /// `in` and `out` may be the same maps. With the check off, nothing is launched: `in` is copied if `out` is not the
-  /// same.
-  void operator()(const ocl::Buffer<cl_uchar>& images, const StereoMaps& in, StereoMaps& out);
+  /// `in` and `out` may be the same maps. With the check off, nothing is launched: `in` and `out` change places.
+  void operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& in, StereoMaps& out);
 
  private:
   ocl::Context& context_;

@@ -37,7 +37,7 @@ void SpeckleRemoval::operator()(StereoMaps& maps) {
   if (options_.max_size_px <= 0) return;
   context_.enter("SpeckleRemoval");
   const int strips = (size_.height + strip_rows_ - 1) / strip_rows_;
-  const ocl::Range pixels = ocl::every_pixel(context_, size_);
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, row_group_ == 1 ? 16 : 1);
   find_runs_(context_, ocl::group_a_row(size_, row_group_), size_, options_.max_difference_px, maps.disparity, runs_,
              parents_, sizes_);
   if (strip_rows_ > 1) {

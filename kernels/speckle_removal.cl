@@ -13,6 +13,20 @@
 
 #define NO_RUN 0xffff  // of an invalid pixel
 
+// Of a work-item that looks for the beginnings of runs; few pixels are one.
+#if ROW_GROUP == 1
+#define PIXELS 16
+#else
+#define PIXELS 1
+#endif
+
+// vload16 goes byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on all.
+typedef struct __attribute__((packed)) {
+  ushort16 lanes;
+} Runs;
+
+ushort16 load_runs(global const ushort* runs) { return ((global const Runs*)runs)->lanes; }
+
 bool is_connected(float a, float b, float max_difference) {
   return a > EGOSGM_INVALID_DISPARITY && b > EGOSGM_INVALID_DISPARITY && fabs(a - b) <= max_difference;
 }
@@ -102,8 +116,8 @@ kernel void join_strips(const ImageSize size, const float max_difference, const 
           are_connected(vload16(0, disparity + row + x), vload16(0, disparity + above + x), max_difference);
       const int16 left_joins =
           are_connected(vload16(0, disparity + row + x - 1), vload16(0, disparity + above + x - 1), max_difference);
-      const short16 same = vload16(0, runs + row + x) == vload16(0, runs + row + x - 1) &
-                           vload16(0, runs + above + x) == vload16(0, runs + above + x - 1);
+      const short16 same = load_runs(runs + row + x) == load_runs(runs + row + x - 1) &
+                           load_runs(runs + above + x) == load_runs(runs + above + x - 1);
       for (uint left = bits_of(joins & ~(left_joins & convert_int16(same))); left != 0; left &= left - 1) {
         const size_t lane = x + lowest_bit(left);
         join(parents, row + runs[row + lane], above + runs[above + lane]);
@@ -156,32 +170,52 @@ kernel void join_seams(const ImageSize size, const float max_difference, const i
   }
 }
 
+// Bit i is set where a run begins at x + i, of the PIXELS pixels from x on.
+uint beginnings(global const ushort* runs, int x, int width) {
+  uint bits = 0;
+#if PIXELS > 1
+  if (x + PIXELS <= width) {
+    const ushort16 columns = (ushort)x + (ushort16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const short16 begins = load_runs(runs + x) == columns;
+    return bits_of(convert_int16(begins));
+  }
+#endif
+  for (int i = 0; i < PIXELS && x + i < width; ++i) bits |= (runs[x + i] == x + i ? 1u : 0u) << i;
+  return bits;
+}
+
 // Adds every run to its root. Only roots are added to, and only others are read.
 kernel void measure(const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
                     volatile global uint* sizes) {
-  const int x = get_global_id(0);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
-  if (x >= size.width) return;
-
-  const size_t pixel = ((size_t)view * size.height + y) * size.width + x;
-  if (runs[pixel] != x) return;
-  uint root = pixel;
-  while (parents[root] != root) root = parents[root];
-  roots[pixel] = root;
-  if (root != pixel) atomic_add(&sizes[root], sizes[pixel]);
-}
-
-kernel void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
-                 global const uint* sizes, global float* disparity, global float* variance) {
-  const int x = get_global_id(0);
+  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   if (x >= size.width) return;
 
   const size_t row = ((size_t)view * size.height + y) * size.width;
-  const int run = runs[row + x];
-  if (run == NO_RUN || sizes[roots[row + run]] > max_size) return;
-  disparity[row + x] = EGOSGM_INVALID_DISPARITY;
-  variance[row + x] = 0.0f;
+  for (uint left = beginnings(runs + row, x, size.width); left != 0; left &= left - 1) {
+    const size_t run = row + x + lowest_bit(left);
+    uint root = run;
+    while (parents[root] != root) root = parents[root];
+    roots[run] = root;
+    if (root != run) atomic_add(&sizes[root], sizes[run]);
+  }
+}
+
+kernel void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
+                 global const uint* sizes, global float* disparity, global float* variance) {
+  const int x = get_global_id(0) * PIXELS;
+  const int y = get_global_id(1);
+  const int view = get_global_id(2);
+  if (x >= size.width) return;
+
+  const size_t row = ((size_t)view * size.height + y) * size.width;
+  for (uint left = beginnings(runs + row, x, size.width); left != 0; left &= left - 1) {
+    const int run = x + lowest_bit(left);
+    if (sizes[roots[row + run]] > max_size) continue;
+    for (int i = run; i < size.width && runs[row + i] == run; ++i) {
+      disparity[row + i] = EGOSGM_INVALID_DISPARITY;
+      variance[row + i] = 0.0f;
+    }
+  }
 }
