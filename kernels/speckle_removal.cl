@@ -31,6 +31,57 @@ bool is_connected(float a, float b, float max_difference) {
   return a > EGOSGM_INVALID_DISPARITY && b > EGOSGM_INVALID_DISPARITY && fabs(a - b) <= max_difference;
 }
 
+int16 are_connected(float16 a, float16 b, float max_difference) {
+  return a > EGOSGM_INVALID_DISPARITY & b > EGOSGM_INVALID_DISPARITY & fabs(a - b) <= max_difference;
+}
+
+// Bit i is set where lane i is.
+uint bits_of(int16 lanes) {
+  const int16 bits = lanes & (int16)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768);
+  const int8 bits8 = bits.lo | bits.hi;
+  const int4 bits4 = bits8.lo | bits8.hi;
+  return bits4.x | bits4.y | bits4.z | bits4.w;
+}
+
+int lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
+
+#if ROW_GROUP == 1
+// Where runs begin, as far as a row has seventeen pixels from x on, sixteen at a time: an inclusive maximum of the
+// columns that do not continue their left neighbour's run. Returns the column behind; `begin` is where its left
+// neighbour's run begins.
+int find_runs_by_lanes(const int width, const float max_difference, global const float* disparity, const uint row,
+                       global ushort* runs, global uint* parents, global uint* sizes, int* begin) {
+  int x = 0;
+  for (; x + 17 <= width; x += 16) {
+    const float16 d = vload16(0, disparity + x);
+    float16 left = d;
+    if (x > 0) {
+      left = vload16(0, disparity + x - 1);
+    } else {
+      left = (float16)(EGOSGM_INVALID_DISPARITY, d.s0, d.s12, d.s3456, d.s789abcde);
+    }
+    const int16 columns = x + (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    int16 begins = are_connected(left, d, max_difference) ? (int16)(0) : columns;
+    begins = max(begins, (int16)(0, begins.s0, begins.s12, begins.s3456, begins.s789abcde));
+    begins = max(begins, (int16)((int2)(0), begins.s01, begins.s2345, begins.s6789abcd));
+    begins = max(begins, (int16)((int4)(0), begins.s0123, begins.s456789ab));
+    begins = max(begins, (int16)((int8)(0), begins.lo));
+    begins = max(begins, (int16)(*begin));
+    *begin = begins.sf;
+    const int16 valid = d > EGOSGM_INVALID_DISPARITY;
+    ((global Runs*)(runs + x))->lanes = convert_ushort16(valid ? begins : (int16)(NO_RUN));
+    const int16 ends = valid & ~are_connected(d, vload16(0, disparity + x + 1), max_difference);
+    for (uint left_ends = bits_of(ends); left_ends != 0; left_ends &= left_ends - 1) {
+      const int end = x + lowest_bit(left_ends);
+      const int first = runs[end];
+      parents[first] = row + first;
+      sizes[first] = end - first + 1;
+    }
+  }
+  return x;
+}
+#endif
+
 // Where the run of each pixel begins, and the length of each run. A work-group of ROW_GROUP a row and view.
 kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void find_runs(const ImageSize size,
                                                                              const float max_difference,
@@ -45,7 +96,12 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void find_runs(con
 #if ROW_GROUP > 1
   local int begins[ROW_GROUP];
 #endif
-  for (int tile = 0; tile < size.width; tile += ROW_GROUP) {
+  int tile = 0;
+#if ROW_GROUP == 1
+  tile = find_runs_by_lanes(size.width, max_difference, disparity + row, row, runs + row, parents + row, sizes + row,
+                            &begin_before);
+#endif
+  for (; tile < size.width; tile += ROW_GROUP) {
     const int x = tile + lane;
     const float d = x < size.width ? disparity[row + x] : EGOSGM_INVALID_DISPARITY;
     const float left = x > 0 && x <= size.width ? disparity[row + x - 1] : EGOSGM_INVALID_DISPARITY;
@@ -76,20 +132,6 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void find_runs(con
     }
   }
 }
-
-int16 are_connected(float16 a, float16 b, float max_difference) {
-  return a > EGOSGM_INVALID_DISPARITY & b > EGOSGM_INVALID_DISPARITY & fabs(a - b) <= max_difference;
-}
-
-// Bit i is set where lane i is.
-uint bits_of(int16 lanes) {
-  const int16 bits = lanes & (int16)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768);
-  const int8 bits8 = bits.lo | bits.hi;
-  const int4 bits4 = bits8.lo | bits8.hi;
-  return bits4.x | bits4.y | bits4.z | bits4.w;
-}
-
-int lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 
 // Hangs the larger root below the smaller one.
 void join(global uint* parents, uint a, uint b) {
