@@ -153,19 +153,9 @@ PipelineOptions PipelineOptions::paper() {
   PipelineOptions options;
   options.forward_warp.process_noise_px2 = 0.5f;
   options.edge_rejection.max_jump_px = 3.0f;
-  options.consistency = {.prediction_px = 1.0f, .measurement_px = 1.0f, .update_px = 1.0f};
   options.search_band.sigmas = 3.0f;
   options.search_band.min_half_width_px = 0.0f;
   options.search_band.from_neighbours = false;
-  options.vertical_alignment.enabled = false;
-  options.banded_sgm.cost = MatchingCost::kCensus9x7;
-  options.banded_sgm.p2 = 120;
-  options.banded_sgm.p2_at_edges = 120;
-  options.banded_sgm.p2_slope = 0;
-  options.banded_sgm.s_max = 120;
-  options.banded_sgm.variance_floor_px2 = 0.05f;
-  options.banded_sgm.variance_per_square_px2 = 0.0f;
-  options.median_filter.enabled = false;
   options.kalman_update.gate_px = 0.0f;
   return options;
 }

@@ -191,10 +191,8 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
   EXPECT_EQ(paper.search_band.sigmas, 3);
   EXPECT_EQ(paper.search_band.min_half_width_px, 0);
   EXPECT_GT(paper.forward_warp.process_noise_px2, 0) << "a constant q";
-  EXPECT_EQ(paper.banded_sgm.p2_slope, 0) << "one penalty everywhere";
   EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged";
-  EXPECT_FALSE(paper.median_filter.enabled);
-  EXPECT_FALSE(paper.vertical_alignment.enabled);
+  EXPECT_EQ(paper.banded_sgm.p2, PipelineOptions().banded_sgm.p2) << "the matcher, which the paper leaves open, is the default's";
   EXPECT_EQ(paper.banded_sgm.paths, 8);
   EXPECT_EQ(paper.search, SearchMode::kBand);
   EXPECT_TRUE(paper.temporal);
@@ -207,8 +205,8 @@ TEST(Options, RangesEndWhereTheyAreSaidTo) {
       {"search_band.neighbour_min_count", {"1", "2147483647"}},
       {"vertical_alignment.gain", {"0", "1"}},
       {"banded_sgm.paths", {"4", "8"}},
-      {"banded_sgm.p1", {"0", "60"}},
-      {"banded_sgm.p2", {"60", "190"}},
+      {"banded_sgm.p1", {"0", "100"}},
+      {"banded_sgm.p2", {"100", "190"}},
       {"banded_sgm.p2_at_edges", {"10", "160"}},
       {"banded_sgm.p2_slope", {"0", "255"}},
       {"banded_sgm.s_max", {"1", "32767"}},
@@ -226,7 +224,7 @@ TEST(Options, RangesEndWhereTheyAreSaidTo) {
       {"search_band.neighbour_min_count", {"0", "-1"}},
       {"vertical_alignment.gain", {"1.0001"}},
       {"banded_sgm.paths", {"0", "1", "5", "16", "-8"}},
-      {"banded_sgm.p1", {"-1", "61"}},
+      {"banded_sgm.p1", {"-1", "101"}},
       {"banded_sgm.p2", {"-1", "191"}},
       {"banded_sgm.p2_at_edges", {"-1", "161"}},
       {"banded_sgm.p2_slope", {"-1", "256"}},

@@ -49,8 +49,8 @@ struct BandedSgmOptions {
   int p1 = 10;    // penalty of a step of one disparity
   // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: max(p2_at_edges, p2 - p2_slope * g).
   int p2 = 160;
-  int p2_at_edges = 60;  // p1 <= p2_at_edges <= p2 <= 190
-  int p2_slope = 2;
+  int p2_at_edges = 100;  // p1 <= p2_at_edges <= p2 <= 190
+  int p2_slope = 1;
   // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved) path sums
   // above the minimum add up to s_max, at most 8 a side.
   int s_max = 80;
@@ -102,7 +102,8 @@ struct PipelineOptions {
   SpeckleRemovalOptions speckle_removal;
   KalmanUpdateOptions kalman_update;
 
-  /// The choices of Fućek et al. (IFAC 2017).
+  /// Fućek et al. (IFAC 2017) in what the paper says of prediction, search and fusion: constant q, three sigmas without a least
+  /// half-width, unpredicted pixels search everything, no gate. The matcher, which it leaves open, is the default's.
   static PipelineOptions paper();
 
   /// Throws InvalidArgument, naming the option, its value and what is allowed.
