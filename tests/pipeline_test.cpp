@@ -619,7 +619,7 @@ TEST(Pipeline, ReportsWhatItDid) {
   const std::vector<std::string> steady{"upload",           "ForwardWarp",       "EdgeRejection", "HoleFill",
                                         "ConsistencyCheck", "VerticalAlignment", "SearchBand",    "Census",
                                         "StepPenalties",    "BandedSgm",         "MedianFilter",  "SpeckleRemoval",
-                                        "KalmanUpdate",     "SadCheck",          "download"};
+                                        "KalmanUpdate",              "download"};
   EXPECT_EQ(stages(reports[3]), steady);
   for (const FrameReport& report : reports) {
     EXPECT_GT(report.total_ms, 0);
