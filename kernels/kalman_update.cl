@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Beyond the gate, and
-// where the matching says that the prediction was wrong (EGOSGM_ESCAPED_VARIANCE_PX2), the measurement is taken.
+// Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two
+// contradict each other, by more than the gate or because the measurement escaped its band, the measurement is taken, with a variance for
+// which the next frame searches wide.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -19,7 +20,10 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
   const Floats r = load_pixels(measured_variance + row, x, size.width);
   const Ints has_prediction = d > INVALID;
   const Ints has_measurement = z > INVALID;
-  const Ints fuses = has_prediction & has_measurement & (fabs(z - d) <= gate) & (r < (Floats)(EGOSGM_ESCAPED_VARIANCE_PX2));
+  const Floats escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+  const Ints has_both = has_prediction & has_measurement;
+  const Ints agrees = (fabs(z - d) <= gate) & (r < escaped);
+  const Ints fuses = has_both & agrees;
   const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
 
   const Floats zero = 0.0f;
@@ -30,7 +34,8 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
   const Floats fused_variance = (1.0f - gain) * p;
 
   const Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
-  const Floats variance = fuses ? fused_variance : has_measurement ? r : p;
+  const Floats contradicted = r < escaped ? escaped : r;
+  const Floats variance = fuses ? fused_variance : has_both ? contradicted : has_measurement ? r : p;
   const Floats bounded = variance < least ? least : variance;
   store_pixels(value, updated + row, x, size.width);
   store_pixels((has_measurement | predicts) ? bounded : zero, updated_variance + row, x, size.width);

@@ -38,7 +38,7 @@ typedef float f32;
 #define EGOSGM_BLOCK 8
 
 // The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside. KalmanUpdate then
-// takes the measurement instead of fusing it, and the next frame searches wide around it.
+// takes the measurement instead of fusing it, as where the two differ by more than the gate, and the next frame searches wide around it.
 #define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
 
 // The variance of a hole that MedianFilter fills.

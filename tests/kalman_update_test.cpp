@@ -73,9 +73,18 @@ TEST(KalmanUpdate, WeighsByTheVariances) {
 
 TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));
-  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12.25f, 1}), (Estimate{12.25f, 1}));
-  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {7.75f, 1}), (Estimate{7.75f, 1}));
+  // With a variance for which the next frame searches wide.
+  const float wide = EGOSGM_ESCAPED_VARIANCE_PX2;
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12.25f, 1}), (Estimate{12.25f, wide}));
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {7.75f, 1}), (Estimate{7.75f, wide}));
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {7.75f, 2 * wide}), (Estimate{7.75f, 2 * wide}));
   EXPECT_EQ(update_pixel({.gate_px = 0}, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
+}
+
+TEST(KalmanUpdate, TakesAMeasurementThatEscapedItsBand) {
+  const float escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, escaped}), (Estimate{11, escaped}));
+  EXPECT_EQ(update_pixel({.gate_px = 0}, {10, 1}, {11, escaped}), (Estimate{11, escaped}));
 }
 
 TEST(KalmanUpdate, TakesWhatIsThere) {

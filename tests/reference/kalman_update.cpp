@@ -24,9 +24,9 @@ Estimate fuse(const Estimate& predicted, const Estimate& measured) {
 Estimate update(float gate_px, bool keep_predicted, const Estimate& predicted, const Estimate& measured) {
   if (!is_valid(measured)) return keep_predicted ? predicted : kNone;
   if (!is_valid(predicted)) return measured;
-  if (gate_px > 0 && std::abs(measured.disparity - predicted.disparity) > gate_px) return measured;
-  if (measured.variance >= EGOSGM_ESCAPED_VARIANCE_PX2) return measured;
-  return fuse(predicted, measured);
+  const bool beyond_gate = gate_px > 0 && std::abs(measured.disparity - predicted.disparity) > gate_px;
+  if (!beyond_gate && measured.variance < EGOSGM_ESCAPED_VARIANCE_PX2) return fuse(predicted, measured);
+  return {measured.disparity, std::max(measured.variance, EGOSGM_ESCAPED_VARIANCE_PX2)};
 }
 
 }  // namespace
