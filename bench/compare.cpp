@@ -13,6 +13,10 @@
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/odometry.h"
+#include "host/banded_sgm.h"
+#include "host/census.h"
+#include "host/ocl/device_handle.h"
+#include "host/step_penalties.h"
 
 namespace egosgm::bench {
 namespace {
@@ -26,6 +30,7 @@ constexpr const char* kHelp =
     "  --json FILE       write the rows\n"
     "  --benchmark_filter=REGEX and what else Google Benchmark knows\n"
     "opencv_*: left view, blockSize 5, P1 = 8*25, P2 = 32*25, disp12MaxDiff 1, nothing padded.\n"
+    "egosgm_full_left: left view on the full range, eight paths, not checked, images up, disparity down.\n"
     "egosgm_full_both: both views on the full range, checked, upload to download. egosgm_banded_frame: a steady frame "
     "of the method, both\n"
     "views, upload to download, motion given. egosgm_video_frame: the same as a stream, with odometry. The last two "
@@ -160,12 +165,69 @@ Contender video_frame(const Clip& clip, const PipelineOptions& options, const De
   return {"egosgm_video_frame", [stream] { return (*stream)(); }};
 }
 
-// egosgm_full_left (one view, census to disparity) joins here when BandedSgm can match one view alone.
+/// Census to disparity of the left view over the full range, eight paths, as OpenCV's modes do it: images up, disparity down.
+class LeftMatcher {
+ public:
+  LeftMatcher(const Clip& clip, const PipelineOptions& options, const Device& device)
+      : size_{clip.frames.back().left.cols, clip.frames.back().left.rows},
+        range_{options.min_disparity, options.disparities},
+        context_(device.handle().device),
+        census_(context_, size_, PixelType::kU8, options.banded_sgm.cost, BandedSgm::code_padding(range_)),
+        step_penalties_(context_, size_, PixelType::kU8, options.banded_sgm),
+        search_band_(context_, size_, range_, options.search_band),
+        banded_sgm_(context_, size_, range_, options.banded_sgm),
+        images_(context_, 2 * pixel_count(size_)),
+        codes_(context_, Census::words(options.banded_sgm.cost, size_, BandedSgm::code_padding(range_))),
+        penalties_(context_, StepPenalties::plane_count(size_)),
+        measured_(context_, size_),
+        disparity_(pixel_count(size_)) {
+    for (const cv::Mat* view : {&clip.frames.back().left, &clip.frames.back().right}) {
+      for (int y = 0; y < view->rows; ++y) pixels_.insert(pixels_.end(), view->ptr(y), view->ptr(y) + view->cols);
+    }
+    search_band_.full_range();  // the same in every frame
+    context_.wait();
+  }
+
+  void operator()() {
+    images_.write(context_, pixels_);
+    census_(images_, codes_);
+    step_penalties_(images_, penalties_);
+    banded_sgm_(codes_, penalties_, search_band_, measured_, 1);
+    const ocl::Drain drain{context_};
+    cl::Event done;
+    context_.queue().enqueueReadBuffer(measured_.disparity.get(), CL_FALSE, 0, disparity_.size() * sizeof(float), disparity_.data(), nullptr,
+                                       &done);
+    context_.record(done);
+    context_.wait();
+  }
+
+ private:
+  const shared::ImageSize size_;
+  const shared::DisparityRange range_;
+  ocl::Context context_;
+  Census census_;
+  StepPenalties step_penalties_;
+  SearchBand search_band_;
+  BandedSgm banded_sgm_;
+  ocl::Buffer<cl_uchar> images_;
+  ocl::Buffer<cl_uint> codes_;
+  ocl::Buffer<cl_uchar> penalties_;
+  StereoMaps measured_;
+  std::vector<cl_uchar> pixels_;
+  std::vector<float> disparity_;
+};
+
+Contender full_left(const Clip& clip, const PipelineOptions& options, const Device& device) {
+  const auto matcher = std::make_shared<LeftMatcher>(clip, options, device);
+  return {"egosgm_full_left", [matcher] { return Turn{seconds_of([&] { (*matcher)(); }), {}}; }};
+}
+
 std::vector<Contender> contenders(const Clip& clip, int disparities, const Device& device) {
   PipelineOptions options;
   options.disparities = disparities;
   std::vector<Contender> list;
   for (const OpencvMode& mode : kOpencvModes) list.push_back(opencv(mode, clip, disparities));
+  list.push_back(full_left(clip, options, device));
   list.push_back(full_both(clip, options, device));
   list.push_back(banded_frame(clip, options, device));
   list.push_back(video_frame(clip, options, device));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/step_penalties.h"
 
+#include <algorithm>
+
 namespace egosgm {
 namespace {
 
@@ -15,7 +17,7 @@ StepPenalties::StepPenalties(ocl::Context& context, shared::ImageSize size, Pixe
     : context_(context),
       size_(size),
       most_(options.p2),
-      least_(options.p2_at_edges),
+      least_(std::min(options.p2_at_edges, options.p2)),
       slope_(options.p2_slope),
       penalties_(build(context, type), "penalties") {}
 

@@ -49,6 +49,8 @@ TEST(StepPenalties, FallWithTheStepInGrey) {
   EXPECT_EQ(std::vector<std::uint8_t>(planes.begin(), planes.begin() + 8), (std::vector<std::uint8_t>{100, 100, 40, 20, 100, 100, 100, 100}));
   // With a row alone, the steps to the upper left and right meet its own pixels, those to above none.
   EXPECT_EQ(std::vector<std::uint8_t>(planes.begin() + 8, planes.begin() + 12), (std::vector<std::uint8_t>{100, 100, 100, 100}));
+  // A lower p2 alone is a lower penalty everywhere.
+  EXPECT_EQ(penalties({1, 1}, {10, 10}, PixelType::kU8, {.p2 = 50, .p2_at_edges = 100}), std::vector<std::uint8_t>(8, 50));
 }
 
 }  // namespace

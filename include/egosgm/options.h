@@ -47,9 +47,10 @@ struct BandedSgmOptions {
   MatchingCost cost = MatchingCost::kPairs32;
   int paths = 8;  // 4 (horizontal and vertical) or 8
   int p1 = 10;    // penalty of a step of one disparity
-  // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: max(p2_at_edges, p2 - p2_slope * g).
-  int p2 = 160;
-  int p2_at_edges = 100;  // p1 <= p2_at_edges <= p2 <= 190
+  // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: p2 - p2_slope * g, but not below p2_at_edges
+  // (nor above p2).
+  int p2 = 160;  // p1 <= p2 <= 190
+  int p2_at_edges = 100;
   int p2_slope = 1;
   // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved) path sums
   // above the minimum add up to s_max, at most 8 a side.

@@ -7,7 +7,7 @@
 namespace egosgm::reference {
 
 int step_penalty(const BandedSgmOptions& options, int p, int q) {
-  return std::max(options.p2_at_edges, options.p2 - options.p2_slope * std::abs(p - q));
+  return std::min(options.p2, std::max(options.p2_at_edges, options.p2 - options.p2_slope * std::abs(p - q)));
 }
 
 std::vector<std::uint8_t> step_penalties(shared::ImageSize size, const std::vector<std::uint16_t>& images, int bits,
