@@ -165,7 +165,8 @@ Contender video_frame(const Clip& clip, const PipelineOptions& options, const De
   return {"egosgm_video_frame", [stream] { return (*stream)(); }};
 }
 
-/// Census to disparity of the left view over the full range, eight paths, as OpenCV's modes do it: images up, disparity down.
+/// Census to disparity of the left view over the full range, eight paths, as OpenCV's modes do it: images up, disparity
+/// down.
 class LeftMatcher {
  public:
   LeftMatcher(const Clip& clip, const PipelineOptions& options, const Device& device)
@@ -195,8 +196,8 @@ class LeftMatcher {
     banded_sgm_(codes_, penalties_, search_band_, measured_, 1);
     const ocl::Drain drain{context_};
     cl::Event done;
-    context_.queue().enqueueReadBuffer(measured_.disparity.get(), CL_FALSE, 0, disparity_.size() * sizeof(float), disparity_.data(), nullptr,
-                                       &done);
+    context_.queue().enqueueReadBuffer(measured_.disparity.get(), CL_FALSE, 0, disparity_.size() * sizeof(float),
+                                       disparity_.data(), nullptr, &done);
     context_.record(done);
     context_.wait();
   }

@@ -51,8 +51,8 @@ BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, s
       backward(build(context, range, options), "sweep_backward"),
       refine(build(context, range, options), "refine") {}
 
-BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
-                     std::optional<BandedSgmPaths::Group> group)
+BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                     const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group)
     : context_((context.enter("BandedSgm"), context)),
       size_(size),
       parameters_{size.width,
@@ -72,8 +72,8 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
   }
 }
 
-void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band,
-                           StereoMaps& measured, int views) {
+void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties,
+                           const SearchBand& band, StereoMaps& measured, int views) {
   context_.enter("BandedSgm");
   if (paths_) {
     (*paths_)(parameters_, codes, penalties, band, measured, views);
@@ -91,15 +91,16 @@ void BandedSgm::sweep(Wavefront& wavefront, const ocl::Buffer<cl_uint>& codes, c
 
   wavefront.slots.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
-    wavefront.forward(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), penalties, wavefront.slots,
-                      wavefront.sums);
+    wavefront.forward(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(),
+                      penalties, wavefront.slots, wavefront.sums);
   }
   wavefront.slots.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
-    wavefront.backward(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(), penalties, wavefront.slots,
-                       wavefront.sums, wavefront.winners);
+    wavefront.backward(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(),
+                       penalties, wavefront.slots, wavefront.sums, wavefront.winners);
   }
-  wavefront.refine(context_, ocl::every_pixel(context_, size_, views), parameters_, wavefront.winners, measured.disparity, measured.variance);
+  wavefront.refine(context_, ocl::every_pixel(context_, size_, views), parameters_, wavefront.winners,
+                   measured.disparity, measured.variance);
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {

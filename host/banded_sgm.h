@@ -11,32 +11,34 @@
 
 namespace egosgm {
 
-/// Semi-global matching of both views in their bands: disparity and matching variance. Two ways to the same bits: diagonal wavefronts (see
-/// kernels/banded_sgm.cl) and a few work-items a path (see kernels/banded_sgm_paths.cl).
+/// Semi-global matching of both views in their bands: disparity and matching variance. Two ways to the same bits:
+/// diagonal wavefronts (see kernels/banded_sgm.cl) and a few work-items a path (see kernels/banded_sgm_paths.cl).
 class BandedSgm {
  public:
   /// `group`: how paths share work-groups, where they do; by default what suits the device.
-  BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
-            std::optional<BandedSgmPaths::Group> group = {});
+  BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+            const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group = {});
 
   /// `codes`: what Census makes with a padding of `code_padding(range)`. `views`: 1 matches the left view only.
   /// `penalties`: what StepPenalties makes.
-  void operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band, StereoMaps& measured,
-                  int views = 2);
+  void operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band,
+                  StereoMaps& measured, int views = 2);
 
   static int code_padding(shared::DisparityRange range);
 
   using Forward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
-                              const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>,
-                              ocl::Buffer<cl_uchar>>;
+                              const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
+                              ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
   using Backward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
-                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>,
-                               ocl::Buffer<cl_ulong>>;
-  using Refine = ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
+                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
+                               ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>>;
+  using Refine =
+      ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
 
  private:
   struct Wavefront {
-    Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options);
+    Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+              const BandedSgmOptions& options);
 
     ocl::Buffer<cl_uchar> slots;  // path costs under way, one row of disparities a path and view
     ocl::Buffer<cl_uchar> sums;   // the forward sweep's sums, 8 bits a cell
@@ -46,8 +48,8 @@ class BandedSgm {
     Refine refine;
   };
 
-  void sweep(Wavefront& wavefront, const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band,
-             StereoMaps& measured, int views);
+  void sweep(Wavefront& wavefront, const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties,
+             const SearchBand& band, StereoMaps& measured, int views);
 
   ocl::Context& context_;
   const shared::ImageSize size_;

@@ -11,7 +11,8 @@ namespace {
 
 void expect_finite(const char* name, double value) {
   if (std::isfinite(value)) return;
-  throw InvalidArgument(std::string("calibration: ") + name + " is " + std::to_string(value) + ": give a finite number");
+  throw InvalidArgument(std::string("calibration: ") + name + " is " + std::to_string(value) +
+                        ": give a finite number");
 }
 
 void expect_positive(const char* name, double value, const char* remedy) {

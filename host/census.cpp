@@ -10,10 +10,14 @@ struct Comparisons {
 
 Comparisons comparisons(MatchingCost cost) {
   switch (cost) {
-    case MatchingCost::kSad3x3: return {0, 0, 0};
-    case MatchingCost::kCensus5x5: return {1, 2, 2};
-    case MatchingCost::kCensus9x7: return {1, 4, 3};
-    case MatchingCost::kPairs32: return {2, EGOSGM_PAIRS_RADIUS_X, EGOSGM_PAIRS_RADIUS_Y};
+    case MatchingCost::kSad3x3:
+      return {0, 0, 0};
+    case MatchingCost::kCensus5x5:
+      return {1, 2, 2};
+    case MatchingCost::kCensus9x7:
+      return {1, 4, 3};
+    case MatchingCost::kPairs32:
+      return {2, EGOSGM_PAIRS_RADIUS_X, EGOSGM_PAIRS_RADIUS_Y};
   }
   return {};
 }

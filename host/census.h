@@ -8,7 +8,8 @@
 
 namespace egosgm {
 
-/// What matching compares: a code a pixel of both views, in padded rows, the right view's from right to left (see kernels/census.cl).
+/// What matching compares: a code a pixel of both views, in padded rows, the right view's from right to left (see
+/// kernels/census.cl).
 class Census {
  public:
   /// Codes may be read up to `padding` pixels outside the image.
@@ -20,7 +21,8 @@ class Census {
   /// 32-bit words of a code, and of all codes.
   static int words(MatchingCost cost) { return cost == MatchingCost::kCensus9x7 ? 2 : 1; }
   static std::size_t words(MatchingCost cost, shared::ImageSize size, int padding) {
-    return 2 * (static_cast<std::size_t>(size.width) + 2 * static_cast<std::size_t>(padding)) * size.height * words(cost);
+    return 2 * (static_cast<std::size_t>(size.width) + 2 * static_cast<std::size_t>(padding)) * size.height *
+           words(cost);
   }
 
   using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>>;

@@ -21,13 +21,15 @@ void validate_image(const char* name, const ImageView& image, shared::ImageSize 
   const std::string view = std::string(name) + " image: ";
   if (!image.data) throw InvalidArgument(view + "no data: give a pointer to its pixels");
   if (image.width != size.width || image.height != size.height) {
-    throw InvalidArgument(view + size_text(image.width, image.height) + ", the pipeline was built for " + size_text(size.width, size.height) +
-                          ": build another pipeline for another size");
+    throw InvalidArgument(view + size_text(image.width, image.height) + ", the pipeline was built for " +
+                          size_text(size.width, size.height) + ": build another pipeline for another size");
   }
-  if (image.type != PixelType::kU8 && image.type != PixelType::kU16) throw InvalidArgument(view + "unknown pixel type: give kU8 or kU16");
+  if (image.type != PixelType::kU8 && image.type != PixelType::kU16)
+    throw InvalidArgument(view + "unknown pixel type: give kU8 or kU16");
   const std::int64_t row = static_cast<std::int64_t>(image.width) * bytes_per_pixel(image.type);
   if (image.height > 1 && std::abs(static_cast<std::int64_t>(image.stride_bytes)) < row) {
-    throw InvalidArgument(view + "a stride of " + std::to_string(image.stride_bytes) + " bytes is shorter than a row of " + std::to_string(row));
+    throw InvalidArgument(view + "a stride of " + std::to_string(image.stride_bytes) +
+                          " bytes is shorter than a row of " + std::to_string(row));
   }
 }
 
@@ -35,13 +37,14 @@ template <typename T>
 void validate_map(const char* name, const MapView<T>& map, shared::ImageSize size) {
   if (!map.data) return;
   if (map.width != size.width || map.height != size.height) {
-    throw InvalidArgument(std::string("output ") + name + ": " + size_text(map.width, map.height) + ", the pipeline was built for " +
-                          size_text(size.width, size.height) + ": give a map of that size");
+    throw InvalidArgument(std::string("output ") + name + ": " + size_text(map.width, map.height) +
+                          ", the pipeline was built for " + size_text(size.width, size.height) +
+                          ": give a map of that size");
   }
   const std::int64_t row = static_cast<std::int64_t>(map.width) * sizeof(T);
   if (map.height > 1 && std::abs(static_cast<std::int64_t>(map.stride_bytes)) < row) {
-    throw InvalidArgument(std::string("output ") + name + ": a stride of " + std::to_string(map.stride_bytes) + " bytes is shorter than a row of " +
-                          std::to_string(row));
+    throw InvalidArgument(std::string("output ") + name + ": a stride of " + std::to_string(map.stride_bytes) +
+                          " bytes is shorter than a row of " + std::to_string(row));
   }
 }
 
@@ -70,7 +73,8 @@ void fill_rows(float value, const MapView<float>& map) {
 std::vector<StageTime> stage_times(const std::vector<ocl::Context::Finished>& finished) {
   std::vector<StageTime> stages;
   for (const auto& command : finished) {
-    const auto known = std::find_if(stages.begin(), stages.end(), [&](const StageTime& s) { return s.stage == command.stage; });
+    const auto known =
+        std::find_if(stages.begin(), stages.end(), [&](const StageTime& s) { return s.stage == command.stage; });
     if (known == stages.end()) {
       stages.push_back({command.stage, command.ms});
     } else {
@@ -97,7 +101,8 @@ void FrameTransfer::validate_size(int width, int height) {
 void FrameTransfer::validate(const ImageView& left, const ImageView& right, const FrameOutputs& outputs) const {
   validate_image("left", left, size_);
   validate_image("right", right, size_);
-  if (left.type != right.type) throw InvalidArgument("left and right image differ in type: give both with 8 or both with 16 bits");
+  if (left.type != right.type)
+    throw InvalidArgument("left and right image differ in type: give both with 8 or both with 16 bits");
   validate_map("disparity", outputs.disparity, size_);
   validate_map("variance", outputs.variance, size_);
   validate_map("right_disparity", outputs.right_disparity, size_);
@@ -121,7 +126,8 @@ const FrameImages& FrameTransfer::upload(const ImageView& left, const ImageView&
     }
   }
   cl::Event done;
-  context_.queue().enqueueWriteBuffer(images_.pixels.get(), CL_FALSE, 0, staged_images_.size(), staged_images_.data(), nullptr, &done);
+  context_.queue().enqueueWriteBuffer(images_.pixels.get(), CL_FALSE, 0, staged_images_.size(), staged_images_.data(),
+                                      nullptr, &done);
   context_.record(done);
   return images_;
 }
@@ -130,16 +136,19 @@ template <typename T>
 void FrameTransfer::fetch(const ocl::Buffer<T>& buffer, std::size_t first, std::size_t count, std::vector<T>& staged) {
   staged.resize(count);
   cl::Event done;
-  context_.queue().enqueueReadBuffer(buffer.get(), CL_FALSE, first * sizeof(T), count * sizeof(T), staged.data(), nullptr, &done);
+  context_.queue().enqueueReadBuffer(buffer.get(), CL_FALSE, first * sizeof(T), count * sizeof(T), staged.data(),
+                                     nullptr, &done);
   context_.record(done);
 }
 
-void FrameTransfer::fetch_view(const ocl::Buffer<float>& maps, int view, const MapView<float>& wanted, std::vector<float>& staged) {
+void FrameTransfer::fetch_view(const ocl::Buffer<float>& maps, int view, const MapView<float>& wanted,
+                               std::vector<float>& staged) {
   if (wanted.data) fetch(maps, view * pixel_count(size_), pixel_count(size_), staged);
 }
 
-FrameReport FrameTransfer::download(const StereoMaps& result, const StereoMaps* predicted, const StereoMaps& measured, const SearchBand& band,
-                                    const ocl::Buffer<float>& vertical_offset_px, const FrameOutputs& outputs) {
+FrameReport FrameTransfer::download(const StereoMaps& result, const StereoMaps* predicted, const StereoMaps& measured,
+                                    const SearchBand& band, const ocl::Buffer<float>& vertical_offset_px,
+                                    const FrameOutputs& outputs) {
   context_.enter("download");
   fetch(result.disparity, 0, pixel_count(size_), staged_maps_[0]);  // always: the report counts its valid pixels
   fetch_view(result.variance, EGOSGM_LEFT, outputs.variance, staged_maps_[1]);
@@ -171,7 +180,8 @@ FrameReport FrameTransfer::download(const StereoMaps& result, const StereoMaps* 
   }
   copy_rows(staged_maps_[6], outputs.measured);
   copy_rows(staged_maps_[7], outputs.measured_variance);
-  copy_rows(staged_bands_, outputs.search_width, [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
+  copy_rows(staged_bands_, outputs.search_width,
+            [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
 
   FrameReport report;
   const double pixels = static_cast<double>(pixel_count(size_)), cells = 2 * pixels * range_.count;
@@ -184,9 +194,12 @@ FrameReport FrameTransfer::download(const StereoMaps& result, const StereoMaps* 
   report.search_fraction = static_cast<double>(searched) / cells;
   report.computed_fraction = static_cast<double>(computed) / cells;
   report.predicted_fraction = static_cast<double>(predicted_pixels) / pixels;
-  report.density = static_cast<double>(std::count_if(staged_maps_[0].begin(), staged_maps_[0].end(), [](float d) { return d > kInvalidDisparity; })) / pixels;
+  report.density = static_cast<double>(std::count_if(staged_maps_[0].begin(), staged_maps_[0].end(),
+                                                     [](float d) { return d > kInvalidDisparity; })) /
+                   pixels;
   report.vertical_offset_px = staged_offset_[0];
-  report.launches = static_cast<int>(std::count_if(finished.begin(), finished.end(), [](const auto& f) { return f.is_launch; }));
+  report.launches =
+      static_cast<int>(std::count_if(finished.begin(), finished.end(), [](const auto& f) { return f.is_launch; }));
   report.stages = stage_times(finished);
   return report;
 }

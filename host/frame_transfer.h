@@ -22,9 +22,11 @@ class FrameTransfer {
   /// REQUIRES: what `validate` asks.
   const FrameImages& upload(const ImageView& left, const ImageView& right);
 
-  /// Waits for the frame and fills the outputs, all of them or, if it throws, none. `predicted`: null where there is no prediction.
-  FrameReport download(const StereoMaps& result, const StereoMaps* predicted, const StereoMaps& measured, const SearchBand& band,
-                       const ocl::Buffer<float>& vertical_offset_px, const FrameOutputs& outputs);
+  /// Waits for the frame and fills the outputs, all of them or, if it throws, none. `predicted`: null where there is no
+  /// prediction.
+  FrameReport download(const StereoMaps& result, const StereoMaps* predicted, const StereoMaps& measured,
+                       const SearchBand& band, const ocl::Buffer<float>& vertical_offset_px,
+                       const FrameOutputs& outputs);
 
  private:
   template <typename T>

@@ -6,18 +6,21 @@
 namespace egosgm {
 
 void Motion::validate() const {
-  if (!current_from_previous.matrix().allFinite()) throw InvalidArgument("motion: not all values are finite: check its source");
+  if (!current_from_previous.matrix().allFinite())
+    throw InvalidArgument("motion: not all values are finite: check its source");
   const Eigen::Matrix3d rotation = current_from_previous.linear();
   const double deviation = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (deviation > 1e-4 || rotation.determinant() < 0) {
-    throw InvalidArgument("motion: its 3x3 part is not a rotation (R R^T differs from 1 by " + std::to_string(deviation) +
-                          "): give an orthonormal right-handed one");
+    throw InvalidArgument("motion: its 3x3 part is not a rotation (R R^T differs from 1 by " +
+                          std::to_string(deviation) + "): give an orthonormal right-handed one");
   }
   if (current_from_previous.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
     throw InvalidArgument("motion: the last row of its 4x4 matrix is not 0 0 0 1: give a rigid motion");
   }
-  if (!covariance.allFinite() || !covariance.isApprox(covariance.transpose(), 1e-6) || covariance.diagonal().minCoeff() < 0) {
-    throw InvalidArgument("motion: the covariance is not symmetric with a non-negative diagonal: give zero if it is not known");
+  if (!covariance.allFinite() || !covariance.isApprox(covariance.transpose(), 1e-6) ||
+      covariance.diagonal().minCoeff() < 0) {
+    throw InvalidArgument(
+        "motion: the covariance is not symmetric with a non-negative diagonal: give zero if it is not known");
   }
 }
 

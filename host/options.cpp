@@ -57,11 +57,10 @@ struct Choice {
   Enum value;
 };
 constexpr Choice<MatchingCost> kChoices(MatchingCost, int i) {
-  constexpr Choice<MatchingCost> choices[] = {
-      {"pairs32", MatchingCost::kPairs32},
-      {"census9x7", MatchingCost::kCensus9x7},
-      {"census5x5", MatchingCost::kCensus5x5},
-      {"sad3x3", MatchingCost::kSad3x3}};
+  constexpr Choice<MatchingCost> choices[] = {{"pairs32", MatchingCost::kPairs32},
+                                              {"census9x7", MatchingCost::kCensus9x7},
+                                              {"census5x5", MatchingCost::kCensus5x5},
+                                              {"sad3x3", MatchingCost::kSad3x3}};
   return i < 4 ? choices[i] : Choice<MatchingCost>{nullptr, {}};
 }
 constexpr Choice<SearchMode> kChoices(SearchMode, int i) {
@@ -78,7 +77,8 @@ std::string text_of(int value) { return std::to_string(value); }
 std::string text_of(bool value) { return value ? "true" : "false"; }
 std::string text_of(float value) {
   char buffer[32];
-  const auto result = std::to_chars(buffer, buffer + sizeof buffer, value);  // the shortest that reads back to the same bits
+  const auto result =
+      std::to_chars(buffer, buffer + sizeof buffer, value);  // the shortest that reads back to the same bits
   return std::string(buffer, result.ptr);
 }
 template <typename Enum>
@@ -100,7 +100,9 @@ void parse_number(std::string_view name, std::string_view text, Number& value, c
   if (error != std::errc() || end != text.data() + text.size()) refuse(name, text, allowed);
   value = parsed;
 }
-void parse(std::string_view name, std::string_view text, int& value) { parse_number(name, text, value, "a whole number"); }
+void parse(std::string_view name, std::string_view text, int& value) {
+  parse_number(name, text, value, "a whole number");
+}
 void parse(std::string_view name, std::string_view text, float& value) { parse_number(name, text, value, "a number"); }
 void parse(std::string_view name, std::string_view text, bool& value) {
   if (text == "true" || text == "on" || text == "1") {
@@ -166,18 +168,23 @@ void PipelineOptions::validate() const {
   for_each(*this, [](const char* name, const auto& value) {
     if constexpr (std::is_same_v<std::decay_t<decltype(value)>, float>) expect_not_negative(name, value);
   });
-  expect("search_band.neighbour_min_count", search_band.neighbour_min_count, search_band.neighbour_min_count >= 1, "choose 1 or more");
+  expect("search_band.neighbour_min_count", search_band.neighbour_min_count, search_band.neighbour_min_count >= 1,
+         "choose 1 or more");
   expect("vertical_alignment.gain", vertical_alignment.gain, vertical_alignment.gain <= 1, "choose 0 to 1");
   expect("banded_sgm.paths", banded_sgm.paths, banded_sgm.paths == 4 || banded_sgm.paths == 8, "choose 4 or 8");
-  expect("banded_sgm.p2", banded_sgm.p2, banded_sgm.p2 >= 0 && banded_sgm.p2 <= 190, "choose 0 to 190: path costs have 8 bits");
+  expect("banded_sgm.p2", banded_sgm.p2, banded_sgm.p2 >= 0 && banded_sgm.p2 <= 190,
+         "choose 0 to 190: path costs have 8 bits");
   expect("banded_sgm.p2_at_edges", banded_sgm.p2_at_edges, banded_sgm.p2_at_edges >= 0 && banded_sgm.p2_at_edges <= 190,
          "choose 0 to 190");
   expect("banded_sgm.p2_slope", banded_sgm.p2_slope, banded_sgm.p2_slope >= 0 && banded_sgm.p2_slope <= 255,
          "choose 0 (the same penalty everywhere) to 255");
-  expect("banded_sgm.p1", banded_sgm.p1, banded_sgm.p1 >= 0 && banded_sgm.p1 <= banded_sgm.p2, "choose 0 to banded_sgm.p2");
+  expect("banded_sgm.p1", banded_sgm.p1, banded_sgm.p1 >= 0 && banded_sgm.p1 <= banded_sgm.p2,
+         "choose 0 to banded_sgm.p2");
   expect("banded_sgm.s_max", banded_sgm.s_max, banded_sgm.s_max >= 1 && banded_sgm.s_max <= 32767, "choose 1 to 32767");
-  expect("banded_sgm.variance_floor_px2", banded_sgm.variance_floor_px2, banded_sgm.variance_floor_px2 > 0, "choose a positive number");
-  expect("speckle_removal.max_size_px", speckle_removal.max_size_px, speckle_removal.max_size_px >= 0, "choose 0 (off) or more");
+  expect("banded_sgm.variance_floor_px2", banded_sgm.variance_floor_px2, banded_sgm.variance_floor_px2 > 0,
+         "choose a positive number");
+  expect("speckle_removal.max_size_px", speckle_removal.max_size_px, speckle_removal.max_size_px >= 0,
+         "choose 0 (off) or more");
 }
 
 std::vector<NamedOption> list_options(const PipelineOptions& options) {

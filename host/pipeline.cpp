@@ -31,7 +31,8 @@ struct PixelStages {
   StepPenalties step_penalties;
   SadCheck sad_check;
 
-  PixelStages(ocl::Context& context, shared::ImageSize size, PixelType type, const PipelineOptions& options, int code_padding)
+  PixelStages(ocl::Context& context, shared::ImageSize size, PixelType type, const PipelineOptions& options,
+              int code_padding)
       : census(context, size, type, options.banded_sgm.cost, code_padding),
         step_penalties(context, size, type, options.banded_sgm),
         sad_check(context, size, type, options.sad_check) {}
@@ -66,7 +67,8 @@ struct Pipeline::Impl {
   bool has_belief = false;
   const char* no_belief_reason = "first frame";
 
-  Impl(const Calibration& calibration, shared::ImageSize image_size, const PipelineOptions& chosen, const Device& chosen_device)
+  Impl(const Calibration& calibration, shared::ImageSize image_size, const PipelineOptions& chosen,
+       const Device& chosen_device)
       : options(chosen),
         device(chosen_device),
         size(image_size),
@@ -142,7 +144,8 @@ struct Pipeline::Impl {
     stages_of(images.type).sad_check(images.pixels, scratch, updated);
   }
 
-  FrameReport process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion, const FrameOutputs& outputs) {
+  FrameReport process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
+                      const FrameOutputs& outputs) {
     const auto start = std::chrono::steady_clock::now();
     const ocl::Drain drain{context};
     const char* reason = full_range_reason(motion);
@@ -152,7 +155,8 @@ struct Pipeline::Impl {
     if (!reason) update(images);
 
     StereoMaps& result = reason ? measured : updated;
-    FrameReport report = transfer.download(result, reason ? nullptr : &predicted, measured, search_band, vertical_alignment.offset_px(), outputs);
+    FrameReport report = transfer.download(result, reason ? nullptr : &predicted, measured, search_band,
+                                           vertical_alignment.offset_px(), outputs);
     report.full_range = reason || options.search == SearchMode::kFull;
     report.full_range_reason = reason ? reason : options.search == SearchMode::kFull ? "search is full" : "";
     std::swap(belief, result);  // only now: a frame that failed has changed nothing
@@ -165,7 +169,8 @@ struct Pipeline::Impl {
   PixelStages& stages_of(PixelType type) { return type == PixelType::kU8 ? stages_u8 : stages_u16; }
 };
 
-Pipeline::Pipeline(const Calibration& calibration, int width, int height, const PipelineOptions& options, const Device& device) {
+Pipeline::Pipeline(const Calibration& calibration, int width, int height, const PipelineOptions& options,
+                   const Device& device) {
   calibration.validate();
   options.validate();
   FrameTransfer::validate_size(width, height);

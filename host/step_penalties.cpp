@@ -13,7 +13,8 @@ const cl::Program& build(ocl::Context& context, PixelType type) {
 
 }  // namespace
 
-StepPenalties::StepPenalties(ocl::Context& context, shared::ImageSize size, PixelType type, const BandedSgmOptions& options)
+StepPenalties::StepPenalties(ocl::Context& context, shared::ImageSize size, PixelType type,
+                             const BandedSgmOptions& options)
     : context_(context),
       size_(size),
       most_(options.p2),

@@ -7,7 +7,8 @@
 
 namespace egosgm {
 
-/// The penalty of a disparity jump between neighbouring pixels, by the grey values between them (see kernels/step_penalties.cl).
+/// The penalty of a disparity jump between neighbouring pixels, by the grey values between them (see
+/// kernels/step_penalties.cl).
 class StepPenalties {
  public:
   StepPenalties(ocl::Context& context, shared::ImageSize size, PixelType type, const BandedSgmOptions& options);
@@ -21,7 +22,9 @@ class StepPenalties {
   ocl::Context& context_;
   const shared::ImageSize size_;
   const cl_int most_, least_, slope_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const cl_int, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>> penalties_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const cl_int, const ocl::Buffer<cl_uchar>,
+              ocl::Buffer<cl_uchar>>
+      penalties_;
 };
 
 }  // namespace egosgm

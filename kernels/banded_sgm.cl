@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // Semi-global matching (Hirschmueller 2008) in a band per pixel, on diagonal wavefronts.
 //
-// Four of the eight paths come to a pixel from pixels that a sweep from the top left has done: from the left, the upper left, above and the upper
-// right. The other four are the same sweep over the image turned by 180 degrees. So two sweeps do it all. In a sweep, a pixel needs the one before it
-// and three of the row above; tiles skewed by a column a row need the tiles to the left, above and to the upper right, so all tiles (i, j) with
-// j + 2 i = wave run at once: a launch a wave, a work-item a tile.
+// Four of the eight paths come to a pixel from pixels that a sweep from the top left has done: from the left, the upper
+// left, above and the upper right. The other four are the same sweep over the image turned by 180 degrees. So two
+// sweeps do it all. In a sweep, a pixel needs the one before it and three of the row above; tiles skewed by a column a
+// row need the tiles to the left, above and to the upper right, so all tiles (i, j) with j + 2 i = wave run at once: a
+// launch a wave, a work-item a tile.
 //
-// Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d +- 1) + P1, P2(p, q)), which is
-// the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of q, or outside the disparity range.
-// The forward sweep leaves half the sum of its four paths, in 8 bits, in `sums`; the backward sweep adds its own and finds the winner.
+// Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d
+// +- 1) + P1, P2(p, q)), which is the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of
+// q, or outside the disparity range. The forward sweep leaves half the sum of its four paths, in 8 bits, in `sums`; the
+// backward sweep adds its own and finds the winner.
 //
-// A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a pixel reads
-// its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them before it writes its own.
+// A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a
+// pixel reads its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them
+// before it writes its own.
 #include "sgm_cells.h"
 
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
@@ -54,7 +57,8 @@
 #define DIRECTIONS (PATHS / 2)
 #define MAX_STEPS 8
 
-// vload16 and vstore16 go byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on all.
+// vload16 and vstore16 go byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on
+// all.
 typedef struct __attribute__((packed)) {
   uchar16 lanes;
 } Lanes;
@@ -93,9 +97,12 @@ inline uchar minimum(uchar16 v) {
 }
 
 // 255 in the lanes from `first` on, 0 in those before it.
-inline uchar16 lanes_from(const int first) { return as_uchar16(kLane >= (uchar16)((uchar)clamp(first, 0, EGOSGM_LANES))); }
+inline uchar16 lanes_from(const int first) {
+  return as_uchar16(kLane >= (uchar16)((uchar)clamp(first, 0, EGOSGM_LANES)));
+}
 
-// The lanes that lie outside of the disparity range, `first` being its end. Bands of whole chunks in a range of whole chunks have none.
+// The lanes that lie outside of the disparity range, `first` being its end. Bands of whole chunks in a range of whole
+// chunks have none.
 #if PARTIAL_CHUNKS
 #define absent_from(first) lanes_from(first)
 #else
@@ -122,8 +129,8 @@ inline Codes bit_count(Codes x) {
   return x * REPEATED(0x01) >> (Codes)(8 * CODE_BYTES - 8);
 }
 
-// Matching cost of 16 disparities. `own` and `other` point at the pixel's code and at the first disparity's in their padded rows, which run in
-// opposite directions.
+// Matching cost of 16 disparities. `own` and `other` point at the pixel's code and at the first disparity's in their
+// padded rows, which run in opposite directions.
 inline uchar16 matching_cost(global const Code* own, global const Code* other, const long above, const long below) {
 #if COST_SAD
   ushort16 sum = 0;
@@ -140,7 +147,8 @@ inline uchar16 matching_cost(global const Code* own, global const Code* other, c
 }
 
 // t(d) of one path, from the predecessor's costs at the same 16 disparities and at those one below and one above.
-inline uchar16 path_cost(const uchar16 cost, const uchar16 same, const uchar16 below, const uchar16 above, const uchar16 p1, const uchar16 p2) {
+inline uchar16 path_cost(const uchar16 cost, const uchar16 same, const uchar16 below, const uchar16 above,
+                         const uchar16 p1, const uchar16 p2) {
   return add_sat(cost, min(min(same, add_sat(min(below, above), p1)), p2));
 }
 
@@ -177,8 +185,8 @@ inline void wipe(global uchar* slot, const Band band, const int min_disparity) {
   for (int v = 1; v < band.chunks; ++v) store((uchar16)(ABSENT), at + EGOSGM_LANES * v);
 }
 
-// Both together: steps to the left and to the right of the winner until the sums above its own add up to `limit`. `beside` holds the sums of
-// the eight lanes before the winner, the nearest first, and of the eight after it.
+// Both together: steps to the left and to the right of the winner until the sums above its own add up to `limit`.
+// `beside` holds the sums of the eight lanes before the winner, the nearest first, and of the eight after it.
 inline uint count_steps(const ushort16 beside, const ushort winner, const ushort limit) {
   const ushort16 from_1 = (ushort16)(0, -1, -1, -1, -1, -1, -1, -1, 0, -1, -1, -1, -1, -1, -1, -1);
   const ushort16 from_2 = (ushort16)(0, 0, -1, -1, -1, -1, -1, -1, 0, 0, -1, -1, -1, -1, -1, -1);
@@ -191,15 +199,16 @@ inline uint count_steps(const ushort16 beside, const ushort winner, const ushort
   return (uint)((counted.x + counted.y) * 0x0101010101010101ul >> 56);
 }
 
-// A winner before its neighbourhood is looked at: the sums of 16 lanes between MAX_STEPS of 65535 on both sides, the winner's total and lane
-// (see `ranked`), and its disparity.
+// A winner before its neighbourhood is looked at: the sums of 16 lanes between MAX_STEPS of 65535 on both sides, the
+// winner's total and lane (see `ranked`), and its disparity.
 typedef struct {
   ulong8 totals;
   int rank;
   int disparity;
 } Candidate;
 
-// What `refine` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one is missing), steps; 16 bits each.
+// What `refine` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one is
+// missing), steps; 16 bits each.
 inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
   const int here = candidate->rank >> 4;
   const ushort* at = (const ushort*)&candidate->totals + MAX_STEPS + (candidate->rank & 15);
@@ -207,7 +216,8 @@ inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
   const ushort16 beside = (ushort16)(load_totals(at - MAX_STEPS).s76543210, load_totals(at + 1));
   const uint steps = count_steps(beside, (ushort)here, (ushort)q.s_max);
   const bool fits = before != 65535 && after != 65535;
-  const ushort rise_before = fits ? (ushort)(before - here) : (ushort)0, rise_after = fits ? (ushort)(after - here) : (ushort)0;
+  const ushort rise_before = fits ? (ushort)(before - here) : (ushort)0,
+               rise_after = fits ? (ushort)(after - here) : (ushort)0;
   return (ulong)(ushort)candidate->disparity | (ulong)rise_before << 16 | (ulong)rise_after << 32 | (ulong)steps << 48;
 }
 
@@ -215,10 +225,13 @@ inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
 inline ushort16 barred(const int first, const int last) { return widened(~lanes_from(first) | lanes_from(last + 1)); }
 
 // The least total of 16 lanes in its upper bits, its lane in the lower four: the smallest disparity wins a tie.
-inline int ranked(const ushort16 totals) { return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane)); }
+inline int ranked(const ushort16 totals) {
+  return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane));
+}
 
-inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
-                  global const Band* bands, global const uint* offsets, global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners) {
+inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns,
+                  global const uint* all_codes, global const Band* bands, global const uint* offsets,
+                  global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners) {
   const int tile_y = get_global_id(0);
   const int view = get_global_id(1);
   const int tile_x = wave - 2 * tile_y;
@@ -248,19 +261,24 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
 
     const int along = view == EGOSGM_LEFT ? image_x : width - 1 - image_x;
     global const Code* own = codes + ((size_t)view * height + image_y) * code_stride + q.padding + along;
-    global const Code* other = codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding + (width - 1 - along);
+    global const Code* other =
+        codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding + (width - 1 - along);
     const long above = image_y > 0 ? -(long)code_stride : 0, below = image_y + 1 < height ? (long)code_stride : 0;
 
     // Cells lie in the image's order: a backward sweep comes to a pixel's cells from their end.
     global const Band* band_at = bands + row_start + image_x;
-    global uchar* cells = sums + (row_start * MAX_CHUNKS + offsets[row_start + image_x] + (backward ? band_at->chunks : 0)) * EGOSGM_LANES;
+    global uchar* cells =
+        sums +
+        (row_start * MAX_CHUNKS + offsets[row_start + image_x] + (backward ? band_at->chunks : 0)) * EGOSGM_LANES;
 
     // P2 of a step lies at its lower or right pixel.
     global const uchar* penalty_at = penalties + row_start + image_x;
 
-    // Slots of the paths from the left, from above, from the upper left and from the upper right; the latter three move on with x.
+    // Slots of the paths from the left, from above, from the upper left and from the upper right; the latter three move
+    // on with x.
     global uchar* slot[4] = {slots + (size_t)y * SLOT, slots + (size_t)height * SLOT,
-                             slots + ((long)2 * height + width - y) * SLOT, slots + (size_t)(2 * height + 2 * width + y) * SLOT};
+                             slots + ((long)2 * height + width - y) * SLOT,
+                             slots + (size_t)(2 * height + 2 * width + y) * SLOT};
     uchar16 last = (uchar16)(ABSENT);
     int last_lane = -1;  // of `last`, or -1 where the path from the left must be read from its slot
 
@@ -268,7 +286,8 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
       const Band band = *band_at;
       const int lane = band.origin - q.min_disparity;
       const long moved = (long)x * SLOT;
-      // The bands before this one on the three paths from above. Where there is none, wiping some place in the slot does no harm.
+      // The bands before this one on the three paths from above. Where there is none, wiping some place in the slot
+      // does no harm.
       const long before[4] = {x > 0 ? -step : 0, up, x > 0 ? up - step : up, x + 1 < width ? up + step : up};
       const Band wiped[4] = {band_at[before[0]], band_at[before[1]], band_at[before[2]], band_at[before[3]]};
       uchar16 p2[DIRECTIONS];
@@ -314,7 +333,8 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
         for (int i = 0; i < DIRECTIONS; ++i) least[i] = (uchar16)(ABSENT);
         for (int v = 0; v < band.chunks; ++v) {
           const int at = lane + EGOSGM_LANES * v;
-          const uchar16 cost = absent_from(q.disparities - at) | matching_cost(own, other + band.origin + EGOSGM_LANES * v, above, below);
+          const uchar16 cost = absent_from(q.disparities - at) |
+                               matching_cost(own, other + band.origin + EGOSGM_LANES * v, above, below);
 #pragma unroll
           for (int i = 0; i < DIRECTIONS; ++i) {
             t[i][v] = path_cost_from(slot[i] + (i > 0 ? moved + at : at), cost, p1, p2[i]);
@@ -343,9 +363,11 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
           if (!backward) {
             store(sum, cells + EGOSGM_LANES * v);
           } else {
-            const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells + EGOSGM_LANES * v))) | widened(absent);
+            const ushort16 total =
+                (convert_ushort16(sum) + convert_ushort16(load(cells + EGOSGM_LANES * v))) | widened(absent);
             store_totals(total, totals + MAX_STEPS + EGOSGM_LANES * v);
-            const int first = band.first - band.origin - EGOSGM_LANES * v, last_of_band = first + band.last - band.first;
+            const int first = band.first - band.origin - EGOSGM_LANES * v,
+                      last_of_band = first + band.last - band.first;
             const bool is_inner = first <= 0 && last_of_band >= EGOSGM_LANES - 1;
             const ushort16 allowed = is_inner ? total : total | barred(first, last_of_band);
             best_chunk = select(best_chunk, (ushort16)((ushort)v), allowed < best);
@@ -373,18 +395,22 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
   }
 }
 
-kernel void sweep_forward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes, global const Band* bands,
-                          global const uint* offsets, global const uchar* penalties, global uchar* slots, global uchar* sums) {
+kernel void sweep_forward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
+                          global const Band* bands, global const uint* offsets, global const uchar* penalties,
+                          global uchar* slots, global uchar* sums) {
   sweep(false, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0);
 }
 
-kernel void sweep_backward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes, global const Band* bands,
-                           global const uint* offsets, global const uchar* penalties, global uchar* slots, global const uchar* sums, global ulong* winners) {
+kernel void sweep_backward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
+                           global const Band* bands, global const uint* offsets, global const uchar* penalties,
+                           global uchar* slots, global const uchar* sums, global ulong* winners) {
   sweep(true, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, (global uchar*)sums, winners);
 }
 
-// Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, and the matching variance (options.h).
-kernel void refine(const SgmParameters q, global const ulong* winners, global float* disparities, global float* variances) {
+// Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, and the matching variance
+// (options.h).
+kernel void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
+                   global float* variances) {
   const int x = get_global_id(0);
   if (x >= q.width) return;
   const size_t i = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width + x;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two
-// contradict each other, by more than the gate or because the measurement escaped its band, the measurement is taken, with a variance for
-// which the next frame searches wide.
+// contradict each other, by more than the gate or because the measurement escaped its band, the measurement is taken,
+// with a variance for which the next frame searches wide.
 #include "pixels.h"
 
 // lint: PIXELS=1

@@ -37,24 +37,27 @@ typedef float f32;
 // Predictions are summed up over blocks of this many pixels a side, for the bands of pixels without one.
 #define EGOSGM_BLOCK 8
 
-// The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside. KalmanUpdate then
-// takes the measurement instead of fusing it, as where the two differ by more than the gate, and the next frame searches wide around it.
+// The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside.
+// KalmanUpdate then takes the measurement instead of fusing it, as where the two differ by more than the gate, and the
+// next frame searches wide around it.
 #define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
 
 // The variance of a hole that MedianFilter fills.
 #define EGOSGM_FILLED_VARIANCE_PX2 1.0f
 
-// The 32 pairs of pixels that MatchingCost::kPairs32 compares: dx, dy of the first and of the second, drawn from a normal distribution.
+// The 32 pairs of pixels that MatchingCost::kPairs32 compares: dx, dy of the first and of the second, drawn from a
+// normal distribution.
 #define EGOSGM_PAIRS_RADIUS_X 6
 #define EGOSGM_PAIRS_RADIUS_Y 5
-#define EGOSGM_PAIRS \
-  { \
-    {-3, 0, 0, -1}, {-2, 1, -3, 0}, {-3, -1, 0, 2}, {-6, 3, -5, 2}, {-5, -1, 2, 2}, {-1, 1, -2, -1}, \
-    {4, -1, -5, -4}, {3, 2, 1, 3}, {1, -3, 4, 3}, {1, 1, -1, -1}, {2, 1, -2, -5}, {3, 0, 0, 3}, \
-    {0, -3, -2, 2}, {0, -1, 0, 2}, {-2, -2, 1, -1}, {-2, 1, -4, -3}, {1, 0, -2, 3}, {1, 0, -1, 1}, \
-    {1, 3, -2, -2}, {-4, 0, 0, -3}, {-3, -2, 3, 0}, {2, -4, 1, -2}, {-6, 1, 0, -2}, {1, -1, -1, 4}, \
-    {-3, 3, 2, 2}, {3, -3, 4, 0}, {3, 2, -1, 1}, {-1, -1, -3, 2}, {-3, 2, -2, 3}, {4, 2, -4, -1}, \
-    {2, 3, 4, -1}, {-1, -2, -1, 2} \
+#define EGOSGM_PAIRS                                                                                                  \
+  {                                                                                                                   \
+    {-3, 0, 0, -1}, {-2, 1, -3, 0}, {-3, -1, 0, 2}, {-6, 3, -5, 2}, {-5, -1, 2, 2}, {-1, 1, -2, -1}, {4, -1, -5, -4}, \
+        {3, 2, 1, 3}, {1, -3, 4, 3}, {1, 1, -1, -1}, {2, 1, -2, -5}, {3, 0, 0, 3}, {0, -3, -2, 2}, {0, -1, 0, 2},     \
+        {-2, -2, 1, -1}, {-2, 1, -4, -3}, {1, 0, -2, 3}, {1, 0, -1, 1}, {1, 3, -2, -2}, {-4, 0, 0, -3},               \
+        {-3, -2, 3, 0}, {2, -4, 1, -2}, {-6, 1, 0, -2}, {1, -1, -1, 4}, {-3, 3, 2, 2}, {3, -3, 4, 0}, {3, 2, -1, 1},  \
+        {-1, -1, -3, 2}, {-3, 2, -2, 3}, {4, 2, -4, -1}, {2, 3, 4, -1}, {                                             \
+      -1, -2, -1, 2                                                                                                   \
+    }                                                                                                                 \
   }
 
 typedef struct {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The penalty P2 of a disparity jump between two neighbouring pixels, lower where the image has an edge between them, since that is where
-// surfaces end (Hirschmueller 2008, section 2.3): P2(p, q) = max(least, most - slope |I(p) - I(q)|), grey values of 8 bits.
+// The penalty P2 of a disparity jump between two neighbouring pixels, lower where the image has an edge between them,
+// since that is where surfaces end (Hirschmueller 2008, section 2.3): P2(p, q) = max(least, most - slope |I(p) -
+// I(q)|), grey values of 8 bits.
 //
-// Four planes of a byte a pixel and view: the steps to the left, to above, to the upper left and to the upper right neighbour.
+// Four planes of a byte a pixel and view: the steps to the left, to above, to the upper left and to the upper right
+// neighbour.
 //
 // lint: PIXEL_BYTES=1
 // lint: PIXEL_BYTES=2
@@ -25,8 +27,8 @@ static inline uchar penalty(const int most, const int least, const int slope, co
   return (uchar)(lowered < least ? least : lowered);
 }
 
-kernel void penalties(const ImageSize size, const int most, const int least, const int slope, global const uchar* images,
-                      global uchar* planes) {
+kernel void penalties(const ImageSize size, const int most, const int least, const int slope,
+                      global const uchar* images, global uchar* planes) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   if (x >= size.width) return;

@@ -27,8 +27,9 @@ struct Case {
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
   const Case& c = info.param;
-  std::string text = std::to_string(c.size.width) + "x" + std::to_string(c.size.height) + "_D" + std::to_string(c.range.count) + "_from" +
-                     (c.range.min < 0 ? "minus" : "") + std::to_string(std::abs(c.range.min)) + "_paths" + std::to_string(c.paths);
+  std::string text = std::to_string(c.size.width) + "x" + std::to_string(c.size.height) + "_D" +
+                     std::to_string(c.range.count) + "_from" + (c.range.min < 0 ? "minus" : "") +
+                     std::to_string(std::abs(c.range.min)) + "_paths" + std::to_string(c.paths);
   if (c.cost == MatchingCost::kSad3x3) text += "_sad";
   if (c.cost == MatchingCost::kCensus9x7) text += "_census9x7";
   text += c.banded ? "_banded" : "_full";
@@ -40,7 +41,9 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
 void random_codes(const Case& c, std::mt19937& random, std::vector<std::uint64_t> (&codes)[2]) {
   const bool sad = c.cost == MatchingCost::kSad3x3;
   const std::uint64_t bits = c.cost == MatchingCost::kCensus9x7 ? (1ull << 62) - 1 : 0xffffffffu;
-  const auto code = [&] { return sad ? random() & 255 : (std::uint64_t{random()} << 32 | random()) & random() * 0x100000001ull & bits; };
+  const auto code = [&] {
+    return sad ? random() & 255 : (std::uint64_t{random()} << 32 | random()) & random() * 0x100000001ull & bits;
+  };
   const std::size_t pixels = pixel_count(c.size);
   for (std::size_t i = 0; i < pixels; ++i) codes[0].push_back(code());
   for (std::size_t i = 0; i < pixels; ++i) {
@@ -89,8 +92,15 @@ TEST_P(BandedSgmTest, EqualsReference) {
   penalties.write(context, {planes.begin(), planes.end()});
   sgm(device_codes, penalties, band, measured);
 
-  const shared::SgmParameters parameters{c.size.width, c.size.height, c.range.min, c.range.count, padding, options.p1,
-                                         options.s_max, options.variance_floor_px2, options.variance_per_step_px2,
+  const shared::SgmParameters parameters{c.size.width,
+                                         c.size.height,
+                                         c.range.min,
+                                         c.range.count,
+                                         padding,
+                                         options.p1,
+                                         options.s_max,
+                                         options.variance_floor_px2,
+                                         options.variance_per_step_px2,
                                          options.variance_per_square_px2};
   const auto expected = reference::banded_sgm(parameters, options, codes, grey, band.bands().read(context));
   EXPECT_TRUE(testing::same_bits(measured.disparity.read(context), expected.disparity, c.size));
@@ -134,8 +144,8 @@ std::vector<Case> along_paths(const std::vector<Case>& cases) {
   return found;
 }
 
-/// Groups of other shapes than the default: single work-items, paths that do not share out evenly, more lanes than quads, a minimum in one, two
-/// and three steps.
+/// Groups of other shapes than the default: single work-items, paths that do not share out evenly, more lanes than
+/// quads, a minimum in one, two and three steps.
 std::vector<Case> in_groups() {
   std::vector<Case> cases;
   for (const auto& [lanes, lines] : {std::pair{1, 1}, {1, 5}, {2, 3}, {16, 1}, {32, 2}, {128, 1}}) {

@@ -16,7 +16,8 @@ using Case = std::tuple<shared::ImageSize, PixelType, MatchingCost>;
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
   const auto [size, type, cost] = info.param;
-  return std::to_string(size.width) + "x" + std::to_string(size.height) + (type == PixelType::kU8 ? "_8bit" : "_16bit") +
+  return std::to_string(size.width) + "x" + std::to_string(size.height) +
+         (type == PixelType::kU8 ? "_8bit" : "_16bit") +
          (cost == MatchingCost::kPairs32     ? "_pairs32"
           : cost == MatchingCost::kCensus9x7 ? "_census9x7"
           : cost == MatchingCost::kCensus5x5 ? "_census5x5"

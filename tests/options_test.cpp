@@ -192,7 +192,8 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
   EXPECT_EQ(paper.search_band.min_half_width_px, 0);
   EXPECT_GT(paper.forward_warp.process_noise_px2, 0) << "a constant q";
   EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged";
-  EXPECT_EQ(paper.banded_sgm.p2, PipelineOptions().banded_sgm.p2) << "the matcher, which the paper leaves open, is the default's";
+  EXPECT_EQ(paper.banded_sgm.p2, PipelineOptions().banded_sgm.p2)
+      << "the matcher, which the paper leaves open, is the default's";
   EXPECT_EQ(paper.banded_sgm.paths, 8);
   EXPECT_EQ(paper.search, SearchMode::kBand);
   EXPECT_TRUE(paper.temporal);

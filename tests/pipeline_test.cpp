@@ -616,10 +616,9 @@ TEST(Pipeline, ReportsWhatItDid) {
     }
     return names;
   };
-  const std::vector<std::string> steady{"upload",           "ForwardWarp",       "EdgeRejection", "HoleFill",
-                                        "ConsistencyCheck", "VerticalAlignment", "SearchBand",    "Census",
-                                        "StepPenalties",    "BandedSgm",         "MedianFilter",  "SpeckleRemoval",
-                                        "KalmanUpdate",              "download"};
+  const std::vector<std::string> steady{
+      "upload", "ForwardWarp",   "EdgeRejection", "HoleFill",     "ConsistencyCheck", "VerticalAlignment", "SearchBand",
+      "Census", "StepPenalties", "BandedSgm",     "MedianFilter", "SpeckleRemoval",   "KalmanUpdate",      "download"};
   EXPECT_EQ(stages(reports[3]), steady);
   for (const FrameReport& report : reports) {
     EXPECT_GT(report.total_ms, 0);

@@ -35,9 +35,11 @@ TEST_P(StepPenaltiesTest, EqualsReference) {
   for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
     const int bits = type == PixelType::kU8 ? 8 : 16;
     std::vector<std::uint16_t> grey;
-    for (std::size_t i = 0; i < 2 * pixel_count(size); ++i) grey.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
+    for (std::size_t i = 0; i < 2 * pixel_count(size); ++i)
+      grey.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
     const BandedSgmOptions options{.p2 = 180, .p2_at_edges = 33, .p2_slope = 2};
-    EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, options), reference::step_penalties(size, grey, bits, options), size));
+    EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, options),
+                                   reference::step_penalties(size, grey, bits, options), size));
   }
 }
 
@@ -45,12 +47,16 @@ INSTANTIATE_TEST_SUITE_P(Sizes, StepPenaltiesTest, ::testing::ValuesIn(testing::
 
 TEST(StepPenalties, FallWithTheStepInGrey) {
   // One row in each view; plane 0 holds the steps to the left.
-  const std::vector<std::uint8_t> planes = penalties({4, 1}, {10, 10, 40, 240, 0, 0, 0, 0}, PixelType::kU8, {.p2 = 100, .p2_at_edges = 20, .p2_slope = 2});
-  EXPECT_EQ(std::vector<std::uint8_t>(planes.begin(), planes.begin() + 8), (std::vector<std::uint8_t>{100, 100, 40, 20, 100, 100, 100, 100}));
+  const std::vector<std::uint8_t> planes =
+      penalties({4, 1}, {10, 10, 40, 240, 0, 0, 0, 0}, PixelType::kU8, {.p2 = 100, .p2_at_edges = 20, .p2_slope = 2});
+  EXPECT_EQ(std::vector<std::uint8_t>(planes.begin(), planes.begin() + 8),
+            (std::vector<std::uint8_t>{100, 100, 40, 20, 100, 100, 100, 100}));
   // With a row alone, the steps to the upper left and right meet its own pixels, those to above none.
-  EXPECT_EQ(std::vector<std::uint8_t>(planes.begin() + 8, planes.begin() + 12), (std::vector<std::uint8_t>{100, 100, 100, 100}));
+  EXPECT_EQ(std::vector<std::uint8_t>(planes.begin() + 8, planes.begin() + 12),
+            (std::vector<std::uint8_t>{100, 100, 100, 100}));
   // A lower p2 alone is a lower penalty everywhere.
-  EXPECT_EQ(penalties({1, 1}, {10, 10}, PixelType::kU8, {.p2 = 50, .p2_at_edges = 100}), std::vector<std::uint8_t>(8, 50));
+  EXPECT_EQ(penalties({1, 1}, {10, 10}, PixelType::kU8, {.p2 = 50, .p2_at_edges = 100}),
+            std::vector<std::uint8_t>(8, 50));
 }
 
 }  // namespace

@@ -20,7 +20,8 @@ class Context {
   /// Builds `file` from the embedded kernels, or returns what it built before. Throws BuildError.
   const cl::Program& program(const std::string& file, const Defines& defines);
 
-  /// What is built, allocated and enqueued from now on belongs to `stage`: errors and timings name it. A string literal.
+  /// What is built, allocated and enqueued from now on belongs to `stage`: errors and timings name it. A string
+  /// literal.
   void enter(const char* stage) { stage_ = stage; }
   const char* stage() const { return stage_; }
 

@@ -93,7 +93,8 @@ std::vector<Device> Device::list() {
 Device Device::select(const std::string& wanted) {
   const std::vector<Device> devices = list();
   if (devices.empty()) {
-    throw InvalidArgument("no OpenCL device: install one, on Debian and Ubuntu `apt install pocl-opencl-icd` for the CPU");
+    throw InvalidArgument(
+        "no OpenCL device: install one, on Debian and Ubuntu `apt install pocl-opencl-icd` for the CPU");
   }
   const char* from_environment = std::getenv("EGOSGM_DEVICE");
   const std::string given = !wanted.empty() ? wanted : from_environment ? from_environment : "";
@@ -106,8 +107,8 @@ Device Device::select(const std::string& wanted) {
   for (const Device& device : devices) {
     if (fits(device.info(), name)) return device;
   }
-  throw InvalidArgument("no OpenCL device fits \"" + given + "\"" + (wanted.empty() ? " (EGOSGM_DEVICE)" : "") + ": choose one of " +
-                        numbered(devices));
+  throw InvalidArgument("no OpenCL device fits \"" + given + "\"" + (wanted.empty() ? " (EGOSGM_DEVICE)" : "") +
+                        ": choose one of " + numbered(devices));
 }
 
 const DeviceInfo& Device::info() const { return handle_->info; }

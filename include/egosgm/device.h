@@ -10,8 +10,8 @@ namespace egosgm {
 
 /// What an OpenCL device says of itself.
 struct DeviceInfo {
-  std::string name;      // "pthread-skylake-avx512-AMD EPYC"
-  std::string type;      // "CPU", "GPU", "accelerator"
+  std::string name;  // "pthread-skylake-avx512-AMD EPYC"
+  std::string type;  // "CPU", "GPU", "accelerator"
   std::string vendor;
   std::string platform;  // "Portable Computing Language"
   std::string version;   // "OpenCL 3.0 PoCL ..."
@@ -27,8 +27,8 @@ class Device {
   /// All devices, in the order in which they are preferred: GPUs, accelerators, CPUs; then as the platforms list them.
   static std::vector<Device> list();
 
-  /// The device that `wanted` names: an index into `list()`, a type ("gpu", "cpu", "accelerator"), or a part of its name,
-  /// vendor or platform (upper and lower case alike; "PLATFORM:NAME" for both). Empty: the environment variable
+  /// The device that `wanted` names: an index into `list()`, a type ("gpu", "cpu", "accelerator"), or a part of its
+  /// name, vendor or platform (upper and lower case alike; "PLATFORM:NAME" for both). Empty: the environment variable
   /// EGOSGM_DEVICE, else the first of `list()`.
   /// Throws InvalidArgument with the list where nothing fits, and how to install one where there is none.
   static Device select(const std::string& wanted = {});

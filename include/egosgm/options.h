@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be chosen: one aggregate a stage, the pipeline's options are their sum. A default is written here and nowhere else.
+// What can be chosen: one aggregate a stage, the pipeline's options are their sum. A default is written here and
+// nowhere else.
 #pragma once
 
 #include <functional>
@@ -9,8 +10,8 @@
 
 namespace egosgm {
 
-/// Matching cost of a pixel pair: Hamming distance of 32 comparisons between fixed pairs of pixels in a 13x11 window (counted
-/// twice) or of census codes, or the mean absolute difference of a 3x3 window.
+/// Matching cost of a pixel pair: Hamming distance of 32 comparisons between fixed pairs of pixels in a 13x11 window
+/// (counted twice) or of census codes, or the mean absolute difference of a 3x3 window.
 enum class MatchingCost { kPairs32, kCensus9x7, kCensus5x5, kSad3x3 };
 /// kBand: search where the prediction says (the method). kFull: search the whole range in every frame.
 enum class SearchMode { kBand, kFull };
@@ -47,13 +48,13 @@ struct BandedSgmOptions {
   MatchingCost cost = MatchingCost::kPairs32;
   int paths = 8;  // 4 (horizontal and vertical) or 8
   int p1 = 10;    // penalty of a step of one disparity
-  // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: p2 - p2_slope * g, but not below p2_at_edges
-  // (nor above p2).
+  // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: p2 - p2_slope * g, but not
+  // below p2_at_edges (nor above p2).
   int p2 = 160;  // p1 <= p2 <= 190
   int p2_at_edges = 100;
   int p2_slope = 1;
-  // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved) path sums
-  // above the minimum add up to s_max, at most 8 a side.
+  // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved)
+  // path sums above the minimum add up to s_max, at most 8 a side.
   int s_max = 80;
   float variance_floor_px2 = 0.15f;
   float variance_per_step_px2 = 0.1f;
@@ -80,8 +81,8 @@ struct SpeckleRemovalOptions {
 };
 
 struct KalmanUpdateOptions {
-  float gate_px = 3.0f;         // where prediction and measurement differ by more, the measurement is taken; 0: no gate
-  bool keep_predicted = true;   // a prediction without a measurement stays, with its grown variance
+  float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
+  bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   float min_variance_px2 = 0.02f;
 };
 
@@ -103,8 +104,9 @@ struct PipelineOptions {
   SpeckleRemovalOptions speckle_removal;
   KalmanUpdateOptions kalman_update;
 
-  /// Fućek et al. (IFAC 2017) in what the paper says of prediction, search and fusion: constant q, three sigmas without a least
-  /// half-width, unpredicted pixels search everything, no gate. The matcher, which it leaves open, is the default's.
+  /// Fućek et al. (IFAC 2017) in what the paper says of prediction, search and fusion: constant q, three sigmas without
+  /// a least half-width, unpredicted pixels search everything, no gate. The matcher, which it leaves open, is the
+  /// default's.
   static PipelineOptions paper();
 
   /// Throws InvalidArgument, naming the option, its value and what is allowed.
@@ -120,7 +122,8 @@ struct NamedOption {
 /// All options of `options`, in the order of this header.
 std::vector<NamedOption> list_options(const PipelineOptions& options);
 
-/// Sets one. Throws InvalidArgument for a name that does not exist (with the nearest that does) or a value that does not parse.
+/// Sets one. Throws InvalidArgument for a name that does not exist (with the nearest that does) or a value that does
+/// not parse.
 void set_option(PipelineOptions& options, std::string_view name, std::string_view value);
 
 }  // namespace egosgm

@@ -15,8 +15,9 @@
 
 namespace egosgm {
 
-/// Where a frame's maps go: views of the caller's memory, width x height of the pipeline each. Empty views are not filled and
-/// cost nothing. Disparities in pixels, variances in px^2; kInvalidDisparity (and variance 0) where there is no value.
+/// Where a frame's maps go: views of the caller's memory, width x height of the pipeline each. Empty views are not
+/// filled and cost nothing. Disparities in pixels, variances in px^2; kInvalidDisparity (and variance 0) where there is
+/// no value.
 struct FrameOutputs {
   MapView<float> disparity, variance;              // the left view's result
   MapView<float> right_disparity, right_variance;  // the right view's
@@ -33,8 +34,9 @@ struct StageTime {
 
 /// What happened in a frame.
 struct FrameReport {
-  bool full_range = false;        // no prediction was used: everything was searched,
-  std::string full_range_reason;  // because of this ("first frame", "no motion", "reset", "search is full", "not temporal")
+  bool full_range = false;  // no prediction was used: everything was searched,
+  std::string
+      full_range_reason;  // because of this ("first frame", "no motion", "reset", "search is full", "not temporal")
   double search_fraction = 0;     // cells that can win / (width * height * D), both views [0..1]
   double computed_fraction = 0;   // with the lanes that were computed and cannot win
   double predicted_fraction = 0;  // left pixels with a prediction
@@ -45,8 +47,8 @@ struct FrameReport {
   double total_ms = 0;            // wall clock, upload to download
 };
 
-/// Dense disparity from stereo video (Fućek et al. 2017): the last frame's disparity map, moved by the camera's motion, says where
-/// to search, and a Kalman filter per pixel fuses what was predicted with what was measured.
+/// Dense disparity from stereo video (Fućek et al. 2017): the last frame's disparity map, moved by the camera's motion,
+/// says where to search, and a Kalman filter per pixel fuses what was predicted with what was measured.
 ///
 /// Not thread-safe; two pipelines may run in two threads, also on one device.
 class Pipeline {
@@ -61,8 +63,8 @@ class Pipeline {
 
   /// Matches one rectified pair, both images of the same type, and fills `outputs`.
   /// `motion`: how the camera moved since the last frame that was processed; none: the whole range is searched.
-  /// Throws InvalidArgument before anything is enqueued, or DeviceError. A frame that throws leaves the pipeline as it was, so the
-  /// next one gives the bits that it would have given.
+  /// Throws InvalidArgument before anything is enqueued, or DeviceError. A frame that throws leaves the pipeline as it
+  /// was, so the next one gives the bits that it would have given.
   FrameReport process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
                       const FrameOutputs& outputs);
 

@@ -50,12 +50,14 @@ struct View {
 
   int cost(int x, int y, int d) const {
     if (options.cost != MatchingCost::kSad3x3) {
-      return (options.cost == MatchingCost::kCensus9x7 ? 1 : 2) * std::popcount(code(own, x, y) ^ code(other, matched(x, d), y));
+      return (options.cost == MatchingCost::kCensus9x7 ? 1 : 2) *
+             std::popcount(code(own, x, y) ^ code(other, matched(x, d), y));
     }
     int sum = 0;
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
-        sum += std::abs(static_cast<int>(code(own, x + dx, y + dy)) - static_cast<int>(code(other, matched(x, d) + dx, y + dy)));
+        sum += std::abs(static_cast<int>(code(own, x + dx, y + dy)) -
+                        static_cast<int>(code(other, matched(x, d) + dx, y + dy)));
       }
     }
     return std::min(sum / 9, 63);
@@ -116,19 +118,22 @@ int count_steps(const shared::SgmParameters& q, Cells& sums, int pixel, int winn
 
 float offset(Cells& sums, int pixel, int winner) {
   if (!sums.has(pixel, winner - 1) || !sums.has(pixel, winner + 1)) return 0;
-  const float before = static_cast<float>(sums.at(pixel, winner - 1)), here = static_cast<float>(sums.at(pixel, winner)),
-              after = static_cast<float>(sums.at(pixel, winner + 1));
+  const float before = static_cast<float>(sums.at(pixel, winner - 1)),
+              here = static_cast<float>(sums.at(pixel, winner)), after = static_cast<float>(sums.at(pixel, winner + 1));
   const float slope = std::max(before, after) - here;
   return slope > 0 ? std::clamp((before - after) / (2 * slope), -0.5f, 0.5f) : 0.0f;
 }
 
 }  // namespace
 
-testing::HostMaps banded_sgm(const shared::SgmParameters& q, const BandedSgmOptions& options, const std::vector<std::uint64_t> (&codes)[2],
-                             const std::vector<std::uint16_t>& grey, const std::vector<shared::Band>& bands) {
+testing::HostMaps banded_sgm(const shared::SgmParameters& q, const BandedSgmOptions& options,
+                             const std::vector<std::uint64_t> (&codes)[2], const std::vector<std::uint16_t>& grey,
+                             const std::vector<shared::Band>& bands) {
   testing::HostMaps maps;
   for (int view = 0; view < 2; ++view) {
-    const View v{q, view, options, grey.data() + static_cast<std::size_t>(view) * q.width * q.height, codes[view], codes[1 - view]};
+    const View v{q,           view,
+                 options,     grey.data() + static_cast<std::size_t>(view) * q.width * q.height,
+                 codes[view], codes[1 - view]};
     const shared::Band* band = bands.data() + static_cast<std::size_t>(view) * q.width * q.height;
     Cells sums = half_sum(v, band, options.paths, 1), backward = half_sum(v, band, options.paths, -1);
     for (int p = 0; p < q.width * q.height; ++p) {

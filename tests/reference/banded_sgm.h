@@ -10,8 +10,8 @@
 
 namespace egosgm::reference {
 
-/// Disparity and matching variance of both views. `codes`: what reference::codes gives, per view. `bands`: per view and pixel.
-/// `grey`: both views' grey values of 8 bits, for the penalties of `options`.
+/// Disparity and matching variance of both views. `codes`: what reference::codes gives, per view. `bands`: per view and
+/// pixel. `grey`: both views' grey values of 8 bits, for the penalties of `options`.
 testing::HostMaps banded_sgm(const shared::SgmParameters& parameters, const BandedSgmOptions& options,
                              const std::vector<std::uint64_t> (&codes)[2], const std::vector<std::uint16_t>& grey,
                              const std::vector<shared::Band>& bands);

@@ -29,9 +29,11 @@ std::vector<Comparison> pairs() {
 
 }  // namespace
 
-std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::uint16_t>& image, int bits, MatchingCost cost) {
+std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::uint16_t>& image, int bits,
+                                 MatchingCost cost) {
   const auto at = [&](int x, int y) {
-    return image[static_cast<std::size_t>(std::clamp(y, 0, size.height - 1)) * size.width + std::clamp(x, 0, size.width - 1)];
+    return image[static_cast<std::size_t>(std::clamp(y, 0, size.height - 1)) * size.width +
+                 std::clamp(x, 0, size.width - 1)];
   };
   const std::vector<Comparison> comparisons = cost == MatchingCost::kCensus9x7   ? window(4, 3)
                                               : cost == MatchingCost::kCensus5x5 ? window(2, 2)
@@ -42,7 +44,8 @@ std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       std::uint64_t code = cost == MatchingCost::kSad3x3 ? at(x, y) >> (bits - 8) : 0;
-      for (const Comparison& c : comparisons) code = 2 * code + (at(x + c.dx, y + c.dy) < at(x + c.than_dx, y + c.than_dy));
+      for (const Comparison& c : comparisons)
+        code = 2 * code + (at(x + c.dx, y + c.dy) < at(x + c.than_dx, y + c.than_dy));
       codes.push_back(code);
     }
   }

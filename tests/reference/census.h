@@ -10,9 +10,11 @@
 namespace egosgm::reference {
 
 /// Codes of one view, without padding, from left to right. `image`: grey values of 8 or 16 `bits`.
-std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::uint16_t>& image, int bits, MatchingCost cost);
+std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::uint16_t>& image, int bits,
+                                 MatchingCost cost);
 
-/// Both views' codes as the kernel lays them out: 32-bit words, low word first, in padded rows, the right view's from right to left.
+/// Both views' codes as the kernel lays them out: 32-bit words, low word first, in padded rows, the right view's from
+/// right to left.
 std::vector<std::uint32_t> padded_codes(shared::ImageSize size, const std::vector<std::uint64_t>& left,
                                         const std::vector<std::uint64_t>& right, int padding, MatchingCost cost);
 

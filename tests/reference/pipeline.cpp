@@ -63,8 +63,8 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
   const bool everything = frame.predicted.disparity.empty() || options_.search == SearchMode::kFull;
   Pass pass;
   pass.images = resample(size_, known.offset_px, images.greys);
-  pass.band =
-      everything ? full_range(size_, range_, frame.predicted.disparity) : search_band(size_, range_, options_.search_band, frame.predicted);
+  pass.band = everything ? full_range(size_, range_, frame.predicted.disparity)
+                         : search_band(size_, range_, options_.search_band, frame.predicted);
 
   const auto middle = pass.images.begin() + static_cast<std::ptrdiff_t>(pass.images.size() / 2);
   const std::vector<std::uint64_t> both[2] = {codes(size_, {pass.images.begin(), middle}, images.bits, sgm.cost),

@@ -20,7 +20,8 @@ std::vector<std::uint8_t> step_penalties(shared::ImageSize size, const std::vect
         for (int x = 0; x < size.width; ++x) {
           const auto at = [&](int u, int v) {
             const int inside_u = std::clamp(u, 0, size.width - 1), inside_v = std::clamp(v, 0, size.height - 1);
-            return images[(static_cast<std::size_t>(view) * size.height + inside_v) * size.width + inside_u] >> (bits - 8);
+            return images[(static_cast<std::size_t>(view) * size.height + inside_v) * size.width + inside_u] >>
+                   (bits - 8);
           };
           planes.push_back(static_cast<std::uint8_t>(step_penalty(options, at(x, y), at(x + dx, y + dy))));
         }

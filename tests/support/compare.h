@@ -10,10 +10,11 @@
 
 namespace egosgm::testing {
 
-/// Bit by bit, for stereo maps (two views of `size`) or anything else that lies row by row. Tells how many differ, where
-/// the first is, and both values.
+/// Bit by bit, for stereo maps (two views of `size`) or anything else that lies row by row. Tells how many differ,
+/// where the first is, and both values.
 template <typename T>
-::testing::AssertionResult same_bits(const std::vector<T>& actual, const std::vector<T>& expected, shared::ImageSize size) {
+::testing::AssertionResult same_bits(const std::vector<T>& actual, const std::vector<T>& expected,
+                                     shared::ImageSize size) {
   if (actual.size() != expected.size()) {
     return ::testing::AssertionFailure() << actual.size() << " values, expected " << expected.size();
   }
