@@ -16,8 +16,10 @@ struct Command {
 };
 
 Command add_run(CLI::App& program);
+Command add_batch(CLI::App& program);
 Command add_eval(CLI::App& program);
 Command add_devices(CLI::App& program);
+Command add_compile(CLI::App& program);
 Command add_synth(CLI::App& program);
 Command add_odometry(CLI::App& program);
 Command add_eval_poses(CLI::App& program);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command.h"
+#include "apps/metrics_json.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
@@ -39,28 +40,18 @@ Row compare(const vision::EvaluationPair& pair) {
   }
 }
 
-Json json_of(const DisparityMetrics& m) {  // NaN becomes null
-  return {{"bad_or_missing", m.bad_or_missing},
-          {"bad_of_valid", m.bad_of_valid},
-          {"density", m.density},
-          {"interpolated", m.interpolated},
-          {"d1", m.d1},
-          {"d1_interpolated", m.d1_interpolated},
-          {"mae", m.mae_px}};
-}
-
 Json json_of(const std::vector<Row>& rows, const DisparityMetrics& pooled, const DisparityMetrics& mean,
              const std::vector<std::filesystem::path>& without_estimate) {
   Json json{{"pairs", Json::array()},
-            {"pooled", json_of(pooled)},
-            {"mean", json_of(mean)},
+            {"pooled", app::json_of(pooled)},
+            {"mean", app::json_of(mean)},
             {"without_estimate", Json::array()}};
   for (const Row& row : rows) {
     Json entry{{"name", row.name},
                {"estimate", row.pair.estimate.string()},
                {"truth", row.pair.truth.string()},
                {"truth_pixels", row.counts.truth}};
-    entry.update(json_of(vision::metrics_of(row.counts)));
+    entry.update(app::json_of(vision::metrics_of(row.counts)));
     json["pairs"].push_back(std::move(entry));
   }
   for (const auto& file : without_estimate) json["without_estimate"].push_back(file.string());

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "apps/run.h"
+
 #include <fmt/core.h>
 
 #include <chrono>
@@ -7,6 +9,7 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/device_arguments.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
 #include "apps/option_arguments.h"
@@ -30,7 +33,7 @@ double ms_since(Clock::time_point start) {
 struct RunArguments {
   SequenceArguments input;
   OptionArguments method;
-  std::string out, poses, device, write;
+  std::string out, poses, device, programs, write;
   bool interpolate = false, quiet = false;
 };
 
@@ -43,20 +46,17 @@ struct PreparedFrame {
 
 class Run {
  public:
-  explicit Run(const RunArguments& arguments)
-      : quiet_(arguments.quiet),
-        folder_(arguments.out),
-        sequence_(arguments.input.open()),
+  Run(const SequenceJob& job, const Device& device)
+      : quiet_(job.quiet),
+        folder_(job.out),
+        sequence_(job.sequence),
         size_(vision::check_image_sizes(sequence_)),
-        motions_(sequence_, arguments.poses),
-        options_(arguments.method.options()),
-        device_(Device::select(arguments.device)),
-        outputs_(folder_, kinds_of(arguments), size_, options_.disparities),
-        pipeline_(sequence_.calibration, size_.width, size_.height, options_, device_),
-        report_(sequence_, pipeline_, arguments.method.preset, size_.width, size_.height) {}
+        motions_(sequence_, job.poses_file),
+        outputs_(folder_, job.kinds, size_, job.options.disparities),
+        pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
+        report_(sequence_, pipeline_, job.preset, size_.width, size_.height) {}
 
-  int operator()() {
-    catch_interrupts();
+  bool operator()() {
     try {
       const bool finished = process_all();
       finish(finished, finished ? "" : "an interrupt");
@@ -64,7 +64,7 @@ class Run {
         fmt::print(stderr, "egosgm: interrupted after {} of {} frames: what is in {} is whole\n", poses_.size(),
                    sequence_.frames.size(), folder_.string());
       }
-      return finished ? kOk : kInterrupted;
+      return finished;
     } catch (const std::exception& error) {
       finish_after(error);
       throw;
@@ -72,12 +72,6 @@ class Run {
   }
 
  private:
-  static std::set<std::string> kinds_of(const RunArguments& arguments) {
-    std::set<std::string> kinds = parse_write_list(arguments.write);
-    if (arguments.interpolate) kinds.insert("interpolated");
-    return kinds;
-  }
-
   bool process_all() {
     // On a CPU device the next frame's odometry would only take the kernels' cores, and spoil their times.
     const bool ahead = pipeline_.device().info().type != "CPU";
@@ -158,12 +152,10 @@ class Run {
   }
 
   const bool quiet_;
-  const std::filesystem::path folder_;
-  const vision::StereoSequence sequence_;
+  const std::filesystem::path& folder_;
+  const vision::StereoSequence& sequence_;
   const cv::Size size_;
   MotionSource motions_;
-  const PipelineOptions options_;
-  const Device device_;
   RunOutputs outputs_;
   Pipeline pipeline_;
   RunReport report_;
@@ -172,7 +164,30 @@ class Run {
   bool warned_of_range_ = false;
 };
 
+SequenceJob job_of(const RunArguments& arguments) {
+  SequenceJob job;
+  job.sequence = arguments.input.open();
+  job.options = arguments.method.options();
+  job.preset = arguments.method.preset;
+  job.poses_file = arguments.poses;
+  job.out = arguments.out;
+  job.kinds = parse_write_list(arguments.write);
+  if (arguments.interpolate) job.kinds.insert("interpolated");
+  job.quiet = arguments.quiet;
+  return job;
+}
+
+int run(const RunArguments& arguments) {
+  const SequenceJob job = job_of(arguments);
+  Device device = Device::select(arguments.device);
+  if (!arguments.programs.empty()) device = device.with_programs(arguments.programs);
+  catch_interrupts();
+  return run_sequence(job, device) ? kOk : kInterrupted;
+}
+
 }  // namespace
+
+bool run_sequence(const SequenceJob& job, const Device& device) { return Run(job, device)(); }
 
 Command add_run(CLI::App& program) {
   CLI::App* command = program.add_subcommand("run", "Disparity and variance for every frame of a stereo sequence");
@@ -195,12 +210,9 @@ Command add_run(CLI::App& program) {
                    "take the motion from KITTI poses (camera-to-world) in place of stereo odometry")
       ->type_name("FILE")
       ->group("Method");
-  command
-      ->add_option("--device", arguments->device,
-                   "OpenCL device: number, cpu, gpu, or part of its name; see egosgm devices")
-      ->type_name("NAME")
-      ->group("Method");
-  return {command, [arguments] { return Run(*arguments)(); }};
+  add_device(*command, arguments->device);
+  add_programs(*command, arguments->programs);
+  return {command, [arguments] { return run(*arguments); }};
 }
 
 }  // namespace egosgm::app

@@ -5,6 +5,7 @@
 #include <chrono>
 
 #include "egosgm/error.h"
+#include "egosgm/programs.h"
 #include "host/banded_sgm.h"
 #include "host/census.h"
 #include "host/consistency_check.h"
@@ -72,7 +73,7 @@ struct Pipeline::Impl {
       : options(chosen),
         device(chosen_device),
         size(image_size),
-        context(device.handle().device),
+        context(device.handle().device, device.handle().programs),
         forward_warp(context, size, calibration, options.forward_warp, range_of(options)),
         edge_rejection(context, size, options.edge_rejection),
         hole_fill(context, size, options.hole_fill),
@@ -199,5 +200,15 @@ void Pipeline::reset() {
 const PipelineOptions& Pipeline::options() const { return impl_->options; }
 const Device& Pipeline::device() const { return impl_->device; }
 std::uint64_t Pipeline::device_memory_bytes() const { return impl_->context.allocated_bytes(); }
+
+std::vector<ProgramFile> compile_programs(const Device& device, const PipelineOptions& options) {
+  options.validate();
+  return ocl::translated("compile", [&] {
+    // Of the least size: no define depends on it.
+    const Calibration any{.fx = 1, .fy = 1, .cx = 0, .cy = 0, .baseline_m = 1};
+    const Pipeline::Impl pipeline(any, shared::ImageSize{1, 1}, options, device);
+    return ocl::files_of(device.handle().device, pipeline.context.programs());
+  });
+}
 
 }  // namespace egosgm

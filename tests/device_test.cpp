@@ -132,6 +132,51 @@ TEST_F(DeviceTest, IsSelectedByTheEnvironmentUnlessTheCallerNamesOne) {
   EXPECT_TRUE(is_same(Device::select("0"), devices.front()));
 }
 
+/// A device of at least two compute units that its driver divides.
+std::optional<Device> divisible_device() {
+  for (const Device& device : Device::list()) {
+    if (device.info().compute_units < 2) continue;
+    try {
+      device.compute_units(0, 0);
+      return device;
+    } catch (const InvalidArgument&) {
+    }
+  }
+  return std::nullopt;
+}
+
+TEST_F(DeviceTest, ComputeUnitsAreDevicesOfTheirOwn) {
+  const auto whole = divisible_device();
+  if (!whole) GTEST_SKIP() << "no device here can be divided";
+  const DeviceInfo& info = whole->info();
+  const std::string last = std::to_string(info.compute_units - 1);
+  for (const auto& [ending, units] :
+       {std::pair<std::string, int>{"/0", 1}, {"/" + last, 1}, {"/0-" + last, info.compute_units}}) {
+    const Device part = Device::select(changed_case(info.name) + ending);
+    EXPECT_EQ(part.info().name, ending == "/0-0" ? info.name + "/0" : info.name + ending);
+    EXPECT_EQ(part.info().compute_units, units);
+    EXPECT_EQ(part.info().driver, info.driver);
+    EXPECT_EQ(Device::select(part.info().name).info().name, part.info().name);
+    set_wanted(part.info().name);
+    EXPECT_EQ(Device::select().info().name, part.info().name);
+  }
+  EXPECT_EQ(Device::select("0/0").info().name, Device::list().front().info().name + "/0");
+}
+
+TEST_F(DeviceTest, RefusesComputeUnitsThatAreNotThere) {
+  const auto whole = divisible_device();
+  if (!whole) GTEST_SKIP() << "no device here can be divided";
+  const std::string units = std::to_string(whole->info().compute_units);
+  for (const std::string ending : {"/" + units, "/0-" + units, std::string("/1-0"), std::string("/99999")}) {
+    expect_refused([&] { Device::select(whole->info().name + ending); },
+                   {whole->info().name + ": compute units ", "it has " + units + ", numbered from 0"});
+  }
+  for (const std::string ending : {"/", "/-1", "/0-", "/a", "/0-1-2", "/99999999999"}) {
+    expect_refused([&] { Device::select(whole->info().name + ending); }, {"no OpenCL device fits"});
+  }
+  expect_refused([&] { whole->compute_units(-1, 0); }, {"compute units -1 to 0"});
+}
+
 TEST_F(DeviceTest, RefusesUnknownNamesWithTheList) {
   for (const std::string wanted : {"No Such Device", "4711", "-1", "0x0", ":::"}) {
     for (const Device& device : Device::list()) {

@@ -39,13 +39,14 @@ std::string build_log(const cl::Program& program, const cl::Device& device) {
 
 }  // namespace
 
-Context::Context(const cl::Device& device)
+Context::Context(const cl::Device& device, std::shared_ptr<const ProgramFolder> programs)
     : device_(device),
       context_(device),
       queue_(context_, device, CL_QUEUE_PROFILING_ENABLE),
       build_options_(build_options(device)),
       max_work_group_size_(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>()),
-      max_allocation_bytes_(device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()) {}
+      max_allocation_bytes_(device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()),
+      folder_(std::move(programs)) {}
 
 std::vector<Context::Finished> Context::wait() {
   const auto commands = std::exchange(commands_, {});
@@ -76,17 +77,28 @@ void Context::expect_allocatable(std::uint64_t bytes) const {
 
 const cl::Program& Context::program(const std::string& file, const Defines& defines) {
   const std::pair key{file, defines.text()};
-  if (const auto built = programs_.find(key); built != programs_.end()) return built->second;
+  if (const auto built = programs_.find(key); built != programs_.end()) return built->second.second;
 
-  cl::Program program(context_, std::string(kPreamble) + expand(file));
-  const std::string options = build_options_ + key.second;
+  const ProgramSource source{file, std::string(kPreamble) + expand(file), build_options_ + key.second};
+  const cl::Program program = created(source);
   // cl::Program::build asks for the log whatever went wrong, and reports that there is none instead of why.
-  const cl_int status = ::clBuildProgram(program(), 1, &device_(), options.c_str(), nullptr, nullptr);
+  const cl_int status = ::clBuildProgram(program(), 1, &device_(), source.options.c_str(), nullptr, nullptr);
   if (status != CL_SUCCESS) {
     throw BuildError(status, std::string(stage_) + ": building " + file + " failed with OpenCL status " +
                                  status_name(status) + "\n" + build_log(program, device_));
   }
-  return programs_.emplace(key, program).first->second;
+  return programs_.emplace(key, std::pair{source, program}).first->second.second;
+}
+
+cl::Program Context::created(const ProgramSource& source) const {
+  if (!folder_) return cl::Program(context_, source.text);
+  return cl::Program(context_, {device_}, {folder_->binary(source)});
+}
+
+std::vector<std::pair<ProgramSource, cl::Program>> Context::programs() const {
+  std::vector<std::pair<ProgramSource, cl::Program>> all;
+  for (const auto& [key, built] : programs_) all.push_back(built);
+  return all;
 }
 
 }  // namespace egosgm::ocl

@@ -3,22 +3,26 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "host/ocl/defines.h"
-#include "host/ocl/opencl.h"
+#include "host/ocl/program_folder.h"
 
 namespace egosgm::ocl {
 
 /// One device with its in-order queue, the programs built for it, and the commands under way. Not thread-safe.
 class Context {
  public:
-  explicit Context(const cl::Device& device);
+  /// `programs`: where programs come from; null: from the embedded kernels, compiled.
+  explicit Context(const cl::Device& device, std::shared_ptr<const ProgramFolder> programs = nullptr);
 
-  /// Builds `file` from the embedded kernels, or returns what it built before. Throws BuildError.
+  /// Builds `file`, or returns what it built before. Throws BuildError, or InvalidArgument as ProgramFolder does.
   const cl::Program& program(const std::string& file, const Defines& defines);
+  /// All that were built.
+  std::vector<std::pair<ProgramSource, cl::Program>> programs() const;
 
   /// What is built, allocated and enqueued from now on belongs to `stage`: errors and timings name it. A string
   /// literal.
@@ -55,6 +59,8 @@ class Context {
   std::size_t max_work_group_size() const { return max_work_group_size_; }
 
  private:
+  cl::Program created(const ProgramSource& source) const;
+
   struct Command {
     const char* stage;
     cl::Event event;
@@ -69,7 +75,8 @@ class Context {
   std::uint64_t max_allocation_bytes_ = 0;
   std::uint64_t allocated_bytes_ = 0;
   const char* stage_ = "setup";
-  std::map<std::pair<std::string, std::string>, cl::Program> programs_;
+  std::shared_ptr<const ProgramFolder> folder_;
+  std::map<std::pair<std::string, std::string>, std::pair<ProgramSource, cl::Program>> programs_;
   std::vector<Command> commands_;
 };
 

@@ -5,19 +5,16 @@
 #include <cctype>
 #include <charconv>
 #include <cstdlib>
+#include <optional>
+#include <string_view>
 
 #include "egosgm/error.h"
 #include "host/ocl/device_handle.h"
+#include "host/ocl/errors.h"
+#include "host/ocl/strings.h"
 
 namespace egosgm {
 namespace {
-
-// CLHPP leaves the terminating zero of some drivers in its strings.
-std::string trimmed(std::string text) {
-  text = text.substr(0, text.find('\0'));
-  while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back()))) text.pop_back();
-  return text;
-}
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
@@ -33,12 +30,12 @@ std::string type_name(cl_device_type type) {
 int preference(const std::string& type) { return type == "GPU" ? 0 : type == "accelerator" ? 1 : 2; }
 
 DeviceInfo describe(const cl::Platform& platform, const cl::Device& device) {
-  return {.name = trimmed(device.getInfo<CL_DEVICE_NAME>()),
+  return {.name = ocl::trimmed(device.getInfo<CL_DEVICE_NAME>()),
           .type = type_name(device.getInfo<CL_DEVICE_TYPE>()),
-          .vendor = trimmed(device.getInfo<CL_DEVICE_VENDOR>()),
-          .platform = trimmed(platform.getInfo<CL_PLATFORM_NAME>()),
-          .version = trimmed(device.getInfo<CL_DEVICE_VERSION>()),
-          .driver = trimmed(device.getInfo<CL_DRIVER_VERSION>()),
+          .vendor = ocl::trimmed(device.getInfo<CL_DEVICE_VENDOR>()),
+          .platform = ocl::trimmed(platform.getInfo<CL_PLATFORM_NAME>()),
+          .version = ocl::trimmed(device.getInfo<CL_DEVICE_VERSION>()),
+          .driver = ocl::trimmed(device.getInfo<CL_DRIVER_VERSION>()),
           .compute_units = static_cast<int>(device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>()),
           .memory_bytes = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>(),
           .max_allocation_bytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()};
@@ -54,6 +51,49 @@ bool fits(const DeviceInfo& info, const std::string& wanted) {
   return contains(info.name, wanted) || contains(info.vendor, wanted) || contains(info.platform, wanted);
 }
 
+/// "NAME/FIRST-LAST" or "NAME/FIRST", numbers of compute units. None where `wanted` does not end so.
+struct UnitRange {
+  std::string device;
+  int first = 0, last = 0;
+};
+
+std::optional<int> number_of(std::string_view text) {
+  int number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size() && number >= 0 ? std::optional(number) : std::nullopt;
+}
+
+std::optional<UnitRange> unit_range(const std::string& wanted) {
+  const auto slash = wanted.rfind('/');
+  if (slash == std::string::npos) return std::nullopt;
+  const std::string_view units = std::string_view(wanted).substr(slash + 1);
+  const auto dash = units.find('-');
+  const auto first = number_of(units.substr(0, dash));
+  const auto last = dash == std::string_view::npos ? first : number_of(units.substr(dash + 1));
+  if (!first || !last) return std::nullopt;
+  return UnitRange{wanted.substr(0, slash), *first, *last};
+}
+
+/// The compute units `first` to `last` of `device` as a device of their own.
+cl::Device sub_device(const cl::Device& device, const DeviceInfo& info, int first, int last) {
+  const std::string asked = info.name + ": compute units " + std::to_string(first) + " to " + std::to_string(last);
+  if (first < 0 || first > last || last >= info.compute_units) {
+    throw InvalidArgument(asked + ": it has " + std::to_string(info.compute_units) + ", numbered from 0");
+  }
+  std::vector<cl_device_partition_property> counts{CL_DEVICE_PARTITION_BY_COUNTS};
+  if (first > 0) counts.push_back(first);
+  counts.push_back(last - first + 1);
+  counts.insert(counts.end(), {CL_DEVICE_PARTITION_BY_COUNTS_LIST_END, 0});
+  std::vector<cl::Device> parts;
+  try {
+    cl::Device(device).createSubDevices(counts.data(), &parts);
+  } catch (const cl::Error& error) {
+    throw InvalidArgument(asked + ": its driver does not divide it (OpenCL status " + ocl::status_name(error.err()) +
+                          "): choose the whole device");
+  }
+  return parts.back();
+}
+
 std::string numbered(const std::vector<Device>& devices) {
   std::string text;
   for (std::size_t i = 0; i < devices.size(); ++i) {
@@ -61,6 +101,15 @@ std::string numbered(const std::vector<Device>& devices) {
     text += (i ? ", " : "") + std::to_string(i) + " = " + info.name + " (" + info.type + ", " + info.platform + ")";
   }
   return text;
+}
+
+/// The device that `name` (lower case) fits as a whole; null: none.
+const Device* find(const std::vector<Device>& devices, const std::string& name) {
+  if (name.empty()) return &devices.front();
+  if (const auto index = number_of(name); index && *index < static_cast<int>(devices.size())) return &devices[*index];
+  const auto found =
+      std::find_if(devices.begin(), devices.end(), [&](const Device& device) { return fits(device.info(), name); });
+  return found == devices.end() ? nullptr : &*found;
 }
 
 }  // namespace
@@ -81,7 +130,7 @@ std::vector<Device> Device::list() {
       continue;  // a platform without a device
     }
     for (const cl::Device& device : found) {
-      devices.push_back(Device(std::make_shared<const Handle>(Handle{device, describe(platform, device)})));
+      devices.push_back(Device(std::make_shared<const Handle>(Handle{device, describe(platform, device), nullptr})));
     }
   }
   std::stable_sort(devices.begin(), devices.end(), [](const Device& a, const Device& b) {
@@ -98,17 +147,27 @@ Device Device::select(const std::string& wanted) {
   }
   const char* from_environment = std::getenv("EGOSGM_DEVICE");
   const std::string given = !wanted.empty() ? wanted : from_environment ? from_environment : "";
-  const std::string name = lower(given);
-  if (name.empty()) return devices.front();
-
-  std::size_t index = 0;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), index);
-  if (error == std::errc() && end == name.data() + name.size() && index < devices.size()) return devices[index];
-  for (const Device& device : devices) {
-    if (fits(device.info(), name)) return device;
+  if (const Device* device = find(devices, lower(given))) return *device;
+  if (const auto units = unit_range(lower(given))) {
+    if (const Device* device = find(devices, units->device)) return device->compute_units(units->first, units->last);
   }
   throw InvalidArgument("no OpenCL device fits \"" + given + "\"" + (wanted.empty() ? " (EGOSGM_DEVICE)" : "") +
                         ": choose one of " + numbered(devices));
+}
+
+Device Device::compute_units(int first, int last) const {
+  const cl::Device part = sub_device(handle_->device, handle_->info, first, last);
+  DeviceInfo info = handle_->info;
+  info.name += "/" + std::to_string(first) + (last > first ? "-" + std::to_string(last) : "");
+  info.compute_units = last - first + 1;
+  return Device(std::make_shared<const Handle>(Handle{part, std::move(info), handle_->programs}));
+}
+
+Device Device::with_programs(const std::string& folder) const {
+  return ocl::translated("with_programs", [&] {
+    auto programs = std::make_shared<const ocl::ProgramFolder>(folder, handle_->device);
+    return Device(std::make_shared<const Handle>(Handle{handle_->device, handle_->info, std::move(programs)}));
+  });
 }
 
 const DeviceInfo& Device::info() const { return handle_->info; }

@@ -2,13 +2,14 @@
 #pragma once
 
 #include "egosgm/device.h"
-#include "host/ocl/opencl.h"
+#include "host/ocl/program_folder.h"
 
 namespace egosgm {
 
 struct Device::Handle {
   cl::Device device;
   DeviceInfo info;
+  std::shared_ptr<const ocl::ProgramFolder> programs;  // null: compiles
 };
 
 }  // namespace egosgm

@@ -29,9 +29,21 @@ class Device {
 
   /// The device that `wanted` names: an index into `list()`, a type ("gpu", "cpu", "accelerator"), or a part of its
   /// name, vendor or platform (upper and lower case alike; "PLATFORM:NAME" for both). Empty: the environment variable
-  /// EGOSGM_DEVICE, else the first of `list()`.
+  /// EGOSGM_DEVICE, else the first of `list()`. What nothing fits as a whole may end in compute units: "cpu/0" is the
+  /// first one of "cpu", "cpu/0-3" the first four, as a device of their own (see `compute_units`).
   /// Throws InvalidArgument with the list where nothing fits, and how to install one where there is none.
   static Device select(const std::string& wanted = {});
+
+  /// The compute units `first` to `last` (from 0, both included) as a device of their own: one core, some cores. Its
+  /// name is this one's with "/FIRST-LAST" after it, so `select` finds it by its name. Same bits as the whole device.
+  /// Throws InvalidArgument where there are no such units, or where the driver does not divide the device.
+  Device compute_units(int first, int last) const;
+
+  /// The same device, on which pipelines take their programs from `folder`, as `compile_programs` made them
+  /// (egosgm/programs.h), and compile nothing. Throws InvalidArgument where they were made for another device, platform
+  /// or driver version; a Pipeline's constructor does where the folder lacks one of its programs, or has it from
+  /// another version of the source.
+  Device with_programs(const std::string& folder) const;
 
   const DeviceInfo& info() const;
 

@@ -15,6 +15,8 @@
 
 namespace egosgm {
 
+struct ProgramFile;  // egosgm/programs.h
+
 /// Where a frame's maps go: views of the caller's memory, width x height of the pipeline each. Empty views are not
 /// filled and cost nothing. Disparities in pixels, variances in px^2; kInvalidDisparity (and variance 0) where there is
 /// no value.
@@ -76,6 +78,7 @@ class Pipeline {
   std::uint64_t device_memory_bytes() const;  // allocated on the device, constant
 
  private:
+  friend std::vector<ProgramFile> compile_programs(const Device&, const PipelineOptions&);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

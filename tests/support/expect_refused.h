@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include <initializer_list>
 #include <string>
+#include <vector>
 
 #include "egosgm/error.h"
 
@@ -12,7 +12,7 @@ namespace egosgm::testing {
 
 /// `call` must throw InvalidArgument, with one line that holds every one of `parts`.
 template <typename Call>
-void expect_refused(Call&& call, std::initializer_list<std::string> parts) {
+void expect_refused(Call&& call, const std::vector<std::string>& parts) {
   try {
     call();
     ADD_FAILURE() << "nothing was thrown; expected " << (parts.size() > 0 ? *parts.begin() : "a refusal");

@@ -17,6 +17,7 @@ int calls = 0, enqueues = 0;
 int failing = -1;
 bool later = false;
 cl_int status = CL_OUT_OF_RESOURCES;
+std::atomic<bool> sources_forbidden = false;
 std::atomic<long> references = 0;
 long buffers_created = 0;
 
@@ -75,7 +76,11 @@ cl_mem CL_API_CALL create_buffer(cl_context c, cl_mem_flags f, size_t n, void* p
   return fails() ? refuse<cl_mem>(e) : counted(next->clCreateBuffer(c, f, n, p, e));
 }
 cl_program CL_API_CALL create_program(cl_context c, cl_uint n, const char** s, const size_t* l, cl_int* e) {
-  return fails() ? refuse<cl_program>(e) : counted(next->clCreateProgramWithSource(c, n, s, l, e));
+  return fails() || sources_forbidden ? refuse<cl_program>(e) : counted(next->clCreateProgramWithSource(c, n, s, l, e));
+}
+cl_program CL_API_CALL create_program_of_binary(cl_context c, cl_uint n, const cl_device_id* d, const size_t* l,
+                                                const unsigned char** b, cl_int* s, cl_int* e) {
+  return fails() ? refuse<cl_program>(e) : counted(next->clCreateProgramWithBinary(c, n, d, l, b, s, e));
 }
 cl_int CL_API_CALL build(cl_program p, cl_uint n, const cl_device_id* d, const char* o,
                          void(CL_CALLBACK* f)(cl_program, void*), void* u) {
@@ -152,6 +157,7 @@ extern "C" void fault_arm(int at, int code, int is_late) {
   status = code;
   later = is_late;
 }
+extern "C" void fault_forbid_sources(int forbidden) { sources_forbidden = forbidden != 0; }
 extern "C" int fault_calls() { return calls; }
 extern "C" int fault_enqueues() { return enqueues; }
 extern "C" long fault_references() { return references; }
@@ -173,6 +179,7 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   layer.clCreateCommandQueue = create_queue;
   layer.clCreateBuffer = create_buffer;
   layer.clCreateProgramWithSource = create_program;
+  layer.clCreateProgramWithBinary = create_program_of_binary;
   layer.clBuildProgram = build;
   layer.clCreateKernel = create_kernel;
   layer.clGetDeviceInfo = device_info;

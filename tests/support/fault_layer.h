@@ -18,8 +18,9 @@ struct FaultLayer {
   /// Counts from zero; lets call `at` return `code`, or, if `is_late`, command `at` fail after it was enqueued. -1:
   /// none.
   void (*arm)(int at, int code, int is_late);
-  int (*calls)();        // since `arm`: calls that can fail,
-  int (*enqueues)();     // and commands among them
+  void (*forbid_sources)(int forbidden);  // 1: no program can be made of its source from now on
+  int (*calls)();                         // since `arm`: calls that can fail,
+  int (*enqueues)();                      // and commands among them
   long (*references)();  // to contexts, queues, buffers, programs, kernels and events: created + retained - released
   long (*buffers_created)();  // ever
 
@@ -29,6 +30,7 @@ struct FaultLayer {
     void* layer = dlopen(file, RTLD_NOW | RTLD_NOLOAD);
     if (!layer) throw std::runtime_error(std::string("run this test with OPENCL_LAYERS=") + file);
     find(layer, "fault_arm", arm);
+    find(layer, "fault_forbid_sources", forbid_sources);
     find(layer, "fault_calls", calls);
     find(layer, "fault_enqueues", enqueues);
     find(layer, "fault_references", references);

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: Apache-2.0
+// Many sequences over several devices, in one process or in many that share the output folder.
+#include <fmt/core.h>
+
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <sstream>
+#include <thread>
+
+#include "apps/batch_list.h"
+#include "apps/batch_queue.h"
+#include "apps/batch_report.h"
+#include "apps/command.h"
+#include "apps/device_arguments.h"
+#include "apps/energy_meter.h"
+#include "apps/interrupt.h"
+#include "apps/option_arguments.h"
+#include "apps/run_outputs.h"
+#include "apps/shard.h"
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+
+namespace egosgm::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Json = nlohmann::ordered_json;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+struct BatchArguments {
+  std::string list, out, devices = "all", programs, write, shard, shards;
+  OptionArguments method;
+  bool merge = false, quiet = false;
+};
+
+std::vector<std::string> split(const std::string& list) {
+  std::vector<std::string> parts;
+  std::istringstream stream(list);
+  for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
+  return parts;
+}
+
+/// "all", or names as of Device::select between commas; NAME/each is every compute unit of NAME.
+std::vector<Device> select_devices(const std::string& list) {
+  if (list == "all" && !Device::list().empty()) return Device::list();
+  const std::string each = "/each";
+  std::vector<Device> devices;
+  for (const std::string& name : split(list)) {
+    if (!name.ends_with(each)) {
+      devices.push_back(Device::select(name));
+      continue;
+    }
+    const Device whole = Device::select(name.substr(0, name.size() - each.size()));
+    for (int unit = 0; unit < whole.info().compute_units; ++unit) devices.push_back(whole.compute_units(unit, unit));
+  }
+  if (devices.empty()) throw InvalidArgument("--devices \"" + list + "\": give all, or names between commas");
+  return devices;
+}
+
+/// What a device did, for OUT/timing.json.
+struct DeviceWork {
+  int sequences = 0, frames = 0;
+  double seconds = 0;
+};
+
+class Batch {
+ public:
+  Batch(const BatchArguments& arguments, std::vector<BatchEntry> entries, const BatchFolder& folder,
+        const PipelineOptions& options, std::vector<Device> devices)
+      : arguments_(arguments),
+        entries_(std::move(entries)),
+        folder_(folder),
+        options_(options),
+        kinds_(parse_write_list(arguments.write)),
+        devices_(std::move(devices)),
+        work_(devices_.size()),
+        queue_(static_cast<int>(entries_.size()), static_cast<int>(devices_.size())) {}
+
+  /// Returns whether it was not interrupted.
+  bool operator()() {
+    std::vector<std::thread> workers;
+    for (std::size_t i = 0; i < devices_.size(); ++i) {
+      workers.emplace_back([this, i] { work(static_cast<int>(i)); });
+    }
+    for (std::thread& worker : workers) worker.join();
+    if (stopped_by_) std::rethrow_exception(stopped_by_);
+    return !interrupted();
+  }
+
+  Json timing() {
+    energy_.sample();
+    const double wall = seconds_since(start_);
+    Json json{{"wall_seconds", wall}, {"frames", 0}, {"devices", Json::array()}};
+    int frames = 0, units = 0;
+    for (std::size_t i = 0; i < devices_.size(); ++i) {
+      const DeviceInfo& info = devices_[i].info();
+      frames += work_[i].frames;
+      units += info.compute_units;
+      json["devices"].push_back({{"name", info.name},
+                                 {"driver", info.driver},
+                                 {"compute_units", info.compute_units},
+                                 {"sequences", work_[i].sequences},
+                                 {"frames", work_[i].frames},
+                                 {"seconds", work_[i].seconds},
+                                 {"retired", queue_.is_retired(static_cast<int>(i))}});
+    }
+    json["frames"] = frames;
+    json["frames_per_second"] = frames / wall;
+    json["frames_per_second_per_compute_unit"] = frames / wall / units;
+    add_energy(json, frames);
+    return json;
+  }
+
+ private:
+  void add_energy(Json& json, int frames) const {
+    const auto add = [&](const std::string& name, std::optional<double> joules) {
+      json[name + "_joules"] = joules ? Json(*joules) : Json();
+      json[name + "_joules_per_frame"] = joules && frames > 0 ? Json(*joules / frames) : Json();
+    };
+    add("cpu", energy_.cpu_joules());
+    add("gpu", energy_.gpu_joules());
+  }
+
+  /// A device's thread.
+  void work(int device) {
+    try {
+      while (const auto job = queue_.next(device)) run(*job, device);
+    } catch (...) {  // the output folder cannot be written: no sequence can be completed
+      const std::lock_guard lock(mutex_);
+      stopped_by_ = std::current_exception();
+      queue_.stop();
+    }
+  }
+
+  void run(int number, int device) {
+    const BatchEntry& entry = entries_[number];
+    const auto start = Clock::now();
+    try {
+      folder_.begin(entry);
+      const SequenceJob job = job_of(entry);
+      if (run_sequence(job, devices_[device])) {
+        finish(number, device, folder_.finish(entry, job), seconds_since(start));
+      } else {
+        queue_.stop();
+      }
+    } catch (const DeviceError& error) {
+      hand_over(number, device, error.what());
+    } catch (const IoError&) {
+      throw;
+    } catch (const std::exception& error) {
+      queue_.failed();
+      fail(entry, error.what());
+    }
+  }
+
+  SequenceJob job_of(const BatchEntry& entry) const {
+    SequenceJob job;
+    job.sequence = entry.input.open();
+    job.options = options_;
+    job.preset = arguments_.method.preset;
+    job.poses_file = entry.poses_file;
+    job.out = folder_.folder_of(entry);
+    job.kinds = kinds_;
+    job.quiet = true;
+    return job;
+  }
+
+  void finish(int number, int device, int frames, double seconds) {
+    queue_.succeeded(number);
+    energy_.sample();
+    const std::lock_guard lock(mutex_);
+    DeviceWork& work = work_[device];
+    ++work.sequences;
+    work.frames += frames;
+    work.seconds += seconds;
+    ++done_;
+    tell(fmt::format("{}: {} frames, {:.1f} frames/s, {}", entries_[number].name, frames, frames / seconds,
+                     devices_[device].info().name));
+  }
+
+  void hand_over(int number, int device, const std::string& reason) {
+    const BatchEntry& entry = entries_[number];
+    const std::string where = devices_[device].info().name + ": " + reason;
+    // Before another device may begin with it.
+    folder_.fail(entry, where);
+    if (queue_.hand_over(number, device)) {
+      const std::lock_guard lock(mutex_);
+      tell(fmt::format("{}: handed to another device: {}", entry.name, where));
+    } else {
+      tell_failed(entry, where);
+    }
+  }
+
+  void fail(const BatchEntry& entry, const std::string& reason) {
+    folder_.fail(entry, reason);
+    tell_failed(entry, reason);
+  }
+
+  void tell_failed(const BatchEntry& entry, const std::string& reason) {
+    const std::lock_guard lock(mutex_);
+    ++done_;
+    tell(fmt::format("{}: failed: {}", entry.name, reason));
+  }
+
+  void tell(const std::string& line) const {
+    if (arguments_.quiet) return;
+    fmt::print("[{}/{}] {}\n", done_, entries_.size(), line);
+    std::fflush(stdout);
+  }
+
+  const BatchArguments& arguments_;
+  const std::vector<BatchEntry> entries_;
+  const BatchFolder& folder_;
+  const PipelineOptions& options_;
+  const std::set<std::string> kinds_;
+  const std::vector<Device> devices_;
+  const Clock::time_point start_ = Clock::now();
+
+  std::mutex mutex_;
+  std::vector<DeviceWork> work_;
+  std::size_t done_ = 0;
+  std::exception_ptr stopped_by_;
+  EnergyMeter energy_;
+  BatchQueue queue_;
+};
+
+std::string figure(const Json& value, const char* unit) {
+  return value.is_number() ? fmt::format("{:.3f} {}", value.get<double>(), unit) : "-";
+}
+
+void print_report(const Json& report, const std::filesystem::path& file) {
+  fmt::print("{} sequences, {} frames", report["sequences_done"].get<std::int64_t>(),
+             report["frames"].get<std::int64_t>());
+  for (const char* kind : {"noc", "occ"}) {
+    const Json& pooled = report["pooled"][kind];
+    if (pooled["bad_or_missing"].is_null()) continue;
+    fmt::print("; {}: bad or missing {}, interpolated {}", kind, figure(pooled["bad_or_missing"], "%"),
+               figure(pooled["interpolated"], "%"));
+  }
+  fmt::print(": {}\n", file.string());
+}
+
+/// Of all sequences of the list, whoever ran them.
+int report_all(const BatchArguments& arguments, const std::vector<BatchEntry>& entries, const BatchFolder& folder) {
+  const Json report = folder.write_report(entries);
+  if (!arguments.quiet) print_report(report, std::filesystem::path(arguments.out) / "batch.json");
+  const auto failed = report["sequences_failed"].get<std::int64_t>();
+  if (failed == 0) return kOk;
+  for (const Json& sequence : report["sequences"]) {
+    if (!sequence.contains("failed")) continue;
+    fmt::print(stderr, "egosgm: error: {} of {} sequences are not done, the first is {}: {}; run the batch again\n",
+               failed, entries.size(), sequence["name"].get<std::string>(), sequence["failed"].get<std::string>());
+    break;
+  }
+  return kFailed;
+}
+
+/// The shard's share of what is not done yet.
+std::vector<BatchEntry> left_to_do(const std::vector<BatchEntry>& entries, const Shard& shard,
+                                   const BatchFolder& folder) {
+  std::vector<BatchEntry> left;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    if (shard.contains(i) && !folder.is_done(entries[i])) left.push_back(entries[i]);
+  }
+  return left;
+}
+
+int run_shard(const BatchArguments& arguments, const std::vector<BatchEntry>& entries, const PipelineOptions& options,
+              const BatchFolder& folder) {
+  const Shard shard = shard_of(arguments.shard, arguments.shards);
+  const std::vector<BatchEntry> left = left_to_do(entries, shard, folder);
+  if (!left.empty()) {
+    std::vector<Device> devices = select_devices(arguments.devices);
+    if (!arguments.programs.empty()) {
+      for (Device& device : devices) device = device.with_programs(arguments.programs);
+    }
+    catch_interrupts();
+    Batch batch(arguments, left, folder, options, devices);
+    if (!batch()) return kInterrupted;
+    const std::string part = shard.count > 1 ? fmt::format("-{}-of-{}", shard.index, shard.count) : "";
+    vision::write_file(std::filesystem::path(arguments.out) / ("timing" + part + ".json"),
+                       batch.timing().dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
+  }
+  if (shard.count == 1) return report_all(arguments, entries, folder);
+  const std::vector<BatchEntry> not_done = left_to_do(entries, shard, folder);
+  if (not_done.empty()) return kOk;
+  fmt::print(stderr, "egosgm: error: {} sequences of shard {}/{} failed, the first is {}: see its failed.json\n",
+             not_done.size(), shard.index, shard.count, not_done.front().name);
+  return kFailed;
+}
+
+int batch(const BatchArguments& arguments) {
+  const std::vector<BatchEntry> entries = read_batch_list(arguments.list);
+  const PipelineOptions options = arguments.method.options();
+  const BatchFolder folder(arguments.out, batch_settings(options, parse_write_list(arguments.write)));
+  return arguments.merge ? report_all(arguments, entries, folder) : run_shard(arguments, entries, options, folder);
+}
+
+}  // namespace
+
+Command add_batch(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("batch", "Many sequences over several devices or machines, and one report");
+  auto arguments = std::make_shared<BatchArguments>();
+  command
+      ->add_option("LIST", arguments->list,
+                   "file with a line a sequence: NAME and the input as for run, for example\n"
+                   "  scene-151 --kitti kitti2012/training --scene 000151 --frames 7:10\n"
+                   "  drive-7 raw/drive_0007 --poses drive_0007.txt")
+      ->type_name("")
+      ->required();
+  command
+      ->add_option("--out", arguments->out,
+                   "folder to write: NAME/ as by run, batch.json (all results, metrics pooled where there is truth), "
+                   "timing.json; what is done there already is not done again")
+      ->type_name("DIR")
+      ->required();
+  command
+      ->add_option("--devices", arguments->devices,
+                   "OpenCL devices that share the sequences: all, or names as for run --device between commas; "
+                   "NAME/each: every compute unit of NAME [all]")
+      ->type_name("LIST");
+  command
+      ->add_option(
+          "--shard", arguments->shard,
+          "only part K (from 0) of N; without, that of the task in a Slurm job array or Kubernetes Indexed Job")
+      ->type_name("K/N");
+  command->add_option("--shards", arguments->shards, "number of parts, where only JOB_COMPLETION_INDEX is set")
+      ->type_name("N");
+  command->add_flag("--merge", arguments->merge, "run nothing: make batch.json of what all shards have done");
+  command->add_option("--write", arguments->write, kWriteListHelp)->type_name("LIST");
+  command->add_flag("--quiet", arguments->quiet, "no progress, only errors");
+  arguments->method.add_to(*command);
+  add_programs(*command, arguments->programs);
+  return {command, [arguments] { return batch(*arguments); }};
+}
+
+}  // namespace egosgm::app

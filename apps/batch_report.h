@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "apps/batch_list.h"
+#include "apps/run.h"
+
+namespace egosgm::app {
+
+/// What a batch writes into its folder OUT beside each sequence's results in OUT/NAME:
+///   settings.json     version and options: all shards of a batch must share them
+///   NAME/done.json    what the sequence gave; written last, so a sequence that has it is complete
+///   NAME/failed.json  or why it gave nothing
+///   batch.json        all of it, in the order of the list, and metrics pooled over all pixels with truth. The same
+///                     bytes whoever ran which sequence where.
+/// None of it names a device or a time. Thread-safe for different sequences.
+class BatchFolder {
+ public:
+  /// Makes the folder, or continues in it. Throws IoError, or InvalidArgument where it was made with other settings.
+  BatchFolder(std::filesystem::path folder, const nlohmann::ordered_json& settings);
+
+  std::filesystem::path folder_of(const BatchEntry& entry) const { return folder_ / entry.name; }
+
+  /// Whether its results are complete. Throws InvalidArgument where they are those of another input of the same name.
+  bool is_done(const BatchEntry& entry) const;
+  /// Forgets that it failed, before it is tried (again).
+  void begin(const BatchEntry& entry) const;
+  /// REQUIRES: `run_sequence` finished. Compares the disparities with the truth that the sequence has. Returns the
+  /// number of frames. Throws IoError.
+  int finish(const BatchEntry& entry, const SequenceJob& job) const;
+  void fail(const BatchEntry& entry, const std::string& reason) const;
+
+  /// Writes batch.json, and returns it. Throws IoError.
+  nlohmann::ordered_json write_report(const std::vector<BatchEntry>& entries) const;
+
+ private:
+  nlohmann::ordered_json result_of(const BatchEntry& entry) const;
+
+  const std::filesystem::path folder_;
+};
+
+/// What all sequences of a batch share.
+nlohmann::ordered_json batch_settings(const PipelineOptions& options, const std::set<std::string>& kinds);
+
+}  // namespace egosgm::app

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "apps/command.h"
+#include "apps/device_arguments.h"
+#include "apps/option_arguments.h"
+#include "egosgm/programs.h"
+#include "egosgm/vision/file_io.h"
+
+namespace egosgm::app {
+namespace {
+
+struct CompileArguments {
+  OptionArguments method;
+  std::string device, out;
+};
+
+int compile(const CompileArguments& arguments) {
+  const PipelineOptions options = arguments.method.options();
+  const Device device = Device::select(arguments.device);
+  const std::vector<ProgramFile> files = compile_programs(device, options);
+  const std::filesystem::path folder = arguments.out;
+  vision::make_folder(folder);
+  for (const ProgramFile& file : files) vision::write_file(folder / file.name, file.bytes);  // the manifest last
+  fmt::print("{} programs for {}: {}\n", files.size() - 1, device.info().name, folder.string());
+  return kOk;
+}
+
+}  // namespace
+
+Command add_compile(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("compile", "Compile the kernels ahead, for machines without an OpenCL compiler");
+  auto arguments = std::make_shared<CompileArguments>();
+  command
+      ->add_option("--out", arguments->out, "folder to write: program binaries, and manifest.json, which says of what")
+      ->type_name("DIR")
+      ->group("Output")
+      ->required();
+  arguments->method.add_to(*command);
+  add_device(*command, arguments->device);
+  return {command, [arguments] { return compile(*arguments); }};
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/device_arguments.h"
+
+namespace egosgm::app {
+namespace {
+
+constexpr const char* kGroup = "Method";
+
+}  // namespace
+
+void add_device(CLI::App& command, std::string& device) {
+  command
+      .add_option("--device", device,
+                  "OpenCL device: number, cpu, gpu, or part of its name; NAME/0-3: its first four compute units; see "
+                  "egosgm devices")
+      ->type_name("NAME")
+      ->group(kGroup);
+}
+
+void add_programs(CLI::App& command, std::string& folder) {
+  command
+      .add_option(
+          "--programs", folder,
+          "take the kernels from a folder of egosgm compile, and compile nothing; refused where device, driver, "
+          "options or version differ")
+      ->type_name("DIR")
+      ->group(kGroup);
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "egosgm/vision/evaluation.h"
+
+namespace egosgm::app {
+
+/// In percent, `mae` in pixels; null where there is nothing to divide by.
+inline nlohmann::ordered_json json_of(const vision::DisparityMetrics& m) {
+  return {{"bad_or_missing", m.bad_or_missing},
+          {"bad_of_valid", m.bad_of_valid},
+          {"density", m.density},
+          {"interpolated", m.interpolated},
+          {"d1", m.d1},
+          {"d1_interpolated", m.d1_interpolated},
+          {"mae", m.mae_px}};
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <set>
+#include <string>
+
+#include "egosgm/device.h"
+#include "egosgm/options.h"
+#include "egosgm/vision/dataset.h"
+
+namespace egosgm::app {
+
+/// A sequence, how to match it, and where its results go.
+struct SequenceJob {
+  vision::StereoSequence sequence;
+  PipelineOptions options;
+  std::string preset = "default";  // what the report calls the options
+  std::string poses_file;          // empty: stereo odometry
+  std::filesystem::path out;
+  std::set<std::string> kinds;  // what is written beside the disparity, see parse_write_list
+  bool quiet = false;
+};
+
+/// What `egosgm run` does once its arguments are read: every frame of the sequence into `job.out`, then poses.txt and
+/// report.json. Returns false where an interrupt ended it early. Throws InvalidArgument (input), IoError, DeviceError;
+/// report.json then says why it stopped, where it could be written. Thread-safe for different folders.
+bool run_sequence(const SequenceJob& job, const Device& device);
+
+}  // namespace egosgm::app

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kernels compiled ahead, for machines that have no compiler at run time. `Device::with_programs` loads them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "egosgm/device.h"
+#include "egosgm/options.h"
+
+namespace egosgm {
+
+/// A file of a folder of programs.
+struct ProgramFile {
+  std::string name;
+  std::string bytes;
+};
+
+/// Builds for `device` every program of a pipeline with `options`, for images of any size and of 8 and 16 bits. Returns
+/// the binaries, as the driver gives them, and last `manifest.json`: device, platform and driver with their versions,
+/// and for each program its kernel file, build options with all defines, and hashes of source and binary. Write them
+/// into one folder in this order. Only the disparity range, `banded_sgm.cost`, `.paths` and `.scheduling` matter.
+/// Throws InvalidArgument (option), DeviceError or BuildError. Thread-safe.
+std::vector<ProgramFile> compile_programs(const Device& device, const PipelineOptions& options = {});
+
+}  // namespace egosgm
