@@ -2,8 +2,8 @@
 // Many sequences over several devices, in one process or in many that share the output folder.
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <memory>
 #include <mutex>
 #include <sstream>
@@ -48,7 +48,11 @@ std::vector<Device> select_devices(const std::string& list) {
   if (list == "all" && !Device::list().empty()) return Device::list();
   const std::string each = "/each";
   std::vector<Device> devices;
-  for (const std::string& name : split(list)) {
+  const std::vector<std::string> names = split(list);
+  if (names.empty() || std::find(names.begin(), names.end(), "") != names.end()) {
+    throw InvalidArgument("--devices \"" + list + "\": give all, or names between commas");
+  }
+  for (const std::string& name : names) {
     if (!name.ends_with(each)) {
       devices.push_back(Device::select(name));
       continue;
@@ -56,7 +60,6 @@ std::vector<Device> select_devices(const std::string& list) {
     const Device whole = Device::select(name.substr(0, name.size() - each.size()));
     for (int unit = 0; unit < whole.info().compute_units; ++unit) devices.push_back(whole.compute_units(unit, unit));
   }
-  if (devices.empty()) throw InvalidArgument("--devices \"" + list + "\": give all, or names between commas");
   return devices;
 }
 

@@ -167,7 +167,7 @@ TEST_F(DeviceTest, RefusesComputeUnitsThatAreNotThere) {
   const auto whole = divisible_device();
   if (!whole) GTEST_SKIP() << "no device here can be divided";
   const std::string units = std::to_string(whole->info().compute_units);
-  for (const std::string ending : {"/" + units, "/0-" + units, std::string("/1-0"), std::string("/99999")}) {
+  for (const std::string& ending : {"/" + units, "/0-" + units, std::string("/1-0"), std::string("/99999")}) {
     expect_refused([&] { Device::select(whole->info().name + ending); },
                    {whole->info().name + ": compute units ", "it has " + units + ", numbered from 0"});
   }

@@ -7,16 +7,24 @@
 #include <CL/cl_layer.h>
 
 #include <atomic>
+#include <cstdio>
+#include <cstdlib>
 
 namespace {
 
 const cl_icd_dispatch* next = nullptr;
 cl_icd_dispatch layer{};
 
-int calls = 0, enqueues = 0;
+std::atomic<int> calls = 0, enqueues = 0;
 int failing = -1;
 bool later = false;
 cl_int status = CL_OUT_OF_RESOURCES;
+// EGOSGM_FAILING_QUEUE=N/M, for programs that do not know of this layer: from command M on, all of queue N fail (both
+// from 0), as if its device were lost.
+int queue_to_fail = -1, last_good_command = 0;
+std::atomic<int> queues_created = 0, commands_of_it = 0;
+std::atomic<cl_command_queue> failing_queue = nullptr;
+
 std::atomic<bool> sources_forbidden = false;
 std::atomic<long> references = 0;
 long buffers_created = 0;
@@ -47,6 +55,7 @@ template <typename Enqueue>
 cl_int enqueue(cl_command_queue queue, cl_event* done, Enqueue&& enqueue_with) {
   const bool fails_later = later && enqueues == failing;
   ++enqueues;
+  if (queue == failing_queue && commands_of_it++ >= last_good_command) return CL_DEVICE_NOT_AVAILABLE;
   if (fails()) return status;
   cl_int result;
   if (fails_later) {
@@ -69,7 +78,11 @@ cl_context CL_API_CALL create_context(const cl_context_properties* p, cl_uint n,
   return fails() ? refuse<cl_context>(e) : counted(next->clCreateContext(p, n, d, f, u, e));
 }
 cl_command_queue CL_API_CALL create_queue(cl_context c, cl_device_id d, cl_command_queue_properties p, cl_int* e) {
-  return fails() ? refuse<cl_command_queue>(e) : counted(next->clCreateCommandQueue(c, d, p, e));
+  if (fails()) return refuse<cl_command_queue>(e);
+  const cl_command_queue queue = counted(next->clCreateCommandQueue(c, d, p, e));
+  if (queue == failing_queue) failing_queue = nullptr;  // that one is gone, its address was used again
+  if (queues_created++ == queue_to_fail) failing_queue = queue;
+  return queue;
 }
 cl_mem CL_API_CALL create_buffer(cl_context c, cl_mem_flags f, size_t n, void* p, cl_int* e) {
   ++buffers_created;
@@ -174,6 +187,9 @@ extern "C" cl_int CL_API_CALL clGetLayerInfo(cl_layer_info name, size_t size, vo
 extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target, cl_uint* count,
                                           const cl_icd_dispatch** out) {
   next = target;
+  if (const char* wanted = std::getenv("EGOSGM_FAILING_QUEUE")) {
+    std::sscanf(wanted, "%d/%d", &queue_to_fail, &last_good_command);
+  }
   layer = *target;
   layer.clCreateContext = create_context;
   layer.clCreateCommandQueue = create_queue;

@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm compile and egosgm batch from outside: devices, shards, failures, kills. Environment as for program_test.py, and
+EGOSGM_FAULT_LAYER: the OpenCL layer that fails."""
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+from program_test import PROGRAM, ProgramTest, egosgm
+
+LAYER = os.environ["EGOSGM_FAULT_LAYER"]
+SEQUENCES = 4
+METHOD = ("--disparities", 32)
+
+
+class BatchTest(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        for i in range(SEQUENCES):
+            done = egosgm("synth", "--out", cls.folder / f"s{i}", "--frames", 3, "--width", 160, "--height", 64, "--seed", i, "--quiet")
+            assert done.returncode == 0, done.stderr
+        cls.list = cls.folder / "list.txt"
+        lines = [f"street-{i} {cls.folder}/s{i}" for i in range(SEQUENCES)]
+        lines[1] += f" --poses '{cls.folder}/s1/poses.txt' --frames 1:2  # a comment"
+        cls.list.write_text("# NAME INPUT\n\n" + "\n".join(lines) + "\n")
+        cls.programs = cls.folder / "programs"  # quicker than compiling for each sequence
+        done = egosgm("compile", "--device", "0", "--out", cls.programs, *METHOD)
+        assert done.returncode == 0, done.stderr
+        cls.expected = cls.folder / "expected"
+        done = egosgm(*cls.batch(cls.expected, "--devices", "0"))
+        assert done.returncode == 0, done.stderr
+
+    @classmethod
+    def batch(cls, out, *arguments):
+        return ["batch", cls.list, "--out", out, "--programs", cls.programs, *METHOD, *arguments]
+
+    def assert_same(self, out):
+        """The report, and every map."""
+        self.assertEqual((out / "batch.json").read_text(), (self.expected / "batch.json").read_text())
+        maps = sorted(file.relative_to(self.expected) for file in self.expected.glob("*/disparity/*"))
+        self.assertEqual(maps, sorted(file.relative_to(out) for file in out.glob("*/disparity/*")))
+        for file in maps:
+            self.assertEqual((out / file).read_bytes(), (self.expected / file).read_bytes(), file)
+
+    def timing(self, out, name="timing"):
+        return json.loads((out / f"{name}.json").read_text())
+
+    def two_devices(self):
+        """Compute units stand in for devices."""
+        units = json.loads(self.assert_works("devices", "--json"))[0]["compute_units"]
+        if units < 2:
+            self.skipTest("the device has one compute unit")
+        return "0/0,0/1"
+
+
+class Compile(ProgramTest):
+    def test_the_same_bits_as_compiling_and_refused_elsewhere(self):
+        programs, compiled, loaded = self.new_folder() / "programs", self.new_folder(), self.new_folder()
+        self.assertIn("programs for", self.assert_works("compile", "--out", programs, "--disparities", 32))
+        manifest = json.loads((programs / "manifest.json").read_text())
+        self.assertEqual(sorted(file.name for file in programs.iterdir()),
+                         sorted(["manifest.json"] + [program["file"] for program in manifest["programs"]]))
+        run = ["run", "--odometry", self.street, "--disparities", 32, "--quiet", "--out"]
+        self.assert_works(*run, compiled)
+        self.assert_works(*run, loaded, "--programs", programs)
+        for file in compiled.glob("disparity/*"):
+            self.assertEqual(file.read_bytes(), (loaded / "disparity" / file.name).read_bytes(), file.name)
+        self.assert_refused([*run, loaded, "--programs", programs, "--paths", 4], "manifest.json", "-DPATHS=4", "egosgm compile")
+        self.assert_refused([*run, loaded, "--programs", self.folder], "manifest.json", "egosgm compile")
+        (programs / "manifest.json").write_text(json.dumps(dict(manifest, driver="0.0")))
+        self.assert_refused([*run, loaded, "--programs", programs], "driver", "0.0", manifest["driver"], "egosgm compile")
+
+
+class Batch(BatchTest):
+    def test_gives_what_run_gives_and_pools_what_eval_counts(self):
+        out = self.new_folder()
+        self.assert_works("run", "--dataset", self.folder / "s2", "--out", out, *METHOD)
+        for file in out.glob("disparity/*"):
+            self.assertEqual(file.read_bytes(), (self.expected / "street-2/disparity" / file.name).read_bytes(), file.name)
+        report = json.loads((self.expected / "batch.json").read_text())
+        self.assertEqual([s["name"] for s in report["sequences"]], [f"street-{i}" for i in range(SEQUENCES)])
+        self.assertEqual([s["frames"] for s in report["sequences"]], [3, 2, 3, 3])
+        bad = truth = 0
+        for i, sequence in enumerate(report["sequences"]):
+            text = self.assert_works("eval", "--estimate", self.expected / sequence["name"], "--truth",
+                                     self.folder / f"s{i}/truth/left_disp_noc", "--json")
+            pixels = sum(pair["truth_pixels"] for pair in json.loads(text)["pairs"])
+            self.assertEqual(pixels, sequence["noc"]["truth"])
+            bad += json.loads(text)["pooled"]["bad_or_missing"] * pixels
+            truth += pixels
+        self.assertAlmostEqual(report["pooled"]["noc"]["bad_or_missing"], bad / truth, places=9)
+
+    def test_devices_share_the_sequences(self):
+        out = self.new_folder()
+        text = self.assert_works(*self.batch(out, "--devices", self.two_devices()))
+        self.assertIn(f"[{SEQUENCES}/{SEQUENCES}]", text)
+        self.assert_same(out)
+        self.assertEqual([d["name"][-2:] for d in self.timing(out)["devices"]], ["/0", "/1"])
+        self.assertEqual(sum(d["sequences"] for d in self.timing(out)["devices"]), SEQUENCES)
+        self.assertEqual(self.timing(out)["frames"], 11)
+
+    def test_shards_by_argument_slurm_and_kubernetes_merge_to_one_report(self):
+        out = self.new_folder()
+        merge = self.batch(out, "--merge", "--quiet")
+        self.assert_works(*self.batch(out, "--shard", "1/4"))
+        self.assertFalse((out / "batch.json").exists())
+        done = egosgm(*merge)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("3 of 4 sequences are not done, the first is street-0", done.stderr)
+        slurm = dict(os.environ, SLURM_ARRAY_TASK_ID="6", SLURM_ARRAY_TASK_MIN="2", SLURM_ARRAY_TASK_STEP="2",
+                     SLURM_ARRAY_TASK_COUNT="4")
+        self.assert_works(*self.batch(out), env=slurm)
+        self.assertTrue((out / "timing-2-of-4.json").exists())
+        kubernetes = dict(os.environ, JOB_COMPLETION_INDEX="0")
+        self.assert_works(*self.batch(out, "--shards", 2), env=kubernetes)
+        self.assertEqual(self.timing(out, "timing-0-of-2")["frames"], 3)  # street-2 was done
+        self.assert_works(*self.batch(out, "--shard", "3/4"))
+        self.assert_works(*merge)
+        self.assert_same(out)
+
+    def test_what_is_done_is_not_done_again(self):
+        out = self.new_folder()
+        shutil.copytree(self.expected, out, dirs_exist_ok=True)
+        (out / "street-3/done.json").unlink()
+        self.assertIn("[1/1] street-3: 3 frames", self.assert_works(*self.batch(out)))
+        self.assertNotIn("[1/", self.assert_works(*self.batch(out)))
+        self.assert_same(out)
+
+    def test_after_a_kill_or_an_interrupt_it_goes_on(self):
+        for how, code in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGTERM, 130)):
+            out = self.new_folder()
+            with subprocess.Popen([PROGRAM, *map(str, self.batch(out, "--devices", "0"))], stdout=subprocess.DEVNULL,
+                                  stderr=subprocess.DEVNULL) as process:
+                while not (out / "street-0/done.json").exists():
+                    self.assertIsNone(process.poll())
+                    time.sleep(0.002)
+                process.send_signal(how)
+            self.assertEqual(process.returncode, code)
+            self.assertFalse((out / "street-3/done.json").exists())
+            self.assert_works(*self.batch(out, "--devices", "0"))
+            self.assert_same(out)
+
+    def test_a_device_that_fails_hands_its_sequence_to_another(self):
+        out = self.new_folder()
+        devices = self.two_devices()
+        lost = dict(os.environ, OPENCL_LAYERS=LAYER, EGOSGM_FAILING_QUEUE="0/80")  # after its first frame
+        text = self.assert_works(*self.batch(out, "--devices", devices), env=lost)
+        self.assertIn("handed to another device", text)
+        self.assert_same(out)
+        self.assertEqual(sorted(d["retired"] for d in self.timing(out)["devices"]), [False, True])
+        self.assertEqual(list(out.glob("*/failed.json")), [])
+
+    def test_where_the_only_device_fails_the_others_sequences_go_on(self):
+        out = self.new_folder()
+        lost = dict(os.environ, OPENCL_LAYERS=LAYER, EGOSGM_FAILING_QUEUE="1/0")
+        self.assert_refused(self.batch(out, "--devices", "0"), "1 of 4 sequences are not done, the first is street-1",
+                            "CL_DEVICE_NOT_AVAILABLE", code=1, env=lost)
+        self.assertEqual(len(list(out.glob("*/done.json"))), SEQUENCES - 1)
+        self.assert_works(*self.batch(out, "--devices", "0"))
+        self.assert_same(out)
+
+    def test_a_broken_sequence_does_not_stop_the_others(self):
+        out, image = self.new_folder(), self.folder / "s0/image_0/000001.png"
+        whole = image.read_bytes()
+        image.write_bytes(whole[:100])
+        try:
+            self.assert_refused(self.batch(out), "1 of 4 sequences are not done, the first is street-0", image, code=1)
+        finally:
+            image.write_bytes(whole)
+        report = json.loads((out / "batch.json").read_text())
+        self.assertEqual((report["sequences_done"], report["sequences_failed"]), (SEQUENCES - 1, 1))
+        self.assertIn(str(image), report["sequences"][0]["failed"])
+        self.assert_works(*self.batch(out))
+        self.assert_same(out)
+
+    def test_refuses_what_does_not_fit_together(self):
+        out = self.new_folder()
+        shutil.copytree(self.expected, out, dirs_exist_ok=True)
+        self.assert_refused(["batch", self.list, "--out", out, "--disparities", 16], "disparities", "32", "16", "another --out")
+        self.assert_refused(["batch", self.list, "--out", out, *METHOD, "--write", "variance"], "write", "another --out")
+        other = self.new_folder() / "list.txt"
+        other.write_text(f"street-0 {self.folder}/s1\n")
+        self.assert_refused(["batch", other, "--out", out, *METHOD], "street-0", "choose another name")
+
+    def test_refuses_wrong_arguments(self):
+        out = self.new_folder() / "out"
+        for arguments, named in ((["--devices", "no such device"], ["no such device"]), (["--devices", ","], ["--devices"]), (["--devices", "0,,0"], ["--devices"]),
+                                 (["--devices", "0/99"], ["compute units 99"]), (["--shard", "4/4"], ["4 of 4", "from 0"]),
+                                 (["--shard", "1"], ["K/N"]), (["--shard", "x/2"], ["\"x\""]), (["--shard", "0/0"], ["--shard"])):
+            self.assert_refused(self.batch(out, *arguments), *named)
+        alone = dict(os.environ, JOB_COMPLETION_INDEX="0")
+        self.assert_refused(self.batch(out), "--shards N", env=alone)
+        broken = self.new_folder() / "list.txt"
+        for text, named in (("", ["names no sequence"]), ("a/b x\n", ["line 1", "a/b"]), ("a x\n\na y\n", ["line 3", "twice"]),
+                            ("a --odometri x\n", ["line 1", "--odometri"]), (".a x\n", [".a"])):
+            broken.write_text(text)
+            self.assert_refused(["batch", broken, "--out", out], "list.txt", *named)
+        self.assert_refused(["batch", self.folder / "nowhere", "--out", out], "nowhere")
+
+
+if __name__ == "__main__":
+    unittest.main()
