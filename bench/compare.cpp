@@ -198,7 +198,7 @@ class LeftMatcher {
     cl::Event done;
     context_.queue().enqueueReadBuffer(measured_.disparity.get(), CL_FALSE, 0, disparity_.size() * sizeof(float),
                                        disparity_.data(), nullptr, &done);
-    context_.record(done);
+    context_.record(done, "read");
     context_.wait();
   }
 

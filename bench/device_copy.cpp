@@ -27,7 +27,7 @@ double copy_gb_s(ocl::Context& context) {
     const auto start = std::chrono::steady_clock::now();
     cl::Event done;
     context.queue().enqueueNDRangeKernel(copy, cl::NullRange, cl::NDRange(kElements), cl::NDRange(64), nullptr, &done);
-    context.record(done);
+    context.record(done, "copy");
     context.wait();
     const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (round > 0) best_s = std::min(best_s, s);  // the first one touches the pages

@@ -49,17 +49,17 @@ void validate_map(const char* name, const MapView<T>& map, shared::ImageSize siz
 }
 
 template <typename T, typename Source, typename Convert>
-void copy_rows(const std::vector<Source>& staged, const MapView<T>& map, Convert&& convert) {
+void copy_rows(const Source* fetched, const MapView<T>& map, Convert&& convert) {
   if (!map.data) return;
   for (int y = 0; y < map.height; ++y) {
     T* row = reinterpret_cast<T*>(reinterpret_cast<char*>(map.data) + y * map.stride_bytes);
-    const Source* from = staged.data() + static_cast<std::size_t>(y) * map.width;
+    const Source* from = fetched + static_cast<std::size_t>(y) * map.width;
     std::transform(from, from + map.width, row, convert);
   }
 }
 
-void copy_rows(const std::vector<float>& staged, const MapView<float>& map) {
-  copy_rows(staged, map, [](float value) { return value; });
+void copy_rows(const float* fetched, const MapView<float>& map) {
+  copy_rows(fetched, map, [](float value) { return value; });
 }
 
 void fill_rows(float value, const MapView<float>& map) {
@@ -86,11 +86,22 @@ std::vector<StageTime> stage_times(const std::vector<ocl::Context::Finished>& fi
 
 }  // namespace
 
+void report_commands(const std::vector<ocl::Context::Finished>& finished, FrameReport& report) {
+  report.launches =
+      static_cast<int>(std::count_if(finished.begin(), finished.end(), [](const auto& f) { return f.is_launch; }));
+  report.stages = stage_times(finished);
+}
+
 FrameTransfer::FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range)
     : context_((context.enter("FrameTransfer"), context)),
       size_(size),
       range_(range),
       images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(size)), PixelType::kU8},
+      upload_(context, images_.pixels),
+      disparity_(context, pixel_count(size)),
+      variance_(context, pixel_count(size)),
+      right_disparity_(context, pixel_count(size)),
+      right_variance_(context, pixel_count(size)),
       row_sums_(2 * static_cast<std::size_t>(size.height)) {}
 
 void FrameTransfer::validate_size(int width, int height) {
@@ -118,90 +129,91 @@ const FrameImages& FrameTransfer::upload(const ImageView& left, const ImageView&
   context_.enter("upload");
   images_.type = left.type;
   const std::size_t row_bytes = static_cast<std::size_t>(size_.width) * bytes_per_pixel(left.type);
-  staged_images_.resize(2 * row_bytes * size_.height);
-  cl_uchar* to = staged_images_.data();
-  for (const ImageView* image : {&left, &right}) {
-    for (int y = 0; y < size_.height; ++y, to += row_bytes) {
-      std::memcpy(to, static_cast<const char*>(image->data) + y * image->stride_bytes, row_bytes);
+  upload_(2 * row_bytes * size_.height, [&](cl_uchar* to) {
+    for (const ImageView* image : {&left, &right}) {
+      for (int y = 0; y < size_.height; ++y, to += row_bytes) {
+        std::memcpy(to, static_cast<const char*>(image->data) + y * image->stride_bytes, row_bytes);
+      }
     }
-  }
-  cl::Event done;
-  context_.queue().enqueueWriteBuffer(images_.pixels.get(), CL_FALSE, 0, staged_images_.size(), staged_images_.data(),
-                                      nullptr, &done);
-  context_.record(done);
+  });
+  context_.let_wait(ocl::Queue::kKernels, upload_.done());
   return images_;
 }
 
 template <typename T>
-void FrameTransfer::fetch(const ocl::Buffer<T>& buffer, std::size_t first, std::size_t count, std::vector<T>& staged) {
+void FrameTransfer::fetch(const ocl::Buffer<T>& buffer, std::size_t count, std::vector<T>& staged) {
   staged.resize(count);
-  cl::Event done;
-  context_.queue().enqueueReadBuffer(buffer.get(), CL_FALSE, first * sizeof(T), count * sizeof(T), staged.data(),
-                                     nullptr, &done);
-  context_.record(done);
+  context_.queue(ocl::Queue::kDownload)
+      .enqueueReadBuffer(buffer.get(), CL_FALSE, 0, count * sizeof(T), staged.data(), nullptr, &scratch_fetched_);
+  context_.record(scratch_fetched_, "read", ocl::Queue::kDownload);
+}
+
+void FrameTransfer::fetch_left(const ocl::Buffer<float>& maps, const MapView<float>& wanted, Scratch& staged) {
+  if (wanted.data) fetch(maps, pixel_count(size_), staged);
 }
 
 void FrameTransfer::fetch_view(const ocl::Buffer<float>& maps, int view, const MapView<float>& wanted,
-                               std::vector<float>& staged) {
-  if (wanted.data) fetch(maps, view * pixel_count(size_), pixel_count(size_), staged);
+                               MapReadback& readback) {
+  if (wanted.data) readback.fetch(maps, view * pixel_count(size_), pixel_count(size_));
 }
 
-FrameReport FrameTransfer::download(const StereoMaps& result, const StereoMaps* predicted, const StereoMaps& measured,
-                                    const SearchBand& band, const ocl::Buffer<float>& vertical_offset_px,
-                                    const FrameOutputs& outputs) {
+void FrameTransfer::download(const FrameResults& results, const FrameOutputs& outputs) {
   context_.enter("download");
-  fetch(result.disparity, 0, pixel_count(size_), staged_maps_[0]);  // always: the report counts its valid pixels
-  fetch_view(result.variance, EGOSGM_LEFT, outputs.variance, staged_maps_[1]);
-  fetch_view(result.disparity, EGOSGM_RIGHT, outputs.right_disparity, staged_maps_[2]);
-  fetch_view(result.variance, EGOSGM_RIGHT, outputs.right_variance, staged_maps_[3]);
-  if (predicted) {
-    fetch_view(predicted->disparity, EGOSGM_LEFT, outputs.predicted, staged_maps_[4]);
-    fetch_view(predicted->variance, EGOSGM_LEFT, outputs.predicted_variance, staged_maps_[5]);
+  outputs_ = outputs;
+  has_prediction_ = results.predicted;
+  context_.let_wait(ocl::Queue::kDownload, context_.last_kernel());
+  if (results.predicted) {
+    fetch_left(results.predicted->disparity, outputs.predicted, predicted_);
+    fetch_left(results.predicted->variance, outputs.predicted_variance, predicted_variance_);
   }
-  fetch_view(measured.disparity, EGOSGM_LEFT, outputs.measured, staged_maps_[6]);
-  fetch_view(measured.variance, EGOSGM_LEFT, outputs.measured_variance, staged_maps_[7]);
-  if (outputs.search_width.data) fetch(band.bands(), 0, pixel_count(size_), staged_bands_);
-  fetch(band.row_sums(), 0, row_sums_.size(), row_sums_);
+  fetch_left(results.measured->disparity, outputs.measured, measured_);
+  fetch_left(results.measured->variance, outputs.measured_variance, measured_variance_);
+  if (outputs.search_width.data) fetch(results.band->bands(), pixel_count(size_), bands_);
+  fetch(results.band->row_sums(), row_sums_.size(), row_sums_);
+  fetch(*results.vertical_offset_px, 1, vertical_offset_px_);
 
-  fetch(vertical_offset_px, 0, 1, staged_offset_);
+  disparity_.fetch(results.result->disparity, 0, pixel_count(size_));  // always: the report counts its valid pixels
+  fetch_view(results.result->variance, EGOSGM_LEFT, outputs.variance, variance_);
+  fetch_view(results.result->disparity, EGOSGM_RIGHT, outputs.right_disparity, right_disparity_);
+  fetch_view(results.result->variance, EGOSGM_RIGHT, outputs.right_variance, right_variance_);
+}
 
-  const auto finished = context_.wait();
-
-  copy_rows(staged_maps_[0], outputs.disparity);
-  copy_rows(staged_maps_[1], outputs.variance);
-  copy_rows(staged_maps_[2], outputs.right_disparity);
-  copy_rows(staged_maps_[3], outputs.right_variance);
-  if (predicted) {
-    copy_rows(staged_maps_[4], outputs.predicted);
-    copy_rows(staged_maps_[5], outputs.predicted_variance);
+void FrameTransfer::collect(FrameReport& report) const {
+  copy_rows(disparity_.data(), outputs_.disparity);
+  copy_rows(variance_.data(), outputs_.variance);
+  copy_rows(right_disparity_.data(), outputs_.right_disparity);
+  copy_rows(right_variance_.data(), outputs_.right_variance);
+  if (has_prediction_) {
+    copy_rows(predicted_.data(), outputs_.predicted);
+    copy_rows(predicted_variance_.data(), outputs_.predicted_variance);
   } else {
-    fill_rows(kInvalidDisparity, outputs.predicted);
-    fill_rows(0, outputs.predicted_variance);
+    fill_rows(kInvalidDisparity, outputs_.predicted);
+    fill_rows(0, outputs_.predicted_variance);
   }
-  copy_rows(staged_maps_[6], outputs.measured);
-  copy_rows(staged_maps_[7], outputs.measured_variance);
-  copy_rows(staged_bands_, outputs.search_width,
+  copy_rows(measured_.data(), outputs_.measured);
+  copy_rows(measured_variance_.data(), outputs_.measured_variance);
+  copy_rows(bands_.data(), outputs_.search_width,
             [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
 
-  FrameReport report;
   const double pixels = static_cast<double>(pixel_count(size_)), cells = 2 * pixels * range_.count;
   std::uint64_t searched = 0, computed = 0, predicted_pixels = 0;
   for (std::size_t row = 0; row < row_sums_.size(); ++row) {
     searched += row_sums_[row].searched;
     computed += row_sums_[row].computed;
-    if (predicted && row < row_sums_.size() / 2) predicted_pixels += row_sums_[row].predicted;
+    if (has_prediction_ && row < row_sums_.size() / 2) predicted_pixels += row_sums_[row].predicted;
   }
   report.search_fraction = static_cast<double>(searched) / cells;
   report.computed_fraction = static_cast<double>(computed) / cells;
   report.predicted_fraction = static_cast<double>(predicted_pixels) / pixels;
-  report.density = static_cast<double>(std::count_if(staged_maps_[0].begin(), staged_maps_[0].end(),
+  report.density = static_cast<double>(std::count_if(disparity_.data(), disparity_.data() + pixel_count(size_),
                                                      [](float d) { return d > kInvalidDisparity; })) /
                    pixels;
-  report.vertical_offset_px = staged_offset_[0];
-  report.launches =
-      static_cast<int>(std::count_if(finished.begin(), finished.end(), [](const auto& f) { return f.is_launch; }));
-  report.stages = stage_times(finished);
-  return report;
+  report.vertical_offset_px = vertical_offset_px_[0];
+}
+
+void FrameTransfer::release() {
+  context_.enter("upload");
+  for (MapReadback* readback : {&disparity_, &variance_, &right_disparity_, &right_variance_}) readback->release();
 }
 
 }  // namespace egosgm

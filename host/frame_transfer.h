@@ -1,15 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "egosgm/pipeline.h"
 #include "host/maps.h"
+#include "host/ocl/host_memory.h"
 #include "host/search_band.h"
 
 namespace egosgm {
 
-/// Checks what the caller gave, brings the images to the device and the results back.
+/// What the stages of a frame leave on the device.
+struct FrameResults {
+  const StereoMaps* result;     // no later frame writes it before this one is collected
+  const StereoMaps* predicted;  // null where there is no prediction. From here on, the next frame writes them:
+  const StereoMaps* measured;   // (or they are the result)
+  const SearchBand* band;
+  const ocl::Buffer<float>* vertical_offset_px;
+};
+
+/// Checks what the caller gave, brings a frame's images to the device and its results back: one for each frame that may
+/// be under way. Transfers have queues of their own; with those of the kernels they are tied here.
 class FrameTransfer {
  public:
   FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
@@ -19,29 +31,47 @@ class FrameTransfer {
   /// Throws InvalidArgument, naming the view and the value.
   void validate(const ImageView& left, const ImageView& right, const FrameOutputs& outputs) const;
 
-  /// REQUIRES: what `validate` asks.
+  /// Copies the images, enqueues their way to the device, and lets what is enqueued for it from now on wait for them.
+  /// REQUIRES: what `validate` asks; no frame of this transfer is under way.
   const FrameImages& upload(const ImageView& left, const ImageView& right);
 
-  /// Waits for the frame and fills the outputs, all of them or, if it throws, none. `predicted`: null where there is no
-  /// prediction.
-  FrameReport download(const StereoMaps& result, const StereoMaps* predicted, const StereoMaps& measured,
-                       const SearchBand& band, const ocl::Buffer<float>& vertical_offset_px,
-                       const FrameOutputs& outputs);
+  /// Enqueues the way back, behind all that was enqueued for the device.
+  void download(const FrameResults& results, const FrameOutputs& outputs);
+
+  /// When all but the result was fetched, so that the next frame may write it.
+  const cl::Event& scratch_fetched() const { return scratch_fetched_; }
+
+  /// Fills the outputs that `download` was given, and what a report can tell of them. Cannot fail.
+  /// REQUIRES: its commands have ended.
+  void collect(FrameReport& report) const;
+
+  /// Lets what is enqueued from now on write the last frame's result. REQUIRES: that is not under way.
+  void release();
 
  private:
+  using MapReadback = ocl::Readback<float>;
+  using Scratch = std::vector<float>;
+
   template <typename T>
-  void fetch(const ocl::Buffer<T>& buffer, std::size_t first, std::size_t count, std::vector<T>& staged);
-  void fetch_view(const ocl::Buffer<float>& maps, int view, const MapView<float>& wanted, std::vector<float>& staged);
+  void fetch(const ocl::Buffer<T>& buffer, std::size_t count, std::vector<T>& staged);
+  void fetch_left(const ocl::Buffer<float>& maps, const MapView<float>& wanted, Scratch& staged);
+  void fetch_view(const ocl::Buffer<float>& maps, int view, const MapView<float>& wanted, MapReadback& readback);
 
   ocl::Context& context_;
   const shared::ImageSize size_;
   const shared::DisparityRange range_;
   FrameImages images_;
-  std::vector<cl_uchar> staged_images_;
-  std::vector<float> staged_maps_[8];
-  std::vector<float> staged_offset_;
-  std::vector<shared::Band> staged_bands_;
+  ocl::Upload upload_;
+  MapReadback disparity_, variance_, right_disparity_, right_variance_;
+  Scratch predicted_, predicted_variance_, measured_, measured_variance_, vertical_offset_px_;
+  std::vector<shared::Band> bands_;
   std::vector<shared::RowSum> row_sums_;
+  cl::Event scratch_fetched_;
+  bool has_prediction_ = false;
+  FrameOutputs outputs_;
 };
+
+/// What the report tells of a frame's commands: launches and stages.
+void report_commands(const std::vector<ocl::Context::Finished>& finished, FrameReport& report);
 
 }  // namespace egosgm

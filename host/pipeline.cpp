@@ -2,7 +2,11 @@
 // The table of contents: a frame, a line a stage.
 #include "egosgm/pipeline.h"
 
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <string>
+#include <vector>
 
 #include "egosgm/error.h"
 #include "egosgm/programs.h"
@@ -41,6 +45,24 @@ struct PixelStages {
 
 shared::DisparityRange range_of(const PipelineOptions& options) { return {options.min_disparity, options.disparities}; }
 
+using Clock = std::chrono::steady_clock;
+
+/// What a frame leaves to the next one.
+struct Memory {
+  const StereoMaps* belief = nullptr;
+  const char* no_belief_reason = "first frame";
+  VerticalAlignment::State alignment = 0;
+};
+
+struct FrameUnderWay {
+  FrameTransfer* transfer;
+  Memory before;  // to go back to if it fails
+  const StereoMaps* result;
+  FrameReport report;
+  std::vector<ocl::Command> commands;
+  Clock::time_point start;
+};
+
 }  // namespace
 
 struct Pipeline::Impl {
@@ -60,13 +82,15 @@ struct Pipeline::Impl {
   MedianFilter median_filter;
   SpeckleRemoval speckle_removal;
   KalmanUpdate kalman_update;
-  FrameTransfer transfer;
+  std::array<FrameTransfer, kMaxUnderWay> transfers;
 
   ocl::Buffer<cl_uint> codes;
   ocl::Buffer<cl_uchar> penalties;
-  StereoMaps predicted, measured, scratch, updated, belief;
-  bool has_belief = false;
-  const char* no_belief_reason = "first frame";
+  StereoMaps predicted, scratch;
+  std::array<StereoMaps, 4> pool;  // the belief, the one to go back to, and what a frame takes of the rest:
+  StereoMaps *measured = nullptr, *updated = nullptr;
+  Memory memory;
+  std::vector<FrameUnderWay> under_way;  // the oldest first
 
   Impl(const Calibration& calibration, shared::ImageSize image_size, const PipelineOptions& chosen,
        const Device& chosen_device)
@@ -86,24 +110,24 @@ struct Pipeline::Impl {
         median_filter(context, size, options.median_filter),
         speckle_removal(context, size, options.speckle_removal),
         kalman_update(context, size, options.kalman_update),
-        transfer(context, size, range_of(options)),
+        transfers{{{context, size, range_of(options)}, {context, size, range_of(options)}}},
         codes(context, Census::words(options.banded_sgm.cost, size, BandedSgm::code_padding(range_of(options)))),
         penalties(context, StepPenalties::plane_count(size)),
         predicted(context, size),
-        measured(context, size),
         scratch(context, size),
-        updated(context, size),
-        belief(context, size) {}
+        pool{{{context, size}, {context, size}, {context, size}, {context, size}}} {}
+
+  ~Impl() { context.drain(); }
 
   /// Why this frame has no prediction, or null.
   const char* full_range_reason(const std::optional<Motion>& motion) const {
     if (!options.temporal) return "not temporal";
-    if (!has_belief) return no_belief_reason;
+    if (!memory.belief) return memory.no_belief_reason;
     return motion ? nullptr : "no motion";
   }
 
   void predict(const Motion& motion) {
-    forward_warp(belief, motion, scratch);
+    forward_warp(*memory.belief, motion, scratch);
     edge_rejection(scratch, predicted);
     hole_fill(predicted, scratch);
     consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);
@@ -121,8 +145,8 @@ struct Pipeline::Impl {
     stages_of(images.type).step_penalties(images.pixels, penalties);
     banded_sgm(codes, penalties, search_band, scratch);
     median_filter(scratch, Holes::kLeave);
-    consistency(scratch, options.consistency.measurement_px, OutsideView::kDrop, measured);
-    speckle_removal(measured);
+    consistency(scratch, options.consistency.measurement_px, OutsideView::kDrop, *measured);
+    speckle_removal(*measured);
   }
 
   /// Returns the images that were matched.
@@ -130,41 +154,111 @@ struct Pipeline::Impl {
     const FrameImages* images = &vertical_alignment.align(uploaded);
     match_aligned(*images, full_range);
     if (vertical_alignment.is_unknown()) {
-      vertical_alignment.estimate(*images, measured);
+      vertical_alignment.estimate(*images, *measured);
       images = &vertical_alignment.realign(uploaded);
       match_aligned(*images, full_range);
     }
-    vertical_alignment.estimate(*images, measured);
+    vertical_alignment.estimate(*images, *measured);
     return *images;
   }
 
   void update(const FrameImages& images) {
-    kalman_update(predicted, measured, updated);
-    median_filter(updated, Holes::kFill);
-    consistency(updated, options.consistency.update_px, OutsideView::kKeep, scratch);
-    stages_of(images.type).sad_check(images.pixels, scratch, updated);
+    kalman_update(predicted, *measured, *updated);
+    median_filter(*updated, Holes::kFill);
+    consistency(*updated, options.consistency.update_px, OutsideView::kKeep, scratch);
+    stages_of(images.type).sad_check(images.pixels, scratch, *updated);
   }
 
-  FrameReport process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
-                      const FrameOutputs& outputs) {
-    const auto start = std::chrono::steady_clock::now();
-    const ocl::Drain drain{context};
-    const char* reason = full_range_reason(motion);
-    const FrameImages& uploaded = transfer.upload(left, right);
+  /// All that happens on the device. `reason`: see `full_range_reason`.
+  FrameResults run_stages(const FrameImages& uploaded, const std::optional<Motion>& motion, const char* reason) {
     if (!reason) predict(*motion);
     const FrameImages& images = match(uploaded, reason);
     if (!reason) update(images);
+    return {.result = reason ? measured : updated,
+            .predicted = reason ? nullptr : &predicted,
+            .measured = measured,
+            .band = &search_band,
+            .vertical_offset_px = &vertical_alignment.offset_px()};
+  }
 
-    StereoMaps& result = reason ? measured : updated;
-    FrameReport report = transfer.download(result, reason ? nullptr : &predicted, measured, search_band,
-                                           vertical_alignment.offset_px(), outputs);
-    report.full_range = reason || options.search == SearchMode::kFull;
-    report.full_range_reason = reason ? reason : options.search == SearchMode::kFull ? "search is full" : "";
-    std::swap(belief, result);  // only now: a frame that failed has changed nothing
-    has_belief = options.temporal;
+  void submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
+              const FrameOutputs& outputs) {
+    expect_none_failed();
+    FrameUnderWay frame{&begin_frame(), memory, nullptr, {}, {}, Clock::now()};
+    ocl::Drain drain{context};
+    release_results();
+    const char* reason = full_range_reason(motion);
+    const FrameImages& uploaded = frame.transfer->upload(left, right);
+    if (!under_way.empty()) context.let_wait(ocl::Queue::kKernels, under_way.back().transfer->scratch_fetched());
+    const FrameResults results = run_stages(uploaded, motion, reason);
+    frame.transfer->download(results, outputs);
+
+    drain.is_dismissed = true;
+    frame.report.full_range = reason || options.search == SearchMode::kFull;
+    frame.report.full_range_reason = reason ? reason : options.search == SearchMode::kFull ? "search is full" : "";
+    frame.result = results.result;
+    frame.commands = context.take_commands();
+    under_way.push_back(std::move(frame));
     vertical_alignment.commit();
-    report.total_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    memory = {options.temporal ? results.result : nullptr, memory.no_belief_reason, vertical_alignment.state()};
+  }
+
+  FrameReport collect() {
+    FrameUnderWay& frame = under_way.front();
+    or_go_back([&] { report_commands(context.wait(frame.commands), frame.report); });
+    expect_none_failed();
+    frame.transfer->collect(frame.report);
+    frame.report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - frame.start).count();
+    FrameReport report = std::move(frame.report);
+    under_way.erase(under_way.begin());
     return report;
+  }
+
+  /// Takes maps that are neither the belief nor those of a frame under way, and a transfer that is free.
+  FrameTransfer& begin_frame() {
+    const FrameUnderWay* other = under_way.empty() ? nullptr : &under_way.front();
+    measured = updated = nullptr;
+    for (StereoMaps& maps : pool) {
+      const bool is_taken =
+          &maps == memory.belief || (other && (&maps == other->before.belief || &maps == other->result));
+      if (!is_taken) (measured ? updated : measured) = &maps;
+    }
+    vertical_alignment.keep(other ? other->before.alignment : memory.alignment);
+    return other && other->transfer == &transfers[0] ? transfers[1] : transfers[0];
+  }
+
+  /// Gives the results of frames that were collected back to the device.
+  void release_results() {
+    for (FrameTransfer& transfer : transfers) {
+      if (under_way.empty() || under_way.front().transfer != &transfer) transfer.release();
+    }
+  }
+
+  /// Also one behind the oldest: commands after a failed one may have overtaken those before it.
+  void expect_none_failed() {
+    or_go_back([&] {
+      for (const FrameUnderWay& frame : under_way) context.expect_none_failed(frame.commands);
+    });
+  }
+
+  /// Where `f` throws, a frame failed: it and those submitted after it, which rest on it, never were.
+  template <typename F>
+  void or_go_back(F&& f) {
+    try {
+      f();
+    } catch (...) {
+      context.drain();
+      memory = under_way.front().before;
+      vertical_alignment.go_back(memory.alignment);
+      under_way.clear();
+      throw;
+    }
+  }
+
+  void reset() {
+    vertical_alignment.reset();
+    memory = {nullptr, "reset", vertical_alignment.state()};
+    for (FrameUnderWay& frame : under_way) frame.before = memory;
   }
 
   PixelStages& stages_of(PixelType type) { return type == PixelType::kU8 ? stages_u8 : stages_u16; }
@@ -186,17 +280,28 @@ Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 
 FrameReport Pipeline::process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
                               const FrameOutputs& outputs) {
-  impl_->transfer.validate(left, right, outputs);
+  if (under_way() > 0) throw InvalidArgument("process: a frame that was submitted is under way: collect it first");
+  submit(left, right, motion, outputs);
+  return collect();
+}
+
+void Pipeline::submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
+                      const FrameOutputs& outputs) {
+  if (under_way() == kMaxUnderWay) {
+    throw InvalidArgument("submit: " + std::to_string(kMaxUnderWay) + " frames are under way: collect one first");
+  }
+  impl_->transfers[0].validate(left, right, outputs);
   if (motion) motion->validate();
-  return ocl::translated(impl_->context, [&] { return impl_->process(left, right, motion, outputs); });
+  ocl::translated(impl_->context, [&] { impl_->submit(left, right, motion, outputs); });
 }
 
-void Pipeline::reset() {
-  impl_->has_belief = false;
-  impl_->no_belief_reason = "reset";
-  impl_->vertical_alignment.reset();
+FrameReport Pipeline::collect() {
+  if (under_way() == 0) throw InvalidArgument("collect: no frame is under way: submit one first");
+  return ocl::translated(impl_->context, [&] { return impl_->collect(); });
 }
 
+int Pipeline::under_way() const { return static_cast<int>(impl_->under_way.size()); }
+void Pipeline::reset() { impl_->reset(); }
 const PipelineOptions& Pipeline::options() const { return impl_->options; }
 const Device& Pipeline::device() const { return impl_->device; }
 std::uint64_t Pipeline::device_memory_bytes() const { return impl_->context.allocated_bytes(); }

@@ -34,7 +34,7 @@ VerticalAlignment::VerticalAlignment(ocl::Context& context, shared::ImageSize si
       update_(build(context, PixelType::kU8, row_group_), "update"),
       aligned_{ocl::Buffer<cl_uchar>(context, options.enabled ? 2 * 2 * pixel_count(size) : 0), PixelType::kU8},
       row_sums_(context, 3 * static_cast<std::size_t>(sampled_rows(size))),
-      states_{{context, 2}, {context, 2}, {context, 2}, {context, 2}} {
+      states_{{context, 2}, {context, 2}, {context, 2}, {context, 2}, {context, 2}} {
   states_[kUnknown].write(context, {0.0f, 0.0f});
 }
 
@@ -65,10 +65,11 @@ void VerticalAlignment::estimate(const FrameImages& aligned, const StereoMaps& m
   working_ = next;
 }
 
-// Neither the committed state, which a frame that fails must leave as it is, nor the applied one, which is reported.
+// Neither the committed state nor the kept one, which a frame that fails must leave as they are, nor the applied one,
+// which is reported.
 int VerticalAlignment::free_state() const {
-  int state = kUnknown + 1;
-  while (state == committed_ || state == applied_) ++state;
+  State state = kUnknown + 1;
+  while (state == committed_ || state == kept_ || state == applied_) ++state;
   return state;
 }
 

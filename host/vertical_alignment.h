@@ -33,6 +33,12 @@ class VerticalAlignment {
   /// Keeps this frame's estimates for the next one. Enqueues nothing and cannot fail.
   void commit() { committed_ = working_; }
 
+  /// What a frame rests on. One that may have to be gone back to, if a frame under way fails, is to be kept.
+  using State = int;
+  State state() const { return committed_; }
+  void keep(State state) { kept_ = state; }
+  void go_back(State state) { committed_ = working_ = state; }
+
   /// Forgets all: nothing is known of the offset, and it is taken as 0. Cannot fail.
   void reset() { committed_ = working_ = kUnknown; }
 
@@ -61,8 +67,8 @@ class VerticalAlignment {
       update_;
   FrameImages aligned_;
   ocl::Buffer<cl_long> row_sums_;  // of each sampled row: see the kernel
-  ocl::Buffer<float> states_[4];   // offset [px], and the number of estimates that it rests on
-  int committed_ = kUnknown, working_ = kUnknown, applied_ = kUnknown;
+  ocl::Buffer<float> states_[5];   // offset [px], and the number of estimates that it rests on
+  State committed_ = kUnknown, working_ = kUnknown, applied_ = kUnknown, kept_ = kUnknown;
 };
 
 }  // namespace egosgm

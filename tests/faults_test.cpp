@@ -11,6 +11,8 @@
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
 #include "tests/support/fault_layer.h"
+#include "tests/support/frame_memory.h"
+#include "tests/support/scene.h"
 
 namespace egosgm {
 namespace {
@@ -64,13 +66,18 @@ std::unique_ptr<Pipeline> make_pipeline() {
                                     kHeight, small_options(), device);
 }
 
-void process(Pipeline& pipeline, int frame, Maps& maps) {
+void submit(Pipeline& pipeline, int frame, Maps& maps) {
   const Images images(frame);
   const ImageView left{images.left.data(), kWidth, kHeight, kWidth, PixelType::kU8};
   const ImageView right{images.right.data(), kWidth, kHeight, kWidth, PixelType::kU8};
   Motion motion;
   motion.current_from_previous.translation().z() = -0.01;
-  pipeline.process(left, right, motion, maps.views());
+  pipeline.submit(left, right, motion, maps.views());
+}
+
+void process(Pipeline& pipeline, int frame, Maps& maps) {
+  submit(pipeline, frame, maps);
+  pipeline.collect();
 }
 
 Maps process(Pipeline& pipeline, int frame) {
@@ -82,6 +89,7 @@ Maps process(Pipeline& pipeline, int frame) {
 struct Fault {
   int code;
   bool is_late;
+  bool separate_memory = false;
 };
 
 std::string fault_name(const ::testing::TestParamInfo<Fault>& info) {
@@ -90,7 +98,7 @@ std::string fault_name(const ::testing::TestParamInfo<Fault>& info) {
                      : code == CL_OUT_OF_HOST_MEMORY            ? "OutOfHostMemory"
                      : code == CL_MEM_OBJECT_ALLOCATION_FAILURE ? "MemObjectAllocationFailure"
                                                                 : "DeviceNotAvailable") +
-         (info.param.is_late ? "Late" : "AtOnce");
+         (info.param.is_late ? "Late" : "AtOnce") + (info.param.separate_memory ? "SeparateMemory" : "");
 }
 
 class FaultTest : public ::testing::TestWithParam<Fault> {
@@ -183,6 +191,135 @@ INSTANTIATE_TEST_SUITE_P(Codes, FaultTest,
                                            Fault{CL_DEVICE_NOT_AVAILABLE, true}),
                          fault_name);
 
+/// Plays frames with two under way, and goes on after errors as the contract of submit and collect says.
+class OverlappedRun {
+ public:
+  /// Frames `first` to `last`; `maps`: one a frame.
+  OverlappedRun(Pipeline& pipeline, int first, int last, std::vector<Maps>& maps)
+      : pipeline_(pipeline), first_(first), maps_(maps) {
+    for (int next = first, oldest = first; oldest <= last;) {
+      try {
+        while (next <= last && pipeline.under_way() < Pipeline::kMaxUnderWay) {
+          submit(pipeline, next, maps[next - first]);
+          ++next;
+        }
+        pipeline.collect();
+        ++oldest;
+      } catch (const DeviceError&) {
+        ++errors_;
+        if (pipeline.under_way() == 0) next = oldest;
+        expect_untouched_from(oldest);
+      }
+    }
+  }
+
+  int errors() const { return errors_; }
+
+ private:
+  void expect_untouched_from(int frame) {
+    for (std::size_t i = frame - first_; i < maps_.size(); ++i) EXPECT_EQ(maps_[i], Maps()) << "frame " << i;
+  }
+
+  Pipeline& pipeline_;
+  const int first_;
+  std::vector<Maps>& maps_;
+  int errors_ = 0;
+};
+
+class OverlappedFaultTest : public FaultTest {
+ protected:
+  OverlappedFaultTest() { faults_.separate_memory(GetParam().separate_memory); }
+  ~OverlappedFaultTest() override { faults_.separate_memory(false); }
+};
+
+TEST_P(OverlappedFaultTest, EveryCallOfTwoFramesUnderWay) {
+  constexpr int kFirst = 1, kLast = 3;
+  const auto pipeline = make_pipeline();
+  faults_.separate_memory(false);
+  const auto other = make_pipeline();
+  std::vector<Maps> expected;
+  process(*other, 0);
+  for (int frame = kFirst; frame <= kLast; ++frame) expected.push_back(process(*other, frame));
+
+  const auto play = [&](std::vector<Maps>& maps) { return OverlappedRun(*pipeline, kFirst, kLast, maps).errors(); };
+  const auto prepare = [&] {
+    pipeline->reset();
+    process(*pipeline, 0);
+  };
+  prepare();
+  const int calls = count([&] {
+    std::vector<Maps> maps(expected.size());
+    EXPECT_EQ(play(maps), 0);
+    EXPECT_EQ(maps, expected);
+  });
+  for (int at = 0; at < calls && !HasFailure(); ++at) {
+    prepare();
+    std::vector<Maps> maps(expected.size());
+    faults_.arm(at, GetParam().code, GetParam().is_late);
+    EXPECT_EQ(play(maps), 1) << "call " << at << " of " << calls;
+    faults_.disarm();
+    EXPECT_EQ(maps, expected) << "after call " << at << " of " << calls << " failed";
+  }
+}
+
+// What is known of the rows' offset goes back with the rest; the other tests' images are too small for an estimate.
+TEST_P(OverlappedFaultTest, TheVerticalOffsetOfFramesThatFailedIsForgotten) {
+  constexpr shared::ImageSize kSize{127, 61};
+  const testing::Scene scene(kSize, 0, 0.4);
+  PipelineOptions options;
+  options.disparities = 32;
+  Pipeline pipeline(scene.calibration(), kSize.width, kSize.height, options);
+  const auto submit_frame = [&](int index) {
+    const std::vector<int> greys = scene.frame(index).greys;
+    const testing::ImageMemory left(kSize, greys, EGOSGM_LEFT, PixelType::kU8),
+        right(kSize, greys, EGOSGM_RIGHT, PixelType::kU8);
+    pipeline.submit(left.view(), right.view(), scene.motion(index), {});
+  };
+  std::vector<double> expected;
+  for (int index = 0; index < 4; ++index) {
+    submit_frame(index);
+    expected.push_back(pipeline.collect().vertical_offset_px);
+  }
+  EXPECT_NE(expected[2], expected[3]);
+
+  pipeline.reset();
+  const int calls = count([&] { submit_frame(0), pipeline.collect(); });
+  submit_frame(1);
+  faults_.arm(calls / 2, GetParam().code, GetParam().is_late);
+  try {
+    submit_frame(2);
+    faults_.disarm();
+    pipeline.collect();
+    ADD_FAILURE() << "the fault was not noticed";
+  } catch (const DeviceError&) {
+    faults_.disarm();
+  }
+  for (int index = pipeline.under_way() == 0 ? 1 : 2; index < 4; ++index) {
+    submit_frame(index);
+    if (pipeline.under_way() == 2) pipeline.collect();
+    EXPECT_EQ(pipeline.collect().vertical_offset_px, expected[index]) << "frame " << index;
+  }
+}
+
+// The frames under way may still write into memory of the pipeline.
+TEST_P(OverlappedFaultTest, APipelineMayEndWithFramesUnderWay) {
+  const long before = faults_.references();
+  const int calls = count([&] {
+    const auto pipeline = make_pipeline();
+    Maps maps[2];
+    submit(*pipeline, 0, maps[0]);
+    submit(*pipeline, 1, maps[1]);
+  });
+  EXPECT_GT(calls, 10);
+  EXPECT_EQ(faults_.references(), before);
+}
+
+INSTANTIATE_TEST_SUITE_P(Codes, OverlappedFaultTest,
+                         ::testing::Values(Fault{CL_OUT_OF_RESOURCES, false}, Fault{CL_OUT_OF_RESOURCES, true},
+                                           Fault{CL_OUT_OF_RESOURCES, false, true},
+                                           Fault{CL_OUT_OF_RESOURCES, true, true}),
+                         fault_name);
+
 class ConstructionFaultTest : public FaultTest {};
 
 TEST_P(ConstructionFaultTest, EveryCallOfConstruction) {
@@ -205,6 +342,8 @@ TEST(Memory, NoBufferIsMadeInAFrame) {
   const auto pipeline = make_pipeline();
   const long made = layer.buffers_created();
   for (int frame = 0; frame < 3; ++frame) process(*pipeline, frame);
+  std::vector<Maps> maps(3);
+  OverlappedRun(*pipeline, 3, 5, maps);
   EXPECT_EQ(layer.buffers_created(), made);
   const auto bytes = pipeline->device_memory_bytes();
   EXPECT_GT(bytes, 0u);
@@ -216,8 +355,9 @@ TEST(Memory, APipelineGivesBackAllThatItTook) {
   {
     const auto pipeline = make_pipeline();
     EXPECT_GT(layer.references(), before + 50);
+    process(*pipeline, 0);
     const long idle = layer.references();
-    for (int frame = 0; frame < 3; ++frame) process(*pipeline, frame);
+    for (int frame = 1; frame < 4; ++frame) process(*pipeline, frame);
     EXPECT_EQ(layer.references(), idle) << "a frame keeps something";
   }
   EXPECT_EQ(layer.references(), before);

@@ -471,6 +471,59 @@ TEST(Pipeline, WithoutTimeEveryFrameIsAlone) {
   EXPECT_EQ(result.report.predicted_fraction, 0);
 }
 
+// With two frames under way at every moment, over a frame without a motion and a reset.
+TEST_P(PipelineTest, SubmitAndCollectGiveTheBitsOfProcess) {
+  const Setting& setting = GetParam();
+  const Video video(setting, 6);
+  Pipeline pipeline = make_pipeline(setting), overlapped = make_pipeline(setting);
+  std::vector<Result> expected;
+  std::vector<OutputMemory> outputs(video.size(), OutputMemory(setting.size));
+  const auto collect = [&](int index) {
+    EXPECT_TRUE(same_outputs(outputs[index], OutputMemory(setting.size), setting.size)) << "touched too early";
+    const FrameReport report = overlapped.collect();
+    EXPECT_TRUE(same_outputs(outputs[index], expected[index].outputs, setting.size)) << "frame " << index;
+    EXPECT_EQ(report.full_range_reason, expected[index].report.full_range_reason) << "frame " << index;
+    EXPECT_EQ(report.search_fraction, expected[index].report.search_fraction) << "frame " << index;
+    EXPECT_EQ(report.density, expected[index].report.density) << "frame " << index;
+    EXPECT_EQ(report.vertical_offset_px, expected[index].report.vertical_offset_px) << "frame " << index;
+    EXPECT_EQ(report.launches, expected[index].report.launches) << "frame " << index;
+  };
+  for (int index = 0; index < video.size(); ++index) {
+    const std::optional<Motion> motion = index != 2 ? std::optional(video.motion(index)) : std::nullopt;
+    if (index == 4) pipeline.reset(), overlapped.reset();
+    expected.push_back(process(pipeline, setting, video, index, motion));
+    if (overlapped.under_way() == Pipeline::kMaxUnderWay) collect(index - Pipeline::kMaxUnderWay);
+    // Images whose memory ends here.
+    const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
+    overlapped.submit(left.view(), right.view(), motion, outputs[index].views());
+  }
+  collect(video.size() - 2);
+  collect(video.size() - 1);
+  EXPECT_EQ(overlapped.under_way(), 0);
+}
+
+TEST(Pipeline, RefusesFramesOutOfTurn) {
+  const Setting setting = standard();
+  const Video video(setting);
+  Pipeline pipeline = make_pipeline(setting), overlapped = make_pipeline(setting);
+  const std::vector<OutputMemory> expected = process_all(pipeline, setting, video);
+  expect_refused([&] { overlapped.collect(); }, {"collect: no frame is under way"});
+  std::vector<OutputMemory> outputs(3, OutputMemory(setting.size));
+  const auto submit = [&](int index) {
+    const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
+    overlapped.submit(left.view(), right.view(), video.motion(index), outputs[index].views());
+  };
+  submit(0);
+  expect_refused([&] { process(overlapped, setting, video, 1); }, {"process: a frame that was submitted is under way"});
+  submit(1);
+  expect_refused([&] { submit(2); }, {"submit: 2 frames are under way"});
+  overlapped.collect();
+  submit(2);
+  overlapped.collect();
+  overlapped.collect();
+  EXPECT_TRUE(same_outputs(outputs, expected, setting.size));
+}
+
 // With search=full the prediction is fused, but narrows nothing.
 TEST(Pipeline, FullSearchStillFusesThePrediction) {
   Setting setting = standard();

@@ -16,7 +16,9 @@ class Buffer {
  public:
   Buffer(Context& context, std::size_t size) : size_(std::max<std::size_t>(size, 1)) {
     context.expect_allocatable(size_ * sizeof(T));
-    buffer_ = cl::Buffer(context.get(), CL_MEM_READ_WRITE, size_ * sizeof(T));
+    // Where host and device share memory, most drivers map only what they allocated as host memory without a copy.
+    const cl_mem_flags place = context.shares_host_memory() ? CL_MEM_ALLOC_HOST_PTR : 0;
+    buffer_ = cl::Buffer(context.get(), CL_MEM_READ_WRITE | place, size_ * sizeof(T));
     context.count_allocation(size_ * sizeof(T));
   }
 
@@ -30,7 +32,7 @@ class Buffer {
   void fill(Context& context, T value) {
     cl::Event done;
     context.queue().enqueueFillBuffer(buffer_, value, 0, size_ * sizeof(T), nullptr, &done);
-    context.record(done);
+    context.record(done, "fill");
   }
   /// For tests: waits for all that was enqueued.
   std::vector<T> read(Context& context) const {
@@ -38,7 +40,7 @@ class Buffer {
     const Drain drain{context};
     cl::Event done;
     context.queue().enqueueReadBuffer(buffer_, CL_FALSE, 0, size_ * sizeof(T), values.data(), nullptr, &done);
-    context.record(done);
+    context.record(done, "read");
     context.wait();
     return values;
   }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/ocl/context.h"
 
+#include <algorithm>
+
 #include "egosgm/error.h"
 #include "host/ocl/errors.h"
 #include "host/ocl/sources.h"
@@ -37,19 +39,41 @@ std::string build_log(const cl::Program& program, const cl::Device& device) {
   }
 }
 
+cl::CommandQueue make_queue(const cl::Context& context, const cl::Device& device) {
+  return {context, device, CL_QUEUE_PROFILING_ENABLE};
+}
+
+void expect_not_failed(const cl::Event& event) {
+  const cl_int status = event.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>();
+  if (status < 0) throw cl::Error(status, "a command");
+}
+
 }  // namespace
 
 Context::Context(const cl::Device& device, std::shared_ptr<const ProgramFolder> programs)
     : device_(device),
       context_(device),
-      queue_(context_, device, CL_QUEUE_PROFILING_ENABLE),
+      queues_{make_queue(context_, device), make_queue(context_, device), make_queue(context_, device)},
       build_options_(build_options(device)),
       max_work_group_size_(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>()),
       max_allocation_bytes_(device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()),
+      shares_host_memory_(device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>()),
       folder_(std::move(programs)) {}
 
-std::vector<Context::Finished> Context::wait() {
-  const auto commands = std::exchange(commands_, {});
+void Context::let_wait(Queue which, const cl::Event& event) {
+  expect_not_failed(event);
+  const std::vector<cl::Event> events{event};
+  cl::Event done;
+  queue(which).enqueueBarrierWithWaitList(&events, &done);
+  record(done, "wait", which);
+}
+
+const cl::Event& Context::last_kernel() const {
+  return std::find_if(commands_.rbegin(), commands_.rend(), [](const Command& c) { return c.queue == Queue::kKernels; })
+      ->event;
+}
+
+std::vector<Context::Finished> Context::wait(const std::vector<Command>& commands) {
   std::vector<Finished> finished;
   finished.reserve(commands.size());
   for (const Command& command : commands) {
@@ -62,8 +86,15 @@ std::vector<Context::Finished> Context::wait() {
   return finished;
 }
 
+void Context::expect_none_failed(const std::vector<Command>& commands) {
+  for (const Command& command : commands) {
+    stage_ = command.stage;
+    expect_not_failed(command.event);
+  }
+}
+
 void Context::drain() noexcept {
-  ::clFinish(queue_());
+  for (const cl::CommandQueue& queue : queues_) ::clFinish(queue());
   commands_.clear();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -13,7 +14,19 @@
 
 namespace egosgm::ocl {
 
-/// One device with its in-order queue, the programs built for it, and the commands under way. Not thread-safe.
+/// The device's in-order queues. Transfers have their own, so that they run beside the kernels of another frame.
+enum class Queue { kUpload, kKernels, kDownload };
+
+/// A command that was enqueued. The names are string literals.
+struct Command {
+  const char* stage;
+  const char* name;  // of the kernel, or "write", "read", ...
+  Queue queue;
+  bool is_launch;
+  cl::Event event;
+};
+
+/// One device with its queues, the programs built for it, and the commands under way. Not thread-safe.
 class Context {
  public:
   /// `programs`: where programs come from; null: from the embedded kernels, compiled.
@@ -29,24 +42,38 @@ class Context {
   void enter(const char* stage) { stage_ = stage; }
   const char* stage() const { return stage_; }
 
-  cl::CommandQueue& queue() { return queue_; }
+  cl::CommandQueue& queue(Queue which = Queue::kKernels) { return queues_[static_cast<std::size_t>(which)]; }
+
+  /// Lets what is enqueued on `which` from now on wait for `event` of another queue. Throws if the event's command has
+  /// failed: PoCL 3.1 never ends a command whose dependency failed before it was enqueued.
+  void let_wait(Queue which, const cl::Event& event);
+
+  /// Of those recorded, the last one for `kKernels`. REQUIRES: there is one.
+  const cl::Event& last_kernel() const;
 
   /// Remembers a command, for `wait` to ask whether it succeeded.
-  void record(cl::Event command, bool is_launch = false) {
-    commands_.push_back({stage_, std::move(command), is_launch});
+  void record(cl::Event event, const char* name, Queue queue = Queue::kKernels, bool is_launch = false) {
+    commands_.push_back({stage_, name, queue, is_launch, std::move(event)});
   }
+
+  /// The commands recorded since the last call; they are forgotten here.
+  std::vector<Command> take_commands() { return std::exchange(commands_, {}); }
 
   struct Finished {
     const char* stage;
     double ms;
     bool is_launch;
   };
-  /// Waits for the recorded commands, forgets them, and throws if one failed. Nothing less tells: clFinish returns
-  /// success after a failed kernel, and a later command of the same queue runs as if nothing were.
-  /// Returns the device time of each.
-  std::vector<Finished> wait();
+  /// Waits for `commands` and throws if one failed. Nothing less tells: clFinish returns success after a failed kernel,
+  /// and a later command of the same queue runs as if nothing were. Returns the device time of each.
+  std::vector<Finished> wait(const std::vector<Command>& commands);
+  /// The same for the recorded ones.
+  std::vector<Finished> wait() { return wait(take_commands()); }
 
-  /// Lets the recorded commands end, and forgets them.
+  /// Throws if one of `commands` has failed by now. Does not wait.
+  void expect_none_failed(const std::vector<Command>& commands);
+
+  /// Lets all that was enqueued end, and forgets what was recorded.
   void drain() noexcept;
 
   /// Throws DeviceError, naming the stage and the limit, for a buffer that this device cannot hold.
@@ -57,33 +84,34 @@ class Context {
   const cl::Context& get() const { return context_; }
   const cl::Device& device() const { return device_; }
   std::size_t max_work_group_size() const { return max_work_group_size_; }
+  /// Whether the device works in the host's memory, so that mapping a buffer copies nothing.
+  bool shares_host_memory() const { return shares_host_memory_; }
 
  private:
   cl::Program created(const ProgramSource& source) const;
 
-  struct Command {
-    const char* stage;
-    cl::Event event;
-    bool is_launch;
-  };
-
   cl::Device device_;
   cl::Context context_;
-  cl::CommandQueue queue_;
+  std::array<cl::CommandQueue, 3> queues_;
   std::string build_options_;
   std::size_t max_work_group_size_ = 1;
   std::uint64_t max_allocation_bytes_ = 0;
   std::uint64_t allocated_bytes_ = 0;
+  bool shares_host_memory_ = false;
   const char* stage_ = "setup";
   std::shared_ptr<const ProgramFolder> folder_;
   std::map<std::pair<std::string, std::string>, std::pair<ProgramSource, cl::Program>> programs_;
   std::vector<Command> commands_;
 };
 
-/// Leaves no command running when its scope ends, however it ends. Declare it after the memory that the commands use.
+/// Leaves no command running when its scope ends, unless `is_dismissed`. Declare it after the memory that the commands
+/// use.
 struct Drain {
   Context& context;
-  ~Drain() { context.drain(); }
+  bool is_dismissed = false;
+  ~Drain() {
+    if (!is_dismissed) context.drain();
+  }
 };
 
 }  // namespace egosgm::ocl

@@ -56,8 +56,8 @@ inline int pixels_a_work_item(const Context& context) {
 template <typename... Params>
 class Kernel {
  public:
-  /// Throws std::logic_error where the .cl does not fit the signature.
-  Kernel(const cl::Program& program, const char* name) : kernel_(program, name) {
+  /// `name`: a string literal. Throws std::logic_error where the .cl does not fit the signature.
+  Kernel(const cl::Program& program, const char* name) : kernel_(program, name), name_(name) {
     expect_signature(kernel_, {KernelParameter<Params>::text()...});
   }
 
@@ -66,7 +66,7 @@ class Kernel {
     (set(index++, args), ...);
     cl::Event done;
     context.queue().enqueueNDRangeKernel(kernel_, cl::NullRange, range.global, range.local, nullptr, &done);
-    context.record(done, true);
+    context.record(done, name_, Queue::kKernels, /*is_launch=*/true);
   }
 
   const cl::Kernel& get() const { return kernel_; }
@@ -83,6 +83,7 @@ class Kernel {
   }
 
   cl::Kernel kernel_;
+  const char* name_;
 };
 
 }  // namespace egosgm::ocl

@@ -46,7 +46,7 @@ struct FrameReport {
   double vertical_offset_px = 0;  // by which the right image was resampled (vertical_alignment)
   int launches = 0;               // kernels enqueued
   std::vector<StageTime> stages;  // in the order in which they ran
-  double total_ms = 0;            // wall clock, upload to download
+  double total_ms = 0;            // wall clock, upload to download; with submit and collect, from one to the other
 };
 
 /// Dense disparity from stereo video (Fućek et al. 2017): the last frame's disparity map, moved by the camera's motion,
@@ -70,7 +70,24 @@ class Pipeline {
   FrameReport process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
                       const FrameOutputs& outputs);
 
-  /// Forgets the last frame: the next one searches the whole range.
+  /// `process` in two halves, so that the host may prepare the next frame while the device is at work, and a frame's
+  /// transfers run beside another's kernels. Gives the same bits.
+  ///
+  /// `submit` copies the images, enqueues the frame and returns; the memory of `outputs` must live until `collect`,
+  /// which waits for the oldest frame under way and fills its outputs.
+  ///
+  /// Both throw InvalidArgument out of turn: with kMaxUnderWay frames, or none, under way. Where a frame under way has
+  /// failed, the next of either throws DeviceError and drops all of them, since they rest on one another: no output is
+  /// touched, the pipeline is as it was before the oldest of them, and `under_way` is 0. Else a `submit` that throws
+  /// leaves the frames before it under way.
+  void submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
+              const FrameOutputs& outputs);
+  FrameReport collect();
+
+  static constexpr int kMaxUnderWay = 2;
+  int under_way() const;  // frames submitted and not collected
+
+  /// Forgets the last frame: the next one searches the whole range. Frames under way are not affected.
   void reset();
 
   const PipelineOptions& options() const;

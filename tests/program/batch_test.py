@@ -147,7 +147,7 @@ class Batch(BatchTest):
     def test_a_device_that_fails_hands_its_sequence_to_another(self):
         out = self.new_folder()
         devices = self.two_devices()
-        lost = dict(os.environ, OPENCL_LAYERS=LAYER, EGOSGM_FAILING_QUEUE="0/80")  # after its first frame
+        lost = dict(os.environ, OPENCL_LAYERS=LAYER, EGOSGM_FAILING_CONTEXT="0/80")  # after its first frame
         text = self.assert_works(*self.batch(out, "--devices", devices), env=lost)
         self.assertIn("handed to another device", text)
         self.assert_same(out)
@@ -156,7 +156,7 @@ class Batch(BatchTest):
 
     def test_where_the_only_device_fails_the_others_sequences_go_on(self):
         out = self.new_folder()
-        lost = dict(os.environ, OPENCL_LAYERS=LAYER, EGOSGM_FAILING_QUEUE="1/0")
+        lost = dict(os.environ, OPENCL_LAYERS=LAYER, EGOSGM_FAILING_CONTEXT="1/0")
         self.assert_refused(self.batch(out, "--devices", "0"), "1 of 4 sequences are not done, the first is street-1",
                             "CL_DEVICE_NOT_AVAILABLE", code=1, env=lost)
         self.assertEqual(len(list(out.glob("*/done.json"))), SEQUENCES - 1)

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <vector>
 
 namespace {
 
@@ -18,12 +19,13 @@ cl_icd_dispatch layer{};
 std::atomic<int> calls = 0, enqueues = 0;
 int failing = -1;
 bool later = false;
+bool separate_memory = false;
 cl_int status = CL_OUT_OF_RESOURCES;
-// EGOSGM_FAILING_QUEUE=N/M, for programs that do not know of this layer: from command M on, all of queue N fail (both
-// from 0), as if its device were lost.
-int queue_to_fail = -1, last_good_command = 0;
-std::atomic<int> queues_created = 0, commands_of_it = 0;
-std::atomic<cl_command_queue> failing_queue = nullptr;
+// EGOSGM_FAILING_CONTEXT=N/M, for programs that do not know of this layer: from command M on, all of context N fail
+// (both from 0), as if its device were lost.
+int context_to_fail = -1, last_good_command = 0;
+std::atomic<int> contexts_created = 0, commands_of_it = 0;
+std::atomic<cl_context> failing_context = nullptr;
 
 std::atomic<bool> sources_forbidden = false;
 std::atomic<long> references = 0;
@@ -48,25 +50,32 @@ Object counted(Object object) {
   return object;
 }
 
-// Enqueues by `enqueue(number of events to wait for, those events)`. A fault that comes later: the command waits for an
-// event that then fails, and takes the rest of its queue down with it. That event must not fail before the enqueue:
-// PoCL 3.1 would hang.
+cl_context context_of(cl_command_queue queue) {
+  cl_context context = nullptr;
+  next->clGetCommandQueueInfo(queue, CL_QUEUE_CONTEXT, sizeof context, &context, nullptr);
+  return context;
+}
+
+// Enqueues by `enqueue(number of events to wait for, those events)`, which are those given and a fault that comes
+// later: the command then waits for an event that fails, and takes the rest of its queue down with it. That event must
+// not fail before the enqueue: PoCL 3.1 would hang.
 template <typename Enqueue>
-cl_int enqueue(cl_command_queue queue, cl_event* done, Enqueue&& enqueue_with) {
+cl_int enqueue(cl_command_queue queue, cl_uint count, const cl_event* given, cl_event* done, Enqueue&& enqueue_with) {
   const bool fails_later = later && enqueues == failing;
   ++enqueues;
-  if (queue == failing_queue && commands_of_it++ >= last_good_command) return CL_DEVICE_NOT_AVAILABLE;
+  if (failing_context && context_of(queue) == failing_context && commands_of_it++ >= last_good_command)
+    return CL_DEVICE_NOT_AVAILABLE;
   if (fails()) return status;
   cl_int result;
   if (fails_later) {
-    cl_context context;
-    next->clGetCommandQueueInfo(queue, CL_QUEUE_CONTEXT, sizeof context, &context, nullptr);
-    cl_event fault = next->clCreateUserEvent(context, nullptr);
-    result = enqueue_with(1, &fault);
+    cl_event fault = next->clCreateUserEvent(context_of(queue), nullptr);
+    std::vector<cl_event> events(given, given + count);
+    events.push_back(fault);
+    result = enqueue_with(count + 1, events.data());
     next->clSetUserEventStatus(fault, status);
     next->clReleaseEvent(fault);
   } else {
-    result = enqueue_with(0, nullptr);
+    result = enqueue_with(count, given);
   }
   if (result == CL_SUCCESS && done) ++references;
   return result;
@@ -75,14 +84,14 @@ cl_int enqueue(cl_command_queue queue, cl_event* done, Enqueue&& enqueue_with) {
 cl_context CL_API_CALL create_context(const cl_context_properties* p, cl_uint n, const cl_device_id* d,
                                       void(CL_CALLBACK* f)(const char*, const void*, size_t, void*), void* u,
                                       cl_int* e) {
-  return fails() ? refuse<cl_context>(e) : counted(next->clCreateContext(p, n, d, f, u, e));
+  if (fails()) return refuse<cl_context>(e);
+  const cl_context context = counted(next->clCreateContext(p, n, d, f, u, e));
+  if (context == failing_context) failing_context = nullptr;  // that one is gone, its address was used again
+  if (contexts_created++ == context_to_fail) failing_context = context;
+  return context;
 }
 cl_command_queue CL_API_CALL create_queue(cl_context c, cl_device_id d, cl_command_queue_properties p, cl_int* e) {
-  if (fails()) return refuse<cl_command_queue>(e);
-  const cl_command_queue queue = counted(next->clCreateCommandQueue(c, d, p, e));
-  if (queue == failing_queue) failing_queue = nullptr;  // that one is gone, its address was used again
-  if (queues_created++ == queue_to_fail) failing_queue = queue;
-  return queue;
+  return fails() ? refuse<cl_command_queue>(e) : counted(next->clCreateCommandQueue(c, d, p, e));
 }
 cl_mem CL_API_CALL create_buffer(cl_context c, cl_mem_flags f, size_t n, void* p, cl_int* e) {
   ++buffers_created;
@@ -103,7 +112,10 @@ cl_kernel CL_API_CALL create_kernel(cl_program p, const char* n, cl_int* e) {
   return fails() ? refuse<cl_kernel>(e) : counted(next->clCreateKernel(p, n, e));
 }
 cl_int CL_API_CALL device_info(cl_device_id d, cl_device_info i, size_t n, void* v, size_t* s) {
-  return fails() ? status : next->clGetDeviceInfo(d, i, n, v, s);
+  if (fails()) return status;
+  const cl_int result = next->clGetDeviceInfo(d, i, n, v, s);
+  if (separate_memory && i == CL_DEVICE_HOST_UNIFIED_MEMORY && v) *static_cast<cl_bool*>(v) = CL_FALSE;
+  return result;
 }
 cl_int CL_API_CALL kernel_info(cl_kernel k, cl_kernel_info i, size_t n, void* v, size_t* s) {
   return fails() ? status : next->clGetKernelInfo(k, i, n, v, s);
@@ -111,40 +123,56 @@ cl_int CL_API_CALL kernel_info(cl_kernel k, cl_kernel_info i, size_t n, void* v,
 cl_int CL_API_CALL set_arg(cl_kernel k, cl_uint i, size_t n, const void* v) {
   return fails() ? status : next->clSetKernelArg(k, i, n, v);
 }
-cl_int CL_API_CALL fill(cl_command_queue q, cl_mem b, const void* p, size_t pn, size_t o, size_t n, cl_uint,
-                        const cl_event*, cl_event* e) {
-  return enqueue(q, e,
+cl_int CL_API_CALL fill(cl_command_queue q, cl_mem b, const void* p, size_t pn, size_t o, size_t n, cl_uint c,
+                        const cl_event* g, cl_event* e) {
+  return enqueue(q, c, g, e,
                  [&](cl_uint w, const cl_event* l) { return next->clEnqueueFillBuffer(q, b, p, pn, o, n, w, l, e); });
 }
-cl_int CL_API_CALL copy(cl_command_queue q, cl_mem from, cl_mem to, size_t fo, size_t o, size_t n, cl_uint,
-                        const cl_event*, cl_event* e) {
-  return enqueue(
-      q, e, [&](cl_uint w, const cl_event* l) { return next->clEnqueueCopyBuffer(q, from, to, fo, o, n, w, l, e); });
+cl_int CL_API_CALL copy(cl_command_queue q, cl_mem from, cl_mem to, size_t fo, size_t o, size_t n, cl_uint c,
+                        const cl_event* g, cl_event* e) {
+  return enqueue(q, c, g, e, [&](cl_uint w, const cl_event* l) {
+    return next->clEnqueueCopyBuffer(q, from, to, fo, o, n, w, l, e);
+  });
 }
-cl_int CL_API_CALL read(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, void* p, cl_uint, const cl_event*,
-                        cl_event* e) {
-  return enqueue(q, e,
+cl_int CL_API_CALL read(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, void* p, cl_uint c,
+                        const cl_event* g, cl_event* e) {
+  return enqueue(q, c, g, e,
                  [&](cl_uint w, const cl_event* l) { return next->clEnqueueReadBuffer(q, b, bl, o, n, p, w, l, e); });
 }
-cl_int CL_API_CALL write(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, const void* p, cl_uint,
-                         const cl_event*, cl_event* e) {
-  return enqueue(q, e,
+cl_int CL_API_CALL write(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, const void* p, cl_uint c,
+                         const cl_event* g, cl_event* e) {
+  return enqueue(q, c, g, e,
                  [&](cl_uint w, const cl_event* l) { return next->clEnqueueWriteBuffer(q, b, bl, o, n, p, w, l, e); });
 }
-void* CL_API_CALL map(cl_command_queue q, cl_mem b, cl_bool bl, cl_map_flags f, size_t o, size_t n, cl_uint w,
-                      const cl_event* l, cl_event* e, cl_int* error) {
-  if (fails()) return refuse<void*>(error);
-  void* mapped = next->clEnqueueMapBuffer(q, b, bl, f, o, n, w, l, e, error);
-  if (mapped && e) ++references;
+// A map that blocks can only fail at once: PoCL 3.1 would hang.
+void* CL_API_CALL map(cl_command_queue q, cl_mem b, cl_bool bl, cl_map_flags f, size_t o, size_t n, cl_uint c,
+                      const cl_event* g, cl_event* e, cl_int* error) {
+  void* mapped = nullptr;
+  const auto enqueue_with = [&](cl_uint w, const cl_event* l) {
+    cl_int result;
+    mapped = next->clEnqueueMapBuffer(q, b, bl, f, o, n, w, l, e, &result);
+    return result;
+  };
+  const cl_int result = !bl ? enqueue(q, c, g, e, enqueue_with) : fails() ? status : enqueue_with(c, g);
+  if (error) *error = result;
   return mapped;
 }
-cl_int CL_API_CALL unmap(cl_command_queue q, cl_mem b, void* p, cl_uint, const cl_event*, cl_event* e) {
-  return enqueue(q, e, [&](cl_uint w, const cl_event* l) { return next->clEnqueueUnmapMemObject(q, b, p, w, l, e); });
+cl_int CL_API_CALL barrier(cl_command_queue q, cl_uint c, const cl_event* g, cl_event* e) {
+  return enqueue(q, c, g, e,
+                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueBarrierWithWaitList(q, w, l, e); });
+}
+cl_int CL_API_CALL event_info(cl_event e, cl_event_info i, size_t n, void* v, size_t* s) {
+  return fails() ? status : next->clGetEventInfo(e, i, n, v, s);
+}
+cl_int CL_API_CALL unmap(cl_command_queue q, cl_mem b, void* p, cl_uint c, const cl_event* g, cl_event* e) {
+  return enqueue(q, c, g, e,
+                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueUnmapMemObject(q, b, p, w, l, e); });
 }
 cl_int CL_API_CALL launch(cl_command_queue q, cl_kernel k, cl_uint d, const size_t* o, const size_t* g, const size_t* l,
-                          cl_uint, const cl_event*, cl_event* e) {
-  return enqueue(
-      q, e, [&](cl_uint w, const cl_event* wl) { return next->clEnqueueNDRangeKernel(q, k, d, o, g, l, w, wl, e); });
+                          cl_uint c, const cl_event* given, cl_event* e) {
+  return enqueue(q, c, given, e, [&](cl_uint w, const cl_event* wl) {
+    return next->clEnqueueNDRangeKernel(q, k, d, o, g, l, w, wl, e);
+  });
 }
 cl_int CL_API_CALL wait(cl_uint n, const cl_event* e) { return fails() ? status : next->clWaitForEvents(n, e); }
 cl_int CL_API_CALL profiling(cl_event e, cl_profiling_info i, size_t n, void* v, size_t* s) {
@@ -171,6 +199,7 @@ extern "C" void fault_arm(int at, int code, int is_late) {
   later = is_late;
 }
 extern "C" void fault_forbid_sources(int forbidden) { sources_forbidden = forbidden != 0; }
+extern "C" void fault_separate_memory(int separate) { separate_memory = separate; }
 extern "C" int fault_calls() { return calls; }
 extern "C" int fault_enqueues() { return enqueues; }
 extern "C" long fault_references() { return references; }
@@ -187,8 +216,8 @@ extern "C" cl_int CL_API_CALL clGetLayerInfo(cl_layer_info name, size_t size, vo
 extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target, cl_uint* count,
                                           const cl_icd_dispatch** out) {
   next = target;
-  if (const char* wanted = std::getenv("EGOSGM_FAILING_QUEUE")) {
-    std::sscanf(wanted, "%d/%d", &queue_to_fail, &last_good_command);
+  if (const char* wanted = std::getenv("EGOSGM_FAILING_CONTEXT")) {
+    std::sscanf(wanted, "%d/%d", &context_to_fail, &last_good_command);
   }
   layer = *target;
   layer.clCreateContext = create_context;
@@ -207,6 +236,8 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   layer.clEnqueueWriteBuffer = write;
   layer.clEnqueueMapBuffer = map;
   layer.clEnqueueUnmapMemObject = unmap;
+  layer.clEnqueueBarrierWithWaitList = barrier;
+  layer.clGetEventInfo = event_info;
   layer.clEnqueueNDRangeKernel = launch;
   layer.clWaitForEvents = wait;
   layer.clGetEventProfilingInfo = profiling;

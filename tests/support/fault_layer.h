@@ -19,6 +19,7 @@ struct FaultLayer {
   /// none.
   void (*arm)(int at, int code, int is_late);
   void (*forbid_sources)(int forbidden);  // 1: no program can be made of its source from now on
+  void (*separate_memory)(int separate);  // 1: devices say from now on that they have memory of their own
   int (*calls)();                         // since `arm`: calls that can fail,
   int (*enqueues)();                      // and commands among them
   long (*references)();  // to contexts, queues, buffers, programs, kernels and events: created + retained - released
@@ -31,6 +32,7 @@ struct FaultLayer {
     if (!layer) throw std::runtime_error(std::string("run this test with OPENCL_LAYERS=") + file);
     find(layer, "fault_arm", arm);
     find(layer, "fault_forbid_sources", forbid_sources);
+    find(layer, "fault_separate_memory", separate_memory);
     find(layer, "fault_calls", calls);
     find(layer, "fault_enqueues", enqueues);
     find(layer, "fault_references", references);
