@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <chrono>
+#include <deque>
 #include <filesystem>
 #include <future>
 #include <memory>
@@ -39,6 +40,7 @@ struct RunArguments {
 
 /// What a frame needs before the device can start.
 struct PreparedFrame {
+  std::size_t index = 0;
   vision::StereoImages images;
   FrameMotion motion;
   double read_ms = 0;
@@ -73,25 +75,34 @@ class Run {
 
  private:
   bool process_all() {
-    // On a CPU device the next frame's odometry would only take the kernels' cores, and spoil their times.
+    // Reading, odometry and writing run while the device works. With a device of its own, the next frame is prepared
+    // beside writing, too; on a CPU device one more thread would only take the kernels' cores.
     const bool ahead = pipeline_.device().info().type != "CPU";
     const auto policy = ahead ? std::launch::async : std::launch::deferred;
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
-    auto next = std::async(policy, [this] { return prepare(0); });
-    for (std::size_t i = 0; i < sequence_.frames.size(); ++i) {
-      if (interrupted()) return false;
-      const auto start = Clock::now();
-      const PreparedFrame frame = next.get();
-      if (i + 1 < sequence_.frames.size()) next = std::async(policy, [this, i] { return prepare(i + 1); });
-      process(sequence_.frames[i], frame, start, progress);
+    const auto prepare_later = [&](std::size_t i) { return std::async(policy, [this, i] { return prepare(i); }); };
+    auto next = prepare_later(0);
+    try {
+      for (std::size_t i = 0; i < sequence_.frames.size() && !interrupted(); ++i) {
+        submit(next.get());
+        if (i + 1 < sequence_.frames.size()) next = prepare_later(i + 1);
+        if (under_way_.size() > 1) collect(progress);
+      }
+    } catch (const DeviceError&) {
+      throw;
+    } catch (const std::exception&) {  // what is under way does not suffer from a next frame that cannot be read
+      while (!under_way_.empty()) collect(progress);
+      throw;
     }
+    while (!under_way_.empty()) collect(progress);
     if (!quiet_) summary_ = fmt::format("{:.1f} frames/s", progress.frames_per_second());
-    return true;
+    return poses_.size() == sequence_.frames.size();
   }
 
   PreparedFrame prepare(std::size_t i) {
     const auto start = Clock::now();
     PreparedFrame frame;
+    frame.index = i;
     frame.images = vision::read_images(sequence_.frames[i]);
     frame.read_ms = ms_since(start);
     if (frame.images.left.size() != size_) {
@@ -103,21 +114,29 @@ class Run {
     return frame;
   }
 
-  void process(const vision::StereoFrame& frame, const PreparedFrame& prepared, Clock::time_point start,
-               Progress& progress) {
-    const FrameReport result =
-        pipeline_.process(vision::image_view(prepared.images.left), vision::image_view(prepared.images.right),
-                          prepared.motion.motion, outputs_.views());
+  void submit(PreparedFrame frame) {
+    pipeline_.submit(vision::image_view(frame.images.left), vision::image_view(frame.images.right), frame.motion.motion,
+                     outputs_.views());
+    under_way_.push_back(std::move(frame));
+  }
+
+  /// The oldest frame under way: waits for it, writes and reports it.
+  void collect(Progress& progress) {
+    const FrameReport result = pipeline_.collect();
+    const PreparedFrame prepared = std::move(under_way_.front());
+    under_way_.pop_front();
+    const vision::StereoFrame& frame = sequence_.frames[prepared.index];
     const auto before_write = Clock::now();
     const std::int64_t unstorable = outputs_.write(frame, prepared.images.left);
-    const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(start)};
+    const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
+    last_written_ = Clock::now();
     report_.add(frame, result, prepared.motion, times, unstorable);
     poses_.push_back(prepared.motion.first_from_camera);
-    tell(frame, result, prepared.motion, unstorable, progress);
+    tell(frame, result, prepared.motion, times, unstorable, progress);
   }
 
   void tell(const vision::StereoFrame& frame, const FrameReport& result, const FrameMotion& motion,
-            std::int64_t unstorable, Progress& progress) {
+            const HostTimes& times, std::int64_t unstorable, Progress& progress) {
     if (poses_.size() > 1 && !motion.motion) {
       progress.note(
           fmt::format("frame {}: no motion ({}): searched the full range", frame.name, motion.odometry.reason));
@@ -129,7 +148,7 @@ class Run {
           frame.name, unstorable));
     }
     progress.done(fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms{}", frame.name,
-                              100 * result.search_fraction, 100 * result.density, result.total_ms,
+                              100 * result.search_fraction, 100 * result.density, times.wall_ms,
                               result.full_range ? "  (full range: " + result.full_range_reason + ")" : ""));
   }
 
@@ -159,6 +178,8 @@ class Run {
   RunOutputs outputs_;
   Pipeline pipeline_;
   RunReport report_;
+  std::deque<PreparedFrame> under_way_;
+  Clock::time_point last_written_ = Clock::now();
   std::vector<Eigen::Isometry3d> poses_;
   std::string summary_;
   bool warned_of_range_ = false;

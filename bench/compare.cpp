@@ -2,7 +2,6 @@
 // This library and OpenCV's four semi-global matchers on the same images, in one process, in turns.
 #include <chrono>
 #include <functional>
-#include <future>
 #include <map>
 #include <memory>
 #include <opencv2/core/utility.hpp>
@@ -66,14 +65,18 @@ class Matcher {
         variance_(disparity_.size(), CV_32FC1) {}
 
   FrameReport operator()(const ClipFrame& frame, const std::optional<Motion>& motion) {
+    submit(frame, motion);
+    return collect();
+  }
+  void submit(const ClipFrame& frame, const std::optional<Motion>& motion) {
     FrameOutputs outputs;
     outputs.disparity = vision::map_view(disparity_);
     outputs.variance = vision::map_view(variance_);
-    return pipeline_.process(vision::image_view(frame.left), vision::image_view(frame.right), motion, outputs);
+    pipeline_.submit(vision::image_view(frame.left), vision::image_view(frame.right), motion, outputs);
   }
+  FrameReport collect() { return pipeline_.collect(); }
 
   void reset() { pipeline_.reset(); }
-  bool shares_cores() const { return pipeline_.device().info().type == "CPU"; }
 
   Turn turn(double seconds, const FrameReport& last) const {
     double device_ms = 0;
@@ -125,7 +128,7 @@ Contender banded_frame(const Clip& clip, const PipelineOptions& options, const D
           }};
 }
 
-/// As `egosgm run` does it: the next frame's odometry beside the device's work, unless the device is the CPU itself.
+/// As `egosgm run` does it: a frame's odometry while the device is at work on the one before.
 class Stream {
  public:
   Stream(const Clip& clip, const PipelineOptions& options, const Device& device)
@@ -134,25 +137,23 @@ class Stream {
   Turn operator()() {
     matcher_.reset();
     odometry_.reset();
-    FrameReport report;
     Clock::time_point steady;
-    auto motion = estimate(0);
     for (std::size_t i = 0; i < clip_.frames.size(); ++i) {
-      if (i == Clip::kSteadyFrom) steady = Clock::now();
-      const std::optional<Motion> current = motion.get();
-      if (i + 1 < clip_.frames.size()) motion = estimate(i + 1);
-      report = matcher_(clip_.frames[i], current);
+      const std::optional<Motion> motion = estimate(clip_.frames[i]);
+      matcher_.submit(clip_.frames[i], motion);
+      if (i == 0) continue;
+      matcher_.collect();
+      if (i == Clip::kSteadyFrom) steady = Clock::now();  // after the odometry of the first one measured,
     }
+    estimate(clip_.frames[Clip::kSteadyFrom]);  // and therefore with that of the one after the last
+    const FrameReport last = matcher_.collect();
     const double seconds = std::chrono::duration<double>(Clock::now() - steady).count();
-    return matcher_.turn(seconds / static_cast<double>(clip_.frames.size() - Clip::kSteadyFrom), report);
+    return matcher_.turn(seconds / static_cast<double>(clip_.frames.size() - Clip::kSteadyFrom), last);
   }
 
  private:
-  std::future<std::optional<Motion>> estimate(std::size_t i) {
-    return std::async(matcher_.shares_cores() ? std::launch::deferred : std::launch::async, [this, i] {
-      const ClipFrame& frame = clip_.frames[i];
-      return odometry_.process(vision::image_view(frame.left), vision::image_view(frame.right)).motion;
-    });
+  std::optional<Motion> estimate(const ClipFrame& frame) {
+    return odometry_.process(vision::image_view(frame.left), vision::image_view(frame.right)).motion;
   }
 
   const Clip& clip_;

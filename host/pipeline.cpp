@@ -91,6 +91,7 @@ struct Pipeline::Impl {
   StereoMaps *measured = nullptr, *updated = nullptr;
   Memory memory;
   std::vector<FrameUnderWay> under_way;  // the oldest first
+  Clock::time_point collected;           // the last one before them
 
   Impl(const Calibration& calibration, shared::ImageSize image_size, const PipelineOptions& chosen,
        const Device& chosen_device)
@@ -208,7 +209,9 @@ struct Pipeline::Impl {
     or_go_back([&] { report_commands(context.wait(frame.commands), frame.report); });
     expect_none_failed();
     frame.transfer->collect(frame.report);
-    frame.report.total_ms = std::chrono::duration<double, std::milli>(Clock::now() - frame.start).count();
+    const Clock::time_point now = Clock::now();
+    frame.report.total_ms = std::chrono::duration<double, std::milli>(now - std::max(frame.start, collected)).count();
+    collected = now;
     FrameReport report = std::move(frame.report);
     under_way.erase(under_way.begin());
     return report;

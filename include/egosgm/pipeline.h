@@ -46,7 +46,7 @@ struct FrameReport {
   double vertical_offset_px = 0;  // by which the right image was resampled (vertical_alignment)
   int launches = 0;               // kernels enqueued
   std::vector<StageTime> stages;  // in the order in which they ran
-  double total_ms = 0;            // wall clock, upload to download; with submit and collect, from one to the other
+  double total_ms = 0;            // wall clock, upload to download, from when the frame before was collected
 };
 
 /// Dense disparity from stereo video (Fućek et al. 2017): the last frame's disparity map, moved by the camera's motion,
