@@ -8,9 +8,26 @@
 
 namespace egosgm::app {
 
-MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file) {
+void add_motion_bounds(CLI::App& command, vision::StereoOdometryOptions& options, const std::string& group) {
+  command
+      .add_option("--max-translation", options.max_translation_m,
+                  "odometry: a longer motion between two frames is no motion [m]")
+      ->type_name("M")
+      ->group(group)
+      ->capture_default_str();
+  command
+      .add_option("--max-rotation", options.max_rotation_deg,
+                  "odometry: a larger turn between two frames is no motion [deg]")
+      ->type_name("DEG")
+      ->group(group)
+      ->capture_default_str();
+}
+
+MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
+                           const vision::StereoOdometryOptions& options) {
+  options.validate();
   if (poses_file.empty()) {
-    odometry_.emplace(sequence.calibration);
+    odometry_.emplace(sequence.calibration, options);
   } else {
     poses_ = vision::poses_of_frames(sequence, poses_file);
   }

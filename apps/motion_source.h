@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,12 +21,16 @@ struct FrameMotion {
   Eigen::Isometry3d first_from_camera = Eigen::Isometry3d::Identity();  // the pose in the first frame's system
 };
 
+/// Adds --max-translation and --max-rotation.
+void add_motion_bounds(CLI::App& command, vision::StereoOdometryOptions& options, const std::string& group);
+
 /// The motion of one frame after the other: from a file of poses, or by stereo odometry. A frame where odometry found
 /// none repeats the last motion in its pose, and only there. Not thread-safe.
 class MotionSource {
  public:
   /// Reads `poses_file`; empty: estimates. Throws InvalidArgument.
-  MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file);
+  MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
+               const vision::StereoOdometryOptions& options);
 
   /// REQUIRES: called for frames 0, 1, 2, ... of the sequence.
   FrameMotion next(const vision::StereoImages& images);

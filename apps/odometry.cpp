@@ -18,6 +18,7 @@ namespace {
 struct OdometryArguments {
   SequenceArguments input;
   std::string out;
+  vision::StereoOdometryOptions options;
   bool quiet = false;
 };
 
@@ -33,7 +34,7 @@ void tell(const vision::StereoFrame& frame, const FrameMotion& motion, bool firs
 int estimate(const OdometryArguments& arguments) {
   const vision::StereoSequence sequence = arguments.input.open();
   vision::check_image_sizes(sequence);
-  MotionSource motions(sequence, {});
+  MotionSource motions(sequence, {}, arguments.options);
   vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
   std::vector<Eigen::Isometry3d> poses;
   catch_interrupts();
@@ -62,6 +63,7 @@ Command add_odometry(CLI::App& program) {
       ->add_option("--out", arguments->out, "file to write: KITTI poses, camera-to-world, relative to the first frame")
       ->type_name("FILE")
       ->required();
+  add_motion_bounds(*command, arguments->options, "Options");
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors");
   return {command, [arguments] { return estimate(*arguments); }};
 }

@@ -35,6 +35,7 @@ struct RunArguments {
   SequenceArguments input;
   OptionArguments method;
   std::string out, poses, device, programs, write;
+  vision::StereoOdometryOptions odometry;
   bool interpolate = false, quiet = false;
 };
 
@@ -53,7 +54,7 @@ class Run {
         folder_(job.out),
         sequence_(job.sequence),
         size_(vision::check_image_sizes(sequence_)),
-        motions_(sequence_, job.poses_file),
+        motions_(sequence_, job.poses_file, job.odometry),
         outputs_(folder_, job.kinds, size_, job.options.disparities),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
         report_(sequence_, pipeline_, job.preset, size_.width, size_.height) {}
@@ -191,6 +192,7 @@ SequenceJob job_of(const RunArguments& arguments) {
   job.options = arguments.method.options();
   job.preset = arguments.method.preset;
   job.poses_file = arguments.poses;
+  job.odometry = arguments.odometry;
   job.out = arguments.out;
   job.kinds = parse_write_list(arguments.write);
   if (arguments.interpolate) job.kinds.insert("interpolated");
@@ -231,6 +233,7 @@ Command add_run(CLI::App& program) {
                    "take the motion from KITTI poses (camera-to-world) in place of stereo odometry")
       ->type_name("FILE")
       ->group("Method");
+  add_motion_bounds(*command, arguments->odometry, "Method");
   add_device(*command, arguments->device);
   add_programs(*command, arguments->programs);
   return {command, [arguments] { return run(*arguments); }};

@@ -8,6 +8,7 @@
 #include "egosgm/device.h"
 #include "egosgm/options.h"
 #include "egosgm/vision/dataset.h"
+#include "egosgm/vision/odometry.h"
 
 namespace egosgm::app {
 
@@ -15,8 +16,9 @@ namespace egosgm::app {
 struct SequenceJob {
   vision::StereoSequence sequence;
   PipelineOptions options;
-  std::string preset = "default";  // what the report calls the options
-  std::string poses_file;          // empty: stereo odometry
+  std::string preset = "default";          // what the report calls the options
+  std::string poses_file;                  // empty: stereo odometry,
+  vision::StereoOdometryOptions odometry;  // with these options
   std::filesystem::path out;
   std::set<std::string> kinds;  // what is written beside the disparity, see parse_write_list
   bool quiet = false;

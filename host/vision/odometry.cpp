@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "egosgm/vision/odometry.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -23,6 +26,8 @@ constexpr int kRoughCell_px = 80, kRoughPerCell = 8;  // few strong features fin
 constexpr SearchWindow kPriorWindow{40, 24};
 constexpr SearchWindow kGuidedWindow{5, 4};
 constexpr double kRoughThreshold_px = 2.5;
+// Standing still: no more than this, and no more than noise explains (99.9 % of six degrees of freedom).
+constexpr double kStandstill_m = 0.01, kStandstill_rad = 1e-3, kStandstillChi2 = 22.5;
 
 void require(bool condition, const char* what) {
   if (!condition) throw InvalidArgument(std::string("stereo odometry: ") + what);
@@ -36,6 +41,28 @@ void check_images(const ImageView& left, const ImageView& right) {
          << "x" << right.height << "; give a rectified pair of one size and type";
     throw InvalidArgument(text.str());
   }
+}
+
+/// Milliseconds from lap to lap.
+class Stopwatch {
+ public:
+  double lap() {
+    const auto before = std::exchange(last_, Clock::now());
+    return std::chrono::duration<double, std::milli>(last_ - before).count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point last_ = Clock::now();
+};
+
+// That the motion is zero, but for noise.
+bool is_standstill(const Motion& motion) {
+  const Eigen::AngleAxisd rotation(motion.current_from_previous.linear());
+  Vector6 xi;
+  xi << motion.current_from_previous.translation(), rotation.angle() * rotation.axis();
+  if (xi.head<3>().norm() > kStandstill_m || xi.tail<3>().norm() > kStandstill_rad) return false;
+  return xi.dot(motion.covariance.ldlt().solve(xi)) <= kStandstillChi2;
 }
 
 }  // namespace
@@ -72,7 +99,7 @@ struct StereoOdometry::State {
 
   void read_frame(const ImageView& left, const ImageView& right);
   MotionEstimate rough_motion(const std::optional<Eigen::Isometry3d>& prior);
-  OdometryResult estimate(const std::optional<Eigen::Isometry3d>& prior);
+  void estimate(const std::optional<Eigen::Isometry3d>& prior, OdometryResult& result);
   void keep_tracks(const std::vector<CircularMatch>& matches, const std::vector<int>& inliers);
 };
 
@@ -111,12 +138,17 @@ MotionEstimate StereoOdometry::State::rough_motion(const std::optional<Eigen::Is
   return attempt(nullptr, {options.max_flow_x_px, options.max_flow_y_px});
 }
 
-OdometryResult StereoOdometry::State::estimate(const std::optional<Eigen::Isometry3d>& prior) {
-  OdometryResult result;
-  result.features = current.left_features.size();
+void StereoOdometry::State::estimate(const std::optional<Eigen::Isometry3d>& prior, OdometryResult& result) {
+  if (result.features < options.min_inliers) {
+    result.reason =
+        "too few features: " + std::to_string(result.features) + " of at least " + std::to_string(options.min_inliers);
+    return;
+  }
+  Stopwatch stopwatch;
   const MotionEstimate rough = rough_motion(prior ? prior : last_motion);
+  result.times_ms.rough_motion = stopwatch.lap();
   result.reason = rough.reason;
-  if (!rough.reason.empty()) return result;
+  if (!rough.reason.empty()) return;
 
   std::vector<CircularMatch> refined;
   const auto candidates =
@@ -124,19 +156,27 @@ OdometryResult StereoOdometry::State::estimate(const std::optional<Eigen::Isomet
                    &rough.motion.current_from_previous, kGuidedWindow, max_disparity_px(current.left.width));
   auto points = refine_matches(calibration, previous, current, candidates, rough.motion.current_from_previous, refined);
   if (options.learn_rectification) rectification.correct(calibration, points);
+  result.times_ms.matching = stopwatch.lap();
   const MotionEstimate fine =
       refine_motion(calibration, options, MatchNoise{}, points, rough.motion.current_from_previous);
+  result.times_ms.motion = stopwatch.lap();
   result.matches = static_cast<int>(points.size());
   result.inliers = static_cast<int>(fine.inliers.size());
   result.reprojection_rms_px = fine.rms_px;
   result.reason = fine.reason;
   keep_tracks(refined, fine.inliers);
-  if (!fine.reason.empty()) return result;
+  if (!fine.reason.empty()) return;
   result.motion = fine.motion;
+  result.standstill = is_standstill(fine.motion);
+  if (result.standstill) {
+    result.motion->current_from_previous.setIdentity();
+    return;
+  }
+  stopwatch.lap();
   if (options.learn_rectification) {
     rectification.update(calibration, MatchNoise{}, points, fine.inliers, fine.motion.current_from_previous);
   }
-  return result;
+  result.times_ms.learning = stopwatch.lap();
 }
 
 // What agrees with the motion goes on as a track; all else starts anew at its pixel.
@@ -176,17 +216,21 @@ OdometryResult StereoOdometry::process(const ImageView& left, const ImageView& r
          << state.previous.left.height << " to " << left.width << "x" << left.height << "; call reset() first";
     throw InvalidArgument(text.str());
   }
-  state.read_frame(left, right);
   OdometryResult result;
+  Stopwatch stopwatch;
+  state.read_frame(left, right);
+  result.times_ms.features = stopwatch.lap();
+  result.features = state.current.left_features.size();
   if (state.has_previous) {
-    result = state.estimate(prior);
+    state.estimate(prior, result);
   } else {
-    result.features = state.current.left_features.size();
     result.reason = "first frame";
   }
   state.last_motion.reset();
   if (result.motion) state.last_motion = result.motion->current_from_previous;
-  std::swap(state.previous, state.current);
+  // The frame where the camera stopped stays the reference: noise does not add up, and creeping is seen as soon as it
+  // is more than noise.
+  if (!result.standstill) std::swap(state.previous, state.current);
   state.has_previous = true;
   return result;
 }

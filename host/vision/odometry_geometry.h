@@ -69,21 +69,37 @@ struct Residual {
   Eigen::Matrix3d information;           // inverse of the covariance of `value`
 };
 
-inline Residual linearise(const Calibration& c, const MatchNoise& noise, const PointMatch& match,
-                          const Eigen::Vector3d& point, const Eigen::Isometry3d& motion) {
+/// All but the information, around the disparity `d1` in place of the measured one.
+inline Residual linearise_at(const Calibration& c, const PointMatch& match, double d1,
+                             const Eigen::Isometry3d& motion) {
+  const Eigen::Vector3d point = triangulate(c, match.u1, match.v1, d1);
   const Eigen::Vector3d rotated = motion.linear() * point;
   const Eigen::Vector3d p = rotated + motion.translation();
   const Eigen::Matrix3d projection = projection_jacobian(c, p);
   Residual residual;
-  residual.value = Eigen::Vector3d(match.u2, match.v2, match.d2) - project(c, p);
   residual.by_motion = motion_jacobian(projection, p);
-  residual.by_disparity = projection * rotated * (-1 / positive_disparity(c, match.d1));
+  residual.by_disparity = projection * rotated * (-1 / positive_disparity(c, d1));
+  residual.value =
+      Eigen::Vector3d(match.u2, match.v2, match.d2) - project(c, p) - residual.by_disparity * (match.d1 - d1);
   residual.by_pixel.col(0) = projection * motion.linear().col(0) * (point.z() / c.fx);
   residual.by_pixel.col(1) = projection * motion.linear().col(1) * (point.z() / c.fy);
+  return residual;
+}
+
+/// Around the disparity that both frames make most likely: around the measured one, its noise would go into the
+/// derivatives too, and pull what many residuals tell all one way.
+inline Residual linearise(const Calibration& c, const MatchNoise& noise, const PointMatch& match,
+                          const Eigen::Isometry3d& motion) {
   const double position2 = noise.position_px * noise.position_px, disparity2 = noise.disparity_px * noise.disparity_px;
-  Eigen::Matrix3d covariance = disparity2 * residual.by_disparity * residual.by_disparity.transpose();
-  covariance.diagonal() += Eigen::Vector3d(position2, position2, disparity2);
-  residual.information = covariance.inverse();
+  const Eigen::Vector3d information(1 / position2, 1 / position2, 1 / disparity2);  // of (u2, v2, d2)
+  Residual residual = linearise_at(c, match, match.d1, motion);
+  const Eigen::Vector3d gain = information.cwiseProduct(residual.by_disparity);
+  const double step = gain.dot(residual.value) / (1 / disparity2 + gain.dot(residual.by_disparity));
+  residual = linearise_at(c, match, match.d1 + step, motion);
+  // Inverse of diag(information)^-1 + disparity2 b b^T (Sherman and Morrison).
+  const Eigen::Vector3d b = information.cwiseProduct(residual.by_disparity);
+  residual.information = -b * b.transpose() / (1 / disparity2 + b.dot(residual.by_disparity));
+  residual.information.diagonal() += information;
   return residual;
 }
 

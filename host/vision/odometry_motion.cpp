@@ -190,11 +190,11 @@ struct NormalEquations {
 };
 
 NormalEquations accumulate(const Calibration& calibration, const MatchNoise& noise,
-                           const std::vector<PointMatch>& matches, const Scene& scene, const std::vector<int>& inliers,
+                           const std::vector<PointMatch>& matches, const std::vector<int>& inliers,
                            const Eigen::Isometry3d& motion) {
   NormalEquations sums;
   for (const int i : inliers) {
-    const Residual residual = linearise(calibration, noise, matches[i], scene.points[i], motion);
+    const Residual residual = linearise(calibration, noise, matches[i], motion);
     const double squared = residual.value.dot(residual.information * residual.value);
     const double weight = cauchy_weight(squared, kCauchy2);
     const Eigen::Matrix<double, 6, 3> weighted = weight * residual.by_motion.transpose() * residual.information;
@@ -247,7 +247,7 @@ MotionEstimate estimate_motion(const Calibration& calibration, const StereoOdome
       sample[s] = members[generator.below(static_cast<int>(members.size()))];
     }
     Eigen::Isometry3d motion = guess;
-    if (!solve_sample(calibration, scene, sample, motion) || !out_of_bounds(options, motion).empty()) continue;
+    if (!solve_sample(calibration, scene, sample, motion)) continue;
     const Score score = score_motion(calibration, scene, parts, motion, threshold_px);
     if (score.value <= best.value) continue;
     best = score;
@@ -272,7 +272,7 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
   for (int k = 0; k < 15; ++k) {
     if (k < 4) collect_inliers(calibration, scene, options.inlier_threshold_px, estimate);
     if (estimate.inliers.size() < 6) break;
-    sums = accumulate(calibration, noise, matches, scene, estimate.inliers, estimate.motion.current_from_previous);
+    sums = accumulate(calibration, noise, matches, estimate.inliers, estimate.motion.current_from_previous);
     const Vector6 step = sums.normal.ldlt().solve(sums.right);
     if (!step.allFinite()) break;
     estimate.motion.current_from_previous = perturb(step, estimate.motion.current_from_previous);
@@ -281,7 +281,7 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
   collect_inliers(calibration, scene, options.inlier_threshold_px, estimate);
   estimate.reason = too_few(options, estimate.inliers.size(), matches.size());
   if (!estimate.reason.empty()) return estimate;
-  sums = accumulate(calibration, noise, matches, scene, estimate.inliers, estimate.motion.current_from_previous);
+  sums = accumulate(calibration, noise, matches, estimate.inliers, estimate.motion.current_from_previous);
   const double variance = sums.cost / std::max(1.0, 3 * sums.weight - 6);
   const Matrix6 covariance = kCorrelated * variance * sums.normal.inverse();
   const double sigma_m = std::sqrt(covariance.topLeftCorner<3, 3>().trace());

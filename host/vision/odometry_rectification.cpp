@@ -18,6 +18,8 @@ constexpr double kClearRowError_px = 0.15;
 constexpr double kIndependence = 0.25;
 constexpr double kMemory = 0.998;  // of what was learnt, from frame to frame: cameras warm up
 
+constexpr int kRowOffset = 1, kRoll = 3;  // among the terms
+
 // Of the right image's error against the left one's.
 Terms column_basis(const Calibration& c, double u, double v) {
   const double x = (u - c.cx) / c.fx, y = (v - c.cy) / c.fy;
@@ -68,25 +70,28 @@ void RectificationError::correct(const Calibration& calibration, std::vector<Poi
 }
 
 // How far the rows of the two images are from each other tells how good the calibration is, and so what to expect of
-// the terms that only the motion shows.
+// the terms that only the motion shows. A constant offset and roll tell nothing of lenses, and the rows alone show them
+// well: they stay out of it.
 Square RectificationError::prior_information(const Calibration& calibration) const {
   // In pixels for a pair whose rows differ by one.
   Terms deviation;
-  deviation << 0.6, 2, 1, 1, 20, 2, 2, 10, 2, 4, 4, 4;
+  deviation << 0.6, 0, 1, 0, 20, 2, 2, 10, 2, 4, 4, 4;
   const Square ridge = Square::Identity();
   const Terms terms = (rows_.information + ridge).ldlt().solve(rows_.right);
   double sum = 0;
   for (const double x : {-0.7, -0.35, 0.35, 0.7}) {
     for (const double y : {-0.2, 0.0, 0.2}) {
-      const double row =
-          row_basis(calibration, calibration.cx + x * calibration.fx, calibration.cy + y * calibration.fy).dot(terms);
+      Terms basis = row_basis(calibration, calibration.cx + x * calibration.fx, calibration.cy + y * calibration.fy);
+      basis[kRowOffset] = basis[kRoll] = 0;
+      const double row = basis.dot(terms);
       sum += row * row;
     }
   }
   const double row_error_px = std::sqrt(sum / 12);
   // Noise alone gives a few hundredths; that must not loosen the prior.
-  const double scale = std::max(1e-3, row_error_px * std::min(1.0, row_error_px / kClearRowError_px));
-  return (deviation * scale).cwiseAbs2().cwiseInverse().asDiagonal();
+  deviation *= std::max(2e-4, row_error_px * std::min(1.0, row_error_px / kClearRowError_px));
+  deviation[kRowOffset] = deviation[kRoll] = 2;
+  return deviation.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
 void RectificationError::update(const Calibration& calibration, const MatchNoise& noise,
@@ -100,7 +105,7 @@ void RectificationError::update(const Calibration& calibration, const MatchNoise
   double cost = 0, sum = 0;
   for (const int i : inliers) {
     const PointMatch& m = corrected[i];
-    const Residual r = linearise(calibration, noise, m, triangulate(calibration, m.u1, m.v1, m.d1), motion);
+    const Residual r = linearise(calibration, noise, m, motion);
     const double squared = r.value.dot(r.information * r.value);
     const double weight = cauchy_weight(squared, kCauchy2);
     // A positive term lowers both disparities; measured less predicted changes the other way as each is corrected.

@@ -8,7 +8,9 @@
 #include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <opencv2/imgproc.hpp>
 #include <random>
+#include <thread>
 #include <vector>
 
 #include "egosgm/vision/calibration_io.h"
@@ -369,6 +371,28 @@ TEST(OdometryRectification, LearnsYawAndDistortionButNothingFromAnExactPair) {
   run(0, 0);
 }
 
+// Half a pixel between the rows, and roll (which moves disparities above and below the centre): such a pair's lenses
+// are as good as any other's.
+TEST(OdometryRectification, OffsetAndRollOfTheRowsTellNothingOfTheDisparity) {
+  const Calibration c = kitti_calibration();
+  const Eigen::Isometry3d truth = make_motion(0, 0, -1.2, 1);
+  std::mt19937 generator(7);
+  std::normal_distribution<double> noise(0, 0.1);
+  odometry::RectificationError rectification;
+  for (int frame = 0; frame < 25; ++frame) {
+    auto matches = random_matches(generator, c, truth, 300, 0.15);
+    for (PointMatch& m : matches) m.row_error2 = 0.5 - 0.6 * (m.u2 - c.cx) / c.fx + noise(generator);
+    rectification.correct(c, matches);
+    const auto fine = odometry::refine_motion(c, {}, {}, matches, truth);
+    ASSERT_EQ(fine.reason, "");
+    EXPECT_LT(motion_error(fine.motion.current_from_previous, truth).translation_m, 0.008) << "frame " << frame;
+    rectification.update(c, {}, matches, fine.inliers, fine.motion.current_from_previous);
+    for (const double u : {0.0, 600.0, 1225.0}) EXPECT_NEAR(rectification.disparity_px(c, u, c.cy), 0, 0.03);
+  }
+  EXPECT_NEAR(rectification.row_px(c, c.cx, c.cy), 0.5, 0.03);
+  EXPECT_NEAR(rectification.row_px(c, c.cx + c.fx, c.cy), -0.1, 0.05);
+}
+
 struct Drive {
   SyntheticSequence sequence;
   std::vector<SyntheticFrame> frames;
@@ -437,12 +461,202 @@ TEST(StereoOdometry, GivesTheSameBitsTwiceAndAfterReset) {
   }
 }
 
+/// The covariance is a claim: over many motions, squared errors over it average to the six degrees of freedom.
+TEST(StereoOdometry, CovarianceIsConsistentWithTheError) {
+  SyntheticOptions options;
+  options.frames = 8;
+  options.seed = 24;
+  options.supersampling = 2;
+  const Drive straight(options);
+  double sum = 0;
+  int motions = 0;
+  for (const Drive* drive : {&turning_drive(), &straight}) {
+    StereoOdometry odometry(drive->sequence.calibration());
+    for (int k = 0; k < drive->sequence.frames(); ++k) {
+      const OdometryResult result = process(odometry, drive->frames[k].left, drive->frames[k].right);
+      if (k == 0) continue;
+      ASSERT_TRUE(result.motion) << result.reason;
+      const Eigen::Isometry3d error =
+          result.motion->current_from_previous * drive->sequence.motion(k).current_from_previous.inverse();
+      const Eigen::AngleAxisd rotation(error.linear());
+      odometry::Vector6 xi;
+      xi << error.translation(), rotation.angle() * rotation.axis();
+      sum += xi.dot(result.motion->covariance.inverse() * xi);
+      ++motions;
+    }
+  }
+  EXPECT_GT(sum / motions, 0.5 * 6);
+  EXPECT_LT(sum / motions, 2.0 * 6);
+}
+
+TEST(StereoOdometry, ThreadsChangeNoBit) {
+  const Drive& drive = turning_drive();
+  const auto motions = [&drive] {
+    StereoOdometry odometry(drive.sequence.calibration());
+    std::vector<Motion> found;
+    for (int k = 0; k < 4; ++k) {
+      const OdometryResult result = process(odometry, drive.frames[k].left, drive.frames[k].right);
+      if (result.motion) found.push_back(*result.motion);
+    }
+    return found;
+  };
+  const int threads = cv::getNumThreads();
+  cv::setNumThreads(1);
+  const std::vector<Motion> expected = motions();
+  cv::setNumThreads(4);
+  std::vector<Motion> more = motions(), beside[2];
+  std::thread first([&] { beside[0] = motions(); }), second([&] { beside[1] = motions(); });
+  first.join();
+  second.join();
+  cv::setNumThreads(threads);
+  ASSERT_EQ(expected.size(), 3u);
+  for (const auto& found : {more, beside[0], beside[1]}) {
+    ASSERT_EQ(found.size(), expected.size());
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_EQ(found[k].current_from_previous.matrix(), expected[k].current_from_previous.matrix());
+      EXPECT_EQ(found[k].covariance, expected[k].covariance);
+    }
+  }
+}
+
+TEST(StereoOdometry, FollowsFastMotion) {
+  SyntheticOptions options;
+  options.frames = 4;
+  options.speed_m = 2.5;
+  options.turn_deg = 2;
+  options.seed = 23;
+  options.supersampling = 2;
+  const Drive drive(options);
+  StereoOdometry odometry(drive.sequence.calibration());
+  process(odometry, drive.frames[0].left, drive.frames[0].right);
+  for (int k = 1; k < options.frames; ++k) {
+    const OdometryResult result = process(odometry, drive.frames[k].left, drive.frames[k].right);
+    ASSERT_TRUE(result.motion) << result.reason;
+    const MotionError error =
+        motion_error(result.motion->current_from_previous, drive.sequence.motion(k).current_from_previous);
+    EXPECT_LT(error.translation_m, 0.02) << "frame " << k;
+    EXPECT_LT(error.rotation_deg, 0.05) << "frame " << k;
+  }
+}
+
+// `image` drawn lower by `rows` [px].
+cv::Mat lowered(const cv::Mat& image, double rows) {
+  const cv::Mat shift = (cv::Mat_<double>(2, 3) << 1, 0, 0, 0, 1, rows);
+  cv::Mat out;
+  cv::warpAffine(image, out, shift, image.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  return out;
+}
+
+TEST(StereoOdometry, BearsAVerticalOffsetBetweenTheImages) {
+  const Drive& drive = turning_drive();
+  for (const double rows : {0.5, -0.5, 1.5}) {
+    StereoOdometry odometry(drive.sequence.calibration());
+    process(odometry, drive.frames[0].left, lowered(drive.frames[0].right, rows));
+    for (int k = 1; k < 5; ++k) {
+      const OdometryResult result = process(odometry, drive.frames[k].left, lowered(drive.frames[k].right, rows));
+      ASSERT_TRUE(result.motion) << rows << " rows: " << result.reason;
+      const MotionError error =
+          motion_error(result.motion->current_from_previous, drive.sequence.motion(k).current_from_previous);
+      EXPECT_LT(error.translation_m, 0.01) << rows << " rows, frame " << k;
+      EXPECT_LT(error.rotation_deg, 0.05) << rows << " rows, frame " << k;
+    }
+  }
+}
+
+TEST(StereoOdometry, BlurGivesAGoodMotionOrNone) {
+  const Drive& drive = turning_drive();
+  int without = 0;
+  for (const int length_px : {3, 9, 61}) {
+    StereoOdometry odometry(drive.sequence.calibration());
+    process(odometry, drive.frames[0].left, drive.frames[0].right);
+    cv::Mat left, right;
+    cv::blur(drive.frames[1].left, left, {length_px, 1});
+    cv::blur(drive.frames[1].right, right, {length_px, 1});
+    const OdometryResult result = process(odometry, left, right);
+    if (!result.motion) {
+      ++without;
+      EXPECT_NE(result.reason.find("too few"), std::string::npos) << result.reason;
+      continue;
+    }
+    const MotionError error =
+        motion_error(result.motion->current_from_previous, drive.sequence.motion(1).current_from_previous);
+    EXPECT_LT(error.translation_m, 0.03) << length_px << " px";
+    EXPECT_LT(error.rotation_deg, 0.1) << length_px << " px";
+  }
+  EXPECT_GE(without, 1) << "nothing is left to be matched after 61 px of blur";
+  EXPECT_LE(without, 2);
+}
+
+TEST(StereoOdometry, BoundsAreOptionsAndTheReasonNamesThem) {
+  const Drive& drive = turning_drive();
+  const auto reason_with = [&drive](double max_translation_m, double max_rotation_deg) {
+    StereoOdometryOptions options;
+    options.max_translation_m = max_translation_m;
+    options.max_rotation_deg = max_rotation_deg;
+    StereoOdometry odometry(drive.sequence.calibration(), options);
+    process(odometry, drive.frames[4].left, drive.frames[4].right);
+    const OdometryResult result = process(odometry, drive.frames[5].left, drive.frames[5].right);
+    EXPECT_EQ(result.motion.has_value(), result.reason.empty());
+    return result.reason;
+  };
+  EXPECT_EQ(reason_with(1, 4), "");
+  EXPECT_NE(reason_with(0.3, 4).find("exceeds the bound of 0.30 m"), std::string::npos);
+  EXPECT_NE(reason_with(1, 0.2).find("exceeds the bound of 0.20 deg"), std::string::npos);
+}
+
+/// What an IMU tells: the rotation; of the translation it knows nothing, so the last one is taken.
+TEST(StereoOdometry, RotationOfAnImuGuidesWhereTheSearchIsNarrow) {
+  const Drive& drive = turning_drive();
+  StereoOdometryOptions options;
+  options.max_flow_x_px = 8;
+  options.max_flow_y_px = 8;
+  const int from = 4, to = 7;
+  const Eigen::Isometry3d truth =
+      current_from_previous(drive.sequence.world_from_camera(from), drive.sequence.world_from_camera(to));
+  Eigen::Isometry3d imu = Eigen::Isometry3d::Identity();
+  imu.linear() = truth.linear();
+  imu.translation() = 3 * drive.sequence.motion(from).current_from_previous.translation();
+  for (const bool with_imu : {false, true}) {
+    StereoOdometry odometry(drive.sequence.calibration(), options);
+    process(odometry, drive.frames[from].left, drive.frames[from].right);
+    const OdometryResult result =
+        odometry.process(image_view(drive.frames[to].left), image_view(drive.frames[to].right),
+                         with_imu ? std::optional(imu) : std::nullopt);
+    ASSERT_EQ(result.motion.has_value(), with_imu) << result.reason;
+    if (!with_imu) continue;
+    EXPECT_LT(motion_error(result.motion->current_from_previous, truth).translation_m, 0.03);
+    EXPECT_LT(motion_error(result.motion->current_from_previous, truth).rotation_deg, 0.1);
+  }
+}
+
+/// Three millimetres a frame: below what one frame can tell, and yet not lost.
+TEST(StereoOdometry, CreepingIsNotTakenForStandstill) {
+  SyntheticOptions options;
+  options.frames = 14;
+  options.speed_m = 0.003;
+  options.turn_deg = 0;
+  options.wobble = 0;
+  options.seed = 25;
+  options.supersampling = 2;
+  const SyntheticSequence sequence(options);
+  StereoOdometry odometry(sequence.calibration());
+  double travel_m = 0;
+  for (int k = 0; k < options.frames; ++k) {
+    const SyntheticFrame frame = sequence.render(k);
+    const OdometryResult result = process(odometry, frame.left, frame.right);
+    if (k == 0) continue;
+    ASSERT_TRUE(result.motion) << result.reason;
+    EXPECT_EQ(result.standstill, result.motion->current_from_previous.matrix() == Eigen::Matrix4d::Identity());
+    travel_m -= result.motion->current_from_previous.translation().z();
+  }
+  EXPECT_NEAR(travel_m, sequence.world_from_camera(options.frames - 1).translation().z(), 0.01);
+}
+
 TEST(StereoOdometry, StandstillIsIdentity) {
   const Drive& drive = turning_drive();
   StereoOdometry odometry(drive.sequence.calibration());
   std::mt19937 generator(31);
   std::normal_distribution<double> noise(0, 2);
-  Eigen::Isometry3d total = Eigen::Isometry3d::Identity();
   for (int k = 0; k < 12; ++k) {
     cv::Mat left = drive.frames[0].left.clone(), right = drive.frames[0].right.clone();
     for (cv::Mat* image : {&left, &right}) {
@@ -453,10 +667,17 @@ TEST(StereoOdometry, StandstillIsIdentity) {
     const OdometryResult result = process(odometry, left, right);
     if (k == 0) continue;
     ASSERT_TRUE(result.motion) << result.reason;
-    total = result.motion->current_from_previous * total;
+    EXPECT_TRUE(result.standstill);
+    EXPECT_EQ(result.motion->current_from_previous.matrix(), Eigen::Matrix4d::Identity());
+    EXPECT_GT(result.motion->covariance.trace(), 0);
   }
-  EXPECT_LT(total.translation().norm(), 0.003);
-  EXPECT_LT(Eigen::AngleAxisd(total.linear()).angle() / kDegree, 0.01);
+  const OdometryResult start = process(odometry, drive.frames[1].left, drive.frames[1].right);
+  ASSERT_TRUE(start.motion) << start.reason;
+  EXPECT_FALSE(start.standstill);
+  const MotionError error =
+      motion_error(start.motion->current_from_previous, drive.sequence.motion(1).current_from_previous);
+  EXPECT_LT(error.translation_m, 0.01);
+  EXPECT_LT(error.rotation_deg, 0.05);
 }
 
 TEST(StereoOdometry, BlankImageGivesNoMotionAndTheNextFramesRecover) {
@@ -466,7 +687,7 @@ TEST(StereoOdometry, BlankImageGivesNoMotionAndTheNextFramesRecover) {
   process(odometry, drive.frames[0].left, drive.frames[0].right);
   const OdometryResult lost = process(odometry, blank, blank);
   EXPECT_FALSE(lost.motion);
-  EXPECT_NE(lost.reason.find("too few"), std::string::npos) << lost.reason;
+  EXPECT_EQ(lost.reason, "too few features: 0 of at least 20");
   EXPECT_EQ(lost.features, 0);
   EXPECT_FALSE(process(odometry, drive.frames[1].left, drive.frames[1].right).motion);
   EXPECT_TRUE(process(odometry, drive.frames[2].left, drive.frames[2].right).motion);

@@ -39,20 +39,32 @@ struct StereoOdometryOptions {
   void validate() const;
 };
 
+/// Wall clock of a frame's steps [ms].
+struct OdometryTimes {
+  double features = 0;      // both images: filters, suppression, descriptors
+  double rough_motion = 0;  // few features: circular matching, RANSAC
+  double matching = 0;      // all features: circular matching near the rough motion, refinement to a part of a pixel
+  double motion = 0;        // refinement of all six parameters, covariance
+  double learning = 0;      // of the rectification error
+};
+
 struct OdometryResult {
   std::optional<Motion> motion;    // from the previous frame to this one, with its covariance
+  bool standstill = false;         // the motion is the identity: what was measured is no more than its noise
   int features = 0;                // in this frame's left image
   int matches = 0;                 // that closed the circle left k-1, left k, right k, right k-1
   int inliers = 0;                 // of them, that agree with the motion
   double reprojection_rms_px = 0;  // of the inliers, in both images
   std::string reason;              // why there is no motion; empty where there is one
+  OdometryTimes times_ms;
 };
 
 /// Ego-motion from rectified stereo video: corner and blob features, circular matching, RANSAC, and refinement
 /// of all six parameters by robust reprojection error in both images. Cvisic and Petrovic, Stereo odometry based
 /// on careful feature selection and tracking (ECMR 2015); filters after Geiger et al., StereoScan (IV 2011).
 ///
-/// One frame is kept, so each image is processed once. Deterministic: the same images give the same bits.
+/// One frame is kept, so each image is processed once. While the camera stands, motions are exactly the identity, and
+/// the frame where it stopped is the one that is kept. Deterministic: the same images give the same bits; one thread.
 /// Not thread-safe: use one object per thread.
 class StereoOdometry {
  public:
@@ -62,8 +74,8 @@ class StereoOdometry {
   StereoOdometry(StereoOdometry&&) noexcept;
   StereoOdometry& operator=(StereoOdometry&&) noexcept;
 
-  /// The next frame. `prior` (current_from_previous, for example the last motion or an IMU's rotation) only guides
-  /// the search; without it, the last frame's motion does. The first frame has no motion.
+  /// The next frame. `prior` (current_from_previous, for example an IMU's rotation with the last motion's translation)
+  /// only guides the search; without it, the last frame's motion does. The first frame has no motion.
   /// Throws InvalidArgument where the images are empty, differ in size or type, or changed size since the last
   /// frame; the state is then as before the call.
   OdometryResult process(const ImageView& left, const ImageView& right,
