@@ -1,11 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
 
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "apps/command.h"
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+#include "egosgm/vision/image_io.h"
 #include "egosgm/vision/pose_evaluation.h"
+#include "egosgm/vision/pose_plot.h"
 #include "egosgm/vision/poses_io.h"
 
 namespace egosgm::app {
@@ -16,12 +23,15 @@ constexpr double kDegrees = 180.0 / 3.14159265358979323846;
 
 struct EvalPosesArguments {
   std::string estimate, truth;
+  std::vector<std::string> plots;
   bool json = false;
 };
 
 Json json_of(const vision::PoseEvaluation& e) {
   Json json{{"frames", e.motions.size() + 1},
             {"path_length_m", e.path_length_m},
+            {"translation_mean_m", e.translation_mean_m},
+            {"rotation_mean_deg", e.rotation_mean_rad * kDegrees},
             {"translation_rmse_m", e.translation_rmse_m},
             {"rotation_rmse_deg", e.rotation_rmse_rad * kDegrees},
             {"end_drift_m", e.end_drift_m},
@@ -30,19 +40,25 @@ Json json_of(const vision::PoseEvaluation& e) {
             {"short_segments", e.short_segments},
             {"segment_translation_percent", e.segment_translation_percent},
             {"segment_rotation_deg_per_m", e.segment_rotation_deg_per_m},
-            {"segments", Json::array()}};
+            {"segments", Json::array()},
+            {"motions", Json::array()}};
   for (const vision::SegmentError& segment : e.segments) {
     json["segments"].push_back({{"length_m", segment.length_m},
                                 {"segments", segment.segments},
                                 {"translation_percent", segment.translation_percent},
                                 {"rotation_deg_per_m", segment.rotation_deg_per_m}});
   }
+  for (const vision::RelativePoseError& motion : e.motions) {
+    json["motions"].push_back(
+        {{"translation_m", motion.translation_m}, {"rotation_deg", motion.rotation_rad * kDegrees}});
+  }
   return json;
 }
 
 void print(const vision::PoseEvaluation& e) {
   fmt::print("{} frames, {:.1f} m\n", e.motions.size() + 1, e.path_length_m);
-  fmt::print("frame to frame   {:.4f} m  {:.4f} deg (root mean square)\n", e.translation_rmse_m,
+  fmt::print("frame to frame   {:.4f} m  {:.4f} deg (mean), {:.4f} m  {:.4f} deg (root mean square)\n",
+             e.translation_mean_m, e.rotation_mean_rad * kDegrees, e.translation_rmse_m,
              e.rotation_rmse_rad * kDegrees);
   fmt::print("at the end       {:.3f} m = {:.3f} %  {:.3f} deg\n", e.end_drift_m, e.end_drift_percent,
              e.rotation_end_drift_deg);
@@ -55,9 +71,25 @@ void print(const vision::PoseEvaluation& e) {
   }
 }
 
+bool is_svg(const std::string& file) {
+  const std::string extension = std::filesystem::path(file).extension();
+  if (extension != ".svg" && extension != ".png") {
+    throw InvalidArgument("--plot " + file + ": the name must end in .png or .svg");
+  }
+  return extension == ".svg";
+}
+
 int evaluate(const EvalPosesArguments& arguments) {
-  const vision::PoseEvaluation evaluation =
-      vision::evaluate_poses(vision::read_poses(arguments.estimate), vision::read_poses(arguments.truth));
+  for (const std::string& file : arguments.plots) is_svg(file);
+  const auto estimate = vision::read_poses(arguments.estimate), truth = vision::read_poses(arguments.truth);
+  const vision::PoseEvaluation evaluation = vision::evaluate_poses(estimate, truth);
+  for (const std::string& file : arguments.plots) {
+    if (is_svg(file)) {
+      vision::write_file(file, vision::path_svg(estimate, truth));
+    } else {
+      vision::write_png(file, vision::draw_path(estimate, truth));
+    }
+  }
   if (arguments.json) {
     fmt::print("{}\n", json_of(evaluation).dump(2));
   } else {
@@ -76,6 +108,11 @@ Command add_eval_poses(CLI::App& program) {
       ->type_name("FILE")
       ->required();
   command->add_option("--truth", arguments->truth, "the true ones, of the same frames")->type_name("FILE")->required();
+  command
+      ->add_option("--plot", arguments->plots,
+                   "draw both paths from above, in metres: a .png or .svg file; may be repeated")
+      ->allow_extra_args(false)
+      ->type_name("FILE");
   command->add_flag("--json", arguments->json, "print JSON");
   return {command, [arguments] { return evaluate(*arguments); }};
 }

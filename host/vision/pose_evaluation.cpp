@@ -41,6 +41,10 @@ void add_motions(const Poses& estimate, const Poses& truth, PoseEvaluation& resu
     translation += error.translation().squaredNorm();
     rotation += result.motions.back().rotation_rad * result.motions.back().rotation_rad;
   }
+  for (const RelativePoseError& motion : result.motions) {
+    result.translation_mean_m += motion.translation_m / result.motions.size();
+    result.rotation_mean_rad += motion.rotation_rad / result.motions.size();
+  }
   const auto count = static_cast<double>(result.motions.size());
   result.translation_rmse_m = std::sqrt(translation / count);
   result.rotation_rmse_rad = std::sqrt(rotation / count);

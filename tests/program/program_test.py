@@ -287,7 +287,22 @@ class Accuracy(ProgramTest):
         self.assert_works("odometry", street, "--out", poses)
         drift = json.loads(self.assert_works("eval-poses", "--estimate", poses, "--truth", street / "poses.txt", "--json"))
         self.assertEqual(drift["frames"], 8)
-        self.assertLess(drift["end_drift_percent"], 1.5)
+        self.assertEqual(len(drift["motions"]), 7)
+        self.assertLess(drift["end_drift_percent"], 0.5)
+        folder = self.new_folder()
+        self.assert_works("eval-poses", "--estimate", poses, "--truth", street / "poses.txt", "--plot", folder / "path.svg", "--plot",
+                          folder / "path.png")
+        self.assertIn("<svg", (folder / "path.svg").read_text())
+        self.assertTrue((folder / "path.png").read_bytes().startswith(b"\x89PNG"))
+
+    def test_bounds_on_the_motion(self):
+        street, poses = self.street, self.new_folder() / "poses.txt"
+        done = egosgm("odometry", street, "--out", poses, "--max-translation", 0.5)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("exceeds the bound of 0.50 m", done.stdout + done.stderr)
+        self.assert_refused(["odometry", street, "--out", poses, "--max-rotation", "-1"], "max_rotation_deg")
+        self.assert_refused(["run", "--odometry", street, "--out", self.folder / "never", "--max-translation", "0"], "max_translation_m")
+        self.assert_refused(["eval-poses", "--estimate", poses, "--truth", street / "poses.txt", "--plot", "path.jpg"], "path.jpg", ".svg")
 
 
 class Synth(ProgramTest):

@@ -44,6 +44,7 @@ TEST(PoseEvaluation, ScaleErrorIsDrift) {
   EXPECT_NEAR(result.end_drift_m, 1.0, 1e-9);
   EXPECT_NEAR(result.end_drift_percent, 2.0, 1e-9);
   EXPECT_NEAR(result.translation_rmse_m, 0.02, 1e-12);
+  EXPECT_NEAR(result.translation_mean_m, 0.02, 1e-12);
   EXPECT_NEAR(result.motions[7].translation_m, 0.02, 1e-12);
   EXPECT_TRUE(result.short_segments);
   // A segment ends at the first frame beyond its length: 6 m for 5 m, so 0.12 m of error for 5 m.
@@ -57,12 +58,21 @@ TEST(PoseEvaluation, TurnErrorIsRotation) {
   const double error_rad = 0.001;
   const PoseEvaluation result = evaluate_poses(drive(1001, 1, error_rad), drive(1001, 1));
   EXPECT_NEAR(result.rotation_rmse_rad, error_rad, 1e-9);
+  EXPECT_NEAR(result.rotation_mean_rad, error_rad, 1e-9);
   EXPECT_NEAR(result.rotation_end_drift_deg, 1000 * error_rad * 180 / M_PI, 1e-6);
   EXPECT_FALSE(result.short_segments);
   ASSERT_EQ(result.segments.size(), 8u);
   EXPECT_EQ(result.segments[0].length_m, 100);
   EXPECT_EQ(result.segments[0].segments, 90);  // starts at 0, 10, ... 890; 900 would need frame 1001
   EXPECT_NEAR(result.segments[0].rotation_deg_per_m, 101 * error_rad * 180 / M_PI / 100, 1e-9);
+}
+
+TEST(PoseEvaluation, MeanAndRootMeanSquareDiffer) {
+  Poses estimate = drive(5, 1);
+  for (std::size_t k = 2; k < estimate.size(); ++k) estimate[k].translation().z() += 0.4;  // one motion of four
+  const PoseEvaluation result = evaluate_poses(estimate, drive(5, 1));
+  EXPECT_NEAR(result.translation_mean_m, 0.1, 1e-12);
+  EXPECT_NEAR(result.translation_rmse_m, 0.2, 1e-12);
 }
 
 TEST(PoseEvaluation, StandingStillHasNoPercent) {

@@ -22,7 +22,9 @@ struct SegmentError {
 
 struct PoseEvaluation {
   std::vector<RelativePoseError> motions;  // one per frame but the first
-  double translation_rmse_m = 0;           // of the motions
+  double translation_mean_m = 0;           // of the motions
+  double rotation_mean_rad = 0;
+  double translation_rmse_m = 0;
   double rotation_rmse_rad = 0;
   double path_length_m = 0;  // of the truth
   double end_drift_m = 0;    // distance of the last positions, the first poses laid on each other
