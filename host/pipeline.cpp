@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "egosgm/error.h"
+#include "egosgm/opencl.h"
 #include "egosgm/programs.h"
 #include "host/banded_sgm.h"
 #include "host/census.h"
@@ -44,6 +45,10 @@ struct PixelStages {
 };
 
 shared::DisparityRange range_of(const PipelineOptions& options) { return {options.min_disparity, options.disparities}; }
+
+ocl::Context context_on(const Device::Handle& device) {
+  return device.queue() ? ocl::Context(device.queue, device.programs) : ocl::Context(device.device, device.programs);
+}
 
 using Clock = std::chrono::steady_clock;
 
@@ -90,15 +95,16 @@ struct Pipeline::Impl {
   std::array<StereoMaps, 4> pool;  // the belief, the one to go back to, and what a frame takes of the rest:
   StereoMaps *measured = nullptr, *updated = nullptr;
   Memory memory;
-  std::vector<FrameUnderWay> under_way;  // the oldest first
-  Clock::time_point collected;           // the last one before them
+  std::vector<FrameUnderWay> under_way;    // the oldest first
+  Clock::time_point collected;             // the last one before them
+  std::vector<ocl::Command> device_frame;  // of the last `enqueue`
 
   Impl(const Calibration& calibration, shared::ImageSize image_size, const PipelineOptions& chosen,
        const Device& chosen_device)
       : options(chosen),
         device(chosen_device),
         size(image_size),
-        context(device.handle().device, device.handle().programs),
+        context(context_on(device.handle())),
         forward_warp(context, size, calibration, options.forward_warp, range_of(options)),
         edge_rejection(context, size, options.edge_rejection),
         hole_fill(context, size, options.hole_fill),
@@ -184,6 +190,7 @@ struct Pipeline::Impl {
 
   void submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
               const FrameOutputs& outputs) {
+    expect_device_frame_not_failed();
     expect_none_failed();
     FrameUnderWay frame{&begin_frame(), memory, nullptr, {}, {}, Clock::now()};
     ocl::Drain drain{context};
@@ -195,13 +202,56 @@ struct Pipeline::Impl {
     frame.transfer->download(results, outputs);
 
     drain.is_dismissed = true;
-    frame.report.full_range = reason || options.search == SearchMode::kFull;
-    frame.report.full_range_reason = reason ? reason : options.search == SearchMode::kFull ? "search is full" : "";
+    frame.report.full_range = is_full_range(reason);
+    frame.report.full_range_reason = reason_text(reason);
     frame.result = results.result;
     frame.commands = context.take_commands();
     under_way.push_back(std::move(frame));
+    advance(results);
+  }
+
+  /// From here on the next frame rests on this one.
+  void advance(const FrameResults& results) {
     vertical_alignment.commit();
     memory = {options.temporal ? results.result : nullptr, memory.no_belief_reason, vertical_alignment.state()};
+  }
+
+  bool is_full_range(const char* reason) const { return reason || options.search == SearchMode::kFull; }
+  const char* reason_text(const char* reason) const {
+    return reason ? reason : options.search == SearchMode::kFull ? "search is full" : "";
+  }
+
+  void expect_device_frame_not_failed() {
+    const std::vector<ocl::Command> commands = std::exchange(device_frame, {});
+    try {
+      context.expect_none_failed(commands);
+    } catch (...) {
+      context.drain();
+      reset();
+      throw;
+    }
+  }
+
+  DeviceMaps enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done) {
+    expect_device_frame_not_failed();
+    begin_frame();
+    ocl::Drain drain{context};
+    release_results();
+    const char* reason = full_range_reason(motion);
+    const FrameResults results = run_stages(images, motion, reason);
+    const cl::Event end = done ? context.end_of_recorded() : cl::Event();
+
+    drain.is_dismissed = true;
+    device_frame = context.take_commands();
+    if (done) {
+      *done = end();
+      ::clRetainEvent(*done);
+    }
+    advance(results);
+    return {.disparity = results.result->disparity.get()(),
+            .variance = results.result->variance.get()(),
+            .full_range = is_full_range(reason),
+            .full_range_reason = reason_text(reason)};
   }
 
   FrameReport collect() {
@@ -316,6 +366,55 @@ std::vector<ProgramFile> compile_programs(const Device& device, const PipelineOp
     const Calibration any{.fx = 1, .fy = 1, .cx = 0, .cy = 0, .baseline_m = 1};
     const Pipeline::Impl pipeline(any, shared::ImageSize{1, 1}, options, device);
     return ocl::files_of(device.handle().device, pipeline.context.programs());
+  });
+}
+
+namespace {
+
+Device device_on(cl_command_queue queue, const std::string& programs) {
+  if (!queue) throw InvalidArgument("DevicePipeline: no queue: give a cl_command_queue");
+  return ocl::translated("DevicePipeline", [&] {
+    const cl::CommandQueue kernels(queue, /*retainObject=*/true);
+    if (kernels.getInfo<CL_QUEUE_PROPERTIES>() & CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE) {
+      throw InvalidArgument("DevicePipeline: the queue runs out of order: give one that runs in order");
+    }
+    Device::Handle handle = Device::Handle::of(kernels.getInfo<CL_QUEUE_DEVICE>());
+    handle.queue = kernels;
+    const Device device(std::make_shared<const Device::Handle>(std::move(handle)));
+    return programs.empty() ? device : device.with_programs(programs);
+  });
+}
+
+FrameImages images_on(const ocl::Context& context, const DeviceImages& images, shared::ImageSize size) {
+  if (!images.pixels) throw InvalidArgument("enqueue: no images: give a cl_mem");
+  const cl::Buffer buffer(images.pixels, /*retainObject=*/true);
+  const std::size_t bytes = buffer.getInfo<CL_MEM_SIZE>();
+  const std::size_t needed = 2 * pixel_count(size) * (images.type == PixelType::kU8 ? 1 : 2);
+  if (buffer.getInfo<CL_MEM_CONTEXT>()() != context.get()()) {
+    throw InvalidArgument("enqueue: the images are in another context than the queue: create them in the queue's");
+  }
+  if (bytes < needed) {
+    throw InvalidArgument("enqueue: the images' buffer has " + std::to_string(bytes) + " bytes, a pair needs " +
+                          std::to_string(needed) + ": left image, then right image, without gaps");
+  }
+  return {ocl::Buffer<cl_uchar>(buffer, bytes), images.type};
+}
+
+}  // namespace
+
+DevicePipeline::DevicePipeline(cl_command_queue queue, const Calibration& calibration, int width, int height,
+                               const PipelineOptions& options, const std::string& programs)
+    : pipeline_(calibration, width, height, options, device_on(queue, programs)) {}
+
+DeviceMaps DevicePipeline::enqueue(const DeviceImages& images, const std::optional<Motion>& motion, cl_event* done) {
+  Pipeline::Impl& impl = *pipeline_.impl_;
+  if (pipeline_.under_way() > 0) {
+    throw InvalidArgument("enqueue: a frame that was submitted is under way: collect it first");
+  }
+  if (motion) motion->validate();
+  return ocl::translated(impl.context, [&] {
+    impl.context.enter("enqueue");
+    return impl.enqueue(images_on(impl.context, images, impl.size), motion, done);
   });
 }
 

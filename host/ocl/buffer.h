@@ -22,6 +22,9 @@ class Buffer {
     context.count_allocation(size_ * sizeof(T));
   }
 
+  /// The caller's memory.
+  Buffer(cl::Buffer buffer, std::size_t size) : size_(size), buffer_(std::move(buffer)) {}
+
   std::size_t size() const { return size_; }
   const cl::Buffer& get() const { return buffer_; }
 

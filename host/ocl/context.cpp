@@ -48,16 +48,31 @@ void expect_not_failed(const cl::Event& event) {
   if (status < 0) throw cl::Error(status, "a command");
 }
 
+double duration_ms(const cl::Event& event) {
+  const auto start = event.getProfilingInfo<CL_PROFILING_COMMAND_START>();
+  const auto end = event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
+  return static_cast<double>(end - start) * 1e-6;
+}
+
 }  // namespace
 
 Context::Context(const cl::Device& device, std::shared_ptr<const ProgramFolder> programs)
+    : Context(device, cl::Context(device), {}, std::move(programs)) {}
+
+Context::Context(const cl::CommandQueue& kernels, std::shared_ptr<const ProgramFolder> programs)
+    : Context(kernels.getInfo<CL_QUEUE_DEVICE>(), kernels.getInfo<CL_QUEUE_CONTEXT>(), kernels, std::move(programs)) {}
+
+Context::Context(const cl::Device& device, const cl::Context& context, const cl::CommandQueue& kernels,
+                 std::shared_ptr<const ProgramFolder> programs)
     : device_(device),
-      context_(device),
-      queues_{make_queue(context_, device), make_queue(context_, device), make_queue(context_, device)},
+      context_(context),
+      queues_{make_queue(context_, device), kernels() ? kernels : make_queue(context_, device),
+              make_queue(context_, device)},
       build_options_(build_options(device)),
       max_work_group_size_(device.getInfo<CL_DEVICE_MAX_WORK_GROUP_SIZE>()),
       max_allocation_bytes_(device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()),
       shares_host_memory_(device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>()),
+      profiles_kernels_(queue().getInfo<CL_QUEUE_PROPERTIES>() & CL_QUEUE_PROFILING_ENABLE),
       folder_(std::move(programs)) {}
 
 void Context::let_wait(Queue which, const cl::Event& event) {
@@ -73,15 +88,24 @@ const cl::Event& Context::last_kernel() const {
       ->event;
 }
 
+cl::Event Context::end_of_recorded() {
+  expect_none_failed(commands_);
+  std::vector<cl::Event> events;
+  events.reserve(commands_.size());
+  for (const Command& command : commands_) events.push_back(command.event);
+  cl::Event end;
+  queue().enqueueMarkerWithWaitList(&events, &end);
+  return end;
+}
+
 std::vector<Context::Finished> Context::wait(const std::vector<Command>& commands) {
   std::vector<Finished> finished;
   finished.reserve(commands.size());
   for (const Command& command : commands) {
     stage_ = command.stage;
     command.event.wait();
-    const auto start = command.event.getProfilingInfo<CL_PROFILING_COMMAND_START>();
-    const auto end = command.event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
-    finished.push_back({command.stage, static_cast<double>(end - start) * 1e-6, command.is_launch});
+    const bool profiles = profiles_kernels_ || command.queue != Queue::kKernels;
+    finished.push_back({command.stage, profiles ? duration_ms(command.event) : 0, command.is_launch});
   }
   return finished;
 }

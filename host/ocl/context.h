@@ -31,6 +31,8 @@ class Context {
  public:
   /// `programs`: where programs come from; null: from the embedded kernels, compiled.
   explicit Context(const cl::Device& device, std::shared_ptr<const ProgramFolder> programs = nullptr);
+  /// On a queue of the caller's, in its context; kernels run there.
+  explicit Context(const cl::CommandQueue& kernels, std::shared_ptr<const ProgramFolder> programs = nullptr);
 
   /// Builds `file`, or returns what it built before. Throws BuildError, or InvalidArgument as ProgramFolder does.
   const cl::Program& program(const std::string& file, const Defines& defines);
@@ -55,6 +57,10 @@ class Context {
   void record(cl::Event event, const char* name, Queue queue = Queue::kKernels, bool is_launch = false) {
     commands_.push_back({stage_, name, queue, is_launch, std::move(event)});
   }
+
+  /// An event that ends when all recorded commands have, and fails if one does; the last one's own would not. Throws if
+  /// one has failed already.
+  cl::Event end_of_recorded();
 
   /// The commands recorded since the last call; they are forgotten here.
   std::vector<Command> take_commands() { return std::exchange(commands_, {}); }
@@ -88,6 +94,8 @@ class Context {
   bool shares_host_memory() const { return shares_host_memory_; }
 
  private:
+  Context(const cl::Device& device, const cl::Context& context, const cl::CommandQueue& kernels,
+          std::shared_ptr<const ProgramFolder> programs);
   cl::Program created(const ProgramSource& source) const;
 
   cl::Device device_;
@@ -98,6 +106,7 @@ class Context {
   std::uint64_t max_allocation_bytes_ = 0;
   std::uint64_t allocated_bytes_ = 0;
   bool shares_host_memory_ = false;
+  bool profiles_kernels_ = true;
   const char* stage_ = "setup";
   std::shared_ptr<const ProgramFolder> folder_;
   std::map<std::pair<std::string, std::string>, std::pair<ProgramSource, cl::Program>> programs_;

@@ -29,7 +29,8 @@ std::string type_name(cl_device_type type) {
 
 int preference(const std::string& type) { return type == "GPU" ? 0 : type == "accelerator" ? 1 : 2; }
 
-DeviceInfo describe(const cl::Platform& platform, const cl::Device& device) {
+DeviceInfo describe(const cl::Device& device) {
+  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
   return {.name = ocl::trimmed(device.getInfo<CL_DEVICE_NAME>()),
           .type = type_name(device.getInfo<CL_DEVICE_TYPE>()),
           .vendor = ocl::trimmed(device.getInfo<CL_DEVICE_VENDOR>()),
@@ -114,6 +115,8 @@ const Device* find(const std::vector<Device>& devices, const std::string& name) 
 
 }  // namespace
 
+Device::Handle Device::Handle::of(const cl::Device& device) { return {device, describe(device)}; }
+
 std::vector<Device> Device::list() {
   std::vector<cl::Platform> platforms;
   try {
@@ -130,7 +133,7 @@ std::vector<Device> Device::list() {
       continue;  // a platform without a device
     }
     for (const cl::Device& device : found) {
-      devices.push_back(Device(std::make_shared<const Handle>(Handle{device, describe(platform, device), nullptr})));
+      devices.push_back(Device(std::make_shared<const Handle>(Handle::of(device))));
     }
   }
   std::stable_sort(devices.begin(), devices.end(), [](const Device& a, const Device& b) {
@@ -156,17 +159,18 @@ Device Device::select(const std::string& wanted) {
 }
 
 Device Device::compute_units(int first, int last) const {
-  const cl::Device part = sub_device(handle_->device, handle_->info, first, last);
-  DeviceInfo info = handle_->info;
-  info.name += "/" + std::to_string(first) + (last > first ? "-" + std::to_string(last) : "");
-  info.compute_units = last - first + 1;
-  return Device(std::make_shared<const Handle>(Handle{part, std::move(info), handle_->programs}));
+  Handle part = *handle_;
+  part.device = sub_device(handle_->device, handle_->info, first, last);
+  part.info.name += "/" + std::to_string(first) + (last > first ? "-" + std::to_string(last) : "");
+  part.info.compute_units = last - first + 1;
+  return Device(std::make_shared<const Handle>(std::move(part)));
 }
 
 Device Device::with_programs(const std::string& folder) const {
   return ocl::translated("with_programs", [&] {
-    auto programs = std::make_shared<const ocl::ProgramFolder>(folder, handle_->device);
-    return Device(std::make_shared<const Handle>(Handle{handle_->device, handle_->info, std::move(programs)}));
+    Handle with = *handle_;
+    with.programs = std::make_shared<const ocl::ProgramFolder>(folder, handle_->device);
+    return Device(std::make_shared<const Handle>(std::move(with)));
   });
 }
 

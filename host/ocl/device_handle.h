@@ -9,7 +9,10 @@ namespace egosgm {
 struct Device::Handle {
   cl::Device device;
   DeviceInfo info;
-  std::shared_ptr<const ocl::ProgramFolder> programs;  // null: compiles
+  std::shared_ptr<const ocl::ProgramFolder> programs = nullptr;  // null: compiles
+  cl::CommandQueue queue = {};                                   // for kernels; empty: of the pipeline's own
+
+  static Handle of(const cl::Device& device);
 };
 
 }  // namespace egosgm

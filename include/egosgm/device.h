@@ -49,9 +49,9 @@ class Device {
 
   struct Handle;  // the OpenCL side, host/ocl/device_handle.h
   const Handle& handle() const { return *handle_; }
+  explicit Device(std::shared_ptr<const Handle> handle) : handle_(std::move(handle)) {}
 
  private:
-  explicit Device(std::shared_ptr<const Handle> handle) : handle_(std::move(handle)) {}
   std::shared_ptr<const Handle> handle_;
 };
 

@@ -96,6 +96,7 @@ class Pipeline {
 
  private:
   friend std::vector<ProgramFile> compile_programs(const Device&, const PipelineOptions&);
+  friend class DevicePipeline;  // egosgm/opencl.h
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -30,6 +30,7 @@ std::atomic<cl_context> failing_context = nullptr;
 std::atomic<bool> sources_forbidden = false;
 std::atomic<long> references = 0;
 long buffers_created = 0;
+std::atomic<int> transfers = 0;
 
 // Calls that take part: all of them where the fault is to come at once, enqueues only where it is to come later.
 bool fails() {
@@ -130,23 +131,27 @@ cl_int CL_API_CALL fill(cl_command_queue q, cl_mem b, const void* p, size_t pn, 
 }
 cl_int CL_API_CALL copy(cl_command_queue q, cl_mem from, cl_mem to, size_t fo, size_t o, size_t n, cl_uint c,
                         const cl_event* g, cl_event* e) {
+  ++transfers;
   return enqueue(q, c, g, e, [&](cl_uint w, const cl_event* l) {
     return next->clEnqueueCopyBuffer(q, from, to, fo, o, n, w, l, e);
   });
 }
 cl_int CL_API_CALL read(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, void* p, cl_uint c,
                         const cl_event* g, cl_event* e) {
+  ++transfers;
   return enqueue(q, c, g, e,
                  [&](cl_uint w, const cl_event* l) { return next->clEnqueueReadBuffer(q, b, bl, o, n, p, w, l, e); });
 }
 cl_int CL_API_CALL write(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, const void* p, cl_uint c,
                          const cl_event* g, cl_event* e) {
+  ++transfers;
   return enqueue(q, c, g, e,
                  [&](cl_uint w, const cl_event* l) { return next->clEnqueueWriteBuffer(q, b, bl, o, n, p, w, l, e); });
 }
 // A map that blocks can only fail at once: PoCL 3.1 would hang.
 void* CL_API_CALL map(cl_command_queue q, cl_mem b, cl_bool bl, cl_map_flags f, size_t o, size_t n, cl_uint c,
                       const cl_event* g, cl_event* e, cl_int* error) {
+  ++transfers;
   void* mapped = nullptr;
   const auto enqueue_with = [&](cl_uint w, const cl_event* l) {
     cl_int result;
@@ -165,6 +170,7 @@ cl_int CL_API_CALL event_info(cl_event e, cl_event_info i, size_t n, void* v, si
   return fails() ? status : next->clGetEventInfo(e, i, n, v, s);
 }
 cl_int CL_API_CALL unmap(cl_command_queue q, cl_mem b, void* p, cl_uint c, const cl_event* g, cl_event* e) {
+  ++transfers;
   return enqueue(q, c, g, e,
                  [&](cl_uint w, const cl_event* l) { return next->clEnqueueUnmapMemObject(q, b, p, w, l, e); });
 }
@@ -203,6 +209,7 @@ extern "C" void fault_separate_memory(int separate) { separate_memory = separate
 extern "C" int fault_calls() { return calls; }
 extern "C" int fault_enqueues() { return enqueues; }
 extern "C" long fault_references() { return references; }
+extern "C" int fault_transfers() { return transfers; }
 extern "C" long fault_buffers_created() { return buffers_created; }
 
 extern "C" cl_int CL_API_CALL clGetLayerInfo(cl_layer_info name, size_t size, void* value, size_t* needed) {

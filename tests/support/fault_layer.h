@@ -24,6 +24,7 @@ struct FaultLayer {
   int (*enqueues)();                      // and commands among them
   long (*references)();  // to contexts, queues, buffers, programs, kernels and events: created + retained - released
   long (*buffers_created)();  // ever
+  int (*transfers)();         // ever: copies, reads, writes, maps and unmaps of buffers
 
   explicit FaultLayer(const char* file) {
     cl_uint platforms = 0;
@@ -37,6 +38,7 @@ struct FaultLayer {
     find(layer, "fault_enqueues", enqueues);
     find(layer, "fault_references", references);
     find(layer, "fault_buffers_created", buffers_created);
+    find(layer, "fault_transfers", transfers);
     disarm();
   }
 

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// Frames on the caller's own OpenCL queue and in its memory. The only header here that includes OpenCL's.
+#pragma once
+
+#ifndef CL_TARGET_OPENCL_VERSION
+#define CL_TARGET_OPENCL_VERSION 120
+#endif
+#include <CL/cl.h>
+
+#include <optional>
+#include <string>
+
+#include "egosgm/pipeline.h"
+
+namespace egosgm {
+
+/// A rectified pair in a buffer of the queue's context: the left image, then the right one, rows from top to bottom
+/// without gaps, 1 or 2 bytes a pixel. Two sub-buffers of it are a way to fill them apart.
+struct DeviceImages {
+  cl_mem pixels = nullptr;
+  PixelType type = PixelType::kU8;
+};
+
+/// What a frame gives, in the pipeline's own buffers: floats, the left view's height x width, then the right view's.
+/// Disparity [px], kInvalidDisparity where there is none; variance [px^2]. Retain neither: they are read by commands of
+/// the same queue (or that wait for `done` of `enqueue`), which are enqueued before the next frame is.
+struct DeviceMaps {
+  cl_mem disparity = nullptr;
+  cl_mem variance = nullptr;
+  bool full_range = false;  // as in FrameReport
+  std::string full_range_reason;
+};
+
+/// A Pipeline whose kernels run on the caller's queue, between the caller's own commands, on images that are there
+/// already: no copy, and the host waits for nothing. Same bits as Pipeline. Not thread-safe.
+class DevicePipeline {
+ public:
+  /// The caller's queue is retained. `programs`: a folder of compiled programs, as in Device::with_programs; empty:
+  /// compiles. Throws InvalidArgument (also for a queue that runs out of order), DeviceError or BuildError.
+  DevicePipeline(cl_command_queue queue, const Calibration& calibration, int width, int height,
+                 const PipelineOptions& options = {}, const std::string& programs = {});
+
+  /// Enqueues a frame behind what is enqueued on the queue, and returns. The images must not change until it has ended.
+  /// `done`, if not null, becomes an event of its end, which the caller releases.
+  /// Throws InvalidArgument before anything is enqueued, or DeviceError: then nothing of the frame is left on the
+  /// queue, and the pipeline is as it was before. A frame that fails on the device later (its event says so) makes the
+  /// next call throw DeviceError; that one forgets what went before, as `Pipeline::reset` does.
+  DeviceMaps enqueue(const DeviceImages& images, const std::optional<Motion>& motion, cl_event* done = nullptr);
+
+  /// The pipeline itself: options, memory, reset, and frames whose images and maps are the host's, in between. Their
+  /// reports name no times where the caller's queue does not profile.
+  Pipeline& host() { return pipeline_; }
+
+ private:
+  Pipeline pipeline_;
+};
+
+}  // namespace egosgm
