@@ -2,9 +2,11 @@
 """egosgm compile and egosgm batch from outside: devices, shards, failures, kills. Environment as for program_test.py, and
 EGOSGM_FAULT_LAYER: the OpenCL layer that fails."""
 import json
+import math
 import os
 import shutil
 import signal
+import struct
 import subprocess
 import time
 import unittest
@@ -73,6 +75,32 @@ class Compile(ProgramTest):
         self.assert_refused([*run, loaded, "--programs", self.folder], "manifest.json", "egosgm compile")
         (programs / "manifest.json").write_text(json.dumps(dict(manifest, driver="0.0")))
         self.assert_refused([*run, loaded, "--programs", programs], "driver", "0.0", manifest["driver"], "egosgm compile")
+
+
+class DeviceBuffers(ProgramTest):
+    """examples/device_buffers.cpp: kernels of its own before and after the pipeline's."""
+
+    def pfm(self, file):
+        kind, size, scale, values = file.read_bytes().split(b"\n", 3)
+        self.assertEqual((kind, float(scale)), (b"Pf", -1))
+        width, height = map(int, size.split())
+        return struct.unpack(f"<{width * height}f", values)
+
+    def test_depth_is_that_of_runs_disparities(self):
+        out, own = self.new_folder(), self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "pfm", "--quiet")
+        subprocess.run([os.environ["EGOSGM_DEVICE_BUFFERS"], self.street], cwd=own, check=True, timeout=240)
+        camera = self.report(out)["calibration"]
+        single = lambda value: struct.unpack("<f", struct.pack("<f", value))[0]
+        focal_times_baseline = single(camera["fx"] * camera["baseline_m"])
+        self.assertEqual(camera["doffs_px"], 0)
+        maps = sorted((out / "pfm").iterdir())
+        self.assertEqual([file.name for file in maps], sorted(file.name for file in own.iterdir()))
+        for file in maps:
+            disparities = self.pfm(file)
+            expected = [single(focal_times_baseline / d) if 0 < d < math.inf else math.inf for d in disparities]
+            self.assertEqual(list(self.pfm(own / file.name)), expected, file.name)
+            self.assertGreater(sum(depth < math.inf for depth in expected), len(expected) // 2)
 
 
 class Batch(BatchTest):
