@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <future>
 #include <memory>
+#include <optional>
 
 #include "apps/command.h"
 #include "apps/device_arguments.h"
@@ -18,6 +19,7 @@
 #include "apps/run_outputs.h"
 #include "apps/run_report.h"
 #include "apps/sequence_arguments.h"
+#include "apps/trace.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
@@ -34,7 +36,7 @@ double ms_since(Clock::time_point start) {
 struct RunArguments {
   SequenceArguments input;
   OptionArguments method;
-  std::string out, poses, device, programs, write;
+  std::string out, poses, device, programs, write, trace;
   vision::StereoOdometryOptions odometry;
   bool interpolate = false, quiet = false;
 };
@@ -44,6 +46,7 @@ struct PreparedFrame {
   std::size_t index = 0;
   vision::StereoImages images;
   FrameMotion motion;
+  Clock::time_point read_start, odometry_start;
   double read_ms = 0;
 };
 
@@ -57,7 +60,11 @@ class Run {
         motions_(sequence_, job.poses_file, job.odometry),
         outputs_(folder_, job.kinds, size_, job.options.disparities),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
-        report_(sequence_, pipeline_, job.preset, size_.width, size_.height) {}
+        report_(sequence_, pipeline_, job.preset, size_.width, size_.height) {
+    if (job.trace.empty()) return;
+    trace_.emplace(job.trace);
+    pipeline_.record_commands(true);
+  }
 
   bool operator()() {
     try {
@@ -101,16 +108,17 @@ class Run {
   }
 
   PreparedFrame prepare(std::size_t i) {
-    const auto start = Clock::now();
     PreparedFrame frame;
     frame.index = i;
+    frame.read_start = Clock::now();
     frame.images = vision::read_images(sequence_.frames[i]);
-    frame.read_ms = ms_since(start);
+    frame.read_ms = ms_since(frame.read_start);
     if (frame.images.left.size() != size_) {
       throw InvalidArgument(fmt::format("{} is {}x{} and the sequence {}x{}: all frames need one size",
                                         sequence_.frames[i].left.string(), frame.images.left.cols,
                                         frame.images.left.rows, size_.width, size_.height));
     }
+    frame.odometry_start = Clock::now();
     frame.motion = motions_.next(frame.images);
     return frame;
   }
@@ -131,9 +139,20 @@ class Run {
     const std::int64_t unstorable = outputs_.write(frame, prepared.images.left);
     const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
     last_written_ = Clock::now();
+    if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
     report_.add(frame, result, prepared.motion, times, unstorable);
     poses_.push_back(prepared.motion.first_from_camera);
     tell(frame, result, prepared.motion, times, unstorable, progress);
+  }
+
+  void trace(const std::string& frame, const PreparedFrame& prepared, const FrameReport& result,
+             Clock::time_point before_write, double write_ms) {
+    trace_->add_host("read", frame, Trace::Row::kPrepare, prepared.read_start, prepared.read_ms);
+    if (!prepared.motion.from_file) {
+      trace_->add_host("odometry", frame, Trace::Row::kPrepare, prepared.odometry_start, prepared.motion.odometry_ms);
+    }
+    trace_->add_device(result.commands, frame);
+    trace_->add_host("write", frame, Trace::Row::kWrite, before_write, write_ms);
   }
 
   void tell(const vision::StereoFrame& frame, const FrameReport& result, const FrameMotion& motion,
@@ -156,6 +175,7 @@ class Run {
   void finish(bool finished, const std::string& why_not) {
     if (!poses_.empty()) vision::write_poses(folder_ / "poses.txt", poses_);
     report_.write(folder_ / "report.json", finished, why_not);
+    if (trace_) trace_->write();
     if (!finished || quiet_) return;
     fmt::print("{}, {} frames, {}x{}, on {}\n", sequence_.title, poses_.size(), size_.width, size_.height,
                pipeline_.device().info().name);
@@ -179,6 +199,7 @@ class Run {
   RunOutputs outputs_;
   Pipeline pipeline_;
   RunReport report_;
+  std::optional<Trace> trace_;
   std::deque<PreparedFrame> under_way_;
   Clock::time_point last_written_ = Clock::now();
   std::vector<Eigen::Isometry3d> poses_;
@@ -196,6 +217,7 @@ SequenceJob job_of(const RunArguments& arguments) {
   job.out = arguments.out;
   job.kinds = parse_write_list(arguments.write);
   if (arguments.interpolate) job.kinds.insert("interpolated");
+  job.trace = arguments.trace;
   job.quiet = arguments.quiet;
   return job;
 }
@@ -225,6 +247,12 @@ Command add_run(CLI::App& program) {
       ->required();
   command->add_option("--write", arguments->write, kWriteListHelp)->type_name("LIST")->group(group);
   command->add_flag("--interpolate", arguments->interpolate, "fill holes from the background, into OUT/interpolated")
+      ->group(group);
+  command
+      ->add_option("--trace", arguments->trace,
+                   "write when every kernel, transfer and step of the host ran, as a Chrome trace (JSON) that "
+                   "https://ui.perfetto.dev opens")
+      ->type_name("FILE")
       ->group(group);
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
   arguments->method.add_to(*command);

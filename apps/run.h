@@ -21,6 +21,7 @@ struct SequenceJob {
   vision::StereoOdometryOptions odometry;  // with these options
   std::filesystem::path out;
   std::set<std::string> kinds;  // what is written beside the disparity, see parse_write_list
+  std::filesystem::path trace;  // file for a trace of all commands; empty: none
   bool quiet = false;
 };
 

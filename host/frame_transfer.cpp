@@ -86,10 +86,18 @@ std::vector<StageTime> stage_times(const std::vector<ocl::Context::Finished>& fi
 
 }  // namespace
 
-void report_commands(const std::vector<ocl::Context::Finished>& finished, FrameReport& report) {
+void report_stages(const std::vector<ocl::Context::Finished>& finished, FrameReport& report) {
   report.launches =
       static_cast<int>(std::count_if(finished.begin(), finished.end(), [](const auto& f) { return f.is_launch; }));
   report.stages = stage_times(finished);
+}
+
+void report_commands(ocl::Context& context, const std::vector<ocl::Command>& commands, FrameReport& report) {
+  const std::vector<ocl::Context::Times> times = context.times_of(commands);
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    report.commands.push_back({commands[i].stage, commands[i].name, commands[i].queue, times[i].queued,
+                               times[i].submitted, times[i].started, times[i].ended});
+  }
 }
 
 FrameTransfer::FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range)

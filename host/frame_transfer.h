@@ -72,6 +72,8 @@ class FrameTransfer {
 };
 
 /// What the report tells of a frame's commands: launches and stages.
-void report_commands(const std::vector<ocl::Context::Finished>& finished, FrameReport& report);
+void report_stages(const std::vector<ocl::Context::Finished>& finished, FrameReport& report);
+/// The same: each of them. REQUIRES: they have ended.
+void report_commands(ocl::Context& context, const std::vector<ocl::Command>& commands, FrameReport& report);
 
 }  // namespace egosgm

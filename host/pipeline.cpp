@@ -98,6 +98,7 @@ struct Pipeline::Impl {
   std::vector<FrameUnderWay> under_way;    // the oldest first
   Clock::time_point collected;             // the last one before them
   std::vector<ocl::Command> device_frame;  // of the last `enqueue`
+  bool records_commands = false;
 
   Impl(const Calibration& calibration, shared::ImageSize image_size, const PipelineOptions& chosen,
        const Device& chosen_device)
@@ -256,7 +257,10 @@ struct Pipeline::Impl {
 
   FrameReport collect() {
     FrameUnderWay& frame = under_way.front();
-    or_go_back([&] { report_commands(context.wait(frame.commands), frame.report); });
+    or_go_back([&] {
+      report_stages(context.wait(frame.commands), frame.report);
+      if (records_commands) report_commands(context, frame.commands, frame.report);
+    });
     expect_none_failed();
     frame.transfer->collect(frame.report);
     const Clock::time_point now = Clock::now();
@@ -355,6 +359,7 @@ FrameReport Pipeline::collect() {
 
 int Pipeline::under_way() const { return static_cast<int>(impl_->under_way.size()); }
 void Pipeline::reset() { impl_->reset(); }
+void Pipeline::record_commands(bool wanted) { impl_->records_commands = wanted; }
 const PipelineOptions& Pipeline::options() const { return impl_->options; }
 const Device& Pipeline::device() const { return impl_->device; }
 std::uint64_t Pipeline::device_memory_bytes() const { return impl_->context.allocated_bytes(); }

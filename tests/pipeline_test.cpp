@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -677,6 +678,37 @@ TEST(Pipeline, ReportsWhatItDid) {
     EXPECT_GT(report.total_ms, 0);
     EXPECT_GT(report.launches, 15);
   }
+}
+
+TEST(Pipeline, ListsEveryCommandIfAsked) {
+  const Setting setting = standard();
+  const Video video(setting, 3);
+  Pipeline pipeline = make_pipeline(setting);
+  EXPECT_TRUE(process(pipeline, setting, video, 0).report.commands.empty());
+  const auto host_ns = [] { return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1); };
+  pipeline.record_commands(true);
+  const std::int64_t before = host_ns();
+  const FrameReport report = process(pipeline, setting, video, 1).report;
+  const std::int64_t after = host_ns();
+  double ms = 0, expected_ms = 0;
+  for (const DeviceCommand& command : report.commands) {
+    EXPECT_LE(command.queued_ns, command.submitted_ns) << command.name;
+    EXPECT_LE(command.submitted_ns, command.started_ns) << command.name;
+    EXPECT_LE(command.started_ns, command.ended_ns) << command.name;
+    EXPECT_GE(command.queued_ns, before) << command.name;
+    EXPECT_LE(command.ended_ns, after) << command.name;
+    ms += 1e-6 * static_cast<double>(command.ended_ns - command.started_ns);
+  }
+  for (const StageTime& stage : report.stages) expected_ms += stage.ms;
+  EXPECT_NEAR(ms, expected_ms, 1e-6 * expected_ms);
+  const auto count = [&](auto&& fits) { return std::count_if(report.commands.begin(), report.commands.end(), fits); };
+  EXPECT_EQ(count([](const auto& c) { return c.stage == "Census" && c.name == "census"; }), 1);
+  EXPECT_EQ(count([](const auto& c) { return c.stage == "ConsistencyCheck"; }), 3);
+  EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kUpload; }), 1);
+  EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kDownload && c.name != "wait"; }), 10);
+  EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kKernels; }), report.launches);
+  pipeline.record_commands(false);
+  EXPECT_TRUE(process(pipeline, setting, video, 2).report.commands.empty());
 }
 
 TEST(Pipeline, KeepsEveryDisparityInItsRange) {

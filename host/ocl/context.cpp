@@ -110,6 +110,25 @@ std::vector<Context::Finished> Context::wait(const std::vector<Command>& command
   return finished;
 }
 
+std::vector<Context::Times> Context::times_of(const std::vector<Command>& commands) {
+  std::vector<Times> times;
+  times.reserve(commands.size());
+  for (const Command& command : commands) {
+    const auto asked = [&](cl_profiling_info what) {
+      cl_ulong ns = 0;
+      command.event.getProfilingInfo(what, &ns);
+      return static_cast<std::int64_t>(ns);
+    };
+    times.push_back({asked(CL_PROFILING_COMMAND_QUEUED), asked(CL_PROFILING_COMMAND_SUBMIT),
+                     asked(CL_PROFILING_COMMAND_START), asked(CL_PROFILING_COMMAND_END)});
+    clock_offset_ns_ = std::min(clock_offset_ns_, command.enqueued_ns - times.back().queued);
+  }
+  for (Times& t : times) {
+    for (std::int64_t* ns : {&t.queued, &t.submitted, &t.started, &t.ended}) *ns += clock_offset_ns_;
+  }
+  return times;
+}
+
 void Context::expect_none_failed(const std::vector<Command>& commands) {
   for (const Command& command : commands) {
     stage_ = command.stage;

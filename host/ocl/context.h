@@ -2,20 +2,23 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "egosgm/device.h"
 #include "host/ocl/defines.h"
 #include "host/ocl/program_folder.h"
 
 namespace egosgm::ocl {
 
 /// The device's in-order queues. Transfers have their own, so that they run beside the kernels of another frame.
-enum class Queue { kUpload, kKernels, kDownload };
+using Queue = DeviceQueue;
 
 /// A command that was enqueued. The names are string literals.
 struct Command {
@@ -24,6 +27,7 @@ struct Command {
   Queue queue;
   bool is_launch;
   cl::Event event;
+  std::int64_t enqueued_ns;  // on the host's steady clock, no earlier than on the device's
 };
 
 /// One device with its queues, the programs built for it, and the commands under way. Not thread-safe.
@@ -55,7 +59,7 @@ class Context {
 
   /// Remembers a command, for `wait` to ask whether it succeeded.
   void record(cl::Event event, const char* name, Queue queue = Queue::kKernels, bool is_launch = false) {
-    commands_.push_back({stage_, name, queue, is_launch, std::move(event)});
+    commands_.push_back({stage_, name, queue, is_launch, std::move(event), steady_ns()});
   }
 
   /// An event that ends when all recorded commands have, and fails if one does; the last one's own would not. Throws if
@@ -70,11 +74,19 @@ class Context {
     double ms;
     bool is_launch;
   };
+  /// When a command was queued, submitted, started and ended [ns].
+  struct Times {
+    std::int64_t queued, submitted, started, ended;
+  };
   /// Waits for `commands` and throws if one failed. Nothing less tells: clFinish returns success after a failed kernel,
   /// and a later command of the same queue runs as if nothing were. Returns the device time of each.
   std::vector<Finished> wait(const std::vector<Command>& commands);
   /// The same for the recorded ones.
   std::vector<Finished> wait() { return wait(take_commands()); }
+
+  /// Of commands that have ended, on the host's steady clock. A command is recorded right after it was queued, so that
+  /// the least distance between the two is how far the device's clock is off.
+  std::vector<Times> times_of(const std::vector<Command>& commands);
 
   /// Throws if one of `commands` has failed by now. Does not wait.
   void expect_none_failed(const std::vector<Command>& commands);
@@ -96,6 +108,10 @@ class Context {
  private:
   Context(const cl::Device& device, const cl::Context& context, const cl::CommandQueue& kernels,
           std::shared_ptr<const ProgramFolder> programs);
+  static std::int64_t steady_ns() {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+  }
   cl::Program created(const ProgramSource& source) const;
 
   cl::Device device_;
@@ -111,6 +127,7 @@ class Context {
   std::shared_ptr<const ProgramFolder> folder_;
   std::map<std::pair<std::string, std::string>, std::pair<ProgramSource, cl::Program>> programs_;
   std::vector<Command> commands_;
+  std::int64_t clock_offset_ns_ = std::numeric_limits<std::int64_t>::max();  // steady clock - device's clock, at most
 };
 
 /// Leaves no command running when its scope ends, unless `is_dismissed`. Declare it after the memory that the commands

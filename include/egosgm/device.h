@@ -8,6 +8,9 @@
 
 namespace egosgm {
 
+/// The queues that a pipeline has of its device.
+enum class DeviceQueue { kUpload, kKernels, kDownload };
+
 /// What an OpenCL device says of itself.
 struct DeviceInfo {
   std::string name;  // "pthread-skylake-avx512-AMD EPYC"

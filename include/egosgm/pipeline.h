@@ -34,19 +34,29 @@ struct StageTime {
   double ms = 0;
 };
 
+/// A command of a frame on the device. Times by the driver, brought to std::chrono::steady_clock [ns] (to within what
+/// enqueueing takes).
+struct DeviceCommand {
+  std::string stage;
+  std::string name;  // of the kernel, or "map", "unmap", "read", "write", "fill", "wait" (for another queue)
+  DeviceQueue queue = DeviceQueue::kKernels;
+  std::int64_t queued_ns = 0, submitted_ns = 0, started_ns = 0, ended_ns = 0;
+};
+
 /// What happened in a frame.
 struct FrameReport {
   bool full_range = false;  // no prediction was used: everything was searched,
   std::string
       full_range_reason;  // because of this ("first frame", "no motion", "reset", "search is full", "not temporal")
-  double search_fraction = 0;     // cells that can win / (width * height * D), both views [0..1]
-  double computed_fraction = 0;   // with the lanes that were computed and cannot win
-  double predicted_fraction = 0;  // left pixels with a prediction
-  double density = 0;             // left pixels with a disparity
-  double vertical_offset_px = 0;  // by which the right image was resampled (vertical_alignment)
-  int launches = 0;               // kernels enqueued
-  std::vector<StageTime> stages;  // in the order in which they ran
-  double total_ms = 0;            // wall clock, upload to download, from when the frame before was collected
+  double search_fraction = 0;           // cells that can win / (width * height * D), both views [0..1]
+  double computed_fraction = 0;         // with the lanes that were computed and cannot win
+  double predicted_fraction = 0;        // left pixels with a prediction
+  double density = 0;                   // left pixels with a disparity
+  double vertical_offset_px = 0;        // by which the right image was resampled (vertical_alignment)
+  int launches = 0;                     // kernels enqueued
+  std::vector<StageTime> stages;        // in the order in which they ran
+  std::vector<DeviceCommand> commands;  // each of them, after record_commands(true)
+  double total_ms = 0;                  // wall clock, upload to download, from when the frame before was collected
 };
 
 /// Dense disparity from stereo video (Fućek et al. 2017): the last frame's disparity map, moved by the camera's motion,
@@ -89,6 +99,9 @@ class Pipeline {
 
   /// Forgets the last frame: the next one searches the whole range. Frames under way are not affected.
   void reset();
+
+  /// Whether reports of frames collected from now on list every command; off by default.
+  void record_commands(bool wanted);
 
   const PipelineOptions& options() const;
   const Device& device() const;

@@ -100,7 +100,7 @@ class Help(ProgramTest):
         text = self.assert_works("run", "--help")
         for option in ("--kitti", "--scene", "--odometry", "--left", "--right", "--calib", "--frames", "--out", "--poses", "--preset",
                        "--search", "--temporal", "--paths", "--disparities", "--min-disparity", "--device", "--interpolate",
-                       "--write", "--set", "--config", "--save-config", "--quiet", "banded_sgm.p2", "kalman_update.gate_px"):
+                       "--write", "--trace", "--set", "--config", "--save-config", "--quiet", "banded_sgm.p2", "kalman_update.gate_px"):
             self.assertIn(option, text)
 
     def test_version(self):
@@ -191,6 +191,38 @@ class Run(ProgramTest):
             self.assertEqual(self.assert_works("run", "--odometry", self.street, "--out", out, "--quiet", "--write", "variance"), "")
         for file in [*first.glob("disparity/*"), *first.glob("variance/*"), first / "poses.txt"]:
             self.assertEqual(file.read_bytes(), (second / file.relative_to(first)).read_bytes(), file.name)
+
+    def test_a_trace_holds_every_command_and_step_of_the_host(self):
+        out, plain, file = self.new_folder(), self.new_folder(), self.new_folder() / "trace.json"
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--trace", file)
+        self.assert_works("run", "--odometry", self.street, "--out", plain)
+        for picture in (plain / "disparity").iterdir():
+            self.assertEqual(picture.read_bytes(), (out / "disparity" / picture.name).read_bytes())
+        events = json.loads(file.read_text())["traceEvents"]
+        rows = {event["tid"]: event["args"]["name"] for event in events if event["name"] == "thread_name"}
+        spans = [event for event in events if event["ph"] == "X"]
+        frames = {f"{index:06}" for index in range(FRAMES)}
+        self.assertEqual({span["args"]["frame"] for span in spans}, frames)
+        for step in ("read", "odometry", "write"):
+            self.assertEqual([span["args"]["frame"] for span in spans if span["name"] == step and span["cat"] == "host"], sorted(frames))
+        for frame in self.report(out)["frames"]:
+            commands = [span for span in spans if int(span["args"]["frame"]) == frame["frame"] and span["cat"] != "host"]
+            kernels = [span for span in commands if span["name"] not in ("fill", "wait", "map", "unmap", "read", "write")]
+            self.assertEqual(len(kernels), frame["launches"])
+            self.assertEqual({rows[span["tid"]] for span in kernels}, {"device: kernels"})
+            self.assertEqual({rows[span["tid"]] for span in commands}, {"device: upload", "device: kernels", "device: download"})
+            self.assertIn(("BandedSgm", "sweep_forward"), {(span["cat"], span["name"]) for span in kernels})
+        for span in spans:
+            self.assertGreaterEqual(span["dur"], 0)
+            if span["cat"] != "host":
+                self.assertLessEqual(span["args"]["queued_us"], span["args"]["submitted_us"])
+                self.assertLessEqual(span["args"]["submitted_us"], span["ts"])
+        for row in rows:  # in-order queues: what overlaps in a row, no viewer can draw
+            in_row = sorted((span["ts"], span["ts"] + span["dur"]) for span in spans if span["tid"] == row)
+            for before, after in zip(in_row, in_row[1:]):
+                self.assertLessEqual(before[1], after[0] + 50)  # us: clocks of host and device are aligned frame by frame
+        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder(), "--trace", "/nonexistent/trace.json"],
+                            "/nonexistent/trace.json", code=1)
 
     def test_a_terminal_gets_a_bar(self):
         terminal, side = pty.openpty()

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "egosgm/pipeline.h"
+
+namespace egosgm::app {
+
+/// Where the time of a run goes, in Chrome's trace format (Perfetto and chrome://tracing open it): a row for each of
+/// the device's queues, one for what the host does before a frame, one for what it does after. Not thread-safe.
+class Trace {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  enum class Row { kPrepare = 1, kWrite, kUpload, kKernels, kDownload };
+
+  /// Writes a trace of nothing, so that a file that cannot be written ends the run at once. Throws IoError.
+  explicit Trace(std::filesystem::path file);
+
+  void add_host(const std::string& name, const std::string& frame, Row row, Time start, double ms);
+  void add_device(const std::vector<DeviceCommand>& commands, const std::string& frame);
+
+  /// Throws IoError.
+  void write() const;
+
+ private:
+  double us_since_start(std::int64_t steady_clock_ns) const;
+
+  const std::filesystem::path file_;
+  const Time start_ = std::chrono::steady_clock::now();
+  nlohmann::ordered_json events_;
+};
+
+}  // namespace egosgm::app
