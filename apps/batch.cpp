@@ -16,6 +16,7 @@
 #include "apps/device_arguments.h"
 #include "apps/energy_meter.h"
 #include "apps/interrupt.h"
+#include "apps/motion_source.h"
 #include "apps/option_arguments.h"
 #include "apps/run_outputs.h"
 #include "apps/shard.h"
@@ -33,6 +34,7 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 struct BatchArguments {
   std::string list, out, devices = "all", programs, write, shard, shards;
   OptionArguments method;
+  vision::StereoOdometryOptions odometry;
   bool merge = false, quiet = false;
 };
 
@@ -161,10 +163,12 @@ class Batch {
 
   SequenceJob job_of(const BatchEntry& entry) const {
     SequenceJob job;
-    job.sequence = entry.input.open();
+    const BatchInput input = parse_input(entry);
+    job.sequence = input.sequence.open();
     job.options = options_;
     job.preset = arguments_.method.preset;
-    job.poses_file = entry.poses_file;
+    job.poses_file = input.poses_file;
+    job.odometry = arguments_.odometry;
     job.out = folder_.folder_of(entry);
     job.kinds = kinds_;
     job.quiet = true;
@@ -280,6 +284,7 @@ int run_shard(const BatchArguments& arguments, const std::vector<BatchEntry>& en
     if (!arguments.programs.empty()) {
       for (Device& device : devices) device = device.with_programs(arguments.programs);
     }
+    for (const BatchEntry& entry : left) parse_input(entry);  // all mistakes now, not at night
     catch_interrupts();
     Batch batch(arguments, left, folder, options, devices);
     if (!batch()) return kInterrupted;
@@ -298,7 +303,8 @@ int run_shard(const BatchArguments& arguments, const std::vector<BatchEntry>& en
 int batch(const BatchArguments& arguments) {
   const std::vector<BatchEntry> entries = read_batch_list(arguments.list);
   const PipelineOptions options = arguments.method.options();
-  const BatchFolder folder(arguments.out, batch_settings(options, parse_write_list(arguments.write)));
+  const BatchFolder folder(arguments.out,
+                           batch_settings(options, arguments.odometry, parse_write_list(arguments.write)));
   return arguments.merge ? report_all(arguments, entries, folder) : run_shard(arguments, entries, options, folder);
 }
 
@@ -338,6 +344,7 @@ Command add_batch(CLI::App& program) {
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors");
   arguments->method.add_to(*command);
   add_programs(*command, arguments->programs);
+  add_motion_bounds(*command, arguments->odometry, "Method");
   return {command, [arguments] { return batch(*arguments); }};
 }
 

@@ -24,30 +24,26 @@ std::string stripped(std::string line) {
   return line;
 }
 
+/// Letters, digits and a few signs, in folders of folders; no part begins with a dot.
 bool is_folder_name(const std::string& name) {
-  return name.front() != '.' && std::all_of(name.begin(), name.end(), [](unsigned char c) {
-           return std::isalnum(c) || c == '.' || c == '_' || c == '-' || c == '+';
-         });
+  const auto is_fit = [](unsigned char c) {
+    return std::isalnum(c) || c == '.' || c == '_' || c == '-' || c == '+' || c == '/';
+  };
+  const std::string framed = '/' + name + '/';
+  return std::all_of(name.begin(), name.end(), is_fit) && framed.find("/.") == std::string::npos &&
+         framed.find("//") == std::string::npos;
 }
 
-BatchEntry parse(const std::string& line) {
-  BatchEntry entry;
+BatchEntry split(const std::string& line, const std::string& place) {
   const auto end = std::min(line.find_first_of(kBlanks), line.size());
-  entry.name = line.substr(0, end);
-  if (!is_folder_name(entry.name)) {
-    throw InvalidArgument(fmt::format(
-        "name \"{}\": choose letters, digits and . _ + - alone, not beginning with a dot; then the input", entry.name));
+  const std::string name = line.substr(0, end);
+  if (!is_folder_name(name)) {
+    throw InvalidArgument(
+        fmt::format("{}: name \"{}\": choose letters, digits and . _ + - /, not beginning with a dot; "
+                    "then the input",
+                    place, name));
   }
-  entry.arguments = stripped(line.substr(end));
-  CLI::App arguments;
-  entry.input.add_to_with_positional(arguments);
-  arguments.add_option("--poses", entry.poses_file);
-  try {
-    arguments.parse(entry.arguments);
-  } catch (const CLI::ParseError& error) {
-    throw InvalidArgument(std::string(error.what()) + ": write NAME and the input as for egosgm run");
-  }
-  return entry;
+  return {name, stripped(line.substr(end)), place};
 }
 
 }  // namespace
@@ -61,20 +57,29 @@ std::vector<BatchEntry> read_batch_list(const std::filesystem::path& file) {
     ++number;
     const std::string line = stripped(raw);
     if (line.empty()) continue;
-    try {
-      entries.push_back(parse(line));
-    } catch (const InvalidArgument& error) {
-      throw InvalidArgument(fmt::format("{}, line {}: {}", file.string(), number, error.what()));
-    }
+    entries.push_back(split(line, fmt::format("{}, line {}", file.string(), number)));
     if (!names.insert(entries.back().name).second) {
-      throw InvalidArgument(fmt::format("{}, line {}: the name {} comes twice: results would overwrite each other",
-                                        file.string(), number, entries.back().name));
+      throw InvalidArgument(fmt::format("{}: the name {} comes twice: results would overwrite each other",
+                                        entries.back().place, entries.back().name));
     }
   }
   if (entries.empty()) {
     throw InvalidArgument(file.string() + ": names no sequence: write a line each, NAME and the input");
   }
   return entries;
+}
+
+BatchInput parse_input(const BatchEntry& entry) {
+  BatchInput input;
+  CLI::App arguments;
+  input.sequence.add_to_with_positional(arguments);
+  arguments.add_option("--poses", input.poses_file);
+  try {
+    arguments.parse(entry.arguments);
+  } catch (const CLI::ParseError& error) {
+    throw InvalidArgument(fmt::format("{}: {}: write NAME and the input as for egosgm run", entry.place, error.what()));
+  }
+  return input;
 }
 
 }  // namespace egosgm::app

@@ -83,8 +83,13 @@ std::string difference(const Json& there, const Json& here) {
 
 }  // namespace
 
-Json batch_settings(const PipelineOptions& options, const std::set<std::string>& kinds) {
-  Json json{{"version", EGOSGM_VERSION}, {"write", kinds}, {"options", Json::object()}};
+Json batch_settings(const PipelineOptions& options, const vision::StereoOdometryOptions& odometry,
+                    const std::set<std::string>& kinds) {
+  Json json{{"version", EGOSGM_VERSION},
+            {"write", kinds},
+            {"odometry",
+             {{"max_translation_m", odometry.max_translation_m}, {"max_rotation_deg", odometry.max_rotation_deg}}},
+            {"options", Json::object()}};
   for (const auto& [name, value] : list_options(options)) json["options"][name] = value;
   return json;
 }

@@ -44,6 +44,7 @@ class BatchFolder {
 };
 
 /// What all sequences of a batch share.
-nlohmann::ordered_json batch_settings(const PipelineOptions& options, const std::set<std::string>& kinds);
+nlohmann::ordered_json batch_settings(const PipelineOptions& options, const vision::StereoOdometryOptions& odometry,
+                                      const std::set<std::string>& kinds);
 
 }  // namespace egosgm::app

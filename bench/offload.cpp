@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What it costs to hand frames over in device memory, and what several devices give.
+#include <sys/resource.h>
+
 #include <algorithm>
 #include <barrier>
 #include <chrono>
@@ -33,6 +35,30 @@ double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
+/// Of all threads of this process, PoCL's among them: on a machine that others use too, steadier than the clock.
+double cpu_ms() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto ms = [](const timeval& time) {
+    return 1e3 * static_cast<double>(time.tv_sec) + 1e-3 * static_cast<double>(time.tv_usec);
+  };
+  return ms(usage.ru_utime) + ms(usage.ru_stime);
+}
+
+/// What frames took.
+struct Times {
+  std::vector<double> wall_ms, cpu_ms;
+
+  template <typename Frame>
+  void add(Frame&& frame) {
+    const double cpu = bench::cpu_ms();
+    const auto start = Clock::now();
+    frame();
+    wall_ms.push_back(ms_since(start));
+    cpu_ms.push_back(bench::cpu_ms() - cpu);
+  }
+};
+
 /// A pipeline's place for a frame's left maps.
 struct Maps {
   std::vector<float> disparity, variance;
@@ -55,11 +81,7 @@ class HostWay {
       : street_(street), pipeline_(street.calibration, street.size.width, street.size.height, options, device) {
     for (int i = 0; i < kWarmUp; ++i) frame();
   }
-  double frame() {
-    const auto start = Clock::now();
-    pipeline_.process(street_.view(EGOSGM_LEFT), street_.view(EGOSGM_RIGHT), Motion{}, outputs_);
-    return ms_since(start);
-  }
+  void frame() { pipeline_.process(street_.view(EGOSGM_LEFT), street_.view(EGOSGM_RIGHT), Motion{}, outputs_); }
 
  private:
   const Street& street_;
@@ -92,15 +114,13 @@ class DeviceWay {
   DeviceWay(const DeviceWay&) = delete;
   DeviceWay& operator=(const DeviceWay&) = delete;
 
-  struct Times {
-    double frame_ms, call_ms;
-  };
-  Times frame() {
+  /// Returns the milliseconds in the call.
+  double frame() {
     const auto start = Clock::now();
     pipeline_->enqueue({pixels_, PixelType::kU8}, Motion{});
     const double call_ms = ms_since(start);
     clFinish(queue_);
-    return {ms_since(start), call_ms};
+    return call_ms;
   }
 
  private:
@@ -116,28 +136,35 @@ struct Setting {
   int rounds;
 
   Row row(const std::string& name, double ms) const { return {name, street.size, options.disparities, ms, {}}; }
+  Row row(const std::string& name, const Times& times) const {
+    Row row = this->row(name, median(times.wall_ms));
+    row.more.emplace_back("cpu_ms", median(times.cpu_ms));
+    return row;
+  }
 };
 
 void compare_ways(const Setting& setting, std::vector<Row>& rows) {
   HostWay host(setting.street, setting.options, Device::list().front());
   DeviceWay device(setting.street, setting.options);
-  std::vector<double> host_ms, device_ms, call_ms;
+  Times host_times, device_times;
+  std::vector<double> call_ms;
+  const std::size_t rounds = setting.rounds;
   std::mt19937 random(5);
-  for (int turn = 0; turn < 2 * setting.rounds; ++turn) {
-    const bool hosts = device_ms.size() == static_cast<std::size_t>(setting.rounds) ||
-                       (host_ms.size() < static_cast<std::size_t>(setting.rounds) && random() % 2 == 0);
+  while (host_times.wall_ms.size() < rounds || device_times.wall_ms.size() < rounds) {
+    const bool hosts =
+        device_times.wall_ms.size() == rounds || (host_times.wall_ms.size() < rounds && random() % 2 == 0);
     if (hosts) {
-      host_ms.push_back(host.frame());
+      host_times.add([&] { host.frame(); });
     } else {
-      const DeviceWay::Times times = device.frame();
-      device_ms.push_back(times.frame_ms);
-      call_ms.push_back(times.call_ms);
+      device_times.add([&] { call_ms.push_back(device.frame()); });
     }
   }
-  rows.push_back(setting.row("host_way", median(host_ms)));
-  rows.push_back(setting.row("device_way", median(device_ms)));
+  rows.push_back(setting.row("host_way", host_times));
+  rows.push_back(setting.row("device_way", device_times));
   rows.push_back(setting.row("device_way_call", median(call_ms)));
-  std::printf("device_way / host_way: %.3f\n", median(device_ms) / median(host_ms));
+  std::printf("device_way / host_way: %.3f by the clock, %.3f by CPU time\n",
+              median(device_times.wall_ms) / median(host_times.wall_ms),
+              median(device_times.cpu_ms) / median(host_times.cpu_ms));
 }
 
 /// Milliseconds a frame when that many compute units, each a device, work at the same time.
@@ -178,7 +205,11 @@ int run(int argc, char** argv) {
   std::vector<Row> rows;
   compare_ways(setting, rows);
   compare_units(setting, rows);
-  for (const Row& row : rows) std::printf("%-16s %8.3f ms\n", row.name.c_str(), row.median_ms);
+  for (const Row& row : rows) {
+    std::printf("%-16s %8.3f ms", row.name.c_str(), row.median_ms);
+    for (const auto& [name, value] : row.more) std::printf("  %s %.3f", name.c_str(), value);
+    std::printf("\n");
+  }
   const Machine machine{Device::select().info(), 0, "a synthetic street, standing camera", arguments.threads};
   print_machine(machine);
   if (!arguments.json.empty()) write_json(arguments.json, machine, rows);

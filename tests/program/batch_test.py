@@ -27,6 +27,7 @@ class BatchTest(ProgramTest):
             assert done.returncode == 0, done.stderr
         cls.list = cls.folder / "list.txt"
         lines = [f"street-{i} {cls.folder}/s{i}" for i in range(SEQUENCES)]
+        lines[3] = lines[3].replace("street-3", "more/street-3")
         lines[1] += f" --poses '{cls.folder}/s1/poses.txt' --frames 1:2  # a comment"
         cls.list.write_text("# NAME INPUT\n\n" + "\n".join(lines) + "\n")
         cls.programs = cls.folder / "programs"  # quicker than compiling for each sequence
@@ -43,8 +44,8 @@ class BatchTest(ProgramTest):
     def assert_same(self, out):
         """The report, and every map."""
         self.assertEqual((out / "batch.json").read_text(), (self.expected / "batch.json").read_text())
-        maps = sorted(file.relative_to(self.expected) for file in self.expected.glob("*/disparity/*"))
-        self.assertEqual(maps, sorted(file.relative_to(out) for file in out.glob("*/disparity/*")))
+        maps = sorted(file.relative_to(self.expected) for file in self.expected.rglob("disparity/*"))
+        self.assertEqual(maps, sorted(file.relative_to(out) for file in out.rglob("disparity/*")))
         for file in maps:
             self.assertEqual((out / file).read_bytes(), (self.expected / file).read_bytes(), file)
 
@@ -110,7 +111,7 @@ class Batch(BatchTest):
         for file in out.glob("disparity/*"):
             self.assertEqual(file.read_bytes(), (self.expected / "street-2/disparity" / file.name).read_bytes(), file.name)
         report = json.loads((self.expected / "batch.json").read_text())
-        self.assertEqual([s["name"] for s in report["sequences"]], [f"street-{i}" for i in range(SEQUENCES)])
+        self.assertEqual([s["name"] for s in report["sequences"]], ["street-0", "street-1", "street-2", "more/street-3"])
         self.assertEqual([s["frames"] for s in report["sequences"]], [3, 2, 3, 3])
         bad = truth = 0
         for i, sequence in enumerate(report["sequences"]):
@@ -153,8 +154,8 @@ class Batch(BatchTest):
     def test_what_is_done_is_not_done_again(self):
         out = self.new_folder()
         shutil.copytree(self.expected, out, dirs_exist_ok=True)
-        (out / "street-3/done.json").unlink()
-        self.assertIn("[1/1] street-3: 3 frames", self.assert_works(*self.batch(out)))
+        (out / "more/street-3/done.json").unlink()
+        self.assertIn("[1/1] more/street-3: 3 frames", self.assert_works(*self.batch(out)))
         self.assertNotIn("[1/", self.assert_works(*self.batch(out)))
         self.assert_same(out)
 
@@ -168,7 +169,7 @@ class Batch(BatchTest):
                     time.sleep(0.002)
                 process.send_signal(how)
             self.assertEqual(process.returncode, code)
-            self.assertFalse((out / "street-3/done.json").exists())
+            self.assertFalse((out / "more/street-3/done.json").exists())
             self.assert_works(*self.batch(out, "--devices", "0"))
             self.assert_same(out)
 
@@ -180,14 +181,14 @@ class Batch(BatchTest):
         self.assertIn("handed to another device", text)
         self.assert_same(out)
         self.assertEqual(sorted(d["retired"] for d in self.timing(out)["devices"]), [False, True])
-        self.assertEqual(list(out.glob("*/failed.json")), [])
+        self.assertEqual(list(out.rglob("failed.json")), [])
 
     def test_where_the_only_device_fails_the_others_sequences_go_on(self):
         out = self.new_folder()
         lost = dict(os.environ, OPENCL_LAYERS=LAYER, EGOSGM_FAILING_CONTEXT="1/0")
         self.assert_refused(self.batch(out, "--devices", "0"), "1 of 4 sequences are not done, the first is street-1",
                             "CL_DEVICE_NOT_AVAILABLE", code=1, env=lost)
-        self.assertEqual(len(list(out.glob("*/done.json"))), SEQUENCES - 1)
+        self.assertEqual(len(list(out.rglob("done.json"))), SEQUENCES - 1)
         self.assert_works(*self.batch(out, "--devices", "0"))
         self.assert_same(out)
 
@@ -223,7 +224,7 @@ class Batch(BatchTest):
         alone = dict(os.environ, JOB_COMPLETION_INDEX="0")
         self.assert_refused(self.batch(out), "--shards N", env=alone)
         broken = self.new_folder() / "list.txt"
-        for text, named in (("", ["names no sequence"]), ("a/b x\n", ["line 1", "a/b"]), ("a x\n\na y\n", ["line 3", "twice"]),
+        for text, named in (("", ["names no sequence"]), ("a//b x\n", ["line 1", "a//b"]), ("a/../b x\n", ["line 1", "a/../b"]), ("/a x\n", ["line 1"]), ("a x\n\na y\n", ["line 3", "twice"]),
                             ("a --odometri x\n", ["line 1", "--odometri"]), (".a x\n", [".a"])):
             broken.write_text(text)
             self.assert_refused(["batch", broken, "--out", out], "list.txt", *named)
