@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <memory>
 #include <mutex>
 #include <sstream>
@@ -46,7 +47,7 @@ std::vector<std::string> split(const std::string& list) {
 }
 
 /// "all", or names as of Device::select between commas; NAME/each is every compute unit of NAME.
-std::vector<Device> select_devices(const std::string& list) {
+std::vector<Device> devices_of(const std::string& list) {
   if (list == "all" && !Device::list().empty()) return Device::list();
   const std::string each = "/each";
   std::vector<Device> devices;
@@ -62,6 +63,13 @@ std::vector<Device> select_devices(const std::string& list) {
     const Device whole = Device::select(name.substr(0, name.size() - each.size()));
     for (int unit = 0; unit < whole.info().compute_units; ++unit) devices.push_back(whole.compute_units(unit, unit));
   }
+  return devices;
+}
+
+std::vector<Device> select_devices(const BatchArguments& arguments) {
+  std::vector<Device> devices = devices_of(arguments.devices);
+  if (arguments.programs.empty()) return devices;
+  for (Device& device : devices) device = device.with_programs(arguments.programs);
   return devices;
 }
 
@@ -265,47 +273,56 @@ int report_all(const BatchArguments& arguments, const std::vector<BatchEntry>& e
   return kFailed;
 }
 
-/// The shard's share of what is not done yet.
-std::vector<BatchEntry> left_to_do(const std::vector<BatchEntry>& entries, const Shard& shard,
-                                   const BatchFolder& folder) {
-  std::vector<BatchEntry> left;
+std::vector<BatchEntry> part_of(const std::vector<BatchEntry>& entries, const Shard& shard) {
+  std::vector<BatchEntry> part;
   for (std::size_t i = 0; i < entries.size(); ++i) {
-    if (shard.contains(i) && !folder.is_done(entries[i])) left.push_back(entries[i]);
+    if (shard.contains(i)) part.push_back(entries[i]);
   }
+  return part;
+}
+
+std::vector<BatchEntry> not_done(const std::vector<BatchEntry>& entries, const BatchFolder& folder) {
+  std::vector<BatchEntry> left;
+  std::copy_if(entries.begin(), entries.end(), std::back_inserter(left),
+               [&](const BatchEntry& entry) { return !folder.is_done(entry); });
   return left;
 }
 
-int run_shard(const BatchArguments& arguments, const std::vector<BatchEntry>& entries, const PipelineOptions& options,
-              const BatchFolder& folder) {
-  const Shard shard = shard_of(arguments.shard, arguments.shards);
-  const std::vector<BatchEntry> left = left_to_do(entries, shard, folder);
-  if (!left.empty()) {
-    std::vector<Device> devices = select_devices(arguments.devices);
-    if (!arguments.programs.empty()) {
-      for (Device& device : devices) device = device.with_programs(arguments.programs);
-    }
-    for (const BatchEntry& entry : left) parse_input(entry);  // all mistakes now, not at night
-    catch_interrupts();
-    Batch batch(arguments, left, folder, options, devices);
-    if (!batch()) return kInterrupted;
-    const std::string part = shard.count > 1 ? fmt::format("-{}-of-{}", shard.index, shard.count) : "";
-    vision::write_file(std::filesystem::path(arguments.out) / ("timing" + part + ".json"),
-                       batch.timing().dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
-  }
-  if (shard.count == 1) return report_all(arguments, entries, folder);
-  const std::vector<BatchEntry> not_done = left_to_do(entries, shard, folder);
-  if (not_done.empty()) return kOk;
+/// Where a shard's own figures go.
+std::filesystem::path timing_file(const BatchArguments& arguments, const Shard& shard) {
+  const std::string part = shard.count > 1 ? fmt::format("-{}-of-{}", shard.index, shard.count) : "";
+  return std::filesystem::path(arguments.out) / ("timing" + part + ".json");
+}
+
+int report_shard(const Shard& shard, const std::vector<BatchEntry>& failed) {
+  if (failed.empty()) return kOk;
   fmt::print(stderr, "egosgm: error: {} sequences of shard {}/{} failed, the first is {}: see its failed.json\n",
-             not_done.size(), shard.index, shard.count, not_done.front().name);
+             failed.size(), shard.index, shard.count, failed.front().name);
   return kFailed;
 }
 
 int batch(const BatchArguments& arguments) {
   const std::vector<BatchEntry> entries = read_batch_list(arguments.list);
   const PipelineOptions options = arguments.method.options();
-  const BatchFolder folder(arguments.out,
-                           batch_settings(options, arguments.odometry, parse_write_list(arguments.write)));
-  return arguments.merge ? report_all(arguments, entries, folder) : run_shard(arguments, entries, options, folder);
+  const Json settings = batch_settings(options, arguments.odometry, parse_write_list(arguments.write));
+  if (arguments.merge) return report_all(arguments, entries, BatchFolder(arguments.out, settings));
+
+  // All mistakes in the arguments now, before anything is written.
+  const Shard shard = shard_of(arguments.shard, arguments.shards);
+  const std::vector<BatchEntry> part = part_of(entries, shard);
+  for (const BatchEntry& entry : part) parse_input(entry);
+  const std::vector<Device> devices = select_devices(arguments);
+
+  const BatchFolder folder(arguments.out, settings);
+  const std::vector<BatchEntry> left = not_done(part, folder);
+  if (!left.empty()) {
+    catch_interrupts();
+    Batch batch(arguments, left, folder, options, devices);
+    if (!batch()) return kInterrupted;
+    vision::write_file(timing_file(arguments, shard),
+                       batch.timing().dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
+  }
+  return shard.count == 1 ? report_all(arguments, entries, folder) : report_shard(shard, not_done(part, folder));
 }
 
 }  // namespace
