@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/banded_sgm.h"
 
+#include <algorithm>
 #include <cstdlib>
 
+#include "egosgm/error.h"
 #include "host/census.h"
 
 namespace egosgm {
@@ -40,6 +42,51 @@ bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
   return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
 }
 
+/// What a match takes on the device.
+struct Demand {
+  std::uint64_t largest_buffer, total;
+};
+
+Demand demand(shared::ImageSize size, shared::DisparityRange range, bool paths) {
+  const std::uint64_t sums = cell_bytes(size, range);
+  if (paths) return {sums, 4 * sums};
+  const std::uint64_t slots = slot_bytes(size, range), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
+  return {std::max({sums, slots, winners}), sums + slots + winners};
+}
+
+std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCost cost) {
+  return Census::words(cost, {width, 1}, BandedSgm::code_padding(range)) / 2;
+}
+
+/// How many rows can be matched at once. A quarter of the memory is left to all else.
+int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                 const BandedSgmOptions& options) {
+  const bool paths = follows_paths(context, options.scheduling);
+  const std::uint64_t memory = context.device().getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>() / 4 * 3;
+  const std::uint64_t device_limit = memory - std::min(memory, context.allocated_bytes());
+  const std::uint64_t chosen = static_cast<std::uint64_t>(options.max_memory_mib) << 20;
+  const std::uint64_t total_limit = chosen > 0 ? std::min(chosen, device_limit) : device_limit;
+  const auto fits = [&](int rows, std::uint64_t copies) {
+    const Demand needs = demand({size.width, rows}, range, paths);
+    return needs.largest_buffer <= context.max_allocation_bytes() && needs.total + copies <= total_limit;
+  };
+  if (fits(size.height, 0)) return size.height;
+  const std::size_t words = code_words_a_row(size.width, range, options.cost);
+  int rows = size.height;
+  while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
+  const int least = 3 * BandedSgm::kStripeOverlap;
+  if (rows >= least) return rows;
+  const std::uint64_t needed = demand({size.width, std::min(size.height, least)}, range, paths).total;
+  throw DeviceError(
+      CL_MEM_OBJECT_ALLOCATION_FAILURE,
+      "BandedSgm: a stripe of " + std::to_string(std::min(size.height, least)) + " rows needs " +
+          std::to_string((needed >> 20) + 1) + " MiB, " +
+          (chosen > 0 && chosen < device_limit ? "banded_sgm.max_memory_mib allows " : "the device has left ") +
+          std::to_string(total_limit >> 20) + " MiB and buffers of at most " +
+          std::to_string(context.max_allocation_bytes() >> 20) +
+          " MiB: choose fewer disparities, a smaller image or another device");
+}
+
 }  // namespace
 
 BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
@@ -54,9 +101,10 @@ BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, s
 BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                      const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group)
     : context_((context.enter("BandedSgm"), context)),
-      size_(size),
-      parameters_{size.width,
-                  size.height,
+      size_{size.width, rows_at_once(context, size, range, options)},
+      stripes_(cut_into_stripes(size.height, size_.height, kStripeOverlap)),
+      parameters_{size_.width,
+                  size_.height,
                   range.min,
                   range.count,
                   code_padding(range),
@@ -66,24 +114,39 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.variance_per_step_px2,
                   options.variance_per_square_px2} {
   if (follows_paths(context, options.scheduling)) {
-    paths_.emplace(context, size, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
+    paths_.emplace(context, size_, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
   } else {
-    wavefront_.emplace(context, size, range, options);
+    wavefront_.emplace(context, size_, range, options);
+  }
+  if (stripes_.size() > 1) {
+    stripe_memory_.emplace(context, size, size_.height, code_words_a_row(size.width, range, options.cost));
   }
 }
 
 void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties,
                            const SearchBand& band, StereoMaps& measured, int views) {
+  (*this)({codes, penalties, band.bands(), band.cell_offsets()}, measured, views);
+}
+
+void BandedSgm::operator()(const MatchInputs& image, StereoMaps& measured, int views) {
   context_.enter("BandedSgm");
-  if (paths_) {
-    (*paths_)(parameters_, codes, penalties, band, measured, views);
-  } else {
-    sweep(*wavefront_, codes, penalties, band, measured, views);
+  if (!stripe_memory_) return match(image, measured, views);
+  for (const Stripe& stripe : stripes_) {
+    stripe_memory_->load(image, stripe);
+    match(stripe_memory_->inputs(), stripe_memory_->measured(), views);
+    stripe_memory_->store(stripe, measured);
   }
 }
 
-void BandedSgm::sweep(Wavefront& wavefront, const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties,
-                      const SearchBand& band, StereoMaps& measured, int views) {
+void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, int views) {
+  if (paths_) {
+    (*paths_)(parameters_, inputs, measured, views);
+  } else {
+    sweep(*wavefront_, inputs, measured, views);
+  }
+}
+
+void BandedSgm::sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMaps& measured, int views) {
   const int tile_rows = ceil_div(size_.height, kTileHeight);
   const int tile_columns = ceil_div(size_.width + kTileHeight, kTileWidth) + 1;
   const int waves = tile_columns + 2 * (tile_rows - 1);
@@ -91,13 +154,13 @@ void BandedSgm::sweep(Wavefront& wavefront, const ocl::Buffer<cl_uint>& codes, c
 
   wavefront.slots.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
-    wavefront.forward(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(),
-                      penalties, wavefront.slots, wavefront.sums);
+    wavefront.forward(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands, inputs.cell_offsets,
+                      inputs.penalties, wavefront.slots, wavefront.sums);
   }
   wavefront.slots.fill(context_, 255);
   for (cl_int wave = 0; wave < waves; ++wave) {
-    wavefront.backward(context_, tiles, parameters_, wave, tile_columns, codes, band.bands(), band.cell_offsets(),
-                       penalties, wavefront.slots, wavefront.sums, wavefront.winners);
+    wavefront.backward(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands,
+                       inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners);
   }
   wavefront.refine(context_, ocl::every_pixel(context_, size_, views), parameters_, wavefront.winners,
                    measured.disparity, measured.variance);

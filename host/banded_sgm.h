@@ -8,21 +8,33 @@
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
 #include "host/search_band.h"
+#include "host/stripes.h"
 
 namespace egosgm {
 
 /// Semi-global matching of both views in their bands: disparity and matching variance. Two ways to the same bits:
 /// diagonal wavefronts (see kernels/banded_sgm.cl) and a few work-items a path (see kernels/banded_sgm_paths.cl).
+///
+/// Its memory grows with width x height x disparities. Where that is more than the device holds, or than the options
+/// allow, the image is matched in horizontal stripes, one after the other in the same memory. Paths then begin
+/// kStripeOverlap rows above and below a stripe instead of at the image's edge.
 class BandedSgm {
  public:
   /// `group`: how paths share work-groups, where they do; by default what suits the device.
   BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
             const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group = {});
 
+  /// Rows around a stripe from which paths come into it.
+  static constexpr int kStripeOverlap = 32;
+  /// In which the image is matched; one: as a whole.
+  const std::vector<Stripe>& stripes() const { return stripes_; }
+
   /// `codes`: what Census makes with a padding of `code_padding(range)`. `views`: 1 matches the left view only.
   /// `penalties`: what StepPenalties makes.
   void operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band,
                   StereoMaps& measured, int views = 2);
+
+  void operator()(const MatchInputs& image, StereoMaps& measured, int views = 2);
 
   static int code_padding(shared::DisparityRange range);
 
@@ -48,13 +60,15 @@ class BandedSgm {
     Refine refine;
   };
 
-  void sweep(Wavefront& wavefront, const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties,
-             const SearchBand& band, StereoMaps& measured, int views);
+  void match(const MatchInputs& inputs, StereoMaps& measured, int views);
+  void sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMaps& measured, int views);
 
   ocl::Context& context_;
-  const shared::ImageSize size_;
+  const shared::ImageSize size_;  // of what is matched at once: the image, or a stripe
+  const std::vector<Stripe> stripes_;
   const shared::SgmParameters parameters_;
-  std::optional<Wavefront> wavefront_;  // one of the two
+  std::optional<StripeMemory> stripe_memory_;  // where there is more than one
+  std::optional<Wavefront> wavefront_;         // one of the two
   std::optional<BandedSgmPaths> paths_;
 };
 

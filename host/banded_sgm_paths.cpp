@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "host/census.h"
+#include "host/search_band.h"
 
 namespace egosgm {
 namespace {
@@ -56,28 +57,26 @@ BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, sh
       follow_paths_(build(context, range, options, group), "follow_paths"),
       find_winners_(build(context, range, options, group), "find_winners") {}
 
-void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, const ocl::Buffer<cl_uint>& codes,
-                            const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band, int views) {
+void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs, int views) {
   const int groups = stage == kStraight ? groups_of(size_.height, group_.lines) + groups_of(size_.width, group_.lines)
                                         : groups_of(size_.width + size_.height - 1, group_.lines);
   const int work_items = group_.lanes * group_.lines;
   const ocl::Range lines{cl::NDRange(work_items, groups, 2 * views), cl::NDRange(work_items, 1, 1)};
-  follow_paths_(context_, lines, parameters, stage, views, codes, penalties, band.bands(), band.cell_offsets(),
-                forward_first_, forward_second_, backward_first_, backward_second_);
+  follow_paths_(context_, lines, parameters, stage, views, inputs.codes, inputs.penalties, inputs.bands,
+                inputs.cell_offsets, forward_first_, forward_second_, backward_first_, backward_second_);
 }
 
-void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const ocl::Buffer<cl_uint>& codes,
-                                const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band, StereoMaps& measured,
-                                int views) {
-  follow(kStraight, parameters, codes, penalties, band, views);
+void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs,
+                                StereoMaps& measured, int views) {
+  follow(kStraight, parameters, inputs, views);
   if (paths_ == 8) {
-    for (const int diagonal : kDiagonals) follow(diagonal, parameters, codes, penalties, band, views);
+    for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);
   }
   const int work_items = group_.lanes * group_.lines;
   const ocl::Range pixels{
       cl::NDRange(static_cast<std::size_t>(groups_of(size_.width, group_.lines)) * work_items, size_.height, views),
       cl::NDRange(work_items, 1, 1)};
-  find_winners_(context_, pixels, parameters, band.bands(), band.cell_offsets(), forward_first_, forward_second_,
+  find_winners_(context_, pixels, parameters, inputs.bands, inputs.cell_offsets, forward_first_, forward_second_,
                 backward_first_, backward_second_, measured.disparity, measured.variance);
 }
 

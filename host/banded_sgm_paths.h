@@ -4,7 +4,7 @@
 #include "egosgm/options.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
-#include "host/search_band.h"
+#include "host/stripes.h"
 
 namespace egosgm {
 
@@ -20,8 +20,7 @@ class BandedSgmPaths {
                  const BandedSgmOptions& options, Group group);
 
   /// As BandedSgm.
-  void operator()(const shared::SgmParameters& parameters, const ocl::Buffer<cl_uint>& codes,
-                  const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band, StereoMaps& measured, int views);
+  void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured, int views);
 
   /// A few quads of disparities a lane, and a group that fills a GPU's smallest unit, as far as the device allows it.
   static Group default_group(const ocl::Context& context, shared::DisparityRange range);
@@ -35,8 +34,7 @@ class BandedSgmPaths {
   using Sums = ocl::Buffer<cl_uchar>;
   using Maps = ocl::Buffer<float>;
 
-  void follow(int stage, const shared::SgmParameters& parameters, const ocl::Buffer<cl_uint>& codes,
-              const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band, int views);
+  void follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs, int views);
 
   ocl::Context& context_;
   const shared::ImageSize size_;

@@ -42,6 +42,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("banded_sgm.variance_per_step_px2", o.banded_sgm.variance_per_step_px2);
   visit("banded_sgm.variance_per_square_px2", o.banded_sgm.variance_per_square_px2);
   visit("banded_sgm.scheduling", o.banded_sgm.scheduling);
+  visit("banded_sgm.max_memory_mib", o.banded_sgm.max_memory_mib);
   visit("median_filter.enabled", o.median_filter.enabled);
   visit("sad_check.max_difference", o.sad_check.max_difference);
   visit("speckle_removal.max_size_px", o.speckle_removal.max_size_px);
@@ -181,6 +182,8 @@ void PipelineOptions::validate() const {
   expect("banded_sgm.p1", banded_sgm.p1, banded_sgm.p1 >= 0 && banded_sgm.p1 <= banded_sgm.p2,
          "choose 0 to banded_sgm.p2");
   expect("banded_sgm.s_max", banded_sgm.s_max, banded_sgm.s_max >= 1 && banded_sgm.s_max <= 32767, "choose 1 to 32767");
+  expect("banded_sgm.max_memory_mib", banded_sgm.max_memory_mib, banded_sgm.max_memory_mib >= 0,
+         "choose 0 (what the device has) or more");
   expect("banded_sgm.variance_floor_px2", banded_sgm.variance_floor_px2, banded_sgm.variance_floor_px2 > 0,
          "choose a positive number");
   expect("speckle_removal.max_size_px", speckle_removal.max_size_px, speckle_removal.max_size_px >= 0,

@@ -203,6 +203,7 @@ struct Pipeline::Impl {
     frame.transfer->download(results, outputs);
 
     drain.is_dismissed = true;
+    frame.report.stripes = static_cast<int>(banded_sgm.stripes().size());
     frame.report.full_range = is_full_range(reason);
     frame.report.full_range_reason = reason_text(reason);
     frame.result = results.result;

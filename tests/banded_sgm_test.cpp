@@ -6,6 +6,7 @@
 #include <optional>
 #include <random>
 
+#include "egosgm/error.h"
 #include "tests/reference/banded_sgm.h"
 #include "tests/reference/census.h"
 #include "tests/reference/step_penalties.h"
@@ -60,22 +61,30 @@ testing::HostMaps predictions(const Case& c) {
   return maps;
 }
 
-class BandedSgmTest : public ::testing::TestWithParam<Case> {};
-
-TEST_P(BandedSgmTest, EqualsReference) {
-  const Case c = GetParam();
-  std::mt19937 random(1);
+/// What a match is given and what it gives, by the twin's layout.
+struct Match {
   std::vector<std::uint64_t> codes[2];
-  random_codes(c, random, codes);
   std::vector<std::uint16_t> grey;
-  for (std::size_t i = 0; i < 2 * pixel_count(c.size); ++i) grey.push_back(static_cast<std::uint16_t>(random() & 127));
+  std::vector<shared::Band> bands;
+  testing::HostMaps measured;
+  std::vector<Stripe> stripes;
+  shared::SgmParameters parameters;
+  BandedSgmOptions options;
+};
+
+Match match(const Case& c, int max_memory_mib = 0) {
+  std::mt19937 random(1);
+  Match m;
+  random_codes(c, random, m.codes);
+  for (std::size_t i = 0; i < 2 * pixel_count(c.size); ++i)
+    m.grey.push_back(static_cast<std::uint16_t>(random() & 127));
 
   ocl::Context context(testing::any_device());
   const int padding = BandedSgm::code_padding(c.range);
-  const BandedSgmOptions options{.cost = c.cost, .paths = c.paths, .scheduling = c.scheduling};
+  m.options = {.cost = c.cost, .paths = c.paths, .scheduling = c.scheduling, .max_memory_mib = max_memory_mib};
   SearchBand band(context, c.size, c.range, {.min_half_width_px = 1});
-  BandedSgm sgm(context, c.size, c.range, options, c.group);
-  const auto padded = reference::padded_codes(c.size, codes[0], codes[1], padding, c.cost);
+  BandedSgm sgm(context, c.size, c.range, m.options, c.group);
+  const auto padded = reference::padded_codes(c.size, m.codes[0], m.codes[1], padding, c.cost);
   ocl::Buffer<cl_uint> device_codes(context, padded.size());
   device_codes.write(context, {padded.begin(), padded.end()});
   StereoMaps predicted(context, c.size), measured(context, c.size);
@@ -87,24 +96,130 @@ TEST_P(BandedSgmTest, EqualsReference) {
   } else {
     band.full_range();
   }
-  const auto planes = reference::step_penalties(c.size, grey, 8, options);
+  const auto planes = reference::step_penalties(c.size, m.grey, 8, m.options);
   ocl::Buffer<cl_uchar> penalties(context, planes.size());
   penalties.write(context, {planes.begin(), planes.end()});
   sgm(device_codes, penalties, band, measured);
 
-  const shared::SgmParameters parameters{c.size.width,
-                                         c.size.height,
-                                         c.range.min,
-                                         c.range.count,
-                                         padding,
-                                         options.p1,
-                                         options.s_max,
-                                         options.variance_floor_px2,
-                                         options.variance_per_step_px2,
-                                         options.variance_per_square_px2};
-  const auto expected = reference::banded_sgm(parameters, options, codes, grey, band.bands().read(context));
-  EXPECT_TRUE(testing::same_bits(measured.disparity.read(context), expected.disparity, c.size));
-  EXPECT_TRUE(testing::same_bits(measured.variance.read(context), expected.variance, c.size));
+  m.parameters = {c.size.width,
+                  c.size.height,
+                  c.range.min,
+                  c.range.count,
+                  padding,
+                  m.options.p1,
+                  m.options.s_max,
+                  m.options.variance_floor_px2,
+                  m.options.variance_per_step_px2,
+                  m.options.variance_per_square_px2};
+  m.bands = band.bands().read(context);
+  m.measured = {measured.disparity.read(context), measured.variance.read(context)};
+  m.stripes = sgm.stripes();
+  return m;
+}
+
+class BandedSgmTest : public ::testing::TestWithParam<Case> {};
+
+TEST_P(BandedSgmTest, EqualsReference) {
+  const Case c = GetParam();
+  const Match m = match(c);
+  ASSERT_EQ(m.stripes.size(), 1u);
+  const auto expected = reference::banded_sgm(m.parameters, m.options, m.codes, m.grey, m.bands);
+  EXPECT_TRUE(testing::same_bits(m.measured.disparity, expected.disparity, c.size));
+  EXPECT_TRUE(testing::same_bits(m.measured.variance, expected.variance, c.size));
+}
+
+/// `rows` rows of every one of `planes` planes, from `first` on.
+template <typename T>
+std::vector<T> rows_of(const std::vector<T>& values, int planes, shared::ImageSize size, int first, int rows) {
+  std::vector<T> taken;
+  for (int plane = 0; plane < planes; ++plane) {
+    const auto begin = values.begin() + (static_cast<std::ptrdiff_t>(plane) * size.height + first) * size.width;
+    taken.insert(taken.end(), begin, begin + static_cast<std::ptrdiff_t>(rows) * size.width);
+  }
+  return taken;
+}
+
+/// The rows that are kept of what the twin makes of each stripe, as if it were the image.
+testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
+  testing::HostMaps expected = m.measured;
+  for (const Stripe& stripe : m.stripes) {
+    const auto cut = [&](const auto& values, int planes) {
+      return rows_of(values, planes, size, stripe.first_row, stripe.rows);
+    };
+    const std::vector<std::uint64_t> codes[2] = {cut(m.codes[0], 1), cut(m.codes[1], 1)};
+    shared::SgmParameters parameters = m.parameters;
+    parameters.height = stripe.rows;
+    const auto maps = reference::banded_sgm(parameters, m.options, codes, cut(m.grey, 2), cut(m.bands, 2));
+    for (int view = 0; view < 2; ++view) {
+      const std::ptrdiff_t kept = static_cast<std::ptrdiff_t>(stripe.kept_end - stripe.kept_begin) * size.width;
+      const std::ptrdiff_t to = (static_cast<std::ptrdiff_t>(view) * size.height + stripe.kept_begin) * size.width;
+      const std::ptrdiff_t from =
+          (static_cast<std::ptrdiff_t>(view) * stripe.rows + stripe.kept_begin - stripe.first_row) * size.width;
+      std::copy_n(maps.disparity.begin() + from, kept, expected.disparity.begin() + to);
+      std::copy_n(maps.variance.begin() + from, kept, expected.variance.begin() + to);
+    }
+  }
+  return expected;
+}
+
+TEST(BandedSgmStripes, EqualTheTwinOfEach) {
+  for (const Scheduling scheduling : {Scheduling::kWavefront, Scheduling::kPaths}) {
+    for (const MatchingCost cost : {MatchingCost::kPairs32, MatchingCost::kSad3x3}) {
+      const Case c{.size = {61, 301}, .range = {-5, 37}, .cost = cost, .scheduling = scheduling};
+      const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
+      ASSERT_GE(m.stripes.size(), 3u);
+      const auto expected = stripe_by_stripe(m, c.size);
+      EXPECT_TRUE(testing::same_bits(m.measured.disparity, expected.disparity, c.size));
+      EXPECT_TRUE(testing::same_bits(m.measured.variance, expected.variance, c.size));
+    }
+  }
+}
+
+TEST(BandedSgmStripes, TooLittleMemoryForOneNamesTheLimit) {
+  try {
+    match({.size = {640, 120}, .range = {0, 1024}}, 7);
+    ADD_FAILURE() << "matched within 7 MiB";
+  } catch (const DeviceError& error) {
+    const std::string text = error.what();
+    for (const char* part : {"BandedSgm", "96 rows", "max_memory_mib allows 7 MiB", "fewer disparities"}) {
+      EXPECT_NE(text.find(part), std::string::npos) << text;
+    }
+  }
+}
+
+TEST(BandedSgmPathsGroup, LargerThanTheDeviceAllowsNamesTheLimit) {
+  const std::size_t limit = ocl::Context(testing::any_device()).max_work_group_size();
+  const int lines = static_cast<int>(limit / 16) + 1;
+  try {
+    match({.size = {9, 5}, .range = {0, 16}, .scheduling = Scheduling::kPaths, .group = {{16, lines}}});
+    ADD_FAILURE() << "launched work-groups of " << 16 * lines;
+  } catch (const DeviceError& error) {
+    const std::string text = error.what();
+    for (const std::string& part : {std::string("BandedSgm: kernel follow_paths"), std::to_string(16 * lines),
+                                    "the device allows " + std::to_string(limit), std::string("another device")}) {
+      EXPECT_NE(text.find(part), std::string::npos) << text;
+    }
+  }
+}
+
+TEST(BandedSgmStripes, CoverTheImageWithRowsAround) {
+  for (const int height : {1, 95, 96, 97, 128, 375, 1080, 2160}) {
+    for (const int rows : {96, 97, 130, 2160}) {
+      const int matched = std::min(rows, height), overlap = BandedSgm::kStripeOverlap;
+      int next = 0;
+      for (const Stripe& stripe : cut_into_stripes(height, matched, overlap)) {
+        EXPECT_EQ(stripe.kept_begin, next);
+        EXPECT_LT(stripe.kept_begin, stripe.kept_end);
+        EXPECT_EQ(stripe.rows, matched);
+        EXPECT_GE(stripe.first_row, 0);
+        EXPECT_LE(stripe.first_row, std::max(0, stripe.kept_begin - overlap));
+        EXPECT_LE(stripe.first_row + stripe.rows, height);
+        EXPECT_GE(stripe.first_row + stripe.rows, std::min(height, stripe.kept_end + overlap));
+        next = stripe.kept_end;
+      }
+      EXPECT_EQ(next, height);
+    }
+  }
 }
 
 const std::vector<Case> kBanded{{{1, 1}, {0, 1}},

@@ -61,6 +61,7 @@ TEST(Options, HasANameForEveryMember) {
       {"banded_sgm.variance_per_step_px2", [](auto& o) { o.banded_sgm.variance_per_step_px2 = 77; }},
       {"banded_sgm.variance_per_square_px2", [](auto& o) { o.banded_sgm.variance_per_square_px2 = 77; }},
       {"banded_sgm.scheduling", [](auto& o) { o.banded_sgm.scheduling = Scheduling::kPaths; }},
+      {"banded_sgm.max_memory_mib", [](auto& o) { o.banded_sgm.max_memory_mib = 77; }},
       {"median_filter.enabled", [](auto& o) { o.median_filter.enabled = false; }},
       {"sad_check.max_difference", [](auto& o) { o.sad_check.max_difference = 77; }},
       {"speckle_removal.max_size_px", [](auto& o) { o.speckle_removal.max_size_px = 77; }},
@@ -211,6 +212,7 @@ TEST(Options, RangesEndWhereTheyAreSaidTo) {
       {"banded_sgm.p2_at_edges", {"0", "190"}},
       {"banded_sgm.p2_slope", {"0", "255"}},
       {"banded_sgm.s_max", {"1", "32767"}},
+      {"banded_sgm.max_memory_mib", {"0", "2147483647"}},
       {"speckle_removal.max_size_px", {"0", "2147483647"}}};
   for (const auto& [name, values] : allowed) {
     for (const std::string& value : values) {
@@ -230,6 +232,7 @@ TEST(Options, RangesEndWhereTheyAreSaidTo) {
       {"banded_sgm.p2_at_edges", {"-1", "191"}},
       {"banded_sgm.p2_slope", {"-1", "256"}},
       {"banded_sgm.s_max", {"0", "32768"}},
+      {"banded_sgm.max_memory_mib", {"-1"}},
       {"banded_sgm.variance_floor_px2", {"0"}},
       {"speckle_removal.max_size_px", {"-1"}}};
   for (const auto& [name, values] : refused) {

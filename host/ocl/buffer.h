@@ -37,6 +37,13 @@ class Buffer {
     context.queue().enqueueFillBuffer(buffer_, value, 0, size_ * sizeof(T), nullptr, &done);
     context.record(done, "fill");
   }
+  /// Copies `count` elements from `from` to here.
+  void copy(Context& context, std::size_t first, const Buffer& from, std::size_t first_from, std::size_t count) {
+    cl::Event done;
+    context.queue().enqueueCopyBuffer(from.buffer_, buffer_, first_from * sizeof(T), first * sizeof(T),
+                                      count * sizeof(T), nullptr, &done);
+    context.record(done, "copy");
+  }
   /// For tests: waits for all that was enqueued.
   std::vector<T> read(Context& context) const {
     std::vector<T> values(size_);

@@ -31,6 +31,16 @@ std::string build_options(const cl::Device& device) {
   return std::string(kBaseOptions) + (rounds_division ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
 }
 
+/// Waits for a command, and throws the status that it failed with. Waiting itself only tells that it failed.
+void expect_done(const cl::Event& event) {
+  const cl_int waited = ::clWaitForEvents(1, &event());
+  if (waited == CL_SUCCESS) return;
+  cl_int status = CL_SUCCESS;
+  ::clGetEventInfo(event(), CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof status, &status, nullptr);
+  // -1 stands for any failure.
+  throw cl::Error(status < -1 ? status : waited, "clWaitForEvents");
+}
+
 std::string build_log(const cl::Program& program, const cl::Device& device) {
   try {
     return program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device);
@@ -103,7 +113,7 @@ std::vector<Context::Finished> Context::wait(const std::vector<Command>& command
   finished.reserve(commands.size());
   for (const Command& command : commands) {
     stage_ = command.stage;
-    command.event.wait();
+    expect_done(command.event);
     const bool profiles = profiles_kernels_ || command.queue != Queue::kKernels;
     finished.push_back({command.stage, profiles ? duration_ms(command.event) : 0, command.is_launch});
   }

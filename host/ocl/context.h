@@ -98,6 +98,8 @@ class Context {
   void expect_allocatable(std::uint64_t bytes) const;
   void count_allocation(std::uint64_t bytes) { allocated_bytes_ += bytes; }
   std::uint64_t allocated_bytes() const { return allocated_bytes_; }
+  /// The largest buffer that the device allows.
+  std::uint64_t max_allocation_bytes() const { return max_allocation_bytes_; }
 
   const cl::Context& get() const { return context_; }
   const cl::Device& device() const { return device_; }

@@ -51,6 +51,9 @@ inline int pixels_a_work_item(const Context& context) {
   return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU ? 1 : 16;
 }
 
+/// Throws DeviceError, naming the stage, the kernel and the limit, where `local` has more work-items than `limit`.
+void expect_work_group(const Context& context, const char* kernel, const cl::NDRange& local, std::size_t limit);
+
 /// A kernel with its C++ signature: `Buffer<T>` for `global T*`, `const Buffer<T>` for
 /// `global const T*`, anything else by value.
 template <typename... Params>
@@ -59,9 +62,12 @@ class Kernel {
   /// `name`: a string literal. Throws std::logic_error where the .cl does not fit the signature.
   Kernel(const cl::Program& program, const char* name) : kernel_(program, name), name_(name) {
     expect_signature(kernel_, {KernelParameter<Params>::text()...});
+    max_work_group_size_ = kernel_.template getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(cl::Device());
   }
 
+  /// Throws DeviceError where the device, for what this kernel takes of it, cannot hold the range's work-groups.
   void operator()(Context& context, const Range& range, Params&... args) {
+    expect_work_group(context, name_, range.local, max_work_group_size_);
     cl_uint index = 0;
     (set(index++, args), ...);
     cl::Event done;
@@ -84,6 +90,7 @@ class Kernel {
 
   cl::Kernel kernel_;
   const char* name_;
+  std::size_t max_work_group_size_ = 0;
 };
 
 }  // namespace egosgm::ocl

@@ -60,6 +60,9 @@ struct BandedSgmOptions {
   float variance_per_step_px2 = 0.1f;
   float variance_per_square_px2 = 0.045f;
   Scheduling scheduling = Scheduling::kAutomatic;
+  // Memory for the path sums. An image that needs more is matched in horizontal stripes that overlap by 32 rows, almost
+  // as well (docs/reliability.md). 0: what the device has.
+  int max_memory_mib = 0;
 };
 
 struct VerticalAlignmentOptions {

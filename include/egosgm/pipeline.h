@@ -54,6 +54,7 @@ struct FrameReport {
   double density = 0;                   // left pixels with a disparity
   double vertical_offset_px = 0;        // by which the right image was resampled (vertical_alignment)
   int launches = 0;                     // kernels enqueued
+  int stripes = 1;                      // in which the image was matched; more than 1 where memory is too small
   std::vector<StageTime> stages;        // in the order in which they ran
   std::vector<DeviceCommand> commands;  // each of them, after record_commands(true)
   double total_ms = 0;                  // wall clock, upload to download, from when the frame before was collected

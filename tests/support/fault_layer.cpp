@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// An OpenCL layer that fails the n-th intercepted call, at once, or later, as a kernel fault would; and that counts
-// references to OpenCL objects. OPENCL_LAYERS loads it, tests arm it through the functions of fault_layer.h.
+// An OpenCL layer that fails the n-th call, at once, or later, as a kernel fault would; and that counts references to
+// OpenCL objects. OPENCL_LAYERS loads it, tests arm it through the functions of fault_layer.h. A call that it does not
+// know ends the program: so none can be forgotten.
 #define CL_TARGET_OPENCL_VERSION 300
 #include <CL/cl.h>
 #include <CL/cl_icd.h>
@@ -16,9 +17,9 @@ namespace {
 const cl_icd_dispatch* next = nullptr;
 cl_icd_dispatch layer{};
 
-std::atomic<int> calls = 0, enqueues = 0;
+std::atomic<int> calls = 0, enqueues = 0, releases = 0;
 int failing = -1;
-bool later = false;
+enum { kAtOnce = 0, kLater = 1, kRelease = 2 } kind = kAtOnce;
 bool separate_memory = false;
 cl_int status = CL_OUT_OF_RESOURCES;
 // EGOSGM_FAILING_CONTEXT=N/M, for programs that do not know of this layer: from command M on, all of context N fail
@@ -34,7 +35,7 @@ std::atomic<int> transfers = 0;
 
 // Calls that take part: all of them where the fault is to come at once, enqueues only where it is to come later.
 bool fails() {
-  const bool chosen = !later && calls == failing;
+  const bool chosen = kind == kAtOnce && calls == failing;
   ++calls;
   return chosen;
 }
@@ -62,7 +63,7 @@ cl_context context_of(cl_command_queue queue) {
 // not fail before the enqueue: PoCL 3.1 would hang.
 template <typename Enqueue>
 cl_int enqueue(cl_command_queue queue, cl_uint count, const cl_event* given, cl_event* done, Enqueue&& enqueue_with) {
-  const bool fails_later = later && enqueues == failing;
+  const bool fails_later = kind == kLater && enqueues == failing;
   ++enqueues;
   if (failing_context && context_of(queue) == failing_context && commands_of_it++ >= last_good_command)
     return CL_DEVICE_NOT_AVAILABLE;
@@ -109,6 +110,9 @@ cl_int CL_API_CALL build(cl_program p, cl_uint n, const cl_device_id* d, const c
                          void(CL_CALLBACK* f)(cl_program, void*), void* u) {
   return fails() ? status : next->clBuildProgram(p, n, d, o, f, u);
 }
+cl_int CL_API_CALL program_info(cl_program p, cl_program_info i, size_t n, void* v, size_t* s) {
+  return fails() ? status : next->clGetProgramInfo(p, i, n, v, s);
+}
 cl_kernel CL_API_CALL create_kernel(cl_program p, const char* n, cl_int* e) {
   return fails() ? refuse<cl_kernel>(e) : counted(next->clCreateKernel(p, n, e));
 }
@@ -120,6 +124,13 @@ cl_int CL_API_CALL device_info(cl_device_id d, cl_device_info i, size_t n, void*
 }
 cl_int CL_API_CALL kernel_info(cl_kernel k, cl_kernel_info i, size_t n, void* v, size_t* s) {
   return fails() ? status : next->clGetKernelInfo(k, i, n, v, s);
+}
+cl_int CL_API_CALL arg_info(cl_kernel k, cl_uint a, cl_kernel_arg_info i, size_t n, void* v, size_t* s) {
+  return fails() ? status : next->clGetKernelArgInfo(k, a, i, n, v, s);
+}
+cl_int CL_API_CALL work_group_info(cl_kernel k, cl_device_id d, cl_kernel_work_group_info i, size_t n, void* v,
+                                   size_t* s) {
+  return fails() ? status : next->clGetKernelWorkGroupInfo(k, d, i, n, v, s);
 }
 cl_int CL_API_CALL set_arg(cl_kernel k, cl_uint i, size_t n, const void* v) {
   return fails() ? status : next->clSetKernelArg(k, i, n, v);
@@ -136,17 +147,34 @@ cl_int CL_API_CALL copy(cl_command_queue q, cl_mem from, cl_mem to, size_t fo, s
     return next->clEnqueueCopyBuffer(q, from, to, fo, o, n, w, l, e);
   });
 }
+// A transfer by `transfer(blocking, number of events to wait for, those events, its event)`. A blocking one that fails
+// later would wait for ever for the event that fails only after the enqueue: it is waited for here.
+template <typename Transfer>
+cl_int enqueue_transfer(cl_command_queue queue, cl_bool blocking, cl_uint count, const cl_event* given, cl_event* done,
+                        Transfer&& transfer) {
+  cl_event own = nullptr;
+  const bool waits = blocking && kind == kLater;
+  const cl_int result = enqueue(queue, count, given, done, [&](cl_uint w, const cl_event* l) {
+    return transfer(waits ? CL_FALSE : blocking, w, l, waits && !done ? &own : done);
+  });
+  if (!waits || result != CL_SUCCESS) return result;
+  const cl_int waited = next->clWaitForEvents(1, done ? done : &own);
+  if (own) next->clReleaseEvent(own);
+  return waited;
+}
 cl_int CL_API_CALL read(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, void* p, cl_uint c,
                         const cl_event* g, cl_event* e) {
   ++transfers;
-  return enqueue(q, c, g, e,
-                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueReadBuffer(q, b, bl, o, n, p, w, l, e); });
+  return enqueue_transfer(q, bl, c, g, e, [&](cl_bool waits, cl_uint w, const cl_event* l, cl_event* done) {
+    return next->clEnqueueReadBuffer(q, b, waits, o, n, p, w, l, done);
+  });
 }
 cl_int CL_API_CALL write(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, const void* p, cl_uint c,
                          const cl_event* g, cl_event* e) {
   ++transfers;
-  return enqueue(q, c, g, e,
-                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueWriteBuffer(q, b, bl, o, n, p, w, l, e); });
+  return enqueue_transfer(q, bl, c, g, e, [&](cl_bool waits, cl_uint w, const cl_event* l, cl_event* done) {
+    return next->clEnqueueWriteBuffer(q, b, waits, o, n, p, w, l, done);
+  });
 }
 // A map that blocks can only fail at once: PoCL 3.1 would hang.
 void* CL_API_CALL map(cl_command_queue q, cl_mem b, cl_bool bl, cl_map_flags f, size_t o, size_t n, cl_uint c,
@@ -165,6 +193,16 @@ void* CL_API_CALL map(cl_command_queue q, cl_mem b, cl_bool bl, cl_map_flags f, 
 cl_int CL_API_CALL barrier(cl_command_queue q, cl_uint c, const cl_event* g, cl_event* e) {
   return enqueue(q, c, g, e,
                  [&](cl_uint w, const cl_event* l) { return next->clEnqueueBarrierWithWaitList(q, w, l, e); });
+}
+cl_int CL_API_CALL marker(cl_command_queue q, cl_uint c, const cl_event* g, cl_event* e) {
+  return enqueue(q, c, g, e,
+                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueMarkerWithWaitList(q, w, l, e); });
+}
+cl_int CL_API_CALL mem_info(cl_mem b, cl_mem_info i, size_t n, void* v, size_t* s) {
+  return fails() ? status : next->clGetMemObjectInfo(b, i, n, v, s);
+}
+cl_int CL_API_CALL queue_info(cl_command_queue q, cl_command_queue_info i, size_t n, void* v, size_t* s) {
+  return fails() ? status : next->clGetCommandQueueInfo(q, i, n, v, s);
 }
 cl_int CL_API_CALL event_info(cl_event e, cl_event_info i, size_t n, void* v, size_t* s) {
   return fails() ? status : next->clGetEventInfo(e, i, n, v, s);
@@ -193,19 +231,28 @@ cl_int CL_API_CALL retain(Object object) {
 template <auto Call, typename Object>
 cl_int CL_API_CALL release(Object object) {
   --references;
-  return (next->*Call)(object);
+  const bool chosen = kind == kRelease && releases == failing;
+  ++releases;
+  const cl_int result = (next->*Call)(object);
+  return chosen ? status : result;
+}
+
+void unknown_call() {
+  std::fputs("the fault layer does not know an OpenCL call that this program makes: add it\n", stderr);
+  std::abort();
 }
 
 }  // namespace
 
-extern "C" void fault_arm(int at, int code, int is_late) {
-  calls = enqueues = 0;
+extern "C" void fault_arm(int at, int code, int how) {
+  calls = enqueues = releases = 0;
   failing = at;
   status = code;
-  later = is_late;
+  kind = how == 2 ? kRelease : how == 1 ? kLater : kAtOnce;
 }
 extern "C" void fault_forbid_sources(int forbidden) { sources_forbidden = forbidden != 0; }
 extern "C" void fault_separate_memory(int separate) { separate_memory = separate; }
+extern "C" int fault_releases() { return releases; }
 extern "C" int fault_calls() { return calls; }
 extern "C" int fault_enqueues() { return enqueues; }
 extern "C" long fault_references() { return references; }
@@ -226,16 +273,31 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   if (const char* wanted = std::getenv("EGOSGM_FAILING_CONTEXT")) {
     std::sscanf(wanted, "%d/%d", &context_to_fail, &last_good_command);
   }
-  layer = *target;
+  using Entry = void (*)();
+  static_assert(sizeof(layer) % sizeof(Entry) == 0);
+  for (size_t i = 0; i < sizeof(layer) / sizeof(Entry); ++i) reinterpret_cast<Entry*>(&layer)[i] = unknown_call;
+  // Finding a device comes before all that is tested here. A build log is asked for after a failure only. What fails
+  // of a finish leaves nobody to tell: Context::drain is the last to go.
+  layer.clGetPlatformIDs = target->clGetPlatformIDs;
+  layer.clGetPlatformInfo = target->clGetPlatformInfo;
+  layer.clGetDeviceIDs = target->clGetDeviceIDs;
+  layer.clCreateSubDevices = target->clCreateSubDevices;
+  layer.clRetainDevice = target->clRetainDevice;
+  layer.clReleaseDevice = target->clReleaseDevice;
+  layer.clGetProgramBuildInfo = target->clGetProgramBuildInfo;
+  layer.clFinish = target->clFinish;
   layer.clCreateContext = create_context;
   layer.clCreateCommandQueue = create_queue;
   layer.clCreateBuffer = create_buffer;
   layer.clCreateProgramWithSource = create_program;
   layer.clCreateProgramWithBinary = create_program_of_binary;
   layer.clBuildProgram = build;
+  layer.clGetProgramInfo = program_info;
   layer.clCreateKernel = create_kernel;
   layer.clGetDeviceInfo = device_info;
   layer.clGetKernelInfo = kernel_info;
+  layer.clGetKernelArgInfo = arg_info;
+  layer.clGetKernelWorkGroupInfo = work_group_info;
   layer.clSetKernelArg = set_arg;
   layer.clEnqueueFillBuffer = fill;
   layer.clEnqueueCopyBuffer = copy;
@@ -244,6 +306,9 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   layer.clEnqueueMapBuffer = map;
   layer.clEnqueueUnmapMemObject = unmap;
   layer.clEnqueueBarrierWithWaitList = barrier;
+  layer.clEnqueueMarkerWithWaitList = marker;
+  layer.clGetMemObjectInfo = mem_info;
+  layer.clGetCommandQueueInfo = queue_info;
   layer.clGetEventInfo = event_info;
   layer.clEnqueueNDRangeKernel = launch;
   layer.clWaitForEvents = wait;

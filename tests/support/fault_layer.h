@@ -15,13 +15,16 @@ namespace egosgm::testing {
 /// The layer between this program and its OpenCL driver. Exists only where OPENCL_LAYERS named it before the first
 /// OpenCL call.
 struct FaultLayer {
-  /// Counts from zero; lets call `at` return `code`, or, if `is_late`, command `at` fail after it was enqueued. -1:
-  /// none.
-  void (*arm)(int at, int code, int is_late);
+  enum How { kAtOnce, kLate, kRelease };
+
+  /// Counts from zero; lets call `at` return `code`, or command `at` fail after it was enqueued, or release `at` return
+  /// `code` after it was done. -1: none.
+  void (*arm)(int at, int code, int how);
   void (*forbid_sources)(int forbidden);  // 1: no program can be made of its source from now on
   void (*separate_memory)(int separate);  // 1: devices say from now on that they have memory of their own
   int (*calls)();                         // since `arm`: calls that can fail,
   int (*enqueues)();                      // and commands among them
+  int (*releases)();                      // and releases beside them
   long (*references)();  // to contexts, queues, buffers, programs, kernels and events: created + retained - released
   long (*buffers_created)();  // ever
   int (*transfers)();         // ever: copies, reads, writes, maps and unmaps of buffers
@@ -36,13 +39,14 @@ struct FaultLayer {
     find(layer, "fault_separate_memory", separate_memory);
     find(layer, "fault_calls", calls);
     find(layer, "fault_enqueues", enqueues);
+    find(layer, "fault_releases", releases);
     find(layer, "fault_references", references);
     find(layer, "fault_buffers_created", buffers_created);
     find(layer, "fault_transfers", transfers);
     disarm();
   }
 
-  void disarm() const { arm(-1, 0, 0); }
+  void disarm() const { arm(-1, 0, kAtOnce); }
 
  private:
   template <typename Function>
