@@ -12,6 +12,7 @@
 
 #include "apps/command.h"
 #include "apps/device_arguments.h"
+#include "apps/earlier_run.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
 #include "apps/option_arguments.h"
@@ -28,6 +29,8 @@
 namespace egosgm::app {
 namespace {
 
+constexpr const char* kKilled = "a kill, or it is still running";
+
 using Clock = std::chrono::steady_clock;
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -38,7 +41,7 @@ struct RunArguments {
   OptionArguments method;
   std::string out, poses, device, programs, write, trace;
   vision::StereoOdometryOptions odometry;
-  bool interpolate = false, quiet = false;
+  bool interpolate = false, quiet = false, resume = false, overwrite = false;
 };
 
 /// What a frame needs before the device can start.
@@ -58,15 +61,18 @@ class Run {
         sequence_(job.sequence),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
-        outputs_(folder_, job.kinds, size_, job.options.disparities),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
-        report_(sequence_, pipeline_, job.preset, size_.width, size_.height) {
+        report_(sequence_, pipeline_, job.preset, motion_of(job), size_.width, size_.height),
+        earlier_(job.earlier) {
+    expect_free(folder_, earlier_, report_.identity());
+    outputs_.emplace(folder_, job.kinds, size_, job.options.disparities);
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
     pipeline_.record_commands(true);
   }
 
   bool operator()() {
+    report_.write(folder_ / "report.json", false, kKilled);
     try {
       const bool finished = process_all();
       finish(finished, finished ? "" : "an interrupt");
@@ -82,6 +88,12 @@ class Run {
   }
 
  private:
+  static std::string motion_of(const SequenceJob& job) {
+    if (!job.poses_file.empty()) return "poses of " + job.poses_file;
+    return fmt::format("stereo odometry, at most {} m and {} degrees a frame", job.odometry.max_translation_m,
+                       job.odometry.max_rotation_deg);
+  }
+
   bool process_all() {
     // Reading, odometry and writing run while the device works. With a device of its own, the next frame is prepared
     // beside writing, too; on a CPU device one more thread would only take the kernels' cores.
@@ -125,7 +137,7 @@ class Run {
 
   void submit(PreparedFrame frame) {
     pipeline_.submit(vision::image_view(frame.images.left), vision::image_view(frame.images.right), frame.motion.motion,
-                     outputs_.views());
+                     outputs_->views());
     under_way_.push_back(std::move(frame));
   }
 
@@ -136,7 +148,7 @@ class Run {
     under_way_.pop_front();
     const vision::StereoFrame& frame = sequence_.frames[prepared.index];
     const auto before_write = Clock::now();
-    const std::int64_t unstorable = outputs_.write(frame, prepared.images.left);
+    const std::int64_t unstorable = outputs_->write(frame, prepared.images.left, earlier_ == EarlierRun::kResume);
     const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
@@ -196,9 +208,10 @@ class Run {
   const vision::StereoSequence& sequence_;
   const cv::Size size_;
   MotionSource motions_;
-  RunOutputs outputs_;
+  std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
   Pipeline pipeline_;
   RunReport report_;
+  const EarlierRun earlier_;
   std::optional<Trace> trace_;
   std::deque<PreparedFrame> under_way_;
   Clock::time_point last_written_ = Clock::now();
@@ -207,8 +220,16 @@ class Run {
   bool warned_of_range_ = false;
 };
 
+EarlierRun earlier_run_of(const RunArguments& arguments) {
+  if (arguments.resume && arguments.overwrite) {
+    throw InvalidArgument("--resume and --overwrite contradict each other: give one of them");
+  }
+  return arguments.resume ? EarlierRun::kResume : arguments.overwrite ? EarlierRun::kOverwrite : EarlierRun::kRefuse;
+}
+
 SequenceJob job_of(const RunArguments& arguments) {
   SequenceJob job;
+  job.earlier = earlier_run_of(arguments);
   job.sequence = arguments.input.open();
   job.options = arguments.method.options();
   job.preset = arguments.method.preset;
@@ -254,6 +275,12 @@ Command add_run(CLI::App& program) {
                    "https://ui.perfetto.dev opens")
       ->type_name("FILE")
       ->group(group);
+  command
+      ->add_flag("--resume", arguments->resume,
+                 "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
+                 "before are computed again, for the filter's state")
+      ->group(group);
+  command->add_flag("--overwrite", arguments->overwrite, "replace an earlier run's maps in OUT")->group(group);
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
   arguments->method.add_to(*command);
   command

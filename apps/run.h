@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "apps/earlier_run.h"
 #include "egosgm/device.h"
 #include "egosgm/options.h"
 #include "egosgm/vision/dataset.h"
@@ -20,8 +21,9 @@ struct SequenceJob {
   std::string poses_file;                  // empty: stereo odometry,
   vision::StereoOdometryOptions odometry;  // with these options
   std::filesystem::path out;
-  std::set<std::string> kinds;  // what is written beside the disparity, see parse_write_list
-  std::filesystem::path trace;  // file for a trace of all commands; empty: none
+  std::set<std::string> kinds;                  // what is written beside the disparity, see parse_write_list
+  std::filesystem::path trace;                  // file for a trace of all commands; empty: none
+  EarlierRun earlier = EarlierRun::kOverwrite;  // what becomes of a run that `out` holds
   bool quiet = false;
 };
 

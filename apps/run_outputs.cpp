@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <functional>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -61,6 +62,12 @@ std::set<std::string> parse_write_list(const std::string& list) {
   return kinds;
 }
 
+std::vector<std::string> output_folders() {
+  std::vector<std::string> folders = kKinds;
+  folders.push_back("disparity");
+  return folders;
+}
+
 RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities)
     : folder_(std::move(folder)), kinds_(std::move(kinds)), disparities_(disparities), disparity_(size, CV_32FC1) {
   vision::make_folder(folder_ / "disparity");
@@ -83,22 +90,34 @@ FrameOutputs RunOutputs::views() {
   return outputs;
 }
 
-std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& left) {
+template <typename Write>
+void RunOutputs::write_file(const char* kind, const vision::StereoFrame& frame, bool keep, Write&& write) const {
+  const std::string name = kind;
+  const std::filesystem::path path = file(kind, frame, name == "variance" || name == "pfm" ? ".pfm" : ".png");
+  if (!(keep && std::filesystem::exists(path))) write(path);
+}
+
+std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& left, bool keep) {
   if (!color_range_) color_range_ = vision::disparity_range(disparity_);
-  if (wants("variance")) vision::write_pfm(file("variance", frame, ".pfm"), variance_);
-  if (wants("pfm")) vision::write_pfm(file("pfm", frame, ".pfm"), disparity_);
-  if (wants("predicted")) vision::write_disparity_png(file("predicted", frame), predicted_);
-  if (wants("measured")) vision::write_disparity_png(file("measured", frame), measured_);
-  if (wants("right")) vision::write_disparity_png(file("right", frame), right_);
-  if (wants("search")) vision::write_png(file("search", frame), search_);
-  if (wants("overview")) vision::write_png(file("overview", frame), overview(frame, left));
-  if (wants("interpolated")) {
-    vision::write_disparity_png(file("interpolated", frame), vision::interpolate_background(disparity_));
+  using Path = std::filesystem::path;
+  const std::pair<const char*, std::function<void(const Path&)>> writers[] = {
+      {"variance", [&](const Path& path) { vision::write_pfm(path, variance_); }},
+      {"pfm", [&](const Path& path) { vision::write_pfm(path, disparity_); }},
+      {"predicted", [&](const Path& path) { vision::write_disparity_png(path, predicted_); }},
+      {"measured", [&](const Path& path) { vision::write_disparity_png(path, measured_); }},
+      {"right", [&](const Path& path) { vision::write_disparity_png(path, right_); }},
+      {"search", [&](const Path& path) { vision::write_png(path, search_); }},
+      {"overview", [&](const Path& path) { vision::write_png(path, overview(frame, left)); }},
+      {"interpolated",
+       [&](const Path& path) { vision::write_disparity_png(path, vision::interpolate_background(disparity_)); }},
+      {"color",
+       [&](const Path& path) { vision::write_png(path, vision::color_disparity(disparity_, *color_range_)); }}};
+  for (const auto& [kind, write] : writers) {
+    if (wants(kind)) write_file(kind, frame, keep, write);
   }
-  if (wants("color")) {
-    vision::write_png(file("color", frame), vision::color_disparity(disparity_, *color_range_));
-  }
-  return vision::write_disparity_png(file("disparity", frame), disparity_);  // last: a frame with it is complete
+  // Last: a frame with it is complete.
+  write_file("disparity", frame, keep, [&](const Path& path) { vision::write_disparity_png(path, disparity_); });
+  return vision::count_outside_png(disparity_);
 }
 
 cv::Mat RunOutputs::overview(const vision::StereoFrame& frame, const cv::Mat& left) const {

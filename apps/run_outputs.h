@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/dataset.h"
@@ -16,6 +17,8 @@ namespace egosgm::app {
 
 /// What `egosgm run` can write beside OUT/disparity, each into a folder of its own, a file a frame.
 std::set<std::string> parse_write_list(const std::string& list);
+/// The folders that a run may write its maps to.
+std::vector<std::string> output_folders();
 /// The same, as --help and the README describe it.
 extern const char* const kWriteListHelp;
 
@@ -28,13 +31,17 @@ class RunOutputs {
   /// Where the pipeline is to write; valid as long as this object lives.
   FrameOutputs views();
 
-  /// Writes the frame that the views hold; `left` is its left image. Returns how many disparities KITTI's PNG has no
-  /// room for.
-  std::int64_t write(const vision::StereoFrame& frame, const cv::Mat& left);
+  /// Writes the frame that the views hold; `left` is its left image. `keep`: what stands in the folder already stays.
+  /// Returns how many disparities KITTI's PNG has no room for.
+  std::int64_t write(const vision::StereoFrame& frame, const cv::Mat& left, bool keep);
 
  private:
   bool wants(const char* kind) const { return kinds_.contains(kind); }
   std::filesystem::path file(const char* kind, const vision::StereoFrame& frame, const char* extension = ".png") const;
+
+  /// Calls `write` with the file's path, unless the file is to stay.
+  template <typename Write>
+  void write_file(const char* kind, const vision::StereoFrame& frame, bool keep, Write&& write) const;
 
   /// Left image, disparity, search width, and the error where there is truth (else the standard deviation), with their
   /// scales.

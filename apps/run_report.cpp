@@ -76,11 +76,13 @@ nlohmann::ordered_json json_of(const Eigen::Isometry3d& motion) {
 }
 
 RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& preset,
-                     int width, int height) {
+                     const std::string& motion, int width, int height) {
   const DeviceInfo& device = pipeline.device().info();
   json_ = {{"program", "egosgm"},
            {"version", EGOSGM_VERSION},
            {"input", sequence.title},
+           {"first_frame", sequence.frames.front().number},
+           {"motion", motion},
            {"width", width},
            {"height", height},
            {"calibration", json_of(sequence.calibration)},
@@ -91,6 +93,15 @@ RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pip
            {"options", json_of(pipeline.options())},
            {"finished", false},
            {"frames", Json::array()}};
+}
+
+Json RunReport::identity() const {
+  Json identity;
+  for (const char* key :
+       {"version", "input", "first_frame", "motion", "width", "height", "calibration", "device", "options"}) {
+    identity[key] = json_.at(key);
+  }
+  return identity;
 }
 
 void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
@@ -105,6 +116,7 @@ void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report,
                              {"full_range_reason", report.full_range_reason},
                              {"odometry", odometry_json(motion)},
                              {"launches", report.launches},
+                             {"stripes", report.stripes},
                              {"outside_png_range", unstorable},
                              {"ms", times_json(report, motion, times)}});
 }

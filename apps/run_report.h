@@ -20,8 +20,12 @@ struct HostTimes {
 /// OUT/report.json: what ran, on what, and what every frame gave.
 class RunReport {
  public:
-  RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& preset, int width,
-            int height);
+  /// `motion`: where the motions come from.
+  RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& preset,
+            const std::string& motion, int width, int height);
+
+  /// All that the maps depend on. Two runs with equal identities give the same maps.
+  nlohmann::ordered_json identity() const;
 
   void add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
            const HostTimes& times, std::int64_t unstorable);

@@ -28,6 +28,8 @@ void require_map(const cv::Mat& map, const std::filesystem::path& file) {
   }
 }
 
+bool fits_png(float disparity) { return disparity >= 0 && disparity < 65536.0f / kKittiStepsPerPx; }
+
 cv::Mat parse_disparity_png(std::string_view bytes, const std::filesystem::path& file) {
   const cv::Mat stored = decode_png(bytes, file);
   if (stored.type() != CV_16UC1) {
@@ -146,23 +148,25 @@ cv::Mat read_disparity_png(const std::filesystem::path& file) {
 
 std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity) {
   require_map(disparity, file);
-  constexpr float kEnd_px = 65536.0f / kKittiStepsPerPx;
   cv::Mat stored(disparity.size(), CV_16UC1, cv::Scalar(0));
-  std::int64_t not_stored = 0;
   for (int y = 0; y < disparity.rows; ++y) {
     const auto* from = disparity.ptr<float>(y);
     auto* to = stored.ptr<std::uint16_t>(y);
     for (int x = 0; x < disparity.cols; ++x) {
-      if (!is_valid_disparity(from[x])) continue;
-      if (from[x] >= 0 && from[x] < kEnd_px) {
-        to[x] = static_cast<std::uint16_t>(std::max(from[x] * kKittiStepsPerPx, 1.0f));
-      } else {
-        ++not_stored;
-      }
+      if (fits_png(from[x])) to[x] = static_cast<std::uint16_t>(std::max(from[x] * kKittiStepsPerPx, 1.0f));
     }
   }
   write_png(file, stored);
-  return not_stored;
+  return count_outside_png(disparity);
+}
+
+std::int64_t count_outside_png(const cv::Mat& disparity) {
+  std::int64_t outside = 0;
+  for (int y = 0; y < disparity.rows; ++y) {
+    const auto* row = disparity.ptr<float>(y);
+    outside += std::count_if(row, row + disparity.cols, [](float d) { return is_valid_disparity(d) && !fits_png(d); });
+  }
+  return outside;
 }
 
 cv::Mat read_pfm(const std::filesystem::path& file) { return parse_pfm(read_file(file, kMaxMapFileBytes), file); }

@@ -29,6 +29,9 @@ cv::Mat read_disparity_png(const std::filesystem::path& file);
 /// negative disparity or one of 256 and more: those become invalid. Returns how many; a PFM keeps them.
 std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity);
 
+/// How many valid pixels of a CV_32FC1 map that PNG has no room for.
+std::int64_t count_outside_png(const cv::Mat& disparity);
+
 /// One-channel PFM (Middlebury): rows bottom-up, byte order by the scale's sign, infinity or NaN = invalid.
 cv::Mat read_pfm(const std::filesystem::path& file);
 
