@@ -31,16 +31,6 @@ std::string build_options(const cl::Device& device) {
   return std::string(kBaseOptions) + (rounds_division ? " -cl-fp32-correctly-rounded-divide-sqrt" : "");
 }
 
-/// Waits for a command, and throws the status that it failed with. Waiting itself only tells that it failed.
-void expect_done(const cl::Event& event) {
-  const cl_int waited = ::clWaitForEvents(1, &event());
-  if (waited == CL_SUCCESS) return;
-  cl_int status = CL_SUCCESS;
-  ::clGetEventInfo(event(), CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof status, &status, nullptr);
-  // -1 stands for any failure.
-  throw cl::Error(status < -1 ? status : waited, "clWaitForEvents");
-}
-
 std::string build_log(const cl::Program& program, const cl::Device& device) {
   try {
     return program.getBuildInfo<CL_PROGRAM_BUILD_LOG>(device);
@@ -55,7 +45,16 @@ cl::CommandQueue make_queue(const cl::Context& context, const cl::Device& device
 
 void expect_not_failed(const cl::Event& event) {
   const cl_int status = event.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>();
-  if (status < 0) throw cl::Error(status, "a command");
+  // A driver that does not tell why says -1.
+  if (status < 0) throw cl::Error(status < -1 ? status : CL_EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST, "a command");
+}
+
+/// Waits for a command, and throws the status that it failed with: waiting itself only tells that it failed.
+void expect_done(const cl::Event& event) {
+  const cl_int waited = ::clWaitForEvents(1, &event());
+  if (waited == CL_SUCCESS) return;
+  expect_not_failed(event);
+  throw cl::Error(waited, "clWaitForEvents");
 }
 
 double duration_ms(const cl::Event& event) {
