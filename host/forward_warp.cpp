@@ -92,7 +92,7 @@ ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Ca
     : context_((context.enter("ForwardWarp"), context)),
       size_(size),
       calibration_(calibration),
-      process_noise_px2_(options.process_noise_px2),
+      options_(options),
       range_(range) {
   if (pixels == 1 || (pixels == 0 && ocl::pixels_a_work_item(context) == 1)) {
     atomics_.emplace(context, size);
@@ -103,20 +103,22 @@ ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Ca
 
 void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted) {
   context_.enter("ForwardWarp");
-  const shared::DisparityMotion left = disparity_motion(calibration_, current_from_previous, EGOSGM_LEFT);
-  const shared::DisparityMotion right = disparity_motion(calibration_, current_from_previous, EGOSGM_RIGHT);
+  Motion motion = current_from_previous;
+  motion.covariance *= static_cast<double>(options_.motion_noise);
+  const shared::DisparityMotion left = disparity_motion(calibration_, motion, EGOSGM_LEFT);
+  const shared::DisparityMotion right = disparity_motion(calibration_, motion, EGOSGM_RIGHT);
   if (bands_) {
     auto& [find_spans, splat_bands, spans] = *bands_;
     const int bands = (size_.height + kRowsOfABand - 1) / kRowsOfABand;
     find_spans(context_, ocl::every_row(context_, size_), size_, range_, left, right, belief.disparity, spans);
-    splat_bands(context_, ocl::every_row(context_, {1, bands}), size_, range_, left, right, process_noise_px2_,
+    splat_bands(context_, ocl::every_row(context_, {1, bands}), size_, range_, left, right, options_.process_noise_px2,
                 kRowsOfABand, spans, belief.disparity, belief.variance, predicted.disparity, predicted.variance);
     return;
   }
   const ocl::Range pixels = ocl::every_pixel(context_, size_);
   auto& [move, splat_disparity, splat_variance, decode, landed, moved_key, moved_variance, zbuffer] = *atomics_;
-  move(context_, pixels, size_, range_, left, right, process_noise_px2_, belief.disparity, belief.variance, landed,
-       moved_key, moved_variance, zbuffer, predicted.variance);
+  move(context_, pixels, size_, range_, left, right, options_.process_noise_px2, belief.disparity, belief.variance,
+       landed, moved_key, moved_variance, zbuffer, predicted.variance);
   splat_disparity(context_, pixels, size_, landed, moved_key, zbuffer);
   splat_variance(context_, pixels, size_, landed, moved_key, moved_variance, zbuffer, predicted.variance);
   decode(context_, pixels, size_, zbuffer, predicted.disparity);

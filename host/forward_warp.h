@@ -61,7 +61,7 @@ class ForwardWarp {
   ocl::Context& context_;
   const shared::ImageSize size_;
   const Calibration calibration_;
-  const float process_noise_px2_;
+  const ForwardWarpOptions options_;
   const shared::DisparityRange range_;
   std::optional<Atomics> atomics_;  // one of the two
   std::optional<Bands> bands_;

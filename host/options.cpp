@@ -19,6 +19,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("search", o.search);
   visit("temporal", o.temporal);
   visit("forward_warp.process_noise_px2", o.forward_warp.process_noise_px2);
+  visit("forward_warp.motion_noise", o.forward_warp.motion_noise);
   visit("edge_rejection.max_jump_px", o.edge_rejection.max_jump_px);
   visit("hole_fill.max_difference_px", o.hole_fill.max_difference_px);
   visit("consistency.prediction_px", o.consistency.prediction_px);
@@ -155,6 +156,7 @@ void expect_not_negative(const char* name, float value) {
 PipelineOptions PipelineOptions::paper() {
   PipelineOptions options;
   options.forward_warp.process_noise_px2 = 0.5f;
+  options.forward_warp.motion_noise = 0.0f;
   options.edge_rejection.max_jump_px = 3.0f;
   options.search_band.sigmas = 3.0f;
   options.search_band.min_half_width_px = 0.0f;

@@ -38,6 +38,7 @@ TEST(Options, HasANameForEveryMember) {
       {"search", [](auto& o) { o.search = SearchMode::kFull; }},
       {"temporal", [](auto& o) { o.temporal = false; }},
       {"forward_warp.process_noise_px2", [](auto& o) { o.forward_warp.process_noise_px2 = 77; }},
+      {"forward_warp.motion_noise", [](auto& o) { o.forward_warp.motion_noise = 77; }},
       {"edge_rejection.max_jump_px", [](auto& o) { o.edge_rejection.max_jump_px = 77; }},
       {"hole_fill.max_difference_px", [](auto& o) { o.hole_fill.max_difference_px = 77; }},
       {"consistency.prediction_px", [](auto& o) { o.consistency.prediction_px = 77; }},
@@ -191,7 +192,8 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
   EXPECT_FALSE(paper.search_band.from_neighbours) << "unpredicted pixels search everything";
   EXPECT_EQ(paper.search_band.sigmas, 3);
   EXPECT_EQ(paper.search_band.min_half_width_px, 0);
-  EXPECT_GT(paper.forward_warp.process_noise_px2, 0) << "a constant q";
+  EXPECT_GT(paper.forward_warp.process_noise_px2, 0) << "a constant q,";
+  EXPECT_EQ(paper.forward_warp.motion_noise, 0) << "and nothing else";
   EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged";
   EXPECT_EQ(paper.banded_sgm.p2, PipelineOptions().banded_sgm.p2)
       << "the matcher, which the paper leaves open, is the default's";

@@ -86,7 +86,7 @@ std::vector<Setting> settings() {
                    o.search_band.neighbour_margin_px = 1;
                    o.speckle_removal.max_size_px = 0;
                    o.median_filter.enabled = false;
-                   o.forward_warp.process_noise_px2 = 0.4f;
+                   o.forward_warp = {.process_noise_px2 = 0.4f, .motion_noise = 2.5f};
                    o.vertical_alignment.gain = 1;
                    o.banded_sgm.p2_at_edges = 25;
                    o.banded_sgm.p2_slope = 9;
@@ -152,8 +152,10 @@ class Video {
     return images;
   }
   reference::ViewMotions twin_motions(int index) const {
-    return {disparity_motion(calibration(), motion(index), EGOSGM_LEFT),
-            disparity_motion(calibration(), motion(index), EGOSGM_RIGHT)};
+    Motion scaled = motion(index);
+    scaled.covariance *= static_cast<double>(setting_.options.forward_warp.motion_noise);
+    return {disparity_motion(calibration(), scaled, EGOSGM_LEFT),
+            disparity_motion(calibration(), scaled, EGOSGM_RIGHT)};
   }
 
  private:

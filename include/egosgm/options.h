@@ -20,6 +20,7 @@ enum class Scheduling { kAutomatic, kWavefront, kPaths };
 
 struct ForwardWarpOptions {
   float process_noise_px2 = 0.05f;  // constant part of q, added to every variance (eq. 6)
+  float motion_noise = 1.0f;        // factor of the other part, J Sigma J^T by the motion's covariance Sigma
 };
 
 struct EdgeRejectionOptions {
