@@ -286,6 +286,8 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   layer.clReleaseDevice = target->clReleaseDevice;
   layer.clGetProgramBuildInfo = target->clGetProgramBuildInfo;
   layer.clFinish = target->clFinish;
+  layer.clCreateUserEvent = [](cl_context c, cl_int* e) { return counted(next->clCreateUserEvent(c, e)); };  // of tests
+  layer.clSetUserEventStatus = target->clSetUserEventStatus;
   layer.clCreateContext = create_context;
   layer.clCreateCommandQueue = create_queue;
   layer.clCreateBuffer = create_buffer;
