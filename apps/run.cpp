@@ -65,7 +65,7 @@ class Run {
         report_(sequence_, pipeline_, job.preset, motion_of(job), size_.width, size_.height),
         earlier_(job.earlier) {
     expect_free(folder_, earlier_, report_.identity());
-    outputs_.emplace(folder_, job.kinds, size_, job.options.disparities);
+    outputs_.emplace(folder_, job.kinds, size_, job.options.disparities, sequence_.calibration);
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
     pipeline_.record_commands(true);

@@ -15,19 +15,18 @@
 #include "egosgm/vision/evaluation.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/point_cloud.h"
+#include "egosgm/vision/render.h"
 
 namespace egosgm::app {
 namespace {
 
-const std::vector<std::string> kKinds{"variance",     "color",  "predicted", "measured", "right",
-                                      "interpolated", "search", "pfm",       "overview"};
+const std::vector<std::string> kKinds{"variance", "color", "predicted", "measured", "right", "interpolated",
+                                      "search",   "pfm",   "overview",  "cloud",    "depth", "depth_m"};
 
-constexpr int kOverviewCellWidth = 800;
-
-cv::Mat above(const cv::Mat& picture, const cv::Mat& bar) {
-  cv::Mat both;
-  cv::vconcat(picture, bar, both);
-  return both;
+const char* extension_of(const std::string& kind) {
+  if (kind == "variance" || kind == "pfm" || kind == "depth_m") return ".pfm";
+  return kind == "cloud" ? ".ply" : ".png";
 }
 
 MapView<std::uint16_t> width_view(cv::Mat& map) {
@@ -44,7 +43,11 @@ const char* const kWriteListHelp =
     "                 these disparity maps, KITTI's PNG\n"
     "  search         disparities searched at each pixel, 16-bit PNG\n"
     "  color          disparity in colours, PNG\n"
-    "  overview       image, disparity, search width and error (or variance) in one PNG";
+    "  overview       image, disparity, search width and error (or variance) in one PNG\n"
+    "  cloud          points with colours [m], PLY, without those whose depth is uncertain by more than 5 %\n"
+    "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none; in metres, PFM";
+
+const std::vector<std::string>& write_kinds() { return kKinds; }
 
 std::set<std::string> parse_write_list(const std::string& list) {
   std::set<std::string> kinds;
@@ -68,11 +71,16 @@ std::vector<std::string> output_folders() {
   return folders;
 }
 
-RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities)
-    : folder_(std::move(folder)), kinds_(std::move(kinds)), disparities_(disparities), disparity_(size, CV_32FC1) {
+RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities,
+                       const Calibration& calibration)
+    : folder_(std::move(folder)),
+      kinds_(std::move(kinds)),
+      calibration_(calibration),
+      disparity_(size, CV_32FC1),
+      panels_(disparities) {
   vision::make_folder(folder_ / "disparity");
   for (const std::string& kind : kinds_) vision::make_folder(folder_ / kind);
-  if (wants("variance") || wants("overview")) variance_.create(size, CV_32FC1);
+  if (wants("variance") || wants("overview") || wants("cloud")) variance_.create(size, CV_32FC1);
   if (wants("right")) right_.create(size, CV_32FC1);
   if (wants("predicted")) predicted_.create(size, CV_32FC1);
   if (wants("measured")) measured_.create(size, CV_32FC1);
@@ -92,14 +100,14 @@ FrameOutputs RunOutputs::views() {
 
 template <typename Write>
 void RunOutputs::write_file(const char* kind, const vision::StereoFrame& frame, bool keep, Write&& write) const {
-  const std::string name = kind;
-  const std::filesystem::path path = file(kind, frame, name == "variance" || name == "pfm" ? ".pfm" : ".png");
+  const std::filesystem::path path = file(kind, frame, extension_of(kind));
   if (!(keep && std::filesystem::exists(path))) write(path);
 }
 
 std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& left, bool keep) {
-  if (!color_range_) color_range_ = vision::disparity_range(disparity_);
+  panels_.disparity_range(disparity_);  // the first frame fixes it, also where its pictures are there already
   using Path = std::filesystem::path;
+  const auto depth_m = [&] { return vision::depth_from_disparity(disparity_, calibration_); };
   const std::pair<const char*, std::function<void(const Path&)>> writers[] = {
       {"variance", [&](const Path& path) { vision::write_pfm(path, variance_); }},
       {"pfm", [&](const Path& path) { vision::write_pfm(path, disparity_); }},
@@ -107,38 +115,26 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
       {"measured", [&](const Path& path) { vision::write_disparity_png(path, measured_); }},
       {"right", [&](const Path& path) { vision::write_disparity_png(path, right_); }},
       {"search", [&](const Path& path) { vision::write_png(path, search_); }},
-      {"overview", [&](const Path& path) { vision::write_png(path, overview(frame, left)); }},
+      {"overview",
+       [&](const Path& path) {
+         vision::write_png(path, panels_.overview({frame, left, disparity_, variance_, search_}));
+       }},
       {"interpolated",
        [&](const Path& path) { vision::write_disparity_png(path, vision::interpolate_background(disparity_)); }},
-      {"color",
-       [&](const Path& path) { vision::write_png(path, vision::color_disparity(disparity_, *color_range_)); }}};
+      {"color", [&](const Path& path) { vision::write_png(path, panels_.disparity(disparity_)); }},
+      {"cloud",
+       [&](const Path& path) {
+         const cv::Mat colors = vision::read_color_png(frame.left);
+         vision::write_ply(path, vision::point_cloud(disparity_, variance_, colors, calibration_));
+       }},
+      {"depth", [&](const Path& path) { vision::write_depth_png(path, depth_m()); }},
+      {"depth_m", [&](const Path& path) { vision::write_pfm(path, depth_m()); }}};
   for (const auto& [kind, write] : writers) {
     if (wants(kind)) write_file(kind, frame, keep, write);
   }
   // Last: a frame with it is complete.
   write_file("disparity", frame, keep, [&](const Path& path) { vision::write_disparity_png(path, disparity_); });
   return vision::count_outside_png(disparity_);
-}
-
-cv::Mat RunOutputs::overview(const vision::StereoFrame& frame, const cv::Mat& left) const {
-  const int width = left.cols;
-  cv::Mat searched;
-  search_.convertTo(searched, CV_32F);
-  const vision::ColorRange widths{1, std::max(2.0, static_cast<double>(disparities_)), true};
-  std::vector<vision::CaptionedPicture> pictures{
-      {vision::color_grey(left), "left image, frame " + frame.name},
-      {above(vision::color_disparity(disparity_, *color_range_), vision::color_bar(width, *color_range_, "px")),
-       "disparity"},
-      {above(vision::color_map(searched, widths), vision::color_bar(width, widths, "")), "disparities searched"}};
-  if (frame.truth_noc.empty()) {
-    pictures.push_back(
-        {above(vision::color_variance(variance_, disparity_), vision::color_bar(width, vision::kVarianceRange, "px^2")),
-         "variance"});
-  } else {
-    const cv::Mat truth = vision::read_disparity(frame.truth_noc);
-    pictures.push_back({above(vision::color_error(disparity_, truth), vision::error_bar(width)), "error [px]"});
-  }
-  return vision::compose(pictures, 2, kOverviewCellWidth);
 }
 
 std::filesystem::path RunOutputs::file(const char* kind, const vision::StereoFrame& frame,

@@ -4,14 +4,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "apps/frame_panels.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/dataset.h"
-#include "egosgm/vision/render.h"
 
 namespace egosgm::app {
 
@@ -19,6 +18,7 @@ namespace egosgm::app {
 std::set<std::string> parse_write_list(const std::string& list);
 /// The folders that a run may write its maps to.
 std::vector<std::string> output_folders();
+const std::vector<std::string>& write_kinds();
 /// The same, as --help and the README describe it.
 extern const char* const kWriteListHelp;
 
@@ -26,7 +26,8 @@ extern const char* const kWriteListHelp;
 class RunOutputs {
  public:
   /// Makes the folders. Throws IoError.
-  RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities);
+  RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities,
+             const Calibration& calibration);
 
   /// Where the pipeline is to write; valid as long as this object lives.
   FrameOutputs views();
@@ -43,15 +44,11 @@ class RunOutputs {
   template <typename Write>
   void write_file(const char* kind, const vision::StereoFrame& frame, bool keep, Write&& write) const;
 
-  /// Left image, disparity, search width, and the error where there is truth (else the standard deviation), with their
-  /// scales.
-  cv::Mat overview(const vision::StereoFrame& frame, const cv::Mat& left) const;
-
   const std::filesystem::path folder_;
   const std::set<std::string> kinds_;
-  const int disparities_;
+  const Calibration calibration_;
   cv::Mat disparity_, variance_, right_, predicted_, measured_, search_;
-  std::optional<vision::ColorRange> color_range_;  // the first frame's, so that colours do not flicker
+  FramePanels panels_;
 };
 
 }  // namespace egosgm::app

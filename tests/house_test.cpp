@@ -28,7 +28,8 @@ std::string without_comments(const std::string& text) {
 /// The project's own files with one of these endings, in its folders.
 std::vector<fs::path> files(const std::set<std::string>& endings,
                             const std::vector<std::string>& folders = {"apps", "bench", "cmake", "host", "include",
-                                                                       "kernels", "scripts", "tests"}) {
+                                                                       "kernels", "python", "scripts", "tests",
+                                                                       "examples"}) {
   std::vector<fs::path> found;
   for (const std::string& folder : folders) {
     if (!fs::exists(kSource / folder)) continue;
@@ -111,6 +112,23 @@ TEST(House, TwinsShareNothingWithTheKernelsButTheirLayouts) {
   for (const fs::path& file : files({".h", ".cpp"}, {"tests/reference"})) {
     EXPECT_FALSE(std::regex_search(text_of(file), foreign)) << file;
   }
+}
+
+TEST(House, LinksOfTheDocumentationLeadSomewhere) {
+  std::vector<fs::path> pages = files({".md"}, {"docs"});
+  pages.push_back(kSource / "README.md");
+  static const std::regex link(R"(\]\(([^)#]+)(#[^)]*)?\))");
+  int links = 0;
+  for (const fs::path& page : pages) {
+    const std::string text = text_of(page);
+    for (std::sregex_iterator at(text.begin(), text.end(), link), end; at != end; ++at) {
+      const std::string target = (*at)[1];
+      if (target.find("://") != std::string::npos) continue;
+      ++links;
+      EXPECT_TRUE(fs::exists(page.parent_path() / target)) << page << ": " << target;
+    }
+  }
+  EXPECT_GT(links, 10);
 }
 
 TEST(House, NothingIsNamedAfterNothing) {

@@ -9,6 +9,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
+#include "egosgm/vision/render.h"
 #include "host/vision/png.h"
 
 namespace egosgm::vision {
@@ -19,6 +20,14 @@ cv::Mat read_grey_png(const std::filesystem::path& file) {
   cv::Mat grey;
   cv::cvtColor(pixels, grey, cv::COLOR_RGB2GRAY);
   return grey;
+}
+
+cv::Mat read_color_png(const std::filesystem::path& file) {
+  cv::Mat pixels = decode_png(read_file(file, kMaxImageFileBytes), file), picture;
+  if (pixels.channels() == 1) return color_grey(pixels);
+  if (pixels.depth() == CV_16U) pixels.convertTo(pixels, CV_8U, 1.0 / 256.0, -0.5);  // rounds, so half a step down
+  cv::cvtColor(pixels, picture, cv::COLOR_RGB2BGR);
+  return picture;
 }
 
 cv::Size read_png_size(const std::filesystem::path& file) {

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "egosgm/export.h"
+
 namespace egosgm {
 
 /// The queues that a pipeline has of its device.
@@ -25,7 +27,7 @@ struct DeviceInfo {
 };
 
 /// An OpenCL device. Copies refer to the same one. Thread-safe.
-class Device {
+class EGOSGM_EXPORT Device {
  public:
   /// All devices, in the order in which they are preferred: GPUs, accelerators, CPUs; then as the platforms list them.
   static std::vector<Device> list();

@@ -4,24 +4,26 @@
 #include <stdexcept>
 #include <string>
 
+#include "egosgm/export.h"
+
 namespace egosgm {
 
 /// What the caller gave cannot be used: an image, a calibration, an option, a file. `what()` names the
 /// value and the remedy in one line. Nothing was enqueued and nothing was written.
-class InvalidArgument : public std::invalid_argument {
+class EGOSGM_EXPORT InvalidArgument : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
 };
 
 /// The file system refused to take a result: a full disk, a folder that cannot be written. `what()` names the file and
 /// the system's reason in one line. What stood under the file's name before stands there still.
-class IoError : public std::runtime_error {
+class EGOSGM_EXPORT IoError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
 /// The device or its driver refused. `code()` is the OpenCL status, `what()` names the stage.
-class DeviceError : public std::runtime_error {
+class EGOSGM_EXPORT DeviceError : public std::runtime_error {
  public:
   DeviceError(int code, const std::string& what) : std::runtime_error(what), code_(code) {}
   int code() const { return code_; }
@@ -31,7 +33,7 @@ class DeviceError : public std::runtime_error {
 };
 
 /// A kernel did not compile. `what()` ends with the compiler's log.
-class BuildError : public DeviceError {
+class EGOSGM_EXPORT BuildError : public DeviceError {
  public:
   using DeviceError::DeviceError;
 };

@@ -3,11 +3,13 @@
 
 #include <Eigen/Geometry>
 
+#include "egosgm/export.h"
+
 namespace egosgm {
 
 /// How the left camera moved: `current_from_previous` takes a point from the previous left camera's frame
 /// (x right, y down, z forward, metres) to the current one's.
-struct Motion {
+struct EGOSGM_EXPORT Motion {
   Eigen::Isometry3d current_from_previous = Eigen::Isometry3d::Identity();
 
   /// Covariance of a left perturbation exp(xi) * current_from_previous, xi = (translation [m], rotation [rad]).

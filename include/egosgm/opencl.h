@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 
+#include "egosgm/export.h"
 #include "egosgm/pipeline.h"
 
 namespace egosgm {
@@ -33,7 +34,7 @@ struct DeviceMaps {
 
 /// A Pipeline whose kernels run on the caller's queue, between the caller's own commands, on images that are there
 /// already: no copy, and the host waits for nothing. Same bits as Pipeline. Not thread-safe.
-class DevicePipeline {
+class EGOSGM_EXPORT DevicePipeline {
  public:
   /// The caller's queue is retained. `programs`: a folder of compiled programs, as in Device::with_programs; empty:
   /// compiles. Throws InvalidArgument (also for a queue that runs out of order), DeviceError or BuildError.

@@ -3,10 +3,11 @@
 // nowhere else.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "egosgm/export.h"
 
 namespace egosgm {
 
@@ -90,7 +91,7 @@ struct KalmanUpdateOptions {
   float min_variance_px2 = 0.02f;
 };
 
-struct PipelineOptions {
+struct EGOSGM_EXPORT PipelineOptions {
   int disparities = 128;  // D >= 1: the range is [min_disparity, min_disparity + disparities)
   int min_disparity = 0;  // of either sign
   SearchMode search = SearchMode::kBand;
@@ -124,10 +125,10 @@ struct NamedOption {
 };
 
 /// All options of `options`, in the order of this header.
-std::vector<NamedOption> list_options(const PipelineOptions& options);
+EGOSGM_EXPORT std::vector<NamedOption> list_options(const PipelineOptions& options);
 
 /// Sets one. Throws InvalidArgument for a name that does not exist (with the nearest that does) or a value that does
 /// not parse.
-void set_option(PipelineOptions& options, std::string_view name, std::string_view value);
+EGOSGM_EXPORT void set_option(PipelineOptions& options, std::string_view name, std::string_view value);
 
 }  // namespace egosgm

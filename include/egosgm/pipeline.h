@@ -9,6 +9,7 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/device.h"
+#include "egosgm/export.h"
 #include "egosgm/image.h"
 #include "egosgm/motion.h"
 #include "egosgm/options.h"
@@ -64,7 +65,7 @@ struct FrameReport {
 /// says where to search, and a Kalman filter per pixel fuses what was predicted with what was measured.
 ///
 /// Not thread-safe; two pipelines may run in two threads, also on one device.
-class Pipeline {
+class EGOSGM_EXPORT Pipeline {
  public:
   /// Builds the kernels and allocates all memory for images of exactly `width` x `height`.
   /// Throws InvalidArgument (size, calibration, option), DeviceError or BuildError.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "egosgm/device.h"
+#include "egosgm/export.h"
 #include "egosgm/options.h"
 
 namespace egosgm {
@@ -21,6 +22,6 @@ struct ProgramFile {
 /// and for each program its kernel file, build options with all defines, and hashes of source and binary. Write them
 /// into one folder in this order. Only the disparity range, `banded_sgm.cost`, `.paths` and `.scheduling` matter.
 /// Throws InvalidArgument (option), DeviceError or BuildError. Thread-safe.
-std::vector<ProgramFile> compile_programs(const Device& device, const PipelineOptions& options = {});
+EGOSGM_EXPORT std::vector<ProgramFile> compile_programs(const Device& device, const PipelineOptions& options = {});
 
 }  // namespace egosgm

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The program from outside: every subcommand, wrong arguments, broken input, interrupts, full disks.
 
-EGOSGM_PROGRAM names the program; EGOSGM_DATA the folder of real data (tests that need it are skipped without).
+EGOSGM_PROGRAM names the program, EGOSGM_EXAMPLES the folder of the examples; EGOSGM_DATA the folder of real data (tests that need it are skipped without).
 """
 import json
 import os
@@ -17,7 +17,7 @@ import unittest
 import zlib
 
 PROGRAM = os.environ["EGOSGM_PROGRAM"]
-EXAMPLE = os.environ.get("EGOSGM_EXAMPLE", "")
+EXAMPLES = pathlib.Path(os.environ.get("EGOSGM_EXAMPLES", ""))
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = os.environ.get("EGOSGM_DATA", "")
 WIDTH, HEIGHT, FRAMES = 320, 96, 4
@@ -92,7 +92,7 @@ class ProgramTest(unittest.TestCase):
 
 class Help(ProgramTest):
     def test_every_subcommand_explains_itself(self):
-        for command in ("run", "eval", "devices", "synth", "odometry", "eval-poses"):
+        for command in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "view", "completion"):
             self.assertIn("--help", self.assert_works(command, "--help"))
             self.assertIn(command, self.assert_works("--help"))
 
@@ -105,6 +105,28 @@ class Help(ProgramTest):
 
     def test_version(self):
         self.assertRegex(self.assert_works("--version"), r"^egosgm \d+\.\d+\.\d+\n$")
+
+    def complete(self, *words):
+        """What bash offers after these words."""
+        script = self.new_folder() / "completion.bash"
+        script.write_text(self.assert_works("completion", "bash"))
+        line = " ".join(f"'{word}'" for word in ("egosgm", *words))
+        code = f"shopt -s expand_aliases; compopt() {{ :; }}; source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words)}; " \
+               '_egosgm; printf "%s\\n" "${COMPREPLY[@]}"'
+        return subprocess.run(["bash", "-euc", code], capture_output=True, text=True, check=True, cwd=self.folder).stdout.split()
+
+    def test_bash_completes_commands_options_and_values(self):
+        self.assertEqual(self.complete("ru"), ["run"])
+        self.assertIn("eval-poses", self.complete("e"))
+        self.assertEqual(self.complete("run", "--disp"), ["--disparities"])
+        self.assertEqual(self.complete("run", "--preset", "p"), ["paper"])
+        self.assertEqual(self.complete("run", "--odometry", "str"), ["street"])
+        self.assertIn("banded_sgm.p2=", self.complete("run", "--set", "banded_sgm.p"))
+        self.assertEqual(self.complete("run", "--write", "color,ov"), ["color,overview"])
+        self.assertEqual(self.complete("run", "--disparities", ""), [])
+        self.assertEqual(self.complete("odometry", "str"), ["street"])
+        self.assertIn("_egosgm", self.assert_works("completion", "zsh"))
+        self.assert_refused(["completion", "fish"], "bash or zsh")
 
     def test_devices_names_the_default_and_why(self):
         text = self.assert_works("devices")
@@ -120,12 +142,36 @@ class Help(ProgramTest):
 
 
 class Example(ProgramTest):
-    def test_the_example_gives_what_the_program_gives(self):
+    def run_example(self, name, *arguments, **options):
+        return subprocess.run([EXAMPLES / f"egosgm_example_{name}", *arguments], capture_output=True, text=True, timeout=240, **options)
+
+    def assert_gives_what_the_program_gives(self, example, options=(), arguments=()):
         out, own = self.new_folder(), self.new_folder()
-        self.assert_works("run", "--odometry", self.street, "--out", out)
-        subprocess.run([EXAMPLE, self.street], cwd=own, check=True, timeout=240)
+        self.assert_works("run", "--odometry", self.street, "--out", out, *options)
+        done = self.run_example(example, self.street, *arguments, cwd=own)
+        self.assertEqual(done.returncode, 0, done.stderr)
         for file in (out / "disparity").iterdir():
             self.assertEqual(file.read_bytes(), (own / file.name).read_bytes(), file.name)
+
+    def test_minimal_gives_what_the_program_gives(self):
+        self.assert_gives_what_the_program_gives("minimal")
+
+    def test_own_poses_gives_what_the_program_gives(self):
+        poses = self.street / "poses.txt"
+        self.assert_gives_what_the_program_gives("own_poses", ["--poses", poses], [poses])
+
+    def test_opencv_types_gives_a_pair_in_kittis_format(self):
+        out = self.new_folder()
+        left, right = (self.street / f"image_{side}/000000.png" for side in (0, 1))
+        done = self.run_example("opencv_types", left, right, out / "steps.png")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assert_works("run", "--odometry", self.street, "--frames", "0", "--out", out, "--temporal", "off")
+        steps, own = (json.loads(self.assert_works("eval", "--estimate", file, "--truth",
+                                                   self.street / "truth/left_disp_noc/000000.png", "--json"))["pooled"]
+                      for file in (out / "steps.png", out / "disparity/000000.png"))
+        self.assertAlmostEqual(steps["bad_of_valid"], own["bad_of_valid"], delta=1)
+        self.assertGreater(steps["density"], 90)  # the sky's disparity rounds to no step
+        self.assertNotEqual(self.run_example("opencv_types", left, self.street / "calib.txt", out / "no.png").returncode, 0)
 
     def test_the_readme_shows_it(self):
         shown = (SOURCE / "README.md").read_text().split("```cpp\n")[1].split("```")[0]
@@ -133,7 +179,7 @@ class Example(ProgramTest):
 
     def test_the_readme_names_every_subcommand_and_exit_code(self):
         text = (SOURCE / "README.md").read_text()
-        for name in ("run", "eval", "devices", "synth", "odometry", "eval-poses"):
+        for name in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "view", "completion"):
             self.assertIn(f"`{name}`", text)
         self.assertIn("130", text)
 
@@ -164,10 +210,10 @@ class Run(ProgramTest):
 
     def test_writes_what_is_asked_for(self):
         out = self.new_folder()
-        kinds = "variance,color,predicted,measured,right,interpolated,search,pfm,overview"
+        kinds = "variance,color,predicted,measured,right,interpolated,search,pfm,overview,cloud,depth,depth_m"
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", kinds, "--frames", "1:2", "--quiet")
         for kind in kinds.split(","):
-            extension = "pfm" if kind in ("variance", "pfm") else "png"
+            extension = "pfm" if kind in ("variance", "pfm", "depth_m") else "ply" if kind == "cloud" else "png"
             self.assertEqual([f.name for f in sorted((out / kind).iterdir())], [f"00000{i}.{extension}" for i in (1, 2)])
         text = json.loads(self.assert_works("eval", "--estimate", out / "interpolated", "--truth",
                                             self.street / "truth/left_disp_occ", "--json"))
@@ -299,6 +345,66 @@ class Run(ProgramTest):
         self.assert_works("run", "--odometry", self.street, "--out", paper, "--preset", "paper")
         self.assertGreater(self.report(paper)["frames"][-1]["search_fraction"],
                            self.report(default)["frames"][-1]["search_fraction"])
+
+
+class View(ProgramTest):
+    """A smaller sequence, since what is looked at is the same."""
+
+    def png_size(self, file):
+        return struct.unpack(">II", file.read_bytes()[16:24])
+
+    def test_pictures_and_a_video_without_a_display(self):
+        out = self.new_folder()
+        headless = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        video = ["--video", out / "street.avi"]  # OpenCV writes it without FFmpeg
+        text = self.assert_works("view", "--odometry", self.street, "--pictures", out / "pictures", *video, "--cell-width", 200,
+                                 env=headless)
+        self.assertIn("frame 000003", text)
+        pictures = sorted((out / "pictures").iterdir())
+        self.assertEqual([file.name for file in pictures], [f"00000{i}.png" for i in range(FRAMES)])
+        width, height = self.png_size(pictures[0])
+        self.assertEqual(width, 404)  # two panels and a gap
+        self.assertGreater(height, 3 * HEIGHT * 200 / WIDTH)  # three rows, the last one for the error
+        self.assertEqual([file.name for file in out.iterdir() if file.is_file()], ["street.avi"])
+        content = (out / "street.avi").read_bytes()
+        self.assertEqual((content[:4], content[8:12]), (b"RIFF", b"AVI "))
+        self.assertEqual(content.count(b"00dc") // 2, FRAMES)  # each frame stands in the stream and in the index
+
+    def test_without_truth_there_is_no_error_panel(self):
+        street, heights = self.broken_street(), []
+        for name in ("with", "without"):
+            self.assert_works("view", "--odometry", street, "--pictures", street / name, "--frames", "0", "--quiet")
+            heights.append(self.png_size(street / name / "000000.png")[1])
+            shutil.rmtree(street / "truth", ignore_errors=True)
+        self.assertGreater(heights[0], heights[1])
+
+    def test_what_cannot_be_shown_is_refused(self):
+        headless = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        view = ["view", "--odometry", self.street]
+        self.assert_refused(view, "--video", "--pictures", env=headless)
+        self.assert_refused([*view, "--video", self.folder / "street.mkv"], ".mp4 or .avi")
+        self.assert_refused([*view, "--pictures", self.folder / "p", "--fps", 0], "--fps 0")
+        self.assert_refused([*view, "--pictures", self.folder / "p", "--cell-width", 0], "1..32768")
+        self.assert_refused([*view, "--pictures", self.street / "calib.txt/p"], "calib.txt", code=1)
+
+    @unittest.skipUnless(shutil.which("Xvfb"), "no Xvfb")
+    def test_the_window_plays_until_it_is_told_to_stop(self):
+        read, write = os.pipe()
+        with subprocess.Popen(["Xvfb", "-displayfd", str(write), "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL) as screen:
+            os.close(write)
+            display = os.read(read, 16).decode().strip()
+            os.close(read)
+            try:
+                process = subprocess.Popen([PROGRAM, "view", "--odometry", self.street], stderr=subprocess.PIPE, text=True,
+                                           env=dict(os.environ, DISPLAY=":" + display))
+                with self.assertRaises(subprocess.TimeoutExpired):  # it stays open after the last frame
+                    process.wait(timeout=8)
+                process.send_signal(signal.SIGINT)
+                _, errors = process.communicate(timeout=60)
+                self.assertEqual(process.returncode, 130, errors)
+                self.assertNotIn("error", errors)
+            finally:
+                screen.terminate()
 
 
 class Accuracy(ProgramTest):

@@ -65,6 +65,20 @@ TEST(ImageIo, GreyImagesKeepEveryBit) {
   }
 }
 
+TEST(ImageIo, ColorIsReadAsItIs) {
+  std::mt19937 random(3);
+  const TemporaryFolder folder;
+  const cv::Mat image = random_image(random, 33, 7, CV_8UC3);
+  write_png(folder / "image.png", image);
+  expect_equal(read_color_png(folder / "image.png"), image);
+  cv::Mat deep;
+  image.convertTo(deep, CV_16U, 256, 255);  // the upper byte counts, the lower one is full
+  ASSERT_TRUE(cv::imwrite((folder / "deep.png").string(), deep));
+  expect_equal(read_color_png(folder / "deep.png"), image);
+  write_png(folder / "grey.png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(7)));
+  expect_equal(read_color_png(folder / "grey.png"), cv::Mat(3, 4, CV_8UC3, cv::Scalar::all(7)));
+}
+
 TEST(ImageIo, ColorBecomesGreyAsInOpenCv) {
   std::mt19937 random(2);
   const TemporaryFolder folder;

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "egosgm/calibration.h"
+#include "egosgm/export.h"
 
 namespace egosgm::vision {
 
@@ -21,9 +22,10 @@ enum class KittiCameras { kAny, kGrey, kColor };
 /// matters only for KITTI's; kAny takes the grey pair where the file has it, else the colour pair. Throws
 /// InvalidArgument with file, row and remedy: too few numbers, not a number, NaN, zero focal length, zero or negative
 /// baseline, no such cameras, unknown key. Thread-safe.
-Calibration read_calibration(const std::filesystem::path& file, KittiCameras cameras = KittiCameras::kAny);
+EGOSGM_EXPORT Calibration read_calibration(const std::filesystem::path& file,
+                                           KittiCameras cameras = KittiCameras::kAny);
 
 /// Writes EgoSGM's own format (TOML). Throws IoError. Thread-safe for different files.
-void write_calibration(const std::filesystem::path& file, const Calibration& calibration);
+EGOSGM_EXPORT void write_calibration(const std::filesystem::path& file, const Calibration& calibration);
 
 }  // namespace egosgm::vision

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "egosgm/calibration.h"
+#include "egosgm/export.h"
 
 namespace egosgm::vision {
 
@@ -35,7 +36,7 @@ struct FrameRange {
 };
 
 /// "7:10", "7:", ":10" or "7". Throws InvalidArgument.
-FrameRange parse_frame_range(const std::string& text);
+EGOSGM_EXPORT FrameRange parse_frame_range(const std::string& text);
 
 // The openers look at names and read the calibration; images are read one by one later. They throw InvalidArgument,
 // naming the file or folder and the remedy: a folder or calibration missing, no such scene (the nearest ones are
@@ -43,30 +44,30 @@ FrameRange parse_frame_range(const std::string& text);
 
 /// KITTI 2012 (image_0, image_1, calib) or 2015 (image_2, image_3, calib_cam_to_cam) multi-view: `folder` is
 /// `training`, `testing` or their parent; `scene` is "000151" or "151".
-StereoSequence open_kitti_multiview(const std::filesystem::path& folder, const std::string& scene,
-                                    FrameRange range = {});
+EGOSGM_EXPORT StereoSequence open_kitti_multiview(const std::filesystem::path& folder, const std::string& scene,
+                                                  FrameRange range = {});
 
 /// KITTI odometry: image_0 and image_1 (else image_2 and image_3), calib.txt, poses.txt if there (also
 /// ../../poses/NAME.txt). Truth is taken from truth/left_disp_noc and truth/left_disp_occ (as write_sequence makes
 /// them) where the folder has them.
-StereoSequence open_kitti_odometry(const std::filesystem::path& folder, FrameRange range = {});
+EGOSGM_EXPORT StereoSequence open_kitti_odometry(const std::filesystem::path& folder, FrameRange range = {});
 
 /// KITTI raw, synchronised and rectified drive: image_00/data and image_01/data (else 02 and 03), calib_cam_to_cam.txt
 /// in the folder or its parent.
-StereoSequence open_kitti_raw(const std::filesystem::path& folder, FrameRange range = {});
+EGOSGM_EXPORT StereoSequence open_kitti_raw(const std::filesystem::path& folder, FrameRange range = {});
 
 /// Middlebury 2014 scene: im0.png, im1.png, calib.txt, disp0GT.pfm if there. One frame, number 0.
-StereoSequence open_middlebury(const std::filesystem::path& folder);
+EGOSGM_EXPORT StereoSequence open_middlebury(const std::filesystem::path& folder);
 
 /// Any pair of PNG files or patterns. A pattern's file name holds one `%d`, `%06d`, ... (the frame's number) or one `*`
 /// (left and right files with equal text there belong together; the text is the frame's number if all of them are
 /// numbers, else frames are counted from 0 in the order of names). Without either it names one pair, number 0.
 /// A left folder called image_2 or image_02 takes the colour cameras of KITTI's calibration, any other the grey ones.
-StereoSequence open_patterns(const std::string& left, const std::string& right,
-                             const std::filesystem::path& calibration_file, FrameRange range = {});
+EGOSGM_EXPORT StereoSequence open_patterns(const std::string& left, const std::string& right,
+                                           const std::filesystem::path& calibration_file, FrameRange range = {});
 
 /// Opens `folder` as whichever of KITTI odometry, KITTI raw or Middlebury it is.
-StereoSequence open_folder(const std::filesystem::path& folder, FrameRange range = {});
+EGOSGM_EXPORT StereoSequence open_folder(const std::filesystem::path& folder, FrameRange range = {});
 
 struct StereoImages {
   cv::Mat left, right;  // both CV_8UC1 or both CV_16UC1, of one size
@@ -74,13 +75,14 @@ struct StereoImages {
 
 /// Reads both images as grey. Throws InvalidArgument, naming both files, where their sizes or depths differ.
 /// Thread-safe.
-StereoImages read_images(const StereoFrame& frame);
+EGOSGM_EXPORT StereoImages read_images(const StereoFrame& frame);
 
 /// Reads only the headers: throws InvalidArgument at the first image whose size is not that of the first. Thread-safe.
-cv::Size check_image_sizes(const StereoSequence& sequence);
+EGOSGM_EXPORT cv::Size check_image_sizes(const StereoSequence& sequence);
 
 /// The pose of each frame: row `number` of the file's poses, or, where there are as many rows as frames, row by row.
 /// Throws InvalidArgument, naming `poses_file`, where neither fits.
-std::vector<Eigen::Isometry3d> poses_of_frames(const StereoSequence& sequence, const std::filesystem::path& poses_file);
+EGOSGM_EXPORT std::vector<Eigen::Isometry3d> poses_of_frames(const StereoSequence& sequence,
+                                                             const std::filesystem::path& poses_file);
 
 }  // namespace egosgm::vision

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
+#include "egosgm/export.h"
 #include "egosgm/image.h"
 
 namespace egosgm::vision {
@@ -16,26 +17,26 @@ namespace egosgm::vision {
 inline bool is_valid_disparity(float d) { return d > kInvalidDisparity && d <= 3.402823466e38f; }
 
 /// Reads KITTI's PNG or a PFM; the file's first bytes tell which.
-cv::Mat read_disparity(const std::filesystem::path& file);
+EGOSGM_EXPORT cv::Mat read_disparity(const std::filesystem::path& file);
 
 /// Writes KITTI's PNG or a PFM by the extension. Returns how many valid pixels could not be stored (see
 /// write_disparity_png).
-std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& disparity);
+EGOSGM_EXPORT std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& disparity);
 
 /// KITTI's disparity PNG: 16-bit grey, disparity = value / 256, 0 = invalid.
-cv::Mat read_disparity_png(const std::filesystem::path& file);
+EGOSGM_EXPORT cv::Mat read_disparity_png(const std::filesystem::path& file);
 
 /// Stores max(d * 256, 1), truncated, as KITTI's development kit does, for 0 <= d < 256. The format has no room for a
 /// negative disparity or one of 256 and more: those become invalid. Returns how many; a PFM keeps them.
-std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity);
+EGOSGM_EXPORT std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity);
 
 /// How many valid pixels of a CV_32FC1 map that PNG has no room for.
-std::int64_t count_outside_png(const cv::Mat& disparity);
+EGOSGM_EXPORT std::int64_t count_outside_png(const cv::Mat& disparity);
 
 /// One-channel PFM (Middlebury): rows bottom-up, byte order by the scale's sign, infinity or NaN = invalid.
-cv::Mat read_pfm(const std::filesystem::path& file);
+EGOSGM_EXPORT cv::Mat read_pfm(const std::filesystem::path& file);
 
 /// Writes any CV_32FC1 map (disparity, variance, depth), little endian; infinity where it is invalid.
-void write_pfm(const std::filesystem::path& file, const cv::Mat& map);
+EGOSGM_EXPORT void write_pfm(const std::filesystem::path& file, const cv::Mat& map);
 
 }  // namespace egosgm::vision

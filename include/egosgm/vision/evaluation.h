@@ -7,12 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "egosgm/export.h"
+
 namespace egosgm::vision {
 
 /// What comparing one disparity map with its truth counted, over pixels that have truth. Counts of several images add
 /// up (KITTI 2015 pools pixels); KITTI 2012 instead averages each image's figures (mean_of). `bad`: |error| > 3 px.
 /// `d1`: bad, and |error| > 5 % of the truth. `interpolated`: after interpolate_background.
-struct DisparityCounts {
+struct EGOSGM_EXPORT DisparityCounts {
   std::int64_t truth = 0;             // pixels with truth
   std::int64_t valid = 0;             // of these, with an estimate
   std::int64_t bad = 0;               // of these, bad
@@ -37,17 +39,17 @@ struct DisparityMetrics {
 
 /// Both CV_32FC1 with kInvalidDisparity (see disparity_io.h). Throws InvalidArgument where sizes or types differ.
 /// Thread-safe.
-DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth);
+EGOSGM_EXPORT DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth);
 
-DisparityMetrics metrics_of(const DisparityCounts& counts);
+EGOSGM_EXPORT DisparityMetrics metrics_of(const DisparityCounts& counts);
 
 /// The mean of each image's figures, images whose figure is NaN left out (KITTI 2012).
-DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images);
+EGOSGM_EXPORT DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images);
 
 /// Fills the holes from the background, as KITTI's development kit does: in each row, a run of invalid pixels between
 /// two valid ones gets the smaller of the two, the ends of a row its nearest valid value; then the top and bottom of
 /// each column get its nearest valid value. A map without any valid pixel stays so. Thread-safe.
-cv::Mat interpolate_background(const cv::Mat& disparity);
+EGOSGM_EXPORT cv::Mat interpolate_background(const cv::Mat& disparity);
 
 /// An estimate and the truth it is compared with.
 struct EvaluationPair {
@@ -63,6 +65,7 @@ struct EvaluationPairs {
 /// `disparity`), equal names without extension belong together; where no names are equal, `000010` belongs to the truth
 /// that ends in the same frame number, `000151_10`, if there is only one. Throws InvalidArgument where nothing belongs
 /// together or the truth is ambiguous.
-EvaluationPairs pair_with_truth(const std::filesystem::path& estimate, const std::filesystem::path& truth);
+EGOSGM_EXPORT EvaluationPairs pair_with_truth(const std::filesystem::path& estimate,
+                                              const std::filesystem::path& truth);
 
 }  // namespace egosgm::vision

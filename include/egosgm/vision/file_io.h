@@ -6,21 +6,23 @@
 #include <string>
 #include <string_view>
 
+#include "egosgm/export.h"
+
 namespace egosgm::vision {
 
 /// Reads a whole file. Throws InvalidArgument, naming the file and the system's reason, where it cannot be read, is a
 /// folder or a device, or holds more than `max_bytes`. Thread-safe.
-std::string read_file(const std::filesystem::path& file, std::size_t max_bytes);
+EGOSGM_EXPORT std::string read_file(const std::filesystem::path& file, std::size_t max_bytes);
 
 /// Reads at most the first `bytes` bytes of a file; throws as read_file does. Thread-safe.
-std::string read_file_start(const std::filesystem::path& file, std::size_t bytes);
+EGOSGM_EXPORT std::string read_file_start(const std::filesystem::path& file, std::size_t bytes);
 
 /// Writes a whole file or none: the bytes go into an unnamed (or, where the file system has none, hidden) file in the
 /// same folder, which then takes the name in one step. A crash, a kill or a full disk leaves the old file as it was.
 /// Not flushed to the medium: a power cut may lose it. Throws IoError. Thread-safe for different files.
-void write_file(const std::filesystem::path& file, std::string_view bytes);
+EGOSGM_EXPORT void write_file(const std::filesystem::path& file, std::string_view bytes);
 
 /// Makes a folder with its parents. Throws IoError.
-void make_folder(const std::filesystem::path& folder);
+EGOSGM_EXPORT void make_folder(const std::filesystem::path& folder);
 
 }  // namespace egosgm::vision

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
+#include "egosgm/export.h"
 #include "egosgm/image.h"
 
 namespace egosgm::vision {
@@ -17,19 +18,23 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 28;
 /// weighted as cv::COLOR_RGB2GRAY does; alpha and gamma are ignored. A file too short for the size in its header is
 /// refused before its pixels are allocated. Nothing is printed. Throws InvalidArgument, naming the file, where it is
 /// missing, too large, truncated, damaged or no PNG. Thread-safe.
-cv::Mat read_grey_png(const std::filesystem::path& file);
+EGOSGM_EXPORT cv::Mat read_grey_png(const std::filesystem::path& file);
+
+/// Reads a PNG to be looked at: CV_8UC3, BGR. Colour of 16 bits keeps its upper 8, grey is stretched as color_grey
+/// does. Throws as read_grey_png does. Thread-safe.
+EGOSGM_EXPORT cv::Mat read_color_png(const std::filesystem::path& file);
 
 /// Width and height from a PNG's header; the pixels are not looked at. Throws as read_grey_png does. Thread-safe.
-cv::Size read_png_size(const std::filesystem::path& file);
+EGOSGM_EXPORT cv::Size read_png_size(const std::filesystem::path& file);
 
 /// Writes CV_8UC1, CV_8UC3 (BGR) or CV_16UC1, whole or not at all. Throws IoError, and InvalidArgument for another type
 /// or an empty image. Thread-safe for different files.
-void write_png(const std::filesystem::path& file, const cv::Mat& image);
+EGOSGM_EXPORT void write_png(const std::filesystem::path& file, const cv::Mat& image);
 
 /// The core's view of a cv::Mat; the Mat must outlive it. Throws InvalidArgument unless CV_8UC1 or CV_16UC1.
-ImageView image_view(const cv::Mat& grey);
+EGOSGM_EXPORT ImageView image_view(const cv::Mat& grey);
 
 /// The core's view of a CV_32FC1 map that it is to fill. Throws InvalidArgument for another type.
-MapView<float> map_view(cv::Mat& map);
+EGOSGM_EXPORT MapView<float> map_view(cv::Mat& map);
 
 }  // namespace egosgm::vision

@@ -7,12 +7,13 @@
 #include <string>
 
 #include "egosgm/calibration.h"
+#include "egosgm/export.h"
 #include "egosgm/image.h"
 #include "egosgm/motion.h"
 
 namespace egosgm::vision {
 
-struct StereoOdometryOptions {
+struct EGOSGM_EXPORT StereoOdometryOptions {
   // Bounds on the motion between two frames. What lies beyond them is reported as "no motion".
   double max_translation_m = 5.0;
   double max_rotation_deg = 15.0;
@@ -66,7 +67,7 @@ struct OdometryResult {
 /// One frame is kept, so each image is processed once. While the camera stands, motions are exactly the identity, and
 /// the frame where it stopped is the one that is kept. Deterministic: the same images give the same bits; one thread.
 /// Not thread-safe: use one object per thread.
-class StereoOdometry {
+class EGOSGM_EXPORT StereoOdometry {
  public:
   /// Throws InvalidArgument where the calibration or an option cannot be used.
   explicit StereoOdometry(const Calibration& calibration, const StereoOdometryOptions& options = {});

@@ -4,6 +4,8 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "egosgm/export.h"
+
 namespace egosgm::vision {
 
 /// The error of one motion, from one frame to the next.
@@ -40,7 +42,7 @@ struct PoseEvaluation {
 /// Compares camera-to-world poses frame by frame (A. Geiger, P. Lenz, R. Urtasun, "Are we ready for Autonomous
 /// Driving?", CVPR 2012). Segments start at every tenth frame, short ones at every frame. Throws InvalidArgument unless
 /// both have the same number of poses, at least two. Percentages are NaN for a path of zero length. Thread-safe.
-PoseEvaluation evaluate_poses(const std::vector<Eigen::Isometry3d>& estimate,
-                              const std::vector<Eigen::Isometry3d>& truth);
+EGOSGM_EXPORT PoseEvaluation evaluate_poses(const std::vector<Eigen::Isometry3d>& estimate,
+                                            const std::vector<Eigen::Isometry3d>& truth);
 
 }  // namespace egosgm::vision

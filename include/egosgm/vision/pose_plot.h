@@ -6,14 +6,18 @@
 #include <string>
 #include <vector>
 
+#include "egosgm/export.h"
+
 namespace egosgm::vision {
 
 /// Two paths from above, their first poses laid on each other: x (to the right) and z (ahead) of the first camera in
 /// metres, at one scale, with a legend and the drift at the end. Takes camera-to-world poses. Throws InvalidArgument
 /// unless both have the same number of them, at least two. Thread-safe.
-cv::Mat draw_path(const std::vector<Eigen::Isometry3d>& estimate, const std::vector<Eigen::Isometry3d>& truth);  // BGR
+EGOSGM_EXPORT cv::Mat draw_path(const std::vector<Eigen::Isometry3d>& estimate,
+                                const std::vector<Eigen::Isometry3d>& truth);  // BGR
 
 /// The same as SVG.
-std::string path_svg(const std::vector<Eigen::Isometry3d>& estimate, const std::vector<Eigen::Isometry3d>& truth);
+EGOSGM_EXPORT std::string path_svg(const std::vector<Eigen::Isometry3d>& estimate,
+                                   const std::vector<Eigen::Isometry3d>& truth);
 
 }  // namespace egosgm::vision

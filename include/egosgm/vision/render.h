@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "egosgm/calibration.h"
+#include "egosgm/export.h"
 
 namespace egosgm::vision {
 
@@ -19,32 +20,33 @@ struct ColorRange {
 };
 
 /// Zero (or below, if disparities are) to the 99.5th percentile of the valid disparities.
-ColorRange disparity_range(const cv::Mat& disparity);
+EGOSGM_EXPORT ColorRange disparity_range(const cv::Mat& disparity);
 
 inline constexpr ColorRange kVarianceRange{0.01, 10.0, true};  // px^2
 
 /// Turbo colours: blue at `low`, red at `high`; black where invalid.
-cv::Mat color_map(const cv::Mat& map, ColorRange range);
+EGOSGM_EXPORT cv::Mat color_map(const cv::Mat& map, ColorRange range);
 
 /// Disparity [px], near is red. With a default range the picture's own.
-cv::Mat color_disparity(const cv::Mat& disparity);
-cv::Mat color_disparity(const cv::Mat& disparity, ColorRange range);
+EGOSGM_EXPORT cv::Mat color_disparity(const cv::Mat& disparity);
+EGOSGM_EXPORT cv::Mat color_disparity(const cv::Mat& disparity, ColorRange range);
 
 /// Variance [px^2] on a logarithmic scale; black where the disparity is invalid.
-cv::Mat color_variance(const cv::Mat& variance, const cv::Mat& disparity, ColorRange range = kVarianceRange);
+EGOSGM_EXPORT cv::Mat color_variance(const cv::Mat& variance, const cv::Mat& disparity,
+                                     ColorRange range = kVarianceRange);
 
 /// |estimate - truth| in ten steps that double, blue below and red above 3 px; black without truth, grey without an
 /// estimate. Truth is drawn 3x3 pixels large where its neighbours have none.
-cv::Mat color_error(const cv::Mat& estimate, const cv::Mat& truth);
+EGOSGM_EXPORT cv::Mat color_error(const cv::Mat& estimate, const cv::Mat& truth);
 
 /// A horizontal bar of turbo colours with the range's ends, three values between and `unit`, `width` x 40 pixels.
-cv::Mat color_bar(int width, ColorRange range, const std::string& unit);
+EGOSGM_EXPORT cv::Mat color_bar(int width, ColorRange range, const std::string& unit);
 
 /// The ten steps of color_error with their limits in px, and its grey, `width` x 40 pixels.
-cv::Mat error_bar(int width);
+EGOSGM_EXPORT cv::Mat error_bar(int width);
 
 /// Grey (8 or 16 bit; 16 bit is stretched to its own maximum) as BGR.
-cv::Mat color_grey(const cv::Mat& grey);
+EGOSGM_EXPORT cv::Mat color_grey(const cv::Mat& grey);
 
 struct CaptionedPicture {
   cv::Mat picture;      // CV_8UC3
@@ -52,10 +54,10 @@ struct CaptionedPicture {
 };
 
 /// Pictures in rows of `columns`, each scaled down to `cell_width` if wider, its caption above it.
-cv::Mat compose(const std::vector<CaptionedPicture>& pictures, int columns, int cell_width);
+EGOSGM_EXPORT cv::Mat compose(const std::vector<CaptionedPicture>& pictures, int columns, int cell_width);
 
 /// Depth [m] = fx * baseline_m / (d + doffs_px), CV_32FC1; kInvalidDisparity where the disparity is invalid or d +
 /// doffs_px <= 0.
-cv::Mat depth_from_disparity(const cv::Mat& disparity, const Calibration& calibration);
+EGOSGM_EXPORT cv::Mat depth_from_disparity(const cv::Mat& disparity, const Calibration& calibration);
 
 }  // namespace egosgm::vision

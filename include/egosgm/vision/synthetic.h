@@ -8,12 +8,13 @@
 #include <opencv2/core.hpp>
 
 #include "egosgm/calibration.h"
+#include "egosgm/export.h"
 #include "egosgm/motion.h"
 
 namespace egosgm::vision {
 
 /// A drive through a street of houses, parked cars, trees and thin poles. Equal options give equal bits.
-struct SyntheticOptions {
+struct EGOSGM_EXPORT SyntheticOptions {
   int frames = 20;                 // 1..10000
   int width = 640, height = 240;   // [px], 1..8192 each
   unsigned seed = 1;               // of street, texture and sensor noise
@@ -42,7 +43,7 @@ struct SyntheticFrame {
 };
 
 /// Renders any frame of the drive on demand. Thread-safe: const calls may run at the same time.
-class SyntheticSequence {
+class EGOSGM_EXPORT SyntheticSequence {
  public:
   /// Throws InvalidArgument for options out of range.
   explicit SyntheticSequence(const SyntheticOptions& options);
@@ -78,7 +79,7 @@ class SyntheticSequence {
 ///   truth/left_moving, right_moving       with moving_object only: 255 on moving objects
 /// Every file appears whole or not at all; existing ones are replaced. `progress(done, frames)` is called after each
 /// frame, if given. Throws InvalidArgument, naming the file, where the folder cannot be written.
-void write_sequence(const SyntheticOptions& options, const std::filesystem::path& folder,
-                    const std::function<void(int done, int frames)>& progress = {});
+EGOSGM_EXPORT void write_sequence(const SyntheticOptions& options, const std::filesystem::path& folder,
+                                  const std::function<void(int done, int frames)>& progress = {});
 
 }  // namespace egosgm::vision

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "egosgm/vision/dataset.h"
+#include "egosgm/vision/render.h"
+
+namespace egosgm::app {
+
+/// A frame and what the pipeline made of it: disparity, variance CV_32FC1, search width CV_16UC1.
+struct ShownFrame {
+  const vision::StereoFrame& frame;
+  const cv::Mat& left;
+  const cv::Mat &disparity, &variance, &search_width;
+};
+
+/// A sequence's maps as pictures with their scales. Colours stand for the same values in all frames: the first one's
+/// range. Not thread-safe.
+class FramePanels {
+ public:
+  explicit FramePanels(int disparities) : disparities_(disparities) {}
+
+  /// The range of the first map that it is asked for.
+  const vision::ColorRange& disparity_range(const cv::Mat& disparity);
+  cv::Mat disparity(const cv::Mat& disparity);
+  /// Left image, disparity, search width, and the error where there is truth, else the variance.
+  cv::Mat overview(const ShownFrame& shown);
+  /// Left image in its colours, disparity, variance, search width, and the error where there is truth; two a row, each
+  /// at most `cell_width` px wide.
+  cv::Mat all(const ShownFrame& shown, int cell_width);
+
+ private:
+  vision::CaptionedPicture disparity_panel(const ShownFrame& shown);
+  vision::CaptionedPicture search_panel(const ShownFrame& shown) const;
+
+  const int disparities_;
+  std::optional<vision::ColorRange> range_;
+};
+
+}  // namespace egosgm::app

@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+// Looks at a sequence while it is matched: in a window, as a video, as pictures.
+#include <fmt/core.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <opencv2/highgui.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "apps/command.h"
+#include "apps/device_arguments.h"
+#include "apps/frame_panels.h"
+#include "apps/interrupt.h"
+#include "apps/motion_source.h"
+#include "apps/option_arguments.h"
+#include "apps/progress.h"
+#include "apps/sequence_arguments.h"
+#include "egosgm/error.h"
+#include "egosgm/pipeline.h"
+#include "egosgm/vision/file_io.h"
+#include "egosgm/vision/image_io.h"
+
+namespace egosgm::app {
+namespace {
+
+struct ViewArguments {
+  SequenceArguments input;
+  OptionArguments method;
+  vision::StereoOdometryOptions odometry;
+  std::string poses, device, programs, video, pictures;
+  double frames_per_second = 10;
+  int cell_width = 620;
+  bool paused = false, quiet = false;
+};
+
+/// Matches one frame after the other and draws what came out.
+class DrawnSequence {
+ public:
+  explicit DrawnSequence(const ViewArguments& arguments)
+      : cell_width_(arguments.cell_width),
+        sequence_(arguments.input.open()),
+        size_(vision::check_image_sizes(sequence_)),
+        motions_(sequence_, arguments.poses, arguments.odometry),
+        options_(arguments.method.options()),
+        pipeline_(sequence_.calibration, size_.width, size_.height, options_, device_of(arguments)),
+        disparity_(size_, CV_32FC1),
+        variance_(size_, CV_32FC1),
+        search_width_(size_, CV_16UC1),
+        panels_(options_.disparities) {}
+
+  std::size_t frames() const { return sequence_.frames.size(); }
+  const std::string& name(std::size_t i) const { return sequence_.frames[i].name; }
+
+  /// REQUIRES: called for frames 0, 1, 2, ... of the sequence.
+  cv::Mat draw(std::size_t i) {
+    const vision::StereoFrame& frame = sequence_.frames[i];
+    const vision::StereoImages images = vision::read_images(frame);
+    const std::optional<Motion> motion = motions_.next(images).motion;
+    FrameOutputs outputs;
+    outputs.disparity = vision::map_view(disparity_);
+    outputs.variance = vision::map_view(variance_);
+    outputs.search_width = {search_width_.ptr<std::uint16_t>(), size_.width, size_.height,
+                            static_cast<std::ptrdiff_t>(search_width_.step)};
+    report_ = pipeline_.process(vision::image_view(images.left), vision::image_view(images.right), motion, outputs);
+    return panels_.all({frame, images.left, disparity_, variance_, search_width_}, cell_width_);
+  }
+
+  std::string summary(std::size_t i) const {
+    return fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms", name(i),
+                       100 * report_.search_fraction, 100 * report_.density, report_.total_ms);
+  }
+
+ private:
+  static Device device_of(const ViewArguments& arguments) {
+    const Device device = Device::select(arguments.device);
+    return arguments.programs.empty() ? device : device.with_programs(arguments.programs);
+  }
+
+  const int cell_width_;
+  const vision::StereoSequence sequence_;
+  const cv::Size size_;
+  MotionSource motions_;
+  const PipelineOptions options_;
+  Pipeline pipeline_;
+  cv::Mat disparity_, variance_, search_width_;
+  FramePanels panels_;
+  FrameReport report_;
+};
+
+/// A video that appears under its name once it is whole.
+class VideoFile {
+ public:
+  VideoFile(std::filesystem::path file, double frames_per_second)
+      : file_(std::move(file)), frames_per_second_(frames_per_second) {
+    if (file_.extension() != ".mp4" && file_.extension() != ".avi")
+      throw InvalidArgument("--video " + file_.string() + ": the name must end in .mp4 or .avi");
+    vision::make_folder(std::filesystem::absolute(file_).parent_path());
+    unfinished_ = file_;
+    unfinished_.replace_filename(fmt::format(".{}.{}{}", file_.stem().string(), getpid(), file_.extension().string()));
+  }
+  ~VideoFile() {
+    std::error_code ignored;
+    std::filesystem::remove(unfinished_, ignored);
+  }
+  VideoFile(const VideoFile&) = delete;
+  VideoFile& operator=(const VideoFile&) = delete;
+
+  void add(const cv::Mat& picture) {
+    cv::Mat even;  // the codecs want even sides
+    cv::copyMakeBorder(picture, even, 0, picture.rows % 2, 0, picture.cols % 2, cv::BORDER_CONSTANT);
+    if (!writer_.isOpened()) {
+      const bool mp4 = file_.extension() == ".mp4";
+      const int codec = mp4 ? cv::VideoWriter::fourcc('m', 'p', '4', 'v') : cv::VideoWriter::fourcc('M', 'J', 'P', 'G');
+      if (!writer_.open(unfinished_.string(), codec, frames_per_second_, even.size())) {
+        throw IoError(file_.string() + ": OpenCV cannot write this video: " +
+                      (mp4 ? "give a name that ends in .avi, or use --pictures" : "use --pictures"));
+      }
+    }
+    writer_.write(even);
+  }
+
+  void finish() {
+    if (!writer_.isOpened()) return;
+    writer_.release();
+    std::error_code error;
+    std::filesystem::rename(unfinished_, file_, error);
+    if (error) throw IoError(file_.string() + ": cannot be written: " + error.message());
+  }
+
+ private:
+  const std::filesystem::path file_;
+  const double frames_per_second_;
+  std::filesystem::path unfinished_;
+  cv::VideoWriter writer_;
+};
+
+int write_files(DrawnSequence& drawn, const ViewArguments& arguments) {
+  std::optional<VideoFile> video;
+  if (!arguments.video.empty()) video.emplace(arguments.video, arguments.frames_per_second);
+  if (!arguments.pictures.empty()) vision::make_folder(arguments.pictures);
+  std::size_t i = 0;
+  {
+    Progress progress(static_cast<int>(drawn.frames()), arguments.quiet);
+    for (; i < drawn.frames() && !interrupted(); ++i) {
+      const cv::Mat picture = drawn.draw(i);
+      if (video) video->add(picture);
+      if (!arguments.pictures.empty())
+        vision::write_png(std::filesystem::path(arguments.pictures) / (drawn.name(i) + ".png"), picture);
+      progress.done(drawn.summary(i));
+    }
+  }
+  if (video) video->finish();
+  if (i == drawn.frames()) return kOk;
+  fmt::print(stderr, "egosgm: interrupted after {} of {} frames: what was written is whole\n", i, drawn.frames());
+  return kInterrupted;
+}
+
+/// The window: plays, pauses, and steps through what has been drawn.
+class Window {
+ public:
+  Window(DrawnSequence& drawn, const ViewArguments& arguments)
+      : drawn_(drawn), playing_(!arguments.paused), delay_ms_(std::max(1, int(1000 / arguments.frames_per_second))) {
+    cv::namedWindow(kName, cv::WINDOW_NORMAL | cv::WINDOW_KEEPRATIO);
+  }
+  ~Window() { cv::destroyAllWindows(); }
+  Window(const Window&) = delete;
+  Window& operator=(const Window&) = delete;
+
+  int operator()() {
+    show(0);
+    cv::resizeWindow(kName, pictures_[0].size());
+    while (!interrupted() && is_open()) {
+      const int key = cv::waitKeyEx(playing_ ? delay_ms_ : 50);
+      if (is_quit(key) || !is_open()) break;
+      if (key == ' ') playing_ = !playing_;
+      if (is_step_back(key) && at_ > 0) playing_ = false, show(at_ - 1);
+      if (is_step(key)) playing_ = false;
+      if ((playing_ || is_step(key)) && at_ + 1 < drawn_.frames()) show(at_ + 1);
+    }
+    return interrupted() ? kInterrupted : kOk;
+  }
+
+ private:
+  static constexpr const char* kName = "egosgm: space plays or pauses, right and left step, q quits";
+  static bool is_quit(int key) { return key >= 0 && ((key & 0xff) == 'q' || (key & 0xff) == 27) && !is_arrow(key); }
+  static bool is_arrow(int key) { return (key & 0xff00) == 0xff00; }  // X11's, as all of OpenCV's windows give them
+  static bool is_step(int key) { return key == 'n' || (is_arrow(key) && (key & 0xff) == 0x53); }
+  static bool is_step_back(int key) { return key == 'p' || (is_arrow(key) && (key & 0xff) == 0x51); }
+  static bool is_open() { return cv::getWindowProperty(kName, cv::WND_PROP_VISIBLE) >= 1; }
+
+  void show(std::size_t i) {
+    while (pictures_.size() <= i) pictures_.push_back(drawn_.draw(pictures_.size()));
+    at_ = i;
+    cv::imshow(kName, pictures_[i]);
+  }
+
+  DrawnSequence& drawn_;
+  bool playing_;
+  const int delay_ms_;
+  std::vector<cv::Mat> pictures_;
+  std::size_t at_ = 0;
+};
+
+void require_display() {
+  for (const char* name : {"DISPLAY", "WAYLAND_DISPLAY"}) {
+    if (const char* value = std::getenv(name); value && *value) return;
+  }
+  throw InvalidArgument("there is no display (DISPLAY is not set): give --video FILE.mp4 or --pictures DIR");
+}
+
+int view(const ViewArguments& arguments) {
+  if (!(arguments.frames_per_second > 0 && arguments.frames_per_second <= 1000))
+    throw InvalidArgument(fmt::format("--fps {}: choose a number above 0, up to 1000", arguments.frames_per_second));
+  const bool window = arguments.video.empty() && arguments.pictures.empty();
+  if (window) require_display();
+  catch_interrupts();
+  DrawnSequence drawn(arguments);
+  return window ? Window(drawn, arguments)() : write_files(drawn, arguments);
+}
+
+}  // namespace
+
+Command add_view(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("view", "Look at a sequence while it is matched: in a window, as a video, as pictures");
+  auto arguments = std::make_shared<ViewArguments>();
+  arguments->input.add_to(*command);
+  const char* group = "Output (default: a window)";
+  command->add_option("--video", arguments->video, "write a video in place of the window")
+      ->type_name("FILE.mp4")
+      ->group(group);
+  command->add_option("--pictures", arguments->pictures, "write DIR/NNNNNN.png in place of the window")
+      ->type_name("DIR")
+      ->group(group);
+  command->add_option("--fps", arguments->frames_per_second, "frames per second, at most")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group(group);
+  command->add_option("--cell-width", arguments->cell_width, "width of a panel [px], two stand in a row")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group(group);
+  command->add_flag("--paused", arguments->paused, "start with the first frame, paused")->group(group);
+  command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
+  arguments->method.add_to(*command);
+  command
+      ->add_option("--poses", arguments->poses,
+                   "take the motion from KITTI poses (camera-to-world) in place of stereo odometry")
+      ->type_name("FILE")
+      ->group("Method");
+  add_motion_bounds(*command, arguments->odometry, "Method");
+  add_device(*command, arguments->device);
+  add_programs(*command, arguments->programs);
+  return {command, [arguments] { return view(*arguments); }};
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+# Builds the Python module where Python's headers and pybind11 are there; -DEGOSGM_PYTHON=ON insists on it, OFF leaves it out.
+if(NOT DEFINED SKBUILD AND NOT DEFINED Python_EXECUTABLE AND EXISTS /usr/bin/python3)
+  set(Python_EXECUTABLE /usr/bin/python3)  # the system's pybind11 and NumPy belong to the system's Python
+endif()
+if(NOT DEFINED EGOSGM_PYTHON OR EGOSGM_PYTHON)
+  find_package(Python 3.9 COMPONENTS Interpreter Development.Module QUIET)
+  if(Python_FOUND)
+    find_package(pybind11 2.6 CONFIG QUIET)
+  endif()
+endif()
+set(found OFF)
+if(pybind11_FOUND AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
+  set(found ON)
+endif()
+option(EGOSGM_PYTHON "Build the Python module (needs pybind11)" ${found})
+if(EGOSGM_PYTHON AND NOT pybind11_FOUND)
+  message(FATAL_ERROR "EGOSGM_PYTHON needs Python's headers and pybind11: install python3-dev and pybind11-dev, or use `pip install .`")
+endif()
+if(EGOSGM_PYTHON)
+  add_subdirectory(python)
+endif()

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/point_cloud.h"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/disparity_io.h"
+#include "egosgm/vision/file_io.h"
+#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/render.h"
+
+namespace egosgm::vision {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "write_ply writes the host's bytes as little endian");
+
+void require(bool fits, const char* what) {
+  if (!fits) throw InvalidArgument(std::string("point cloud: ") + what);
+}
+
+void require_positive(const char* name, double value) {
+  if (value > 0) return;
+  throw InvalidArgument(std::string("point cloud: ") + name + " is " + std::to_string(value) +
+                        ": choose a positive number");
+}
+
+bool has_neighbour_within(const cv::Mat& disparity, int x, int y, float max_jump_px) {
+  const float d = disparity.at<float>(y, x);
+  const auto near = [&](int u, int v) {
+    if (u < 0 || v < 0 || u >= disparity.cols || v >= disparity.rows) return false;
+    const float n = disparity.at<float>(v, u);
+    return is_valid_disparity(n) && std::abs(n - d) <= max_jump_px;
+  };
+  return near(x - 1, y) || near(x + 1, y) || near(x, y - 1) || near(x, y + 1);
+}
+
+template <typename T>
+void put(std::string& bytes, T value) {
+  char raw[sizeof value];
+  std::memcpy(raw, &value, sizeof value);
+  bytes.append(raw, sizeof value);
+}
+
+}  // namespace
+
+void PointCloudOptions::validate() const {
+  require_positive("max_relative_sigma", max_relative_sigma);
+  require_positive("max_depth_m", max_depth_m);
+  require_positive("max_jump_px", max_jump_px);
+}
+
+PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const cv::Mat& colors,
+                       const Calibration& calibration, const PointCloudOptions& options) {
+  require(!disparity.empty() && disparity.type() == CV_32FC1 && variance.type() == CV_32FC1,
+          "disparity and variance must be CV_32FC1");
+  require(disparity.size() == variance.size() && disparity.size() == colors.size(),
+          "disparity, variance and image must have one size");
+  options.validate();
+  const cv::Mat picture = colors.type() == CV_8UC3 ? colors : color_grey(colors);
+  PointCloud cloud;
+  for (int y = 0; y < disparity.rows; ++y) {
+    for (int x = 0; x < disparity.cols; ++x) {
+      const float d = disparity.at<float>(y, x);
+      const double shift_px = d + calibration.doffs_px;
+      if (!is_valid_disparity(d) || shift_px <= 0) continue;
+      const double depth_m = calibration.fx * calibration.baseline_m / shift_px;
+      const double relative_sigma = std::sqrt(variance.at<float>(y, x)) / shift_px;
+      if (depth_m > options.max_depth_m || !(relative_sigma <= options.max_relative_sigma)) continue;
+      if (!has_neighbour_within(disparity, x, y, static_cast<float>(options.max_jump_px))) continue;
+      cloud.points_m.emplace_back(static_cast<float>((x - calibration.cx) / calibration.fx * depth_m),
+                                  static_cast<float>((y - calibration.cy) / calibration.fy * depth_m),
+                                  static_cast<float>(depth_m));
+      cloud.colors.push_back(picture.at<cv::Vec3b>(y, x));
+    }
+  }
+  return cloud;
+}
+
+void write_ply(const std::filesystem::path& file, const PointCloud& cloud) {
+  require(cloud.points_m.size() == cloud.colors.size(), "as many colours as points are needed");
+  std::string bytes =
+      "ply\nformat binary_little_endian 1.0\ncomment EgoSGM: left camera's frame, x right, y down, z forward, metres\n"
+      "element vertex " +
+      std::to_string(cloud.points_m.size()) +
+      "\nproperty float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
+  constexpr std::size_t kBytesPerPoint = 15;
+  bytes.reserve(bytes.size() + kBytesPerPoint * cloud.points_m.size());
+  for (std::size_t i = 0; i < cloud.points_m.size(); ++i) {
+    const cv::Point3f& point = cloud.points_m[i];
+    for (const float value : {point.x, point.y, point.z}) put(bytes, value);
+    for (const int channel : {2, 1, 0}) put(bytes, cloud.colors[i][channel]);
+  }
+  write_file(file, bytes);
+}
+
+std::int64_t write_depth_png(const std::filesystem::path& file, const cv::Mat& depth_m) {
+  require(!depth_m.empty() && depth_m.type() == CV_32FC1, "a depth map must be CV_32FC1");
+  constexpr float kStepsPerMetre = 1000.0f;
+  cv::Mat stored(depth_m.size(), CV_16UC1, cv::Scalar(0));
+  std::int64_t not_stored = 0;
+  for (int y = 0; y < depth_m.rows; ++y) {
+    for (int x = 0; x < depth_m.cols; ++x) {
+      const float depth = depth_m.at<float>(y, x);
+      if (!is_valid_disparity(depth) || depth <= 0) continue;
+      const float steps = std::max(std::round(depth * kStepsPerMetre), 1.0f);
+      if (steps <= 65535.0f) {
+        stored.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(steps);
+      } else {
+        ++not_stored;
+      }
+    }
+  }
+  write_png(file, stored);
+  return not_stored;
+}
+
+}  // namespace egosgm::vision

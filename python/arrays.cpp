@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "python/arrays.h"
+
+#include <cmath>
+
+#include "egosgm/error.h"
+
+namespace egosgm::python {
+namespace {
+
+std::string shape_of(const py::array& array) {
+  std::string text = "(";
+  for (py::ssize_t i = 0; i < array.ndim(); ++i) text += (i ? ", " : "") + std::to_string(array.shape(i));
+  return text + ") of " + py::str(array.dtype()).cast<std::string>();
+}
+
+py::array as_array(const py::object& object, const std::string& name, const char* wanted) {
+  py::array array = object.is_none() ? py::array() : py::array::ensure(object);
+  if (object.is_none() || !array) {
+    PyErr_Clear();
+    throw InvalidArgument(name + " is no array: give " + wanted);
+  }
+  return array;
+}
+
+bool rows_are_contiguous(const py::array& array) { return array.shape(1) < 2 || array.strides(1) == array.itemsize(); }
+
+py::array contiguous(const py::array& array) { return py::module_::import("numpy").attr("ascontiguousarray")(array); }
+
+py::array_t<double> doubles_of(const py::object& object, const char* name) {
+  auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
+  if (!array) {
+    PyErr_Clear();
+    throw InvalidArgument(std::string(name) + " is no array of numbers: give a 4x4 matrix");
+  }
+  return array;
+}
+
+Eigen::Isometry3d transform_at(const double* rows, int count, const char* name) {
+  Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
+  for (int row = 0; row < count; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      const double value = rows[4 * row + column];
+      if (!std::isfinite(value)) throw InvalidArgument(std::string(name) + " holds a value that is not finite");
+      transform.matrix()(row, column) = value;
+    }
+  }
+  return transform;
+}
+
+void store(const Eigen::Isometry3d& transform, double* to) {
+  Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(to, 4, 4) = transform.matrix();
+}
+
+}  // namespace
+
+ImageArray image_of(const py::object& image, const char* name) {
+  constexpr const char* kWanted = "a grey image, H x W of uint8 or uint16";
+  py::array array = as_array(image, name, kWanted);
+  const bool bytes = array.dtype().equal(py::dtype::of<std::uint8_t>());
+  if (array.ndim() != 2 || (!bytes && !array.dtype().equal(py::dtype::of<std::uint16_t>()))) {
+    throw InvalidArgument(std::string(name) + " is " + shape_of(array) + ": give " + kWanted);
+  }
+  if (!rows_are_contiguous(array)) array = contiguous(array);
+  const ImageView view{.data = array.data(),
+                       .width = static_cast<int>(array.shape(1)),
+                       .height = static_cast<int>(array.shape(0)),
+                       .stride_bytes = array.strides(0),
+                       .type = bytes ? PixelType::kU8 : PixelType::kU16};
+  return {array, view};
+}
+
+cv::Mat map_of(const py::object& map, const char* name, py::array& keep) {
+  keep = as_array(map, name, "an H x W map of float32");
+  if (keep.ndim() != 2 || keep.size() == 0) {
+    throw InvalidArgument(std::string(name) + " is " + shape_of(keep) + ": give an H x W map of float32");
+  }
+  if (!keep.dtype().equal(py::dtype::of<float>())) {
+    py::object floats = py::module_::import("numpy").attr("asarray")(keep, py::dtype::of<float>());
+    keep = floats;
+  }
+  if (!rows_are_contiguous(keep) || keep.strides(0) < keep.shape(1) * keep.itemsize()) keep = contiguous(keep);
+  return cv::Mat(static_cast<int>(keep.shape(0)), static_cast<int>(keep.shape(1)), CV_32FC1,
+                 const_cast<void*>(keep.data()), static_cast<std::size_t>(keep.strides(0)));
+}
+
+template <typename T>
+MapView<T> output_of(const py::object& object, const std::string& name) {
+  const std::string wanted =
+      "give a writeable H x W array of " + py::str(py::dtype::of<T>()).cast<std::string>() + " with contiguous rows";
+  if (!py::isinstance<py::array>(object)) throw InvalidArgument("output " + name + " is no NumPy array: " + wanted);
+  auto array = py::reinterpret_borrow<py::array>(object);
+  if (array.ndim() != 2 || !array.dtype().equal(py::dtype::of<T>()) || !array.writeable() ||
+      !rows_are_contiguous(array)) {
+    throw InvalidArgument("output " + name + " is " + shape_of(array) + (array.writeable() ? "" : ", read-only") +
+                          ": " + wanted);
+  }
+  return {static_cast<T*>(array.mutable_data()), static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)),
+          array.strides(0)};
+}
+template MapView<float> output_of<float>(const py::object&, const std::string&);
+template MapView<std::uint16_t> output_of<std::uint16_t>(const py::object&, const std::string&);
+
+py::array array_of(const cv::Mat& mat) {
+  const py::dtype type = mat.depth() == CV_8U    ? py::dtype::of<std::uint8_t>()
+                         : mat.depth() == CV_16U ? py::dtype::of<std::uint16_t>()
+                                                 : py::dtype::of<float>();
+  const py::capsule owner(new cv::Mat(mat), [](void* held) { delete static_cast<cv::Mat*>(held); });
+  const auto item = static_cast<py::ssize_t>(mat.elemSize1());
+  const auto step = static_cast<py::ssize_t>(mat.step[0]);
+  if (mat.channels() == 1) return py::array(type, {mat.rows, mat.cols}, {step, item}, mat.data, owner);
+  return py::array(type, {mat.rows, mat.cols, 3}, {step, 3 * item, -item}, mat.data + 2 * item, owner);  // BGR read RGB
+}
+
+Eigen::Isometry3d transform_of(const py::object& matrix, const char* name) {
+  const py::array_t<double> values = doubles_of(matrix, name);
+  if (values.ndim() != 2 || values.shape(1) != 4 || (values.shape(0) != 4 && values.shape(0) != 3)) {
+    throw InvalidArgument(std::string(name) + " is " + shape_of(values) + ": give a 4x4 matrix [R t; 0 1]");
+  }
+  return transform_at(values.data(), static_cast<int>(values.shape(0)), name);
+}
+
+py::array_t<double> array_of(const Eigen::Isometry3d& transform) {
+  py::array_t<double> array({4, 4});
+  store(transform, array.mutable_data());
+  return array;
+}
+
+std::vector<Eigen::Isometry3d> transforms_of(const py::object& matrices, const char* name) {
+  const py::array_t<double> values = doubles_of(matrices, name);
+  if (values.ndim() != 3 || values.shape(1) != 4 || values.shape(2) != 4) {
+    throw InvalidArgument(std::string(name) + " is " + shape_of(values) + ": give poses as an (N, 4, 4) array");
+  }
+  std::vector<Eigen::Isometry3d> transforms;
+  for (py::ssize_t i = 0; i < values.shape(0); ++i) transforms.push_back(transform_at(values.data(i), 4, name));
+  return transforms;
+}
+
+py::array_t<double> array_of(const std::vector<Eigen::Isometry3d>& transforms) {
+  py::array_t<double> array({static_cast<py::ssize_t>(transforms.size()), py::ssize_t{4}, py::ssize_t{4}});
+  for (std::size_t i = 0; i < transforms.size(); ++i) store(transforms[i], array.mutable_data() + 16 * i);
+  return array;
+}
+
+}  // namespace egosgm::python

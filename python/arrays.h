@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// NumPy's arrays and the library's views of the same memory.
+#pragma once
+
+#include <pybind11/numpy.h>
+
+#include <Eigen/Geometry>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "egosgm/image.h"
+#include "egosgm/motion.h"
+
+namespace egosgm::python {
+
+namespace py = pybind11;
+
+/// A view, and what keeps its memory alive.
+struct ImageArray {
+  py::array array;
+  ImageView view;
+};
+
+/// A grey image, H x W of uint8 or uint16, rows at any stride. Copied only where a row's pixels do not lie side by
+/// side. Throws InvalidArgument, naming the image.
+ImageArray image_of(const py::object& image, const char* name);
+
+/// An H x W map of float32; other numbers, and rows that are not contiguous, are converted into a copy, which `keep`
+/// holds. Throws InvalidArgument.
+cv::Mat map_of(const py::object& map, const char* name, py::array& keep);
+
+/// A view for the library to fill. Throws InvalidArgument unless a writeable H x W array of T with contiguous rows.
+template <typename T>
+MapView<T> output_of(const py::object& object, const std::string& name);
+
+/// The matrix's memory as an array, without a copy; colours as RGB.
+py::array array_of(const cv::Mat& mat);
+
+/// A 4x4 (or 3x4) rigid transform. Throws InvalidArgument for another shape or values that are not finite.
+Eigen::Isometry3d transform_of(const py::object& matrix, const char* name);
+py::array_t<double> array_of(const Eigen::Isometry3d& transform);
+
+/// An (N, 4, 4) array.
+std::vector<Eigen::Isometry3d> transforms_of(const py::object& matrices, const char* name);
+py::array_t<double> array_of(const std::vector<Eigen::Isometry3d>& transforms);
+
+}  // namespace egosgm::python

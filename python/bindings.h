@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace egosgm::python {
+
+void bind_errors(pybind11::module_& module);
+void bind_pipeline(pybind11::module_& module);
+void bind_odometry(pybind11::module_& module);
+void bind_files(pybind11::module_& module);
+void bind_evaluation(pybind11::module_& module);
+
+}  // namespace egosgm::python

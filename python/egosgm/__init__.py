@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Dense disparity from stereo video on OpenCL devices.
+
+    import egosgm
+    sequence = egosgm.open_folder("street")
+    width, height = sequence.size
+    pipeline = egosgm.Pipeline(sequence.calibration, width, height, disparities=128)
+    odometry = egosgm.StereoOdometry(sequence.calibration)
+    for frame in sequence.frames:
+        left, right = frame.read()
+        result = pipeline.process(left, right, odometry.process(left, right).motion)
+        result.disparity  # float32, pixels, egosgm.INVALID_DISPARITY where there is none
+"""
+import inspect as _inspect
+
+from . import _egosgm
+from ._egosgm import *  # noqa: F401,F403
+from ._egosgm import __version__
+
+__all__ = ["__version__", *(name for name in dir(_egosgm) if not name.startswith("_"))]
+
+
+def _signature(leading, options):
+    """What help() and editors show: the options with their defaults."""
+    kind = _inspect.Parameter
+    names = [kind(name, kind.POSITIONAL_OR_KEYWORD) for name in leading]
+    return _inspect.Signature(names + [kind(name.replace(".", "__"), kind.KEYWORD_ONLY, default=value)
+                                       for name, value in options.items()])
+
+
+_egosgm.Pipeline.__doc__ = """Disparity and its variance for every frame of rectified stereo video.
+
+Pipeline(calibration, width, height, *, device="", preset="default", **options)
+
+device: a number, a type or a part of a name, see devices(); "" is the environment variable EGOSGM_DEVICE, else the first one.
+preset: "default" or "paper".
+options: by name, `banded_sgm__p2=150`, or by stage, `banded_sgm={"p2": 150}`. They are, with their defaults:
+""" + "".join(f"    {_name.replace('.', '__')}={_value!r}\n" for _name, _value in _egosgm.pipeline_options().items())
+_egosgm.Pipeline.__signature__ = _signature(("calibration", "width", "height"),
+                                            {"device": "", "preset": "default", **_egosgm.pipeline_options()})
+_egosgm.StereoOdometry.__signature__ = _signature(("calibration",), _egosgm.odometry_options())
+_egosgm.SyntheticSequence.__signature__ = _signature((), _egosgm.synthetic_options())

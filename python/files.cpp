@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "egosgm/vision/calibration_io.h"
+#include "egosgm/vision/dataset.h"
+#include "egosgm/vision/disparity_io.h"
+#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/poses_io.h"
+#include "python/arrays.h"
+#include "python/bindings.h"
+
+namespace egosgm::python {
+namespace {
+
+using std::filesystem::path;
+using vision::StereoFrame;
+using vision::StereoSequence;
+
+vision::FrameRange range_of(const std::string& frames) {
+  return frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(frames);
+}
+
+py::tuple read_images(const StereoFrame& frame) {
+  vision::StereoImages images;
+  {
+    const py::gil_scoped_release other_threads_run;
+    images = vision::read_images(frame);
+  }
+  return py::make_tuple(array_of(images.left), array_of(images.right));
+}
+
+void bind_sequences(py::module_& module) {
+  py::class_<StereoFrame>(module, "StereoFrame", "One stereo pair on disk, and its truth where there is one.")
+      .def_readonly("number", &StereoFrame::number)
+      .def_readonly("name", &StereoFrame::name, "The number with six digits.")
+      .def_readonly("left", &StereoFrame::left)
+      .def_readonly("right", &StereoFrame::right)
+      .def_readonly("truth_noc", &StereoFrame::truth_noc, "Left disparity of non-occluded pixels; empty: none.")
+      .def_readonly("truth_occ", &StereoFrame::truth_occ, "Left disparity of all pixels; empty: none.")
+      .def("read", &read_images, "Both images as grey: (left, right).");
+  py::class_<StereoSequence>(module, "StereoSequence", "Consecutive frames of one rectified camera pair.")
+      .def_readonly("title", &StereoSequence::title)
+      .def_readonly("frames", &StereoSequence::frames)
+      .def_readonly("calibration", &StereoSequence::calibration)
+      .def_readonly("poses_file", &StereoSequence::poses_file, "The true poses; empty where there are none.")
+      .def_property_readonly(
+          "size",
+          [](const StereoSequence& s) {
+            const cv::Size size = vision::check_image_sizes(s);
+            return py::make_tuple(size.width, size.height);
+          },
+          "(width, height) of all images.")
+      .def("__len__", [](const StereoSequence& s) { return s.frames.size(); });
+
+  module.def(
+      "open_folder",
+      [](const path& folder, const std::string& frames) { return vision::open_folder(folder, range_of(frames)); },
+      py::arg("folder"), py::arg("frames") = "",
+      "Opens a folder in the layout of KITTI odometry, KITTI raw or Middlebury. frames: \"7:10\", \"7:\", \":10\".");
+  module.def(
+      "open_kitti_multiview",
+      [](const path& folder, const std::string& scene, const std::string& frames) {
+        return vision::open_kitti_multiview(folder, scene, range_of(frames));
+      },
+      py::arg("folder"), py::arg("scene"), py::arg("frames") = "", "KITTI 2012 or 2015 multi-view.");
+  module.def(
+      "open_patterns",
+      [](const std::string& left, const std::string& right, const path& calibration, const std::string& frames) {
+        return vision::open_patterns(left, right, calibration, range_of(frames));
+      },
+      py::arg("left"), py::arg("right"), py::arg("calibration"), py::arg("frames") = "",
+      "PNG files or patterns such as 'left/%06d.png' or 'left/*.png'.");
+}
+
+std::int64_t write_disparity(const path& file, const py::object& map) {
+  py::array keep;
+  return vision::write_disparity(file, map_of(map, "disparity", keep));
+}
+
+void write_pfm(const path& file, const py::object& map) {
+  py::array keep;
+  vision::write_pfm(file, map_of(map, "map", keep));
+}
+
+}  // namespace
+
+void bind_files(py::module_& module) {
+  bind_sequences(module);
+  module.def(
+      "read_calibration", [](const path& file) { return vision::read_calibration(file); }, py::arg("file"),
+      "Reads KITTI's, Middlebury's or EgoSGM's own format.");
+  module.def("write_calibration", &vision::write_calibration, py::arg("file"), py::arg("calibration"));
+  module.def(
+      "read_grey", [](const path& file) { return array_of(vision::read_grey_png(file)); }, py::arg("file"),
+      "Reads a PNG of any colour type as grey, uint8 or uint16.");
+  module.def(
+      "read_disparity", [](const path& file) { return array_of(vision::read_disparity(file)); }, py::arg("file"),
+      "Reads KITTI's PNG or a PFM into float32; INVALID_DISPARITY where there is none.");
+  module.def("write_disparity", &write_disparity, py::arg("file"), py::arg("disparity"),
+             "Writes KITTI's PNG or a PFM by the extension. Returns how many disparities the format has no room for.");
+  module.def("write_pfm", &write_pfm, py::arg("file"), py::arg("map"), "Writes any map; infinity where invalid.");
+  module.def(
+      "read_poses", [](const path& file) { return array_of(vision::read_poses(file)); }, py::arg("file"),
+      "Reads KITTI poses, camera-to-world: (N, 4, 4).");
+  module.def(
+      "write_poses",
+      [](const path& file, const py::object& poses) { vision::write_poses(file, transforms_of(poses, "poses")); },
+      py::arg("file"), py::arg("world_from_camera"));
+}
+
+}  // namespace egosgm::python

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/error.h"
+#include "egosgm/image.h"
+#include "python/bindings.h"
+
+namespace egosgm::python {
+
+namespace py = pybind11;
+
+void bind_errors(py::module_& module) {
+  py::register_exception<InvalidArgument>(module, "InvalidArgument", PyExc_ValueError).doc() =
+      "What the caller gave cannot be used: an image, a calibration, an option, a file. The text names the value and "
+      "the remedy.";
+  py::register_exception<IoError>(module, "IoError", PyExc_OSError).doc() =
+      "The file system refused to take a result. What stood under the file's name before stands there still.";
+  auto device_error = py::register_exception<DeviceError>(module, "DeviceError", PyExc_RuntimeError);
+  device_error.doc() = "The device or its driver refused. The text names the stage and the OpenCL status.";
+  // Asked before the others, as the last to be registered.
+  py::register_exception<BuildError>(module, "BuildError", device_error).doc() =
+      "A kernel did not compile. The text ends with the compiler's log.";
+}
+
+}  // namespace egosgm::python
+
+PYBIND11_MODULE(_egosgm, module) {
+  using namespace egosgm::python;
+  module.attr("__version__") = EGOSGM_VERSION;
+  module.attr("INVALID_DISPARITY") = egosgm::kInvalidDisparity;
+  bind_errors(module);
+  bind_pipeline(module);
+  bind_odometry(module);
+  bind_files(module);
+  bind_evaluation(module);
+}

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/odometry.h"
+
+#include <pybind11/stl.h>
+
+#include "egosgm/vision/synthetic.h"
+#include "python/arrays.h"
+#include "python/bindings.h"
+#include "python/option_values.h"
+
+namespace egosgm::vision {
+
+template <typename Visit>
+void for_each_field(StereoOdometryOptions& o, Visit&& visit) {
+  visit("max_translation_m", o.max_translation_m);
+  visit("max_rotation_deg", o.max_rotation_deg);
+  visit("corner_threshold", o.corner_threshold);
+  visit("max_features", o.max_features);
+  visit("max_disparity_px", o.max_disparity_px);
+  visit("max_flow_x_px", o.max_flow_x_px);
+  visit("max_flow_y_px", o.max_flow_y_px);
+  visit("learn_rectification", o.learn_rectification);
+  visit("ransac_iterations", o.ransac_iterations);
+  visit("inlier_threshold_px", o.inlier_threshold_px);
+  visit("min_inliers", o.min_inliers);
+  visit("min_inlier_ratio", o.min_inlier_ratio);
+  visit("seed", o.seed);
+}
+
+template <typename Visit>
+void for_each_field(SyntheticOptions& o, Visit&& visit) {
+  visit("frames", o.frames);
+  visit("width", o.width);
+  visit("height", o.height);
+  visit("seed", o.seed);
+  visit("moving_object", o.moving_object);
+  visit("moving_object_scale", o.moving_object_scale);
+  visit("speed_m", o.speed_m);
+  visit("turn_deg", o.turn_deg);
+  visit("wobble", o.wobble);
+  visit("noise_grey", o.noise_grey);
+  visit("pole_width_px", o.pole_width_px);
+  visit("pole_spacing_m", o.pole_spacing_m);
+  visit("supersampling", o.supersampling);
+}
+
+}  // namespace egosgm::vision
+
+namespace egosgm::python {
+namespace {
+
+using vision::OdometryResult;
+using vision::StereoOdometry;
+using vision::SyntheticFrame;
+using vision::SyntheticSequence;
+
+template <typename Options>
+Options options_of(const py::kwargs& values) {
+  Options options;
+  set_fields(options, values);
+  return options;
+}
+
+OdometryResult process(StereoOdometry& odometry, const py::object& left, const py::object& right,
+                       const py::object& prior) {
+  const ImageArray left_image = image_of(left, "left"), right_image = image_of(right, "right");
+  std::optional<Eigen::Isometry3d> guess;
+  if (!prior.is_none()) guess = transform_of(prior, "prior");
+  const py::gil_scoped_release other_threads_run;
+  return odometry.process(left_image.view, right_image.view, guess);
+}
+
+void bind_synthetic(py::module_& module) {
+  auto frame = py::class_<SyntheticFrame>(module, "SyntheticFrame", "Images, exact disparities [px] and masks.");
+  const std::pair<const char*, cv::Mat SyntheticFrame::*> maps[] = {
+      {"left", &SyntheticFrame::left},
+      {"right", &SyntheticFrame::right},
+      {"left_disparity", &SyntheticFrame::left_disparity},
+      {"right_disparity", &SyntheticFrame::right_disparity},
+      {"left_noc", &SyntheticFrame::left_noc},
+      {"right_noc", &SyntheticFrame::right_noc},
+      {"left_moving", &SyntheticFrame::left_moving},
+      {"right_moving", &SyntheticFrame::right_moving}};
+  for (const auto& [name, member] : maps) {
+    frame.def_property_readonly(name, [member = member](const SyntheticFrame& f) { return array_of(f.*member); });
+  }
+  frame.def_property_readonly("world_from_camera",
+                              [](const SyntheticFrame& f) { return array_of(f.world_from_camera); });
+
+  py::class_<SyntheticSequence>(module, "SyntheticSequence",
+                                "A drive through a synthetic street with exact truth; frames are rendered on demand. "
+                                "Options as keyword arguments: see synthetic_options().")
+      .def(py::init([](const py::kwargs& values) {
+        return std::make_unique<SyntheticSequence>(options_of<vision::SyntheticOptions>(values));
+      }))
+      .def("__len__", &SyntheticSequence::frames)
+      .def_property_readonly("options", [](const SyntheticSequence& s) { return dict_of_fields(s.options()); })
+      .def_property_readonly("calibration", &SyntheticSequence::calibration)
+      .def("motion", &SyntheticSequence::motion, py::arg("frame"), "From the frame before; identity for frame 0.")
+      .def("render", &SyntheticSequence::render, py::arg("frame"), py::call_guard<py::gil_scoped_release>());
+  module.def(
+      "synthetic_options", [] { return dict_of_fields(vision::SyntheticOptions{}); },
+      "All options of SyntheticSequence with their defaults.");
+}
+
+}  // namespace
+
+void bind_odometry(py::module_& module) {
+  py::class_<OdometryResult>(module, "OdometryResult")
+      .def_readonly("motion", &OdometryResult::motion, "From the previous frame to this one, or None.")
+      .def_readonly("features", &OdometryResult::features)
+      .def_readonly("matches", &OdometryResult::matches)
+      .def_readonly("inliers", &OdometryResult::inliers)
+      .def_readonly("reprojection_rms_px", &OdometryResult::reprojection_rms_px)
+      .def_readonly("standstill", &OdometryResult::standstill, "The motion is the identity: nothing but noise.")
+      .def_readonly("reason", &OdometryResult::reason, "Why there is no motion; empty where there is one.");
+
+  py::class_<StereoOdometry>(module, "StereoOdometry",
+                             "Ego-motion from rectified stereo video. Options as keyword arguments: see "
+                             "odometry_options(). One object per thread.")
+      .def(py::init([](const Calibration& calibration, const py::kwargs& values) {
+             return std::make_unique<StereoOdometry>(calibration, options_of<vision::StereoOdometryOptions>(values));
+           }),
+           py::arg("calibration"))
+      .def("process", &process, py::arg("left"), py::arg("right"), py::arg("prior") = py::none(),
+           "The next frame; images as Pipeline.process takes them. `prior`, a 4x4 matrix current_from_previous, only "
+           "guides the search. The first frame has no motion.")
+      .def("reset", &StereoOdometry::reset, "Forgets all frames: the next one is a first frame.");
+  module.def(
+      "odometry_options", [] { return dict_of_fields(vision::StereoOdometryOptions{}); },
+      "All options of StereoOdometry with their defaults.");
+  bind_synthetic(module);
+}
+
+}  // namespace egosgm::python

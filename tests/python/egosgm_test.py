@@ -1,0 +1,316 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python module: same names, same bits, no copies, errors by kind."""
+import ast
+import importlib.util
+import inspect
+import pathlib
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import egosgm
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+WIDTH, HEIGHT, FRAMES = 160, 64, 3
+OPTIONS = dict(disparities=48, banded_sgm__paths=4)
+
+
+@pytest.fixture(scope="module")
+def street():
+    return egosgm.SyntheticSequence(frames=FRAMES, width=WIDTH, height=HEIGHT, seed=7)
+
+
+@pytest.fixture(scope="module")
+def frames(street):
+    return [street.render(i) for i in range(FRAMES)]
+
+
+@pytest.fixture(scope="module")
+def shared_pipeline(street):
+    return egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, **OPTIONS)
+
+
+@pytest.fixture
+def pipeline(shared_pipeline):
+    """As if it were new."""
+    shared_pipeline.reset()
+    return shared_pipeline
+
+
+def disparities_of(pipeline, street, pairs):
+    return [pipeline.process(left, right, street.motion(i) if i else None).disparity for i, (left, right) in enumerate(pairs)]
+
+
+def padded(image):
+    """The same pixels with a gap after each row."""
+    return np.pad(image, ((0, 0), (0, 13)))[:, :image.shape[1]]
+
+
+def test_a_sequence_is_matched_and_predicted(pipeline, street, frames):
+    results = [pipeline.process(f.left, f.right, street.motion(i) if i else None, "disparity") for i, f in enumerate(frames)]
+    assert [r.report.full_range for r in results] == [True, False, False]
+    assert results[0].report.full_range_reason in ("first frame", "reset")
+    assert results[-1].report.search_fraction < 0.5
+    assert results[-1].variance is None
+    assert "BandedSgm" in dict(results[-1].report.stages)
+    metrics = egosgm.compare_disparity(results[-1].disparity, frames[-1].left_disparity).metrics
+    assert metrics.density > 60 and metrics.bad_of_valid < 15
+
+
+def test_any_stride_and_depth_gives_the_same_bits(pipeline, street, frames):
+    plain = disparities_of(pipeline, street, [(f.left, f.right) for f in frames])
+    assert plain[-1].dtype == np.float32 and plain[-1].shape == (HEIGHT, WIDTH)
+    for change in (padded, lambda image: image[::-1].copy()[::-1], lambda image: np.repeat(image, 2, axis=1)[:, ::2],
+                   np.asfortranarray):
+        pipeline.reset()
+        again = disparities_of(pipeline, street, [(change(f.left), change(f.right)) for f in frames])
+        for a, b in zip(plain, again):
+            np.testing.assert_array_equal(a, b)
+    pipeline.reset()
+    wide = disparities_of(pipeline, street, [(f.left.astype(np.uint16), f.right.astype(np.uint16)) for f in frames])
+    assert (wide[0] != egosgm.INVALID_DISPARITY).mean() > 0.5
+
+
+def test_outputs_fill_the_callers_arrays(pipeline, frames):
+    whole = np.full((HEIGHT, WIDTH + 5), 7, np.float32)
+    width = np.zeros((HEIGHT, WIDTH), np.uint16)
+    result = pipeline.process(frames[0].left, frames[0].right, outputs={"disparity": whole[:, :WIDTH], "search_width": width})
+    assert (whole[:, WIDTH:] == 7).all()
+    np.testing.assert_array_equal(result.disparity, whole[:, :WIDTH])
+    assert np.shares_memory(result.disparity, whole)
+    assert (width == OPTIONS["disparities"]).mean() > 0.5
+    pipeline.reset()
+    made = pipeline.process(frames[0].left, frames[0].right)
+    np.testing.assert_array_equal(made.disparity, whole[:, :WIDTH])
+    assert (made.variance[made.disparity == egosgm.INVALID_DISPARITY] == 0).all()
+
+
+def test_options_have_the_librarys_names_and_defaults(street):
+    defaults, paper = egosgm.pipeline_options(), egosgm.pipeline_options("paper")
+    assert isinstance(defaults["edge_rejection.max_jump_px"], float) and isinstance(defaults["banded_sgm.p2"], int)
+    assert isinstance(defaults["median_filter.enabled"], bool) and isinstance(defaults["banded_sgm.cost"], str)
+    assert defaults["kalman_update.gate_px"] != paper["kalman_update.gate_px"] == 0
+    shown = inspect.signature(egosgm.Pipeline).parameters
+    for name, value in defaults.items():
+        assert shown[name.replace(".", "__")].default == value
+        assert name.replace(".", "__") in egosgm.Pipeline.__doc__
+    pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, preset="paper", disparities=np.int64(32), temporal=False,
+                               banded_sgm={"p1": 7, "p2": 97}, search_band__sigmas=np.float32(2.7), **{"banded_sgm.cost": "sad3x3"})
+    changed = {"disparities": 32, "temporal": False, "banded_sgm.p1": 7, "banded_sgm.p2": 97, "banded_sgm.cost": "sad3x3"}
+    options = pipeline.options
+    assert options.pop("search_band.sigmas") == pytest.approx(2.7)
+    assert options == {name: value for name, value in {**paper, **changed}.items() if name != "search_band.sigmas"}
+
+
+@pytest.mark.parametrize("options, named", [
+    (dict(banded_sgm__p22=3), "banded_sgm.p2"), (dict(disparities=0), "1 to 4096"), (dict(disparities=2.5), "whole number"),
+    (dict(banded_sgm={"cost": "sad"}), "pairs32"), (dict(preset="papers"), "default or paper"), (dict(device="no such"), "no such")])
+def test_wrong_options_are_refused_by_name(street, options, named):
+    with pytest.raises(egosgm.InvalidArgument, match=named) as refused:
+        egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, **options)
+    assert isinstance(refused.value, ValueError)
+
+
+@pytest.mark.parametrize("image, named", [
+    (np.zeros((HEIGHT, WIDTH, 3), np.uint8), "left is"), (np.zeros((HEIGHT, WIDTH), np.float32), "uint8 or uint16"),
+    (np.zeros((HEIGHT, WIDTH + 1), np.uint8), str(WIDTH + 1)), (np.zeros((HEIGHT, WIDTH), np.uint16), "type"), (None, "no array"),
+    (np.zeros((0, 0), np.uint8), "")])
+def test_wrong_images_are_refused_and_change_nothing(pipeline, street, frames, image, named):
+    expected = disparities_of(pipeline, street, [(f.left, f.right) for f in frames[:2]])[1]
+    pipeline.reset()
+    pipeline.process(frames[0].left, frames[0].right)
+    with pytest.raises(egosgm.InvalidArgument, match=named):
+        pipeline.process(image, frames[1].right, street.motion(1))
+    np.testing.assert_array_equal(pipeline.process(frames[1].left, frames[1].right, street.motion(1)).disparity, expected)
+
+
+def test_wrong_outputs_and_motions_are_refused(pipeline, frames):
+    left, right = frames[0].left, frames[0].right
+    read_only = np.zeros((HEIGHT, WIDTH), np.float32)
+    read_only.flags.writeable = False
+    for outputs, named in (("disparities", "choose from disparity"), ({"disparity": read_only}, "read-only"),
+                           ({"disparity": np.zeros((HEIGHT, WIDTH))}, "float32"), ({"variance": np.zeros((3, 4), np.float32)}, ""),
+                           ({"disparity": [[1.0]]}, "no NumPy array"),
+                           ({"disparity": np.zeros((HEIGHT, 2 * WIDTH), np.float32)[:, ::2]}, "contiguous")):
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            pipeline.process(left, right, outputs=outputs)
+    for motion, named in ((np.eye(3), "4x4"), (np.full((4, 4), np.nan), "finite"), (2 * np.eye(4), "otation"), ("forward", "matrix")):
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            pipeline.process(left, right, motion)
+
+
+def test_motion_may_be_a_matrix_or_a_motion(pipeline, street, frames):
+    assert egosgm.Motion(np.eye(4), np.eye(6)).covariance.trace() == 6
+    maps = []
+    for motion in (street.motion(1), street.motion(1).current_from_previous):
+        pipeline.reset()
+        pipeline.process(frames[0].left, frames[0].right)
+        maps.append(pipeline.process(frames[1].left, frames[1].right, motion).disparity)
+    np.testing.assert_array_equal(*maps)
+
+
+def test_other_threads_run_meanwhile(pipeline, frames):
+    """A thread counts while a frame is processed: nothing but processing lets go of the interpreter's lock here."""
+    counted, stop = [0], threading.Event()
+
+    def count():
+        while not stop.is_set():
+            counted[0] += 1
+            time.sleep(0)
+
+    thread = threading.Thread(target=count)
+    interval = sys.getswitchinterval()
+    thread.start()
+    sys.setswitchinterval(60)
+    try:
+        before = counted[0]
+        for _ in range(3):
+            pipeline.process(frames[0].left, frames[0].right)
+        during = counted[0] - before
+    finally:
+        sys.setswitchinterval(interval)
+        stop.set()
+        thread.join()
+    assert during > 0
+
+
+def test_threads_that_share_a_pipeline_take_turns(street, frames):
+    pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, temporal=False, vertical_alignment__enabled=False, **OPTIONS)
+    pairs = [(frame.left, frame.right) for frame in frames]
+    expected = [pipeline.process(*pair).disparity for pair in pairs]
+    start, wrong = threading.Barrier(len(pairs)), []
+
+    def process(pair, disparity):
+        start.wait()
+        for _ in range(10):
+            if not np.array_equal(pipeline.process(*pair).disparity, disparity):
+                wrong.append(1)
+
+    threads = [threading.Thread(target=process, args=both) for both in zip(pairs, expected)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong
+
+
+def test_odometry_finds_the_motion(street, frames):
+    big = egosgm.SyntheticSequence(frames=2, width=480, height=160, seed=3)
+    odometry = egosgm.StereoOdometry(big.calibration, ransac_iterations=300, learn_rectification=False)
+    pairs = [big.render(i) for i in range(2)]
+    first = odometry.process(pairs[0].left, pairs[0].right)
+    assert first.motion is None and first.reason
+    second = odometry.process(pairs[1].left, padded(pairs[1].right))
+    assert second.inliers > 20 and second.reason == ""
+    difference = second.motion.current_from_previous - big.motion(1).current_from_previous
+    assert np.abs(difference[:3, 3]).max() < 0.1
+    assert second.motion.covariance.shape == (6, 6) and second.motion.covariance.trace() > 0
+    with pytest.raises(egosgm.InvalidArgument, match="max_features"):
+        egosgm.StereoOdometry(big.calibration, max_feature=3)
+    with pytest.raises(egosgm.InvalidArgument, match="wrong type"):
+        egosgm.StereoOdometry(big.calibration, seed="x")
+
+
+def test_files_read_back(tmp_path, frames, street):
+    truth = frames[0].left_disparity
+    assert egosgm.write_disparity(tmp_path / "d.png", truth) == 0
+    stored = egosgm.read_disparity(tmp_path / "d.png")
+    assert np.abs(stored - truth).max() <= 1 / 256
+    egosgm.write_pfm(tmp_path / "d.pfm", truth.astype(np.float64)[:, ::-1])
+    np.testing.assert_array_equal(egosgm.read_disparity(str(tmp_path / "d.pfm")), truth[:, ::-1])
+    egosgm.write_calibration(tmp_path / "c.toml", street.calibration)
+    assert repr(egosgm.read_calibration(tmp_path / "c.toml")) == repr(street.calibration)
+    poses = np.stack([frame.world_from_camera for frame in frames])
+    egosgm.write_poses(tmp_path / "poses.txt", poses)
+    np.testing.assert_allclose(egosgm.read_poses(tmp_path / "poses.txt"), poses, atol=1e-8)
+    with pytest.raises(egosgm.InvalidArgument, match="nowhere.png"):
+        egosgm.read_grey(tmp_path / "nowhere.png")
+    with pytest.raises(egosgm.IoError, match="d.pfm") as failed:
+        egosgm.write_pfm(tmp_path / "d.png" / "d.pfm", truth)
+    assert isinstance(failed.value, OSError)
+
+
+def test_metrics_and_pictures(frames, street):
+    truth = frames[0].left_disparity
+    wrong = truth + 10
+    counts = egosgm.compare_disparity(wrong, truth)
+    assert counts.bad == counts.truth == truth.size and counts.metrics.mae_px == pytest.approx(10, abs=1e-3)
+    assert (counts + egosgm.compare_disparity(truth, truth)).metrics.bad_or_missing == 50
+    poses = np.stack([street.render(i).world_from_camera for i in range(FRAMES)])
+    assert egosgm.evaluate_poses(poses, poses).end_drift_m < 1e-9
+    holes = truth.copy()
+    holes[:, 10:20] = np.nan
+    assert np.isfinite(egosgm.interpolate_background(holes)).all()
+    depth = egosgm.depth_from_disparity(truth, street.calibration)
+    np.testing.assert_allclose(depth, street.calibration.fx * street.calibration.baseline_m / truth, rtol=1e-5)
+    near = np.where(truth == truth.max(), truth, 0)
+    picture = egosgm.color_disparity(near, low=0)
+    y, x = np.unravel_index(truth.argmax(), truth.shape)
+    red, _, blue = picture[y, x].astype(int)
+    assert picture.shape == (HEIGHT, WIDTH, 3) and red > blue
+    assert egosgm.color_error(wrong, truth).shape == (HEIGHT, WIDTH, 3)
+
+
+def test_sequences_are_read(tmp_path, frames, street):
+    for i, frame in enumerate(frames[:2]):
+        for side in ("left", "right"):
+            egosgm.write_disparity(tmp_path / f"{side}_{i}.png", getattr(frame, side).astype(np.float32))
+    egosgm.write_calibration(tmp_path / "c.toml", street.calibration)
+    sequence = egosgm.open_patterns(str(tmp_path / "left_%d.png"), str(tmp_path / "right_%d.png"), tmp_path / "c.toml")
+    assert len(sequence) == 2 and sequence.size == (WIDTH, HEIGHT) and sequence.frames[1].name == "000001"
+    left, right = sequence.frames[1].read()
+    assert left.dtype == np.uint16
+    np.testing.assert_array_equal(left // 256, frames[1].left)
+    with pytest.raises(egosgm.InvalidArgument, match="nowhere"):
+        egosgm.open_folder(tmp_path / "nowhere")
+
+
+def test_a_build_error_is_a_device_error():
+    assert issubclass(egosgm.BuildError, egosgm.DeviceError) and issubclass(egosgm.DeviceError, RuntimeError)
+
+
+def test_the_stub_and_the_module_name_the_same():
+    folder = pathlib.Path(egosgm.__file__).parent
+    stub = ast.parse((folder / "__init__.pyi").read_text())
+
+    def public(names):
+        return {name for name in names if not name.startswith("_")}
+
+    classes = {node.name: node for node in stub.body if isinstance(node, ast.ClassDef)}
+    functions = {node.name for node in stub.body if isinstance(node, ast.FunctionDef)}
+    constants = {node.target.id for node in stub.body if isinstance(node, ast.AnnAssign)}
+    assert public(classes) | functions | public(constants) == public(egosgm.__all__)
+    for name, node in classes.items():
+        members = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
+        if not issubclass(getattr(egosgm, name), Exception):
+            assert public(members) == public(vars(getattr(egosgm, name))), name
+    generated = (folder / "_options.pyi").read_text()
+    assert "banded_sgm__p2: int" in generated and "ransac_iterations: int" in generated
+    assert (folder / "py.typed").exists()
+
+
+def test_the_readmes_lines_run(tmp_path, frames, street, monkeypatch):
+    folder = tmp_path / "out/demo/street"
+    for side in (0, 1):
+        (folder / f"image_{side}").mkdir(parents=True)
+        for i, frame in enumerate(frames):
+            egosgm.write_disparity(folder / f"image_{side}/{i:06d}.png", (frame.left, frame.right)[side].astype(np.float32))
+    c = street.calibration
+    (folder / "calib.txt").write_text("".join(
+        f"P{i}: {c.fx} 0 {c.cx} {-c.fx * c.baseline_m * (i % 2)} 0 {c.fy} {c.cy} 0 0 0 1 0\n" for i in range(4)))
+    monkeypatch.chdir(tmp_path)
+    exec((SOURCE / "README.md").read_text().split("```python\n")[1].split("```")[0], {})
+
+
+def test_the_example_runs(tmp_path):
+    example = SOURCE / "examples/show_disparity.py"
+    done = subprocess.run([sys.executable, "-B", example, "--out", tmp_path / "picture.png"], capture_output=True, text=True, timeout=120)
+    assert "median depth" in done.stdout, done.stderr
+    if importlib.util.find_spec("matplotlib"):
+        assert done.returncode == 0 and (tmp_path / "picture.png").stat().st_size > 10000
+    else:
+        assert "pip install matplotlib" in done.stderr

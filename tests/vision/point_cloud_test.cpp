@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/point_cloud.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <opencv2/imgcodecs.hpp>
+
+#include "egosgm/error.h"
+#include "egosgm/image.h"
+#include "egosgm/vision/file_io.h"
+#include "tests/vision/temporary_folder.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr float kNo = kInvalidDisparity;
+const Calibration kCamera{.fx = 100, .fy = 50, .cx = 2, .cy = 1, .baseline_m = 0.5, .doffs_px = 5};
+
+cv::Mat filled(float value, cv::Size size = {6, 4}) { return cv::Mat(size, CV_32FC1, cv::Scalar(value)); }
+cv::Mat grey(cv::Size size = {6, 4}) { return cv::Mat(size, CV_8UC1, cv::Scalar(90)); }
+
+TEST(PointCloud, PutsPixelsWhereTheCameraSawThem) {
+  const PointCloud cloud = point_cloud(filled(5), filled(0.01f), grey(), kCamera);
+  ASSERT_EQ(cloud.points_m.size(), 24u);
+  const cv::Point3f last = cloud.points_m.back();  // pixel (5, 3), shift 10 px: depth 5 m
+  EXPECT_FLOAT_EQ(last.z, 5.0f);
+  EXPECT_FLOAT_EQ(last.x, 0.15f);
+  EXPECT_FLOAT_EQ(last.y, 0.2f);
+  EXPECT_EQ(cloud.colors.back(), cv::Vec3b(90, 90, 90));
+}
+
+TEST(PointCloud, LeavesOutWhatIsUncertainFarInvalidOrAlone) {
+  cv::Mat disparity = filled(5), variance = filled(0.01f);
+  disparity.at<float>(0, 0) = kNo;
+  disparity.at<float>(0, 2) = -5;    // d + doffs = 0
+  disparity.at<float>(1, 4) = 9;     // no neighbour near
+  variance.at<float>(3, 1) = 0.26f;  // sigma 0.51 px of 10 px: just above 5 %
+  variance.at<float>(3, 3) = 0.24f;
+  variance.at<float>(3, 5) = NAN;
+  EXPECT_EQ(point_cloud(disparity, variance, grey(), kCamera).points_m.size(), 24u - 5u);
+  EXPECT_EQ(point_cloud(disparity, variance, grey(), kCamera, {.max_depth_m = 4.9}).points_m.size(), 0u);
+  EXPECT_EQ(point_cloud(disparity, variance, grey(), kCamera, {.max_jump_px = 4}).points_m.size(), 24u - 4u);
+}
+
+TEST(PointCloud, RefusesWhatDoesNotBelongTogether) {
+  EXPECT_THROW(point_cloud(filled(5), filled(1, {5, 4}), grey(), kCamera), InvalidArgument);
+  EXPECT_THROW(point_cloud(filled(5), filled(1), grey({6, 5}), kCamera), InvalidArgument);
+  EXPECT_THROW(point_cloud(grey(), filled(1), grey(), kCamera), InvalidArgument);
+  EXPECT_THROW(point_cloud(filled(5), filled(1), grey(), kCamera, {.max_relative_sigma = 0}), InvalidArgument);
+  EXPECT_THROW(write_ply("cloud.ply", {.points_m = {{1, 2, 3}}, .colors = {}}), InvalidArgument);
+}
+
+TEST(PointCloud, PlyHoldsPointsAndColoursAsItsHeaderSays) {
+  const TemporaryFolder folder;
+  write_ply(folder / "cloud.ply", {.points_m = {{1, 2, 3}, {-4, 5.5f, 6}}, .colors = {{10, 20, 30}, {40, 50, 60}}});
+  const std::string bytes = read_file(folder / "cloud.ply", 1 << 16);
+  EXPECT_TRUE(bytes.starts_with("ply\nformat binary_little_endian 1.0\n"));
+  EXPECT_NE(bytes.find("\nelement vertex 2\n"), std::string::npos);
+  const std::size_t begin = bytes.find("end_header\n") + 11;
+  ASSERT_EQ(bytes.size(), begin + 2 * 15);
+  float xyz[3];
+  std::memcpy(xyz, &bytes[begin + 15], sizeof xyz);
+  EXPECT_EQ(xyz[0], -4.0f);
+  EXPECT_EQ(xyz[1], 5.5f);
+  EXPECT_EQ(xyz[2], 6.0f);
+  EXPECT_EQ(static_cast<unsigned char>(bytes[begin + 12]), 30);  // red first
+  EXPECT_EQ(static_cast<unsigned char>(bytes[begin + 14]), 10);
+}
+
+TEST(PointCloud, DepthIsStoredInMillimetres) {
+  const TemporaryFolder folder;
+  const cv::Mat depth = (cv::Mat_<float>(1, 6) << 1.2344f, kNo, 65.535f, 65.536f, 0.0001f, 3e6f);
+  EXPECT_EQ(write_depth_png(folder / "depth.png", depth), 2);
+  const cv::Mat stored = cv::imread((folder / "depth.png").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(stored.type(), CV_16UC1);
+  const std::vector<int> expected{1234, 0, 65535, 0, 1, 0};
+  for (int x = 0; x < 6; ++x) EXPECT_EQ(stored.at<std::uint16_t>(0, x), expected[static_cast<std::size_t>(x)]) << x;
+}
+
+}  // namespace
+}  // namespace egosgm::vision
