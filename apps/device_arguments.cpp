@@ -17,6 +17,15 @@ void add_device(CLI::App& command, std::string& device) {
       ->group(kGroup);
 }
 
+void add_tuning(CLI::App& command, std::string& tuning) {
+  command
+      .add_option("--tuning", tuning,
+                  "sizes of egosgm tune for the device, or none [$XDG_CONFIG_HOME/egosgm/tuning.json if it is there, "
+                  "but with --programs none]")
+      ->type_name("FILE|none")
+      ->group(kGroup);
+}
+
 void add_programs(CLI::App& command, std::string& folder) {
   command
       .add_option(

@@ -8,6 +8,8 @@ namespace egosgm::app {
 
 /// --device NAME.
 void add_device(CLI::App& command, std::string& device);
+/// --tuning: a file of `egosgm tune`, or none; empty: the user's.
+void add_tuning(CLI::App& command, std::string& tuning);
 /// --programs DIR.
 void add_programs(CLI::App& command, std::string& folder);
 

@@ -21,6 +21,7 @@
 #include "apps/run_report.h"
 #include "apps/sequence_arguments.h"
 #include "apps/trace.h"
+#include "apps/tuning_file.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
@@ -39,7 +40,7 @@ double ms_since(Clock::time_point start) {
 struct RunArguments {
   SequenceArguments input;
   OptionArguments method;
-  std::string out, poses, device, programs, write, trace;
+  std::string out, poses, device, programs, tuning, write, trace;
   vision::StereoOdometryOptions odometry;
   bool interpolate = false, quiet = false, resume = false, overwrite = false;
 };
@@ -246,6 +247,7 @@ SequenceJob job_of(const RunArguments& arguments) {
 int run(const RunArguments& arguments) {
   const SequenceJob job = job_of(arguments);
   Device device = Device::select(arguments.device);
+  if (arguments.programs.empty() || !arguments.tuning.empty()) device = tuned_by_argument(device, arguments.tuning);
   if (!arguments.programs.empty()) device = device.with_programs(arguments.programs);
   catch_interrupts();
   return run_sequence(job, device) ? kOk : kInterrupted;
@@ -291,6 +293,7 @@ Command add_run(CLI::App& program) {
   add_motion_bounds(*command, arguments->odometry, "Method");
   add_device(*command, arguments->device);
   add_programs(*command, arguments->programs);
+  add_tuning(*command, arguments->tuning);
   return {command, [arguments] { return run(*arguments); }};
 }
 

@@ -10,10 +10,6 @@
 namespace egosgm {
 namespace {
 
-// Tiles of a wavefront; measured best on two cores (bench/NOTES.md).
-constexpr int kTileWidth = 128;
-constexpr int kTileHeight = 24;
-
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
 
 std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range) {
@@ -25,7 +21,8 @@ std::size_t cell_bytes(shared::ImageSize size, shared::DisparityRange range) {
   return 2 * pixel_count(size) * SearchBand::max_chunks(range) * EGOSGM_LANES;
 }
 
-const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options) {
+const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+                         BandedSgm::Tile tile) {
   return context.program("banded_sgm.cl", ocl::Defines()
                                               .set("MAX_CHUNKS", SearchBand::max_chunks(range))
                                               .set("PATHS", options.paths)
@@ -33,8 +30,8 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
                                               .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
                                               .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
                                               .set("PARTIAL_CHUNKS", range.count % EGOSGM_LANES != 0)
-                                              .set("TILE_WIDTH", kTileWidth)
-                                              .set("TILE_HEIGHT", kTileHeight));
+                                              .set("TILE_WIDTH", tile.width)
+                                              .set("TILE_HEIGHT", tile.height));
 }
 
 bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
@@ -90,16 +87,21 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
 }  // namespace
 
 BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-                                const BandedSgmOptions& options)
-    : slots(context, slot_bytes(size, range)),
+                                const BandedSgmOptions& options, Tile chosen)
+    : tile(chosen),
+      slots(context, slot_bytes(size, range)),
       sums(context, cell_bytes(size, range)),
       winners(context, 2 * pixel_count(size)),
-      forward(build(context, range, options), "sweep_forward"),
-      backward(build(context, range, options), "sweep_backward"),
-      refine(build(context, range, options), "refine") {}
+      forward(build(context, range, options, tile), "sweep_forward"),
+      backward(build(context, range, options, tile), "sweep_backward"),
+      refine(build(context, range, options, tile), "refine") {}
 
 BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                      const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group)
+    : BandedSgm(context, size, range, options, group, Tile()) {}
+
+BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                     const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile)
     : context_((context.enter("BandedSgm"), context)),
       size_{size.width, rows_at_once(context, size, range, options)},
       stripes_(cut_into_stripes(size.height, size_.height, kStripeOverlap)),
@@ -116,7 +118,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
   if (follows_paths(context, options.scheduling)) {
     paths_.emplace(context, size_, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
   } else {
-    wavefront_.emplace(context, size_, range, options);
+    wavefront_.emplace(context, size_, range, options, tile);
   }
   if (stripes_.size() > 1) {
     stripe_memory_.emplace(context, size, size_.height, code_words_a_row(size.width, range, options.cost));
@@ -147,8 +149,9 @@ void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, int views
 }
 
 void BandedSgm::sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMaps& measured, int views) {
-  const int tile_rows = ceil_div(size_.height, kTileHeight);
-  const int tile_columns = ceil_div(size_.width + kTileHeight, kTileWidth) + 1;
+  const Tile tile = wavefront.tile;
+  const int tile_rows = ceil_div(size_.height, tile.height);
+  const int tile_columns = ceil_div(size_.width + tile.height, tile.width) + 1;
   const int waves = tile_columns + 2 * (tile_rows - 1);
   const ocl::Range tiles{cl::NDRange(tile_rows, views), cl::NDRange(1, 1)};
 

@@ -9,6 +9,7 @@
 #include "host/ocl/kernel.h"
 #include "host/search_band.h"
 #include "host/stripes.h"
+#include "host/tuning_defaults.h"
 
 namespace egosgm {
 
@@ -20,9 +21,17 @@ namespace egosgm {
 /// kStripeOverlap rows above and below a stripe instead of at the image's edge.
 class BandedSgm {
  public:
-  /// `group`: how paths share work-groups, where they do; by default what suits the device.
+  /// Of a wavefront; at most as high as wide.
+  struct Tile {
+    int width = kCpuTuning.tile_width, height = kCpuTuning.tile_height;
+  };
+
+  /// `group`: how paths share work-groups, where they do; by default what suits the device. `tile`: where they do not.
+  /// Same bits.
   BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
             const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group = {});
+  BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+            const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile);
 
   /// Rows around a stripe from which paths come into it.
   static constexpr int kStripeOverlap = 32;
@@ -50,8 +59,9 @@ class BandedSgm {
  private:
   struct Wavefront {
     Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-              const BandedSgmOptions& options);
+              const BandedSgmOptions& options, Tile tile);
 
+    Tile tile;
     ocl::Buffer<cl_uchar> slots;  // path costs under way, one row of disparities a path and view
     ocl::Buffer<cl_uchar> sums;   // the forward sweep's sums, 8 bits a cell
     ocl::Buffer<cl_ulong> winners;

@@ -4,7 +4,7 @@
 namespace egosgm {
 namespace {
 
-constexpr cl_int kRowsOfABand = 32;  // more move fewer sources twice, fewer balance better
+constexpr cl_int band_rows_ = 32;  // more move fewer sources twice, fewer balance better
 
 const cl::Program& build(ocl::Context& context, int pixels) {
   context.enter("ForwardWarp");
@@ -88,12 +88,13 @@ ForwardWarp::Bands::Bands(ocl::Context& context, shared::ImageSize size)
       spans(context, 4 * static_cast<std::size_t>(size.height)) {}
 
 ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
-                         const ForwardWarpOptions& options, shared::DisparityRange range, int pixels)
+                         const ForwardWarpOptions& options, shared::DisparityRange range, int pixels, int band_rows)
     : context_((context.enter("ForwardWarp"), context)),
       size_(size),
       calibration_(calibration),
       options_(options),
-      range_(range) {
+      range_(range),
+      band_rows_(band_rows) {
   if (pixels == 1 || (pixels == 0 && ocl::pixels_a_work_item(context) == 1)) {
     atomics_.emplace(context, size);
   } else {
@@ -109,10 +110,10 @@ void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_fro
   const shared::DisparityMotion right = disparity_motion(calibration_, motion, EGOSGM_RIGHT);
   if (bands_) {
     auto& [find_spans, splat_bands, spans] = *bands_;
-    const int bands = (size_.height + kRowsOfABand - 1) / kRowsOfABand;
+    const int bands = (size_.height + band_rows_ - 1) / band_rows_;
     find_spans(context_, ocl::every_row(context_, size_), size_, range_, left, right, belief.disparity, spans);
     splat_bands(context_, ocl::every_row(context_, {1, bands}), size_, range_, left, right, options_.process_noise_px2,
-                kRowsOfABand, spans, belief.disparity, belief.variance, predicted.disparity, predicted.variance);
+                band_rows_, spans, belief.disparity, belief.variance, predicted.disparity, predicted.variance);
     return;
   }
   const ocl::Range pixels = ocl::every_pixel(context_, size_);

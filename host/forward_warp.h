@@ -8,6 +8,7 @@
 #include "egosgm/options.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
+#include "host/tuning_defaults.h"
 
 namespace egosgm {
 
@@ -21,9 +22,10 @@ shared::DisparityMotion disparity_motion(const Calibration& calibration, const M
 /// dropped.
 class ForwardWarp {
  public:
-  /// `pixels` of a work-item: 1 (and atomics) or 16 (and bands of rows); 0: by the device. Same bits.
+  /// `pixels` of a work-item: 1 (and atomics) or 16 (and bands of `band_rows` rows); 0: by the device. Same bits.
   ForwardWarp(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
-              const ForwardWarpOptions& options, shared::DisparityRange range, int pixels = 0);
+              const ForwardWarpOptions& options, shared::DisparityRange range, int pixels = 0,
+              int band_rows = kCpuTuning.warp_band_rows);
 
   /// REQUIRES: `motion` is valid; `predicted` is not `belief`.
   void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted);
@@ -63,6 +65,7 @@ class ForwardWarp {
   const Calibration calibration_;
   const ForwardWarpOptions options_;
   const shared::DisparityRange range_;
+  const int band_rows_;
   std::optional<Atomics> atomics_;  // one of the two
   std::optional<Bands> bands_;
 };

@@ -46,6 +46,11 @@ struct PixelStages {
 
 shared::DisparityRange range_of(const PipelineOptions& options) { return {options.min_disparity, options.disparities}; }
 
+std::optional<BandedSgmPaths::Group> path_group(const Tuning& tuning) {
+  if (tuning.path_lanes == 0) return {};
+  return BandedSgmPaths::Group{tuning.path_lanes, tuning.path_lines};
+}
+
 ocl::Context context_on(const Device::Handle& device) {
   return device.queue() ? ocl::Context(device.queue, device.programs) : ocl::Context(device.device, device.programs);
 }
@@ -74,6 +79,7 @@ struct Pipeline::Impl {
   const PipelineOptions options;
   const Device device;
   const shared::ImageSize size;
+  const Tuning tuning;
   ocl::Context context;
 
   ForwardWarp forward_warp;
@@ -105,18 +111,20 @@ struct Pipeline::Impl {
       : options(chosen),
         device(chosen_device),
         size(image_size),
+        tuning(with_defaults(device.handle().tuning, device.info().type)),
         context(context_on(device.handle())),
-        forward_warp(context, size, calibration, options.forward_warp, range_of(options)),
+        forward_warp(context, size, calibration, options.forward_warp, range_of(options), 0, tuning.warp_band_rows),
         edge_rejection(context, size, options.edge_rejection),
         hole_fill(context, size, options.hole_fill),
         consistency(context, size),
-        vertical_alignment(context, size, options.vertical_alignment),
-        search_band(context, size, range_of(options), options.search_band),
+        vertical_alignment(context, size, options.vertical_alignment, tuning.row_group),
+        search_band(context, size, range_of(options), options.search_band, tuning.row_group),
         stages_u8(context, size, PixelType::kU8, options, BandedSgm::code_padding(range_of(options))),
         stages_u16(context, size, PixelType::kU16, options, BandedSgm::code_padding(range_of(options))),
-        banded_sgm(context, size, range_of(options), options.banded_sgm),
+        banded_sgm(context, size, range_of(options), options.banded_sgm, path_group(tuning),
+                   {tuning.tile_width, tuning.tile_height}),
         median_filter(context, size, options.median_filter),
-        speckle_removal(context, size, options.speckle_removal),
+        speckle_removal(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
         kalman_update(context, size, options.kalman_update),
         transfers{{{context, size, range_of(options)}, {context, size, range_of(options)}}},
         codes(context, Census::words(options.banded_sgm.cost, size, BandedSgm::code_padding(range_of(options)))),

@@ -4,8 +4,6 @@
 namespace egosgm {
 namespace {
 
-constexpr int kRowsOfAStrip = 24;  // of those tried, the fastest for 1242x375 on two cores
-
 const cl::Program& build(ocl::Context& context, int row_group) {
   context.enter("SpeckleRemoval");
   return context.program("speckle_removal.cl", ocl::Defines().set("ROW_GROUP", row_group));
@@ -22,7 +20,7 @@ SpeckleRemoval::SpeckleRemoval(ocl::Context& context, shared::ImageSize size, co
       row_group_(row_group > 0 ? row_group : ocl::row_group(context)),
       strip_rows_(strip_rows > 0   ? strip_rows
                   : row_group_ > 1 ? 1
-                                   : kRowsOfAStrip),
+                                   : kCpuTuning.speckle_strip_rows),
       runs_(context, 2 * pixel_count(size)),
       parents_(context, 2 * pixel_count(size)),
       roots_(context, 2 * pixel_count(size)),

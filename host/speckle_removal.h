@@ -4,6 +4,7 @@
 #include "egosgm/options.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
+#include "host/tuning_defaults.h"
 
 namespace egosgm {
 

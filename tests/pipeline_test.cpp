@@ -554,6 +554,42 @@ TEST(Pipeline, GivesTheSameBitsForEveryScheduling) {
   EXPECT_TRUE(same_outputs(results[2], results[0], setting.size));
 }
 
+TEST(Pipeline, GivesTheSameBitsForEveryTuning) {
+  Setting setting = standard();
+  const Video video(setting);
+  Pipeline untuned = make_pipeline(setting);
+  const std::vector<OutputMemory> expected = process_all(untuned, setting, video);
+  const Tuning tunings[] = {
+      {.tile_width = 16, .tile_height = 16, .warp_band_rows = 7, .speckle_strip_rows = 5, .row_group = 8},
+      {.tile_width = 96, .tile_height = 5, .warp_band_rows = 100, .speckle_strip_rows = 1, .row_group = 1},
+      {.path_lanes = 2, .path_lines = 3, .row_group = 64}};
+  for (const Tuning& tuning : tunings) {
+    setting.options.banded_sgm.scheduling = tuning.path_lanes > 0 ? Scheduling::kPaths : Scheduling::kWavefront;
+    Pipeline pipeline(setting.scene().calibration(), setting.size.width, setting.size.height, setting.options,
+                      Device::select().with_tuning(tuning));
+    const std::vector<OutputMemory> actual = process_all(pipeline, setting, video);
+    EXPECT_TRUE(same_outputs(actual, expected, setting.size)) << "tile width " << tuning.tile_width;
+  }
+}
+
+TEST(Tuning, NamesEverySizeAndRefusesWhatCannotBe) {
+  Tuning tuning;
+  int value = 1;
+  for (const NamedOption& size : list_tuning(tuning)) set_tuning(tuning, size.name, std::to_string(16 * value++));
+  EXPECT_EQ(tuning.tile_width, 16);
+  EXPECT_EQ(tuning.row_group, 16 * 7);
+  expect_refused([&] { set_tuning(tuning, "tile_with", "1"); }, {"tile_with", "tile_width"});
+  expect_refused([&] { set_tuning(tuning, "tile_width", "1.5"); }, {"tile_width", "1.5", "whole number"});
+  const Device device = Device::select();
+  const std::pair<Tuning, const char*> wrong[] = {{{.tile_width = 32, .tile_height = 33}, "tile_height is 33"},
+                                                  {{.tile_width = 32}, "tile_height is 0"},
+                                                  {{.tile_width = -1, .tile_height = 1}, "tile_width is -1"},
+                                                  {{.path_lanes = 6, .path_lines = 1}, "path_lanes is 6"},
+                                                  {{.path_lanes = 64, .path_lines = 8}, "path_lines is 8"},
+                                                  {{.row_group = 257}, "row_group is 257"}};
+  for (const auto& [sizes, what] : wrong) expect_refused([&] { device.with_tuning(sizes); }, {what});
+}
+
 TEST(Pipeline, GivesTheSameBitsForEveryLayoutOfRows) {
   Setting setting = standard();
   for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {

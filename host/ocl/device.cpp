@@ -174,6 +174,13 @@ Device Device::with_programs(const std::string& folder) const {
   });
 }
 
+Device Device::with_tuning(const Tuning& tuning) const {
+  tuning.validate();
+  Handle with = *handle_;
+  with.tuning = tuning;
+  return Device(std::make_shared<const Handle>(std::move(with)));
+}
+
 const DeviceInfo& Device::info() const { return handle_->info; }
 
 }  // namespace egosgm

@@ -11,6 +11,7 @@ struct Device::Handle {
   DeviceInfo info;
   std::shared_ptr<const ocl::ProgramFolder> programs = nullptr;  // null: compiles
   cl::CommandQueue queue = {};                                   // for kernels; empty: of the pipeline's own
+  Tuning tuning = {};
 
   static Handle of(const cl::Device& device);
 };

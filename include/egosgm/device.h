@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "egosgm/export.h"
+#include "egosgm/tuning.h"
 
 namespace egosgm {
 
@@ -49,6 +50,9 @@ class EGOSGM_EXPORT Device {
   /// or driver version; a Pipeline's constructor does where the folder lacks one of its programs, or has it from
   /// another version of the source.
   Device with_programs(const std::string& folder) const;
+
+  /// The same device, on which pipelines use these sizes. Throws InvalidArgument as Tuning::validate.
+  Device with_tuning(const Tuning& tuning) const;
 
   const DeviceInfo& info() const;
 

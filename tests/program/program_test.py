@@ -92,14 +92,14 @@ class ProgramTest(unittest.TestCase):
 
 class Help(ProgramTest):
     def test_every_subcommand_explains_itself(self):
-        for command in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "view", "completion"):
+        for command in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "completion"):
             self.assertIn("--help", self.assert_works(command, "--help"))
             self.assertIn(command, self.assert_works("--help"))
 
     def test_run_lists_all_its_options_and_those_of_the_stages(self):
         text = self.assert_works("run", "--help")
         for option in ("--kitti", "--scene", "--odometry", "--left", "--right", "--calib", "--frames", "--out", "--poses", "--preset",
-                       "--search", "--temporal", "--paths", "--disparities", "--min-disparity", "--device", "--interpolate",
+                       "--search", "--temporal", "--paths", "--disparities", "--min-disparity", "--device", "--tuning", "--interpolate",
                        "--write", "--trace", "--resume", "--overwrite", "--set", "--config", "--save-config", "--quiet", "banded_sgm.p2", "kalman_update.gate_px"):
             self.assertIn(option, text)
 
@@ -179,7 +179,7 @@ class Example(ProgramTest):
 
     def test_the_readme_names_every_subcommand_and_exit_code(self):
         text = (SOURCE / "README.md").read_text()
-        for name in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "view", "completion"):
+        for name in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "completion"):
             self.assertIn(f"`{name}`", text)
         self.assertIn("130", text)
 
@@ -269,6 +269,30 @@ class Run(ProgramTest):
                 self.assertLessEqual(before[1], after[0] + 50)  # us: clocks of host and device are aligned frame by frame
         self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder(), "--trace", "/nonexistent/trace.json"],
                             "/nonexistent/trace.json", code=1)
+
+    def test_tune_keeps_sizes_that_run_uses_and_change_no_bit(self):
+        folder = self.new_folder()
+        plain, tuned, file = folder / "plain", folder / "tuned", folder / "egosgm/tuning.json"
+        environment = dict(os.environ, XDG_CONFIG_HOME=str(folder))
+        self.assert_works("tune", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "SpeckleRemoval", env=environment)
+        stored = json.loads(file.read_text())
+        self.assertEqual(len(stored), 1)
+        key, sizes = stored.popitem()
+        self.assertIn("driver", key)
+        self.assertIn("tile_width", sizes)
+        sizes.update(tile_width=32, tile_height=8, warp_band_rows=5)
+        file.write_text(json.dumps({"another device, driver 1": {"tile_width": "nonsense"}, key: sizes}))
+        self.assert_works("run", "--odometry", self.street, "--out", tuned, "--trace", folder / "tuned.json", env=environment)
+        self.assert_works("run", "--odometry", self.street, "--out", plain, "--tuning", "none", env=environment)
+        for picture in (plain / "disparity").iterdir():
+            self.assertEqual(picture.read_bytes(), (tuned / "disparity" / picture.name).read_bytes())
+        self.assertGreater(self.report(tuned)["frames"][2]["launches"], self.report(plain)["frames"][2]["launches"])  # more, smaller tiles
+        for broken in ("", "[]", "{", json.dumps({key: {"tile_width": 3, "tile_height": 3}}), json.dumps({key: {"tiles": 3}}),
+                       json.dumps({key: 7}), json.dumps({key: {"tile_width": "wide"}})):
+            file.write_text(broken)
+            self.assert_refused(["run", "--odometry", self.street, "--out", plain], file, "egosgm tune", env=environment)
+        self.assert_refused(["run", "--odometry", self.street, "--out", plain, "--tuning", "/nonexistent"], "/nonexistent")
+        self.assert_refused(["tune", "--file", "/proc/tuning.json"], "/proc/tuning.json", code=1)
 
     def test_a_terminal_gets_a_bar(self):
         terminal, side = pty.openpty()

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "apps/command.h"
+#include "apps/device_arguments.h"
+#include "apps/tuning_file.h"
+#include "egosgm/error.h"
+#include "egosgm/pipeline.h"
+#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/synthetic.h"
+
+namespace egosgm::app {
+namespace {
+
+struct TuneArguments {
+  std::string device, file, stage;
+  int width = 1242, height = 375, disparities = 128, rounds = 9;
+};
+
+/// Sizes to try together, and the stages whose time tells.
+struct Trial {
+  std::vector<std::string> stages;
+  std::vector<std::vector<NamedOption>> candidates;
+};
+
+std::vector<NamedOption> pair(const char* first, int a, const char* second, int b) {
+  return {{first, std::to_string(a)}, {second, std::to_string(b)}};
+}
+
+std::vector<Trial> trials(bool is_gpu) {
+  std::vector<Trial> all(1, {{"BandedSgm"}, {}});
+  auto& matching = all.front().candidates;
+  if (is_gpu) {
+    for (const int lanes : {4, 8, 16, 32, 64}) {
+      for (const int lines : {1, 2, 4, 8}) {
+        if (lanes * lines >= 16 && lanes * lines <= 256)
+          matching.push_back(pair("path_lanes", lanes, "path_lines", lines));
+      }
+    }
+    all.push_back({{"SearchBand", "SpeckleRemoval", "VerticalAlignment"}, {}});
+    for (const char* size : {"32", "64", "128", "256"}) all.back().candidates.push_back({{"row_group", size}});
+    return all;
+  }
+  for (const int width : {64, 96, 128, 192, 256}) {
+    for (const int height : {16, 24, 32, 48}) matching.push_back(pair("tile_width", width, "tile_height", height));
+  }
+  all.push_back({{"ForwardWarp"}, {}});
+  for (const char* rows : {"16", "24", "32", "48", "64"}) all.back().candidates.push_back({{"warp_band_rows", rows}});
+  all.push_back({{"SpeckleRemoval"}, {}});
+  for (const char* rows : {"12", "24", "48", "96"}) all.back().candidates.push_back({{"speckle_strip_rows", rows}});
+  return all;
+}
+
+/// A short drive, and what a device with some tuning takes for it.
+class Course {
+ public:
+  Course(const TuneArguments& arguments, const Device& device)
+      : arguments_(arguments),
+        device_(device),
+        street_({.frames = 3, .width = arguments.width, .height = arguments.height}) {
+    options_.disparities = arguments.disparities;
+    for (int i = 0; i < street_.frames(); ++i) frames_.push_back(street_.render(i));
+  }
+
+  /// Least device time [ms] of each stage in a steady frame. The first call's maps are what all later ones must give.
+  std::vector<StageTime> run(const Tuning& tuning) {
+    Pipeline pipeline(street_.calibration(), arguments_.width, arguments_.height, options_,
+                      device_.with_tuning(tuning));
+    cv::Mat disparity(arguments_.height, arguments_.width, CV_32FC1);
+    FrameOutputs outputs;
+    outputs.disparity = vision::map_view(disparity);
+    std::vector<std::vector<StageTime>> rounds;
+    for (int round = 0; round < arguments_.rounds; ++round) {
+      pipeline.reset();
+      for (int i = 0; i < street_.frames(); ++i) {
+        const std::optional<Motion> motion = i > 0 ? std::optional(street_.motion(i)) : std::nullopt;
+        const FrameReport report = pipeline.process(vision::image_view(frames_[i].left),
+                                                    vision::image_view(frames_[i].right), motion, outputs);
+        if (i + 1 == street_.frames() && round > 0) rounds.push_back(report.stages);
+      }
+    }
+    expect_same(disparity);
+    return least(rounds);
+  }
+
+ private:
+  void expect_same(const cv::Mat& disparity) {
+    if (expected_.empty()) expected_ = disparity.clone();
+    if (!std::equal(disparity.begin<float>(), disparity.end<float>(), expected_.begin<float>()))
+      throw DeviceError(0, "tune: these sizes change the result on this device: please report it");
+  }
+
+  /// Other work on the machine only adds.
+  static std::vector<StageTime> least(const std::vector<std::vector<StageTime>>& rounds) {
+    std::vector<StageTime> result = rounds.front();
+    for (const std::vector<StageTime>& round : rounds) {
+      for (std::size_t stage = 0; stage < result.size(); ++stage) {
+        result[stage].ms = std::min(result[stage].ms, round[stage].ms);
+      }
+    }
+    return result;
+  }
+
+  const TuneArguments& arguments_;
+  const Device device_;
+  const vision::SyntheticSequence street_;
+  PipelineOptions options_;
+  std::vector<vision::SyntheticFrame> frames_;
+  cv::Mat expected_;
+};
+
+double ms_of(const std::vector<StageTime>& times, const std::vector<std::string>& stages) {
+  double ms = 0;
+  for (const StageTime& time : times) {
+    if (std::find(stages.begin(), stages.end(), time.stage) != stages.end()) ms += time.ms;
+  }
+  return ms;
+}
+
+std::string text_of(const std::vector<NamedOption>& sizes) {
+  std::string text;
+  for (const auto& [name, value] : sizes) text += (text.empty() ? "" : ", ") + name + " " + value;
+  return text;
+}
+
+int tune(const TuneArguments& arguments) {
+  const Device device = Device::select(arguments.device);
+  const std::filesystem::path file =
+      arguments.file.empty() ? user_tuning_file() : std::filesystem::path(arguments.file);
+  if (file.empty()) throw InvalidArgument("tune: neither XDG_CONFIG_HOME nor HOME is set: give --file FILE");
+  store_tuning(file, device.info(), {});  // so that a file that cannot be written ends it at once
+  Course course(arguments, device);
+  Tuning best;
+  const std::vector<StageTime> untuned = course.run(best);
+  constexpr double kGain = 0.98;  // less than 2 % is noise
+  for (const Trial& trial : trials(device.info().type == "GPU")) {
+    if (!arguments.stage.empty() && trial.stages.front() != arguments.stage) continue;
+    double least = ms_of(untuned, trial.stages);
+    fmt::print("{}: {:.3f} ms with the defaults\n", fmt::join(trial.stages, " + "), least);
+    for (const std::vector<NamedOption>& sizes : trial.candidates) {
+      Tuning candidate = best;
+      for (const auto& [name, value] : sizes) set_tuning(candidate, name, value);
+      const double ms = ms_of(course.run(candidate), trial.stages);
+      const bool is_better = ms < kGain * least;
+      fmt::print("  {:<36} {:8.3f} ms{}\n", text_of(sizes), ms, is_better ? "  the best so far" : "");
+      std::fflush(stdout);
+      if (is_better) best = candidate, least = ms;
+    }
+  }
+  store_tuning(file, device.info(), best);
+  fmt::print("Kept for {}, driver {}: {}\n", device.info().name, device.info().driver, file.string());
+  return kOk;
+}
+
+}  // namespace
+
+Command add_tune(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("tune", "Measure what tile and work-group sizes suit a device, and keep them");
+  auto arguments = std::make_shared<TuneArguments>();
+  command
+      ->add_option(
+          "--file", arguments->file,
+          "where to keep them; other devices' stay [$XDG_CONFIG_HOME/egosgm/tuning.json, which egosgm run reads]")
+      ->type_name("FILE")
+      ->group("Output");
+  const char* group = "Method";
+  command->add_option("--width", arguments->width, "of the images to measure with, px [1242]")
+      ->type_name("N")
+      ->group(group)
+      ->check(CLI::Range(1, 8192));
+  command->add_option("--height", arguments->height, "[375]")->type_name("N")->group(group)->check(CLI::Range(1, 8192));
+  command->add_option("--disparities", arguments->disparities, "[128]")
+      ->type_name("N")
+      ->group(group)
+      ->check(CLI::Range(1, 4096));
+  command->add_option("--rounds", arguments->rounds, "runs with each size, the first of which does not count [9]")
+      ->type_name("N")
+      ->group(group)
+      ->check(CLI::Range(2, 1000));
+  command->add_option("--stage", arguments->stage, "only the sizes of this one")
+      ->type_name("NAME")
+      ->group(group)
+      ->check(CLI::IsMember({"BandedSgm", "ForwardWarp", "SpeckleRemoval", "SearchBand"}));
+  add_device(*command, arguments->device);
+  return {command, [arguments] { return tune(*arguments); }};
+}
+
+}  // namespace egosgm::app

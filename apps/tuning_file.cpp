@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/tuning_file.h"
+
+#include <fmt/core.h>
+
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+
+namespace egosgm::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMaxBytes = 1 << 20;
+
+std::string key_of(const DeviceInfo& device) { return device.name + ", driver " + device.driver; }
+
+[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {
+  throw InvalidArgument(
+      fmt::format("{}: {}: delete it and run egosgm tune again, or give --tuning none", file.string(), what));
+}
+
+Json read(const std::filesystem::path& file) {
+  const Json json = Json::parse(vision::read_file(file, kMaxBytes), nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object()) refuse(file, "not a tuning file");
+  return json;
+}
+
+Tuning tuning_of(const Json& sizes, const std::filesystem::path& file) {
+  if (!sizes.is_object()) refuse(file, "not a tuning file");
+  Tuning tuning;
+  try {
+    for (const auto& [name, value] : sizes.items()) set_tuning(tuning, name, value.dump());
+    tuning.validate();
+  } catch (const InvalidArgument& error) {
+    refuse(file, error.what());
+  }
+  return tuning;
+}
+
+}  // namespace
+
+std::filesystem::path user_tuning_file() {
+  const char* config = std::getenv("XDG_CONFIG_HOME");
+  const char* home = std::getenv("HOME");
+  if (config && *config) return std::filesystem::path(config) / "egosgm/tuning.json";
+  return home && *home ? std::filesystem::path(home) / ".config/egosgm/tuning.json" : std::filesystem::path();
+}
+
+Device tuned(const Device& device, const std::filesystem::path& file) {
+  const Json json = read(file);
+  const auto sizes = json.find(key_of(device.info()));
+  return sizes == json.end() ? device : device.with_tuning(tuning_of(*sizes, file));
+}
+
+Device tuned_by_argument(const Device& device, const std::string& argument) {
+  if (argument == "none") return device;
+  if (!argument.empty()) return tuned(device, argument);
+  const std::filesystem::path file = user_tuning_file();
+  return std::filesystem::exists(file) ? tuned(device, file) : device;
+}
+
+void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, const Tuning& tuning) {
+  Json json = std::filesystem::exists(file) ? read(file) : Json::object();
+  Json sizes = Json::object();
+  for (const auto& [name, value] : list_tuning(tuning)) sizes[name] = std::stoi(value);
+  json[key_of(device)] = sizes;
+  if (file.has_parent_path()) vision::make_folder(file.parent_path());
+  vision::write_file(file, json.dump(2) + '\n');
+}
+
+}  // namespace egosgm::app
