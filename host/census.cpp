@@ -16,8 +16,8 @@ Comparisons comparisons(MatchingCost cost) {
       return {1, 2, 2};
     case MatchingCost::kCensus9x7:
       return {1, 4, 3};
-    case MatchingCost::kPairs32:
-      return {2, EGOSGM_PAIRS_RADIUS_X, EGOSGM_PAIRS_RADIUS_Y};
+    case MatchingCost::kCensus13x11:
+      return {2, EGOSGM_CENSUS13X11_RADIUS_X, EGOSGM_CENSUS13X11_RADIUS_Y};
   }
   return {};
 }

@@ -59,7 +59,7 @@ struct Choice {
   Enum value;
 };
 constexpr Choice<MatchingCost> kChoices(MatchingCost, int i) {
-  constexpr Choice<MatchingCost> choices[] = {{"pairs32", MatchingCost::kPairs32},
+  constexpr Choice<MatchingCost> choices[] = {{"census13x11", MatchingCost::kCensus13x11},
                                               {"census9x7", MatchingCost::kCensus9x7},
                                               {"census5x5", MatchingCost::kCensus5x5},
                                               {"sad3x3", MatchingCost::kSad3x3}};

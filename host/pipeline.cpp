@@ -13,6 +13,7 @@
 #include "egosgm/programs.h"
 #include "host/banded_sgm.h"
 #include "host/census.h"
+#include "host/coarse_match.h"
 #include "host/consistency_check.h"
 #include "host/edge_rejection.h"
 #include "host/forward_warp.h"
@@ -87,6 +88,7 @@ struct Pipeline::Impl {
   HoleFill hole_fill;
   ConsistencyCheck consistency;
   VerticalAlignment vertical_alignment;
+  CoarseMatch coarse_match;
   SearchBand search_band;
   PixelStages stages_u8, stages_u16;
   BandedSgm banded_sgm;
@@ -118,6 +120,7 @@ struct Pipeline::Impl {
         hole_fill(context, size, options.hole_fill),
         consistency(context, size),
         vertical_alignment(context, size, options.vertical_alignment, tuning.row_group),
+        coarse_match(context, size, range_of(options), options.banded_sgm),
         search_band(context, size, range_of(options), options.search_band, tuning.row_group),
         stages_u8(context, size, PixelType::kU8, options, BandedSgm::code_padding(range_of(options))),
         stages_u16(context, size, PixelType::kU16, options, BandedSgm::code_padding(range_of(options))),
@@ -155,7 +158,7 @@ struct Pipeline::Impl {
     } else if (options.search == SearchMode::kFull) {
       search_band.full_range(predicted);
     } else {
-      search_band(predicted);
+      search_band(predicted, coarse_match(images));
     }
     stages_of(images.type).census(images.pixels, codes);
     stages_of(images.type).step_penalties(images.pixels, penalties);

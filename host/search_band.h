@@ -19,7 +19,7 @@ class SearchBand {
              const SearchBandOptions& options, int row_group = 0);
 
   /// Bands from the prediction.
-  void operator()(const StereoMaps& predicted);
+  void operator()(const StereoMaps& predicted, const StereoMaps& coarse);
   /// Every pixel searches everything.
   void full_range();
   /// The same where there is a prediction that is not searched by: `row_sums` counts its pixels.
@@ -43,17 +43,18 @@ class SearchBand {
   const shared::DisparityRange range_;
   const SearchBandOptions options_;
   const int row_group_;
-  ocl::Buffer<shared::BlockRange> block_ranges_;
+  ocl::Buffer<shared::BlockRange> block_ranges_, coarse_ranges_;
   ocl::Buffer<shared::Band> block_bands_;
   ocl::Buffer<shared::Band> bands_;
   ocl::Buffer<cl_uint> cell_offsets_;
   ocl::Buffer<shared::RowSum> row_sums_;
-  ocl::Kernel<const shared::ImageSize, Disparities, ocl::Buffer<shared::BlockRange>> gather_blocks_;
+  ocl::Kernel<const shared::ImageSize, Disparities, ocl::Buffer<shared::BlockRange>> gather_blocks_, gather_coarse_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const cl_int,
-              const ocl::Buffer<shared::BlockRange>, ocl::Buffer<shared::Band>>
+              const ocl::Buffer<shared::BlockRange>, const ocl::Buffer<shared::BlockRange>, ocl::Buffer<shared::Band>>
       bands_of_blocks_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
-              const ocl::Buffer<shared::Band>, ocl::Buffer<shared::Band>>
+              const ocl::Buffer<shared::Band>, const ocl::Buffer<shared::BlockRange>, const float,
+              ocl::Buffer<shared::Band>>
       bands_of_pixels_;
   ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
               ocl::Buffer<shared::RowSum>>

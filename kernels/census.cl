@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What matching compares, a code a pixel: a bit for each comparison of two grey values in a window around it.
 // - Census transform (Zabih and Woodfill 1994): every pixel of the window, row by row, against the centre.
-// - Pairs: 32 pairs of pixels drawn once from a normal distribution (after Calonder et al., BRIEF, 2010; EGOSGM_PAIRS).
+// - Sparse census: 32 pixels of a window against its centre (EGOSGM_CENSUS13X11).
 // - The grey value itself (8 bits), for sums of absolute differences.
 // Pixels outside the image are those of its border.
 //
@@ -26,7 +26,7 @@
 #error "CODE_BYTES: 4 or 8, the size of a code"
 #endif
 #ifndef COMPARISONS
-#error "COMPARISONS: 0 for the grey value, 1 for a census window, 2 for pairs"
+#error "COMPARISONS: 0 for the grey value, 1 for a census window, 2 for the sparse census"
 #endif
 #ifndef RADIUS_X
 #error "RADIUS_X: half the window's width"
@@ -62,7 +62,7 @@ typedef struct __attribute__((packed)) {
 } PackedCodes;
 
 #if COMPARISONS == 2
-constant char kPairs[32][4] = EGOSGM_PAIRS;
+constant char kSparse[32][2] = EGOSGM_CENSUS13X11;
 #endif
 
 inline Code code_at(const ImageSize size, global const Pixel* image, const int x, const int y) {
@@ -80,8 +80,7 @@ inline Code code_at(const ImageSize size, global const Pixel* image, const int x
 #else
   Code code = 0;
   for (int i = 0; i < 32; ++i) {
-    constant char* pair = kPairs[i];
-    code = code << 1 | (AT(pair[0], pair[1]) < AT(pair[2], pair[3]) ? 1 : 0);
+    code = code << 1 | (AT(kSparse[i][0], kSparse[i][1]) < AT(0, 0) ? 1 : 0);
   }
   return code;
 #endif
@@ -110,13 +109,13 @@ inline Codes codes_at(const ImageSize size, global const Pixel* image, const int
     }
   }
 #else
+  const Pixels centre = load(ROW(0));
   global const Pixel* rows[2 * RADIUS_Y + 1];
 #pragma unroll
   for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) rows[RADIUS_Y + dy] = ROW(dy);
 #pragma unroll
   for (int i = 0; i < 32; ++i) {
-    constant char* pair = kPairs[i];
-    codes = append(codes, load(rows[RADIUS_Y + pair[1]] + pair[0]), load(rows[RADIUS_Y + pair[3]] + pair[2]));
+    codes = append(codes, load(rows[RADIUS_Y + kSparse[i][1]] + kSparse[i][0]), centre);
   }
 #endif
   return codes;

@@ -117,9 +117,42 @@ kernel void gather_blocks(const ImageSize size, global const float* disparity, g
   ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range;
 }
 
+// What the coarse match says of a block and of one coarse pixel around it, in full pixels. A work-item a block and view.
+kernel void gather_coarse(const ImageSize size, global const float* coarse, global BlockRange* ranges) {
+  const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int x = get_global_id(0);
+  const int y = get_global_id(1);
+  const int view = get_global_id(2);
+  if (x >= blocks_x || y >= blocks_y) return;
+
+  BlockRange range;
+  range.min = INFINITY;
+  range.max = -INFINITY;
+  range.count = 0;
+  const int side = EGOSGM_BLOCK / EGOSGM_COARSE;
+#ifndef AR
+#define AR 1
+#endif
+  for (int v = max(y * side - AR, 0); v <= min(y * side + side - 1 + AR, height - 1); ++v) {
+    for (int u = max(x * side - AR, 0); u <= min(x * side + side - 1 + AR, width - 1); ++u) {
+      const float d = coarse[((size_t)view * height + v) * width + u];
+      if (d > EGOSGM_INVALID_DISPARITY) {
+        range.min = fmin(range.min, d * EGOSGM_COARSE);
+        range.max = fmax(range.max, d * EGOSGM_COARSE);
+        range.count += 1;
+      }
+    }
+  }
+  ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range;
+}
+
 // The band of a block's unpredicted pixels, from the 3x3 blocks around it. A work-item a block and view.
 kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, const float margin, const int min_count,
-                            global const BlockRange* ranges, global Band* bands) {
+                            global const BlockRange* ranges, global const BlockRange* coarse_ranges,
+                            global Band* bands) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int x = get_global_id(0);
@@ -138,15 +171,23 @@ kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, co
       count += block.count;
     }
   }
+  const BlockRange coarse = coarse_ranges[((size_t)view * blocks_y + y) * blocks_x + x];
+  if (count < (uint)max(min_count, 0) && coarse.count >= (AR ? 8 : 3)) {
+    least = coarse.min, most = coarse.max, count = 1000;
+  } else {
+    least = fmin(least, coarse.min), most = fmax(most, coarse.max);
+  }
   const bool enough = count > 0 && count >= (uint)max(min_count, 0);
   bands[((size_t)view * blocks_y + y) * blocks_x + x] =
       first_of(bands_of(range, enough ? least - margin : -INFINITY, enough ? most + margin : INFINITY));
+
 }
 
 // A work-item a block's row of pixels and view.
 kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
-                            global const Band* block_bands, global Band* bands) {
+                            global const Band* block_bands, global const BlockRange* coarse_ranges, const float tolerance,
+                            global Band* bands) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int block = get_global_id(0);
@@ -162,7 +203,23 @@ kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   // A variance that is not a number searches everything.
   const float8 half_width = deviation <= min_half_width ? (float8)min_half_width : deviation;
   const float8 reach = half_width <= (float)range.count ? half_width : (float8)range.count;
-  const Bands own = bands_of(range, predicted ? d - reach : 0.0f, predicted ? d + reach : 0.0f);
+  const BlockRange coarse = coarse_ranges[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + block];
+#ifndef MARG
+#define MARG 4.0f
+#endif
+#ifdef VARB
+  const int8 below = d + reach + tolerance < coarse.max;
+  const int8 above = d - reach - tolerance > coarse.min;
+#else
+  const int8 below = d < coarse.min - tolerance;
+  const int8 above = d > coarse.max + tolerance;
+#endif
+  const int8 contradicted = (below | above) & (coarse.count >= (AR ? 8 : 3) ? -1 : 0);
+  const float8 low_end = d - reach;
+  const float8 high_end = d + reach;
+  const float8 from = contradicted ? fmin(low_end, (float8)(coarse.min - MARG)) : low_end;
+  const float8 to = contradicted ? fmax(high_end, (float8)(coarse.max + MARG)) : high_end;
+  const Bands own = bands_of(range, predicted ? from : 0.0f, predicted ? to : 0.0f);
   const Band around = block_bands[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + block];
 
   const uint8 origin = as_uint8(predicted ? own.origin : around.origin) & 0xffff;

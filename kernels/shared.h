@@ -37,6 +37,9 @@ typedef float f32;
 // Predictions are summed up over blocks of this many pixels a side, for the bands of pixels without one.
 #define EGOSGM_BLOCK 8
 
+// CoarseMatch takes this many pixels a side for one.
+#define EGOSGM_COARSE 4
+
 // The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside.
 // KalmanUpdate then takes the measurement instead of fusing it, as where the two differ by more than the gate, and the
 // next frame searches wide around it.
@@ -45,19 +48,17 @@ typedef float f32;
 // The variance of a hole that MedianFilter fills.
 #define EGOSGM_FILLED_VARIANCE_PX2 1.0f
 
-// The 32 pairs of pixels that MatchingCost::kPairs32 compares: dx, dy of the first and of the second, drawn from a
-// normal distribution.
-#define EGOSGM_PAIRS_RADIUS_X 6
-#define EGOSGM_PAIRS_RADIUS_Y 5
-#define EGOSGM_PAIRS                                                                                                  \
-  {                                                                                                                   \
-    {-3, 0, 0, -1}, {-2, 1, -3, 0}, {-3, -1, 0, 2}, {-6, 3, -5, 2}, {-5, -1, 2, 2}, {-1, 1, -2, -1}, {4, -1, -5, -4}, \
-        {3, 2, 1, 3}, {1, -3, 4, 3}, {1, 1, -1, -1}, {2, 1, -2, -5}, {3, 0, 0, 3}, {0, -3, -2, 2}, {0, -1, 0, 2},     \
-        {-2, -2, 1, -1}, {-2, 1, -4, -3}, {1, 0, -2, 3}, {1, 0, -1, 1}, {1, 3, -2, -2}, {-4, 0, 0, -3},               \
-        {-3, -2, 3, 0}, {2, -4, 1, -2}, {-6, 1, 0, -2}, {1, -1, -1, 4}, {-3, 3, 2, 2}, {3, -3, 4, 0}, {3, 2, -1, 1},  \
-        {-1, -1, -3, 2}, {-3, 2, -2, 3}, {4, 2, -4, -1}, {2, 3, 4, -1}, {                                             \
-      -1, -2, -1, 2                                                                                                   \
-    }                                                                                                                 \
+// The 32 pixels dx, dy of a 13x11 window that MatchingCost::kCensus13x11 compares with its centre: on a golden-angle
+// spiral, as dense as a normal distribution of deviations 3.4 and 2.6 px, each moved to the nearest free pixel.
+#define EGOSGM_CENSUS13X11_RADIUS_X 6
+#define EGOSGM_CENSUS13X11_RADIUS_Y 5
+#define EGOSGM_CENSUS13X11                                                                                             \
+  {                                                                                                                    \
+    {1, 0}, {-1, 1}, {0, -1}, {1, 1}, {-2, 0}, {2, -1}, {-1, 2}, {-1, -2}, {3, 1}, {-3, 1}, {1, -2}, {1, 2}, {-3, -1}, \
+        {3, -1}, {-2, 2}, {-1, -3}, {3, 2}, {-4, 0}, {3, -2}, {0, 4}, {-3, -3}, {5, 1}, {-4, 2}, {1, -4}, {3, 4},      \
+        {-6, -1}, {6, -2}, {-3, 5}, {-2, -5}, {6, 3}, {-6, 2}, {                                                       \
+      5, -5                                                                                                            \
+    }                                                                                                                  \
   }
 
 typedef struct {

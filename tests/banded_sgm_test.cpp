@@ -19,7 +19,7 @@ namespace {
 struct Case {
   shared::ImageSize size;
   shared::DisparityRange range;
-  MatchingCost cost = MatchingCost::kPairs32;
+  MatchingCost cost = MatchingCost::kCensus13x11;
   int paths = 8;
   bool banded = true;
   Scheduling scheduling = Scheduling::kWavefront;

@@ -18,7 +18,7 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   const auto [size, type, cost] = info.param;
   return std::to_string(size.width) + "x" + std::to_string(size.height) +
          (type == PixelType::kU8 ? "_8bit" : "_16bit") +
-         (cost == MatchingCost::kPairs32     ? "_pairs32"
+         (cost == MatchingCost::kCensus13x11 ? "_census13x11"
           : cost == MatchingCost::kCensus9x7 ? "_census9x7"
           : cost == MatchingCost::kCensus5x5 ? "_census5x5"
                                              : "_grey");
@@ -57,7 +57,7 @@ TEST_P(CensusTest, EqualsReference) {
 INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
                          ::testing::Combine(::testing::ValuesIn(testing::kSizes),
                                             ::testing::Values(PixelType::kU8, PixelType::kU16),
-                                            ::testing::Values(MatchingCost::kPairs32, MatchingCost::kCensus9x7,
+                                            ::testing::Values(MatchingCost::kCensus13x11, MatchingCost::kCensus9x7,
                                                               MatchingCost::kCensus5x5, MatchingCost::kSad3x3)),
                          name);
 

@@ -24,7 +24,7 @@ std::map<std::string, std::string> texts(const PipelineOptions& options) {
 /// Another value that an option whose value is `text` can take; by way of what it is.
 std::string another_value(const std::string& text) {
   static const std::map<std::string, std::string> kOthers{{"true", "false"},      {"false", "true"},
-                                                          {"band", "full"},       {"pairs32", "census5x5"},
+                                                          {"band", "full"},       {"census13x11", "census5x5"},
                                                           {"automatic", "paths"}, {"8", "4"}};
   if (const auto found = kOthers.find(text); found != kOthers.end()) return found->second;
   return text.find('.') == std::string::npos ? std::to_string(std::stoi(text) + 3) : text + "5";
@@ -117,7 +117,7 @@ TEST(Options, KeepEveryBitOfANumber) {
 
 TEST(Options, TakeEveryNameOfAChoice) {
   PipelineOptions options;
-  for (const std::string cost : {"pairs32", "census9x7", "census5x5", "sad3x3"}) {
+  for (const std::string cost : {"census13x11", "census9x7", "census5x5", "sad3x3"}) {
     set_option(options, "banded_sgm.cost", cost);
     EXPECT_EQ(texts(options)["banded_sgm.cost"], cost);
   }
@@ -178,7 +178,7 @@ TEST(Options, RefusesTextsThatAreNoValue) {
   expect_refused([&] { set_option(options, "temporal", "yes"); }, {"true or false"});
   expect_refused([&] { set_option(options, "search", "Band"); }, {"one of band, full"});
   expect_refused([&] { set_option(options, "banded_sgm.cost", "census"); },
-                 {"one of pairs32, census9x7, census5x5, sad3x3"});
+                 {"one of census13x11, census9x7, census5x5, sad3x3"});
   expect_refused([&] { set_option(options, "banded_sgm.scheduling", ""); }, {"one of automatic, wavefront, paths"});
 }
 

@@ -11,9 +11,9 @@
 
 namespace egosgm {
 
-/// Matching cost of a pixel pair: Hamming distance of 32 comparisons between fixed pairs of pixels in a 13x11 window
-/// (counted twice) or of census codes, or the mean absolute difference of a 3x3 window.
-enum class MatchingCost { kPairs32, kCensus9x7, kCensus5x5, kSad3x3 };
+/// Matching cost of a pixel pair: Hamming distance of census codes, or the mean absolute difference of a 3x3 window.
+/// kCensus13x11 compares 32 pixels of its window, denser towards the centre, and counts each twice.
+enum class MatchingCost { kCensus13x11, kCensus9x7, kCensus5x5, kSad3x3 };
 /// kBand: search where the prediction says (the method). kFull: search the whole range in every frame.
 enum class SearchMode { kBand, kFull };
 /// How the paths of BandedSgm run: diagonal wavefronts of tiles (CPUs, FPGAs) or a work-group a path (GPUs). Same bits.
@@ -47,7 +47,7 @@ struct SearchBandOptions {
 };
 
 struct BandedSgmOptions {
-  MatchingCost cost = MatchingCost::kPairs32;
+  MatchingCost cost = MatchingCost::kCensus13x11;
   int paths = 8;  // 4 (horizontal and vertical) or 8
   int p1 = 10;    // penalty of a step of one disparity
   // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: p2 - p2_slope * g, but not

@@ -6,25 +6,25 @@
 namespace egosgm::reference {
 namespace {
 
-struct Comparison {
-  int dx, dy, than_dx, than_dy;
+struct Offset {
+  int dx, dy;
 };
 
-std::vector<Comparison> window(int radius_x, int radius_y) {
-  std::vector<Comparison> comparisons;
+std::vector<Offset> window(int radius_x, int radius_y) {
+  std::vector<Offset> offsets;
   for (int dy = -radius_y; dy <= radius_y; ++dy) {
     for (int dx = -radius_x; dx <= radius_x; ++dx) {
-      if (dx != 0 || dy != 0) comparisons.push_back({dx, dy, 0, 0});
+      if (dx != 0 || dy != 0) offsets.push_back({dx, dy});
     }
   }
-  return comparisons;
+  return offsets;
 }
 
-std::vector<Comparison> pairs() {
-  constexpr int kPairs[32][4] = EGOSGM_PAIRS;
-  std::vector<Comparison> comparisons;
-  for (const auto& p : kPairs) comparisons.push_back({p[0], p[1], p[2], p[3]});
-  return comparisons;
+std::vector<Offset> sparse_window() {
+  constexpr int kOffsets[32][2] = EGOSGM_CENSUS13X11;
+  std::vector<Offset> offsets;
+  for (const auto& offset : kOffsets) offsets.push_back({offset[0], offset[1]});
+  return offsets;
 }
 
 }  // namespace
@@ -35,17 +35,16 @@ std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::
     return image[static_cast<std::size_t>(std::clamp(y, 0, size.height - 1)) * size.width +
                  std::clamp(x, 0, size.width - 1)];
   };
-  const std::vector<Comparison> comparisons = cost == MatchingCost::kCensus9x7   ? window(4, 3)
-                                              : cost == MatchingCost::kCensus5x5 ? window(2, 2)
-                                              : cost == MatchingCost::kPairs32   ? pairs()
-                                                                                 : std::vector<Comparison>{};
+  const std::vector<Offset> offsets = cost == MatchingCost::kCensus13x11 ? sparse_window()
+                                      : cost == MatchingCost::kCensus9x7 ? window(4, 3)
+                                      : cost == MatchingCost::kCensus5x5 ? window(2, 2)
+                                                                         : std::vector<Offset>{};
   std::vector<std::uint64_t> codes;
   codes.reserve(image.size());
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       std::uint64_t code = cost == MatchingCost::kSad3x3 ? at(x, y) >> (bits - 8) : 0;
-      for (const Comparison& c : comparisons)
-        code = 2 * code + (at(x + c.dx, y + c.dy) < at(x + c.than_dx, y + c.than_dy));
+      for (const Offset& offset : offsets) code = 2 * code + (at(x + offset.dx, y + offset.dy) < at(x, y));
       codes.push_back(code);
     }
   }
