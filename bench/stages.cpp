@@ -9,6 +9,7 @@
 #include "bench/street.h"
 #include "host/banded_sgm.h"
 #include "host/census.h"
+#include "host/coarse_match.h"
 #include "host/consistency_check.h"
 #include "host/edge_rejection.h"
 #include "host/forward_warp.h"
@@ -74,6 +75,7 @@ class Chain {
         edge_rejection_(context, size_, {}),
         hole_fill_(context, size_, {}),
         consistency_(context, size_),
+        coarse_match_(context, size_, options(range_)),
         search_band_(context, size_, range_, {}),
         full_band_(context, size_, range_, {}),
         vertical_alignment_(context, size_, {}),
@@ -106,7 +108,8 @@ class Chain {
         {"EdgeRejection", [this] { edge_rejection_(warped_, rejected_); }, 2 * maps},
         {"HoleFill", [this] { hole_fill_(rejected_, filled_); }, 2 * maps},
         {"ConsistencyCheck", [this] { consistency_(filled_, 3.0f, OutsideView::kKeep, predicted_); }, 2 * maps},
-        {"SearchBand", [this] { search_band_(predicted_); }, maps + band},
+        {"CoarseMatch", [this] { coarse_match_(images_); }, grey},
+        {"SearchBand", [this] { search_band_(predicted_, &coarse_match_.found()); }, maps + band},
         // Resampling both images, and the estimate on every fourth row of the left view.
         {"VerticalAlignment", [this] { align(); }, 2 * grey + (grey + map / 2) / 4},
         {"Census", [this] { census_(images_.pixels, codes_); }, grey + codes},
@@ -123,6 +126,13 @@ class Chain {
   }
 
  private:
+  static PipelineOptions options(shared::DisparityRange range) {
+    PipelineOptions options;
+    options.min_disparity = range.min;
+    options.disparities = range.count;
+    return options;
+  }
+
   int padding() const { return BandedSgm::code_padding(range_); }
 
   void align() { vertical_alignment_.estimate(vertical_alignment_.align(images_), predicted_); }
@@ -146,6 +156,7 @@ class Chain {
   EdgeRejection edge_rejection_;
   HoleFill hole_fill_;
   ConsistencyCheck consistency_;
+  CoarseMatch coarse_match_;
   SearchBand search_band_, full_band_;
   VerticalAlignment vertical_alignment_;
   Census census_;

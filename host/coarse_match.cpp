@@ -6,8 +6,6 @@
 namespace egosgm {
 namespace {
 
-constexpr float kMaxDifferencePx = 1.0f;  // of the left-right check, in coarse pixels
-
 int floor_div(int a, int b) { return a / b - (a % b < 0); }
 
 const cl::Program& build(ocl::Context& context, PixelType type) {
@@ -27,44 +25,44 @@ shared::DisparityRange CoarseMatch::coarse_range(shared::DisparityRange range) {
   return {first, last - first + 1};
 }
 
-BandedSgmOptions CoarseMatch::coarse_options(const BandedSgmOptions& options) {
-  BandedSgmOptions coarse = options;
+BandedSgmOptions CoarseMatch::matcher(const PipelineOptions& options) {
+  BandedSgmOptions coarse = options.banded_sgm;
   coarse.cost = MatchingCost::kCensus5x5;
-  coarse.p1 = 6;
-  coarse.p2 = 60;
-  coarse.p2_at_edges = 40;
+  coarse.p1 = options.coarse_match.p1;
+  coarse.p2 = options.coarse_match.p2;
+  coarse.p2_at_edges = options.coarse_match.p2_at_edges;
   return coarse;
 }
 
-CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-                         const BandedSgmOptions& options)
+CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options)
     : context_((context.enter("CoarseMatch"), context)),
       size_(size),
       coarse_(coarse_size(size)),
+      range_(coarse_range({options.min_disparity, options.disparities})),
+      matcher_(matcher(options)),
+      max_difference_px_(options.coarse_match.max_difference_px),
       shrink_u8_(build(context, PixelType::kU8), "shrink"),
       shrink_u16_(build(context, PixelType::kU16), "shrink"),
-      band_(context, coarse_, coarse_range(range), {}),
-      census_(context, coarse_, PixelType::kU16, coarse_options(options).cost,
-              BandedSgm::code_padding(coarse_range(range))),
-      step_penalties_(context, coarse_, PixelType::kU16, coarse_options(options)),
-      banded_sgm_(context, coarse_, coarse_range(range), coarse_options(options)),
+      band_(context, coarse_, range_, {}),
+      census_(context, coarse_, PixelType::kU16, matcher_.cost, BandedSgm::code_padding(range_)),
+      step_penalties_(context, coarse_, PixelType::kU16, matcher_),
+      banded_sgm_(context, coarse_, range_, matcher_),
       consistency_(context, coarse_),
       images_(context, 2 * 2 * pixel_count(coarse_)),
-      codes_(context,
-             Census::words(coarse_options(options).cost, coarse_, BandedSgm::code_padding(coarse_range(range)))),
+      codes_(context, Census::words(matcher_.cost, coarse_, BandedSgm::code_padding(range_))),
       penalties_(context, StepPenalties::plane_count(coarse_)),
       matched_(context, coarse_),
       checked_(context, coarse_) {}
 
 const StereoMaps& CoarseMatch::operator()(const FrameImages& images) {
-  context_.enter("CoarseMatch");
+  const ocl::Context::Within within(context_, "CoarseMatch");
   Shrink& shrink = images.type == PixelType::kU8 ? shrink_u8_ : shrink_u16_;
   shrink(context_, ocl::every_pixel(context_, coarse_), size_, images.pixels, images_);
   band_.full_range();
   census_(images_, codes_);
   step_penalties_(images_, penalties_);
   banded_sgm_(codes_, penalties_, band_, matched_);
-  consistency_(matched_, kMaxDifferencePx, OutsideView::kDrop, checked_);
+  consistency_(matched_, max_difference_px_, OutsideView::kDrop, checked_);
   return checked_;
 }
 

@@ -17,22 +17,27 @@ namespace egosgm {
 /// disparity for EGOSGM_COARSE times as many.
 class CoarseMatch {
  public:
-  CoarseMatch(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-              const BandedSgmOptions& options);
+  CoarseMatch(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options);
 
   /// Left-right consistent disparities of both views, `coarse_size` of the images' each.
   const StereoMaps& operator()(const FrameImages& images);
 
+  /// What the last call returned.
+  const StereoMaps& found() const { return checked_; }
+
   static shared::ImageSize coarse_size(shared::ImageSize size);
   static shared::DisparityRange coarse_range(shared::DisparityRange range);
-  /// The matcher's options at that resolution.
-  static BandedSgmOptions coarse_options(const BandedSgmOptions& options);
+  /// The options of BandedSgm at that resolution.
+  static BandedSgmOptions matcher(const PipelineOptions& options);
 
  private:
   using Shrink = ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
 
   ocl::Context& context_;
   const shared::ImageSize size_, coarse_;
+  const shared::DisparityRange range_;
+  const BandedSgmOptions matcher_;
+  const float max_difference_px_;
   Shrink shrink_u8_, shrink_u16_;
   SearchBand band_;
   Census census_;

@@ -25,11 +25,18 @@ void for_each(Options& o, Visit&& visit) {
   visit("consistency.prediction_px", o.consistency.prediction_px);
   visit("consistency.measurement_px", o.consistency.measurement_px);
   visit("consistency.update_px", o.consistency.update_px);
+  visit("coarse_match.enabled", o.coarse_match.enabled);
+  visit("coarse_match.p1", o.coarse_match.p1);
+  visit("coarse_match.p2", o.coarse_match.p2);
+  visit("coarse_match.p2_at_edges", o.coarse_match.p2_at_edges);
+  visit("coarse_match.max_difference_px", o.coarse_match.max_difference_px);
   visit("search_band.sigmas", o.search_band.sigmas);
   visit("search_band.min_half_width_px", o.search_band.min_half_width_px);
   visit("search_band.from_neighbours", o.search_band.from_neighbours);
   visit("search_band.neighbour_min_count", o.search_band.neighbour_min_count);
   visit("search_band.neighbour_margin_px", o.search_band.neighbour_margin_px);
+  visit("search_band.coarse_tolerance_px", o.search_band.coarse_tolerance_px);
+  visit("search_band.coarse_margin_px", o.search_band.coarse_margin_px);
   visit("vertical_alignment.enabled", o.vertical_alignment.enabled);
   visit("vertical_alignment.gain", o.vertical_alignment.gain);
   visit("banded_sgm.cost", o.banded_sgm.cost);
@@ -161,6 +168,7 @@ PipelineOptions PipelineOptions::paper() {
   options.search_band.sigmas = 3.0f;
   options.search_band.min_half_width_px = 0.0f;
   options.search_band.from_neighbours = false;
+  options.coarse_match.enabled = false;
   options.kalman_update.gate_px = 0.0f;
   return options;
 }
@@ -173,6 +181,11 @@ void PipelineOptions::validate() const {
   });
   expect("search_band.neighbour_min_count", search_band.neighbour_min_count, search_band.neighbour_min_count >= 1,
          "choose 1 or more");
+  expect("coarse_match.p2", coarse_match.p2, coarse_match.p2 >= 0 && coarse_match.p2 <= 190, "choose 0 to 190");
+  expect("coarse_match.p2_at_edges", coarse_match.p2_at_edges,
+         coarse_match.p2_at_edges >= 0 && coarse_match.p2_at_edges <= 190, "choose 0 to 190");
+  expect("coarse_match.p1", coarse_match.p1, coarse_match.p1 >= 0 && coarse_match.p1 <= coarse_match.p2,
+         "choose 0 to coarse_match.p2");
   expect("vertical_alignment.gain", vertical_alignment.gain, vertical_alignment.gain <= 1, "choose 0 to 1");
   expect("banded_sgm.paths", banded_sgm.paths, banded_sgm.paths == 4 || banded_sgm.paths == 8, "choose 4 or 8");
   expect("banded_sgm.p2", banded_sgm.p2, banded_sgm.p2 >= 0 && banded_sgm.p2 <= 190,

@@ -88,7 +88,7 @@ struct Pipeline::Impl {
   HoleFill hole_fill;
   ConsistencyCheck consistency;
   VerticalAlignment vertical_alignment;
-  CoarseMatch coarse_match;
+  std::optional<CoarseMatch> coarse_match;
   SearchBand search_band;
   PixelStages stages_u8, stages_u16;
   BandedSgm banded_sgm;
@@ -120,7 +120,6 @@ struct Pipeline::Impl {
         hole_fill(context, size, options.hole_fill),
         consistency(context, size),
         vertical_alignment(context, size, options.vertical_alignment, tuning.row_group),
-        coarse_match(context, size, range_of(options), options.banded_sgm),
         search_band(context, size, range_of(options), options.search_band, tuning.row_group),
         stages_u8(context, size, PixelType::kU8, options, BandedSgm::code_padding(range_of(options))),
         stages_u16(context, size, PixelType::kU16, options, BandedSgm::code_padding(range_of(options))),
@@ -134,7 +133,11 @@ struct Pipeline::Impl {
         penalties(context, StepPenalties::plane_count(size)),
         predicted(context, size),
         scratch(context, size),
-        pool{{{context, size}, {context, size}, {context, size}, {context, size}}} {}
+        pool{{{context, size}, {context, size}, {context, size}, {context, size}}} {
+    if (options.coarse_match.enabled && options.temporal && options.search == SearchMode::kBand) {
+      coarse_match.emplace(context, size, options);
+    }
+  }
 
   ~Impl() { context.drain(); }
 
@@ -158,7 +161,7 @@ struct Pipeline::Impl {
     } else if (options.search == SearchMode::kFull) {
       search_band.full_range(predicted);
     } else {
-      search_band(predicted, coarse_match(images));
+      search_band(predicted, coarse_match ? &(*coarse_match)(images) : nullptr);
     }
     stages_of(images.type).census(images.pixels, codes);
     stages_of(images.type).step_penalties(images.pixels, penalties);

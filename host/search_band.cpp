@@ -2,7 +2,6 @@
 #include "host/search_band.h"
 
 #include <algorithm>
-#include <cstdlib>
 
 namespace egosgm {
 namespace {
@@ -33,6 +32,7 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       row_group_(row_group > 0 ? row_group : ocl::row_group(context)),
       block_ranges_(context, 2 * pixel_count(blocks_)),
       coarse_ranges_(context, 2 * pixel_count(blocks_)),
+      no_coarse_(context, 2 * pixel_count(blocks_)),
       block_bands_(context, 2 * pixel_count(blocks_)),
       bands_(context, 2 * pixel_count(size)),
       cell_offsets_(context, 2 * pixel_count(size)),
@@ -43,21 +43,23 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       bands_of_pixels_(build(context, row_group_), "bands_of_pixels"),
       sum_rows_(build(context, row_group_), "sum_rows"),
       full_range_(build(context, row_group_), "full_range") {
+  no_coarse_.write(context, std::vector(no_coarse_.size(), shared::BlockRange{}));
   if (!options.from_neighbours) block_bands_.write(context, std::vector(block_bands_.size(), whole(range)));
 }
 
-void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps& coarse) {
+void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* coarse) {
   context_.enter("SearchBand");
-  gather_coarse_(context_, ocl::every_pixel(context_, blocks_), size_, coarse.disparity, coarse_ranges_);
+  const ocl::Range blocks = ocl::every_pixel(context_, blocks_);
+  if (coarse) gather_coarse_(context_, blocks, size_, coarse->disparity, coarse_ranges_);
+  const ocl::Buffer<shared::BlockRange>& found = coarse ? coarse_ranges_ : no_coarse_;
   if (options_.from_neighbours) {
-    const ocl::Range blocks = ocl::every_pixel(context_, blocks_);
     gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
     bands_of_blocks_(context_, blocks, size_, range_, options_.neighbour_margin_px, options_.neighbour_min_count,
-                     block_ranges_, coarse_ranges_, block_bands_);
+                     options_.coarse_margin_px, block_ranges_, found, block_bands_);
   }
-  const float tolerance = getenv("TOL") ? static_cast<float>(atof(getenv("TOL"))) : 4.0f;
   bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}), size_, range_, options_.sigmas,
-                   options_.min_half_width_px, predicted.disparity, predicted.variance, block_bands_, coarse_ranges_, tolerance, bands_);
+                   options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
+                   options_.coarse_margin_px, found, block_bands_, bands_);
   sum_rows_(context_, ocl::group_a_row(size_, row_group_), size_, predicted.disparity, bands_, cell_offsets_,
             row_sums_);
 }

@@ -10,16 +10,18 @@ namespace egosgm {
 /// Says for every pixel of both views which disparities are searched, and where their cells lie.
 ///
 /// A predicted pixel searches d +- max(min_half_width_px, sigmas * sqrt(p)), another one the range that the predictions
-/// around it span, one with none near everything. Bands hold whole chunks of EGOSGM_LANES lanes; lanes outside of the
-/// disparity range, of which there may be up to EGOSGM_LANES - 1 at its end, do not exist for BandedSgm.
+/// around it span, one with none near everything. Where CoarseMatch found disparities beyond that by more than
+/// coarse_tolerance_px, as on an object that moves by itself, the band reaches there too. Bands hold whole chunks of
+/// EGOSGM_LANES lanes; lanes outside of the disparity range, of which there may be up to EGOSGM_LANES - 1 at its end,
+/// do not exist for BandedSgm.
 class SearchBand {
  public:
   /// `row_group`: work-items that share a row when chunks are summed up; 0: one on a CPU, many elsewhere. Same bits.
   SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
              const SearchBandOptions& options, int row_group = 0);
 
-  /// Bands from the prediction.
-  void operator()(const StereoMaps& predicted, const StereoMaps& coarse);
+  /// Bands from the prediction, and from what CoarseMatch found, where there is one.
+  void operator()(const StereoMaps& predicted, const StereoMaps* coarse = nullptr);
   /// Every pixel searches everything.
   void full_range();
   /// The same where there is a prediction that is not searched by: `row_sums` counts its pixels.
@@ -43,17 +45,17 @@ class SearchBand {
   const shared::DisparityRange range_;
   const SearchBandOptions options_;
   const int row_group_;
-  ocl::Buffer<shared::BlockRange> block_ranges_, coarse_ranges_;
+  ocl::Buffer<shared::BlockRange> block_ranges_, coarse_ranges_, no_coarse_;
   ocl::Buffer<shared::Band> block_bands_;
   ocl::Buffer<shared::Band> bands_;
   ocl::Buffer<cl_uint> cell_offsets_;
   ocl::Buffer<shared::RowSum> row_sums_;
   ocl::Kernel<const shared::ImageSize, Disparities, ocl::Buffer<shared::BlockRange>> gather_blocks_, gather_coarse_;
-  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const cl_int,
+  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const cl_int, const float,
               const ocl::Buffer<shared::BlockRange>, const ocl::Buffer<shared::BlockRange>, ocl::Buffer<shared::Band>>
       bands_of_blocks_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
-              const ocl::Buffer<shared::Band>, const ocl::Buffer<shared::BlockRange>, const float,
+              const float, const float, const ocl::Buffer<shared::BlockRange>, const ocl::Buffer<shared::Band>,
               ocl::Buffer<shared::Band>>
       bands_of_pixels_;
   ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,

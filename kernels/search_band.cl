@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span.
+// What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span; and
+// what CoarseMatch found there, where that lies elsewhere.
 #include "shared.h"
 
 // lint: ROW_GROUP=1
@@ -117,7 +118,7 @@ kernel void gather_blocks(const ImageSize size, global const float* disparity, g
   ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range;
 }
 
-// What the coarse match says of a block and of one coarse pixel around it, in full pixels. A work-item a block and view.
+// What CoarseMatch found in a block and one coarse pixel around it, in full pixels. A work-item a block and view.
 kernel void gather_coarse(const ImageSize size, global const float* coarse, global BlockRange* ranges) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
@@ -128,31 +129,28 @@ kernel void gather_coarse(const ImageSize size, global const float* coarse, glob
   const int view = get_global_id(2);
   if (x >= blocks_x || y >= blocks_y) return;
 
+  const int side = EGOSGM_BLOCK / EGOSGM_COARSE;
   BlockRange range;
   range.min = INFINITY;
   range.max = -INFINITY;
   range.count = 0;
-  const int side = EGOSGM_BLOCK / EGOSGM_COARSE;
-#ifndef AR
-#define AR 1
-#endif
-  for (int v = max(y * side - AR, 0); v <= min(y * side + side - 1 + AR, height - 1); ++v) {
-    for (int u = max(x * side - AR, 0); u <= min(x * side + side - 1 + AR, width - 1); ++u) {
+  for (int v = max(y * side - 1, 0); v <= min(y * side + side, height - 1); ++v) {
+    for (int u = max(x * side - 1, 0); u <= min(x * side + side, width - 1); ++u) {
       const float d = coarse[((size_t)view * height + v) * width + u];
-      if (d > EGOSGM_INVALID_DISPARITY) {
-        range.min = fmin(range.min, d * EGOSGM_COARSE);
-        range.max = fmax(range.max, d * EGOSGM_COARSE);
-        range.count += 1;
-      }
+      const bool valid = d > EGOSGM_INVALID_DISPARITY;
+      range.min = valid ? fmin(range.min, d * EGOSGM_COARSE) : range.min;
+      range.max = valid ? fmax(range.max, d * EGOSGM_COARSE) : range.max;
+      range.count += valid ? 1 : 0;
     }
   }
   ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range;
 }
 
-// The band of a block's unpredicted pixels, from the 3x3 blocks around it. A work-item a block and view.
+// The band of a block's unpredicted pixels: what the predictions in the 3x3 blocks around it and the coarse match span.
+// A work-item a block and view.
 kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, const float margin, const int min_count,
-                            global const BlockRange* ranges, global const BlockRange* coarse_ranges,
-                            global Band* bands) {
+                            const float coarse_margin, global const BlockRange* ranges,
+                            global const BlockRange* coarse_ranges, global Band* bands) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int x = get_global_id(0);
@@ -171,22 +169,28 @@ kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, co
       count += block.count;
     }
   }
-  const BlockRange coarse = coarse_ranges[((size_t)view * blocks_y + y) * blocks_x + x];
-  if (count < (uint)max(min_count, 0) && coarse.count >= (AR ? 8 : 3)) {
-    least = coarse.min, most = coarse.max, count = 1000;
-  } else {
-    least = fmin(least, coarse.min), most = fmax(most, coarse.max);
+  const size_t here = ((size_t)view * blocks_y + y) * blocks_x + x;
+  const BlockRange coarse = coarse_ranges[here];
+  const bool has_around = count > 0 && count >= (uint)max(min_count, 0);
+  const bool has_coarse = coarse.count >= EGOSGM_COARSE_MIN_COUNT;
+  float from = has_around || has_coarse ? INFINITY : -INFINITY;
+  float to = -from;
+  if (has_around) {
+    from = least - margin;
+    to = most + margin;
   }
-  const bool enough = count > 0 && count >= (uint)max(min_count, 0);
-  bands[((size_t)view * blocks_y + y) * blocks_x + x] =
-      first_of(bands_of(range, enough ? least - margin : -INFINITY, enough ? most + margin : INFINITY));
-
+  if (has_coarse) {
+    from = fmin(from, coarse.min - coarse_margin);
+    to = fmax(to, coarse.max + coarse_margin);
+  }
+  bands[here] = first_of(bands_of(range, from, to));
 }
 
 // A work-item a block's row of pixels and view.
 kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
-                            global const Band* block_bands, global const BlockRange* coarse_ranges, const float tolerance,
+                            const float coarse_tolerance, const float coarse_margin,
+                            global const BlockRange* coarse_ranges, global const Band* block_bands,
                             global Band* bands) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
@@ -204,21 +208,14 @@ kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   const float8 half_width = deviation <= min_half_width ? (float8)min_half_width : deviation;
   const float8 reach = half_width <= (float)range.count ? half_width : (float8)range.count;
   const BlockRange coarse = coarse_ranges[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + block];
-#ifndef MARG
-#define MARG 4.0f
-#endif
-#ifdef VARB
-  const int8 below = d + reach + tolerance < coarse.max;
-  const int8 above = d - reach - tolerance > coarse.min;
-#else
-  const int8 below = d < coarse.min - tolerance;
-  const int8 above = d > coarse.max + tolerance;
-#endif
-  const int8 contradicted = (below | above) & (coarse.count >= (AR ? 8 : 3) ? -1 : 0);
-  const float8 low_end = d - reach;
-  const float8 high_end = d + reach;
-  const float8 from = contradicted ? fmin(low_end, (float8)(coarse.min - MARG)) : low_end;
-  const float8 to = contradicted ? fmax(high_end, (float8)(coarse.max + MARG)) : high_end;
+  const int8 believed = coarse.count >= EGOSGM_COARSE_MIN_COUNT ? -1 : 0;
+  const float8 low = d - reach;
+  const float8 high = d + reach;
+  const int8 contradicted = believed & ((coarse.min < low - coarse_tolerance) | (coarse.max > high + coarse_tolerance));
+  const float8 found_low = coarse.min - coarse_margin;
+  const float8 found_high = coarse.max + coarse_margin;
+  const float8 from = (contradicted & (found_low < low)) ? found_low : low;
+  const float8 to = (contradicted & (found_high > high)) ? found_high : high;
   const Bands own = bands_of(range, predicted ? from : 0.0f, predicted ? to : 0.0f);
   const Band around = block_bands[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + block];
 
@@ -226,11 +223,11 @@ kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   const uint8 chunks = as_uint8(predicted ? own.chunks : around.chunks);
   const uint8 first = as_uint8(predicted ? own.first : around.first) & 0xffff;
   const uint8 last = as_uint8(predicted ? own.last : around.last);
-  const uint8 low = origin | chunks << 16;
-  const uint8 high = first | last << 16;
+  const uint8 first_words = origin | chunks << 16;
+  const uint8 second_words = first | last << 16;
   uint16 words;
-  words.even = low;
-  words.odd = high;
+  words.even = first_words;
+  words.odd = second_words;
   store_eight(bands + row, x, size.width, words);
 }
 

@@ -39,6 +39,8 @@ typedef float f32;
 
 // CoarseMatch takes this many pixels a side for one.
 #define EGOSGM_COARSE 4
+// SearchBand looks at a block's coarse pixels and the ones around them, and believes this many that have a disparity.
+#define EGOSGM_COARSE_MIN_COUNT 8
 
 // The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside.
 // KalmanUpdate then takes the measurement instead of fusing it, as where the two differ by more than the gate, and the

@@ -209,6 +209,7 @@ void expect_same(const reference::Pass& actual, const reference::Pass& expected,
   const int padding = BandedSgm::code_padding(testing::range_of(setting.options));
   const int words = Census::words(setting.options.banded_sgm.cost);
   EXPECT_TRUE(testing::same_bits(actual.images, expected.images, size)) << "images";
+  EXPECT_TRUE(testing::same_bits(actual.coarse, expected.coarse, CoarseMatch::coarse_size(size))) << "coarse match";
   EXPECT_TRUE(testing::same_bits(actual.band.bands, expected.band.bands, size)) << "bands";
   EXPECT_TRUE(testing::same_bits(actual.band.cell_offsets, expected.band.cell_offsets, size)) << "cell offsets";
   EXPECT_TRUE(testing::same_bits(actual.band.row_sums, expected.band.row_sums, {1, size.height})) << "row sums";
@@ -708,9 +709,10 @@ TEST(Pipeline, ReportsWhatItDid) {
     }
     return names;
   };
-  const std::vector<std::string> steady{
-      "upload", "ForwardWarp",   "EdgeRejection", "HoleFill",     "ConsistencyCheck", "VerticalAlignment", "SearchBand",
-      "Census", "StepPenalties", "BandedSgm",     "MedianFilter", "SpeckleRemoval",   "KalmanUpdate",      "download"};
+  const std::vector<std::string> steady{"upload",           "ForwardWarp",       "EdgeRejection", "HoleFill",
+                                        "ConsistencyCheck", "VerticalAlignment", "CoarseMatch",   "SearchBand",
+                                        "Census",           "StepPenalties",     "BandedSgm",     "MedianFilter",
+                                        "SpeckleRemoval",   "KalmanUpdate",      "download"};
   EXPECT_EQ(stages(reports[3]), steady);
   for (const FrameReport& report : reports) {
     EXPECT_GT(report.total_ms, 0);

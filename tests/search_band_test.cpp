@@ -24,13 +24,15 @@ reference::SearchBands read(ocl::Context& context, const SearchBand& stage) {
 }
 
 reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                           const HostMaps& maps, int row_group = 0) {
+                           const HostMaps& maps, int row_group = 0, const std::vector<float>& coarse = {}) {
   ocl::Context context(testing::any_device());
   SearchBand stage(context, size, range, options, row_group);
   StereoMaps predicted(context, size);
   predicted.disparity.write(context, maps.disparity);
   predicted.variance.write(context, maps.variance);
-  stage(predicted);
+  StereoMaps found(context, {(size.width + 3) / 4, (size.height + 3) / 4});
+  if (!coarse.empty()) found.disparity.write(context, coarse);
+  stage(predicted, coarse.empty() ? nullptr : &found);
   return read(context, stage);
 }
 
@@ -50,6 +52,19 @@ TEST_P(SearchBandTest, EqualsReference) {
     const auto maps = testing::random_maps(size, static_cast<float>(range.min - 3),
                                            static_cast<float>(range.min + range.count + 3), 0.6, 31);
     expect_same(run(size, range, {}, maps), reference::search_band(size, range, {}, maps), size);
+  }
+}
+
+TEST_P(SearchBandTest, EqualsReferenceWithACoarseMatch) {
+  const shared::ImageSize size = GetParam(), quarter{(size.width + 3) / 4, (size.height + 3) / 4};
+  for (const shared::DisparityRange range : kRanges) {
+    SCOPED_TRACE("min " + std::to_string(range.min) + ", count " + std::to_string(range.count));
+    const float end = static_cast<float>(range.min + range.count);
+    const auto maps = testing::random_maps(size, static_cast<float>(range.min), end, 0.5, 35);
+    const auto coarse = testing::random_maps(quarter, static_cast<float>(range.min) / 4, end / 4, 0.3, 36).disparity;
+    const SearchBandOptions options{.coarse_tolerance_px = 1.25f, .coarse_margin_px = 0.5f};
+    expect_same(run(size, range, options, maps, 0, coarse), reference::search_band(size, range, options, maps, coarse),
+                size);
   }
 }
 
@@ -153,6 +168,29 @@ TEST(SearchBand, UnpredictedPixelSearchesWhatItsNeighboursSpan) {
 
   maps.disparity[20 * 64 + 31] = EGOSGM_INVALID_DISPARITY;  // seven left around (32, 25)
   EXPECT_EQ(run(size, {0, 128}, options, maps).bands[25 * 64 + 32].last, 127);
+}
+
+TEST(SearchBand, ReachesWhatTheCoarseMatchFoundElsewhere) {
+  const shared::ImageSize size{64, 64};
+  auto maps = nothing(size);
+  maps.disparity[20 * 64 + 20] = 40, maps.disparity[20 * 64 + 60] = 40;
+  std::vector<float> coarse(2 * 16 * 16, EGOSGM_INVALID_DISPARITY);
+  for (int v = 3; v <= 6; ++v) {
+    for (int u = 3; u <= 6; ++u) coarse[v * 16 + u] = 20;  // 80 px, around the block of (16..23, 16..23) alone
+  }
+  const SearchBandOptions options{.min_half_width_px = 2, .coarse_tolerance_px = 3, .coarse_margin_px = 2};
+  const auto bands = run(size, {0, 128}, options, maps, 0, coarse).bands;
+  EXPECT_EQ(bands[20 * 64 + 20].first, 38);
+  EXPECT_EQ(bands[20 * 64 + 20].last, 82);
+  EXPECT_EQ(bands[20 * 64 + 60].last, 42) << "nothing was found there";
+  EXPECT_EQ(bands[20 * 64 + 21].first, 78) << "unpredicted, with one prediction around: what was found";
+  EXPECT_EQ(bands[20 * 64 + 21].last, 82);
+  EXPECT_EQ(bands[4096 + 20 * 64 + 20].last, 127) << "the right view";
+
+  for (float& d : coarse) d = d > 0 ? 11.2f : d;  // 44.8: within 3 px of what is searched anyway
+  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 42);
+  for (float& d : coarse) d = d > 0 ? 11.3f : d;
+  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 48);
 }
 
 TEST(SearchBand, CountsCellsAndLanesOfARow) {

@@ -45,7 +45,18 @@ class Context {
 
   /// What is built, allocated and enqueued from now on belongs to `stage`: errors and timings name it. A string
   /// literal.
-  void enter(const char* stage) { stage_ = stage; }
+  void enter(const char* stage) { stage_ = whole_ ? whole_ : stage; }
+  /// While it lives, the stages entered are parts of `stage`, and go by its name.
+  class Within {
+   public:
+    Within(Context& context, const char* stage) : context_(context) { context.stage_ = context.whole_ = stage; }
+    ~Within() { context_.whole_ = nullptr; }
+    Within(const Within&) = delete;
+    Within& operator=(const Within&) = delete;
+
+   private:
+    Context& context_;
+  };
   const char* stage() const { return stage_; }
 
   cl::CommandQueue& queue(Queue which = Queue::kKernels) { return queues_[static_cast<std::size_t>(which)]; }
@@ -126,6 +137,7 @@ class Context {
   bool shares_host_memory_ = false;
   bool profiles_kernels_ = true;
   const char* stage_ = "setup";
+  const char* whole_ = nullptr;
   std::shared_ptr<const ProgramFolder> folder_;
   std::map<std::pair<std::string, std::string>, std::pair<ProgramSource, cl::Program>> programs_;
   std::vector<Command> commands_;

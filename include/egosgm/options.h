@@ -38,12 +38,24 @@ struct ConsistencyCheckOptions {
   float update_px = 3.0f;       // and of the update
 };
 
+struct CoarseMatchOptions {
+  bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
+  int p1 = 6;           // penalties as in BandedSgmOptions, for a census of 5x5 coarse pixels
+  int p2 = 60;
+  int p2_at_edges = 40;
+  float max_difference_px = 1.0f;  // of the left-right check, in coarse pixels
+};
+
 struct SearchBandOptions {
   float sigmas = 2.0f;             // half-width of a predicted pixel's band, in standard deviations
   float min_half_width_px = 2.0f;  // and at least this
   bool from_neighbours = true;     // unpredicted pixels search the range of the predictions around them
   int neighbour_min_count = 8;     // with fewer predictions than this around, the whole range
   float neighbour_margin_px = 4.0f;
+  // A band is widened to reach what CoarseMatch found around the pixel, and a margin more, where that lies beyond it by
+  // more than the tolerance.
+  float coarse_tolerance_px = 3.0f;
+  float coarse_margin_px = 2.0f;
 };
 
 struct BandedSgmOptions {
@@ -101,6 +113,7 @@ struct EGOSGM_EXPORT PipelineOptions {
   EdgeRejectionOptions edge_rejection;
   HoleFillOptions hole_fill;
   ConsistencyCheckOptions consistency;
+  CoarseMatchOptions coarse_match;
   SearchBandOptions search_band;
   VerticalAlignmentOptions vertical_alignment;
   BandedSgmOptions banded_sgm;

@@ -3,6 +3,7 @@
 
 #include "tests/reference/banded_sgm.h"
 #include "tests/reference/census.h"
+#include "tests/reference/coarse_match.h"
 #include "tests/reference/consistency_check.h"
 #include "tests/reference/edge_rejection.h"
 #include "tests/reference/forward_warp.h"
@@ -63,8 +64,11 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
   const bool everything = frame.predicted.disparity.empty() || options_.search == SearchMode::kFull;
   Pass pass;
   pass.images = resample(size_, known.offset_px, images.greys);
+  if (!everything && options_.coarse_match.enabled) {
+    pass.coarse = coarse_match(size_, options_, pass.images, images.bits);
+  }
   pass.band = everything ? full_range(size_, range_, frame.predicted.disparity)
-                         : search_band(size_, range_, options_.search_band, frame.predicted);
+                         : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse);
 
   const auto middle = pass.images.begin() + static_cast<std::ptrdiff_t>(pass.images.size() / 2);
   const std::vector<std::uint64_t> both[2] = {codes(size_, {pass.images.begin(), middle}, images.bits, sgm.cost),

@@ -28,6 +28,7 @@ struct ViewMotions {
 /// A matching pass: of the resampled images, in their bands, and what each stage left of it.
 struct Pass {
   std::vector<int> images;
+  std::vector<float> coarse;  // disparities of both views at a quarter of the resolution
   SearchBands band;
   std::vector<std::uint32_t> codes;     // as kernels/census.cl lays them out
   std::vector<std::uint8_t> penalties;  // as kernels/step_penalties.cl does

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace egosgm::reference {
 namespace {
@@ -33,8 +34,27 @@ shared::Band band_of(shared::DisparityRange range, float from, float to) {
 
 bool is_valid(float disparity) { return disparity > EGOSGM_INVALID_DISPARITY; }
 
+/// What the coarse match found around a block, in full pixels; first > second: not enough.
+std::pair<float, float> found_around(shared::ImageSize size, const std::vector<float>& coarse, int view, int block_x,
+                                     int block_y) {
+  const int width = (size.width + 3) / 4, height = (size.height + 3) / 4;
+  float least = kInfinity, most = -kInfinity;
+  int count = 0;
+  for (int y = 2 * block_y - 1; y <= 2 * block_y + 2; ++y) {
+    for (int x = 2 * block_x - 1; x <= 2 * block_x + 2; ++x) {
+      if (coarse.empty() || x < 0 || y < 0 || x >= width || y >= height) continue;
+      const float d = coarse[(static_cast<std::size_t>(view) * height + y) * width + x];
+      if (!is_valid(d)) continue;
+      least = std::min(least, 4 * d), most = std::max(most, 4 * d), ++count;
+    }
+  }
+  if (count < EGOSGM_COARSE_MIN_COUNT) return {kInfinity, -kInfinity};
+  return {least, most};
+}
+
 shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                             const testing::HostMaps& predicted, int view, int block_x, int block_y) {
+                             const testing::HostMaps& predicted, std::pair<float, float> found, int view, int block_x,
+                             int block_y) {
   float least = kInfinity, most = -kInfinity;
   int count = 0;
   for (int y = std::max(0, (block_y - 1) * EGOSGM_BLOCK); y < std::min(size.height, (block_y + 2) * EGOSGM_BLOCK);
@@ -46,15 +66,26 @@ shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange rang
       least = std::min(least, d), most = std::max(most, d), ++count;
     }
   }
-  if (count == 0 || count < options.neighbour_min_count) return band_of(range, -kInfinity, kInfinity);
-  return band_of(range, least - options.neighbour_margin_px, most + options.neighbour_margin_px);
+  const bool is_found = found.first <= found.second;
+  const float coarse_from = found.first - options.coarse_margin_px, coarse_to = found.second + options.coarse_margin_px;
+  if (count == 0 || count < options.neighbour_min_count) {
+    return is_found ? band_of(range, coarse_from, coarse_to) : band_of(range, -kInfinity, kInfinity);
+  }
+  const float from = least - options.neighbour_margin_px, to = most + options.neighbour_margin_px;
+  return is_found ? band_of(range, std::min(from, coarse_from), std::max(to, coarse_to)) : band_of(range, from, to);
 }
 
-shared::Band of_prediction(shared::DisparityRange range, const SearchBandOptions& options, float d, float p) {
+shared::Band of_prediction(shared::DisparityRange range, const SearchBandOptions& options, float d, float p,
+                           std::pair<float, float> found) {
   float half_width = options.sigmas * std::sqrt(p);
   if (half_width <= options.min_half_width_px) half_width = options.min_half_width_px;
   if (!(half_width <= static_cast<float>(range.count))) half_width = static_cast<float>(range.count);
-  return band_of(range, d - half_width, d + half_width);
+  float from = d - half_width, to = d + half_width;
+  if (found.first < from - options.coarse_tolerance_px || found.second > to + options.coarse_tolerance_px) {
+    const float below = found.first - options.coarse_margin_px, above = found.second + options.coarse_margin_px;
+    from = std::min(from, below), to = std::max(to, above);
+  }
+  return band_of(range, from, to);
 }
 
 void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, SearchBands& result) {
@@ -77,15 +108,18 @@ void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, Searc
 }  // namespace
 
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted) {
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   std::vector<shared::Band> of_blocks;
+  std::vector<std::pair<float, float>> found;
   for (int view = 0; view < 2; ++view) {
     for (int y = 0; y < blocks_y; ++y) {
       for (int x = 0; x < blocks_x; ++x) {
-        of_blocks.push_back(options.from_neighbours ? from_neighbours(size, range, options, predicted, view, x, y)
-                                                    : band_of(range, -kInfinity, kInfinity));
+        found.push_back(found_around(size, coarse, view, x, y));
+        of_blocks.push_back(options.from_neighbours
+                                ? from_neighbours(size, range, options, predicted, found.back(), view, x, y)
+                                : band_of(range, -kInfinity, kInfinity));
       }
     }
   }
@@ -95,10 +129,10 @@ SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, co
       for (int x = 0; x < size.width; ++x) {
         const std::size_t i = (static_cast<std::size_t>(view) * size.height + y) * size.width + x;
         const float d = predicted.disparity[i];
-        result.bands.push_back(
-            is_valid(d) ? of_prediction(range, options, d, predicted.variance[i])
-                        : of_blocks[(static_cast<std::size_t>(view) * blocks_y + y / EGOSGM_BLOCK) * blocks_x +
-                                    x / EGOSGM_BLOCK]);
+        const std::size_t block =
+            (static_cast<std::size_t>(view) * blocks_y + y / EGOSGM_BLOCK) * blocks_x + x / EGOSGM_BLOCK;
+        result.bands.push_back(is_valid(d) ? of_prediction(range, options, d, predicted.variance[i], found[block])
+                                           : of_blocks[block]);
       }
     }
   }

@@ -15,8 +15,9 @@ struct SearchBands {
   std::vector<shared::RowSum> row_sums;
 };
 
+/// `coarse`: what reference::coarse_match gives; empty: none.
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted);
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse = {});
 SearchBands full_range(shared::ImageSize size, shared::DisparityRange range, const std::vector<float>& predicted = {});
 
 }  // namespace egosgm::reference

@@ -5,6 +5,7 @@
 
 #include "host/banded_sgm.h"
 #include "host/census.h"
+#include "host/coarse_match.h"
 #include "host/consistency_check.h"
 #include "host/edge_rejection.h"
 #include "host/forward_warp.h"
@@ -39,6 +40,7 @@ class StageChain {
         hole_fill_(context_, size, options.hole_fill),
         consistency_(context_, size),
         vertical_alignment_(context_, size, options.vertical_alignment),
+        coarse_match_(context_, size, options),
         search_band_(context_, size, range_of(options), options.search_band),
         census_(context_, size, type, options.banded_sgm.cost, code_padding()),
         step_penalties_(context_, size, type, options.banded_sgm),
@@ -89,7 +91,9 @@ class StageChain {
     reference::Pass pass;
     pass.images = greys(images);
     if (has_prediction && options_.search == SearchMode::kBand) {
-      search_band_(predicted_);
+      const StereoMaps* coarse = options_.coarse_match.enabled ? &coarse_match_(images) : nullptr;
+      if (coarse) pass.coarse = coarse->disparity.read(context_);
+      search_band_(predicted_, coarse);
     } else {
       has_prediction ? search_band_.full_range(predicted_) : search_band_.full_range();
     }
@@ -142,6 +146,7 @@ class StageChain {
   HoleFill hole_fill_;
   ConsistencyCheck consistency_;
   VerticalAlignment vertical_alignment_;
+  CoarseMatch coarse_match_;
   SearchBand search_band_;
   Census census_;
   StepPenalties step_penalties_;
