@@ -9,6 +9,7 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
+#include "egosgm/vision/image_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -18,7 +19,7 @@ using vision::DisparityMetrics;
 using Json = nlohmann::ordered_json;
 
 struct EvalArguments {
-  std::string estimate, truth;
+  std::string estimate, truth, mask;
   bool json = false;
 };
 
@@ -28,14 +29,29 @@ struct Row {
   DisparityCounts counts;
 };
 
-Row compare(const vision::EvaluationPair& pair) {
+/// The truth where the mask, if there is one, is not 0.
+cv::Mat masked_truth(const std::filesystem::path& truth_file, const std::filesystem::path& mask) {
+  cv::Mat truth = vision::read_disparity(truth_file);
+  if (mask.empty()) return truth;
+  const std::filesystem::path file = is_directory(mask) ? mask / truth_file.filename().replace_extension(".png") : mask;
+  const cv::Mat kept = vision::read_grey_png(file);
+  if (kept.size() != truth.size()) {
+    throw InvalidArgument(fmt::format("{}: the mask is {}x{}, the truth {}x{}", file.string(), kept.cols, kept.rows,
+                                      truth.cols, truth.rows));
+  }
+  truth.setTo(kInvalidDisparity, kept == 0);
+  return truth;
+}
+
+Row compare(const vision::EvaluationPair& pair, const std::filesystem::path& mask) {
   try {
     return {pair.estimate.stem().string(), pair,
-            vision::compare_disparity(vision::read_disparity(pair.estimate), vision::read_disparity(pair.truth))};
+            vision::compare_disparity(vision::read_disparity(pair.estimate), masked_truth(pair.truth, mask))};
   } catch (const InvalidArgument& error) {
     const std::string what = error.what();  // a reader names its file, the comparison cannot
-    if (what.find(pair.estimate.string()) != std::string::npos || what.find(pair.truth.string()) != std::string::npos)
-      throw;
+    for (const std::string& file : {pair.estimate.string(), pair.truth.string(), mask.string()}) {
+      if (!file.empty() && what.find(file) != std::string::npos) throw;
+    }
     throw InvalidArgument(pair.estimate.string() + " and " + pair.truth.string() + ": " + what);
   }
 }
@@ -74,7 +90,7 @@ int evaluate(const EvalArguments& arguments) {
   std::vector<DisparityMetrics> each;
   DisparityCounts pooled;
   for (const vision::EvaluationPair& pair : found.pairs) {
-    rows.push_back(compare(pair));
+    rows.push_back(compare(pair, arguments.mask));
     each.push_back(vision::metrics_of(rows.back().counts));
     pooled += rows.back().counts;
   }
@@ -111,6 +127,10 @@ Command add_eval(CLI::App& program) {
   command->add_option("--truth", arguments->truth, "true disparity, or a folder of files with equal names")
       ->type_name("FILE|DIR")
       ->required();
+  command
+      ->add_option("--mask", arguments->mask,
+                   "compare only where this grey PNG, or the one of the truth's name in this folder, is not 0")
+      ->type_name("FILE|DIR");
   command->add_flag("--json", arguments->json, "print JSON");
   command->footer(
       "In percent of the pixels with truth (bad_of_valid: of those with an estimate too); bad: off by more than 3 px.\n"

@@ -497,6 +497,20 @@ class Eval(ProgramTest):
         self.assertIn("pooled", table)
         self.assertIn("000003", table)
 
+    def test_a_mask_limits_what_is_compared(self):
+        everything, visible = self.street / "truth/left_disp_occ", self.street / "truth/left_disp_noc"
+
+        def counts(*arguments):
+            return [pair["truth_pixels"] for pair in json.loads(self.assert_works("eval", "--estimate", everything, *arguments, "--json"))["pairs"]]
+        masked = counts("--truth", everything, "--mask", visible)
+        self.assertEqual(masked, counts("--truth", visible))
+        self.assertLess(sum(masked), sum(counts("--truth", everything)))
+        arguments = ["eval", "--estimate", everything, "--truth", everything, "--mask"]
+        self.assert_refused([*arguments, self.new_folder()], "000000.png")
+        small = self.new_folder()
+        (small / "000000.png").write_bytes(grey_png(20, 10))
+        self.assert_refused([*arguments, small], "20x10")
+
     def test_refuses_what_cannot_be_compared(self):
         truth = self.street / "truth/left_disp_occ"
         small = self.new_folder() / "000000.png"
