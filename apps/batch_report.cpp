@@ -7,6 +7,7 @@
 
 #include "apps/metrics_json.h"
 #include "egosgm/error.h"
+#include "egosgm/named_options.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
 #include "egosgm/vision/file_io.h"

@@ -7,7 +7,7 @@
 #include "apps/command.h"
 #include "apps/run_outputs.h"
 #include "egosgm/error.h"
-#include "egosgm/options.h"
+#include "egosgm/named_options.h"
 
 namespace egosgm::app {
 namespace {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "egosgm/error.h"
+#include "egosgm/named_options.h"
 #include "egosgm/vision/file_io.h"
 
 namespace egosgm::app {

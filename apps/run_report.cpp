@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include "egosgm/named_options.h"
 #include "egosgm/vision/file_io.h"
 
 namespace egosgm::app {

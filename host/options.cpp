@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "egosgm/options.h"
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numeric>
 
 #include "egosgm/error.h"
+#include "egosgm/named_options.h"
 
 namespace egosgm {
 namespace {

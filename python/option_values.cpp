@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "python/option_values.h"
 
+#include "egosgm/named_options.h"
+
 namespace egosgm::python {
 namespace {
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <mutex>
 
+#include "egosgm/named_options.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/option_values.h"

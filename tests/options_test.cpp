@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "egosgm/options.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <limits>
 #include <map>
 
+#include "egosgm/named_options.h"
 #include "tests/support/expect_refused.h"
 
 namespace egosgm {

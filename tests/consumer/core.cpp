@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shifted noise has the disparity that it was shifted by.
 #include <egosgm/error.h>
+#include <egosgm/named_options.h>
 #include <egosgm/pipeline.h>
 
 #include <cstdio>

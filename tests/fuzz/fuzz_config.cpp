@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Configuration files of egosgm run.
 #include "apps/option_arguments.h"
+#include "egosgm/named_options.h"
 #include "tests/fuzz/memory_file.h"
 #include "tests/fuzz/target.h"
 

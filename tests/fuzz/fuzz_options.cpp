@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Options by name and value, a line each: NAME VALUE.
-#include "egosgm/options.h"
+#include "egosgm/named_options.h"
 #include "tests/fuzz/target.h"
 
 namespace egosgm::fuzz {

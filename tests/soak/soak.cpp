@@ -9,6 +9,7 @@
 #include <fstream>
 #include <string>
 
+#include "egosgm/named_options.h"
 #include "tests/support/frame_memory.h"
 #include "tests/support/scene.h"
 
