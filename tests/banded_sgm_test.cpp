@@ -164,7 +164,7 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
 
 TEST(BandedSgmStripes, EqualTheTwinOfEach) {
   for (const Scheduling scheduling : {Scheduling::kWavefront, Scheduling::kPaths}) {
-    for (const MatchingCost cost : {MatchingCost::kPairs32, MatchingCost::kSad3x3}) {
+    for (const MatchingCost cost : {MatchingCost::kCensus13x11, MatchingCost::kSad3x3}) {
       const Case c{.size = {61, 301}, .range = {-5, 37}, .cost = cost, .scheduling = scheduling};
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
