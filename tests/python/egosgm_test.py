@@ -108,7 +108,7 @@ def test_options_have_the_librarys_names_and_defaults(street):
 
 @pytest.mark.parametrize("options, named", [
     (dict(banded_sgm__p22=3), "banded_sgm.p2"), (dict(disparities=0), "1 to 4096"), (dict(disparities=2.5), "whole number"),
-    (dict(banded_sgm={"cost": "sad"}), "pairs32"), (dict(preset="papers"), "default or paper"), (dict(device="no such"), "no such")])
+    (dict(banded_sgm={"cost": "sad"}), "census13x11"), (dict(preset="papers"), "default or paper"), (dict(device="no such"), "no such")])
 def test_wrong_options_are_refused_by_name(street, options, named):
     with pytest.raises(egosgm.InvalidArgument, match=named) as refused:
         egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, **options)
