@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "egosgm/export.h"
-#include "egosgm/options.h"
+#include "egosgm/named_options.h"
 
 namespace egosgm {
 
