@@ -62,7 +62,8 @@ class Kernel {
   /// `name`: a string literal. Throws std::logic_error where the .cl does not fit the signature.
   Kernel(const cl::Program& program, const char* name) : kernel_(program, name), name_(name) {
     expect_signature(kernel_, {KernelParameter<Params>::text()...});
-    max_work_group_size_ = kernel_.template getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(cl::Device());
+    max_work_group_size_ =
+        kernel_.template getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(program.getInfo<CL_PROGRAM_DEVICES>().front());
   }
 
   /// Throws DeviceError where the device, for what this kernel takes of it, cannot hold the range's work-groups.
