@@ -26,5 +26,6 @@ Command add_eval_poses(CLI::App& program);
 Command add_view(CLI::App& program);
 Command add_completion(CLI::App& program);
 Command add_tune(CLI::App& program);
+Command add_report(CLI::App& program);
 
 }  // namespace egosgm::app

@@ -84,6 +84,7 @@ void expect_free(const fs::path& out, EarlierRun treatment, const Json& identity
     case EarlierRun::kOverwrite:
       remove_file(report);  // first: maps without it are never taken for those of another run
       remove_file(out / "poses.txt");
+      remove_file(out / "report.html");
       std::for_each(maps.begin(), maps.end(), remove_file);
   }
 }

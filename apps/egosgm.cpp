@@ -75,10 +75,10 @@ int run_program(int argc, char** argv) {
       "  egosgm run --odometry street --out result --write color\n"
       "  egosgm eval --estimate result --truth street/truth/left_disp_noc\n"
       "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.");
-  const Command commands[] = {add_run(program),        add_batch(program),      add_view(program),
-                              add_eval(program),       add_devices(program),    add_synth(program),
-                              add_odometry(program),   add_eval_poses(program), add_compile(program),
-                              add_completion(program), add_tune(program)};
+  const Command commands[] = {add_run(program),     add_batch(program),      add_view(program),
+                              add_report(program),  add_eval(program),       add_devices(program),
+                              add_synth(program),   add_odometry(program),   add_eval_poses(program),
+                              add_compile(program), add_completion(program), add_tune(program)};
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -11,21 +11,21 @@ namespace {
 
 constexpr int kOverviewCellWidth = 800;
 
-cv::Mat above(const cv::Mat& picture, const cv::Mat& bar) {
+vision::CaptionedPicture panel(const Layer& layer) {
+  if (layer.bar.empty()) return {layer.picture, layer.name};
   cv::Mat both;
-  cv::vconcat(picture, bar, both);
-  return both;
+  cv::vconcat(layer.picture, layer.bar, both);
+  return {both, layer.name};
 }
 
-vision::CaptionedPicture variance_panel(const ShownFrame& shown) {
-  return {above(vision::color_variance(shown.variance, shown.disparity),
-                vision::color_bar(shown.left.cols, vision::kVarianceRange, "px^2")),
-          "variance"};
+Layer variance_layer(const ShownFrame& shown) {
+  return {"variance", vision::color_variance(shown.variance, shown.disparity),
+          vision::color_bar(shown.variance.cols, vision::kVarianceRange, "px^2")};
 }
 
-vision::CaptionedPicture error_panel(const ShownFrame& shown) {
+Layer error_layer(const ShownFrame& shown) {
   const cv::Mat truth = vision::read_disparity(shown.frame.truth_noc);
-  return {above(vision::color_error(shown.disparity, truth), vision::error_bar(shown.left.cols)), "error [px]"};
+  return {"error [px]", vision::color_error(shown.disparity, truth), vision::error_bar(truth.cols)};
 }
 
 }  // namespace
@@ -39,35 +39,41 @@ cv::Mat FramePanels::disparity(const cv::Mat& disparity) {
   return vision::color_disparity(disparity, disparity_range(disparity));
 }
 
-vision::CaptionedPicture FramePanels::disparity_panel(const ShownFrame& shown) {
-  return {above(disparity(shown.disparity), vision::color_bar(shown.left.cols, disparity_range(shown.disparity), "px")),
-          "disparity"};
+Layer FramePanels::disparity_layer(const ShownFrame& shown) {
+  return {"disparity", disparity(shown.disparity),
+          vision::color_bar(shown.disparity.cols, disparity_range(shown.disparity), "px")};
 }
 
-vision::CaptionedPicture FramePanels::search_panel(const ShownFrame& shown) const {
+Layer FramePanels::search_layer(const ShownFrame& shown) const {
   cv::Mat searched;
   shown.search_width.convertTo(searched, CV_32F);
   const vision::ColorRange widths{1, std::max(2.0, static_cast<double>(disparities_)), true};
-  return {above(vision::color_map(searched, widths), vision::color_bar(shown.left.cols, widths, "")),
-          "disparities searched"};
+  return {"disparities searched", vision::color_map(searched, widths), vision::color_bar(searched.cols, widths, "")};
 }
 
 cv::Mat FramePanels::overview(const ShownFrame& shown) {
   const bool truth = !shown.frame.truth_noc.empty();
   return vision::compose({{vision::color_grey(shown.left), "left image, frame " + shown.frame.name},
-                          disparity_panel(shown),
-                          search_panel(shown),
-                          truth ? error_panel(shown) : variance_panel(shown)},
+                          panel(disparity_layer(shown)),
+                          panel(search_layer(shown)),
+                          panel(truth ? error_layer(shown) : variance_layer(shown))},
                          2, kOverviewCellWidth);
 }
 
+std::vector<Layer> FramePanels::layers(const ShownFrame& shown) {
+  std::vector<Layer> layers;
+  if (!shown.frame.left.empty()) layers.push_back({"left image", vision::read_color_png(shown.frame.left), {}});
+  layers.push_back(disparity_layer(shown));
+  if (!shown.variance.empty()) layers.push_back(variance_layer(shown));
+  if (!shown.search_width.empty()) layers.push_back(search_layer(shown));
+  if (!shown.frame.truth_noc.empty()) layers.push_back(error_layer(shown));
+  return layers;
+}
+
 cv::Mat FramePanels::all(const ShownFrame& shown, int cell_width) {
-  std::vector<vision::CaptionedPicture> pictures{
-      {vision::read_color_png(shown.frame.left), "left image, frame " + shown.frame.name},
-      disparity_panel(shown),
-      variance_panel(shown),
-      search_panel(shown)};
-  if (!shown.frame.truth_noc.empty()) pictures.push_back(error_panel(shown));
+  std::vector<vision::CaptionedPicture> pictures;
+  for (const Layer& layer : layers(shown)) pictures.push_back(panel(layer));
+  pictures.front().caption += ", frame " + shown.frame.name;
   return vision::compose(pictures, 2, cell_width);
 }
 

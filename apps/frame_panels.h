@@ -3,17 +3,26 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/render.h"
 
 namespace egosgm::app {
 
-/// A frame and what the pipeline made of it: disparity, variance CV_32FC1, search width CV_16UC1.
+/// A frame and what the pipeline made of it: disparity, variance CV_32FC1, search width CV_16UC1. `frame.truth_noc` may
+/// be empty.
 struct ShownFrame {
   const vision::StereoFrame& frame;
   const cv::Mat& left;
   const cv::Mat &disparity, &variance, &search_width;
+};
+
+/// A map as a picture, and its colour scale of the same width (none for an image).
+struct Layer {
+  std::string name;
+  cv::Mat picture, bar;
 };
 
 /// A sequence's maps as pictures with their scales. Colours stand for the same values in all frames: the first one's
@@ -27,13 +36,15 @@ class FramePanels {
   cv::Mat disparity(const cv::Mat& disparity);
   /// Left image, disparity, search width, and the error where there is truth, else the variance.
   cv::Mat overview(const ShownFrame& shown);
-  /// Left image in its colours, disparity, variance, search width, and the error where there is truth; two a row, each
-  /// at most `cell_width` px wide.
+  /// Left image in its colours, disparity, variance, search width, and the error: those for which there is a file or a
+  /// map (an empty one is none).
+  std::vector<Layer> layers(const ShownFrame& shown);
+  /// All of them, two a row, each at most `cell_width` px wide.
   cv::Mat all(const ShownFrame& shown, int cell_width);
 
  private:
-  vision::CaptionedPicture disparity_panel(const ShownFrame& shown);
-  vision::CaptionedPicture search_panel(const ShownFrame& shown) const;
+  Layer disparity_layer(const ShownFrame& shown);
+  Layer search_layer(const ShownFrame& shown) const;
 
   const int disparities_;
   std::optional<vision::ColorRange> range_;

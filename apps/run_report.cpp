@@ -108,6 +108,7 @@ Json RunReport::identity() const {
 void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
                     const HostTimes& times, std::int64_t unstorable) {
   json_["frames"].push_back({{"frame", frame.number},
+                             {"left", std::filesystem::absolute(frame.left).string()},
                              {"search_fraction", report.search_fraction},
                              {"computed_fraction", report.computed_fraction},
                              {"predicted_fraction", report.predicted_fraction},

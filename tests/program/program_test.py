@@ -92,7 +92,7 @@ class ProgramTest(unittest.TestCase):
 
 class Help(ProgramTest):
     def test_every_subcommand_explains_itself(self):
-        for command in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "completion"):
+        for command in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "report", "completion"):
             self.assertIn("--help", self.assert_works(command, "--help"))
             self.assertIn(command, self.assert_works("--help"))
 
@@ -179,7 +179,7 @@ class Example(ProgramTest):
 
     def test_the_readme_names_every_subcommand_and_exit_code(self):
         text = (SOURCE / "README.md").read_text()
-        for name in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "completion"):
+        for name in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "report", "completion"):
             self.assertIn(f"`{name}`", text)
         self.assertIn("130", text)
 

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm report: the page's structure, and the page in a headless Chromium. Environment as for program_test.py."""
+import base64
+import html.parser
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import time
+import unittest
+
+from program_test import FRAMES, HEIGHT, WIDTH, ProgramTest
+
+CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
+LAYERS = ["left image", "disparity", "variance", "disparities searched", "error [px]"]
+
+
+class Elements(html.parser.HTMLParser):
+    """What a page is made of: its elements with their attributes, and the text of those with an id."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.elements, self.texts, self.ids = [], {}, []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        self.ids.append(dict(attributes).get("id"))
+
+    def handle_endtag(self, tag):
+        self.ids.append(None)
+
+    def handle_data(self, data):
+        if self.ids and self.ids[-1]:
+            self.texts[self.ids[-1]] = self.texts.get(self.ids[-1], "") + data
+
+
+class ReportTest(ProgramTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.out = cls.folder / "out"
+        cls.works("run", "--odometry", cls.street, "--out", cls.out, "--write", "variance,search", "--quiet", "--set", "banded_sgm.p2=150",
+                  "--disparities", 64)
+        cls.works("report", cls.out, "--truth", cls.street / "truth/left_disp_noc", "--poses", cls.street / "poses.txt")
+        cls.page = cls.out / "report.html"
+
+    @classmethod
+    def works(cls, *arguments):
+        return ProgramTest.assert_works(cls("id"), *arguments)
+
+    def data(self, page):
+        return json.loads(Elements(page.read_text()).texts["data"])
+
+
+class Report(ReportTest):
+    def test_the_page_holds_what_it_shows_and_asks_for_nothing_else(self):
+        elements = Elements(self.page.read_text()).elements
+        for tag, attributes in elements:
+            self.assertNotIn(tag, ("link", "iframe", "object", "embed", "base"))
+            self.assertFalse({"src", "href", "srcset", "onload"} & set(attributes), (tag, attributes))
+        policy = next(attributes["content"] for tag, attributes in elements if attributes.get("http-equiv") == "Content-Security-Policy")
+        self.assertTrue(policy.startswith("default-src 'none'; img-src data:;"))
+
+    def test_pictures_of_all_layers(self):
+        data = self.data(self.page)
+        self.assertEqual([picture["frame"] for picture in data["pictures"]], list(range(FRAMES)))  # fewer than six
+        for picture in data["pictures"]:
+            self.assertEqual([layer["name"] for layer in picture["layers"]], LAYERS)
+            for layer in picture["layers"]:
+                kind, content = layer["picture"].split(";base64,")
+                start = base64.b64decode(content, validate=True)[:8]
+                self.assertTrue(start == b"\x89PNG\r\n\x1a\n" if kind == "data:image/png" else start.startswith(b"\xff\xd8\xff"), kind)
+        self.assertEqual(sorted(data["bars"]), sorted(LAYERS[1:]))
+
+    def test_figures_are_those_of_the_run_and_of_eval(self):
+        data = self.data(self.page)
+        self.assertEqual(data["run"], self.report(self.out))
+        own = json.loads(self.assert_works("eval", "--estimate", self.out, "--truth", self.street / "truth/left_disp_noc", "--json"))
+        self.assertEqual(data["pooled"], own["pooled"])
+        self.assertEqual([data["metrics"][str(i)]["bad_or_missing"] for i in range(FRAMES)],
+                         [pair["bad_or_missing"] for pair in own["pairs"]])
+        self.assertEqual(sorted(data["changed"]), ["banded_sgm.p2", "disparities"])
+        self.assertEqual((len(data["path"]), len(data["true_path"])), (FRAMES, FRAMES))
+        self.assertAlmostEqual(data["path"][-1][1], data["true_path"][-1][1], delta=0.2)
+
+    def test_chosen_frames_and_where_the_page_goes(self):
+        page = self.new_folder() / "page.html"
+        self.assert_works("report", self.out, "--pictures", "3,000001", "--picture-width", 100, "--out", page)
+        data = self.data(page)
+        self.assertEqual([picture["frame"] for picture in data["pictures"]], [1, 3])
+        self.assertEqual([layer["name"] for layer in data["pictures"][0]["layers"]], LAYERS[:-1])
+        self.assertIn("--truth DIR", data["notes"][0])
+        self.assertLess(page.stat().st_size, self.page.stat().st_size / 2)
+
+    def test_a_run_of_which_little_is_left(self):
+        copy = self.new_folder() / "copy"
+        shutil.copytree(self.out, copy)
+        for folder in ("variance", "search"):
+            shutil.rmtree(copy / folder)
+        report = self.report(copy)
+        report["input"] = "</script><script>alert(1)"
+        for frame in report["frames"]:
+            frame["left"] = "/nonexistent/left.png"
+        (copy / "report.json").write_text(json.dumps(report))
+        (copy / "poses.txt").unlink()
+        self.assert_works("report", copy)
+        data = self.data(copy / "report.html")
+        self.assertEqual(data["run"]["input"], report["input"])
+        self.assertEqual(data["pictures"][0]["layers"][0]["name"], "disparity")
+        self.assertEqual(len(data["notes"]), 4)
+
+    def test_what_is_no_run_is_refused(self):
+        copy = self.new_folder() / "copy"
+        shutil.copytree(self.out, copy)
+        report = self.report(copy)
+        self.assert_refused(["report", self.street], "report.json", "egosgm run")
+        self.assert_refused(["report", self.out, "--pictures", "0,17"], '"17"', "from 0 to 3")
+        self.assert_refused(["report", self.out, "--picture-width", 1], "--picture-width 1")
+        self.assert_refused(["report", self.out, "--truth", self.street / "image_0/calib"], "image_0/calib")
+        for text in ("[]", "{", json.dumps({**report, "frames": []}), json.dumps({**report, "frames": [7]}), json.dumps({**report, "options": 3})):
+            (copy / "report.json").write_text(text)
+            self.assert_refused(["report", copy], copy / "report.json")
+        (copy / "report.json").write_text(json.dumps(report))
+        (copy / "disparity/000003.png").unlink()
+        self.assert_refused(["report", copy], "disparity/000003.png")
+
+    def test_replacing_a_run_removes_its_page(self):
+        copy = self.new_folder() / "copy"
+        shutil.copytree(self.out, copy)
+        self.assert_works("run", "--odometry", self.street, "--frames", "0", "--out", copy, "--overwrite", "--quiet", "--disparities", 64)
+        self.assertFalse((copy / "report.html").exists())
+
+
+class Browser:
+    """A headless Chromium, driven over a pipe by its DevTools protocol."""
+
+    def __init__(self):
+        self.profile = tempfile.TemporaryDirectory(prefix="egosgm_chromium_")
+        from_us, self.to_browser = os.pipe()
+        self.from_browser, to_us = os.pipe()
+        command = (f"exec '{CHROMIUM}' --headless --no-sandbox --disable-gpu --disable-dev-shm-usage --no-first-run --remote-debugging-pipe "
+                   f"--window-size=1280,1600 --user-data-dir='{self.profile.name}' about:blank 3<&{from_us} 4>&{to_us}")
+        self.process = subprocess.Popen(["bash", "-c", command], pass_fds=[from_us, to_us], stderr=subprocess.DEVNULL)
+        os.close(from_us), os.close(to_us)
+        self.number, self.rest, self.events, self.session = 0, b"", [], None
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Runtime", "Log", "Page", "Network"):
+            self.call(domain + ".enable")
+
+    def close(self):
+        self.process.terminate()
+        self.process.wait(timeout=30)
+        os.close(self.to_browser), os.close(self.from_browser)
+        try:
+            self.profile.cleanup()
+        except OSError:  # a process of the browser that is still leaving
+            shutil.rmtree(self.profile.name, ignore_errors=True)
+
+    def receive(self):
+        while b"\0" not in self.rest:
+            part = os.read(self.from_browser, 1 << 16)
+            if not part:
+                raise RuntimeError("Chromium has gone")
+            self.rest += part
+        message, self.rest = self.rest.split(b"\0", 1)
+        return json.loads(message)
+
+    def call(self, method, **parameters):
+        self.number += 1
+        message = {"id": self.number, "method": method, "params": parameters}
+        if self.session:
+            message["sessionId"] = self.session
+        os.write(self.to_browser, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self.receive()
+            if answer.get("id") == self.number:
+                if "error" in answer:
+                    raise RuntimeError(answer["error"])
+                return answer["result"]
+            self.events.append(answer)
+
+    def open(self, file):
+        self.call("Page.navigate", url=pathlib.Path(file).as_uri())
+        while not any(event["method"] == "Page.loadEventFired" for event in self.events):
+            self.events.append(self.receive())
+
+    def evaluate(self, expression):
+        answer = self.call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in answer:
+            raise RuntimeError(answer["exceptionDetails"])
+        return answer["result"].get("value")
+
+    def errors(self):
+        return [event for event in self.events if event["method"] == "Runtime.exceptionThrown"
+                or (event["method"] == "Runtime.consoleAPICalled" and event["params"]["type"] in ("error", "warning", "assert"))
+                or (event["method"] == "Log.entryAdded" and event["params"]["entry"]["level"] in ("error", "warning"))]
+
+    def requests(self):
+        return [event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"]
+
+    def mouse(self, kind, x, y, buttons=1):
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=buttons, clickCount=1)
+
+
+@unittest.skipUnless(CHROMIUM, "no Chromium")
+class ReportInBrowser(ReportTest):
+    def setUp(self):
+        self.browser = Browser()
+        self.addCleanup(self.browser.close)
+
+    def assert_no_errors(self):
+        self.assertEqual(self.browser.errors(), [])
+        self.assertEqual({url.split(":")[0] for url in self.browser.requests()} - {"file", "data"}, set())
+
+    def test_charts_slider_and_layers(self):
+        browser = self.browser
+        browser.open(self.page)
+        self.assertIn("street", browser.evaluate("document.title"))
+        titles = browser.evaluate("[...document.querySelectorAll('.chart h3')].map(e => e.textContent)")
+        self.assertEqual(len(titles), 7, titles)
+        for series in browser.evaluate("[...document.querySelectorAll('.chart')].map(e => [...e.querySelectorAll('.series')].map(s => s.getTotalLength()))"):
+            self.assertTrue(series and all(length > 50 for length in series), series)
+        self.assertGreater(browser.evaluate("document.querySelectorAll('#options tr').length"), 30)
+        self.assertEqual(sorted(browser.evaluate("[...document.querySelectorAll('.changed td:first-child')].map(e => e.textContent)")),
+                         ["banded_sgm.p2", "disparities"])
+
+        loaded = "(async () => { for (const id of ['above', 'below']) await document.getElementById(id).decode(); " \
+                 "return ['above', 'below'].map(id => document.getElementById(id).naturalWidth) })()"
+        self.assertEqual(browser.evaluate(loaded), [WIDTH, WIDTH])
+        box = browser.evaluate("(() => { document.getElementById('stage').scrollIntoView(); "
+                               "const b = document.getElementById('stage').getBoundingClientRect(); return [b.x, b.y, b.width, b.height] })()")
+        self.assertAlmostEqual(box[3] / box[2], HEIGHT / WIDTH, delta=0.01)
+        split = lambda: (browser.evaluate("document.getElementById('split').value"), browser.evaluate("document.getElementById('above').style.clipPath"))
+        self.assertEqual(split(), ("50", "inset(0px 50% 0px 0px)"))
+        middle = box[1] + box[3] / 2
+        browser.mouse("mousePressed", box[0] + 0.5 * box[2], middle)
+        browser.mouse("mouseMoved", box[0] + 0.25 * box[2], middle)
+        browser.mouse("mouseReleased", box[0] + 0.25 * box[2], middle, buttons=0)
+        self.assertEqual(split(), ("25", "inset(0px 75% 0px 0px)"))
+
+        sources = lambda: browser.evaluate("['above', 'below'].map(id => document.getElementById(id).src)")
+        pictures = self.data(self.page)["pictures"]
+        self.assertEqual(sources(), [pictures[0]["layers"][i]["picture"] for i in (0, 1)])
+        for i, name in enumerate(LAYERS):
+            browser.evaluate(f"{{ const s = document.getElementById('right-layer'); s.value = {json.dumps(name)}; s.dispatchEvent(new Event('change')) }}")
+            self.assertEqual(sources()[1], pictures[0]["layers"][i]["picture"])
+        browser.evaluate("{ const f = document.getElementById('frame'); f.value = 2; f.dispatchEvent(new Event('input')) }")
+        self.assertEqual(sources(), [pictures[2]["layers"][i]["picture"] for i in (0, 4)])
+        self.assertEqual(browser.evaluate("document.getElementById('frame-name').textContent"), "000002")
+        self.assert_no_errors()
+
+    def test_a_short_run_without_truth(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--frames", "1", "--out", out, "--quiet", "--disparities", 64)
+        self.assert_works("report", out)
+        self.browser.open(out / "report.html")
+        self.assertEqual(self.browser.evaluate("document.querySelectorAll('.note').length"), 3)
+        self.assertGreaterEqual(self.browser.evaluate("document.querySelectorAll('.chart').length"), 4)
+        self.assert_no_errors()
+
+    def test_errors_would_be_seen(self):
+        broken = self.new_folder() / "broken.html"
+        broken.write_text(self.page.read_text().replace("setUpPictures();\n", "setUpPicture();\n").replace("</h1>", "</h1><img src='https://localhost:1/a.png'>"))
+        self.browser.open(broken)
+        time.sleep(0.2)
+        self.browser.evaluate("1")
+        texts = json.dumps(self.browser.errors())
+        self.assertIn("setUpPicture is not defined", texts)
+        self.assertIn("Content Security Policy", texts)
+
+
+if __name__ == "__main__":
+    unittest.main()
