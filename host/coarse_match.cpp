@@ -21,7 +21,7 @@ shared::ImageSize CoarseMatch::coarse_size(shared::ImageSize size) {
 
 shared::DisparityRange CoarseMatch::coarse_range(shared::DisparityRange range) {
   const int first = floor_div(range.min, EGOSGM_COARSE);
-  const int last = floor_div(range.min + range.count - 1 + EGOSGM_COARSE - 1, EGOSGM_COARSE);
+  const int last = floor_div(range.min + range.count - 1, EGOSGM_COARSE);
   return {first, last - first + 1};
 }
 

@@ -11,7 +11,8 @@ namespace egosgm {
 /// kernels/step_penalties.cl).
 class StepPenalties {
  public:
-  StepPenalties(ocl::Context& context, shared::ImageSize size, PixelType type, const BandedSgmOptions& options);
+  StepPenalties(ocl::Context& context, shared::ImageSize size, PixelType type, const BandedSgmOptions& options,
+                int pixels = 0);
 
   /// `images`: both views' pixels. `planes`: `plane_count(size)` bytes.
   void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& planes);
@@ -22,6 +23,7 @@ class StepPenalties {
   ocl::Context& context_;
   const shared::ImageSize size_;
   const cl_int most_, least_, slope_;
+  const int pixels_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const cl_int, const ocl::Buffer<cl_uchar>,
               ocl::Buffer<cl_uchar>>
       penalties_;

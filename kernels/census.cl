@@ -86,8 +86,9 @@ inline Code code_at(const ImageSize size, global const Pixel* image, const int x
 #endif
 }
 
-inline Codes append(const Codes codes, const Pixels first, const Pixels second) {
-  return (codes << (Codes)(1)) | (convert_codes(first < second) & (Codes)(1));
+// Appends a bit to codes of 8 bits: compilers keep these in narrow vectors.
+inline uchar16 append(const uchar16 bits, const Pixels first, const Pixels second) {
+  return bits + bits - as_uchar16(convert_char16(first < second));
 }
 
 inline Pixels load(global const Pixel* from) { return ((global const PackedPixels*)from)->pixels; }
@@ -100,22 +101,32 @@ inline Codes codes_at(const ImageSize size, global const Pixel* image, const int
   codes = convert_codes(to_8_bit(load(ROW(0))));
 #elif COMPARISONS == 1
   const Pixels centre = load(ROW(0));
+  uchar16 bits = 0;
+  int count = 0;
 #pragma unroll
   for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) {
     global const Pixel* row = ROW(dy);
 #pragma unroll
     for (int dx = -RADIUS_X; dx <= RADIUS_X; ++dx) {
-      if (dx != 0 || dy != 0) codes = append(codes, load(row + dx), centre);
+      if (dx == 0 && dy == 0) continue;
+      bits = append(bits, load(row + dx), centre);
+      if (++count % 8 == 0) codes = (codes << (Codes)(8)) | convert_codes(bits);
     }
   }
+  codes = (codes << (Codes)(count % 8)) | (convert_codes(bits) & (Codes)((1 << count % 8) - 1));
 #else
   const Pixels centre = load(ROW(0));
   global const Pixel* rows[2 * RADIUS_Y + 1];
 #pragma unroll
   for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) rows[RADIUS_Y + dy] = ROW(dy);
 #pragma unroll
-  for (int i = 0; i < 32; ++i) {
-    codes = append(codes, load(rows[RADIUS_Y + kSparse[i][1]] + kSparse[i][0]), centre);
+  for (int byte = 0; byte < 4; ++byte) {
+    uchar16 bits = 0;
+#pragma unroll
+    for (int i = 8 * byte; i < 8 * byte + 8; ++i) {
+      bits = append(bits, load(rows[RADIUS_Y + kSparse[i][1]] + kSparse[i][0]), centre);
+    }
+    codes = (codes << (Codes)(8)) | convert_codes(bits);
   }
 #endif
   return codes;

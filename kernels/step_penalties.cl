@@ -5,10 +5,12 @@
 //
 // Four planes of a byte a pixel and view: the steps to the left, to above, to the upper left and to the upper right
 // neighbour.
-//
-// lint: PIXEL_BYTES=1
-// lint: PIXEL_BYTES=2
-#include "shared.h"
+#include "pixels.h"
+
+// lint: PIXEL_BYTES=1 PIXELS=1
+// lint: PIXEL_BYTES=1 PIXELS=16
+// lint: PIXEL_BYTES=2 PIXELS=1
+// lint: PIXEL_BYTES=2 PIXELS=16
 
 #ifndef PIXEL_BYTES
 #error "PIXEL_BYTES: 1 or 2, the size of a grey value"
@@ -16,32 +18,66 @@
 
 #if PIXEL_BYTES == 1
 typedef uchar Pixel;
+typedef uchar16 Pixels;
 #define to_8_bit(value) (value)
 #else
 typedef ushort Pixel;
+typedef ushort16 Pixels;
 #define to_8_bit(value) ((value) >> 8)
 #endif
+typedef struct __attribute__((packed)) {
+  Pixels pixels;
+} PackedPixels;
+typedef struct __attribute__((packed)) {
+  uchar16 lanes;
+} PackedBytes;
 
-static inline uchar penalty(const int most, const int least, const int slope, const int p, const int q) {
-  const int lowered = most - slope * (p > q ? p - q : q - p);
-  return (uchar)(lowered < least ? least : lowered);
+// Grey values of pixels x .. x + PIXELS - 1; outside the row its border's.
+static inline Ints grey_at(global const Pixel* row, const int x, const int width) {
+#if PIXELS == 1
+  return to_8_bit(row[clamp(x, 0, width - 1)]);
+#else
+  if (x >= 0 && x + PIXELS <= width) return convert_int16(to_8_bit(((global const PackedPixels*)(row + x))->pixels));
+  int lanes[PIXELS];
+  for (int i = 0; i < PIXELS; ++i) lanes[i] = to_8_bit(row[clamp(x + i, 0, width - 1)]);
+  return vload16(0, lanes);
+#endif
+}
+
+static inline void store_bytes(const Ints values, global uchar* row, const int x, const int width) {
+#if PIXELS == 1
+  row[x] = (uchar)values;
+#else
+  if (x + PIXELS <= width) {
+    ((global PackedBytes*)(row + x))->lanes = convert_uchar16(values);
+    return;
+  }
+  int lanes[PIXELS];
+  vstore16(values, 0, lanes);
+  for (int i = 0; i < width - x; ++i) row[x + i] = (uchar)lanes[i];
+#endif
+}
+
+static inline Ints penalty(const Ints most, const Ints least, const Ints slope, const Ints p, const Ints q) {
+  return max(most - slope * max(p - q, q - p), least);
 }
 
 kernel void penalties(const ImageSize size, const int most, const int least, const int slope,
                       global const uchar* images, global uchar* planes) {
-  const int x = get_global_id(0);
+  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
-  if (x >= size.width) return;
-  const size_t i = ((size_t)get_global_id(2) * size.height + y) * size.width + x;
-  const size_t plane = 2 * (size_t)size.height * size.width;
-  global const Pixel* image = (global const Pixel*)images;
-  // Outside the image there is no step: the pixel itself stands in.
-  const size_t up = y > 0 ? size.width : 0;
-  const size_t left = x > 0 ? 1 : 0;
-  const size_t right = x + 1 < size.width ? 1 : 0;
-  const int here = to_8_bit(image[i]);
-  planes[i] = penalty(most, least, slope, here, to_8_bit(image[i - left]));
-  planes[plane + i] = penalty(most, least, slope, here, to_8_bit(image[i - up]));
-  planes[2 * plane + i] = penalty(most, least, slope, here, to_8_bit(image[i - up - left]));
-  planes[3 * plane + i] = penalty(most, least, slope, here, to_8_bit(image[i - up + right]));
+  const int width = size.width;
+  if (x >= width) return;
+  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  const size_t plane = 2 * (size_t)size.height * width;
+  // Outside the image there is no step: the border's pixel stands in.
+  global const Pixel* here = (global const Pixel*)images + row;
+  global const Pixel* above = here - (y > 0 ? width : 0);
+  global uchar* at = planes + row;
+
+  const Ints grey = grey_at(here, x, width);
+  store_bytes(penalty(most, least, slope, grey, grey_at(here, x - 1, width)), at, x, width);
+  store_bytes(penalty(most, least, slope, grey, grey_at(above, x, width)), at + plane, x, width);
+  store_bytes(penalty(most, least, slope, grey, grey_at(above, x - 1, width)), at + 2 * plane, x, width);
+  store_bytes(penalty(most, least, slope, grey, grey_at(above, x + 1, width)), at + 3 * plane, x, width);
 }

@@ -13,14 +13,14 @@ namespace egosgm {
 namespace {
 
 std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<std::uint16_t>& grey, PixelType type,
-                                    const BandedSgmOptions& options) {
+                                    const BandedSgmOptions& options, int pixels = 0) {
   std::vector<cl_uchar> raw;
   for (const std::uint16_t value : grey) {
     raw.push_back(static_cast<cl_uchar>(value));
     if (type == PixelType::kU16) raw.push_back(static_cast<cl_uchar>(value >> 8));
   }
   ocl::Context context(testing::any_device());
-  StepPenalties penalties(context, size, type, options);
+  StepPenalties penalties(context, size, type, options, pixels);
   ocl::Buffer<cl_uchar> images(context, raw.size()), planes(context, StepPenalties::plane_count(size));
   images.write(context, raw);
   penalties(images, planes);
@@ -38,8 +38,11 @@ TEST_P(StepPenaltiesTest, EqualsReference) {
     for (std::size_t i = 0; i < 2 * pixel_count(size); ++i)
       grey.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
     const BandedSgmOptions options{.p2 = 180, .p2_at_edges = 33, .p2_slope = 2};
-    EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, options),
-                                   reference::step_penalties(size, grey, bits, options), size));
+    for (const int pixels : {1, 16}) {
+      EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, options, pixels),
+                                     reference::step_penalties(size, grey, bits, options), size))
+          << "by " << pixels;
+    }
   }
 }
 

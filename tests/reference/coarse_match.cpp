@@ -37,7 +37,7 @@ std::vector<float> coarse_match(shared::ImageSize size, const PipelineOptions& o
                                 int bits) {
   const shared::ImageSize coarse{shrunk(size.width), shrunk(size.height)};
   const int first = static_cast<int>(std::floor(options.min_disparity / 4.0));
-  const int last = static_cast<int>(std::ceil((options.min_disparity + options.disparities - 1) / 4.0));
+  const int last = static_cast<int>(std::floor((options.min_disparity + options.disparities - 1) / 4.0));
   BandedSgmOptions sgm = options.banded_sgm;
   sgm.cost = MatchingCost::kCensus5x5;
   sgm.p1 = options.coarse_match.p1;
