@@ -8,7 +8,7 @@
 // A view's codes lie in rows of `stride` = padding + width + padding, the right view's from right to left, so that the
 // codes a pixel is compared with at growing disparities lie at growing addresses in both views. The padding repeats the
 // border's codes.
-#include "shared.h"
+#include "grey.h"
 
 // lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2
@@ -19,9 +19,6 @@
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=3
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1
 
-#ifndef PIXEL_BYTES
-#error "PIXEL_BYTES: 1 or 2, the size of a grey value"
-#endif
 #ifndef CODE_BYTES
 #error "CODE_BYTES: 4 or 8, the size of a code"
 #endif
@@ -35,15 +32,6 @@
 #error "RADIUS_Y: half the window's height"
 #endif
 
-#if PIXEL_BYTES == 1
-typedef uchar Pixel;
-typedef uchar16 Pixels;
-#define to_8_bit(value) (value)
-#else
-typedef ushort Pixel;
-typedef ushort16 Pixels;
-#define to_8_bit(value) ((value) >> 8)
-#endif
 #if CODE_BYTES == 4
 typedef uint Code;
 typedef uint16 Codes;
@@ -54,9 +42,6 @@ typedef ulong16 Codes;
 #define convert_codes convert_ulong16
 #endif
 
-typedef struct __attribute__((packed)) {
-  Pixels pixels;
-} PackedPixels;
 typedef struct __attribute__((packed)) {
   Codes codes;
 } PackedCodes;
@@ -91,16 +76,14 @@ inline uchar16 append(const uchar16 bits, const Pixels first, const Pixels secon
   return bits + bits - as_uchar16(convert_char16(first < second));
 }
 
-inline Pixels load(global const Pixel* from) { return ((global const PackedPixels*)from)->pixels; }
-
 // 16 pixels at once, where no column needs clamping.
 inline Codes codes_at(const ImageSize size, global const Pixel* image, const int x, const int y) {
 #define ROW(dy) (image + (size_t)clamp(y + (dy), 0, size.height - 1) * size.width + x)
   Codes codes = 0;
 #if COMPARISONS == 0
-  codes = convert_codes(to_8_bit(load(ROW(0))));
+  codes = convert_codes(to_8_bit(load_grey(ROW(0))));
 #elif COMPARISONS == 1
-  const Pixels centre = load(ROW(0));
+  const Pixels centre = load_grey(ROW(0));
   uchar16 bits = 0;
   int count = 0;
 #pragma unroll
@@ -109,13 +92,13 @@ inline Codes codes_at(const ImageSize size, global const Pixel* image, const int
 #pragma unroll
     for (int dx = -RADIUS_X; dx <= RADIUS_X; ++dx) {
       if (dx == 0 && dy == 0) continue;
-      bits = append(bits, load(row + dx), centre);
+      bits = append(bits, load_grey(row + dx), centre);
       if (++count % 8 == 0) codes = (codes << (Codes)(8)) | convert_codes(bits);
     }
   }
   codes = (codes << (Codes)(count % 8)) | (convert_codes(bits) & (Codes)((1 << count % 8) - 1));
 #else
-  const Pixels centre = load(ROW(0));
+  const Pixels centre = load_grey(ROW(0));
   global const Pixel* rows[2 * RADIUS_Y + 1];
 #pragma unroll
   for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) rows[RADIUS_Y + dy] = ROW(dy);
@@ -124,7 +107,7 @@ inline Codes codes_at(const ImageSize size, global const Pixel* image, const int
     uchar16 bits = 0;
 #pragma unroll
     for (int i = 8 * byte; i < 8 * byte + 8; ++i) {
-      bits = append(bits, load(rows[RADIUS_Y + kSparse[i][1]] + kSparse[i][0]), centre);
+      bits = append(bits, load_grey(rows[RADIUS_Y + kSparse[i][1]] + kSparse[i][0]), centre);
     }
     codes = (codes << (Codes)(8)) | convert_codes(bits);
   }

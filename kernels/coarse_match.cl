@@ -1,20 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The images that are matched at a quarter of the resolution: sums of EGOSGM_COARSE x EGOSGM_COARSE pixels, those
 // outside the image being its border's. Of 8-bit grey values the sum (times 16), of 16-bit ones the mean: 16 bits both.
-#include "shared.h"
+#include "grey.h"
 
 // lint: PIXEL_BYTES=1
 // lint: PIXEL_BYTES=2
 
-#ifndef PIXEL_BYTES
-#error "PIXEL_BYTES: 1 or 2, the size of a grey value"
-#endif
-
 #if PIXEL_BYTES == 1
-typedef uchar Pixel;
 #define to_16_bit(sum) ((sum) << 4)
 #else
-typedef ushort Pixel;
 #define to_16_bit(sum) ((sum) >> 4)
 #endif
 

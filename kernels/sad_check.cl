@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Drops disparities whose 3x3 windows in the two images differ too much: mean absolute difference, on the 8-bit scale.
-#include "shared.h"
+#include "grey.h"
 
 // lint: PIXEL_BYTES=1
 // lint: PIXEL_BYTES=2
 
-#ifndef PIXEL_BYTES
-#error "PIXEL_BYTES: 1 or 2"
-#endif
 #if PIXEL_BYTES == 1
-typedef uchar Pixel;
 #define STEPS_PER_GREY 1
 #else
-typedef ushort Pixel;
 #define STEPS_PER_GREY 257
 #endif
 

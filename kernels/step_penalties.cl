@@ -5,6 +5,7 @@
 //
 // Four planes of a byte a pixel and view: the steps to the left, to above, to the upper left and to the upper right
 // neighbour.
+#include "grey.h"
 #include "pixels.h"
 
 // lint: PIXEL_BYTES=1 PIXELS=1
@@ -12,22 +13,6 @@
 // lint: PIXEL_BYTES=2 PIXELS=1
 // lint: PIXEL_BYTES=2 PIXELS=16
 
-#ifndef PIXEL_BYTES
-#error "PIXEL_BYTES: 1 or 2, the size of a grey value"
-#endif
-
-#if PIXEL_BYTES == 1
-typedef uchar Pixel;
-typedef uchar16 Pixels;
-#define to_8_bit(value) (value)
-#else
-typedef ushort Pixel;
-typedef ushort16 Pixels;
-#define to_8_bit(value) ((value) >> 8)
-#endif
-typedef struct __attribute__((packed)) {
-  Pixels pixels;
-} PackedPixels;
 typedef struct __attribute__((packed)) {
   uchar16 lanes;
 } PackedBytes;
@@ -37,7 +22,7 @@ static inline Ints grey_at(global const Pixel* row, const int x, const int width
 #if PIXELS == 1
   return to_8_bit(row[clamp(x, 0, width - 1)]);
 #else
-  if (x >= 0 && x + PIXELS <= width) return convert_int16(to_8_bit(((global const PackedPixels*)(row + x))->pixels));
+  if (x >= 0 && x + PIXELS <= width) return convert_int16(to_8_bit(load_grey(row + x)));
   int lanes[PIXELS];
   for (int i = 0; i < PIXELS; ++i) lanes[i] = to_8_bit(row[clamp(x + i, 0, width - 1)]);
   return vload16(0, lanes);

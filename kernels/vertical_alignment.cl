@@ -6,32 +6,27 @@
 // where r is not clamped, with g the mean of the vertical gradients g_I and g_J (after Lucas and Kanade 1981). Smoothed
 // rows for r, g of both images, and the product of the two gradients instead of g g: so the noise of a pixel biases
 // neither sum. All sums are of integers, so their order does not matter.
-#include "shared.h"
+#include "grey.h"
 
 // lint: PIXEL_BYTES=1 ROW_GROUP=1
 // lint: PIXEL_BYTES=2 ROW_GROUP=64
 
-#ifndef PIXEL_BYTES
-#error "PIXEL_BYTES: 1 or 2, the size of a grey value"
-#endif
 #ifndef ROW_GROUP
 #error "ROW_GROUP: work-items that share a row"
 #endif
 
 #if PIXEL_BYTES == 1
-typedef uchar Pixel;
 #define vload_pixels(offset, from) convert_ushort16(vload16(offset, from))
 #define convert_pixels convert_uchar16
 typedef ushort16 Wide;
 typedef ushort Weight;
-#define to_8_bit(value) (value)
+#define rounded_to_8_bit(value) (value)
 #else
-typedef ushort Pixel;
 #define vload_pixels(offset, from) convert_uint16(vload16(offset, from))
 #define convert_pixels convert_ushort16
 typedef uint16 Wide;
 typedef uint Weight;
-#define to_8_bit(value) (((value) + 128) >> 8)
+#define rounded_to_8_bit(value) (((value) + 128) >> 8)
 #endif
 
 // Rows are resampled in 256ths of a pixel, columns read in 16ths.
@@ -111,9 +106,9 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
       const int j0 = before * right[u - width] + after * right[u + 1 - width];
       const int j1 = before * right[u] + after * right[u + 1];
       const int j2 = before * right[u + width] + after * right[u + 1 + width];
-      const int r = to_8_bit(COLUMN_STEPS * (i0 + 2 * i1 + i2) - (j0 + 2 * j1 + j2));
-      const int g_left = to_8_bit(COLUMN_STEPS * (i2 - i0));
-      const int g_right = to_8_bit(j2 - j0);
+      const int r = rounded_to_8_bit(COLUMN_STEPS * (i0 + 2 * i1 + i2) - (j0 + 2 * j1 + j2));
+      const int g_left = rounded_to_8_bit(COLUMN_STEPS * (i2 - i0));
+      const int g_right = rounded_to_8_bit(j2 - j0);
       const int g = g_left + g_right;
       const int is_textured = abs(g) >= MIN_GRADIENT;
       const int is_inlier = is_textured & (abs(r) < MAX_RESIDUAL);

@@ -22,13 +22,16 @@ constexpr std::string_view kPreamble =
     "#pragma clang diagnostic ignored \"-Wpsabi\"\n"
     "#endif\n";
 
+// Headers have guards and do not include each other in a circle.
 std::string expand(const std::string& file) {
   const auto found = sources().find(file);
   if (found == sources().end()) throw std::invalid_argument("no embedded kernel named " + file);
   std::string text(found->second);
-  for (const auto& [name, header] : sources()) {
-    const std::string include = "#include \"" + std::string(name) + "\"";
-    if (const auto at = text.find(include); at != std::string::npos) text.replace(at, include.size(), header);
+  for (const auto& source : sources()) {
+    const std::string name(source.first), include = "#include \"" + name + "\"";
+    for (auto at = text.find(include); at != std::string::npos; at = text.find(include, at)) {
+      text.replace(at, include.size(), expand(name));
+    }
   }
   return text;
 }
