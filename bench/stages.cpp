@@ -42,7 +42,7 @@ constexpr const char* kHelp =
     "and read), by wall\n"
     "clock; of_copy: the same as part of a copy's GB/s; Gcells_s: cells that can win, both views.\n";
 
-constexpr MatchingCost kCost = MatchingCost::kCensus9x7;
+const MatchingCost kCost = BandedSgmOptions().cost;
 
 struct Stage {
   const char* name;

@@ -185,6 +185,12 @@ inline void wipe(global uchar* slot, const Band band, const int min_disparity) {
   for (int v = 1; v < band.chunks; ++v) store((uchar16)(ABSENT), at + EGOSGM_LANES * v);
 }
 
+// Whether what a predecessor with `band` left in a slot is overwritten by a pixel with `own`.
+inline bool covers(const Band own, const Band band) {
+  return own.origin <= band.origin &&
+         band.origin + EGOSGM_LANES * band.chunks <= own.origin + EGOSGM_LANES * own.chunks;
+}
+
 // Both together: steps to the left and to the right of the winner until the sums above its own add up to `limit`.
 // `beside` holds the sums of the eight lanes before the winner, the nearest first, and of the eight after it.
 inline uint count_steps(const ushort16 beside, const ushort winner, const ushort limit) {
@@ -344,7 +350,7 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
 #pragma unroll
         for (int i = 0; i < DIRECTIONS; ++i) {
           least[i] = (uchar16)(minimum(least[i]));
-          wipe(slot[i] + (i > 0 ? moved : 0), wiped[i], q.min_disparity);
+          if (!covers(band, wiped[i])) wipe(slot[i] + (i > 0 ? moved : 0), wiped[i], q.min_disparity);
         }
         last_lane = -1;
         ushort16 best = (ushort16)(65535), best_chunk = 0;
