@@ -121,7 +121,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
     wavefront_.emplace(context, size_, range, options, tile);
   }
   if (stripes_.size() > 1) {
-    stripe_memory_.emplace(context, size, size_.height, code_words_a_row(size.width, range, options.cost));
+    stripe_memory_.emplace(context, size, range, size_.height, code_words_a_row(size.width, range, options.cost));
   }
 }
 

@@ -44,7 +44,16 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       sum_rows_(build(context, row_group_), "sum_rows"),
       full_range_(build(context, row_group_), "full_range") {
   no_coarse_.write(context, std::vector(no_coarse_.size(), shared::BlockRange{}));
-  if (!options.from_neighbours) block_bands_.write(context, std::vector(block_bands_.size(), whole(range)));
+  block_bands_.write(context, std::vector(block_bands_.size(), whole(range)));  // kept without bands from neighbours
+  clear(context, range, bands_, cell_offsets_);
+}
+
+void SearchBand::clear(ocl::Context& context, shared::DisparityRange range, ocl::Buffer<shared::Band>& bands,
+                       ocl::Buffer<cl_uint>& cell_offsets) {
+  const ocl::Drain drain{context};
+  bands.fill(context, whole(range));
+  cell_offsets.fill(context, 0);
+  context.wait();
 }
 
 void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* coarse) {

@@ -36,6 +36,10 @@ class SearchBand {
 
   /// No pixel has more chunks than this.
   static int max_chunks(shared::DisparityRange range) { return (range.count + EGOSGM_LANES - 1) / EGOSGM_LANES; }
+  /// What a device that goes on after a kernel that failed must find: bands that fit the range, and offsets below a
+  /// row's end. Waits.
+  static void clear(ocl::Context& context, shared::DisparityRange range, ocl::Buffer<shared::Band>& bands,
+                    ocl::Buffer<cl_uint>& cell_offsets);
 
  private:
   using Disparities = const ocl::Buffer<float>;

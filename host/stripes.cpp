@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "host/search_band.h"
 #include "host/step_penalties.h"
 
 namespace egosgm {
@@ -26,7 +27,8 @@ std::vector<Stripe> cut_into_stripes(int height, int rows, int overlap) {
   return stripes;
 }
 
-StripeMemory::StripeMemory(ocl::Context& context, shared::ImageSize size, int rows, std::size_t words_a_row)
+StripeMemory::StripeMemory(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, int rows,
+                           std::size_t words_a_row)
     : context_(context),
       size_(size),
       stripe_size_{size.width, rows},
@@ -35,7 +37,9 @@ StripeMemory::StripeMemory(ocl::Context& context, shared::ImageSize size, int ro
       penalties_(context, StepPenalties::plane_count(stripe_size_)),
       bands_(context, kViews * pixel_count(stripe_size_)),
       cell_offsets_(context, kViews * pixel_count(stripe_size_)),
-      measured_(context, stripe_size_) {}
+      measured_(context, stripe_size_) {
+  SearchBand::clear(context, range, bands_, cell_offsets_);
+}
 
 std::uint64_t StripeMemory::bytes(int width, int rows, std::size_t words_a_row) {
   const std::uint64_t a_pixel = kPenaltyPlanes + kViews * (sizeof(shared::Band) + sizeof(cl_uint) + 2 * sizeof(float));

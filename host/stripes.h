@@ -28,7 +28,8 @@ std::vector<Stripe> cut_into_stripes(int height, int rows, int overlap);
 class StripeMemory {
  public:
   /// `size`: of the image; `words_a_row`: of codes.
-  StripeMemory(ocl::Context& context, shared::ImageSize size, int rows, std::size_t words_a_row);
+  StripeMemory(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, int rows,
+               std::size_t words_a_row);
 
   /// Brings a stripe of both views here.
   void load(const MatchInputs& image, const Stripe& stripe);

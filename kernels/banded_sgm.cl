@@ -273,9 +273,9 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
 
     // Cells lie in the image's order: a backward sweep comes to a pixel's cells from their end.
     global const Band* band_at = bands + row_start + image_x;
+    global uchar* row_cells = sums + row_start * MAX_CHUNKS * EGOSGM_LANES;
     global uchar* cells =
-        sums +
-        (row_start * MAX_CHUNKS + offsets[row_start + image_x] + (backward ? band_at->chunks : 0)) * EGOSGM_LANES;
+        row_cells + ((size_t)offsets[row_start + image_x] + (backward ? band_at->chunks : 0)) * EGOSGM_LANES;
 
     // P2 of a step lies at its lower or right pixel.
     global const uchar* penalty_at = penalties + row_start + image_x;
@@ -299,7 +299,8 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
       uchar16 p2[DIRECTIONS];
 #pragma unroll
       for (int i = 0; i < DIRECTIONS; ++i) p2[i] = (uchar16)(penalty_at[i * plane + (backward ? before[i] : 0)]);
-      if (backward) cells -= EGOSGM_LANES * band.chunks;
+      // Where offsets and bands do not belong together, after a kernel that failed, still not before the row.
+      if (backward) cells -= min((long)(EGOSGM_LANES * band.chunks), (long)(cells - row_cells));
 
       if (band.chunks == 1) {
         const uchar16 absent = absent_from(q.disparities - lane);

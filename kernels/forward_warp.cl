@@ -92,8 +92,8 @@ kernel void splat_disparity(const ImageSize size, global const int* landed, glob
   if (x >= size.width) return;
   const size_t first = (size_t)get_global_id(2) * size.width * size.height;
   const size_t i = first + (size_t)get_global_id(1) * size.width + x;
-  const int target = landed[i];
-  if (target >= 0) atomic_max(&zbuffer[first + target], moved_key[i]);
+  const uint target = landed[i];  // -1 is above all
+  if (target < (uint)(size.width * size.height)) atomic_max(&zbuffer[first + target], moved_key[i]);
 }
 
 // Positive floats are ordered as their bits are.
@@ -104,8 +104,8 @@ kernel void splat_variance(const ImageSize size, global const int* landed, globa
   if (x >= size.width) return;
   const size_t first = (size_t)get_global_id(2) * size.width * size.height;
   const size_t i = first + (size_t)get_global_id(1) * size.width + x;
-  const int target = landed[i];
-  if (target < 0 || zbuffer[first + target] != moved_key[i]) return;
+  const uint target = landed[i];
+  if (target >= (uint)(size.width * size.height) || zbuffer[first + target] != moved_key[i]) return;
   atomic_max((global uint*)predicted_variance + first + target, as_uint(moved_variance[i]));
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Small regions by union-find over runs (connected pixels in a row). A run is known by the index of its first pixel;
 // parents[run] is never above run, so that the root of a region is its first run, whatever the order in which runs are
-// joined.
+// joined. A device may go on after a kernel that failed: indices that are read from memory are held below what they
+// can be, which also ends every loop.
 #include "shared.h"
 
 // lint: ROW_GROUP=1
@@ -133,10 +134,21 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void find_runs(con
   }
 }
 
+// The index of the run at column x of a row.
+uint run_at(global const ushort* runs, size_t row, int x) { return row + min((int)runs[row + x], x); }
+
+uint root_of(global uint* parents, uint run) {
+  for (uint parent = parents[run]; parent < run; parent = parents[run]) {
+    parents[run] = min(parents[parent], parent);
+    run = parents[run];
+  }
+  return run;
+}
+
 // Hangs the larger root below the smaller one.
 void join(global uint* parents, uint a, uint b) {
-  while (parents[a] != a) a = parents[a] = parents[parents[a]];
-  while (parents[b] != b) b = parents[b] = parents[parents[b]];
+  a = root_of(parents, a);
+  b = root_of(parents, b);
   parents[max(a, b)] = min(a, b);
 }
 
@@ -151,8 +163,7 @@ kernel void join_strips(const ImageSize size, const float max_difference, const 
     const size_t row = ((size_t)view * size.height + y) * size.width;
     const size_t above = row - size.width;
     int x = 0;
-    if (is_connected(disparity[row], disparity[above], max_difference))
-      join(parents, row + runs[row], above + runs[above]);
+    if (is_connected(disparity[row], disparity[above], max_difference)) join(parents, row, above);
     for (x = 1; x + 16 <= size.width; x += 16) {
       const int16 joins =
           are_connected(vload16(0, disparity + row + x), vload16(0, disparity + above + x), max_difference);
@@ -161,20 +172,20 @@ kernel void join_strips(const ImageSize size, const float max_difference, const 
       const short16 same = load_runs(runs + row + x) == load_runs(runs + row + x - 1) &
                            load_runs(runs + above + x) == load_runs(runs + above + x - 1);
       for (uint left = bits_of(joins & ~(left_joins & convert_int16(same))); left != 0; left &= left - 1) {
-        const size_t lane = x + lowest_bit(left);
-        join(parents, row + runs[row + lane], above + runs[above + lane]);
+        const int lane = x + lowest_bit(left);
+        join(parents, run_at(runs, row, lane), run_at(runs, above, lane));
       }
     }
     for (; x < size.width; ++x) {
       if (is_connected(disparity[row + x], disparity[above + x], max_difference)) {
-        join(parents, row + runs[row + x], above + runs[above + x]);
+        join(parents, run_at(runs, row, x), run_at(runs, above, x));
       }
     }
   }
 }
 
 uint root_now(volatile global uint* parents, uint run) {
-  for (uint parent = atomic_or(&parents[run], 0u); parent != run; parent = atomic_or(&parents[run], 0u)) run = parent;
+  for (uint parent = atomic_or(&parents[run], 0u); parent < run; parent = atomic_or(&parents[run], 0u)) run = parent;
   return run;
 }
 
@@ -197,8 +208,8 @@ kernel void join_seams(const ImageSize size, const float max_difference, const i
   }
   // The larger root is hung below the smaller one; if another work-item has hung it elsewhere meanwhile, that is joined
   // next.
-  uint a = row + run;
-  uint b = above + run_above;
+  uint a = row + min(run, x);
+  uint b = above + min(run_above, x);
   while (true) {
     a = root_now(parents, a);
     b = root_now(parents, b);
@@ -206,7 +217,7 @@ kernel void join_seams(const ImageSize size, const float max_difference, const i
     const uint larger = max(a, b);
     const uint smaller = min(a, b);
     const uint parent = atomic_min(&parents[larger], smaller);
-    if (parent == larger) break;
+    if (parent >= larger) break;
     a = parent;
     b = smaller;
   }
@@ -238,7 +249,7 @@ kernel void measure(const ImageSize size, global const ushort* runs, global cons
   for (uint left = beginnings(runs + row, x, size.width); left != 0; left &= left - 1) {
     const size_t run = row + x + lowest_bit(left);
     uint root = run;
-    while (parents[root] != root) root = parents[root];
+    while (parents[root] < root) root = parents[root];
     roots[run] = root;
     if (root != run) atomic_add(&sizes[root], sizes[run]);
   }
@@ -254,7 +265,7 @@ kernel void drop(const ImageSize size, const uint max_size, global const ushort*
   const size_t row = ((size_t)view * size.height + y) * size.width;
   for (uint left = beginnings(runs + row, x, size.width); left != 0; left &= left - 1) {
     const int run = x + lowest_bit(left);
-    if (sizes[roots[row + run]] > max_size) continue;
+    if (sizes[min((size_t)roots[row + run], row + run)] > max_size) continue;
     for (int i = run; i < size.width && runs[row + i] == run; ++i) {
       disparity[row + i] = EGOSGM_INVALID_DISPARITY;
       variance[row + i] = 0.0f;

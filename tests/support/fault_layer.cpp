@@ -10,6 +10,8 @@
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
+#include <mutex>
 #include <vector>
 
 namespace {
@@ -32,6 +34,9 @@ std::atomic<bool> sources_forbidden = false;
 std::atomic<long> references = 0;
 long buffers_created = 0;
 std::atomic<int> transfers = 0;
+
+std::mutex queues_mutex;
+std::map<cl_command_queue, int> queues;  // that live, with their owners
 
 // Calls that take part: all of them where the fault is to come at once, enqueues only where it is to come later.
 bool fails() {
@@ -58,9 +63,16 @@ cl_context context_of(cl_command_queue queue) {
   return context;
 }
 
+void finish_all_queues() {
+  const std::lock_guard lock(queues_mutex);
+  for (const auto& [queue, owners] : queues) next->clFinish(queue);
+}
+
 // Enqueues by `enqueue(number of events to wait for, those events)`, which are those given and a fault that comes
 // later: the command then waits for an event that fails, and takes the rest of its queue down with it. That event must
-// not fail before the enqueue: PoCL 3.1 would hang.
+// not fail before the enqueue: PoCL 3.1 would hang. Nor while a command runs that this one would wait for as well:
+// PoCL 3.1 goes on to notify the failed command when that one ends, though it may be freed by then
+// (tests/support/pocl_late_failure.c).
 template <typename Enqueue>
 cl_int enqueue(cl_command_queue queue, cl_uint count, const cl_event* given, cl_event* done, Enqueue&& enqueue_with) {
   const bool fails_later = kind == kLater && enqueues == failing;
@@ -70,6 +82,7 @@ cl_int enqueue(cl_command_queue queue, cl_uint count, const cl_event* given, cl_
   if (fails()) return status;
   cl_int result;
   if (fails_later) {
+    finish_all_queues();
     cl_event fault = next->clCreateUserEvent(context_of(queue), nullptr);
     std::vector<cl_event> events(given, given + count);
     events.push_back(fault);
@@ -93,7 +106,11 @@ cl_context CL_API_CALL create_context(const cl_context_properties* p, cl_uint n,
   return context;
 }
 cl_command_queue CL_API_CALL create_queue(cl_context c, cl_device_id d, cl_command_queue_properties p, cl_int* e) {
-  return fails() ? refuse<cl_command_queue>(e) : counted(next->clCreateCommandQueue(c, d, p, e));
+  if (fails()) return refuse<cl_command_queue>(e);
+  const cl_command_queue queue = counted(next->clCreateCommandQueue(c, d, p, e));
+  const std::lock_guard lock(queues_mutex);
+  if (queue) queues.emplace(queue, 1);
+  return queue;
 }
 cl_mem CL_API_CALL create_buffer(cl_context c, cl_mem_flags f, size_t n, void* p, cl_int* e) {
   ++buffers_created;
@@ -237,6 +254,17 @@ cl_int CL_API_CALL release(Object object) {
   return chosen ? status : result;
 }
 
+cl_int CL_API_CALL retain_queue(cl_command_queue queue) {
+  const std::lock_guard lock(queues_mutex);
+  ++queues[queue];
+  return retain<&cl_icd_dispatch::clRetainCommandQueue>(queue);
+}
+cl_int CL_API_CALL release_queue(cl_command_queue queue) {
+  const std::lock_guard lock(queues_mutex);
+  if (--queues[queue] == 0) queues.erase(queue);
+  return release<&cl_icd_dispatch::clReleaseCommandQueue>(queue);
+}
+
 void unknown_call() {
   std::fputs("the fault layer does not know an OpenCL call that this program makes: add it\n", stderr);
   std::abort();
@@ -319,12 +347,13 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   layer.clRetain##Name = retain<&cl_icd_dispatch::clRetain##Name, Object>; \
   layer.clRelease##Name = release<&cl_icd_dispatch::clRelease##Name, Object>
   COUNT(Context, cl_context);
-  COUNT(CommandQueue, cl_command_queue);
   COUNT(MemObject, cl_mem);
   COUNT(Program, cl_program);
   COUNT(Kernel, cl_kernel);
   COUNT(Event, cl_event);
 #undef COUNT
+  layer.clRetainCommandQueue = retain_queue;
+  layer.clReleaseCommandQueue = release_queue;
   *count = sizeof(layer) / sizeof(void*);
   *out = &layer;
   return CL_SUCCESS;
