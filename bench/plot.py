@@ -241,6 +241,22 @@ def draw_error_over_frames(plt, content):
     return figure
 
 
+def draw_uncertainty(plt, content):
+    curves = content["curves"]["uncertainty"]
+    figure, axes = plt.subplots(figsize=(5.2, 4.4))
+    for curve, color in zip(curves, (OURS, ACCENT, THEIRS, "#e0a458")):
+        axes.plot([at["predicted_px"] for at in curve["bins"]], [at["actual_px"] for at in curve["bins"]], "o-", ms=4, color=color, label=curve["input"])
+    ends = [at[name] for curve in curves for at in curve["bins"] for name in ("predicted_px", "actual_px")]
+    axes.plot([min(ends), max(ends)], [min(ends), max(ends)], color="#cccccc", zorder=0)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel("predicted deviation, of a tenth of the pixels each [px]")
+    axes.set_ylabel("actual deviation, errors cut at 3 px [px]")
+    axes.legend(fontsize=8)
+    tidy(axes)
+    return figure
+
+
 def contents_of(content):
     """Tables (functions) and drawings (name -> function) for what is in a file."""
     names = {row.get("name", "") for row in content.get("rows", [])}
@@ -261,6 +277,8 @@ def contents_of(content):
         drawings["error_against_search"] = draw_error_against_search
     if content.get("curves", {}).get("error_over_frames"):
         drawings["error_over_frames"] = draw_error_over_frames
+    if content.get("curves", {}).get("uncertainty"):
+        drawings["uncertainty"] = draw_uncertainty
     return tables, drawings
 
 

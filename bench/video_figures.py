@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of a video that need its maps pixel by pixel: flicker, mistakes of the motion, uncovered pixels, variances.
+
+Runs the pipeline through the Python module (PYTHONPATH=build/python); bench/accuracy makes rows of what this returns.
+Disparities and errors in px; shares in percent.
+"""
+import functools
+import pathlib
+
+import numpy as np
+
+import egosgm
+
+BAD_PX = 3.0
+SINGLE_FRAME = {"temporal": False}
+
+
+class Street:
+    """A folder of `egosgm synth`, with its true motions."""
+
+    def __init__(self, folder):
+        self.folder = pathlib.Path(folder)
+        self.sequence = egosgm.open_folder(self.folder)
+        self.calibration, self.size = self.sequence.calibration, self.sequence.size
+        self.numbers = range(len(self.sequence))
+        self.world_from_camera = egosgm.read_poses(self.folder / "poses.txt")
+
+    def images(self, k):
+        return self.sequence.frames[k].read()
+
+    def motion(self, k, since):
+        return np.linalg.inv(self.world_from_camera[k]) @ self.world_from_camera[since]
+
+    def file(self, kind, k):
+        return self.folder / "truth" / kind / f"{self.sequence.frames[k].name}.png"
+
+    def truth(self, k):
+        return egosgm.read_disparity(self.file("left_disp_noc", k))
+
+    def all_truth(self, k):
+        """Of occluded pixels too."""
+        return egosgm.read_disparity(self.file("left_disp_occ", k))
+
+    def moving(self, k):
+        return egosgm.read_grey(self.file("left_moving", k)) > 0
+
+
+class Recorded:
+    """A sequence on disk with odometry's motions. `numbers`: its frames in the order in which they are played."""
+
+    def __init__(self, sequence, numbers=None):
+        by_number = {frame.number: frame for frame in sequence.frames}
+        self.numbers = list(numbers or by_number)
+        self.calibration, self.size = sequence.calibration, sequence.size
+        self.images = lambda k: by_number[k].read()
+        self.truth = lambda k: egosgm.read_disparity(by_number[k].truth_noc)
+
+    @functools.cached_property
+    def motions(self):
+        odometry = egosgm.StereoOdometry(self.calibration)
+        return {k: odometry.process(*self.images(k)).motion for k in self.numbers}
+
+    def motion(self, k, since):
+        if self.numbers.index(k) - self.numbers.index(since) != 1:
+            raise ValueError(f"frame {since} is not the one before {k}")
+        return self.motions[k]
+
+
+def matrix_of(motion):
+    return motion if isinstance(motion, np.ndarray) else motion.current_from_previous
+
+
+def play(video, numbers=None, wrong=None, outputs=("disparity", "variance"), **options):
+    """Yields (k, Frame). `numbers` may leave out frames. `wrong`: matrices by number that displace a frame's motion."""
+    pipeline = egosgm.Pipeline(video.calibration, *video.size, **options)
+    since = None
+    for k in video.numbers if numbers is None else numbers:
+        motion = None if since is None else video.motion(k, since)
+        if k in (wrong or {}):
+            motion = wrong[k] @ matrix_of(motion)
+        yield k, pipeline.process(*video.images(k), motion, outputs)
+        since = k
+
+
+def is_valid(disparity):
+    return disparity > egosgm.INVALID_DISPARITY
+
+
+def bad_or_missing(disparity, truth, where=None):
+    """(bad or missing, all) pixels that have truth."""
+    known = is_valid(truth) if where is None else is_valid(truth) & where
+    d, t = disparity[known], truth[known]
+    return int(np.sum(~is_valid(d) | (np.abs(d - t) > BAD_PX))), int(known.sum())
+
+
+def share(counts):
+    """Percent, of a list of (part, all)."""
+    parts = np.sum(np.reshape(counts, (-1, 2)), axis=0)
+    return float(100 * parts[0] / parts[1]) if parts[1] else float("nan")
+
+
+def moved(calibration, x, y, d, motion):
+    """Points of disparity space (x, y, d) after a motion; NaN behind the camera."""
+    z = calibration.fx * calibration.baseline_m / (d + calibration.doffs_px)
+    points = np.stack([(x - calibration.cx) * z / calibration.fx, (y - calibration.cy) * z / calibration.fy, z])
+    points = motion[:3, :3] @ points + motion[:3, 3:]
+    z = np.where(points[2] > 1e-3, points[2], np.nan)
+    return (calibration.fx * points[0] / z + calibration.cx, calibration.fy * points[1] / z + calibration.cy,
+            calibration.fx * calibration.baseline_m / z - calibration.doffs_px)
+
+
+def warped(calibration, disparity, motion):
+    """`disparity` moved to the nearest pixels of the next frame, the nearest surface on top."""
+    height, width = disparity.shape
+    y, x = np.nonzero(disparity + calibration.doffs_px > 0.1)
+    moved_x, moved_y, d = moved(calibration, x, y, disparity[y, x].astype(float), motion)
+    seen = np.isfinite(d) & (moved_x > -0.5) & (moved_x < width - 0.5) & (moved_y > -0.5) & (moved_y < height - 0.5)
+    order = np.argsort(d[seen], kind="stable")
+    to = np.rint(moved_y[seen]).astype(int)[order], np.rint(moved_x[seen]).astype(int)[order]
+    result = np.full(disparity.shape, egosgm.INVALID_DISPARITY, np.float32)
+    result[to] = d[seen][order]
+    return result
+
+
+def flicker(video, first, **options):
+    """Mean |d_k - warped d_(k-1)| over the pixels that have both, from frame number `first` on."""
+    total, pixels, previous = 0.0, 0, None
+    for k, frame in play(video, **options):
+        if previous is not None and k >= first:
+            before = warped(video.calibration, previous, matrix_of(video.motion(k, k - 1)))
+            both = is_valid(before) & is_valid(frame.disparity)
+            total, pixels = total + float(np.abs(before - frame.disparity)[both].sum()), pixels + int(both.sum())
+        previous = frame.disparity
+    return total / pixels
+
+
+def turned(axis, degrees):
+    """A rotation about the camera's axis 0 (pitch), 1 (yaw) or 2 (roll)."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(4)
+    matrix[[i, j], [i, j]] = np.cos(np.radians(degrees))
+    matrix[i, j], matrix[j, i] = -np.sin(np.radians(degrees)), np.sin(np.radians(degrees))
+    return matrix
+
+
+DISTURBANCES = ("a gap of 5 frames", "yaw wrong by 1 degree", "pitch wrong by 1 degree")
+
+
+def recovery(video, at, frames=4):
+    """bad_or_missing of frames at, at + 1, ...: of a single frame, undisturbed, and with a disturbance at frame `at`."""
+    lead = list(range(at - 4, at + frames))
+    runs = {"single frame": dict(numbers=lead[4:], **SINGLE_FRAME), "undisturbed": dict(numbers=lead),
+            "a gap of 5 frames": dict(numbers=list(range(at - 9, at - 5)) + lead[4:]),
+            "yaw wrong by 1 degree": dict(numbers=lead, wrong={at: turned(1, 1)}),
+            "pitch wrong by 1 degree": dict(numbers=lead, wrong={at: turned(0, 1)})}
+    return {name: [share([bad_or_missing(frame.disparity, video.truth(k))]) for k, frame in play(video, **run) if k >= at]
+            for name, run in runs.items()}
+
+
+def long_run(video, restart, **options):
+    """bad_or_missing a frame: of one run over all frames, and of one that starts at frame `restart`. And the later resets."""
+    def errors(numbers):
+        frames = {k: (share([bad_or_missing(frame.disparity, video.truth(k))]), frame.report.full_range)
+                  for k, frame in play(video, numbers, **options)}
+        return {k: error for k, (error, _) in frames.items()}, sum(full for k, (_, full) in frames.items() if k != numbers[0])
+    through, resets = errors(video.numbers)
+    return through, errors(range(restart, len(video.numbers)))[0], resets
+
+
+def uncovered_ages(video, oldest):
+    """Yields (k, for how many frames each pixel's surface has been in sight since a moving object covered it; -1: was not)."""
+    previous = None
+    for k in video.numbers:
+        ages = np.full(video.all_truth(k).shape, -1, np.int32)
+        if previous is not None:
+            static = ~video.moving(k)
+            y, x = np.nonzero(static)
+            d = video.all_truth(k)[y, x].astype(float)
+            then_x, then_y, then_d = moved(video.calibration, x, y, d, np.linalg.inv(video.motion(k, k - 1)))
+            column, row = np.rint(np.nan_to_num(then_x, nan=-1)).astype(int), np.rint(np.nan_to_num(then_y, nan=-1)).astype(int)
+            inside = (row >= 0) & (row < ages.shape[0]) & (column >= 0) & (column < ages.shape[1])
+            y, x, row, column, then_d = (values[inside] for values in (y, x, row, column, then_d))
+            behind = video.moving(k - 1)[row, column] & (video.all_truth(k - 1)[row, column] > then_d + 1)
+            age = np.where(behind, 0, np.where(previous[row, column] >= 0, previous[row, column] + 1, -1))
+            ages[y, x] = np.where(age > oldest, -1, age)
+        previous = ages
+        yield k, ages
+
+
+def uncovered(video, first, oldest=2, **options):
+    """bad_or_missing of pixels that a moving object uncovered 0, 1, ... frames ago."""
+    ages, counts = dict(uncovered_ages(video, oldest)), {age: [] for age in range(oldest + 1)}
+    for k, frame in play(video, **options):
+        for age in counts if k >= first else ():
+            counts[age].append(bad_or_missing(frame.disparity, video.truth(k), ages[k] == age))
+    return [share(counts[age]) for age in counts]
+
+
+def errors_and_variances(video, frames, **options):
+    """Absolute errors and variances of all pixels with truth and a disparity, of each of the frames numbered `frames`."""
+    pairs = []
+    for k, frame in play(video, **options):
+        if k in frames:
+            known = is_valid(video.truth(k)) & is_valid(frame.disparity)
+            pairs.append((np.abs(frame.disparity - video.truth(k))[known].astype(float), frame.variance[known].astype(float)))
+    return pairs
+
+
+def calibration_of_variance(pairs, bins=10):
+    """What the variances are worth. `ratio`: mean of error^2 / variance, errors cut at 3 px, since a few mismatches would decide it.
+    `removed`: percent of the bad pixels among the tenth of each frame with the largest variances. `bins`: predicted and actual
+    deviation of pixels in order of their variance."""
+    errors, variances = (np.concatenate(values) for values in zip(*pairs))
+    cut = np.minimum(errors, BAD_PX)**2
+    removed = []
+    for error, variance in pairs:
+        worst = np.argsort(variance, kind="stable")[int(0.9 * len(variance)):]
+        removed.append((np.sum(error[worst] > BAD_PX), np.sum(error > BAD_PX)))
+    parts = np.array_split(np.argsort(variances, kind="stable"), bins)
+    return {"ratio": float(np.mean(cut / variances)), "ratio_not_bad": float(np.mean((errors**2 / variances)[errors <= BAD_PX])),
+            "removed": share(removed),
+            "bins": [{"predicted_px": float(np.sqrt(variances[part].mean())), "actual_px": float(np.sqrt(cut[part].mean()))} for part in parts]}

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figures that bench/accuracy reads off the maps."""
+import pathlib
+import sys
+
+import numpy as np
+import pytest
+
+import egosgm
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "bench"))
+import video_figures as figures  # noqa: E402
+
+CAMERA = egosgm.Calibration(fx=100, fy=100, cx=20, cy=10, baseline_m=0.5)
+NONE = egosgm.INVALID_DISPARITY
+
+
+class Still:
+    """A camera that stands: the motion is the identity."""
+
+    calibration, size, numbers = CAMERA, (48, 24), range(2)
+
+    def motion(self, k, since):
+        return np.eye(4)
+
+
+def forward(metres):
+    motion = np.eye(4)
+    motion[2, 3] = -metres
+    return motion
+
+
+def test_a_wall_comes_nearer():
+    wall = np.full((21, 41), 5.0, np.float32)  # 10 m away
+    near = figures.warped(CAMERA, wall, forward(5))
+    seen = near > NONE
+    np.testing.assert_allclose(near[seen], 10, rtol=1e-6)
+    assert not seen[10, 21] and seen[10, 22], "points move apart, from the principal point on"
+
+
+def test_the_nearest_surface_is_on_top():
+    maps = np.full((21, 41), NONE, np.float32)
+    maps[10, 24], maps[10, 26] = 10, 5  # 5 and 10 m away; both land 8 pixels right of the centre
+    near = figures.warped(CAMERA, maps, forward(2.5))
+    assert near[10, 28] == pytest.approx(20)
+    assert (near > NONE).sum() == 1
+
+
+def test_flicker_is_the_mean_change(monkeypatch):
+    first, second = np.full((24, 48), 4, np.float32), np.full((24, 48), 4, np.float32)
+    second[:, :24] += 0.5
+    second[0] = NONE
+    frames = [(k, type("Frame", (), {"disparity": d})) for k, d in enumerate((first, second))]
+    monkeypatch.setattr(figures, "play", lambda video, **options: frames)
+    assert figures.flicker(Still(), 1) == pytest.approx(0.25, abs=1e-6)
+
+
+def test_thin_things_stand_out_from_both_sides():
+    row = np.full((1, 40), 5.0)
+    row[0, 10:13] = 20  # a pole
+    row[0, 20:] = 20    # a wall
+    assert np.flatnonzero(figures.thin(row)).tolist() == [10, 11, 12]
+
+
+def test_bad_or_missing_counts_what_has_truth():
+    truth = np.array([[5, 5, 5, NONE]], np.float32)
+    assert figures.bad_or_missing(np.array([[5, 8.5, NONE, 1]], np.float32), truth) == (2, 3)
+    assert figures.bad_or_missing(np.array([[5, 8, 2, 1]], np.float32), truth, np.array([[True, True, False, True]])) == (0, 2)
+    assert figures.share([(1, 4), (2, 2)]) == 50
+    assert np.isnan(figures.share([(0, 0)]))
+
+
+def test_a_calibrated_variance_gives_one():
+    random = np.random.default_rng(5)
+    variance = random.uniform(0.05, 0.3, 20000)
+    errors = np.abs(random.normal(size=20000)) * np.sqrt(variance)
+    worth = figures.calibration_of_variance([(errors, variance)])
+    assert worth["ratio"] == pytest.approx(1, abs=0.05)
+    for at in worth["bins"]:
+        assert at["actual_px"] == pytest.approx(at["predicted_px"], rel=0.1)
+    assert np.isnan(worth["removed"]), "none is bad"
+
+
+def test_the_worst_tenth_by_variance():
+    errors, variance = np.zeros(100), np.ones(100)
+    errors[:4] = 10
+    variance[[0, 1, 2]] = 9
+    worth = figures.calibration_of_variance([(errors, variance)])
+    assert worth["removed"] == 75
+    assert worth["ratio"] == pytest.approx((3 * 9 / 9 + 9 / 1) / 100)
+    assert worth["ratio_not_bad"] == 0
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_turns_are_rotations(axis):
+    turn = figures.turned(axis, 1)
+    np.testing.assert_allclose(turn[:3, :3] @ turn[:3, :3].T, np.eye(3), atol=1e-12)
+    assert np.degrees(np.arccos((np.trace(turn[:3, :3]) - 1) / 2)) == pytest.approx(1)
+    assert turn[axis, axis] == 1
+
+
+def test_what_an_object_uncovers_has_an_age(monkeypatch):
+    class Passing(Still):
+        """An object 8 pixels wide that moves 4 pixels to the right a frame, before a wall."""
+
+        size, numbers = (48, 4), range(4)
+
+        def moving(self, k):
+            mask = np.zeros((4, 48), bool)
+            mask[:, 8 + 4 * k:16 + 4 * k] = True
+            return mask
+
+        def all_truth(self, k):
+            return np.where(self.moving(k), 20, 5).astype(np.float32)
+
+    ages = dict(figures.uncovered_ages(Passing(), 1))
+    assert (ages[0] == -1).all()
+    assert np.flatnonzero(ages[1][0] == 0).tolist() == [8, 9, 10, 11]
+    assert np.flatnonzero(ages[2][0] == 1).tolist() == [8, 9, 10, 11]
+    assert np.flatnonzero(ages[2][0] == 0).tolist() == [12, 13, 14, 15]
+    assert (ages[3][0, 8:12] == -1).all(), "older than asked for"
