@@ -413,6 +413,16 @@ class View(ProgramTest):
 
     @unittest.skipUnless(shutil.which("Xvfb"), "no Xvfb")
     def test_the_window_plays_until_it_is_told_to_stop(self):
+        # Another system's screen of the same number, in a root folder beside this one, may answer instead.
+        for _ in range(5):
+            code, errors = self.window_until_interrupted()
+            if "could not connect to display" not in errors:
+                break
+        self.assertEqual(code, 130, errors)
+        self.assertNotIn("error", errors)
+
+    def window_until_interrupted(self):
+        """The exit code of a window that is interrupted after its last frame, and what it printed."""
         read, write = os.pipe()
         with subprocess.Popen(["Xvfb", "-displayfd", str(write), "-nolisten", "tcp"], pass_fds=[write], stderr=subprocess.DEVNULL) as screen:
             os.close(write)
@@ -421,12 +431,12 @@ class View(ProgramTest):
             try:
                 process = subprocess.Popen([PROGRAM, "view", "--odometry", self.street], stderr=subprocess.PIPE, text=True,
                                            env=dict(os.environ, DISPLAY=":" + display))
-                with self.assertRaises(subprocess.TimeoutExpired):  # it stays open after the last frame
+                try:
                     process.wait(timeout=8)
-                process.send_signal(signal.SIGINT)
+                except subprocess.TimeoutExpired:  # it stays open after the last frame
+                    process.send_signal(signal.SIGINT)
                 _, errors = process.communicate(timeout=60)
-                self.assertEqual(process.returncode, 130, errors)
-                self.assertNotIn("error", errors)
+                return process.returncode, errors
             finally:
                 screen.terminate()
 
