@@ -27,5 +27,7 @@ Command add_view(CLI::App& program);
 Command add_completion(CLI::App& program);
 Command add_tune(CLI::App& program);
 Command add_report(CLI::App& program);
+Command add_doctor(CLI::App& program);
+Command add_rectify(CLI::App& program);
 
 }  // namespace egosgm::app

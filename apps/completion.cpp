@@ -94,12 +94,82 @@ std::string bash_script(const CLI::App& program) {
       joined(names, " "), cases);
 }
 
+/// Text within single quotes, and within the brackets or before the colon of what zsh's _arguments takes.
+std::string zsh_text(const std::string& text) {
+  std::string escaped;
+  for (const char c : text.substr(0, text.find('\n'))) {
+    if (c == '\'') {
+      escaped += "'\\''";
+      continue;
+    }
+    if (c == '[' || c == ']' || c == ':' || c == '\\') escaped += '\\';
+    escaped += c;
+  }
+  return escaped;
+}
+
+/// What completes the option's value, as an action of _arguments; a blank where nothing does.
+std::string zsh_action(const CLI::Option& option) {
+  const std::string type = option.get_type_name(), name = option.get_name();
+  if (type == "DIR") return "_files -/";
+  if (type.starts_with("FILE") || type == "PATTERN") return "_files";
+  if (name == "--write") return fmt::format("_values -s , kind {}", joined(write_kinds(), " "));
+  if (name == "--set") {
+    std::string stages;
+    for (const NamedOption& stage : list_options({})) stages += stage.name + "= ";
+    return fmt::format("compadd -S \"\" -- {}", stages);
+  }
+  return type.find('|') == std::string::npos ? " " : fmt::format("({})", joined(split(type, '|'), " "));
+}
+
+std::string zsh_case(const CLI::App& command) {
+  std::string specs;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_positional()) specs += " \\\n        '*:folder:_files'";
+    for (const std::string& name : option->get_lnames()) {
+      const bool flag = option->get_items_expected_max() == 0;
+      specs += fmt::format(" \\\n        '*--{}[{}]{}'", name, zsh_text(option->get_description()),
+                           flag ? "" : fmt::format(":{}:{}", zsh_text(option->get_type_name()), zsh_action(*option)));
+    }
+  }
+  return fmt::format("    {})\n      _arguments{} ;;\n", command.get_name(), specs);
+}
+
+std::string zsh_script(const CLI::App& program) {
+  std::string commands, cases;
+  for (const CLI::App* command : commands_of(program)) {
+    commands += fmt::format("    '{}:{}'\n", command->get_name(), zsh_text(command->get_description()));
+    cases += zsh_case(*command);
+  }
+  return fmt::format(
+      "#compdef egosgm\n"
+      "# egosgm completion zsh\n"
+      "_egosgm() {{\n"
+      "  local -a commands=(\n{}  )\n"
+      "  if ((CURRENT == 2)); then\n"
+      "    _describe command commands\n"
+      "    _arguments '--help[how it is used]' '--version[its version]'\n"
+      "    return\n"
+      "  fi\n"
+      "  shift words\n"
+      "  ((CURRENT--))\n"
+      "  case $words[1] in\n{}  esac\n"
+      "}}\n"
+      "# A file named _egosgm in $fpath is run where it is needed; else this is sourced.\n"
+      "if [[ ${{funcstack[1]-}} == _egosgm ]]; then\n"
+      "  _egosgm \"$@\"\n"
+      "else\n"
+      "  (($+functions[compdef])) || {{ autoload -Uz compinit && compinit; }}\n"
+      "  compdef _egosgm egosgm\n"
+      "fi\n",
+      commands, cases);
+}
+
 int print_completion(const CLI::App& program, const std::string& shell) {
   if (shell == "bash") {
     fmt::print("{}", bash_script(program));
-  } else if (shell == "zsh") {  // zsh reads bash's
-    fmt::print("autoload -U +X compinit && compinit\nautoload -U +X bashcompinit && bashcompinit\n{}",
-               bash_script(program));
+  } else if (shell == "zsh") {
+    fmt::print("{}", zsh_script(program));
   } else {
     throw InvalidArgument("completion \"" + shell + "\": choose bash or zsh");
   }
@@ -112,7 +182,7 @@ Command add_completion(CLI::App& program) {
   CLI::App* command = program.add_subcommand("completion", "Print a script that completes arguments in the shell");
   auto shell = std::make_shared<std::string>();
   command->add_option("SHELL", *shell, "bash or zsh")->type_name("")->required();
-  command->footer("For example, in ~/.bashrc or ~/.zshrc:  source <(egosgm completion bash)");
+  command->footer("For example, in ~/.bashrc or ~/.zshrc:  source <(egosgm completion bash)   (or zsh)");
   return {command, [&program, shell] { return print_completion(program, *shell); }};
 }
 

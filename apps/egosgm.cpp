@@ -55,6 +55,17 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
                           typed, nearest.empty() ? "" : "did you mean " + nearest + "? ", help_hint(command)));
 }
 
+/// A question that names the path that an argument was meant to be, where the error is of one that is not there.
+std::string meant_path(int argc, char** argv, const std::string& error) {
+  for (int i = 2; i < argc; ++i) {
+    const std::string text = argv[i];
+    const std::string value = text.starts_with("--") ? text.substr(text.find('=') + 1) : text;
+    if (value.empty() || value.starts_with("-") || error.find(value) == std::string::npos) continue;
+    if (const std::string path = path_suggestion(value); !path.empty()) return "; did you mean " + path + "?";
+  }
+  return {};
+}
+
 /// A result that the standard output did not take, for example for a full disk, is no result.
 int flushed(int code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
@@ -75,10 +86,10 @@ int run_program(int argc, char** argv) {
       "  egosgm run --odometry street --out result --write color\n"
       "  egosgm eval --estimate result --truth street/truth/left_disp_noc\n"
       "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.");
-  const Command commands[] = {add_run(program),     add_batch(program),      add_view(program),
-                              add_report(program),  add_eval(program),       add_devices(program),
-                              add_synth(program),   add_odometry(program),   add_eval_poses(program),
-                              add_compile(program), add_completion(program), add_tune(program)};
+  const Command commands[] = {
+      add_run(program),        add_batch(program), add_view(program),     add_report(program),     add_eval(program),
+      add_devices(program),    add_synth(program), add_odometry(program), add_eval_poses(program), add_compile(program),
+      add_completion(program), add_tune(program),  add_doctor(program),   add_rectify(program)};
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -100,7 +111,7 @@ int main(int argc, char** argv) {
   try {
     return run_program(argc, argv);
   } catch (const InvalidArgument& error) {
-    return fail(kBadInput, error.what());
+    return fail(kBadInput, error.what() + meant_path(argc, argv, error.what()));
   } catch (const IoError& error) {
     return fail(kFailed, error.what());
   } catch (const DeviceError& error) {

@@ -8,6 +8,15 @@
 
 namespace egosgm::app {
 
+void add_motion(CLI::App& command, std::string& poses_file, vision::StereoOdometryOptions& options) {
+  command
+      .add_option("--poses", poses_file,
+                  "take the motion from KITTI poses (camera-to-world) in place of stereo odometry")
+      ->type_name("FILE")
+      ->group("Method");
+  add_motion_bounds(command, options, "Method");
+}
+
 void add_motion_bounds(CLI::App& command, vision::StereoOdometryOptions& options, const std::string& group) {
   command
       .add_option("--max-translation", options.max_translation_m,

@@ -21,6 +21,9 @@ struct FrameMotion {
   Eigen::Isometry3d first_from_camera = Eigen::Isometry3d::Identity();  // the pose in the first frame's system
 };
 
+/// Adds --poses, --max-translation and --max-rotation to the group "Method".
+void add_motion(CLI::App& command, std::string& poses_file, vision::StereoOdometryOptions& options);
+
 /// Adds --max-translation and --max-rotation.
 void add_motion_bounds(CLI::App& command, vision::StereoOdometryOptions& options, const std::string& group);
 

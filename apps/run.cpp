@@ -285,12 +285,7 @@ Command add_run(CLI::App& program) {
   command->add_flag("--overwrite", arguments->overwrite, "replace an earlier run's maps in OUT")->group(group);
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
   arguments->method.add_to(*command);
-  command
-      ->add_option("--poses", arguments->poses,
-                   "take the motion from KITTI poses (camera-to-world) in place of stereo odometry")
-      ->type_name("FILE")
-      ->group("Method");
-  add_motion_bounds(*command, arguments->odometry, "Method");
+  add_motion(*command, arguments->poses, arguments->odometry);
   add_device(*command, arguments->device);
   add_programs(*command, arguments->programs);
   add_tuning(*command, arguments->tuning);

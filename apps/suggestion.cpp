@@ -38,4 +38,27 @@ std::string suggestion(const std::string& typed, const std::vector<std::string>&
   return nearest;
 }
 
+std::string path_suggestion(const std::filesystem::path& typed) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path known;
+  for (auto part = typed.begin(); part != typed.end(); ++part) {
+    if (fs::exists(known / *part, error)) {
+      known /= *part;
+      continue;
+    }
+    if (part->string().find_first_of("*%") != std::string::npos) return {};
+    std::vector<std::string> names;
+    fs::directory_iterator entry(known.empty() ? "." : known, error);
+    for (; !error && entry != fs::directory_iterator(); entry.increment(error))
+      names.push_back(entry->path().filename().string());
+    const std::string nearest = suggestion(part->string(), names);
+    if (nearest.empty()) return {};
+    known /= nearest;
+    while (++part != typed.end()) known /= *part;
+    return fs::exists(known, error) ? known.string() : std::string();
+  }
+  return {};
+}
+
 }  // namespace egosgm::app

@@ -7,7 +7,9 @@ import json
 import os
 import pathlib
 import pty
+import re
 import resource
+import select
 import shutil
 import signal
 import struct
@@ -92,7 +94,7 @@ class ProgramTest(unittest.TestCase):
 
 class Help(ProgramTest):
     def test_every_subcommand_explains_itself(self):
-        for command in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "report", "completion"):
+        for command in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "report", "doctor", "rectify", "completion"):
             self.assertIn("--help", self.assert_works(command, "--help"))
             self.assertIn(command, self.assert_works("--help"))
 
@@ -125,8 +127,35 @@ class Help(ProgramTest):
         self.assertEqual(self.complete("run", "--write", "color,ov"), ["color,overview"])
         self.assertEqual(self.complete("run", "--disparities", ""), [])
         self.assertEqual(self.complete("odometry", "str"), ["street"])
-        self.assertIn("_egosgm", self.assert_works("completion", "zsh"))
         self.assert_refused(["completion", "fish"], "bash or zsh")
+
+    @unittest.skipUnless(shutil.which("zsh"), "no zsh")
+    def test_zsh_completes_commands_options_and_values(self):
+        script = self.new_folder() / "completion.zsh"
+        script.write_text(self.assert_works("completion", "zsh"))
+        terminal, side = pty.openpty()
+        process = subprocess.Popen(["zsh", "-f", "-i"], stdin=side, stdout=side, stderr=side, cwd=self.folder, start_new_session=True,
+                                   env=dict(os.environ, TERM="dumb", PS1="", HOME=str(self.folder)))
+        os.close(side)
+
+        def wait_for(text):
+            seen = b""
+            while text not in seen:
+                self.assertTrue(select.select([terminal], [], [], 60)[0], f"zsh shows no {text}: {seen}")
+                seen += os.read(terminal, 4096)
+
+        try:
+            os.write(terminal, f"unsetopt zle_bracketed_paste; autoload -U compinit; compinit -u -D; source {script}; echo rea''dy\n".encode())
+            wait_for(b"ready")
+            for typed, completed in (("view --vid", "--video"), ("run --odometry st", "street/"), ("run --preset pap", "paper"),
+                                     ("run --set banded_sgm.p2_s", "banded_sgm.p2_slope="), ("run --write ove", "overview"), ("devi", "devices")):
+                os.write(terminal, f"egosgm {typed}\t".encode())
+                wait_for(completed.encode())
+                os.write(terminal, b"\x15")  # clears the line
+        finally:
+            process.kill()
+            process.wait()
+            os.close(terminal)
 
     def test_devices_names_the_default_and_why(self):
         text = self.assert_works("devices")
@@ -177,9 +206,21 @@ class Example(ProgramTest):
         shown = (SOURCE / "README.md").read_text().split("```cpp\n")[1].split("```")[0]
         self.assertIn(shown.strip(), (SOURCE / "examples/minimal.cpp").read_text())
 
+    def test_the_comparison_names_tests_that_exist(self):
+        claims = (SOURCE / "docs/comparison.md").read_text().split("## Each claim")[1]
+        sources = "".join(file.read_text() for folder in ("tests", "bench") for kind in ("*.cpp", "*.py") for file in (SOURCE / folder).rglob(kind))
+        named = [name for name in re.findall("`([A-Za-z_0-9.]+)`", claims) if "test_" in name or "." in name]
+        self.assertGreater(len(named), 20)
+        for name in named:
+            suite, _, test = name.rpartition(".")
+            if test.startswith("test_"):
+                self.assertIn(f"def {test}(", sources)
+            else:
+                self.assertRegex(sources, rf"TEST(_F|_P)?\({suite}, {test}\)")
+
     def test_the_readme_names_every_subcommand_and_exit_code(self):
         text = (SOURCE / "README.md").read_text()
-        for name in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "report", "completion"):
+        for name in ("run", "eval", "devices", "synth", "odometry", "eval-poses", "tune", "view", "report", "doctor", "rectify", "completion"):
             self.assertIn(f"`{name}`", text)
         self.assertIn("130", text)
 
@@ -553,6 +594,15 @@ class WrongArguments(ProgramTest):
         self.assert_refused(self.run_with("--disparites=64"), "did you mean --disparities?")
         self.assert_refused(self.run_with("--set", "banded_sgm.p_2=64"), "banded_sgm.p_2", "banded_sgm.p2")
         self.assert_refused(self.run_with("--write", "colour"), "colour", "did you mean color?")
+
+    def test_mistyped_paths_get_a_suggestion(self):
+        mistyped = self.street.parent / "stret"
+        self.assert_refused(["run", "--odometry", mistyped, "--out", self.folder / "never"], mistyped, f"did you mean {self.street}?")
+        self.assert_refused(["eval", f"--estimate={mistyped}/truth/left_disp_occ/000000.png", "--truth", self.street],
+                            f"did you mean {self.street}/truth/left_disp_occ/000000.png?")
+        self.assert_refused(self.run_with("--poses", self.street / "pose.txt"), f"did you mean {self.street / 'poses.txt'}?")
+        done = egosgm("run", "--odometry", self.street.parent / "another", "--out", self.folder / "never")
+        self.assertNotIn("did you mean", done.stderr)
 
     def test_missing_and_contradicting_arguments(self):
         self.assert_refused([], "subcommand")

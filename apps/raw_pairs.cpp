@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/raw_pairs.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+#include <sstream>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+
+namespace egosgm::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxListBytes = std::size_t{1} << 28;
+
+cv::Mat read_image(const fs::path& file) {
+  cv::Mat image = cv::imread(file.string(), cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
+  if (image.empty() || (image.depth() != CV_8U && image.depth() != CV_16U)) {
+    throw InvalidArgument(file.string() + ": cannot be read as an image of 8 or 16 bits");
+  }
+  return image;
+}
+
+class Files : public ImageSource {
+ public:
+  explicit Files(std::vector<fs::path> files) : files_(std::move(files)) {}
+  cv::Mat next() override { return at_ < files_.size() ? read_image(files_[at_++]) : cv::Mat(); }
+  std::optional<double> time_s() const override { return std::nullopt; }
+  int count() const override { return static_cast<int>(files_.size()); }
+
+ private:
+  const std::vector<fs::path> files_;
+  std::size_t at_ = 0;
+};
+
+class Video : public ImageSource {
+ public:
+  explicit Video(const std::string& file) : file_(file) {
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said once, below
+    if (!fs::exists(file)) throw InvalidArgument(file + ": no such file");
+    if (!video_.open(file)) throw InvalidArgument(file + ": neither an image nor a video that OpenCV can read");
+  }
+  cv::Mat next() override {
+    cv::Mat image;
+    const double rate = video_.get(cv::CAP_PROP_FPS);
+    if (!video_.read(image)) return {};
+    time_s_ = rate > 0 ? std::optional<double>(number_ / rate) : std::nullopt;
+    ++number_;
+    return image;
+  }
+  std::optional<double> time_s() const override { return time_s_; }
+  int count() const override { return static_cast<int>(video_.get(cv::CAP_PROP_FRAME_COUNT)); }
+
+ private:
+  const std::string file_;
+  cv::VideoCapture video_;
+  std::optional<double> time_s_;
+  int number_ = 0;
+};
+
+/// Files that match a name with one `*`, shorter names first, so that 10 comes after 9.
+std::vector<fs::path> matching(const fs::path& pattern) {
+  const std::string name = pattern.filename().string();
+  const std::size_t star = name.find('*');
+  const std::string prefix = name.substr(0, star), suffix = name.substr(star + 1);
+  std::vector<fs::path> files;
+  std::error_code error;
+  const fs::path folder = pattern.has_parent_path() ? pattern.parent_path() : fs::path(".");
+  for (fs::directory_iterator file(folder, error), end; !error && file != end; file.increment(error)) {
+    const std::string text = file->path().filename().string();
+    if (text.size() >= prefix.size() + suffix.size() && text.starts_with(prefix) && text.ends_with(suffix)) {
+      files.push_back(file->path());
+    }
+  }
+  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+    const std::string x = a.string(), y = b.string();
+    return x.size() != y.size() ? x.size() < y.size() : x < y;
+  });
+  if (files.empty()) throw InvalidArgument(pattern.string() + ": no file matches");
+  return files;
+}
+
+void require_same_size(const RawPair& pair, const std::string& what) {
+  if (pair.left.size() == pair.right.size() && pair.left.depth() == pair.right.depth()) return;
+  throw InvalidArgument(fmt::format("{}: the left image is {}x{}, the right one {}x{}: both need one size and depth",
+                                    what, pair.left.cols, pair.left.rows, pair.right.cols, pair.right.rows));
+}
+
+class TwoSources : public RawPairs {
+ public:
+  TwoSources(const std::string& left, const std::string& right)
+      : name_(left), left_(open_images(left)), right_(open_images(right)) {
+    if (left_->count() < 0 || right_->count() < 0 || left_->count() == right_->count()) return;
+    throw InvalidArgument(fmt::format("--left {} has {} images, --right {} has {}: give as many of both", left,
+                                      left_->count(), right, right_->count()));
+  }
+  std::optional<RawPair> next() override {
+    RawPair pair{left_->next(), right_->next(), left_->time_s()};
+    if (pair.left.empty() || pair.right.empty()) return std::nullopt;
+    require_same_size(pair, name_);
+    return pair;
+  }
+  int count() const override { return left_->count(); }
+
+ private:
+  const std::string name_;
+  const std::unique_ptr<ImageSource> left_, right_;
+};
+
+class SideBySide : public RawPairs {
+ public:
+  explicit SideBySide(const std::string& pattern) : name_(pattern), images_(open_images(pattern)) {}
+  std::optional<RawPair> next() override {
+    const cv::Mat both = images_->next();
+    if (both.empty()) return std::nullopt;
+    if (both.cols % 2 != 0) {
+      throw InvalidArgument(
+          fmt::format("--side-by-side {}: the images are {} px wide, which has no half", name_, both.cols));
+    }
+    const int width = both.cols / 2;
+    return RawPair{both.colRange(0, width), both.colRange(width, both.cols), images_->time_s()};
+  }
+  int count() const override { return images_->count(); }
+
+ private:
+  const std::string name_;
+  const std::unique_ptr<ImageSource> images_;
+};
+
+struct ListedPair {
+  fs::path left, right;
+  std::optional<double> time_s;
+};
+
+class Listed : public RawPairs {
+ public:
+  Listed(std::vector<ListedPair> pairs, std::string note) : pairs_(std::move(pairs)), note_(std::move(note)) {}
+  std::optional<RawPair> next() override {
+    if (at_ == pairs_.size()) return std::nullopt;
+    const ListedPair& listed = pairs_[at_++];
+    RawPair pair{read_image(listed.left), read_image(listed.right), listed.time_s};
+    require_same_size(pair, listed.right.string());
+    return pair;
+  }
+  int count() const override { return static_cast<int>(pairs_.size()); }
+  std::string note() const override { return note_; }
+
+ private:
+  const std::vector<ListedPair> pairs_;
+  const std::string note_;
+  std::size_t at_ = 0;
+};
+
+/// Rows LEFT RIGHT [SECONDS]; paths from the list's folder on.
+std::unique_ptr<RawPairs> open_list(const fs::path& file) {
+  std::istringstream text(vision::read_file(file, kMaxListBytes));
+  std::vector<ListedPair> pairs;
+  int number = 0;
+  for (std::string row; std::getline(text, row);) {
+    ++number;
+    std::istringstream words(row.substr(0, row.find('#')));
+    std::string left, right, time, more;
+    if (!(words >> left)) continue;
+    words >> right >> time;
+    std::optional<double> seconds;
+    std::size_t end = 0;
+    try {
+      if (!time.empty()) seconds = std::stod(time, &end);
+    } catch (const std::exception&) {
+      end = 0;
+    }
+    if (right.empty() || end != time.size() || words >> more) {
+      throw InvalidArgument(fmt::format("{}: row {}: give LEFT RIGHT or LEFT RIGHT SECONDS", file.string(), number));
+    }
+    pairs.push_back({file.parent_path() / left, file.parent_path() / right, seconds});
+  }
+  if (pairs.empty()) throw InvalidArgument(file.string() + ": lists no pair");
+  return std::make_unique<Listed>(std::move(pairs), "");
+}
+
+/// Nanoseconds -> file, of a camera's data.csv.
+std::map<std::int64_t, fs::path> euroc_images(const fs::path& camera) {
+  std::istringstream text(vision::read_file(camera / "data.csv", kMaxListBytes));
+  std::map<std::int64_t, fs::path> images;
+  for (std::string row; std::getline(text, row);) {
+    if (row.empty() || row.starts_with('#')) continue;
+    const std::size_t comma = row.find(',');
+    std::string name = comma == std::string::npos ? "" : row.substr(comma + 1);
+    name.erase(name.find_last_not_of(" \t\r") + 1);
+    std::int64_t time_ns = 0;
+    if (name.empty() || !(std::istringstream(row.substr(0, comma)) >> time_ns)) {
+      throw InvalidArgument(fmt::format("{}/data.csv: \"{}\" is not TIME,FILE", camera.string(), row));
+    }
+    images[time_ns] = camera / "data" / name;
+  }
+  return images;
+}
+
+std::unique_ptr<RawPairs> open_euroc(const fs::path& mav0) {
+  const auto left = euroc_images(mav0 / "cam0"), right = euroc_images(mav0 / "cam1");
+  std::vector<ListedPair> pairs;
+  for (const auto& [time_ns, file] : left) {
+    const auto other = right.find(time_ns);
+    if (other == right.end()) continue;
+    const double seconds = 1e-9 * static_cast<double>(time_ns - left.begin()->first);
+    pairs.push_back({file, other->second, seconds});
+  }
+  if (pairs.empty()) throw InvalidArgument(mav0.string() + ": cam0 and cam1 have no time stamp in common");
+  const std::size_t alone = left.size() + right.size() - 2 * pairs.size();
+  return std::make_unique<Listed>(
+      std::move(pairs), alone > 0 ? fmt::format("{} images without their other one were left out", alone) : "");
+}
+
+}  // namespace
+
+std::unique_ptr<ImageSource> open_images(const std::string& pattern) {
+  static const std::array<const char*, 9> kImages{".png",  ".jpg", ".jpeg", ".bmp", ".tif",
+                                                  ".tiff", ".pgm", ".ppm",  ".webp"};
+  std::string wild = pattern;
+  const std::size_t name = wild.find_last_of('/') + 1;
+  if (const std::size_t percent = wild.find('%', name); percent != std::string::npos) {
+    const std::size_t end = wild.find('d', percent);
+    if (end == std::string::npos) throw InvalidArgument(pattern + ": its name must hold one * or one %d, %06d, ...");
+    wild.replace(percent, end + 1 - percent, "*");
+  }
+  if (wild.find('*', name) != std::string::npos) return std::make_unique<Files>(matching(wild));
+  std::string extension = fs::path(pattern).extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  if (std::find(kImages.begin(), kImages.end(), extension) != kImages.end()) {
+    return std::make_unique<Files>(std::vector<fs::path>{pattern});
+  }
+  return std::make_unique<Video>(pattern);
+}
+
+std::unique_ptr<RawPairs> open_pairs(const RawPairArguments& arguments) {
+  const bool two = !arguments.left.empty() || !arguments.right.empty();
+  const int sources = two + !arguments.side_by_side.empty() + !arguments.list.empty() + !arguments.euroc.empty();
+  if (sources != 1 || (two && (arguments.left.empty() || arguments.right.empty()))) {
+    throw InvalidArgument(std::string(sources == 0  ? "no input"
+                                      : sources > 1 ? "more than one input"
+                                                    : "half a pair") +
+                          ": give --left and --right, or --side-by-side, or --list, or --euroc");
+  }
+  if (two) return std::make_unique<TwoSources>(arguments.left, arguments.right);
+  if (!arguments.side_by_side.empty()) return std::make_unique<SideBySide>(arguments.side_by_side);
+  if (!arguments.list.empty()) return open_list(arguments.list);
+  return open_euroc(arguments.euroc);
+}
+
+}  // namespace egosgm::app

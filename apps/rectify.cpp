@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+// Raw pairs in, a rectified sequence out, in the layout that all other commands read.
+#include <fmt/core.h>
+
+#include <filesystem>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/command.h"
+#include "apps/interrupt.h"
+#include "apps/progress.h"
+#include "apps/raw_pairs.h"
+#include "apps/stereo_rig.h"
+#include "egosgm/error.h"
+#include "egosgm/vision/calibration_io.h"
+#include "egosgm/vision/file_io.h"
+#include "egosgm/vision/image_io.h"
+
+namespace egosgm::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RectifyArguments {
+  RawPairArguments input;
+  std::string calib, out, unit = "m";
+  double alpha = 0;
+  bool quiet = false;
+};
+
+double metres_in(const std::string& unit) {
+  if (unit == "m") return 1;
+  if (unit == "cm") return 0.01;
+  if (unit == "mm") return 0.001;
+  throw InvalidArgument("--unit " + unit + ": choose m, cm or mm");
+}
+
+/// mav0, where the folder of an EuRoC sequence is given.
+fs::path mav0_of(const fs::path& folder) { return fs::is_directory(folder / "mav0") ? folder / "mav0" : folder; }
+
+/// What a pair goes through: rectification, or nothing where the images are rectified already.
+class Rectifier {
+ public:
+  explicit Rectifier(const RectifyArguments& arguments) : arguments_(arguments) {
+    if (!arguments.input.euroc.empty()) {
+      rig_ = read_euroc_rig(mav0_of(arguments.input.euroc));
+      return;
+    }
+    if (arguments.calib.empty()) throw InvalidArgument("no calibration: give --calib FILE");
+    rig_ = read_opencv_rig(arguments.calib, metres_in(arguments.unit));
+    if (!rig_) calibration_ = vision::read_calibration(arguments.calib);
+  }
+
+  bool rectifies() const { return rig_.has_value(); }
+
+  void operator()(RawPair& pair) {
+    if (!rig_) return;
+    if (!rectification_) {
+      rectification_ = rectification_of(*rig_, pair.left.size(), arguments_.alpha);
+      calibration_ = rectification_->calibration;
+    }
+    if (pair.left.size() != rectification_->valid.size()) {
+      throw InvalidArgument(fmt::format("an image is {}x{}, the first one {}x{}: all need one size", pair.left.cols,
+                                        pair.left.rows, rectification_->valid.cols, rectification_->valid.rows));
+    }
+    remap(pair.left, rectification_->left_map);
+    remap(pair.right, rectification_->right_map);
+  }
+
+  const Calibration& calibration() const { return calibration_; }
+  const std::optional<Rectification>& rectification() const { return rectification_; }
+
+ private:
+  static void remap(cv::Mat& image, const cv::Mat (&map)[2]) {
+    cv::Mat rectified;
+    cv::remap(image, rectified, map[0], map[1], cv::INTER_LINEAR);
+    image = rectified;
+  }
+
+  const RectifyArguments& arguments_;
+  std::optional<StereoRig> rig_;
+  std::optional<Rectification> rectification_;
+  Calibration calibration_;
+};
+
+/// KITTI odometry's layout; colour goes to image_2 and image_3.
+class SequenceFolder {
+ public:
+  explicit SequenceFolder(const fs::path& folder) : folder_(folder) {
+    if (fs::exists(folder) && !fs::is_empty(folder)) {
+      throw InvalidArgument("--out " + folder.string() + ": is not empty: give a new folder");
+    }
+  }
+
+  void add(const RawPair& pair) {
+    if (frames_ == 0) {
+      colour_ = pair.left.channels() > 1;
+      for (const char* side : {left(), right()}) vision::make_folder(folder_ / side);
+    }
+    const std::string name = fmt::format("{:06}.png", frames_);
+    vision::write_png(folder_ / left() / name, writable(pair.left));
+    vision::write_png(folder_ / right() / name, writable(pair.right));
+    if (pair.time_s)
+      times_ += fmt::format("{:.9f}\n", *pair.time_s);
+    else
+      timeless_ = true;
+    ++frames_;
+  }
+
+  void finish(const Rectifier& rectifier) {
+    if (frames_ == 0) throw InvalidArgument("the input has no pair: is it empty?");
+    vision::write_calibration(folder_ / "calib.txt", rectifier.calibration());
+    if (!timeless_) vision::write_file(folder_ / "times.txt", times_);
+    if (rectifier.rectification()) vision::write_png(folder_ / "valid.png", rectifier.rectification()->valid);
+  }
+
+  int frames() const { return frames_; }
+
+ private:
+  const char* left() const { return colour_ ? "image_2" : "image_0"; }
+  const char* right() const { return colour_ ? "image_3" : "image_1"; }
+
+  /// PNGs here are grey of 8 or 16 bits, or colour of 8.
+  cv::Mat writable(const cv::Mat& image) const {
+    cv::Mat result = image;
+    if (colour_ && result.channels() == 1) cv::cvtColor(image, result, cv::COLOR_GRAY2BGR);
+    if (!colour_ && result.channels() > 1) cv::cvtColor(image, result, cv::COLOR_BGR2GRAY);
+    if (result.channels() > 1 && result.depth() == CV_16U) result.convertTo(result, CV_8U, 1.0 / 257);
+    return result;
+  }
+
+  const fs::path folder_;
+  bool colour_ = false, timeless_ = false;
+  int frames_ = 0;
+  std::string times_;
+};
+
+std::string rectangle_text(const cv::Rect& r) {
+  return fmt::format("{}x{} from ({}, {})", r.width, r.height, r.x, r.y);
+}
+
+int rectify(const RectifyArguments& arguments) {
+  if (!(arguments.alpha >= 0 && arguments.alpha <= 1)) {
+    throw InvalidArgument(fmt::format("--alpha {}: choose from 0 to 1", arguments.alpha));
+  }
+  RawPairArguments input = arguments.input;
+  if (!input.euroc.empty()) input.euroc = mav0_of(input.euroc);
+  const std::unique_ptr<RawPairs> pairs = open_pairs(input);
+  Rectifier rectifier(arguments);
+  SequenceFolder folder(arguments.out);
+  catch_interrupts();
+  {
+    Progress progress(pairs->count(), arguments.quiet);
+    if (!pairs->note().empty()) progress.note(pairs->note());
+    for (std::optional<RawPair> pair; !interrupted() && (pair = pairs->next());) {
+      rectifier(*pair);
+      folder.add(*pair);
+      progress.done(fmt::format("pair {}", folder.frames()));
+    }
+  }
+  folder.finish(rectifier);
+  if (!arguments.quiet) {
+    const Calibration& c = rectifier.calibration();
+    fmt::print("{} pairs in {}: fx {:.2f} px, baseline {:.4f} m{}\n", folder.frames(), arguments.out, c.fx,
+               c.baseline_m, rectifier.rectifies() ? "" : "; they were rectified already");
+    if (const auto& rectification = rectifier.rectification()) {
+      fmt::print("valid: left {}, right {} (valid.png has the left one's pixels)\n",
+                 rectangle_text(rectification->valid_left), rectangle_text(rectification->valid_right));
+    }
+    fmt::print("egosgm doctor {0}; egosgm run --odometry {0} --out OUT\n", arguments.out);
+  }
+  return interrupted() ? kInterrupted : kOk;
+}
+
+}  // namespace
+
+Command add_rectify(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "rectify", "Make a rectified sequence of raw pairs, side-by-side images or videos, EuRoC folders, lists");
+  auto arguments = std::make_shared<RectifyArguments>();
+  const char* group = "Input (one of)";
+  RawPairArguments& input = arguments->input;
+  command
+      ->add_option("--left", input.left,
+                   "left images: a file, a pattern such as 'left/*.jpg' or 'left/%06d.png', or a video")
+      ->type_name("PATTERN")
+      ->group(group);
+  command->add_option("--right", input.right, "right images, likewise")->type_name("PATTERN")->group(group);
+  command
+      ->add_option("--side-by-side", input.side_by_side,
+                   "images or a video with the left view in the left half and the right one in the right half")
+      ->type_name("PATTERN")
+      ->group(group);
+  command->add_option("--list", input.list, "a text file with rows LEFT RIGHT or LEFT RIGHT SECONDS")
+      ->type_name("FILE")
+      ->group(group);
+  command->add_option("--euroc", input.euroc, "an EuRoC sequence (mav0 or its parent), with its own calibration")
+      ->type_name("DIR")
+      ->group(group);
+  command
+      ->add_option(
+          "--calib", arguments->calib,
+          "OpenCV's stereo calibration (M1, D1, M2, D2, R, T; YAML, XML or JSON), a folder with intrinsics.yml "
+          "and extrinsics.yml, or, for images that are rectified already, what `run --calib` reads")
+      ->type_name("FILE");
+  command->add_option("--unit", arguments->unit, "unit of T in OpenCV's calibration")
+      ->type_name("m|cm|mm")
+      ->capture_default_str();
+  command
+      ->add_option("--alpha", arguments->alpha,
+                   "0: only pixels that the raw images have; 1: all of theirs, with black borders")
+      ->type_name("A")
+      ->capture_default_str();
+  command
+      ->add_option("--out", arguments->out,
+                   "new folder: image_0 and image_1 (colour: image_2, image_3), calib.txt, times.txt, valid.png")
+      ->type_name("DIR")
+      ->required();
+  command->add_flag("--quiet", arguments->quiet, "no progress, only errors");
+  return {command, [arguments] { return rectify(*arguments); }};
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,435 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm doctor and egosgm rectify: sequences that are broken in just one way, and raw images of a known rig. Environment as for program_test.py."""
+import csv
+import json
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import unittest
+import zlib
+
+import numpy
+
+from program_test import DATA, EXAMPLES, FRAMES, HEIGHT, WIDTH, ProgramTest, egosgm
+
+
+def read_grey(file):
+    """An 8-bit grey PNG as an array."""
+    content, at, body = pathlib.Path(file).read_bytes(), 8, b""
+    while at < len(content):
+        length, kind = struct.unpack(">I4s", content[at:at + 8])
+        if kind == b"IHDR":
+            width, height, depth, colour = struct.unpack(">IIBB", content[at + 8:at + 18])
+            assert (depth, colour) == (8, 0), file
+        if kind == b"IDAT":
+            body += content[at + 8:at + 8 + length]
+        at += 12 + length
+    rows = zlib.decompress(body)
+    image = numpy.zeros((height + 1, width + 1), numpy.int32)  # a row above and a column to the left
+    for y in range(height):
+        start = y * (width + 1)
+        method, row = rows[start], numpy.frombuffer(rows, numpy.uint8, width, start + 1).astype(numpy.int32)
+        if method in (0, 2):
+            image[y + 1, 1:] = row + (image[y, 1:] if method == 2 else 0) & 255
+            continue
+        for x in range(width):
+            left, up, corner = image[y + 1, x], image[y, x + 1], image[y, x]
+            if method == 1:
+                guess = left
+            elif method == 3:
+                guess = (left + up) // 2
+            else:
+                guess = min((left, up, corner), key=lambda v: abs(left + up - corner - v))
+            image[y + 1, x + 1] = (row[x] + guess) & 255
+    return image[1:, 1:].astype(numpy.uint8)
+
+
+def write_grey(file, image):
+    def chunk(kind, body):
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+    rows = b"".join(b"\0" + row.tobytes() for row in numpy.ascontiguousarray(image, numpy.uint8))
+    header = struct.pack(">IIBBBBB", image.shape[1], image.shape[0], 8, 0, 0, 0, 0)
+    pathlib.Path(file).write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b""))
+
+
+def sampled(image, x, y):
+    """Bilinear, the border repeated."""
+    x, y = numpy.clip(x, 0, image.shape[1] - 1.001), numpy.clip(y, 0, image.shape[0] - 1.001)
+    u, v = x.astype(int), y.astype(int)
+    a, b, image = x - u, y - v, image.astype(float)
+    top = (1 - a) * image[v, u] + a * image[v, u + 1]
+    bottom = (1 - a) * image[v + 1, u] + a * image[v + 1, u + 1]
+    return numpy.rint((1 - b) * top + b * bottom).astype(numpy.uint8)
+
+
+def rotation(axis, degrees):
+    a = numpy.radians(degrees)
+    x, y, z = numpy.asarray(axis, float)
+    K = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return numpy.eye(3) + numpy.sin(a) * K + (1 - numpy.cos(a)) * K @ K
+
+
+class InputTest(ProgramTest):
+    def calibration(self):
+        rows = dict(line.split(":") for line in (self.street / "calib.txt").read_text().splitlines())
+        left, right = ([float(number) for number in rows[name].split()] for name in ("P0", "P1"))
+        return left[0], left[2], left[6], (left[3] - right[3]) / left[0]  # f, cx, cy, baseline
+
+    def examine(self, *arguments, code=0):
+        """Verdicts by check."""
+        done = self.run_doctor(*arguments, "--json")
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return {finding["check"]: finding for finding in json.loads(done.stdout)}
+
+    def run_doctor(self, *arguments):
+        return egosgm("doctor", *arguments)
+
+    def assert_only_problem(self, check, *arguments):
+        findings = self.examine(*arguments, code=2)
+        self.assertEqual([name for name, finding in findings.items() if finding["verdict"] == "problem"], [check], findings)
+        self.assertTrue(findings[check]["remedy"])
+        return findings[check]
+
+
+class Doctor(InputTest):
+    def test_a_sound_sequence_has_no_problem(self):
+        findings = self.examine(self.street)
+        self.assertEqual(list(findings), ["images", "calibration", "rows", "sides", "range", "times"])
+        self.assertLess(abs(float(findings["rows"]["text"].split()[2])), 0.1)
+        text = self.assert_works("doctor", "--odometry", self.street)
+        self.assertTrue(text.endswith("No problem was found.\n"))
+        self.assertIn("baseline 0.54 m", text)
+
+    def shifted(self, shift_px):
+        street = self.broken_street()
+        for file in (street / "image_1").iterdir():
+            image = read_grey(file)
+            y, x = numpy.mgrid[0:HEIGHT, 0:WIDTH]
+            write_grey(file, sampled(image, x.astype(float), y - shift_px))
+        return street
+
+    def test_a_vertical_misalignment_is_measured(self):
+        for shift in (0.7, -3.0):
+            finding = self.assert_only_problem("rows", self.shifted(shift))
+            self.assertAlmostEqual(float(finding["text"].split()[2]), shift, delta=0.07)
+            self.assertIn(f"{abs(shift):.1f} px: rectify again", finding["remedy"])
+
+    def test_a_turned_camera_is_measured(self):
+        street = self.broken_street()
+        for file in (street / "image_1").iterdir():
+            y, x = numpy.mgrid[0:HEIGHT, 0:WIDTH]
+            write_grey(file, sampled(read_grey(file), x.astype(float), y - 8 * (x / WIDTH - 0.5)))
+        finding = self.assert_only_problem("rows", street)
+        self.assertAlmostEqual(float(finding["text"].split(" px from left to right")[0].split()[-1]), 8, delta=0.5)
+
+    def test_swapped_sides(self):
+        finding = self.assert_only_problem("sides", "--left", self.street / "image_1/%06d.png", "--right", self.street / "image_0/%06d.png",
+                                           "--calib", self.street / "calib.txt")
+        self.assertIn("swapped", finding["remedy"])
+
+    def test_wrong_sign_and_unit_of_the_baseline(self):
+        street = self.broken_street()
+        f, cx, cy, baseline = self.calibration()
+        (street / "calib.txt").write_text(f"fx = {f}\nfy = {f}\ncx = {cx}\ncy = {cy}\nbaseline_m = {-baseline}\n")
+        self.assertIn("exchange", self.assert_only_problem("calibration", street)["remedy"])
+        (street / "calib.txt").write_text(f"fx = {f}\nfy = {f}\ncx = {cx}\ncy = {cy}\nbaseline_m = {1000 * baseline}\n")
+        self.assertIn("millimetres", self.assert_only_problem("calibration", street)["remedy"])
+        (street / "calib.txt").write_text(f"fx = {2 * f}\nfy = {2 * f}\ncx = {2 * cx}\ncy = {2 * cy}\nbaseline_m = {baseline}\n")
+        self.assertIn("scale", self.assert_only_problem("calibration", street)["remedy"])
+
+    def test_a_range_that_clips_and_its_remedy(self):
+        finding = self.assert_only_problem("range", self.street, "--disparities", 8)
+        enough = int(finding["remedy"].split()[-1])
+        self.assertNotEqual(self.examine(self.street, "--disparities", enough)["range"]["verdict"], "problem")
+        self.assertEqual(enough % 16, 0)
+        finding = self.assert_only_problem("range", self.street, "--min-disparity", 4)
+        self.examine(self.street, "--min-disparity", finding["remedy"].split()[-1])
+        self.assertIn("faster", self.examine(self.street, "--disparities", 512)["range"]["remedy"])
+
+    def test_gaps_in_time(self):
+        street = self.broken_street()
+        (street / "times.txt").write_text("0\n0.1\n0.2\n0.7\n")
+        finding = self.assert_only_problem("times", street)
+        self.assertIn("0.5 s after frame 000002", finding["text"])
+        self.assertIn("--frames :2 and --frames 3:", finding["remedy"])
+        (street / "times.txt").write_text("0\n0.1\n0.05\n0.15\n")
+        self.assertIn("goes back", self.assert_only_problem("times", street)["text"])
+        rows = [f"2011-09-{day} {clock}" for day, clock in ((30, "23:59:59.950"), (30, "23:59:59.975"))] + ["2011-10-01 00:00:00.000", "2011-10-01 00:00:00.025"]
+        (street / "times.txt").write_text("\n".join(rows))
+        self.assertIn("0.025 s", self.examine(street)["times"]["text"])
+        (street / "times.txt").write_text("0\n0.1\n")
+        self.assert_refused(["doctor", street], "times.txt", "2 times")
+        (street / "times.txt").write_text("0\n0.1\nnoon\n0.3\n")
+        self.assert_refused(["doctor", street], "row 3", "noon")
+        (street / "times.txt").unlink()
+        self.assertEqual(self.examine(street)["times"]["verdict"], "note")
+
+    def test_images_of_other_moments_or_of_nothing(self):
+        street = self.broken_street()
+        for file in (street / "image_1").iterdir():
+            write_grey(file, numpy.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH)))
+        self.assert_only_problem("matches", street)
+        for file in (street / "image_1").iterdir():
+            write_grey(file, numpy.full((HEIGHT, WIDTH), 60))
+        self.assert_only_problem("matches", street)
+
+    def test_wrong_arguments(self):
+        self.assert_refused(["doctor", self.street, "--samples", 0], "--samples 0")
+        self.assert_refused(["doctor", self.street, "--disparities", 0], "disparities")
+        self.assert_refused(["doctor", self.folder / "nowhere"], "nowhere")
+
+
+class Rectify(InputTest):
+    """The street as a rig would see it whose cameras are turned and distorted, rectified back."""
+
+    DISTORTION = ([-0.12, 0.03, 0.001, -0.0005, 0.0], [-0.1, 0.02, -0.0008, 0.0006, 0.0])
+
+    def rig(self):
+        """K, distortion, rotation from the raw to the rectified camera; for left and right."""
+        f, cx, cy, baseline = self.calibration()
+        K = [numpy.array([[1.05 * f, 0, cx + 3], [0, 1.04 * f, cy - 2], [0, 0, 1]]), numpy.array([[1.03 * f, 0, cx - 4], [0, 1.04 * f, cy + 1], [0, 0, 1]])]
+        R = [rotation([0, 0, 1], 0.8), rotation([1, 0, 0], -1.5) @ rotation([0, 0, 1], -0.7)]
+        return K, R, numpy.array([[f, 0, cx], [0, f, cy], [0, 0, 1]]), baseline
+
+    def raw(self, image, side):
+        """Where each raw pixel lies in the rectified image."""
+        K, R, P, _ = self.rig()
+        k1, k2, p1, p2, k3 = self.DISTORTION[side]
+        v, u = numpy.mgrid[0:HEIGHT, 0:WIDTH]
+        xd, yd = (u - K[side][0, 2]) / K[side][0, 0], (v - K[side][1, 2]) / K[side][1, 1]
+        x, y = xd, yd
+        for _ in range(20):
+            r = x * x + y * y
+            radial = 1 + r * (k1 + r * (k2 + r * k3))
+            x, y = (xd - 2 * p1 * x * y - p2 * (r + 2 * x * x)) / radial, (yd - p1 * (r + 2 * y * y) - 2 * p2 * x * y) / radial
+        ray = R[side] @ numpy.stack([x.ravel(), y.ravel(), numpy.ones(x.size)])
+        at = P @ (ray / ray[2])
+        return sampled(image, at[0].reshape(x.shape), at[1].reshape(x.shape))
+
+    @staticmethod
+    def matrix(name, values):
+        values = numpy.atleast_2d(values)
+        numbers = ", ".join(f"{float(value):.12g}" for value in values.ravel())
+        return f"{name}: !!opencv-matrix\n   rows: {values.shape[0]}\n   cols: {values.shape[1]}\n   dt: d\n   data: [ {numbers} ]\n"
+
+    def opencv_yaml(self, unit_m=1.0, given=True):
+        K, R, P, baseline = self.rig()
+        right_from_left = R[1].T @ R[0]
+        T = R[1].T @ numpy.array([-baseline, 0, 0]) / unit_m
+        text = "%YAML:1.0\n---\n"
+        for i in (0, 1):
+            text += self.matrix(f"M{i + 1}", K[i]) + self.matrix(f"D{i + 1}", self.DISTORTION[i])
+        text += self.matrix("R", right_from_left) + self.matrix("T", T.reshape(3, 1))
+        if given:
+            projections = numpy.hstack([P, numpy.zeros((3, 1))]), numpy.hstack([P, [[-P[0, 0] * baseline / unit_m], [0], [0]]])
+            for i in (0, 1):
+                text += self.matrix(f"R{i + 1}", R[i]) + self.matrix(f"P{i + 1}", projections[i])
+        return text
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.raw_folder = cls.folder / "raw"
+        for side in (0, 1):
+            (cls.raw_folder / f"cam{side}").mkdir(parents=True)
+            for i in range(2):
+                image = cls.raw(cls("id"), read_grey(cls.street / f"image_{side}/00000{i}.png"), side)
+                write_grey(cls.raw_folder / f"cam{side}/{9 + i}.png", image)
+
+    def rectify(self, *arguments, calib=None):
+        out = self.new_folder() / "out"
+        file = out.parent / "stereo.yml"
+        file.write_text(calib or self.opencv_yaml())
+        text = self.assert_works("rectify", *arguments, "--calib", file, "--out", out)
+        return out, text
+
+    PAIRS = property(lambda self: ("--left", self.raw_folder / "cam0/*.png", "--right", self.raw_folder / "cam1/%d.png"))
+
+    def assert_like_the_street(self, out):
+        """It was interpolated twice: blurred, but each pixel at its place, to a tenth of a pixel."""
+        valid = read_grey(out / "valid.png") == 255
+        self.assertGreater(valid.mean(), 0.8)
+        for side in (0, 1):
+            for i in range(2):
+                mine, true = (read_grey(folder / f"image_{side}/00000{i}.png").astype(int) for folder in (out, self.street))
+                inner = numpy.zeros_like(valid)
+                inner[12:-12, 16:-16] = True
+                left, here, right, up, down = (numpy.abs(mine - numpy.roll(true, shift, (0, 1)))[inner & valid].mean()
+                                               for shift in ((0, -1), (0, 0), (0, 1), (-1, 0), (1, 0)))
+                self.assertLess(here, 0.5 * min(left, right, up, down))
+                self.assertLess(max(abs(left - right), abs(up - down)), 0.1 * left)
+
+    def test_raw_pairs_of_a_known_rig_become_the_street_again(self):
+        findings = self.run_doctor(*self.PAIRS[:2], "--right", self.raw_folder / "cam1/*.png", "--calib", self.street / "calib.txt")
+        self.assertIn("rectify again", findings.stdout)
+        out, text = self.rectify(*self.PAIRS)
+        self.assert_like_the_street(out)
+        self.assertIn("baseline 0.5400 m", text)
+        self.assertIn("valid: left", text)
+        self.assertFalse((out / "times.txt").exists())
+        self.assertLess(abs(float(self.examine(out)["rows"]["text"].split()[2])), 0.1)
+        self.assert_works("run", "--odometry", out, "--out", out.parent / "maps", "--disparities", 48, "--quiet")
+
+    def test_without_projections_opencv_finds_them_and_units_are_converted(self):
+        out, _ = self.rectify(*self.PAIRS, "--unit", "mm", calib=self.opencv_yaml(unit_m=1e-3, given=False))
+        self.assertIn("baseline 0.54 m", self.examine(out)["calibration"]["text"])
+        self.assertGreater((read_grey(out / "valid.png") == 255).mean(), 0.98)  # alpha 0
+        wide, _ = self.rectify(*self.PAIRS, "--alpha", 1, calib=self.opencv_yaml(given=False))
+        self.assertLess((read_grey(wide / "valid.png") == 255).mean(), 0.95)
+
+    def test_side_by_side_images_and_lists(self):
+        both = self.new_folder()
+        for i in range(2):
+            left, right = (read_grey(self.raw_folder / f"cam{side}/{9 + i}.png") for side in (0, 1))
+            write_grey(both / f"{i}.png", numpy.hstack([left, right]))
+        expected, _ = self.rectify(*self.PAIRS)
+        out, _ = self.rectify("--side-by-side", both / "*.png")
+        rows = "# left right seconds\n" + "".join(f"cam0/{i}.png cam1/{i}.png {i / 8}\n" for i in (9, 10))
+        (self.raw_folder / "list.txt").write_text(rows)
+        listed, _ = self.rectify("--list", self.raw_folder / "list.txt")
+        for file in expected.rglob("*.png"):
+            for folder in (out, listed):
+                self.assertEqual((folder / file.relative_to(expected)).read_bytes(), file.read_bytes())
+        self.assertEqual((listed / "times.txt").read_text(), "1.125000000\n1.250000000\n")
+
+    def test_what_is_rectified_already_is_only_split(self):
+        both = self.new_folder() / "both.png"
+        images = [read_grey(self.street / f"image_{side}/000000.png") for side in (0, 1)]
+        write_grey(both, numpy.hstack(images))
+        out, text = self.rectify("--side-by-side", both, calib=(self.street / "calib.txt").read_text())
+        for side in (0, 1):
+            self.assertTrue((read_grey(out / f"image_{side}/000000.png") == images[side]).all())
+        self.assertIn("rectified already", text)
+
+    def euroc(self, drop=()):
+        folder = self.new_folder() / "mav0"
+        K, R, P, baseline = self.rig()
+        body_from_left = numpy.eye(4)
+        body_from_left[:3, :3] = rotation([0, 1, 0], 90)
+        left_from_right = numpy.eye(4)
+        left_from_right[:3, :3] = R[0].T @ R[1]
+        left_from_right[:3, 3] = R[0].T @ [baseline, 0, 0]
+        for side, pose in enumerate((body_from_left, body_from_left @ left_from_right)):
+            camera = folder / f"cam{side}"
+            (camera / "data").mkdir(parents=True)
+            numbers = ", ".join(f"{value:.12g}" for value in pose.ravel())
+            fu, fv, cu, cv = K[side][0, 0], K[side][1, 1], K[side][0, 2], K[side][1, 2]
+            (camera / "sensor.yaml").write_text(
+                "# General sensor definitions.\nsensor_type: camera\ncomment: VI-Sensor cam0 (MT9M034)\n\n# Sensor extrinsics wrt. the body-frame.\n"
+                f"T_BS:\n  cols: 4\n  rows: 4\n  data: [{numbers}]\n\nrate_hz: 20\nresolution: [{WIDTH}, {HEIGHT}]\ncamera_model: pinhole\n"
+                f"intrinsics: [{fu:.12g}, {fv:.12g}, {cu:.12g}, {cv:.12g}] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n"
+                f"distortion_coefficients: {self.DISTORTION[side][:4]}\n")
+            with open(camera / "data.csv", "w", newline="") as file:
+                writer = csv.writer(file)
+                writer.writerow(["#timestamp [ns]", "filename"])
+                for i, time in enumerate((1403636579763555584, 1403636579813555456)):
+                    if (side, i) in drop:
+                        continue
+                    writer.writerow([time, f"{time}.png"])
+                    shutil.copy(self.raw_folder / f"cam{side}/{9 + i}.png", camera / "data" / f"{time}.png")
+        return folder
+
+    def test_euroc_folders(self):
+        out = self.new_folder() / "out"
+        folder = self.euroc()
+        text = self.assert_works("rectify", "--euroc", folder.parent, "--out", out)
+        self.assertIn("baseline 0.5400 m", text)
+        self.assertEqual((out / "times.txt").read_text(), "0.000000000\n0.049999872\n")
+        self.assertEqual(self.examine(out)["rows"]["verdict"], "ok")
+        text = self.assert_works("rectify", "--euroc", self.euroc(drop=[(1, 0)]), "--out", out.parent / "fewer")
+        self.assertIn("1 images without their other one", text)
+        self.assertEqual(len(list((out.parent / "fewer/image_0").iterdir())), 1)
+
+    def test_what_cannot_be_rectified_is_refused(self):
+        file, out = self.new_folder() / "stereo.yml", self.folder / "never"
+
+        def refused(text, *named, arguments=()):
+            file.write_text(text)
+            self.assert_refused(["rectify", *(arguments or self.PAIRS), "--calib", file, "--out", out], *named)
+
+        good = self.opencv_yaml(given=False)
+        refused(good.replace("M2:", "M3:"), file, "M2")
+        refused(good.replace("T:", "U:"), file, "T")
+        refused(good.replace("dt: d", "dt: q", 1), file)
+        refused("%YAML:1.0\n---\nM1: [1, 2", file)
+        refused("nothing", file)
+        refused(good.replace("data: [ ", "data: [ .Nan, ", 1), file)
+        refused(self.opencv_yaml(unit_m=-1, given=False), "exchange left and right")
+        refused(self.opencv_yaml(unit_m=1e-3, given=False), "--unit mm")
+        refused(good + "image_width: 640\nimage_height: 480\n", "640x480 were calibrated")
+        refused(good, "2 images", "1", arguments=[*self.PAIRS[:2], "--right", self.raw_folder / "cam1/9.png"])
+        refused(good, "no file matches", arguments=["--side-by-side", self.raw_folder / "*.jpg"])
+        refused(good, "half a pair", arguments=self.PAIRS[:2])
+        refused(good, "more than one input", arguments=[*self.PAIRS, "--list", file])
+        refused(good, "calib.txt", arguments=["--side-by-side", self.street / "calib.txt"])
+        refused(good, "--unit inch", arguments=[*self.PAIRS, "--unit", "inch"])
+        refused(good, "--alpha 2", arguments=[*self.PAIRS, "--alpha", 2])
+        (self.raw_folder / "bad.txt").write_text("cam0/9.png\n")
+        refused(good, "row 1", arguments=["--list", self.raw_folder / "bad.txt"])
+        self.assertFalse(out.exists())
+        self.assert_refused(["rectify", *self.PAIRS, "--calib", file, "--out", self.street], "not empty")
+        self.assert_refused(["rectify", *self.PAIRS, "--out", out], "--calib FILE")
+
+
+class Camera(InputTest):
+    """examples/camera.cpp, on a video in place of a camera."""
+
+    def video(self, rate, repeat=1, frames=FRAMES):
+        """Both views side by side, uncompressed (YUV4MPEG2, grey)."""
+        file = self.new_folder() / "street.y4m"
+        pictures = []
+        for i in range(frames):
+            left, right = (read_grey(self.street / f"image_{side}/00000{i}.png") for side in (0, 1))
+            pictures.append(b"FRAME\n" + numpy.hstack([left, right]).tobytes())
+        file.write_bytes(f"YUV4MPEG2 W{2 * WIDTH} H{HEIGHT} F{rate}:1 Ip A1:1 Cmono\n".encode() + b"".join(pictures * repeat))
+        return file
+
+    def run_camera(self, *arguments):
+        headless = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        return subprocess.run([EXAMPLES / "egosgm_example_camera", *map(str, arguments)], capture_output=True, text=True, timeout=240, env=headless)
+
+    def test_frames_are_dropped_rather_than_late(self):
+        frames = 25 * FRAMES
+        done = self.run_camera(self.video(1000, repeat=25), self.street / "calib.txt", 64)  # faster than any matcher
+        self.assertEqual(done.returncode, 0, done.stderr)
+        *lines, last = done.stdout.splitlines()
+        matched, dropped = (int(word) for word in last.replace(",", "").split()[::2])
+        self.assertEqual(matched + dropped, frames)
+        self.assertEqual(len(lines), matched)
+        self.assertGreater(dropped, 0)
+        self.assertRegex(lines[0], r"^frame 1  [0-9.]+ frames/s  \d+ dropped$")
+
+    def test_a_single_frame_is_not_dropped(self):
+        done = self.run_camera(self.video(1, frames=1), self.street / "calib.txt", 32)
+        self.assertIn("1 matched, 0 dropped", done.stdout, done.stderr)
+
+    def test_a_video_is_a_side_by_side_source_of_rectify_too(self):
+        out = self.new_folder() / "out"
+        self.assert_works("rectify", "--side-by-side", self.video(8), "--calib", self.street / "calib.txt", "--out", out)
+        self.assertEqual([float(row) for row in (out / "times.txt").read_text().split()], [i / 8 for i in range(FRAMES)])
+        self.assertEqual(len(list((out / "image_3").iterdir())), FRAMES)  # OpenCV gives a video in colour
+        self.assertEqual(self.examine(out)["rows"]["verdict"], "ok")
+
+    def test_what_cannot_be_opened_is_refused(self):
+        for arguments in ((), ("nothing.mp4", self.street / "calib.txt"), (self.video(1), self.street / "times.txt"), (99, self.street / "calib.txt")):
+            done = self.run_camera(*arguments)
+            self.assertNotEqual(done.returncode, 0, arguments)
+            self.assertTrue(done.stderr)
+
+
+@unittest.skipUnless(DATA and pathlib.Path(DATA).is_dir(), "no real data")
+class DoctorOnRealData(InputTest):
+    def test_kitti_and_middlebury_are_sound(self):
+        data = pathlib.Path(DATA)
+        for arguments in (["--odometry", data / "odometry/sequences/A"], ["--kitti", data / "kitti2012/training", "--scene", "000151"],
+                          ["--kitti", data / "kitti2015/training", "--scene", "000002"], [data / "middlebury/Motorcycle"]):
+            findings = self.examine(*arguments)
+            self.assertEqual(findings["rows"]["verdict"], "ok")
+            self.assertEqual(findings["sides"]["verdict"], "ok")
+
+
+if __name__ == "__main__":
+    unittest.main()
