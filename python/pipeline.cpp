@@ -4,6 +4,7 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
+#include <deque>
 #include <mutex>
 
 #include "egosgm/named_options.h"
@@ -124,6 +125,45 @@ class LockedPipeline {
     return frame;
   }
 
+  void submit(const py::object& left, const py::object& right, const py::object& motion, const py::object& wanted) {
+    const ImageArray left_image = image_of(left, "left"), right_image = image_of(right, "right");
+    const std::optional<Motion> moved = motion_of(motion);
+    Frame frame{.maps = arrays_to_fill(wanted, width_, height_), .report = {}};
+    const FrameOutputs outputs = views_of(frame.maps);
+    std::deque<Frame> dropped;  // goes when this thread may touch Python's objects again
+    const py::gil_scoped_release other_threads_run;
+    const std::lock_guard one_at_a_time(mutex_);
+    try {
+      pipeline_.submit(left_image.view, right_image.view, moved, outputs);
+    } catch (...) {
+      if (pipeline_.under_way() == 0) dropped.swap(under_way_);
+      throw;
+    }
+    under_way_.push_back(std::move(frame));
+  }
+
+  Frame collect() {
+    std::deque<Frame> dropped;
+    std::optional<Frame> frame;
+    {
+      const py::gil_scoped_release other_threads_run;
+      const std::lock_guard one_at_a_time(mutex_);
+      FrameReport report;
+      try {
+        report = pipeline_.collect();
+      } catch (...) {
+        if (pipeline_.under_way() == 0) dropped.swap(under_way_);
+        throw;
+      }
+      frame.emplace(std::move(under_way_.front()));
+      under_way_.pop_front();
+      frame->report = std::move(report);
+    }
+    return std::move(*frame);
+  }
+
+  int under_way() const { return pipeline_.under_way(); }
+
   void reset() {
     const py::gil_scoped_release other_threads_run;
     const std::lock_guard one_at_a_time(mutex_);
@@ -135,6 +175,7 @@ class LockedPipeline {
  private:
   const int width_, height_;
   std::mutex mutex_;
+  std::deque<Frame> under_way_;  // submitted: their arrays are written to
   Pipeline pipeline_;
 };
 
@@ -253,6 +294,16 @@ void bind_pipeline(py::module_& module) {
            "outputs: names of the maps to make, or a dict of arrays to fill (float32; search_width: uint16).\n\n"
            "Raises InvalidArgument before anything runs, or DeviceError. A frame that raises leaves the pipeline as "
            "it was. Other Python threads run meanwhile; several that call one pipeline take turns.")
+      .def("submit", &LockedPipeline::submit, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
+           py::arg("outputs") = py::make_tuple("disparity", "variance"),
+           "The first half of process: copies the images, starts the frame and returns, so that Python may read and "
+           "estimate the next one meanwhile. At most two frames may be under way; arrays to fill are written until "
+           "their frame is collected.")
+      .def("collect", &LockedPipeline::collect,
+           "The second half: waits for the oldest frame under way and returns it. The bits are those of process. "
+           "Raises InvalidArgument where none is under way, and DeviceError where one has failed: all are dropped "
+           "then.")
+      .def_property_readonly("under_way", &LockedPipeline::under_way, "Frames submitted and not collected.")
       .def("reset", &LockedPipeline::reset, "Forgets the last frame: the next one searches the whole range.")
       .def_property_readonly(
           "options", [](const LockedPipeline& p) { return dict_of(p.pipeline().options()); }, "All options by name.")
