@@ -35,7 +35,7 @@
 #error "CODE_BYTES: 4 or 8, the size of a code"
 #endif
 #ifndef COST_SCALE
-#error "COST_SCALE: what a bit of Hamming distance costs"
+#error "COST_SCALE: what a bit of Hamming distance costs, 1 or 2"
 #endif
 #ifndef COST_SAD
 #error "COST_SAD: 0 for the Hamming distance of codes, 1 for a 3x3 sum of absolute differences of grey values"
@@ -142,7 +142,9 @@ inline uchar16 matching_cost(global const Code* own, global const Code* other, c
   }
   return convert_uchar16(min(sum / (ushort)9, (ushort16)(MAX_COST)));
 #else
-  return convert_uchar16(bit_count((Codes)(own[0]) ^ load_codes(other))) * (uchar16)(COST_SCALE);
+  const uchar16 distance = convert_uchar16(bit_count((Codes)(own[0]) ^ load_codes(other)));
+  // A product would melt into the bit count, which compilers then do not know any more.
+  return COST_SCALE == 2 ? add_sat(distance, distance) : distance;
 #endif
 }
 
