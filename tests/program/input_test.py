@@ -141,10 +141,11 @@ class Doctor(InputTest):
         self.assertIn("scale", self.assert_only_problem("calibration", street)["remedy"])
 
     def test_a_range_that_clips_and_its_remedy(self):
-        finding = self.assert_only_problem("range", self.street, "--disparities", 8)
-        enough = int(finding["remedy"].split()[-1])
-        self.assertNotEqual(self.examine(self.street, "--disparities", enough)["range"]["verdict"], "problem")
-        self.assertEqual(enough % 16, 0)
+        for least, too_few in ((0, 8), (-40, 45)):
+            finding = self.assert_only_problem("range", self.street, "--min-disparity", least, "--disparities", too_few)
+            enough = int(finding["remedy"].split()[-1])
+            self.assertEqual(enough % 16, 0)
+            self.assertNotEqual(self.examine(self.street, "--min-disparity", least, "--disparities", enough)["range"]["verdict"], "problem")
         finding = self.assert_only_problem("range", self.street, "--min-disparity", 4)
         self.examine(self.street, "--min-disparity", finding["remedy"].split()[-1])
         self.assertIn("faster", self.examine(self.street, "--disparities", 512)["range"]["remedy"])
