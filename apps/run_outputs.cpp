@@ -21,16 +21,17 @@
 namespace egosgm::app {
 namespace {
 
-const std::vector<std::string> kKinds{"variance", "color", "predicted", "measured", "right", "interpolated",
-                                      "search",   "pfm",   "overview",  "cloud",    "depth", "depth_m"};
+const std::vector<std::string> kKinds{"variance", "color", "predicted", "measured", "right", "interpolated", "search",
+                                      "dynamic",  "pfm",   "overview",  "cloud",    "depth", "depth_m"};
 
 const char* extension_of(const std::string& kind) {
   if (kind == "variance" || kind == "pfm" || kind == "depth_m") return ".pfm";
   return kind == "cloud" ? ".ply" : ".png";
 }
 
-MapView<std::uint16_t> width_view(cv::Mat& map) {
-  return {map.ptr<std::uint16_t>(), map.cols, map.rows, static_cast<std::ptrdiff_t>(map.step)};
+template <typename T>
+MapView<T> view_of(cv::Mat& map) {
+  return {map.ptr<T>(), map.cols, map.rows, static_cast<std::ptrdiff_t>(map.step)};
 }
 
 }  // namespace
@@ -42,6 +43,8 @@ const char* const kWriteListHelp =
     "  right, predicted, measured, interpolated\n"
     "                 these disparity maps, KITTI's PNG\n"
     "  search         disparities searched at each pixel, 16-bit PNG\n"
+    "  dynamic        255 where prediction and measurement contradict each other, as on what moves by itself, 8-bit "
+    "PNG\n"
     "  color          disparity in colours, PNG\n"
     "  overview       image, disparity, search width and error (or variance) in one PNG\n"
     "  cloud          points with colours [m], PLY, without those whose depth is uncertain by more than 5 %\n"
@@ -85,6 +88,7 @@ RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds
   if (wants("predicted")) predicted_.create(size, CV_32FC1);
   if (wants("measured")) measured_.create(size, CV_32FC1);
   if (wants("search") || wants("overview")) search_.create(size, CV_16UC1);
+  if (wants("dynamic")) dynamic_.create(size, CV_8UC1);
 }
 
 FrameOutputs RunOutputs::views() {
@@ -94,7 +98,8 @@ FrameOutputs RunOutputs::views() {
   if (!right_.empty()) outputs.right_disparity = vision::map_view(right_);
   if (!predicted_.empty()) outputs.predicted = vision::map_view(predicted_);
   if (!measured_.empty()) outputs.measured = vision::map_view(measured_);
-  if (!search_.empty()) outputs.search_width = width_view(search_);
+  if (!search_.empty()) outputs.search_width = view_of<std::uint16_t>(search_);
+  if (!dynamic_.empty()) outputs.dynamic = view_of<std::uint8_t>(dynamic_);
   return outputs;
 }
 
@@ -115,6 +120,7 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
       {"measured", [&](const Path& path) { vision::write_disparity_png(path, measured_); }},
       {"right", [&](const Path& path) { vision::write_disparity_png(path, right_); }},
       {"search", [&](const Path& path) { vision::write_png(path, search_); }},
+      {"dynamic", [&](const Path& path) { vision::write_png(path, dynamic_); }},
       {"overview",
        [&](const Path& path) {
          vision::write_png(path, panels_.overview({frame, left, disparity_, variance_, search_}));

@@ -53,6 +53,14 @@ Command add_synth(CLI::App& program) {
   command->add_option("--noise", options.noise_grey, "sensor noise, standard deviation [grey values]")
       ->type_name("G")
       ->capture_default_str();
+  command
+      ->add_option("--pole-width", options.pole_width_px,
+                   "mean width of a pole 10 m ahead [px]; single ones from 2/3 to 4/3 of it")
+      ->type_name("PX")
+      ->capture_default_str();
+  command->add_option("--pole-spacing", options.pole_spacing_m, "mean distance of poles along either side [m]")
+      ->type_name("M")
+      ->capture_default_str();
   command->add_flag("--quiet", arguments->quiet, "no progress");
   return {command, [arguments] { return render(*arguments); }};
 }

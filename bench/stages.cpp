@@ -12,6 +12,7 @@
 #include "host/coarse_match.h"
 #include "host/consistency_check.h"
 #include "host/edge_rejection.h"
+#include "host/edge_variance.h"
 #include "host/forward_warp.h"
 #include "host/frame_transfer.h"
 #include "host/hole_fill.h"
@@ -85,7 +86,8 @@ class Chain {
         median_filter_(context, size_, {}),
         speckle_removal_(context, size_, {}),
         sad_check_(context, size_, PixelType::kU8, {.max_difference = 20.0f}),
-        kalman_update_(context, size_, {}) {
+        kalman_update_(context, size_, {}),
+        edge_variance_(context, size_, {}) {
     images_.pixels.write(context, street.images);
     belief_.disparity.write(context, street.disparity);
     belief_.variance.write(context, street.variance);
@@ -121,6 +123,7 @@ class Chain {
         {"MedianFilter", [this] { median_filter_(matched_, Holes::kLeave); }, 2 * map},
         {"SpeckleRemoval", [this] { speckle_removal_(matched_); }, map},
         {"KalmanUpdate", [this] { kalman_update_(predicted_, matched_, updated_); }, 3 * maps},
+        {"EdgeVariance", [this] { edge_variance_(updated_, warped_); }, 8 * map},
         {"SadCheck", [this] { sad_check_(images_.pixels, updated_, checked_); }, grey + 2 * maps},
     };
   }
@@ -166,6 +169,7 @@ class Chain {
   SpeckleRemoval speckle_removal_;
   SadCheck sad_check_;
   KalmanUpdate kalman_update_;
+  EdgeVariance edge_variance_;
 };
 
 void measure(benchmark::State& state, ocl::Context& context, const Stage& stage, double copy_gb_s) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a video that need its maps pixel by pixel: flicker, mistakes of the motion, uncovered pixels, variances.
+"""Figures of a video that need its maps pixel by pixel: flicker, mistakes of the motion, uncovered and thin things, variances.
 
 Runs the pipeline through the Python module (PYTHONPATH=build/python); bench/accuracy makes rows of what this returns.
 Disparities and errors in px; shares in percent.
@@ -196,6 +196,20 @@ def uncovered(video, first, oldest=2, **options):
     return [share(counts[age]) for age in counts]
 
 
+def thin(disparity, width=7, step_px=3.0):
+    """What is narrower than `width` pixels and stands out from both sides by more than the step: poles."""
+    def slide(values, reduce):
+        padded = np.pad(values, ((0, 0), (width // 2, width // 2)), mode="edge")
+        return reduce(np.lib.stride_tricks.sliding_window_view(padded, width, axis=1), axis=2)
+    return disparity - slide(slide(disparity, np.min), np.max) > step_px
+
+
+def of_thin_things(video, first, **options):
+    counts = [bad_or_missing(frame.disparity, video.truth(k), thin(video.all_truth(k))) for k, frame in play(video, **options)
+              if k >= first]
+    return share(counts), sum(pixels for _, pixels in counts)
+
+
 def errors_and_variances(video, frames, **options):
     """Absolute errors and variances of all pixels with truth and a disparity, of each of the frames numbered `frames`."""
     pairs = []
@@ -220,3 +234,20 @@ def calibration_of_variance(pairs, bins=10):
     return {"ratio": float(np.mean(cut / variances)), "ratio_not_bad": float(np.mean((errors**2 / variances)[errors <= BAD_PX])),
             "removed": share(removed),
             "bins": [{"predicted_px": float(np.sqrt(variances[part].mean())), "actual_px": float(np.sqrt(cut[part].mean()))} for part in parts]}
+
+
+def dynamic_map(video, first, **options):
+    """(percent of the moving objects' pixels that are marked, percent of the marked pixels that lie on or near one)."""
+    found, right = [], []
+    for k, frame in play(video, outputs=("disparity", "dynamic"), **options):
+        if k >= first:
+            marked, moving = frame.dynamic > 0, video.moving(k)
+            found.append((np.sum(marked & moving), moving.sum()))
+            right.append((np.sum(marked & grown(moving, 8)), marked.sum()))
+    return share(found), share(right)
+
+
+def grown(mask, radius):
+    padded = np.pad(mask, radius)
+    rows = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1, axis=0).any(axis=2)
+    return np.lib.stride_tricks.sliding_window_view(rows, 2 * radius + 1, axis=1).any(axis=2)

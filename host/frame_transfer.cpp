@@ -7,6 +7,7 @@
 #include <string>
 
 #include "egosgm/error.h"
+#include "host/dynamic_map.h"
 
 namespace egosgm {
 namespace {
@@ -58,14 +59,16 @@ void copy_rows(const Source* fetched, const MapView<T>& map, Convert&& convert) 
   }
 }
 
-void copy_rows(const float* fetched, const MapView<float>& map) {
-  copy_rows(fetched, map, [](float value) { return value; });
+template <typename T>
+void copy_rows(const T* fetched, const MapView<T>& map) {
+  copy_rows(fetched, map, [](T value) { return value; });
 }
 
-void fill_rows(float value, const MapView<float>& map) {
+template <typename T>
+void fill_rows(T value, const MapView<T>& map) {
   if (!map.data) return;
   for (int y = 0; y < map.height; ++y) {
-    float* row = reinterpret_cast<float*>(reinterpret_cast<char*>(map.data) + y * map.stride_bytes);
+    T* row = reinterpret_cast<T*>(reinterpret_cast<char*>(map.data) + y * map.stride_bytes);
     std::fill(row, row + map.width, value);
   }
 }
@@ -100,10 +103,12 @@ void report_commands(ocl::Context& context, const std::vector<ocl::Command>& com
   }
 }
 
-FrameTransfer::FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range)
+FrameTransfer::FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                             const DynamicMapOptions& dynamic_map)
     : context_((context.enter("FrameTransfer"), context)),
       size_(size),
       range_(range),
+      dynamic_map_(dynamic_map),
       images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(size)), PixelType::kU8},
       upload_(context, images_.pixels),
       disparity_(context, pixel_count(size)),
@@ -131,6 +136,7 @@ void FrameTransfer::validate(const ImageView& left, const ImageView& right, cons
   validate_map("measured", outputs.measured, size_);
   validate_map("measured_variance", outputs.measured_variance, size_);
   validate_map("search_width", outputs.search_width, size_);
+  validate_map("dynamic", outputs.dynamic, size_);
 }
 
 const FrameImages& FrameTransfer::upload(const ImageView& left, const ImageView& right) {
@@ -156,8 +162,8 @@ void FrameTransfer::fetch(const ocl::Buffer<T>& buffer, std::size_t count, std::
   context_.record(scratch_fetched_, "read", ocl::Queue::kDownload);
 }
 
-void FrameTransfer::fetch_left(const ocl::Buffer<float>& maps, const MapView<float>& wanted, Scratch& staged) {
-  if (wanted.data) fetch(maps, pixel_count(size_), staged);
+void FrameTransfer::fetch_left(const ocl::Buffer<float>& maps, bool wanted, Scratch& staged) {
+  if (wanted) fetch(maps, pixel_count(size_), staged);
 }
 
 void FrameTransfer::fetch_view(const ocl::Buffer<float>& maps, int view, const MapView<float>& wanted,
@@ -171,11 +177,11 @@ void FrameTransfer::download(const FrameResults& results, const FrameOutputs& ou
   has_prediction_ = results.predicted;
   context_.let_wait(ocl::Queue::kDownload, context_.last_kernel());
   if (results.predicted) {
-    fetch_left(results.predicted->disparity, outputs.predicted, predicted_);
-    fetch_left(results.predicted->variance, outputs.predicted_variance, predicted_variance_);
+    fetch_left(results.predicted->disparity, outputs.predicted.data || outputs.dynamic.data, predicted_);
+    fetch_left(results.predicted->variance, outputs.predicted_variance.data, predicted_variance_);
   }
-  fetch_left(results.measured->disparity, outputs.measured, measured_);
-  fetch_left(results.measured->variance, outputs.measured_variance, measured_variance_);
+  fetch_left(results.measured->disparity, outputs.measured.data || outputs.dynamic.data, measured_);
+  fetch_left(results.measured->variance, outputs.measured_variance.data, measured_variance_);
   if (outputs.search_width.data) fetch(results.band->bands(), pixel_count(size_), bands_);
   fetch(results.band->row_sums(), row_sums_.size(), row_sums_);
   fetch(*results.vertical_offset_px, 1, vertical_offset_px_);
@@ -194,9 +200,13 @@ void FrameTransfer::collect(FrameReport& report) const {
   if (has_prediction_) {
     copy_rows(predicted_.data(), outputs_.predicted);
     copy_rows(predicted_variance_.data(), outputs_.predicted_variance);
+    if (outputs_.dynamic.data) {
+      copy_rows(dynamic_map(size_, dynamic_map_, predicted_, measured_).data(), outputs_.dynamic);
+    }
   } else {
     fill_rows(kInvalidDisparity, outputs_.predicted);
-    fill_rows(0, outputs_.predicted_variance);
+    fill_rows(0.0f, outputs_.predicted_variance);
+    fill_rows(std::uint8_t{0}, outputs_.dynamic);
   }
   copy_rows(measured_.data(), outputs_.measured);
   copy_rows(measured_variance_.data(), outputs_.measured_variance);

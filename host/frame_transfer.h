@@ -24,7 +24,8 @@ struct FrameResults {
 /// be under way. Transfers have queues of their own; with those of the kernels they are tied here.
 class FrameTransfer {
  public:
-  FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
+  FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                const DynamicMapOptions& dynamic_map = {});
 
   /// Throws InvalidArgument for a size that no pipeline can have.
   static void validate_size(int width, int height);
@@ -54,12 +55,13 @@ class FrameTransfer {
 
   template <typename T>
   void fetch(const ocl::Buffer<T>& buffer, std::size_t count, std::vector<T>& staged);
-  void fetch_left(const ocl::Buffer<float>& maps, const MapView<float>& wanted, Scratch& staged);
+  void fetch_left(const ocl::Buffer<float>& maps, bool wanted, Scratch& staged);
   void fetch_view(const ocl::Buffer<float>& maps, int view, const MapView<float>& wanted, MapReadback& readback);
 
   ocl::Context& context_;
   const shared::ImageSize size_;
   const shared::DisparityRange range_;
+  const DynamicMapOptions dynamic_map_;
   FrameImages images_;
   ocl::Upload upload_;
   MapReadback disparity_, variance_, right_disparity_, right_variance_;

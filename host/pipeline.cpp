@@ -16,6 +16,7 @@
 #include "host/coarse_match.h"
 #include "host/consistency_check.h"
 #include "host/edge_rejection.h"
+#include "host/edge_variance.h"
 #include "host/forward_warp.h"
 #include "host/frame_transfer.h"
 #include "host/hole_fill.h"
@@ -95,6 +96,7 @@ struct Pipeline::Impl {
   MedianFilter median_filter;
   SpeckleRemoval speckle_removal;
   KalmanUpdate kalman_update;
+  EdgeVariance edge_variance;
   std::array<FrameTransfer, kMaxUnderWay> transfers;
 
   ocl::Buffer<cl_uint> codes;
@@ -128,7 +130,9 @@ struct Pipeline::Impl {
         median_filter(context, size, options.median_filter),
         speckle_removal(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
         kalman_update(context, size, options.kalman_update),
-        transfers{{{context, size, range_of(options)}, {context, size, range_of(options)}}},
+        edge_variance(context, size, options.edge_variance),
+        transfers{{{context, size, range_of(options), options.dynamic_map},
+                   {context, size, range_of(options), options.dynamic_map}}},
         codes(context, Census::words(options.banded_sgm.cost, size, BandedSgm::code_padding(range_of(options)))),
         penalties(context, StepPenalties::plane_count(size)),
         predicted(context, size),
@@ -196,7 +200,9 @@ struct Pipeline::Impl {
     if (!reason) predict(*motion);
     const FrameImages& images = match(uploaded, reason);
     if (!reason) update(images);
-    return {.result = reason ? measured : updated,
+    StereoMaps* result = reason ? measured : updated;
+    edge_variance(*result, scratch);
+    return {.result = result,
             .predicted = reason ? nullptr : &predicted,
             .measured = measured,
             .band = &search_band,

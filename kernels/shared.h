@@ -47,6 +47,9 @@ typedef float f32;
 // next frame searches wide around it.
 #define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
 
+// EdgeVariance looks this many pixels to all sides.
+#define EGOSGM_EDGE_RADIUS 4
+
 // The variance of a hole that MedianFilter fills.
 #define EGOSGM_FILLED_VARIANCE_PX2 1.0f
 

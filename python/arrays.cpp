@@ -100,6 +100,7 @@ MapView<T> output_of(const py::object& object, const std::string& name) {
 }
 template MapView<float> output_of<float>(const py::object&, const std::string&);
 template MapView<std::uint16_t> output_of<std::uint16_t>(const py::object&, const std::string&);
+template MapView<std::uint8_t> output_of<std::uint8_t>(const py::object&, const std::string&);
 
 py::array array_of(const cv::Mat& mat) {
   const py::dtype type = mat.depth() == CV_8U    ? py::dtype::of<std::uint8_t>()

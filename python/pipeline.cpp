@@ -27,6 +27,7 @@ void for_each_output(FrameOutputs& outputs, Visit&& visit) {
   visit("measured", outputs.measured);
   visit("measured_variance", outputs.measured_variance);
   visit("search_width", outputs.search_width);
+  visit("dynamic", outputs.dynamic);
 }
 
 struct Frame {
@@ -50,6 +51,8 @@ py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
     const auto name = item.cast<std::string>();
     if (name == "search_width") {
       arrays[item] = py::array_t<std::uint16_t>({height, width});
+    } else if (name == "dynamic") {
+      arrays[item] = py::array_t<std::uint8_t>({height, width});
     } else {
       arrays[item] = py::array_t<float>({height, width});
     }
@@ -291,7 +294,8 @@ void bind_pipeline(py::module_& module) {
            "left, right: H x W of uint8 or uint16, both alike; rows at any stride are read where they are.\n"
            "motion: how the camera moved since the last frame, a Motion or a 4x4 matrix current_from_previous; None: "
            "the whole range is searched.\n"
-           "outputs: names of the maps to make, or a dict of arrays to fill (float32; search_width: uint16).\n\n"
+           "outputs: names of the maps to make, or a dict of arrays to fill (float32; search_width: uint16, dynamic: "
+           "uint8).\n\n"
            "Raises InvalidArgument before anything runs, or DeviceError. A frame that raises leaves the pipeline as "
            "it was. Other Python threads run meanwhile; several that call one pipeline take turns.")
       .def("submit", &LockedPipeline::submit, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),

@@ -51,14 +51,22 @@ struct Images {
 struct Maps {
   std::vector<std::vector<float>> maps{8, std::vector<float>(kWidth* kHeight, kUntouched)};
   std::vector<std::uint16_t> search_width = std::vector<std::uint16_t>(kWidth * kHeight, 7);
+  std::vector<std::uint8_t> dynamic = std::vector<std::uint8_t>(kWidth * kHeight, 7);
 
   bool operator==(const Maps&) const = default;
 
   FrameOutputs views() {
     const auto view = [&](int i) { return MapView<float>{maps[i].data(), kWidth, kHeight, kWidth * sizeof(float)}; };
-    return {view(0), view(1), view(2),
-            view(3), view(4), view(5),
-            view(6), view(7), {search_width.data(), kWidth, kHeight, kWidth * sizeof(std::uint16_t)}};
+    return {view(0),
+            view(1),
+            view(2),
+            view(3),
+            view(4),
+            view(5),
+            view(6),
+            view(7),
+            {search_width.data(), kWidth, kHeight, kWidth * sizeof(std::uint16_t)},
+            {dynamic.data(), kWidth, kHeight, kWidth}};
   }
 };
 

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "egosgm/error.h"
+#include "host/dynamic_map.h"
 #include "tests/reference/pipeline.h"
 #include "tests/support/compare.h"
 #include "tests/support/expect_refused.h"
@@ -79,6 +80,7 @@ std::vector<Setting> settings() {
                    o.kalman_update.keep_predicted = false;
                    o.kalman_update.gate_px = 0.25f;
                    o.kalman_update.min_variance_px2 = 0.3f;
+                   o.edge_variance.weight = 0.03f;
                    o.consistency = {.prediction_px = 0.5f, .measurement_px = 0.75f, .update_px = 1};
                    o.edge_rejection.max_jump_px = 1;
                    o.hole_fill.max_difference_px = 0.25f;
@@ -254,10 +256,11 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
   const bool has_prediction = !expected.predicted.disparity.empty();
   const testing::HostMaps predicted = has_prediction ? expected.predicted : testing::empty_maps(size);
   const reference::Pass& pass = expected.passes.back();
+  const testing::HostMaps& measured = has_prediction ? pass.measured : expected.result;  // they share memory
   const std::vector<float> maps[] = {half(expected.result.disparity, 0), half(expected.result.variance, 0),
                                      half(expected.result.disparity, 1), half(expected.result.variance, 1),
                                      half(predicted.disparity, 0),       half(predicted.variance, 0),
-                                     half(pass.measured.disparity, 0),   half(pass.measured.variance, 0)};
+                                     half(measured.disparity, 0),        half(measured.variance, 0)};
   const auto actual = outputs.maps();
   for (std::size_t i = 0; i < actual.size(); ++i) {
     EXPECT_TRUE(testing::same_bits(actual[i].second->values(), maps[i], size)) << "output " << actual[i].first;
@@ -267,6 +270,8 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
     widths.push_back(static_cast<std::uint16_t>(band.last - band.first + 1));
   }
   EXPECT_TRUE(testing::same_bits(outputs.search_width.values(), widths, size)) << "output search_width";
+  const std::vector<std::uint8_t> marks = dynamic_map(size, {}, maps[4], maps[6]);
+  EXPECT_TRUE(testing::same_bits(outputs.dynamic.values(), marks, size)) << "output dynamic";
   EXPECT_TRUE(outputs.padding_is_untouched());
 }
 
@@ -808,6 +813,8 @@ std::vector<BadFrame> bad_frames() {
       {"output predicted_variance: ", [](Frame& f) { f.outputs.predicted_variance.stride_bytes = 0; }},
       {"output measured: ", [](Frame& f) { f.outputs.measured.stride_bytes = -504; }},
       {"output measured_variance: ", [](Frame& f) { f.outputs.measured_variance.width = 128; }},
+      {"output dynamic: a stride of 126 bytes is shorter than a row of 127",
+       [](Frame& f) { f.outputs.dynamic.stride_bytes = 126; }},
       {"output search_width: a stride of 253 bytes is shorter than a row of 254",
        [](Frame& f) { f.outputs.search_width.stride_bytes = 253; }},
       {"motion: not all values are finite", [](Frame& f) { f.motion->current_from_previous.translation().x() = kNan; }},

@@ -19,21 +19,17 @@ struct ForwardWarpOptions {
   float process_noise_px2 = 0.05f;  // constant part of q, added to every variance (eq. 6)
   float motion_noise = 1.0f;        // factor of the other part, J Sigma J^T by the motion's covariance Sigma
 };
-
 struct EdgeRejectionOptions {
   float max_jump_px = 5.0f;  // a larger step to a neighbour drops the prediction on both sides; 0 keeps all
 };
-
 struct HoleFillOptions {
   float max_difference_px = 1.0f;  // gamma (eqs. 7-8): neighbours that differ by less fill the gap between them
 };
-
 struct ConsistencyCheckOptions {
   float prediction_px = 3.0f;   // largest left-right difference of the prediction,
   float measurement_px = 3.0f;  // of the measurement,
   float update_px = 3.0f;       // and of the update
 };
-
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
   int p1 = 6;           // penalties as in BandedSgmOptions, for a census of 5x5 coarse pixels
@@ -41,7 +37,6 @@ struct CoarseMatchOptions {
   int p2_at_edges = 40;
   float max_difference_px = 1.0f;  // of the left-right check, in coarse pixels
 };
-
 struct SearchBandOptions {
   float sigmas = 2.0f;             // half-width of a predicted pixel's band, in standard deviations
   float min_half_width_px = 2.0f;  // and at least this
@@ -79,24 +74,26 @@ struct VerticalAlignmentOptions {
   bool enabled = true;  // estimate one vertical offset between the views, and resample the right image by it
   float gain = 0.25f;   // part of what a frame finds that is added to the offset, once it is known; 0 to 1
 };
-
 struct MedianFilterOptions {
   bool enabled = true;  // 3x3 median of the disparities, before the left-right check
 };
-
 struct SadCheckOptions {
   float max_difference = 0.0f;  // mean absolute grey difference of the 3x3 windows (8-bit scale); 0: no check
 };
-
 struct SpeckleRemovalOptions {
   int max_size_px = 100;           // connected regions up to this size are dropped; 0: none
   float max_difference_px = 2.0f;  // neighbours within this belong to one region
 };
-
 struct KalmanUpdateOptions {
   float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   float min_variance_px2 = 0.02f;
+};
+struct EdgeVarianceOptions {
+  float weight = 0.01f;  // of the squared range of disparities in a 9x9 window: the least variance; 0: off
+};
+struct DynamicMapOptions {
+  float min_difference_px = 1.0f;  // of prediction and measurement, to contradict each other; changes no disparity
 };
 
 struct EGOSGM_EXPORT PipelineOptions {
@@ -117,6 +114,8 @@ struct EGOSGM_EXPORT PipelineOptions {
   SadCheckOptions sad_check;
   SpeckleRemovalOptions speckle_removal;
   KalmanUpdateOptions kalman_update;
+  EdgeVarianceOptions edge_variance;
+  DynamicMapOptions dynamic_map;
 
   /// Fućek et al. (IFAC 2017) in what the paper says of prediction, search and fusion: constant q, three sigmas without
   /// a least half-width, unpredicted pixels search everything, no gate. The matcher, which it leaves open, is the

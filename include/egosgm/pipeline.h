@@ -27,6 +27,9 @@ struct FrameOutputs {
   MapView<float> predicted, predicted_variance;    // left, before matching
   MapView<float> measured, measured_variance;      // left, after matching and its checks
   MapView<std::uint16_t> search_width;             // left: disparities that can win at each pixel
+  // left: 255 where prediction and measurement contradict each other, as on what moves by itself towards or away from
+  // the camera; else 0, also where one of them is missing, as in every frame without a prediction
+  MapView<std::uint8_t> dynamic;
 };
 
 /// Device time of a stage in one frame.

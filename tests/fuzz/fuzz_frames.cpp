@@ -89,6 +89,7 @@ void run(std::string_view input) {
   const Rows disparity(bytes, 4, outputs.disparity), variance(bytes, 4, outputs.variance);
   const Rows predicted(bytes, 4, outputs.predicted);
   const Rows search_width(bytes, 2, outputs.search_width);
+  const Rows dynamic(bytes, 1, outputs.dynamic);
   if (bytes.below(24) == 0) right.type = static_cast<PixelType>(bytes.below(4));
   if (bytes.below(12) == 0) pipeline().reset();
   std::optional<Motion> motion;
@@ -98,7 +99,8 @@ void run(std::string_view input) {
     if (!(fraction >= 0 && fraction <= 1)) throw std::logic_error("a fraction of " + std::to_string(fraction));
   }
   if (!left_rows.guards_are_whole() || !right_rows.guards_are_whole() || !disparity.guards_are_whole() ||
-      !variance.guards_are_whole() || !predicted.guards_are_whole() || !search_width.guards_are_whole()) {
+      !variance.guards_are_whole() || !predicted.guards_are_whole() || !search_width.guards_are_whole() ||
+      !dynamic.guards_are_whole()) {
     throw std::logic_error("wrote outside of the caller's rows");
   }
 }

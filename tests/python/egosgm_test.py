@@ -338,3 +338,18 @@ def test_the_example_runs(tmp_path):
         assert done.returncode == 0 and (tmp_path / "picture.png").stat().st_size > 10000
     else:
         assert "pip install matplotlib" in done.stderr
+
+
+def test_the_dynamic_map_finds_what_moves():
+    street = egosgm.SyntheticSequence(frames=4, moving_object=True)
+    pipeline = egosgm.Pipeline(street.calibration, 640, 240)
+    for k in range(4):
+        frame = street.render(k)
+        result = pipeline.process(frame.left, frame.right, street.motion(k) if k else None, outputs="dynamic")
+        assert result.dynamic.dtype == np.uint8
+        if k == 0:
+            assert not result.dynamic.any(), "nothing was predicted"
+    marked, moving = result.dynamic == 255, frame.left_moving > 0
+    assert (marked == (result.dynamic > 0)).all()
+    assert marked[moving].mean() > 0.5
+    assert marked[~moving].mean() < 0.05

@@ -6,6 +6,7 @@
 #include "tests/reference/coarse_match.h"
 #include "tests/reference/consistency_check.h"
 #include "tests/reference/edge_rejection.h"
+#include "tests/reference/edge_variance.h"
 #include "tests/reference/forward_warp.h"
 #include "tests/reference/hole_fill.h"
 #include "tests/reference/kalman_update.h"
@@ -43,7 +44,8 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   }
   if (has_prediction) update(images, frame);
 
-  frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
+  frame.result = edge_variance(size_, options_.edge_variance.weight,
+                               has_prediction ? frame.updated : frame.passes.back().measured);
   if (has_prediction && options_.search == SearchMode::kFull) frame.full_range_reason = "search is full";
   offset_ = frame.passes.back().offset;
   has_offset_ = true;

@@ -87,6 +87,7 @@ int soak(int frames, shared::ImageSize size, int disparities, const std::string&
     stream.process(pipeline, frame, outputs);
     for (const auto& [name, map] : outputs.maps()) checksum.add(map->values());
     checksum.add(outputs.search_width.values());
+    checksum.add(outputs.dynamic.values());
     if (frame == frames / 10) early_kib = resident_kib(), early_files = open_files();
   }
   const long grown_kib = resident_kib() - early_kib, grown_files = open_files() - early_files;

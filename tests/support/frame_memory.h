@@ -102,6 +102,7 @@ struct OutputMemory {
   MapMemory<float> disparity, variance, right_disparity, right_variance, predicted, predicted_variance, measured,
       measured_variance;
   MapMemory<std::uint16_t> search_width;
+  MapMemory<std::uint8_t> dynamic;
 
   explicit OutputMemory(shared::ImageSize size, Layout layout = {})
       : disparity(size, layout),
@@ -112,14 +113,15 @@ struct OutputMemory {
         predicted_variance(size, layout),
         measured(size, layout),
         measured_variance(size, layout),
-        search_width(size, layout) {}
+        search_width(size, layout),
+        dynamic(size, layout) {}
 
   FrameOutputs views() {
-    return {disparity.view(),      variance.view(),          right_disparity.view(),
-            right_variance.view(), predicted.view(),         predicted_variance.view(),
-            measured.view(),       measured_variance.view(), search_width.view()};
+    return {
+        disparity.view(),          variance.view(), right_disparity.view(),   right_variance.view(), predicted.view(),
+        predicted_variance.view(), measured.view(), measured_variance.view(), search_width.view(),   dynamic.view()};
   }
-  /// All but the search width, by name.
+  /// All that are of floats, by name.
   std::vector<std::pair<std::string, const MapMemory<float>*>> maps() const {
     return {{"disparity", &disparity},
             {"variance", &variance},
@@ -133,7 +135,7 @@ struct OutputMemory {
   bool padding_is_untouched() const {
     const auto all = maps();
     return std::all_of(all.begin(), all.end(), [](const auto& map) { return map.second->padding_is_untouched(); }) &&
-           search_width.padding_is_untouched();
+           search_width.padding_is_untouched() && dynamic.padding_is_untouched();
   }
 };
 
@@ -146,7 +148,9 @@ inline ::testing::AssertionResult same_outputs(const OutputMemory& actual, const
     if (!same) return ::testing::AssertionFailure() << actual_maps[i].first << ": " << same.message();
   }
   const auto same = same_bits(actual.search_width.values(), expected.search_width.values(), size);
-  return same ? same : ::testing::AssertionFailure() << "search_width: " << same.message();
+  if (!same) return ::testing::AssertionFailure() << "search_width: " << same.message();
+  const auto same_marks = same_bits(actual.dynamic.values(), expected.dynamic.values(), size);
+  return same_marks ? same_marks : ::testing::AssertionFailure() << "dynamic: " << same_marks.message();
 }
 
 /// Of all frames of two runs.

@@ -8,6 +8,7 @@
 #include "host/coarse_match.h"
 #include "host/consistency_check.h"
 #include "host/edge_rejection.h"
+#include "host/edge_variance.h"
 #include "host/forward_warp.h"
 #include "host/frame_transfer.h"
 #include "host/hole_fill.h"
@@ -48,6 +49,7 @@ class StageChain {
         median_filter_(context_, size, options.median_filter),
         speckle_removal_(context_, size, options.speckle_removal),
         kalman_update_(context_, size, options.kalman_update),
+        edge_variance_(context_, size, options.edge_variance),
         sad_check_(context_, size, type, options.sad_check),
         transfer_(context_, size, range_of(options)),
         codes_(context_, Census::words(options.banded_sgm.cost, size, code_padding())),
@@ -66,6 +68,7 @@ class StageChain {
     ++frames_;
     if (has_prediction) update(frame);
     StereoMaps& result = has_prediction ? updated_ : measured_;
+    edge_variance_(result, scratch_);
     frame.result = download(context_, result);
     std::swap(belief_, result);
     has_belief_ = true;
@@ -154,6 +157,7 @@ class StageChain {
   MedianFilter median_filter_;
   SpeckleRemoval speckle_removal_;
   KalmanUpdate kalman_update_;
+  EdgeVariance edge_variance_;
   SadCheck sad_check_;
   FrameTransfer transfer_;
   ocl::Buffer<cl_uint> codes_;
