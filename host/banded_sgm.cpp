@@ -31,7 +31,8 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
                                               .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
                                               .set("PARTIAL_CHUNKS", range.count % EGOSGM_LANES != 0)
                                               .set("TILE_WIDTH", tile.width)
-                                              .set("TILE_HEIGHT", tile.height));
+                                              .set("TILE_HEIGHT", tile.height)
+                                              .set("PIXELS", ocl::pixels_a_work_item(context)));
 }
 
 bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
@@ -165,8 +166,8 @@ void BandedSgm::sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMap
     wavefront.backward(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands,
                        inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners);
   }
-  wavefront.refine(context_, ocl::every_pixel(context_, size_, views), parameters_, wavefront.winners,
-                   measured.disparity, measured.variance);
+  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters_,
+                   wavefront.winners, measured.disparity, measured.variance);
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {

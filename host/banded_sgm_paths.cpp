@@ -31,7 +31,8 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
                                                     .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
                                                     .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
                                                     .set("LANES", group.lanes)
-                                                    .set("LINES", group.lines));
+                                                    .set("LINES", group.lines)
+                                                    .set("PIXELS", 1));
 }
 
 }  // namespace

@@ -115,7 +115,7 @@ struct Pipeline::Impl {
       : options(chosen),
         device(chosen_device),
         size(image_size),
-        tuning(with_defaults(device.handle().tuning, device.info().type)),
+        tuning(with_defaults(device.handle().tuning, device.info())),
         context(context_on(device.handle())),
         forward_warp(context, size, calibration, options.forward_warp, range_of(options), 0, tuning.warp_band_rows),
         edge_rejection(context, size, options.edge_rejection),

@@ -65,9 +65,9 @@ void set_tuning(Tuning& tuning, std::string_view name, std::string_view value) {
   throw InvalidArgument("no tuning named \"" + std::string(name) + "\": choose from " + all);
 }
 
-Tuning with_defaults(Tuning tuning, const std::string& device_type) {
-  const bool is_gpu = device_type == "GPU";
-  const Tuning& defaults = is_gpu ? kGpuTuning : kCpuTuning;
+Tuning with_defaults(Tuning tuning, const DeviceInfo& device) {
+  const bool is_small = device.compute_units <= kFewComputeUnits;
+  const Tuning& defaults = device.type == "GPU" ? kGpuTuning : is_small ? kSmallCpuTuning : kCpuTuning;
   for (const Size& size : kSizes) {
     if (tuning.*size.value == 0) tuning.*size.value = defaults.*size.value;
   }

@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <string>
-
+#include "egosgm/device.h"
 #include "egosgm/tuning.h"
 
 namespace egosgm {
 
 // The defaults of device classes. 0: the stage decides by the disparity range and the device's limits.
-inline constexpr Tuning kCpuTuning{.tile_width = 128,  // measured best on two cores (bench/NOTES.md)
-                                   .tile_height = 24,
-                                   .warp_band_rows = 32,
-                                   .speckle_strip_rows = 24,
-                                   .row_group = 1};
+inline constexpr Tuning kCpuTuning{
+    .tile_width = 128, .tile_height = 24, .warp_band_rows = 32, .speckle_strip_rows = 24, .row_group = 1};
+// Up to four compute units are busy with fewer tiles, too, and wait less often (bench/NOTES.md).
+inline constexpr int kFewComputeUnits = 4;
+inline constexpr Tuning kSmallCpuTuning{
+    .tile_width = 256, .tile_height = 48, .warp_band_rows = 32, .speckle_strip_rows = 24, .row_group = 1};
 inline constexpr Tuning kGpuTuning{.tile_width = 128, .tile_height = 24, .warp_band_rows = 32};  // not measured yet
 
-/// `tuning` with the class's defaults where it says nothing. `device_type`: as in DeviceInfo.
-Tuning with_defaults(Tuning tuning, const std::string& device_type);
+/// `tuning` with the defaults of the device's class where it says nothing.
+Tuning with_defaults(Tuning tuning, const DeviceInfo& device);
 
 }  // namespace egosgm

@@ -18,12 +18,13 @@
 #include "sgm_cells.h"
 
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
-// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
-// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
-// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
-// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
-// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=0 TILE_WIDTH=128 TILE_HEIGHT=24
-// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24
+// PIXELS=16 lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128
+// TILE_HEIGHT=24 PIXELS=16 lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 PARTIAL_CHUNKS=1
+// TILE_WIDTH=128 TILE_HEIGHT=24 PIXELS=16 lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0
+// PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24 PIXELS=16 lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2
+// COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24 PIXELS=1 lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4
+// COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=0 TILE_WIDTH=128 TILE_HEIGHT=24 PIXELS=16 lint: MAX_CHUNKS=8 PATHS=8
+// CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 PARTIAL_CHUNKS=1 TILE_WIDTH=128 TILE_HEIGHT=24 PIXELS=16
 
 #ifndef MAX_CHUNKS
 #error "MAX_CHUNKS: chunks of EGOSGM_LANES disparities in the whole range"
@@ -416,15 +417,35 @@ kernel void sweep_backward(const SgmParameters q, const int wave, const int tile
   sweep(true, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, (global uchar*)sums, winners);
 }
 
+#if PIXELS == 1
+typedef ulong Winners;
+#define FIELD(winners, bit) ((int)((long)((winners) << (48 - (bit))) >> 48))
+#else
+typedef ulong16 Winners;
+#define FIELD(winners, bit) convert_int16(as_long16((winners) << (48 - (bit))) >> 48)
+#endif
+
+inline Winners load_winners(global const ulong* row, const int x, const int width) {
+#if PIXELS == 1
+  return row[x];
+#else
+  if (x + PIXELS <= width) return vload16(0, row + x);
+  ulong lanes[PIXELS];
+  for (int i = 0; i < PIXELS; ++i) lanes[i] = row[min(x + i, width - 1)];
+  return vload16(0, lanes);
+#endif
+}
+
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, and the matching variance
 // (options.h).
 kernel void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
                    global float* variances) {
-  const int x = get_global_id(0);
+  const int x = get_global_id(0) * PIXELS;
   if (x >= q.width) return;
-  const size_t i = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width + x;
-  const ulong winner = winners[i];
-  const int rise_before = (short)(winner >> 16), rise_after = (short)(winner >> 32);
-  disparities[i] = refined((short)winner, rise_before, rise_after);
-  variances[i] = matching_variance(q, (int)(winner >> 48), rise_before, rise_after);
+  const size_t row = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width;
+  const Winners winner = load_winners(winners + row, x, q.width);
+  const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
+  const Ints steps = FIELD(winner, 48);
+  store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities + row, x, q.width);
+  store_pixels(matching_variance(q, steps, rise_before, rise_after), variances + row, x, q.width);
 }
