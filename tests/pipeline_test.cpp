@@ -717,7 +717,7 @@ TEST(Pipeline, ReportsWhatItDid) {
   const std::vector<std::string> steady{"upload",           "ForwardWarp",       "EdgeRejection", "HoleFill",
                                         "ConsistencyCheck", "VerticalAlignment", "CoarseMatch",   "SearchBand",
                                         "Census",           "StepPenalties",     "BandedSgm",     "MedianFilter",
-                                        "SpeckleRemoval",   "KalmanUpdate",      "download"};
+                                        "SpeckleRemoval",   "KalmanUpdate",      "EdgeVariance",  "download"};
   EXPECT_EQ(stages(reports[3]), steady);
   for (const FrameReport& report : reports) {
     EXPECT_GT(report.total_ms, 0);
