@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Shows a fault of PoCL 3.1 that tests/support/fault_layer.cpp steers around; docs/reliability.md tells of it. A
 // command that fails while another one of its queue still runs is notified by that one when it ends, though it is gone
-// by then. cc -o /tmp/late tests/support/pocl_late_failure.c -lOpenCL && /tmp/late: ends by a failed assertion of PoCL
-// within seconds. /tmp/late wait, which lets the earlier command end first, says how many rounds went well.
+// by then. cc -o late tests/support/pocl_late_failure.c -lOpenCL && ./late: ends by a failed assertion of PoCL
+// within seconds. ./late wait, which lets the earlier command end first, says how many rounds went well.
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 #include <stdio.h>
