@@ -24,6 +24,7 @@
 #include "host/median_filter.h"
 #include "host/ocl/device_handle.h"
 #include "host/ocl/errors.h"
+#include "host/ocl/svm.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -412,10 +413,17 @@ Device device_on(cl_command_queue queue, const std::string& programs) {
 }
 
 FrameImages images_on(const ocl::Context& context, const DeviceImages& images, shared::ImageSize size) {
-  if (!images.pixels) throw InvalidArgument("enqueue: no images: give a cl_mem");
+  if (!images.pixels == !images.svm_pixels) {
+    throw InvalidArgument(images.pixels ? "enqueue: images as cl_mem and as pointer: give one of them"
+                                        : "enqueue: no images: give a cl_mem, or a pointer of clSVMAlloc");
+  }
+  const std::size_t needed = 2 * pixel_count(size) * (images.type == PixelType::kU8 ? 1 : 2);
+  if (images.svm_pixels) {
+    const cl::Buffer buffer = ocl::buffer_in_svm(context.get(), context.device(), images.svm_pixels, needed);
+    return {ocl::Buffer<cl_uchar>(buffer, needed), images.type};
+  }
   const cl::Buffer buffer(images.pixels, /*retainObject=*/true);
   const std::size_t bytes = buffer.getInfo<CL_MEM_SIZE>();
-  const std::size_t needed = 2 * pixel_count(size) * (images.type == PixelType::kU8 ? 1 : 2);
   if (buffer.getInfo<CL_MEM_CONTEXT>()() != context.get()()) {
     throw InvalidArgument("enqueue: the images are in another context than the queue: create them in the queue's");
   }

@@ -15,11 +15,14 @@
 
 namespace egosgm {
 
-/// A rectified pair in a buffer of the queue's context: the left image, then the right one, rows from top to bottom
+/// A rectified pair in memory of the queue's context: the left image, then the right one, rows from top to bottom
 /// without gaps, 1 or 2 bytes a pixel. Two sub-buffers of it are a way to fill them apart.
 struct DeviceImages {
   cl_mem pixels = nullptr;
   PixelType type = PixelType::kU8;
+  /// In the place of `pixels`: what clSVMAlloc returned in the queue's context (OpenCL 2.0; coarse-grained suffices,
+  /// and is then not mapped while the frame runs). Refused with InvalidArgument where the device has no such memory.
+  const void* svm_pixels = nullptr;
 };
 
 /// What a frame gives, in the pipeline's own buffers: floats, the left view's height x width, then the right view's.

@@ -22,7 +22,7 @@ cl_icd_dispatch layer{};
 std::atomic<int> calls = 0, enqueues = 0, releases = 0;
 int failing = -1;
 enum { kAtOnce = 0, kLater = 1, kRelease = 2 } kind = kAtOnce;
-bool separate_memory = false;
+bool separate_memory = false, svm_is_hidden = false;
 cl_int status = CL_OUT_OF_RESOURCES;
 // EGOSGM_FAILING_CONTEXT=N/M, for programs that do not know of this layer: from command M on, all of context N fail
 // (both from 0), as if its device were lost.
@@ -135,6 +135,7 @@ cl_kernel CL_API_CALL create_kernel(cl_program p, const char* n, cl_int* e) {
 }
 cl_int CL_API_CALL device_info(cl_device_id d, cl_device_info i, size_t n, void* v, size_t* s) {
   if (fails()) return status;
+  if (svm_is_hidden && i == CL_DEVICE_SVM_CAPABILITIES) return CL_INVALID_VALUE;  // as drivers of OpenCL 1.2 do
   const cl_int result = next->clGetDeviceInfo(d, i, n, v, s);
   if (separate_memory && i == CL_DEVICE_HOST_UNIFIED_MEMORY && v) *static_cast<cl_bool*>(v) = CL_FALSE;
   return result;
@@ -280,6 +281,7 @@ extern "C" void fault_arm(int at, int code, int how) {
 }
 extern "C" void fault_forbid_sources(int forbidden) { sources_forbidden = forbidden != 0; }
 extern "C" void fault_separate_memory(int separate) { separate_memory = separate; }
+extern "C" void fault_hide_svm(int hidden) { svm_is_hidden = hidden; }
 extern "C" int fault_releases() { return releases; }
 extern "C" int fault_calls() { return calls; }
 extern "C" int fault_enqueues() { return enqueues; }
@@ -316,6 +318,10 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   layer.clFinish = target->clFinish;
   layer.clCreateUserEvent = [](cl_context c, cl_int* e) { return counted(next->clCreateUserEvent(c, e)); };  // of tests
   layer.clSetUserEventStatus = target->clSetUserEventStatus;
+  layer.clSVMAlloc = target->clSVMAlloc;
+  layer.clSVMFree = target->clSVMFree;
+  layer.clEnqueueSVMMap = target->clEnqueueSVMMap;
+  layer.clEnqueueSVMUnmap = target->clEnqueueSVMUnmap;
   layer.clCreateContext = create_context;
   layer.clCreateCommandQueue = create_queue;
   layer.clCreateBuffer = create_buffer;

@@ -22,6 +22,7 @@ struct FaultLayer {
   void (*arm)(int at, int code, int how);
   void (*forbid_sources)(int forbidden);  // 1: no program can be made of its source from now on
   void (*separate_memory)(int separate);  // 1: devices say from now on that they have memory of their own
+  void (*hide_svm)(int hidden);           // 1: devices do not know shared virtual memory from now on
   int (*calls)();                         // since `arm`: calls that can fail,
   int (*enqueues)();                      // and commands among them
   int (*releases)();                      // and releases beside them
@@ -37,6 +38,7 @@ struct FaultLayer {
     find(layer, "fault_arm", arm);
     find(layer, "fault_forbid_sources", forbid_sources);
     find(layer, "fault_separate_memory", separate_memory);
+    find(layer, "fault_hide_svm", hide_svm);
     find(layer, "fault_calls", calls);
     find(layer, "fault_enqueues", enqueues);
     find(layer, "fault_releases", releases);

@@ -1,0 +1,334 @@
+// SPDX-License-Identifier: Apache-2.0
+// The same bits on the caller's own queue, with images in its buffers or in shared virtual memory.
+#define CL_TARGET_OPENCL_VERSION 200  // for clSVMAlloc
+#define CL_USE_DEPRECATED_OPENCL_1_2_APIS
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "egosgm/error.h"
+#include "egosgm/opencl.h"
+#include "host/ocl/device_handle.h"
+#include "tests/support/expect_refused.h"
+#include "tests/support/fault_layer.h"
+#include "tests/support/short_video.h"
+
+namespace egosgm {
+namespace {
+
+using testing::expect_refused;
+using testing::OutputMemory;
+using testing::Scene;
+using testing::ShortVideo;
+
+std::size_t view_bytes(PixelType type) {
+  return static_cast<std::size_t>(ShortVideo::kSize.width) * ShortVideo::kSize.height *
+         (type == PixelType::kU8 ? 1 : 2);
+}
+
+/// A queue of the test's own, of the preferred device.
+class OwnQueue {
+ public:
+  explicit OwnQueue(cl_command_queue_properties properties = 0) {
+    cl_device_id device = Device::select().handle().device();
+    context_ = clCreateContext(nullptr, 1, &device, nullptr, nullptr, nullptr);
+    queue_ = clCreateCommandQueue(context_, device, properties, nullptr);
+  }
+  ~OwnQueue() {
+    clReleaseCommandQueue(queue_);
+    clReleaseContext(context_);
+  }
+  OwnQueue(const OwnQueue&) = delete;
+  OwnQueue& operator=(const OwnQueue&) = delete;
+
+  cl_command_queue get() const { return queue_; }
+  cl_context context() const { return context_; }
+
+  /// Both views of a frame.
+  cl_mem upload(const ShortVideo& video, int index) const {
+    const std::size_t bytes = view_bytes(video.type());
+    cl_mem pixels = clCreateBuffer(context_, CL_MEM_READ_ONLY, 2 * bytes, nullptr, nullptr);
+    for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
+      clEnqueueWriteBuffer(queue_, pixels, CL_TRUE, view * bytes, bytes, video.image(index, view).data, 0, nullptr,
+                           nullptr);
+    }
+    return pixels;
+  }
+  std::vector<float> view_of(cl_mem maps, int view) const {
+    std::vector<float> values(static_cast<std::size_t>(ShortVideo::kSize.width) * ShortVideo::kSize.height);
+    const std::size_t bytes = values.size() * sizeof(float);
+    clEnqueueReadBuffer(queue_, maps, CL_TRUE, view * bytes, bytes, values.data(), 0, nullptr, nullptr);
+    return values;
+  }
+
+ private:
+  cl_context context_;
+  cl_command_queue queue_;
+};
+
+cl_command_queue_properties queue_properties(const Device& device) {
+  return device.handle().device.getInfo<CL_DEVICE_QUEUE_PROPERTIES>();
+}
+
+class DevicePipelineTest : public ::testing::Test {
+ protected:
+  DevicePipeline pipeline(const OwnQueue& queue, const PipelineOptions& options = ShortVideo::options()) const {
+    const Scene scene(ShortVideo::kSize);
+    return {queue.get(), scene.calibration(), ShortVideo::kSize.width, ShortVideo::kSize.height, options};
+  }
+
+  void expect_same(const OwnQueue& queue, const DeviceMaps& maps, const OutputMemory& expected) const {
+    const auto same = [&](cl_mem map, int view, const std::vector<float>& values) {
+      return testing::same_bits(queue.view_of(map, view), values, ShortVideo::kSize);
+    };
+    EXPECT_TRUE(same(maps.disparity, EGOSGM_LEFT, expected.disparity.values()));
+    EXPECT_TRUE(same(maps.disparity, EGOSGM_RIGHT, expected.right_disparity.values()));
+    EXPECT_TRUE(same(maps.variance, EGOSGM_LEFT, expected.variance.values()));
+    EXPECT_TRUE(same(maps.variance, EGOSGM_RIGHT, expected.right_variance.values()));
+  }
+
+  const testing::FaultLayer layer_{FAULT_LAYER};
+};
+
+TEST_F(DevicePipelineTest, GivesTheBitsOfTheHostsWay) {
+  for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
+    for (const cl_command_queue_properties profiling : {0, CL_QUEUE_PROFILING_ENABLE}) {
+      const ShortVideo video(type);
+      const std::vector<OutputMemory> expected = video.through(Device::select());
+      const OwnQueue queue(profiling);
+      DevicePipeline device = pipeline(queue);
+      for (int index = 0; index < ShortVideo::kFrames; ++index) {
+        cl_mem pixels = queue.upload(video, index);
+        cl_event done = nullptr;
+        const DeviceMaps maps = device.enqueue({pixels, type}, video.motion(index), &done);
+        ASSERT_NE(done, nullptr);
+        EXPECT_EQ(clWaitForEvents(1, &done), CL_SUCCESS);
+        clReleaseEvent(done);
+        EXPECT_EQ(maps.full_range, index == 0);
+        EXPECT_EQ(maps.full_range_reason, index == 0 ? "first frame" : "");
+        expect_same(queue, maps, expected[index]);
+        clReleaseMemObject(pixels);
+      }
+    }
+  }
+}
+
+// All frames are on the queue at once, behind a gate: whatever waited for the device would wait for ever.
+TEST_F(DevicePipelineTest, WaitsForNothingAndCopiesNothing) {
+  const ShortVideo video;
+  const std::vector<OutputMemory> expected = video.through(Device::select());
+  const OwnQueue queue;
+  DevicePipeline device = pipeline(queue);
+  std::vector<cl_mem> pixels;
+  for (int index = 0; index < ShortVideo::kFrames; ++index) pixels.push_back(queue.upload(video, index));
+
+  cl_event gate = clCreateUserEvent(queue.context(), nullptr);
+  clEnqueueBarrierWithWaitList(queue.get(), 1, &gate, nullptr);
+  const long buffers = layer_.buffers_created();
+  const int transfers = layer_.transfers();
+  DeviceMaps maps;
+  for (int index = 0; index < ShortVideo::kFrames; ++index) {
+    maps = device.enqueue({pixels[index], PixelType::kU8}, video.motion(index));
+  }
+  EXPECT_EQ(layer_.buffers_created(), buffers);
+  EXPECT_EQ(layer_.transfers(), transfers);
+  clSetUserEventStatus(gate, CL_COMPLETE);
+  expect_same(queue, maps, expected.back());
+  clReleaseEvent(gate);
+  for (cl_mem memory : pixels) clReleaseMemObject(memory);
+}
+
+TEST_F(DevicePipelineTest, FramesOfTheHostGoInBetween) {
+  const ShortVideo video;
+  const std::vector<OutputMemory> expected = video.through(Device::select());
+  const OwnQueue queue;
+  DevicePipeline device = pipeline(queue);
+  for (int round = 0; round < 2; ++round) {
+    for (int index = 0; index < ShortVideo::kFrames; ++index) {
+      if (index % 2 == round) {
+        OutputMemory outputs(ShortVideo::kSize);
+        device.host().process(video.image(index, EGOSGM_LEFT), video.image(index, EGOSGM_RIGHT), video.motion(index),
+                              outputs.views());
+        EXPECT_TRUE(same_outputs(outputs, expected[index], ShortVideo::kSize)) << index;
+      } else {
+        cl_mem pixels = queue.upload(video, index);
+        expect_same(queue, device.enqueue({pixels, PixelType::kU8}, video.motion(index)), expected[index]);
+        clReleaseMemObject(pixels);
+      }
+    }
+    device.host().reset();
+  }
+}
+
+TEST_F(DevicePipelineTest, GoesOnAfterAFrameThatFailed) {
+  const ShortVideo video;
+  const std::vector<OutputMemory> expected = video.through(Device::select());
+  const OwnQueue queue;
+  DevicePipeline device = pipeline(queue);
+  std::vector<cl_mem> pixels;
+  for (int index = 0; index < ShortVideo::kFrames; ++index) pixels.push_back(queue.upload(video, index));
+  const auto enqueue = [&](int index) { return device.enqueue({pixels[index], PixelType::kU8}, video.motion(index)); };
+
+  layer_.disarm();
+  enqueue(0);
+  const int enqueues = layer_.enqueues();
+  device.host().reset();
+  enqueue(0);
+  for (int at = 0; at < enqueues; at += 7) {  // at once: the frame never was
+    layer_.arm(at, CL_OUT_OF_RESOURCES, 0);
+    EXPECT_THROW(for (;;) enqueue(1), DeviceError) << at;
+    layer_.disarm();
+    device.host().reset();
+    expect_same(queue, enqueue(0), expected[0]);
+    expect_same(queue, enqueue(1), expected[1]);
+    device.host().reset();
+    enqueue(0);
+  }
+  for (const bool asks_for_the_end : {false, true}) {  // on the device: the next frame says so
+    layer_.arm(5, CL_OUT_OF_RESOURCES, 1);
+    cl_event done = nullptr;
+    try {
+      device.enqueue({pixels[1], PixelType::kU8}, video.motion(1), asks_for_the_end ? &done : nullptr);
+      layer_.disarm();
+      clFinish(queue.get());
+      EXPECT_THROW(enqueue(2), DeviceError);
+    } catch (const DeviceError&) {  // it was quick, so the frame never was
+      EXPECT_TRUE(asks_for_the_end);
+      device.host().reset();
+    }
+    layer_.disarm();
+    if (done) {
+      EXPECT_NE(clWaitForEvents(1, &done), CL_SUCCESS);
+      clReleaseEvent(done);
+    }
+  }
+  for (int index = 0; index < ShortVideo::kFrames; ++index) {
+    const DeviceMaps maps = enqueue(index);
+    EXPECT_EQ(maps.full_range_reason, index == 0 ? "reset" : "");
+    expect_same(queue, maps, expected[index]);
+  }
+  for (cl_mem memory : pixels) clReleaseMemObject(memory);
+}
+
+TEST_F(DevicePipelineTest, KeepsNothingOfTheCallers) {
+  const ShortVideo video;
+  const long before = layer_.references();
+  {
+    const OwnQueue queue;
+    DevicePipeline device = pipeline(queue);
+    cl_mem pixels = queue.upload(video, 0);
+    device.enqueue({pixels, PixelType::kU8}, std::nullopt);
+    clReleaseMemObject(pixels);
+  }
+  EXPECT_EQ(layer_.references(), before);
+}
+
+TEST_F(DevicePipelineTest, RefusesWhatDoesNotFit) {
+  const ShortVideo video;
+  const OwnQueue queue, other;
+  const Calibration any{.fx = 9, .fy = 9, .cx = 3, .cy = 3, .baseline_m = 1};
+  expect_refused([&] { DevicePipeline(nullptr, any, 8, 8); }, {"no queue"});
+  if (queue_properties(Device::select()) & CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE) {
+    const OwnQueue disordered(CL_QUEUE_OUT_OF_ORDER_EXEC_MODE_ENABLE);
+    expect_refused([&] { DevicePipeline(disordered.get(), any, 8, 8); }, {"out of order"});
+  }
+  expect_refused([&] { DevicePipeline(queue.get(), any, 8, 8, {}, "no such folder"); },
+                 {"no such folder/manifest.json"});
+  DevicePipeline device = pipeline(queue);
+  expect_refused([&] { device.enqueue({}, std::nullopt); }, {"no images"});
+  cl_mem pixels = other.upload(video, 0);
+  expect_refused([&] { device.enqueue({pixels, PixelType::kU8}, std::nullopt); }, {"another context"});
+  clReleaseMemObject(pixels);
+  pixels = queue.upload(video, 0);
+  expect_refused(
+      [&] {
+        device.enqueue({pixels, PixelType::kU16}, std::nullopt);
+      },
+      {"15494 bytes", "needs 30988", "left image, then right image"});
+  Motion bad;
+  bad.current_from_previous.translation().x() = std::nan("");
+  expect_refused([&] { device.enqueue({pixels, PixelType::kU8}, bad); }, {"otion"});
+  device.host().submit(video.image(0, EGOSGM_LEFT), video.image(0, EGOSGM_RIGHT), std::nullopt, {});
+  expect_refused([&] { device.enqueue({pixels, PixelType::kU8}, std::nullopt); }, {"collect it first"});
+  device.host().collect();
+  clReleaseMemObject(pixels);
+}
+
+/// Shared virtual memory, until the end of its scope; coarse-grained.
+class SvmMemory {
+ public:
+  SvmMemory(const OwnQueue& queue, std::size_t bytes)
+      : queue_(queue), bytes_(bytes), data_(clSVMAlloc(queue.context(), CL_MEM_READ_ONLY, bytes, 0)) {}
+  ~SvmMemory() {
+    clFinish(queue_.get());
+    clSVMFree(queue_.context(), data_);
+  }
+  SvmMemory(const SvmMemory&) = delete;
+  SvmMemory& operator=(const SvmMemory&) = delete;
+
+  const void* get() const { return data_; }
+  void write(const ShortVideo& video, int index) {
+    clEnqueueSVMMap(queue_.get(), CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, data_, bytes_, 0, nullptr, nullptr);
+    const std::size_t bytes = view_bytes(video.type());
+    for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
+      std::memcpy(static_cast<char*>(data_) + view * bytes, video.image(index, view).data, bytes);
+    }
+    clEnqueueSVMUnmap(queue_.get(), data_, 0, nullptr, nullptr);
+  }
+
+ private:
+  const OwnQueue& queue_;
+  std::size_t bytes_;
+  void* data_;
+};
+
+bool has_svm(const Device& device) {
+  cl_device_svm_capabilities capabilities = 0;
+  clGetDeviceInfo(device.handle().device(), CL_DEVICE_SVM_CAPABILITIES, sizeof capabilities, &capabilities, nullptr);
+  return capabilities & CL_DEVICE_SVM_COARSE_GRAIN_BUFFER;
+}
+
+TEST_F(DevicePipelineTest, SharedVirtualMemoryGivesTheBitsOfTheHostsWay) {
+  if (!has_svm(Device::select())) GTEST_SKIP() << "the device has no shared virtual memory";
+  for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
+    const ShortVideo video(type);
+    const std::vector<OutputMemory> expected = video.through(Device::select());
+    const OwnQueue queue;
+    DevicePipeline device = pipeline(queue);
+    SvmMemory pixels(queue, 2 * view_bytes(type));
+    for (int index = 0; index < ShortVideo::kFrames; ++index) {
+      pixels.write(video, index);
+      const int transfers = layer_.transfers();
+      const DeviceMaps maps = device.enqueue({.type = type, .svm_pixels = pixels.get()}, video.motion(index));
+      EXPECT_EQ(layer_.transfers(), transfers);
+      expect_same(queue, maps, expected[index]);
+    }
+  }
+}
+
+TEST_F(DevicePipelineTest, RefusesWhatIsNoSharedVirtualMemory) {
+  const OwnQueue queue;
+  DevicePipeline device = pipeline(queue);
+  const std::vector<std::uint8_t> plain(2 * view_bytes(PixelType::kU8));
+  const auto expect_not_enqueued = [&](const DeviceImages& images, const std::vector<std::string>& named) {
+    layer_.disarm();  // counts from here
+    expect_refused([&] { device.enqueue(images, std::nullopt); }, named);
+    EXPECT_EQ(layer_.enqueues(), 0);
+  };
+  layer_.hide_svm(1);
+  expect_not_enqueued({.svm_pixels = plain.data()},
+                      {Device::select().info().name, "no shared virtual memory", "cl_mem"});
+  layer_.hide_svm(0);
+  if (!has_svm(Device::select())) GTEST_SKIP() << "the device has no shared virtual memory";
+  expect_not_enqueued({.svm_pixels = plain.data()}, {"not what clSVMAlloc returned"});
+  const SvmMemory small(queue, plain.size() - 1), enough(queue, plain.size());
+  expect_not_enqueued({.svm_pixels = small.get()}, {"fewer bytes than the 15494", "left image, then right image"});
+  cl_mem pixels = queue.upload(ShortVideo(), 0);
+  expect_not_enqueued({.pixels = pixels, .svm_pixels = enough.get()}, {"give one of them"});
+  clReleaseMemObject(pixels);
+  EXPECT_TRUE(device.enqueue({.svm_pixels = enough.get()}, std::nullopt).full_range);
+}
+
+}  // namespace
+}  // namespace egosgm
