@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <iterator>
 #include <memory>
 #include <mutex>
@@ -14,6 +15,7 @@
 #include "apps/batch_queue.h"
 #include "apps/batch_report.h"
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "apps/device_arguments.h"
 #include "apps/energy_meter.h"
 #include "apps/interrupt.h"
@@ -192,7 +194,7 @@ class Batch {
     work.frames += frames;
     work.seconds += seconds;
     ++done_;
-    tell(fmt::format("{}: {} frames, {:.1f} frames/s, {}", entries_[number].name, frames, frames / seconds,
+    tell(fmt::format("{}: {}, {:.1f} frames/s, {}", entries_[number].name, counted(frames, "frame"), frames / seconds,
                      devices_[device].info().name));
   }
 
@@ -242,16 +244,24 @@ class Batch {
   BatchQueue queue_;
 };
 
-std::string figure(const Json& value, const char* unit) {
-  return value.is_number() ? fmt::format("{:.3f} {}", value.get<double>(), unit) : "-";
+std::string figure(const Json& value, const char* unit, const char* none = "-") {
+  return value.is_number() ? fmt::format("{:.3f} {}", value.get<double>(), unit) : none;
+}
+
+void print_timing(const Json& timing) {
+  fmt::print("{} in {:.1f} s: {:.2f} frames/s, {:.2f} a compute unit; energy a frame: CPU {}, GPU {}\n",
+             counted(timing["frames"].get<std::size_t>(), "frame"), timing["wall_seconds"].get<double>(),
+             timing["frames_per_second"].get<double>(), timing["frames_per_second_per_compute_unit"].get<double>(),
+             figure(timing["cpu_joules_per_frame"], "J", "not told"),
+             figure(timing["gpu_joules_per_frame"], "J", "not told"));
 }
 
 void print_report(const Json& report, const std::filesystem::path& file) {
-  fmt::print("{} sequences, {} frames", report["sequences_done"].get<std::int64_t>(),
-             report["frames"].get<std::int64_t>());
+  fmt::print("{}, {}", counted(report["sequences_done"].get<std::size_t>(), "sequence"),
+             counted(report["frames"].get<std::size_t>(), "frame"));
   for (const char* kind : {"noc", "occ"}) {
     const Json& pooled = report["pooled"][kind];
-    if (pooled["bad_or_missing"].is_null()) continue;
+    if (std::isnan(pooled["bad_or_missing"].get<double>())) continue;  // no truth
     fmt::print("; {}: bad or missing {}, interpolated {}", kind, figure(pooled["bad_or_missing"], "%"),
                figure(pooled["interpolated"], "%"));
   }
@@ -296,8 +306,8 @@ std::filesystem::path timing_file(const BatchArguments& arguments, const Shard& 
 
 int report_shard(const Shard& shard, const std::vector<BatchEntry>& failed) {
   if (failed.empty()) return kOk;
-  fmt::print(stderr, "egosgm: error: {} sequences of shard {}/{} failed, the first is {}: see its failed.json\n",
-             failed.size(), shard.index, shard.count, failed.front().name);
+  fmt::print(stderr, "egosgm: error: {} of shard {}/{} failed, the first is {}: see its failed.json\n",
+             counted(failed.size(), "sequence"), shard.index, shard.count, failed.front().name);
   return kFailed;
 }
 
@@ -319,8 +329,10 @@ int batch(const BatchArguments& arguments) {
     catch_interrupts();
     Batch batch(arguments, left, folder, options, devices);
     if (!batch()) return kInterrupted;
+    const Json timing = batch.timing();
     vision::write_file(timing_file(arguments, shard),
-                       batch.timing().dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
+                       timing.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
+    if (!arguments.quiet) print_timing(timing);
   }
   return shard.count == 1 ? report_all(arguments, entries, folder) : report_shard(shard, not_done(part, folder));
 }

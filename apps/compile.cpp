@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "apps/device_arguments.h"
 #include "apps/option_arguments.h"
 #include "egosgm/programs.h"
@@ -25,7 +26,7 @@ int compile(const CompileArguments& arguments) {
   const std::filesystem::path folder = arguments.out;
   vision::make_folder(folder);
   for (const ProgramFile& file : files) vision::write_file(folder / file.name, file.bytes);  // the manifest last
-  fmt::print("{} programs for {}: {}\n", files.size() - 1, device.info().name, folder.string());
+  fmt::print("{} for {}: {}\n", counted(files.size() - 1, "program"), device.info().name, folder.string());
   return kOk;
 }
 

@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "apps/frame_times.h"
 #include "apps/pair_matches.h"
 #include "apps/sequence_arguments.h"
@@ -71,7 +72,7 @@ class Doctor {
     check_images();
     check_calibration();
     if (samples_.matches.size() < kFewestMatches) {
-      problem("matches", fmt::format("only {} points were found in both images", samples_.matches.size()),
+      problem("matches", fmt::format("only {} found in both images", counted(samples_.matches.size(), "point")),
               "give the left and right images of the same moments, sharp, and overlapping");
     } else {
       check_rows();
@@ -110,7 +111,7 @@ class Doctor {
   }
 
   void check_images() {
-    const std::string text = fmt::format("{} pairs of {}x{}, {} bit", sequence_.frames.size(), size_.width,
+    const std::string text = fmt::format("{} of {}x{}, {} bit", counted(sequence_.frames.size(), "pair"), size_.width,
                                          size_.height, samples_.depth_bits);
     const double ratio = (samples_.left_brightness + 1) / (samples_.right_brightness + 1);
     if (std::max(ratio, 1 / ratio) <= kMaxBrightness) return fine("images", text);
@@ -145,8 +146,8 @@ class Doctor {
     for (const double error : samples_.row_error) rest.push_back(std::abs(error - offset));
     const double spread = quantile(rest, 0.9);
     const std::string text = fmt::format(
-        "vertical misalignment {:.2f} px in the median, 90 % within {:.2f} px of it ({} points in {} frames){}", offset,
-        spread, samples_.matches.size(), samples_.frames, slope_text(offset, spread));
+        "vertical misalignment {:.2f} px in the median, 90 % within {:.2f} px of it ({} in {}){}", offset, spread,
+        counted(samples_.matches.size(), "point"), counted(samples_.frames, "frame"), slope_text(offset, spread));
     if (std::abs(offset) > kMaxOffset_px || spread > kMaxSpread_px) {
       return problem("rows", text,
                      fmt::format("{:.1f} px: rectify again (egosgm rectify, from the raw images and a new calibration)",
@@ -236,11 +237,12 @@ class Doctor {
                      text + fmt::format(", but after frame {} the time goes back by {:.4g} s", before, -steps[first]),
                      "sort the frames by time, and drop those that came twice");
     }
-    problem("times",
-            text + fmt::format(", but {} gap{}, the first of {:.4g} s after frame {}", gaps, gaps == 1 ? "" : "s",
-                               steps[first], before),
-            fmt::format("record without dropping frames, or run the parts alone: --frames :{} and --frames {}:",
-                        after - 1, after));
+    problem(
+        "times",
+        text +
+            fmt::format(", but {}, the first of {:.4g} s after frame {}", counted(gaps, "gap"), steps[first], before),
+        fmt::format("record without dropping frames, or run the parts alone: --frames :{} and --frames {}:", after - 1,
+                    after));
   }
 
   const vision::StereoSequence& sequence_;
@@ -290,9 +292,7 @@ int examine(const DoctorArguments& arguments) {
   const auto problems =
       std::count_if(findings.begin(), findings.end(), [](const Finding& f) { return f.verdict == Verdict::kProblem; });
   if (!arguments.json) {
-    fmt::print("{}\n", problems == 0   ? "No problem was found."
-                       : problems == 1 ? "1 problem was found."
-                                       : fmt::format("{} problems were found.", problems));
+    fmt::print("{} found.\n", problems == 0 ? "No problem was" : counted(problems, "problem"));
   }
   return problems == 0 ? kOk : kBadInput;
 }

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "apps/metrics_json.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
@@ -107,8 +108,8 @@ int evaluate(const EvalArguments& arguments) {
     print_row("mean", vision::mean_of(each));
   }
   if (!found.without_estimate.empty()) {
-    fmt::print("{} truth file{} without an estimate, the first is {}\n", found.without_estimate.size(),
-               found.without_estimate.size() == 1 ? "" : "s", found.without_estimate.front().string());
+    fmt::print("{} without an estimate, the first is {}\n", counted(found.without_estimate.size(), "truth file"),
+               found.without_estimate.front().string());
   }
   return kOk;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
@@ -56,7 +57,7 @@ Json json_of(const vision::PoseEvaluation& e) {
 }
 
 void print(const vision::PoseEvaluation& e) {
-  fmt::print("{} frames, {:.1f} m\n", e.motions.size() + 1, e.path_length_m);
+  fmt::print("{}, {:.1f} m\n", counted(e.motions.size() + 1, "frame"), e.path_length_m);
   fmt::print("frame to frame   {:.4f} m  {:.4f} deg (mean), {:.4f} m  {:.4f} deg (root mean square)\n",
              e.translation_mean_m, e.rotation_mean_rad * kDegrees, e.translation_rmse_m,
              e.rotation_rmse_rad * kDegrees);

@@ -11,6 +11,7 @@
 #include <opencv2/videoio.hpp>
 #include <sstream>
 
+#include "apps/counted.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 
@@ -216,7 +217,7 @@ std::unique_ptr<RawPairs> open_euroc(const fs::path& mav0) {
   if (pairs.empty()) throw InvalidArgument(mav0.string() + ": cam0 and cam1 have no time stamp in common");
   const std::size_t alone = left.size() + right.size() - 2 * pairs.size();
   return std::make_unique<Listed>(
-      std::move(pairs), alone > 0 ? fmt::format("{} images without their other one were left out", alone) : "");
+      std::move(pairs), alone > 0 ? fmt::format("{} without the other one left out", counted(alone, "image")) : "");
 }
 
 }  // namespace

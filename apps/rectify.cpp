@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "apps/interrupt.h"
 #include "apps/progress.h"
 #include "apps/raw_pairs.h"
@@ -161,7 +162,7 @@ int rectify(const RectifyArguments& arguments) {
   folder.finish(rectifier);
   if (!arguments.quiet) {
     const Calibration& c = rectifier.calibration();
-    fmt::print("{} pairs in {}: fx {:.2f} px, baseline {:.4f} m{}\n", folder.frames(), arguments.out, c.fx,
+    fmt::print("{} in {}: fx {:.2f} px, baseline {:.4f} m{}\n", counted(folder.frames(), "pair"), arguments.out, c.fx,
                c.baseline_m, rectifier.rectifies() ? "" : "; they were rectified already");
     if (const auto& rectification = rectifier.rectification()) {
       fmt::print("valid: left {}, right {} (valid.png has the left one's pixels)\n",

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "apps/device_arguments.h"
 #include "apps/earlier_run.h"
 #include "apps/interrupt.h"
@@ -190,7 +191,7 @@ class Run {
     report_.write(folder_ / "report.json", finished, why_not);
     if (trace_) trace_->write();
     if (!finished || quiet_) return;
-    fmt::print("{}, {} frames, {}x{}, on {}\n", sequence_.title, poses_.size(), size_.width, size_.height,
+    fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
                pipeline_.device().info().name);
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
                100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.string());

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "apps/progress.h"
 #include "egosgm/vision/synthetic.h"
 
@@ -23,8 +24,8 @@ int render(const SynthArguments& arguments) {
     });
   }
   if (!arguments.quiet) {
-    fmt::print("{} frames in {}: egosgm run --odometry {} --out OUT\n", arguments.options.frames, arguments.out,
-               arguments.out);
+    fmt::print("{} in {}: egosgm run --odometry {} --out OUT\n", counted(arguments.options.frames, "frame"),
+               arguments.out, arguments.out);
   }
   return kOk;
 }

@@ -4,6 +4,7 @@ EGOSGM_FAULT_LAYER: the OpenCL layer that fails."""
 import json
 import math
 import os
+import re
 import shutil
 import signal
 import struct
@@ -11,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from program_test import PROGRAM, ProgramTest, egosgm
+from program_test import PROGRAM, SOURCE, ProgramTest, egosgm
 
 LAYER = os.environ["EGOSGM_FAULT_LAYER"]
 SEQUENCES = 4
@@ -123,6 +124,12 @@ class Batch(BatchTest):
             truth += pixels
         self.assertAlmostEqual(report["pooled"]["noc"]["bad_or_missing"], bad / truth, places=9)
 
+    def test_without_truth_there_are_no_metrics(self):
+        plain, out, s0 = self.new_folder() / "list.txt", self.new_folder(), self.folder / "s0"
+        plain.write_text(f"plain --left {s0}/image_0/%06d.png --right {s0}/image_1/%06d.png --calib {s0}/calib.txt --frames 0\n")
+        text = self.assert_works("batch", plain, "--out", out, "--programs", self.programs, *METHOD)
+        self.assertIn("\n1 sequence, 1 frame: ", text)
+
     def test_devices_share_the_sequences(self):
         out = self.new_folder()
         text = self.assert_works(*self.batch(out, "--devices", self.two_devices()))
@@ -130,7 +137,12 @@ class Batch(BatchTest):
         self.assert_same(out)
         self.assertEqual([d["name"][-2:] for d in self.timing(out)["devices"]], ["/0", "/1"])
         self.assertEqual(sum(d["sequences"] for d in self.timing(out)["devices"]), SEQUENCES)
-        self.assertEqual(self.timing(out)["frames"], 11)
+        timing = self.timing(out)
+        self.assertEqual(timing["frames"], 11)
+        self.assertAlmostEqual(timing["frames_per_second_per_compute_unit"] * 2, timing["frames_per_second"])
+        for meter in ("cpu", "gpu"):  # where the machine has none, it says so
+            joules = timing[f"{meter}_joules_per_frame"]
+            self.assertIn(f"{meter.upper()} " + ("not told" if joules is None else f"{joules:.3f} J"), text)
 
     def test_shards_by_argument_slurm_and_kubernetes_merge_to_one_report(self):
         out = self.new_folder()
@@ -149,6 +161,21 @@ class Batch(BatchTest):
         self.assertEqual(self.timing(out, "timing-0-of-2")["frames"], 3)  # street-2 was done
         self.assert_works(*self.batch(out, "--shard", "3/4"))
         self.assert_works(*merge)
+        self.assert_same(out)
+
+    def test_the_pods_of_the_kubernetes_manifest_merge_to_one_report(self):
+        """Its command, once for each index, with the folder in the place of the volume."""
+        manifest, out = (SOURCE / "examples/cluster/batch.yaml").read_text(), self.new_folder()
+        pods = int(re.search(r"completions: (\d+)", manifest)[1])
+        command = json.loads(re.search(r"command: (\[.*\])", manifest)[1])
+        self.assertEqual(int(command[command.index("--shards") + 1]), pods)
+        place = {"egosgm": PROGRAM, "/data/list.txt": str(self.list), "/data/results": str(out)}
+        self.assertTrue(place.keys() <= set(command))
+        for index in range(pods):
+            done = subprocess.run([*(place.get(word, word) for word in command), "--programs", self.programs, *map(str, METHOD)],
+                                  capture_output=True, text=True, timeout=240, env=dict(os.environ, JOB_COMPLETION_INDEX=str(index)))
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assert_works(*self.batch(out, "--merge", "--quiet"))
         self.assert_same(out)
 
     def test_what_is_done_is_not_done_again(self):

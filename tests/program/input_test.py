@@ -102,6 +102,8 @@ class Doctor(InputTest):
         text = self.assert_works("doctor", "--odometry", self.street)
         self.assertTrue(text.endswith("No problem was found.\n"))
         self.assertIn("baseline 0.54 m", text)
+        self.assertIn(f" {FRAMES} pairs of ", text)
+        self.assertIn(" 1 pair of ", self.assert_works("doctor", "--odometry", self.street, "--frames", "0"))
 
     def shifted(self, shift_px):
         street = self.broken_street()

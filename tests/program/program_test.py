@@ -448,6 +448,8 @@ class View(ProgramTest):
         headless = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
         view = ["view", "--odometry", self.street]
         self.assert_refused(view, "--video", "--pictures", env=headless)
+        for name in ("DISPLAY", "WAYLAND_DISPLAY"):  # a display that is not there
+            self.assert_refused(view, f":77777 ({name})", "--video", "--pictures", env={**headless, name: ":77777"})
         self.assert_refused([*view, "--video", self.folder / "street.mkv"], ".mp4 or .avi")
         self.assert_refused([*view, "--pictures", self.folder / "p", "--fps", 0], "--fps 0")
         self.assert_refused([*view, "--pictures", self.folder / "p", "--cell-width", 0], "1..32768")
