@@ -102,7 +102,8 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
     : BandedSgm(context, size, range, options, group, Tile()) {}
 
 BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-                     const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile)
+                     const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile,
+                     Launches launches)
     : context_((context.enter("BandedSgm"), context)),
       size_{size.width, rows_at_once(context, size, range, options)},
       stripes_(cut_into_stripes(size.height, size_.height, kStripeOverlap)),
@@ -115,7 +116,8 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.s_max,
                   options.variance_floor_px2,
                   options.variance_per_step_px2,
-                  options.variance_per_square_px2} {
+                  options.variance_per_square_px2},
+      launches_(launches) {
   if (follows_paths(context, options.scheduling)) {
     paths_.emplace(context, size_, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
   } else {
@@ -153,21 +155,28 @@ void BandedSgm::sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMap
   const Tile tile = wavefront.tile;
   const int tile_rows = ceil_div(size_.height, tile.height);
   const int tile_columns = ceil_div(size_.width + tile.height, tile.width) + 1;
-  const int waves = tile_columns + 2 * (tile_rows - 1);
-  const ocl::Range tiles{cl::NDRange(tile_rows, views), cl::NDRange(1, 1)};
+  const bool is_whole = takes_whole_views(views);
+  const ocl::Range tiles{cl::NDRange(is_whole ? 1 : tile_rows, views), cl::NDRange(1, 1)};
+  const int first_wave = is_whole ? EGOSGM_ALL_TILES : 0;
+  const int end_wave = is_whole ? EGOSGM_ALL_TILES + 1 : tile_columns + 2 * (tile_rows - 1);
 
   wavefront.slots.fill(context_, 255);
-  for (cl_int wave = 0; wave < waves; ++wave) {
+  for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.forward(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands, inputs.cell_offsets,
                       inputs.penalties, wavefront.slots, wavefront.sums);
   }
   wavefront.slots.fill(context_, 255);
-  for (cl_int wave = 0; wave < waves; ++wave) {
+  for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.backward(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands,
                        inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners);
   }
   wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters_,
                    wavefront.winners, measured.disparity, measured.variance);
+}
+
+bool BandedSgm::takes_whole_views(int views) const {
+  if (launches_ != Launches::kAutomatic) return launches_ == Launches::kViews;
+  return context_.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(views);
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {

@@ -26,12 +26,17 @@ class BandedSgm {
     int width = kCpuTuning.tile_width, height = kCpuTuning.tile_height;
   };
 
-  /// `group`: how paths share work-groups, where they do; by default what suits the device. `tile`: where they do not.
-  /// Same bits.
+  /// Of the wavefronts: one for every wave of tiles, or one a sweep, whose work-items take a view each and wait for
+  /// nobody. Automatic: the latter where the device has no more compute units than there are views.
+  enum class Launches { kAutomatic, kWaves, kViews };
+
+  /// `group`: how paths share work-groups, where they do; by default what suits the device. `tile`, `launches`: where
+  /// they do not. Same bits.
   BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
             const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group = {});
   BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-            const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile);
+            const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile,
+            Launches launches = Launches::kAutomatic);
 
   /// Rows around a stripe from which paths come into it.
   static constexpr int kStripeOverlap = 32;
@@ -72,11 +77,13 @@ class BandedSgm {
 
   void match(const MatchInputs& inputs, StereoMaps& measured, int views);
   void sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMaps& measured, int views);
+  bool takes_whole_views(int views) const;
 
   ocl::Context& context_;
   const shared::ImageSize size_;  // of what is matched at once: the image, or a stripe
   const std::vector<Stripe> stripes_;
   const shared::SgmParameters parameters_;
+  const Launches launches_;
   std::optional<StripeMemory> stripe_memory_;  // where there is more than one
   std::optional<Wavefront> wavefront_;         // one of the two
   std::optional<BandedSgmPaths> paths_;

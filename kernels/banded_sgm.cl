@@ -5,7 +5,8 @@
 // left, above and the upper right. The other four are the same sweep over the image turned by 180 degrees. So two
 // sweeps do it all. In a sweep, a pixel needs the one before it and three of the row above; tiles skewed by a column a
 // row need the tiles to the left, above and to the upper right, so all tiles (i, j) with j + 2 i = wave run at once: a
-// launch a wave, a work-item a tile.
+// launch a wave, a work-item a tile. Where a device has no more compute units than there are views, a work-item takes
+// all tiles of a view, row by row, and nobody waits.
 //
 // Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d
 // +- 1) + P1, P2(p, q)), which is the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of
@@ -237,14 +238,9 @@ inline int ranked(const ushort16 totals) {
   return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane));
 }
 
-inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns,
-                  global const uint* all_codes, global const Band* bands, global const uint* offsets,
-                  global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners) {
-  const int tile_y = get_global_id(0);
-  const int view = get_global_id(1);
-  const int tile_x = wave - 2 * tile_y;
-  if (tile_x < 0 || tile_x >= tile_columns) return;
-
+inline void sweep_tile(const bool backward, const SgmParameters q, const int tile_x, const int tile_y, const int view,
+                       global const uint* all_codes, global const Band* bands, global const uint* offsets,
+                       global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners) {
   const int width = q.width, height = q.height;
   const size_t first_pixel = (size_t)view * width * height;
   global const Code* codes = (global const Code*)all_codes;
@@ -400,6 +396,23 @@ inline void sweep(const bool backward, const SgmParameters q, const int wave, co
     // Apart from the sweep, whose pixels wait for each other: these do not.
     if (backward) {
       for (int x = from; x < to; ++x) winners[row_start + width - 1 - x] = winner_of(q, &candidates[x - from]);
+    }
+  }
+}
+
+// The tile of a wave in this work-item's row of tiles, or all tiles of its view.
+inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns,
+                  global const uint* all_codes, global const Band* bands, global const uint* offsets,
+                  global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners) {
+  const int view = get_global_id(1);
+  const bool all = wave == EGOSGM_ALL_TILES;
+  const int first_row = get_global_id(0);
+  const int end_row = all ? (q.height + TILE_HEIGHT - 1) / TILE_HEIGHT : first_row + 1;
+  for (int tile_y = first_row; tile_y < end_row; ++tile_y) {
+    const int tile_of_wave = wave - 2 * tile_y;
+    const int first = all ? 0 : max(tile_of_wave, 0), end = all ? tile_columns : min(tile_of_wave + 1, tile_columns);
+    for (int tile_x = first; tile_x < end; ++tile_x) {
+      sweep_tile(backward, q, tile_x, tile_y, view, all_codes, bands, offsets, penalties, slots, sums, winners);
     }
   }
 }

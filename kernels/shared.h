@@ -37,6 +37,9 @@ typedef float f32;
 // Predictions are summed up over blocks of this many pixels a side, for the bands of pixels without one.
 #define EGOSGM_BLOCK 8
 
+// In place of a wave of tiles: BandedSgm's work-items take a view each, with all of its tiles.
+#define EGOSGM_ALL_TILES (-1)
+
 // CoarseMatch takes this many pixels a side for one.
 #define EGOSGM_COARSE 4
 // SearchBand looks at a block's coarse pixels and the ones around them, and believes this many that have a disparity.

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
 #include <random>
 
@@ -24,6 +25,7 @@ struct Case {
   bool banded = true;
   Scheduling scheduling = Scheduling::kWavefront;
   std::optional<BandedSgmPaths::Group> group = {};
+  BandedSgm::Launches launches = BandedSgm::Launches::kWaves;
 };
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
@@ -83,7 +85,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
   const int padding = BandedSgm::code_padding(c.range);
   m.options = {.cost = c.cost, .paths = c.paths, .scheduling = c.scheduling, .max_memory_mib = max_memory_mib};
   SearchBand band(context, c.size, c.range, {.min_half_width_px = 1});
-  BandedSgm sgm(context, c.size, c.range, m.options, c.group);
+  BandedSgm sgm(context, c.size, c.range, m.options, c.group, {}, c.launches);
   const auto padded = reference::padded_codes(c.size, m.codes[0], m.codes[1], padding, c.cost);
   ocl::Buffer<cl_uint> device_codes(context, padded.size());
   device_codes.write(context, {padded.begin(), padded.end()});
@@ -248,16 +250,16 @@ const std::vector<Case> kFullRange{{.size = {1, 1}, .range = {0, 16}, .banded = 
                                    {.size = {320, 97}, .range = {0, 16}, .banded = false},
                                    {.size = {127, 33}, .range = {0, 64}, .paths = 4, .banded = false}};
 
-/// The same cases along paths; the largest is left to the wavefronts, work-items of a CPU being slow at this.
-std::vector<Case> along_paths(const std::vector<Case>& cases) {
-  std::vector<Case> found;
-  for (Case c : cases) {
-    if (pixel_count(c.size) > 100000) continue;
-    c.scheduling = Scheduling::kPaths;
-    found.push_back(c);
-  }
-  return found;
+/// The same cases but for the largest, which is left to one way.
+template <typename Change>
+std::vector<Case> changed(std::vector<Case> cases, Change change) {
+  std::erase_if(cases, [](const Case& c) { return pixel_count(c.size) > 100000; });
+  std::for_each(cases.begin(), cases.end(), change);
+  return cases;
 }
+
+void along_paths(Case& c) { c.scheduling = Scheduling::kPaths; }
+void view_by_view(Case& c) { c.launches = BandedSgm::Launches::kViews; }
 
 /// Groups of other shapes than the default: single work-items, paths that do not share out evenly, more lanes than
 /// quads, a minimum in one, two and three steps.
@@ -276,8 +278,10 @@ std::vector<Case> in_groups() {
 using ::testing::ValuesIn;
 INSTANTIATE_TEST_SUITE_P(Banded, BandedSgmTest, ValuesIn(kBanded), name);
 INSTANTIATE_TEST_SUITE_P(FullRange, BandedSgmTest, ValuesIn(kFullRange), name);
-INSTANTIATE_TEST_SUITE_P(BandedPaths, BandedSgmTest, ValuesIn(along_paths(kBanded)), name);
-INSTANTIATE_TEST_SUITE_P(FullRangePaths, BandedSgmTest, ValuesIn(along_paths(kFullRange)), name);
+INSTANTIATE_TEST_SUITE_P(BandedViews, BandedSgmTest, ValuesIn(changed(kBanded, view_by_view)), name);
+INSTANTIATE_TEST_SUITE_P(FullRangeViews, BandedSgmTest, ValuesIn(changed(kFullRange, view_by_view)), name);
+INSTANTIATE_TEST_SUITE_P(BandedPaths, BandedSgmTest, ValuesIn(changed(kBanded, along_paths)), name);
+INSTANTIATE_TEST_SUITE_P(FullRangePaths, BandedSgmTest, ValuesIn(changed(kFullRange, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(GroupedPaths, BandedSgmTest, ValuesIn(in_groups()), name);
 
 }  // namespace
