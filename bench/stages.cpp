@@ -92,6 +92,7 @@ class Chain {
     belief_.disparity.write(context, street.disparity);
     belief_.variance.write(context, street.variance);
     full_band_.full_range();
+    predicted_.variance = filled_.variance = rejected_.variance = warped_.variance;  // taken over, run after run
     for (int pass = 0; pass < 2; ++pass) {  // fills the maps, and pays for what only a first launch costs
       for (const Stage& stage : stages()) stage.enqueue();
       context.wait();

@@ -16,15 +16,15 @@ class ConsistencyCheck {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   ConsistencyCheck(ocl::Context& context, shared::ImageSize size, int pixels = 0);
 
-  /// REQUIRES: `out` is not `in`.
-  void operator()(const StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out);
+  /// `out` takes over the variances of `in`, which keeps its disparities only. REQUIRES: `out` is not `in`.
+  void operator()(StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
-  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>, const ocl::Buffer<float>,
-              ocl::Buffer<float>, ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>,
+              ocl::Buffer<float>>
       check_;
 };
 

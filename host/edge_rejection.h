@@ -15,16 +15,15 @@ class EdgeRejection {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   EdgeRejection(ocl::Context& context, shared::ImageSize size, const EdgeRejectionOptions& options, int pixels = 0);
 
-  /// REQUIRES: `out` is not `in`.
-  void operator()(const StereoMaps& in, StereoMaps& out);
+  /// `out` takes over the variances of `in`, which keeps its disparities only. REQUIRES: `out` is not `in`.
+  void operator()(StereoMaps& in, StereoMaps& out);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
   const float max_jump_px_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
-              ocl::Buffer<float>, ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       reject_;
 };
 

@@ -6,7 +6,7 @@
 namespace egosgm {
 namespace {
 
-constexpr cl_int kFillFrom = 6;
+constexpr cl_int kFillFrom = 6;  // of eight neighbours
 
 const cl::Program& build(ocl::Context& context, int pixels) {
   context.enter("MedianFilter");
@@ -22,14 +22,18 @@ MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, const 
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       enabled_(options.enabled),
       filter_(build(context, pixels_), "filter"),
+      filter_and_fill_(build(context, pixels_), "filter_and_fill"),
       filtered_(context, enabled_ ? 2 * pixel_count(size) : 0) {}
 
 void MedianFilter::operator()(StereoMaps& maps, Holes holes) {
   if (!enabled_) return;
   context_.enter("MedianFilter");
-  const cl_int fill_from = holes == Holes::kFill ? kFillFrom : 9;  // of eight neighbours: never
-  filter_(context_, ocl::every_pixels(context_, size_, pixels_), size_, fill_from, maps.disparity, filtered_,
-          maps.variance);
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_);
+  if (holes == Holes::kFill) {
+    filter_and_fill_(context_, pixels, size_, kFillFrom, maps.disparity, filtered_, maps.variance);
+  } else {
+    filter_(context_, pixels, size_, maps.disparity, filtered_);
+  }
   std::swap(maps.disparity, filtered_);
 }
 

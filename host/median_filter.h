@@ -26,8 +26,9 @@ class MedianFilter {
   const shared::ImageSize size_;
   const int pixels_;
   const bool enabled_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, ocl::Buffer<float>> filter_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
-      filter_;
+      filter_and_fill_;
   ocl::Buffer<float> filtered_;
 };
 

@@ -17,8 +17,7 @@ static inline Floats gather(global const float* row, const Ints x) {
 }
 
 kernel void check(const ImageSize size, const float max_difference, const int keep_outside,
-                  global const float* disparity, global const float* variance, global float* kept_disparity,
-                  global float* kept_variance) {
+                  global const float* disparity, global float* kept_disparity, global float* variance) {
   const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int view = get_global_id(2);
@@ -38,5 +37,5 @@ kernel void check(const ImageSize size, const float max_difference, const int ke
   const Ints keeps = inside ? agree : valid & ((Ints)(keep_outside) != 0);
 
   store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);
-  store_pixels(keeps ? load_pixels(variance + row, x, width) : zero, kept_variance + row, x, width);
+  clear_dropped(keeps ? (Ints)(0) : (d != INVALID), variance + row, x, width);
 }

@@ -12,7 +12,7 @@ static inline Ints is_jump(const Floats d, const Floats near, const Floats far, 
 }
 
 kernel void reject(const ImageSize size, const float max_jump, global const float* disparity,
-                   global const float* variance, global float* kept_disparity, global float* kept_variance) {
+                   global float* kept_disparity, global float* variance) {
   const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int width = size.width;
@@ -31,5 +31,5 @@ kernel void reject(const ImageSize size, const float max_jump, global const floa
                      is_jump(d, load_pixels(above, x, width), load_pixels(far_above, x, width), max_jump) |
                      is_jump(d, load_pixels(below, x, width), load_pixels(far_below, x, width), max_jump);
   store_pixels(jumps ? INVALID : d, kept_disparity + row, x, width);
-  store_pixels(jumps ? (Floats)(0.0f) : load_pixels(variance + row, x, width), kept_variance + row, x, width);
+  clear_dropped(jumps, variance + row, x, width);
 }

@@ -25,8 +25,9 @@ static inline Sorted sort(const Floats a, const Floats b, const Floats c) {
   return sorted;
 }
 
-kernel void filter(const ImageSize size, const int fill_from, global const float* disparity, global float* filtered,
-                   global float* variance) {
+// Where it does not fill, `fill_from` and `variance` are not looked at.
+static inline void filter_window(const bool fills, const ImageSize size, const int fill_from,
+                                 global const float* disparity, global float* filtered, global float* variance) {
   const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int width = size.width;
@@ -49,7 +50,8 @@ kernel void filter(const ImageSize size, const int fill_from, global const float
 #define VOTE(vote, exists, from, column)                                                 \
   const Floats neighbour_##vote = (exists) ? load_pixels(from, column, width) : INVALID; \
   const Ints absent_##vote = neighbour_##vote == INVALID;                                \
-  const Floats abstained_##vote = is_hole ? ((holes & 1) != 0 ? highest : lowest) : d;   \
+  const Floats by_turns_##vote = (holes & 1) != 0 ? highest : lowest;                    \
+  const Floats abstained_##vote = (fills ? is_hole : (Ints)(0)) ? by_turns_##vote : d;   \
   holes += absent_##vote ? (Ints)(1) : (Ints)(0);                                        \
   const Floats vote = absent_##vote ? abstained_##vote : neighbour_##vote;
   VOTE(left_above, has_above, above, x - 1)
@@ -70,8 +72,21 @@ kernel void filter(const ImageSize size, const int fill_from, global const float
   const Floats middle =
       median(upper(upper(left.low, centre.low), right.low), median(left.middle, centre.middle, right.middle),
              lower(lower(left.high, centre.high), right.high));
+  if (!fills) {
+    store_pixels(is_hole ? INVALID : middle, filtered + row, x, width);
+    return;
+  }
   const Ints is_filled = is_hole & (8 - holes >= fill_from);
   store_pixels((is_hole != is_filled) ? INVALID : middle, filtered + row, x, width);
   const Floats kept_variance = load_pixels(variance + row, x, width);
   store_pixels(is_filled ? (Floats)(EGOSGM_FILLED_VARIANCE_PX2) : kept_variance, variance + row, x, width);
+}
+
+kernel void filter(const ImageSize size, global const float* disparity, global float* filtered) {
+  filter_window(false, size, 0, disparity, filtered, 0);
+}
+
+kernel void filter_and_fill(const ImageSize size, const int fill_from, global const float* disparity,
+                            global float* filtered, global float* variance) {
+  filter_window(true, size, fill_from, disparity, filtered, variance);
 }

@@ -17,7 +17,7 @@ testing::HostMaps check(shared::ImageSize size, float max_difference_px, const t
                         OutsideView outside = OutsideView::kDrop, int pixels = 0) {
   ocl::Context context(testing::any_device());
   ConsistencyCheck check(context, size, pixels);
-  const StereoMaps in = testing::upload(context, size, maps);
+  StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
   check(in, max_difference_px, outside, out);
   return testing::download(context, out);
