@@ -6,6 +6,8 @@
 namespace egosgm {
 namespace {
 
+constexpr int kShrunkAtOnce = 4;  // coarse pixels, by a work-item of `shrink`
+
 int floor_div(int a, int b) { return a / b - (a % b < 0); }
 
 const cl::Program& build(ocl::Context& context, PixelType type) {
@@ -57,7 +59,7 @@ CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const Pi
 const StereoMaps& CoarseMatch::operator()(const FrameImages& images) {
   const ocl::Context::Within within(context_, "CoarseMatch");
   Shrink& shrink = images.type == PixelType::kU8 ? shrink_u8_ : shrink_u16_;
-  shrink(context_, ocl::every_pixel(context_, coarse_), size_, images.pixels, images_);
+  shrink(context_, ocl::every_pixels(context_, coarse_, kShrunkAtOnce), size_, images.pixels, images_);
   band_.full_range();
   census_(images_, codes_);
   step_penalties_(images_, penalties_);

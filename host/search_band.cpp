@@ -75,7 +75,8 @@ void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* coars
 
 void SearchBand::full_range() {
   context_.enter("SearchBand");
-  full_range_(context_, ocl::every_pixel(context_, size_), size_, range_, bands_, cell_offsets_, row_sums_);
+  full_range_(context_, ocl::every_pixel(context_, size_), size_, range_, whole(range_), bands_, cell_offsets_,
+              row_sums_);
 }
 
 void SearchBand::full_range(const StereoMaps& predicted) {

@@ -64,6 +64,7 @@ inline Code code_at(const ImageSize size, global const Pixel* image, const int x
   return code;
 #else
   Code code = 0;
+#pragma unroll
   for (int i = 0; i < 32; ++i) {
     code = code << 1 | (AT(kSparse[i][0], kSparse[i][1]) < AT(0, 0) ? 1 : 0);
   }
@@ -126,10 +127,13 @@ kernel void census(const ImageSize size, const int padding, global const uchar* 
   global const Pixel* image = (global const Pixel*)images + (size_t)view * size.height * width;
   global Code* row = (global Code*)all_codes + ((size_t)view * size.height + y) * stride + padding;
 
+  // Blocks of 16 from RADIUS_X on; the last one overlaps the one before it, to leave few pixels to the slow way.
+  const int last_block = width - RADIUS_X - 16;
   int x = 0;
   while (x < width) {
-    const bool inside = x >= RADIUS_X && x + 15 + RADIUS_X < width;
+    const bool inside = last_block >= RADIUS_X && x >= RADIUS_X && x < width - RADIUS_X;
     if (inside) {
+      x = min(x, last_block);
       const Codes codes = codes_at(size, image, x, y);
       if (view == EGOSGM_LEFT) {
         ((global PackedCodes*)(row + x))->codes = codes;

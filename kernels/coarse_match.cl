@@ -7,25 +7,44 @@
 // lint: PIXEL_BYTES=2
 
 #if PIXEL_BYTES == 1
+typedef ushort16 Sums;
+typedef ushort4 Means;
+#define convert_sums convert_ushort16
 #define to_16_bit(sum) ((sum) << 4)
 #else
+typedef uint16 Sums;
+typedef uint4 Means;
+#define convert_sums convert_uint16
 #define to_16_bit(sum) ((sum) >> 4)
 #endif
 
-// A work-item a coarse pixel and view.
+// A work-item four neighbouring coarse pixels and view.
 kernel void shrink(const ImageSize size, global const uchar* images, global uchar* coarse_images) {
   const int coarse_width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int coarse_height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
-  const int x = get_global_id(0);
+  const int x = 4 * get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   if (x >= coarse_width) return;
 
   global const Pixel* image = (global const Pixel*)images + (size_t)view * size.height * size.width;
-  uint sum = 0;
-  for (int v = 0; v < EGOSGM_COARSE; ++v) {
-    global const Pixel* row = image + (size_t)min(y * EGOSGM_COARSE + v, size.height - 1) * size.width;
-    for (int u = 0; u < EGOSGM_COARSE; ++u) sum += row[min(x * EGOSGM_COARSE + u, size.width - 1)];
+  global ushort* to = (global ushort*)coarse_images + ((size_t)view * coarse_height + y) * coarse_width;
+  if ((x + 4) * EGOSGM_COARSE <= size.width) {
+    Sums columns = 0;
+    for (int v = 0; v < EGOSGM_COARSE; ++v) {
+      const size_t row = min(y * EGOSGM_COARSE + v, size.height - 1);
+      columns += convert_sums(load_grey(image + row * size.width + x * EGOSGM_COARSE));
+    }
+    const Means sums = columns.s048c + columns.s159d + columns.s26ae + columns.s37bf;
+    vstore4(convert_ushort4(to_16_bit(sums)), 0, to + x);
+    return;
   }
-  ((global ushort*)coarse_images)[((size_t)view * coarse_height + y) * coarse_width + x] = (ushort)to_16_bit(sum);
+  for (int u = x; u < min(x + 4, coarse_width); ++u) {
+    uint sum = 0;
+    for (int v = 0; v < EGOSGM_COARSE; ++v) {
+      global const Pixel* row = image + (size_t)min(y * EGOSGM_COARSE + v, size.height - 1) * size.width;
+      for (int w = 0; w < EGOSGM_COARSE; ++w) sum += row[min(u * EGOSGM_COARSE + w, size.width - 1)];
+    }
+    to[u] = (ushort)to_16_bit(sum);
+  }
 }

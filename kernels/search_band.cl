@@ -76,6 +76,14 @@ float8 eight(global const float* row, int x, int width) {
   return vload8(0, values);
 }
 
+// Four disparities of a row from x on; what lies before or beyond the row is invalid.
+float4 four(global const float* row, int x, int width) {
+  if (x >= 0 && x + 4 <= width) return vload4(0, row + x);
+  float values[4];
+  for (int i = 0; i < 4; ++i) values[i] = x + i >= 0 && x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
+  return vload4(0, values);
+}
+
 // Writes eight bands of two words each, as far as the row goes.
 void store_eight(global Band* row, int x, int width, uint16 words) {
   global uint* to = (global uint*)(row + x);
@@ -129,20 +137,23 @@ kernel void gather_coarse(const ImageSize size, global const float* coarse, glob
   const int view = get_global_id(2);
   if (x >= blocks_x || y >= blocks_y) return;
 
-  const int side = EGOSGM_BLOCK / EGOSGM_COARSE;
-  BlockRange range;
-  range.min = INFINITY;
-  range.max = -INFINITY;
-  range.count = 0;
-  for (int v = max(y * side - 1, 0); v <= min(y * side + side, height - 1); ++v) {
-    for (int u = max(x * side - 1, 0); u <= min(x * side + side, width - 1); ++u) {
-      const float d = coarse[((size_t)view * height + v) * width + u];
-      const bool valid = d > EGOSGM_INVALID_DISPARITY;
-      range.min = valid ? fmin(range.min, d * EGOSGM_COARSE) : range.min;
-      range.max = valid ? fmax(range.max, d * EGOSGM_COARSE) : range.max;
-      range.count += valid ? 1 : 0;
-    }
+#if EGOSGM_BLOCK != 2 * EGOSGM_COARSE
+#error "a block and what lies around it are four coarse pixels wide"
+#endif
+  float4 least = INFINITY;
+  float4 most = -INFINITY;
+  int4 count = 0;
+  for (int v = max(2 * y - 1, 0); v <= min(2 * y + 2, height - 1); ++v) {
+    const float4 d = four(coarse + ((size_t)view * height + v) * width, 2 * x - 1, width);
+    const int4 valid = d > EGOSGM_INVALID_DISPARITY;
+    least = select(least, d, valid & (d < least));
+    most = select(most, d, valid & (d > most));
+    count -= valid;
   }
+  BlockRange range;
+  range.min = EGOSGM_COARSE * fmin(fmin(least.x, least.y), fmin(least.z, least.w));
+  range.max = EGOSGM_COARSE * fmax(fmax(most.x, most.y), fmax(most.z, most.w));
+  range.count = count.x + count.y + count.z + count.w;
   ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range;
 }
 
@@ -231,6 +242,63 @@ kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   store_eight(bands + row, x, size.width, words);
 }
 
+#if ROW_GROUP == 1
+
+int8 low_half(uint8 word) { return as_int8(word << 16) >> 16; }
+int8 high_half(uint8 word) { return as_int8(word) >> 16; }
+
+uint sum_of(uint8 v) {
+  const uint4 halves = v.lo + v.hi;
+  return halves.x + halves.y + halves.z + halves.w;
+}
+
+// The bands from x on, two words each; what lies beyond the row has no chunks, and searches nothing.
+uint16 load_eight(global const Band* row, int x, int width) {
+  global const uint* from = (global const uint*)(row + x);
+  if (x + EGOSGM_BLOCK <= width) return vload16(0, from);
+  uint words[2 * EGOSGM_BLOCK];
+  for (int i = 0; i < EGOSGM_BLOCK; ++i) {
+    words[2 * i] = x + i < width ? from[2 * i] : 0;
+    words[2 * i + 1] = x + i < width ? from[2 * i + 1] : 1;  // from 1 to 0
+  }
+  return vload16(0, words);
+}
+
+// Sums up each row, eight pixels at a time. A work-item a row and view.
+kernel __attribute__((reqd_work_group_size(1, 1, 1))) void sum_rows(const ImageSize size, global const float* disparity,
+                                                                    global const Band* bands, global uint* cell_offsets,
+                                                                    global RowSum* row_sums) {
+  const size_t row = (size_t)get_global_id(2) * size.height + get_global_id(1);
+  global const float* disparities = disparity + row * size.width;
+  global uint* offsets = cell_offsets + row * size.width;
+  uint chunks_before = 0;
+  int8 searched = 0, predicted = 0;
+  for (int x = 0; x < size.width; x += EGOSGM_BLOCK) {
+    const uint16 words = load_eight(bands + row * size.width, x, size.width);
+    const uint8 chunks = words.even >> 16;
+    searched += high_half(words.odd) - low_half(words.odd) + 1;
+    predicted -= eight(disparities, x, size.width) > EGOSGM_INVALID_DISPARITY;
+    uint8 scan = chunks;  // inclusive, in steps of 1, 2 and 4
+    scan += (uint8)(0, scan.s0123, scan.s456);
+    scan += (uint8)(0, 0, scan.s0123, scan.s45);
+    scan += (uint8)(0, 0, 0, 0, scan.s0123);
+    const uint8 before = chunks_before + scan - chunks;
+    chunks_before += scan.s7;
+    if (x + EGOSGM_BLOCK <= size.width) {
+      vstore8(before, 0, offsets + x);
+    } else {
+      uint values[EGOSGM_BLOCK];
+      vstore8(before, 0, values);
+      for (int i = 0; i < size.width - x; ++i) offsets[x + i] = values[i];
+    }
+  }
+  row_sums[row].searched = sum_of(as_uint8(searched));
+  row_sums[row].computed = chunks_before * EGOSGM_LANES;
+  row_sums[row].predicted = sum_of(as_uint8(predicted));
+}
+
+#else
+
 // Sums up each row: a work-group of ROW_GROUP a row and view goes over it in tiles, with an inclusive scan of a tile at
 // a time.
 kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
@@ -245,10 +313,8 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
   uint chunks_before = 0;
   uint searched = 0;
   uint predicted = 0;
-#if ROW_GROUP > 1
   local uint chunks[ROW_GROUP];
   local uint totals[2][ROW_GROUP];
-#endif
   for (int tile = 0; tile < size.width; tile += ROW_GROUP) {
     const int x = tile + lane;
     const size_t pixel = row * size.width + x;
@@ -258,8 +324,6 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
       searched += bands[pixel].last - bands[pixel].first + 1;
       predicted += disparity[pixel] > EGOSGM_INVALID_DISPARITY ? 1 : 0;
     }
-    uint before = chunks_before;
-#if ROW_GROUP > 1
     chunks[lane] = own;
     barrier(CLK_LOCAL_MEM_FENCE);
     for (int step = 1; step < ROW_GROUP; step *= 2) {
@@ -268,15 +332,10 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
       chunks[lane] += left;
       barrier(CLK_LOCAL_MEM_FENCE);
     }
-    before += chunks[lane] - own;
+    if (x < size.width) cell_offsets[pixel] = chunks_before + chunks[lane] - own;
     chunks_before += chunks[ROW_GROUP - 1];
     barrier(CLK_LOCAL_MEM_FENCE);
-#else
-    chunks_before += own;
-#endif
-    if (x < size.width) cell_offsets[pixel] = before;
   }
-#if ROW_GROUP > 1
   totals[0][lane] = searched;
   totals[1][lane] = predicted;
   barrier(CLK_LOCAL_MEM_FENCE);
@@ -284,7 +343,6 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
     searched += totals[0][i];
     predicted += totals[1][i];
   }
-#endif
   if (lane == 0) {
     row_sums[row].searched = searched;
     row_sums[row].computed = chunks_before * EGOSGM_LANES;
@@ -292,14 +350,16 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
   }
 }
 
-kernel void full_range(const ImageSize size, const DisparityRange range, global Band* bands, global uint* cell_offsets,
-                       global RowSum* row_sums) {
+#endif
+
+// `band`: the one of every pixel.
+kernel void full_range(const ImageSize size, const DisparityRange range, const Band band, global Band* bands,
+                       global uint* cell_offsets, global RowSum* row_sums) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   if (x >= size.width) return;
 
-  const Band band = first_of(bands_of(range, -INFINITY, INFINITY));
   const size_t row = (size_t)view * size.height + y;
   bands[row * size.width + x] = band;
   cell_offsets[row * size.width + x] = (uint)x * band.chunks;
