@@ -133,17 +133,18 @@ kernel void census(const ImageSize size, const int padding, global const uchar* 
   while (x < width) {
     const bool inside = last_block >= RADIUS_X && x >= RADIUS_X && x < width - RADIUS_X;
     if (inside) {
-      x = min(x, last_block);
-      const Codes codes = codes_at(size, image, x, y);
+      const int first = min(x, last_block);
+      const Codes codes = codes_at(size, image, first, y);
       if (view == EGOSGM_LEFT) {
-        ((global PackedCodes*)(row + x))->codes = codes;
+        ((global PackedCodes*)(row + first))->codes = codes;
       } else {
-        ((global PackedCodes*)(row + width - 16 - x))->codes = codes.sfedcba9876543210;
+        ((global PackedCodes*)(row + width - 16 - first))->codes = codes.sfedcba9876543210;
       }
+      x += first - x + 16;
     } else {
       row[view == EGOSGM_LEFT ? x : width - 1 - x] = code_at(size, image, x, y);
+      x += 1;
     }
-    x += inside ? 16 : 1;
   }
   for (int i = 1; i <= padding; ++i) {
     row[-i] = row[0];
