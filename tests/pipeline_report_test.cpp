@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a frame reports, what it was predicted from, and what range its disparities keep.
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+#include "egosgm/pipeline.h"
+#include "tests/support/compare.h"
+#include "tests/support/pipeline_video.h"
+
+namespace egosgm {
+namespace {
+
+using testing::make_pipeline;
+using testing::OutputMemory;
+using testing::process;
+using testing::process_all;
+using testing::Result;
+using testing::Setting;
+using testing::settings;
+using testing::standard;
+using testing::valid_part;
+using testing::Video;
+
+TEST(Pipeline, SaysWhyAFrameWasSearchedInFull) {
+  Setting setting = standard();
+  const Video video(setting, 3);
+  Pipeline pipeline = make_pipeline(setting);
+  const auto reason = [&](int index, bool has_motion) {
+    const FrameReport report =
+        process(pipeline, setting, video, index, has_motion ? std::optional(video.motion(index)) : std::nullopt).report;
+    EXPECT_EQ(report.full_range, !report.full_range_reason.empty());
+    EXPECT_EQ(report.full_range, report.search_fraction == 1) << report.search_fraction;
+    return report.full_range_reason;
+  };
+  EXPECT_EQ(reason(0, true), "first frame");
+  EXPECT_EQ(reason(1, true), "");
+  EXPECT_EQ(reason(2, false), "no motion");
+  EXPECT_EQ(reason(0, true), "");
+  pipeline.reset();
+  EXPECT_EQ(reason(1, true), "reset");
+  EXPECT_EQ(reason(2, true), "");
+  pipeline.reset();
+  pipeline.reset();
+  EXPECT_EQ(reason(0, false), "reset");
+
+  setting.options.search = SearchMode::kFull;
+  pipeline = make_pipeline(setting);
+  EXPECT_EQ(reason(0, true), "first frame");
+  EXPECT_EQ(reason(1, true), "search is full");
+  setting.options.temporal = false;
+  pipeline = make_pipeline(setting);
+  EXPECT_EQ(reason(0, true), "not temporal");
+  EXPECT_EQ(reason(1, true), "not temporal");
+}
+
+// The belief of the frame without a motion is what the next one predicts from.
+TEST(Pipeline, PredictsAgainAfterAFrameWithoutMotion) {
+  const Setting setting = standard();
+  const Video video(setting, 3);
+  Pipeline broken = make_pipeline(setting), fresh = make_pipeline(setting);
+  process(broken, setting, video, 0);
+  const Result gap = process(broken, setting, video, 1, std::nullopt);
+  EXPECT_EQ(gap.report.predicted_fraction, 0);
+  EXPECT_EQ(valid_part(gap.outputs.predicted.values()), 0);
+  EXPECT_TRUE(testing::same_bits(gap.outputs.disparity.values(), gap.outputs.measured.values(), setting.size));
+  const Result after = process(broken, setting, video, 2);
+  EXPECT_FALSE(after.report.full_range);
+  EXPECT_GT(after.report.predicted_fraction, 0.5);
+  EXPECT_LT(after.report.search_fraction, 0.4);
+}
+
+TEST(Pipeline, WithoutTimeEveryFrameIsAlone) {
+  Setting setting = standard();
+  setting.options.temporal = false;
+  setting.options.vertical_alignment.enabled = false;
+  const Video video(setting, 3);
+  Pipeline pipeline = make_pipeline(setting), other = make_pipeline(setting);
+  process(pipeline, setting, video, 0);
+  process(pipeline, setting, video, 1);
+  const Result result = process(pipeline, setting, video, 2);
+  const Result alone = process(other, setting, video, 2, std::nullopt);
+  EXPECT_TRUE(same_outputs(result.outputs, alone.outputs, setting.size));
+  EXPECT_TRUE(testing::same_bits(result.outputs.disparity.values(), result.outputs.measured.values(), setting.size));
+  EXPECT_EQ(result.report.predicted_fraction, 0);
+}
+
+// With search=full the prediction is fused, but narrows nothing.
+TEST(Pipeline, FullSearchStillFusesThePrediction) {
+  Setting setting = standard();
+  setting.options.search = SearchMode::kFull;
+  const Video video(setting, 2);
+  Pipeline pipeline = make_pipeline(setting);
+  process(pipeline, setting, video, 0);
+  const Result result = process(pipeline, setting, video, 1);
+  EXPECT_NE(result.outputs.variance.values(), result.outputs.measured_variance.values());
+  EXPECT_DOUBLE_EQ(result.report.search_fraction, 1);
+  EXPECT_NEAR(result.report.predicted_fraction, valid_part(result.outputs.predicted.values()), 1e-12);
+  EXPECT_GT(result.report.predicted_fraction, 0.5);
+}
+
+TEST(Pipeline, ReportsWhatItDid) {
+  const Setting setting = standard();
+  const Video video(setting, 4);
+  Pipeline pipeline = make_pipeline(setting);
+  const std::uint64_t memory = pipeline.device_memory_bytes();
+  EXPECT_GT(memory, 2u * 127 * 61 * 32);
+  EXPECT_EQ(pipeline.options().disparities, 32);
+  EXPECT_EQ(pipeline.device().info().name, Device::select().info().name);
+  std::vector<FrameReport> reports;
+  for (int index = 0; index < video.size(); ++index) {
+    reports.push_back(process(pipeline, setting, video, index).report);
+    EXPECT_EQ(pipeline.device_memory_bytes(), memory) << "after frame " << index;
+  }
+  EXPECT_EQ(reports[2].launches, reports[3].launches);
+  const auto stages = [](const FrameReport& report) {
+    std::vector<std::string> names;
+    for (const StageTime& time : report.stages) {
+      EXPECT_GE(time.ms, 0) << time.stage;
+      names.push_back(time.stage);
+    }
+    return names;
+  };
+  const std::vector<std::string> steady{"upload",           "ForwardWarp",       "EdgeRejection", "HoleFill",
+                                        "ConsistencyCheck", "VerticalAlignment", "CoarseMatch",   "SearchBand",
+                                        "Census",           "StepPenalties",     "BandedSgm",     "MedianFilter",
+                                        "SpeckleRemoval",   "KalmanUpdate",      "EdgeVariance",  "download"};
+  EXPECT_EQ(stages(reports[3]), steady);
+  for (const FrameReport& report : reports) {
+    EXPECT_GT(report.total_ms, 0);
+    EXPECT_GT(report.launches, 15);
+  }
+}
+
+TEST(Pipeline, ListsEveryCommandIfAsked) {
+  const Setting setting = standard();
+  const Video video(setting, 3);
+  Pipeline pipeline = make_pipeline(setting);
+  EXPECT_TRUE(process(pipeline, setting, video, 0).report.commands.empty());
+  const auto host_ns = [] { return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1); };
+  pipeline.record_commands(true);
+  const std::int64_t before = host_ns();
+  const FrameReport report = process(pipeline, setting, video, 1).report;
+  const std::int64_t after = host_ns();
+  double ms = 0, expected_ms = 0;
+  for (const DeviceCommand& command : report.commands) {
+    EXPECT_LE(command.queued_ns, command.submitted_ns) << command.name;
+    EXPECT_LE(command.submitted_ns, command.started_ns) << command.name;
+    EXPECT_LE(command.started_ns, command.ended_ns) << command.name;
+    EXPECT_GE(command.queued_ns, before) << command.name;
+    EXPECT_LE(command.ended_ns, after) << command.name;
+    ms += 1e-6 * static_cast<double>(command.ended_ns - command.started_ns);
+  }
+  for (const StageTime& stage : report.stages) expected_ms += stage.ms;
+  EXPECT_NEAR(ms, expected_ms, 1e-6 * expected_ms);
+  const auto count = [&](auto&& fits) { return std::count_if(report.commands.begin(), report.commands.end(), fits); };
+  EXPECT_EQ(count([](const auto& c) { return c.stage == "Census" && c.name == "census"; }), 1);
+  EXPECT_EQ(count([](const auto& c) { return c.stage == "ConsistencyCheck"; }), 3);
+  EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kUpload; }), 1);
+  EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kDownload && c.name != "wait"; }), 10);
+  EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kKernels; }), report.launches);
+  pipeline.record_commands(false);
+  EXPECT_TRUE(process(pipeline, setting, video, 2).report.commands.empty());
+}
+
+TEST(Pipeline, KeepsEveryDisparityInItsRange) {
+  for (const Setting& setting : settings()) {
+    if (setting.size.width != 65 && setting.name != "negative_min_16bit_odd_stride") continue;
+    const Video video(setting, 2);
+    Pipeline pipeline = make_pipeline(setting);
+    for (const OutputMemory& outputs : process_all(pipeline, setting, video)) {
+      const std::vector<float> disparity = outputs.disparity.values(), variance = outputs.variance.values();
+      for (std::size_t i = 0; i < disparity.size(); ++i) {
+        const float min = static_cast<float>(setting.options.min_disparity);
+        const float max = min + static_cast<float>(setting.options.disparities - 1);
+        const bool is_valid = disparity[i] >= min && disparity[i] <= max && variance[i] > 0;
+        ASSERT_TRUE(is_valid || (disparity[i] == kInvalidDisparity && variance[i] == 0))
+            << setting.name << ": " << disparity[i] << ", variance " << variance[i];
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace egosgm
