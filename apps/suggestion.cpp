@@ -1,29 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/suggestion.h"
 
-#include <algorithm>
-#include <numeric>
+#include "host/edit_distance.h"
 
 namespace egosgm::app {
-namespace {
-
-/// Levenshtein distance.
-int edit_distance(const std::string& a, const std::string& b) {
-  std::vector<int> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    int diagonal = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const int substituted = diagonal + (a[i] != b[j]);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({substituted, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
-}
-
-}  // namespace
-
 std::string suggestion(const std::string& typed, const std::vector<std::string>& known) {
   std::string nearest;
   int least = 1 + static_cast<int>(typed.size()) / 3;  // farther is not a typing error

@@ -128,6 +128,13 @@ def tidy(axes):
     axes.grid(True, alpha=0.25)
 
 
+def label(axes, x, y):
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    axes.legend(fontsize=8)
+    tidy(axes)
+
+
 def draw_compare(plt, content):
     shapes = [s for s in shapes_of(content["rows"]) if s[2] == TYPICAL[2]] or shapes_of(content["rows"])
     figure, panels = plt.subplots(1, len(shapes), figsize=(4.2 * len(shapes) + 1, 3.6), squeeze=False, sharey=True)
@@ -217,10 +224,7 @@ def draw_error_against_search(plt, content):
             if name == "default" or any(max(a, b) > 1.2 * min(a, b) for a, b in zip(at, configurations["default"])):  # else they overlap
                 axes.annotate(name, at, fontsize=6, xytext=(3, 2), textcoords="offset points")
         axes.set_xscale("log")
-        axes.set_xlabel("search [% of all cells]")
-        axes.set_ylabel("bad or missing, non-occluded [%]")
-        axes.legend(fontsize=8)
-        tidy(axes)
+        label(axes, "search [% of all cells]", "bad or missing, non-occluded [%]")
     return figure
 
 
@@ -234,10 +238,7 @@ def draw_error_over_frames(plt, content):
                 axes.plot(curve["frames"], curve["bad_or_missing"], "o-", ms=3, label=curve["name"], color=colors[curve["name"]])
         axes.set_ylim(bottom=0)
         axes.xaxis.get_major_locator().set_params(integer=True)
-        axes.set_xlabel("frame")
-        axes.set_ylabel("bad or missing, non-occluded [%]")
-        axes.legend(fontsize=8)
-        tidy(axes)
+        label(axes, "frame", "bad or missing, non-occluded [%]")
     return figure
 
 
@@ -250,10 +251,7 @@ def draw_uncertainty(plt, content):
     axes.plot([min(ends), max(ends)], [min(ends), max(ends)], color="#cccccc", zorder=0)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlabel("predicted deviation, of a tenth of the pixels each [px]")
-    axes.set_ylabel("actual deviation, errors cut at 3 px [px]")
-    axes.legend(fontsize=8)
-    tidy(axes)
+    label(axes, "predicted deviation, of a tenth of the pixels each [px]", "actual deviation, errors cut at 3 px [px]")
     return figure
 
 

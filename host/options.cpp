@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <numeric>
 
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
+#include "host/edit_distance.h"
 
 namespace egosgm {
 namespace {
@@ -134,20 +134,6 @@ void parse(std::string_view name, std::string_view text, Enum& value) {
     allowed += std::string(i ? ", " : "one of ") + kChoices(value, i).name;
   }
   refuse(name, text, allowed);
-}
-
-int edit_distance(std::string_view a, std::string_view b) {
-  std::vector<int> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    int diagonal = row[0]++;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const int substituted = diagonal + (a[i] != b[j]);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({substituted, row[j] + 1, row[j + 1] + 1});
-    }
-  }
-  return row.back();
 }
 
 template <typename Number>

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""egosgm compile and egosgm batch from outside: devices, shards, failures, kills. Environment as for program_test.py, and
+"""egosgm compile and egosgm batch from outside: devices, shards, failures, kills. Environment as for program_case.py, and
 EGOSGM_FAULT_LAYER: the OpenCL layer that fails."""
 import json
 import math
@@ -12,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from program_test import PROGRAM, SOURCE, ProgramTest, egosgm
+from program_case import EXAMPLES, PROGRAM, SOURCE, ProgramTest, egosgm
 
 LAYER = os.environ["EGOSGM_FAULT_LAYER"]
 SEQUENCES = 4
@@ -91,7 +91,7 @@ class DeviceBuffers(ProgramTest):
     def test_depth_is_that_of_runs_disparities(self):
         out, own = self.new_folder(), self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "pfm", "--quiet")
-        subprocess.run([os.environ["EGOSGM_DEVICE_BUFFERS"], self.street], cwd=own, check=True, timeout=240)
+        subprocess.run([EXAMPLES / "egosgm_example_device_buffers", self.street], cwd=own, check=True, timeout=240)
         camera = self.report(out)["calibration"]
         single = lambda value: struct.unpack("<f", struct.pack("<f", value))[0]
         focal_times_baseline = single(camera["fx"] * camera["baseline_m"])

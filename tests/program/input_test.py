@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""egosgm doctor and egosgm rectify: sequences that are broken in just one way, and raw images of a known rig. Environment as for program_test.py."""
+"""egosgm doctor and egosgm rectify: sequences that are broken in just one way, and raw images of a known rig. Environment as for program_case.py."""
 import csv
 import json
 import os
@@ -12,7 +12,7 @@ import zlib
 
 import numpy
 
-from program_test import DATA, EXAMPLES, FRAMES, HEIGHT, WIDTH, ProgramTest, egosgm
+from program_case import DATA, EXAMPLES, FRAMES, HEIGHT, WIDTH, ProgramTest, egosgm, png
 
 
 def read_grey(file):
@@ -47,12 +47,8 @@ def read_grey(file):
 
 
 def write_grey(file, image):
-    def chunk(kind, body):
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-
-    rows = b"".join(b"\0" + row.tobytes() for row in numpy.ascontiguousarray(image, numpy.uint8))
-    header = struct.pack(">IIBBBBB", image.shape[1], image.shape[0], 8, 0, 0, 0, 0)
-    pathlib.Path(file).write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b""))
+    rows = numpy.ascontiguousarray(image, numpy.uint8)
+    pathlib.Path(file).write_bytes(png(image.shape[1], image.shape[0], 8, (row.tobytes() for row in rows)))
 
 
 def sampled(image, x, y):
@@ -343,7 +339,7 @@ class Rectify(InputTest):
         self.assertEqual((out / "times.txt").read_text(), "0.000000000\n0.049999872\n")
         self.assertEqual(self.examine(out)["rows"]["verdict"], "ok")
         text = self.assert_works("rectify", "--euroc", self.euroc(drop=[(1, 0)]), "--out", out.parent / "fewer")
-        self.assertIn("1 images without their other one", text)
+        self.assertIn("1 image without the other one", text)
         self.assertEqual(len(list((out.parent / "fewer/image_0").iterdir())), 1)
 
     def test_what_cannot_be_rectified_is_refused(self):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""egosgm report: the page's structure, and the page in a headless Chromium. Environment as for program_test.py."""
+"""egosgm report: the page's structure, and the page in a headless Chromium. Environment as for program_case.py."""
 import base64
 import html.parser
 import json
@@ -11,7 +11,7 @@ import tempfile
 import time
 import unittest
 
-from program_test import FRAMES, HEIGHT, WIDTH, ProgramTest
+from program_case import FRAMES, HEIGHT, WIDTH, ProgramTest
 
 CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
 LAYERS = ["left image", "disparity", "variance", "disparities searched", "error [px]"]

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm synth and eval."""
+import json
+import subprocess
+import unittest
+
+from program_case import FRAMES, PROGRAM, ProgramTest, grey_png
+
+
+class Synth(ProgramTest):
+    def test_moving_objects_have_masks(self):
+        street = self.new_folder() / "street"
+        self.assert_works("synth", "--out", street, "--frames", 2, "--width", 160, "--height", 64, "--moving-object")
+        for folder in ("image_0", "image_1", "truth/left_disp_occ", "truth/right_disp_noc", "truth/left_moving"):
+            self.assertEqual([f.name for f in sorted((street / folder).iterdir())], ["000000.png", "000001.png"], folder)
+        for file in ("calib.txt", "poses.txt", "times.txt"):
+            self.assertTrue((street / file).read_text().strip(), file)
+
+    def test_a_seed_is_a_street(self):
+        first, same, other = (self.new_folder() / "street" for _ in range(3))
+        for street, seed in ((first, 3), (same, 3), (other, 4)):
+            self.assert_works("synth", "--out", street, "--frames", 1, "--width", 80, "--height", 40, "--seed", seed, "--quiet")
+        image = "image_0/000000.png"
+        self.assertEqual((first / image).read_bytes(), (same / image).read_bytes())
+        self.assertNotEqual((first / image).read_bytes(), (other / image).read_bytes())
+
+
+class Eval(ProgramTest):
+    def test_an_estimate_against_itself_is_perfect(self):
+        truth = self.street / "truth/left_disp_occ"
+        result = json.loads(self.assert_works("eval", "--estimate", truth, "--truth", truth, "--json"))
+        self.assertEqual(len(result["pairs"]), FRAMES)
+        for key, value in {"bad_or_missing": 0, "bad_of_valid": 0, "density": 100, "interpolated": 0, "d1": 0,
+                           "d1_interpolated": 0, "mae": 0}.items():
+            self.assertEqual(result["pooled"][key], value, key)
+        table = self.assert_works("eval", "--estimate", truth, "--truth", truth)
+        self.assertIn("pooled", table)
+        self.assertIn("000003", table)
+
+    def test_a_mask_limits_what_is_compared(self):
+        everything, visible = self.street / "truth/left_disp_occ", self.street / "truth/left_disp_noc"
+
+        def counts(*arguments):
+            return [pair["truth_pixels"] for pair in json.loads(self.assert_works("eval", "--estimate", everything, *arguments, "--json"))["pairs"]]
+        masked = counts("--truth", everything, "--mask", visible)
+        self.assertEqual(masked, counts("--truth", visible))
+        self.assertLess(sum(masked), sum(counts("--truth", everything)))
+        arguments = ["eval", "--estimate", everything, "--truth", everything, "--mask"]
+        self.assert_refused([*arguments, self.new_folder()], "000000.png")
+        small = self.new_folder()
+        (small / "000000.png").write_bytes(grey_png(20, 10))
+        self.assert_refused([*arguments, small], "20x10")
+
+    def test_refuses_what_cannot_be_compared(self):
+        truth = self.street / "truth/left_disp_occ"
+        small = self.new_folder() / "000000.png"
+        small.write_bytes(grey_png(20, 10, depth=16))
+        self.assert_refused(["eval", "--estimate", small, "--truth", truth / "000000.png"], small)
+        self.assert_refused(["eval", "--estimate", self.street / "calib.txt", "--truth", truth / "000000.png"], "calib.txt")
+        self.assert_refused(["eval", "--estimate", self.new_folder(), "--truth", truth])
+        self.assert_refused(["eval", "--estimate", "nowhere", "--truth", truth], "nowhere")
+
+    def test_a_full_disk_under_the_standard_output_is_an_error(self):
+        truth = self.street / "truth/left_disp_occ/000000.png"
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([PROGRAM, "eval", "--estimate", truth, "--truth", truth], stdout=full, stderr=subprocess.PIPE,
+                                  text=True, timeout=60)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("standard output", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

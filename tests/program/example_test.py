@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""examples/, and what the documents promise."""
+import json
+import re
+import subprocess
+import unittest
+
+from program_case import EXAMPLES, SOURCE, ProgramTest
+
+
+class Example(ProgramTest):
+    def run_example(self, name, *arguments, **options):
+        return subprocess.run([EXAMPLES / f"egosgm_example_{name}", *arguments], capture_output=True, text=True, timeout=240, **options)
+
+    def assert_gives_what_the_program_gives(self, example, options=(), arguments=()):
+        out, own = self.new_folder(), self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, *options)
+        done = self.run_example(example, self.street, *arguments, cwd=own)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for file in (out / "disparity").iterdir():
+            self.assertEqual(file.read_bytes(), (own / file.name).read_bytes(), file.name)
+
+    def test_minimal_gives_what_the_program_gives(self):
+        self.assert_gives_what_the_program_gives("minimal")
+
+    def test_own_poses_gives_what_the_program_gives(self):
+        poses = self.street / "poses.txt"
+        self.assert_gives_what_the_program_gives("own_poses", ["--poses", poses], [poses])
+
+    def test_opencv_types_gives_a_pair_in_kittis_format(self):
+        out = self.new_folder()
+        left, right = (self.street / f"image_{side}/000000.png" for side in (0, 1))
+        done = self.run_example("opencv_types", left, right, out / "steps.png")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assert_works("run", "--odometry", self.street, "--frames", "0", "--out", out, "--temporal", "off")
+        steps, own = (json.loads(self.assert_works("eval", "--estimate", file, "--truth",
+                                                   self.street / "truth/left_disp_noc/000000.png", "--json"))["pooled"]
+                      for file in (out / "steps.png", out / "disparity/000000.png"))
+        self.assertAlmostEqual(steps["bad_of_valid"], own["bad_of_valid"], delta=1)
+        self.assertGreater(steps["density"], 90)  # the sky's disparity rounds to no step
+        self.assertNotEqual(self.run_example("opencv_types", left, self.street / "calib.txt", out / "no.png").returncode, 0)
+
+    def test_the_readme_shows_it(self):
+        shown = (SOURCE / "README.md").read_text().split("```cpp\n")[1].split("```")[0]
+        self.assertIn(shown.strip(), (SOURCE / "examples/minimal.cpp").read_text())
+
+    def test_the_comparison_names_tests_that_exist(self):
+        claims = (SOURCE / "docs/comparison.md").read_text().split("## Each claim")[1]
+        sources = "".join(file.read_text() for folder in ("tests", "bench") for kind in ("*.cpp", "*.py") for file in (SOURCE / folder).rglob(kind))
+        named = [name for name in re.findall("`([A-Za-z_0-9.]+)`", claims) if "test_" in name or "." in name]
+        self.assertGreater(len(named), 20)
+        for name in named:
+            suite, _, test = name.rpartition(".")
+            if test.startswith("test_"):
+                self.assertIn(f"def {test}(", sources)
+            else:
+                self.assertRegex(sources, rf"TEST(_F|_P)?\({suite}, {test}\)")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Help, completion, devices: what the program says of itself, and what the README and docs/ say of it."""
+import json
+import os
+import pty
+import select
+import shutil
+import subprocess
+import unittest
+
+from program_case import SOURCE, ProgramTest, egosgm
+
+COMMANDS = ("run", "batch", "eval", "devices", "compile", "synth", "odometry", "eval-poses", "tune", "view", "report", "doctor", "rectify",
+            "completion")
+
+
+class Help(ProgramTest):
+    def test_every_subcommand_explains_itself(self):
+        for command in COMMANDS:
+            self.assertIn("--help", self.assert_works(command, "--help"))
+            self.assertIn(command, self.assert_works("--help"))
+
+    def test_the_readme_names_every_subcommand_and_exit_code(self):
+        text = (SOURCE / "README.md").read_text()
+        for name in COMMANDS:
+            self.assertIn(f"`{name}`", text)
+        self.assertIn("130", text)
+
+    def test_run_lists_all_its_options_and_those_of_the_stages(self):
+        text = self.assert_works("run", "--help")
+        for option in ("--kitti", "--scene", "--odometry", "--left", "--right", "--calib", "--frames", "--out", "--poses", "--preset",
+                       "--search", "--temporal", "--paths", "--disparities", "--min-disparity", "--device", "--tuning", "--interpolate",
+                       "--write", "--trace", "--resume", "--overwrite", "--set", "--config", "--save-config", "--quiet", "banded_sgm.p2", "kalman_update.gate_px"):
+            self.assertIn(option, text)
+
+    def test_version(self):
+        self.assertRegex(self.assert_works("--version"), r"^egosgm \d+\.\d+\.\d+\n$")
+
+    def complete(self, *words):
+        """What bash offers after these words."""
+        script = self.new_folder() / "completion.bash"
+        script.write_text(self.assert_works("completion", "bash"))
+        line = " ".join(f"'{word}'" for word in ("egosgm", *words))
+        code = f"shopt -s expand_aliases; compopt() {{ :; }}; source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words)}; " \
+               '_egosgm; printf "%s\\n" "${COMPREPLY[@]}"'
+        return subprocess.run(["bash", "-euc", code], capture_output=True, text=True, check=True, cwd=self.folder).stdout.split()
+
+    def test_bash_completes_commands_options_and_values(self):
+        self.assertEqual(self.complete("ru"), ["run"])
+        self.assertIn("eval-poses", self.complete("e"))
+        self.assertEqual(self.complete("run", "--disp"), ["--disparities"])
+        self.assertEqual(self.complete("run", "--preset", "p"), ["paper"])
+        self.assertEqual(self.complete("run", "--odometry", "str"), ["street"])
+        self.assertIn("banded_sgm.p2=", self.complete("run", "--set", "banded_sgm.p"))
+        self.assertEqual(self.complete("run", "--write", "color,ov"), ["color,overview"])
+        self.assertEqual(self.complete("run", "--disparities", ""), [])
+        self.assertEqual(self.complete("odometry", "str"), ["street"])
+        self.assert_refused(["completion", "fish"], "bash or zsh")
+
+    @unittest.skipUnless(shutil.which("zsh"), "no zsh")
+    def test_zsh_completes_commands_options_and_values(self):
+        script = self.new_folder() / "completion.zsh"
+        script.write_text(self.assert_works("completion", "zsh"))
+        terminal, side = pty.openpty()
+        process = subprocess.Popen(["zsh", "-f", "-i"], stdin=side, stdout=side, stderr=side, cwd=self.folder, start_new_session=True,
+                                   env=dict(os.environ, TERM="dumb", PS1="", HOME=str(self.folder)))
+        os.close(side)
+
+        def wait_for(text):
+            seen = b""
+            while text not in seen:
+                self.assertTrue(select.select([terminal], [], [], 60)[0], f"zsh shows no {text}: {seen}")
+                seen += os.read(terminal, 4096).replace(b"\a", b"")  # it may complete only a part, and beep
+
+        try:
+            os.write(terminal, f"unsetopt zle_bracketed_paste; autoload -U compinit; compinit -u -D; source {script}; echo rea''dy\n".encode())
+            wait_for(b"ready")
+            for typed, completed in (("view --vid", "--video"), ("run --odometry st", "street/"), ("run --preset pap", "paper"),
+                                     ("run --set banded_sgm.p2_s", "banded_sgm.p2_slope="), ("run --write ove", "overview"), ("devi", "devices")):
+                os.write(terminal, f"egosgm {typed}\t".encode())
+                wait_for(completed.encode())
+                os.write(terminal, b"\x15")  # clears the line
+        finally:
+            process.kill()
+            process.wait()
+            os.close(terminal)
+
+    def test_devices_names_the_default_and_why(self):
+        text = self.assert_works("devices")
+        self.assertIn("* 0", text)
+        self.assertIn("is taken by default", text)
+        devices = json.loads(self.assert_works("devices", "--json"))
+        self.assertEqual(sum(device["default"] for device in devices), 1)
+
+    def test_without_a_device_it_says_how_to_install_one(self):
+        nothing = dict(os.environ, OCL_ICD_VENDORS="/nonexistent")
+        self.assert_refused(["devices"], "pocl-opencl-icd", env=nothing)
+        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder()], "pocl-opencl-icd", env=nothing)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the program from outside share.
+
+EGOSGM_PROGRAM names the program, EGOSGM_EXAMPLES the folder of the examples; EGOSGM_DATA the folder of real data (tests that need it are skipped without).
+"""
+import json
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import tempfile
+import unittest
+import zlib
+
+PROGRAM = os.environ["EGOSGM_PROGRAM"]
+EXAMPLES = pathlib.Path(os.environ.get("EGOSGM_EXAMPLES", ""))
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+DATA = os.environ.get("EGOSGM_DATA", "")
+WIDTH, HEIGHT, FRAMES = 320, 96, 4
+
+
+def egosgm(*arguments, **options):
+    return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=240, **options)
+
+
+def png(width, height, depth, rows):
+    """A grey PNG of rows of bytes."""
+    def chunk(kind, body):
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+    header = struct.pack(">IIBBBBB", width, height, depth, 0, 0, 0, 0)
+    body = zlib.compress(b"".join(b"\0" + row for row in rows))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
+
+
+def grey_png(width, height, depth=8):
+    """A textured PNG, built here so that sizes and depths are free."""
+    return png(width, height, depth, (bytes((x * 7 + y * 13 + x * y) % 256 for x in range(width * depth // 8)) for y in range(height)))
+
+
+class ProgramTest(unittest.TestCase):
+    """A folder with a small synthetic sequence for each class, and a copy of it for each test that breaks it."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder_holder = tempfile.TemporaryDirectory(prefix="egosgm_program_")
+        cls.folder = pathlib.Path(cls.folder_holder.name)
+        cls.street = cls.folder / "street"
+        done = egosgm("synth", "--out", cls.street, "--frames", FRAMES, "--width", WIDTH, "--height", HEIGHT, "--seed", 7, "--quiet")
+        assert done.returncode == 0, done.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.folder_holder.cleanup()
+
+    def new_folder(self):
+        return pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+
+    def broken_street(self):
+        copy = self.new_folder() / "street"
+        shutil.copytree(self.street, copy)
+        return copy
+
+    def assert_works(self, *arguments, **options):
+        done = egosgm(*arguments, **options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr, "")
+        return done.stdout
+
+    def assert_refused(self, arguments, *named, code=2, **options):
+        """One line on the standard error that holds every text of `named`, and the exit code."""
+        done = egosgm(*arguments, **options)
+        lines = [line for line in done.stderr.splitlines() if line]
+        self.assertEqual(done.returncode, code, f"{arguments}: {done.stdout}{done.stderr}")
+        self.assertEqual(len(lines), 1, done.stderr)
+        self.assertTrue(lines[0].startswith("egosgm: error: "), lines[0])
+        for text in named:
+            self.assertIn(str(text), lines[0])
+
+    def report(self, out):
+        return json.loads((out / "report.json").read_text())
+
+    def assert_whole(self, out, at_least=0):
+        """Everything in `out` can be read, and nothing temporary is left."""
+        maps = sorted((out / "disparity").glob("*"))
+        self.assertGreaterEqual(len(maps), at_least)
+        for file in maps:
+            self.assertRegex(file.name, r"^\d{6}\.png$")
+            self.assert_works("eval", "--estimate", file, "--truth", file)
+        return len(maps)

@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm run: what it writes, its options, small devices, accuracy, real data."""
+import json
+import os
+import pathlib
+import pty
+import subprocess
+import unittest
+
+from program_case import DATA, FRAMES, PROGRAM, ProgramTest, egosgm, grey_png
+
+
+class Run(ProgramTest):
+    def test_writes_maps_poses_and_report(self):
+        out = self.new_folder()
+        text = self.assert_works("run", "--odometry", self.street, "--out", out)
+        self.assertEqual(self.assert_whole(out), FRAMES)
+        self.assertEqual(len((out / "poses.txt").read_text().splitlines()), FRAMES)
+        self.assertIn("frame 000003", text)
+        report = self.report(out)
+        self.assertTrue(report["finished"])
+        for key in ("device", "driver", "version", "options"):
+            self.assertTrue(report[key])
+        self.assertEqual([frame["frame"] for frame in report["frames"]], list(range(FRAMES)))
+        for frame in report["frames"]:
+            for fraction in ("search_fraction", "computed_fraction", "predicted_fraction", "density"):
+                self.assertTrue(0 <= frame[fraction] <= 1, fraction)
+            self.assertGreater(frame["ms"]["total"], 0)
+            self.assertIn("BandedSgm", frame["ms"])
+        first, later = report["frames"][0], report["frames"][-1]
+        self.assertEqual((first["search_fraction"], first["full_range"], first["full_range_reason"]), (1, True, "first frame"))
+        self.assertIsNone(first["odometry"]["motion"])
+        self.assertLess(later["search_fraction"], 0.5)
+        self.assertGreater(later["odometry"]["inliers"], 10)
+        self.assertAlmostEqual(later["odometry"]["motion"]["translation_m"][2], -0.8, delta=0.1)
+
+    def test_writes_what_is_asked_for(self):
+        out = self.new_folder()
+        kinds = "variance,color,predicted,measured,right,interpolated,search,dynamic,pfm,overview,cloud,depth,depth_m"
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", kinds, "--frames", "1:2", "--quiet")
+        for kind in kinds.split(","):
+            extension = "pfm" if kind in ("variance", "pfm", "depth_m") else "ply" if kind == "cloud" else "png"
+            self.assertEqual([f.name for f in sorted((out / kind).iterdir())], [f"00000{i}.{extension}" for i in (1, 2)])
+        text = json.loads(self.assert_works("eval", "--estimate", out / "interpolated", "--truth",
+                                            self.street / "truth/left_disp_occ", "--json"))
+        self.assertEqual(text["pooled"]["density"], 100)
+
+    def test_interpolate_fills_a_folder_of_its_own(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--interpolate", "--frames", "0")
+        self.assertTrue((out / "interpolated/000000.png").exists())
+
+    def test_frames_keep_their_own_numbers(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "2:3")
+        self.assertEqual([f.name for f in sorted((out / "disparity").iterdir())], ["000002.png", "000003.png"])
+        self.assertEqual([frame["frame"] for frame in self.report(out)["frames"]], [2, 3])
+        self.assertTrue((out / "poses.txt").read_text().startswith("1.0000"))
+
+    def test_same_bits_twice_and_quiet_says_nothing(self):
+        first, second = self.new_folder(), self.new_folder()
+        for out in (first, second):
+            self.assertEqual(self.assert_works("run", "--odometry", self.street, "--out", out, "--quiet", "--write", "variance"), "")
+        for file in [*first.glob("disparity/*"), *first.glob("variance/*"), first / "poses.txt"]:
+            self.assertEqual(file.read_bytes(), (second / file.relative_to(first)).read_bytes(), file.name)
+
+    def test_a_trace_holds_every_command_and_step_of_the_host(self):
+        out, plain, file = self.new_folder(), self.new_folder(), self.new_folder() / "trace.json"
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--trace", file)
+        self.assert_works("run", "--odometry", self.street, "--out", plain)
+        for picture in (plain / "disparity").iterdir():
+            self.assertEqual(picture.read_bytes(), (out / "disparity" / picture.name).read_bytes())
+        events = json.loads(file.read_text())["traceEvents"]
+        rows = {event["tid"]: event["args"]["name"] for event in events if event["name"] == "thread_name"}
+        spans = [event for event in events if event["ph"] == "X"]
+        frames = {f"{index:06}" for index in range(FRAMES)}
+        self.assertEqual({span["args"]["frame"] for span in spans}, frames)
+        for step in ("read", "odometry", "write"):
+            self.assertEqual([span["args"]["frame"] for span in spans if span["name"] == step and span["cat"] == "host"], sorted(frames))
+        for frame in self.report(out)["frames"]:
+            commands = [span for span in spans if int(span["args"]["frame"]) == frame["frame"] and span["cat"] != "host"]
+            kernels = [span for span in commands if span["name"] not in ("fill", "wait", "map", "unmap", "read", "write")]
+            self.assertEqual(len(kernels), frame["launches"])
+            self.assertEqual({rows[span["tid"]] for span in kernels}, {"device: kernels"})
+            self.assertEqual({rows[span["tid"]] for span in commands}, {"device: upload", "device: kernels", "device: download"})
+            self.assertIn(("BandedSgm", "sweep_forward"), {(span["cat"], span["name"]) for span in kernels})
+        for span in spans:
+            self.assertGreaterEqual(span["dur"], 0)
+            if span["cat"] != "host":
+                self.assertLessEqual(span["args"]["queued_us"], span["args"]["submitted_us"])
+                self.assertLessEqual(span["args"]["submitted_us"], span["ts"])
+        for row in rows:  # in-order queues: what overlaps in a row, no viewer can draw
+            in_row = sorted((span["ts"], span["ts"] + span["dur"]) for span in spans if span["tid"] == row)
+            for before, after in zip(in_row, in_row[1:]):
+                self.assertLessEqual(before[1], after[0] + 50)  # us: clocks of host and device are aligned frame by frame
+        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder(), "--trace", "/nonexistent/trace.json"],
+                            "/nonexistent/trace.json", code=1)
+
+    def test_tune_keeps_sizes_that_run_uses_and_change_no_bit(self):
+        folder = self.new_folder()
+        plain, tuned, file = folder / "plain", folder / "tuned", folder / "egosgm/tuning.json"
+        environment = dict(os.environ, XDG_CONFIG_HOME=str(folder))
+        self.assert_works("tune", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "SpeckleRemoval", env=environment)
+        stored = json.loads(file.read_text())
+        self.assertEqual(len(stored), 1)
+        key, sizes = stored.popitem()
+        self.assertIn("driver", key)
+        self.assertIn("tile_width", sizes)
+        sizes.update(tile_width=32, tile_height=8, warp_band_rows=5)
+        file.write_text(json.dumps({"another device, driver 1": {"tile_width": "nonsense"}, key: sizes}))
+        self.assert_works("run", "--odometry", self.street, "--out", tuned, "--trace", folder / "tuned.json", env=environment)
+        self.assert_works("run", "--odometry", self.street, "--out", plain, "--tuning", "none", env=environment)
+        for picture in (plain / "disparity").iterdir():
+            self.assertEqual(picture.read_bytes(), (tuned / "disparity" / picture.name).read_bytes())
+        self.assertGreater(self.report(tuned)["frames"][2]["launches"], self.report(plain)["frames"][2]["launches"])  # more, smaller tiles
+        for broken in ("", "[]", "{", json.dumps({key: {"tile_width": 3, "tile_height": 3}}), json.dumps({key: {"tiles": 3}}),
+                       json.dumps({key: 7}), json.dumps({key: {"tile_width": "wide"}})):
+            file.write_text(broken)
+            self.assert_refused(["run", "--odometry", self.street, "--out", plain], file, "egosgm tune", env=environment)
+        self.assert_refused(["run", "--odometry", self.street, "--out", plain, "--tuning", "/nonexistent"], "/nonexistent")
+        self.assert_refused(["tune", "--file", "/proc/tuning.json"], "/proc/tuning.json", code=1)
+
+    def test_a_terminal_gets_a_bar(self):
+        terminal, side = pty.openpty()
+        with subprocess.Popen([PROGRAM, "run", "--odometry", self.street, "--out", self.new_folder()], stdout=side) as process:
+            os.close(side)
+            text = b""
+            try:
+                while part := os.read(terminal, 4096):
+                    text += part
+            except OSError:  # the program has closed its end
+                pass
+        os.close(terminal)
+        self.assertEqual(process.returncode, 0)
+        self.assertIn(b"frames/s", text)
+        self.assertIn(f"{FRAMES}/{FRAMES}".encode(), text)
+        self.assertGreaterEqual(text.count(b"\r\x1b[K"), FRAMES)
+
+    def test_temporal_off_searches_everything(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--temporal", "off")
+        for frame in self.report(out)["frames"]:
+            self.assertEqual((frame["search_fraction"], frame["full_range"], frame["predicted_fraction"]), (1, True, 0))
+
+    def test_search_full_still_predicts(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--search", "full")
+        last = self.report(out)["frames"][-1]
+        self.assertEqual(last["search_fraction"], 1)
+        self.assertGreater(last["predicted_fraction"], 0.5)
+
+    def test_poses_take_the_place_of_odometry(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--poses", self.street / "poses.txt")
+        self.assertEqual(self.report(out)["frames"][-1]["odometry"]["source"], "poses file")
+        drift = json.loads(self.assert_works("eval-poses", "--estimate", out / "poses.txt", "--truth", self.street / "poses.txt",
+                                             "--json"))
+        self.assertLess(drift["end_drift_m"], 1e-6)
+
+    def test_patterns_and_16_bit_images_and_odd_sizes(self):
+        folder = self.new_folder()
+        for side in ("left", "right"):
+            for i in (1, 2):
+                (folder / f"{side}_{i}.png").write_bytes(grey_png(65, 31, depth=16))
+        (folder / "calib.toml").write_text("fx = 100\nfy = 100\ncx = 32\ncy = 15\nbaseline_m = 0.5\n")
+        out = self.new_folder()
+        self.assert_works("run", "--left", folder / "left_%d.png", "--right", folder / "right_%d.png", "--calib",
+                          folder / "calib.toml", "--out", out, "--disparities", 19, "--min-disparity", "-3", "--paths", 4)
+        self.assertEqual(self.assert_whole(out), 2)
+        options = self.report(out)["options"]
+        self.assertEqual((options["disparities"], options["min_disparity"], options["banded_sgm.paths"]), (19, -3, 4))
+
+    def test_a_saved_configuration_gives_the_same_bits(self):
+        first, second = self.new_folder(), self.new_folder()
+        saved, again = first / "saved.toml", second / "again.toml"
+        self.assert_works("run", "--odometry", self.street, "--out", first, "--preset", "paper", "--set", "banded_sgm.p2=97",
+                          "--set", "search_band.sigmas=2.7", "--disparities", 50, "--save-config", saved)
+        self.assert_works("run", "--odometry", self.street, "--out", second, "--config", saved, "--save-config", again)
+        self.assertEqual(saved.read_text(), again.read_text())
+        for file in first.glob("disparity/*"):
+            self.assertEqual(file.read_bytes(), (second / "disparity" / file.name).read_bytes())
+
+    def test_the_last_choice_wins_preset_config_set_named(self):
+        folder = self.new_folder()
+        config = folder / "config.toml"
+        config.write_text("# a comment\ndisparities = 40\n[banded_sgm]\np1 = 7\np2 = 77\n")
+        self.assert_works("run", "--odometry", self.street, "--out", folder / "out", "--frames", "0", "--config", config, "--set",
+                          "banded_sgm.p2=88", "--set", "disparities=41", "--disparities", 42)
+        options = self.report(folder / "out")["options"]
+        self.assertEqual((options["disparities"], options["banded_sgm.p1"], options["banded_sgm.p2"]), (42, 7, 88))
+
+    def test_paper_preset_searches_everything_that_is_not_predicted(self):
+        default, paper = self.new_folder(), self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", default)
+        self.assert_works("run", "--odometry", self.street, "--out", paper, "--preset", "paper")
+        self.assertGreater(self.report(paper)["frames"][-1]["search_fraction"],
+                           self.report(default)["frames"][-1]["search_fraction"])
+
+
+class Accuracy(ProgramTest):
+    def test_synthetic_sequence_with_true_poses(self):
+        street, out = self.new_folder(), self.new_folder()
+        self.assert_works("synth", "--out", street, "--frames", 20, "--quiet")
+        self.assert_works("run", "--odometry", street, "--poses", street / "poses.txt", "--out", out, "--quiet")
+        for i in range(3):
+            (out / f"disparity/00000{i}.png").unlink()
+        result = json.loads(self.assert_works("eval", "--estimate", out, "--truth", street / "truth/left_disp_noc", "--json"))
+        self.assertEqual(len(result["pairs"]), 17)
+        self.assertEqual(len(result["without_estimate"]), 3)
+        self.assertLessEqual(result["pooled"]["bad_or_missing"], 2.0)
+
+    def test_odometry_of_a_synthetic_sequence(self):
+        street, poses = self.new_folder(), self.new_folder() / "poses.txt"
+        self.assert_works("synth", "--out", street, "--frames", 8, "--quiet")
+        self.assert_works("odometry", street, "--out", poses)
+        drift = json.loads(self.assert_works("eval-poses", "--estimate", poses, "--truth", street / "poses.txt", "--json"))
+        self.assertEqual(drift["frames"], 8)
+        self.assertEqual(len(drift["motions"]), 7)
+        self.assertLess(drift["end_drift_percent"], 0.5)
+        folder = self.new_folder()
+        self.assert_works("eval-poses", "--estimate", poses, "--truth", street / "poses.txt", "--plot", folder / "path.svg", "--plot",
+                          folder / "path.png")
+        self.assertIn("<svg", (folder / "path.svg").read_text())
+        self.assertTrue((folder / "path.png").read_bytes().startswith(b"\x89PNG"))
+
+    def test_bounds_on_the_motion(self):
+        street, poses = self.street, self.new_folder() / "poses.txt"
+        done = egosgm("odometry", street, "--out", poses, "--max-translation", 0.5)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("exceeds the bound of 0.50 m", done.stdout + done.stderr)
+        self.assert_refused(["odometry", street, "--out", poses, "--max-rotation", "-1"], "max_rotation_deg")
+        self.assert_refused(["run", "--odometry", street, "--out", self.folder / "never", "--max-translation", "0"], "max_translation_m")
+        self.assert_refused(["eval-poses", "--estimate", poses, "--truth", street / "poses.txt", "--plot", "path.jpg"], "path.jpg", ".svg")
+
+
+class Limits(ProgramTest):
+    """Devices that allow little, which PoCL can play."""
+
+    def run_with(self, *arguments, **environment):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--quiet", *arguments, env=dict(os.environ, **environment))
+        return out
+
+    def assert_same_maps(self, out, expected):
+        for file in sorted((expected / "disparity").iterdir()):
+            self.assertEqual((out / "disparity" / file.name).read_bytes(), file.read_bytes(), file.name)
+
+    def test_small_work_groups_give_the_same_bits(self):
+        for scheduling in ("wavefront", "paths"):
+            arguments = ("--frames", ":1", "--disparities", 32, "--set", f"banded_sgm.scheduling={scheduling}")
+            expected = self.run_with(*arguments)
+            for size in ("1", "6"):
+                with self.subTest(scheduling=scheduling, size=size):
+                    self.assert_same_maps(self.run_with(*arguments, POCL_MAX_WORK_GROUP_SIZE=size), expected)
+
+    def test_one_compute_unit_gives_the_same_bits(self):
+        self.assert_same_maps(self.run_with("--frames", ":1", POCL_MAX_PTHREAD_COUNT="1"), self.run_with("--frames", ":1"))
+
+    def test_a_range_that_does_not_fit_is_matched_in_stripes(self):
+        folder, out = self.new_folder(), self.new_folder()
+        for side in ("left", "right"):
+            (folder / f"{side}.png").write_bytes(grey_png(640, 200))
+        (folder / "calib.toml").write_text("fx = 400\nfy = 400\ncx = 320\ncy = 100\nbaseline_m = 0.5\n")
+        run = ["run", "--left", folder / "left.png", "--right", folder / "right.png", "--calib", folder / "calib.toml", "--out", out]
+        gigabyte = dict(os.environ, POCL_MEMORY_LIMIT="1")
+        self.assert_works(*run, "--disparities", 2048, env=gigabyte)
+        report = self.report(out)
+        self.assertGreater(report["frames"][0]["stripes"], 1)
+        self.assertLess(report["device_memory_bytes"], 1 << 30)
+        self.assert_refused([*run, "--overwrite", "--disparities", 64, "--set", "banded_sgm.max_memory_mib=3"],
+                            "BandedSgm: a stripe of 96 rows needs", "max_memory_mib allows 3 MiB", "fewer disparities", code=1)
+
+    def test_stripes_are_almost_as_good(self):
+        street, bad = self.new_folder(), {}
+        self.assert_works("synth", "--out", street, "--frames", 3, "--width", 320, "--height", 240, "--seed", 7, "--quiet")
+        for name, arguments in (("whole", []), ("stripes", ["--set", "banded_sgm.max_memory_mib=8"])):
+            out = self.new_folder()
+            self.assert_works("run", "--odometry", street, "--out", out, "--disparities", 64, *arguments)
+            self.assertTrue(all((frame["stripes"] > 1) == (name == "stripes") for frame in self.report(out)["frames"]))
+            bad[name] = json.loads(self.assert_works("eval", "--estimate", out, "--truth", street / "truth/left_disp_noc",
+                                                     "--json"))["pooled"]["bad_or_missing"]
+        self.assertLess(abs(bad["stripes"] - bad["whole"]), 1, bad)
+
+
+@unittest.skipUnless(pathlib.Path(DATA, "README.md").is_file(), f"no real data: EGOSGM_DATA is '{DATA}'")
+class RealData(ProgramTest):
+    data = pathlib.Path(DATA)
+
+    def evaluate(self, estimate, truth):
+        return json.loads(self.assert_works("eval", "--estimate", estimate, "--truth", truth, "--json"))["pooled"]
+
+    def test_evaluation_agrees_with_kittis_kit(self):
+        kit = self.data / "devkit2012"
+        figures = self.evaluate(kit / "disp_est.png", kit / "disp_gt.png")
+        for key, value in {"density": 96.337, "interpolated": 5.186, "bad_of_valid": 4.393, "bad_or_missing": 7.894,
+                           "d1_interpolated": 5.185}.items():
+            self.assertAlmostEqual(figures[key], value, delta=0.0006, msg=key)
+
+    def test_kitti_2012_beats_the_single_frame(self):
+        training = self.data / "kitti2012/training"
+        figures = {}
+        for temporal in ("on", "off"):
+            out = self.new_folder()
+            self.assert_works("run", "--kitti", training, "--scene", "000151", "--frames", "7:10", "--temporal", temporal, "--out", out)
+            figures[temporal] = self.evaluate(out / "disparity/000010.png", training / "disp_noc/000151_10.png")
+            if temporal == "on":
+                self.assertLessEqual(self.report(out)["frames"][-1]["search_fraction"], 0.12)
+        self.assertLessEqual(figures["on"]["bad_or_missing"], 5.0)
+        self.assertLessEqual(figures["on"]["interpolated"], 4.0)
+        self.assertLessEqual(figures["off"]["bad_or_missing"], 10.0)
+        self.assertLess(figures["on"]["interpolated"], figures["off"]["interpolated"])
+
+    def test_kitti_2015_in_colour(self):
+        out = self.new_folder()
+        self.assert_works("run", "--kitti", self.data / "kitti2015/training", "--scene", "2", "--frames", "10:11", "--out", out)
+        self.assertEqual(self.assert_whole(out), 2)
+
+    def test_middlebury_has_an_offset(self):
+        out = self.new_folder()
+        self.assert_works("run", "--dataset", self.data / "middlebury/Motorcycle", "--out", out)
+        self.assertGreater(self.report(out)["calibration"]["doffs_px"], 1)
+
+    def test_odometry_excerpt(self):
+        folder, poses = self.data / "odometry/sequences/A", self.new_folder() / "poses.txt"
+        self.assert_works("odometry", folder, "--out", poses)
+        drift = json.loads(self.assert_works("eval-poses", "--estimate", poses, "--truth", folder / "poses.txt", "--json"))
+        self.assertLessEqual(drift["end_drift_percent"], 1.5)
+
+
+if __name__ == "__main__":
+    unittest.main()

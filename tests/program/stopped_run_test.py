@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs that end early: full disks, interrupts, kills; and runs that go on or are replaced."""
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import unittest
+
+from program_case import FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png
+
+
+class LongRuns(ProgramTest):
+    """What tests of stopped runs are made of."""
+    LONG = 60
+
+    def street_of(self, frames):
+        """The sequence forth and back, again and again."""
+        street = self.broken_street()
+        there_and_back = [*range(FRAMES), *range(FRAMES - 2, 0, -1)]
+        for side in (0, 1):
+            for i in range(FRAMES, frames):
+                source = self.street / f"image_{side}/{there_and_back[i % len(there_and_back)]:06d}.png"
+                shutil.copyfile(source, street / f"image_{side}/{i:06d}.png")
+        return street
+
+    def long_street(self):
+        """A sequence that takes a while."""
+        return self.street_of(self.LONG)
+
+    def start(self, street, out, *arguments, lines=1):
+        """A run that has reported `lines` frames."""
+        process = subprocess.Popen([PROGRAM, "run", "--odometry", street, "--out", out, *arguments], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        for _ in range(lines):
+            process.stdout.readline()
+        return process
+
+
+class Disk(LongRuns):
+    def test_output_folders_that_cannot_be_written(self):
+        below_a_file = self.street / "calib.txt/out"
+        self.assert_refused(["run", "--odometry", self.street, "--out", below_a_file], below_a_file, code=1)
+        self.assert_refused(["synth", "--out", below_a_file], below_a_file, code=1)
+        self.assert_refused(["odometry", self.street, "--out", below_a_file / "poses.txt"], below_a_file, code=1)
+
+    def test_a_full_disk_leaves_whole_files(self):
+        street, out = self.long_street(), self.new_folder()
+        process = subprocess.Popen([PROGRAM, "run", "--odometry", street, "--out", out], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        for _ in range(3):  # by then the driver has written its kernel cache
+            process.stdout.readline()
+        resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (4096, 4096))  # EFBIG: ENOSPC without a file system of its own
+        _, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 1, errors)
+        self.assertRegex(errors, r"^egosgm: error: .*disparity/\d{6}\.png.*\n$")
+        self.assert_whole(out, at_least=3)
+
+    def test_an_interrupt_ends_cleanly(self):
+        street, out = self.long_street(), self.new_folder()
+        for stop in (signal.SIGINT, signal.SIGTERM):
+            process = self.start(street, out, "--overwrite")
+            process.send_signal(stop)
+            _, errors = process.communicate(timeout=120)
+            self.assertEqual(process.returncode, 130, errors)
+            self.assertIn("interrupted", errors)
+            report = self.report(out)
+            self.assertFalse(report["finished"])
+            self.assertTrue(1 <= len(report["frames"]) < self.LONG)
+            self.assertEqual(len((out / "poses.txt").read_text().splitlines()), len(report["frames"]))
+
+    def test_a_kill_leaves_only_whole_files(self):
+        street, out = self.long_street(), self.new_folder()
+        for lines in (1, 2, 3):
+            process = self.start(street, out, "--overwrite", lines=lines)
+            process.kill()
+            process.communicate()
+            self.assert_whole(out, at_least=lines)
+            self.assertFalse(self.report(out)["finished"])
+
+    def assert_fails_after(self, frames, broken, *named):
+        """A run over a long sequence that `broken(street)` breaks while it runs."""
+        street, out = self.long_street(), self.new_folder()
+        process = self.start(street, out, lines=frames)
+        broken(street)
+        _, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 2, errors)
+        self.assertEqual(len(errors.splitlines()), 1, errors)
+        for text in named:
+            self.assertIn(text, errors)
+        report = self.report(out)
+        self.assertFalse(report["finished"])
+        self.assertEqual(self.assert_whole(out, at_least=frames), len(report["frames"]))
+
+    def test_a_file_that_vanishes(self):
+        last = f"image_1/{self.LONG - 1:06d}.png"
+        self.assert_fails_after(2, lambda street: (street / last).unlink(), last, "cannot be read")
+
+    def test_a_file_that_changes_size_or_is_cut(self):
+        last = f"image_0/{self.LONG - 1:06d}.png"
+        self.assert_fails_after(2, lambda street: (street / last).write_bytes(grey_png(WIDTH, HEIGHT + 1)), last)
+        self.assert_fails_after(2, lambda street: os.truncate(street / last, 1000), last, "truncated")
+
+    def test_a_file_system_without_room(self):
+        out = self.new_folder()
+        small = ["unshare", "--map-root-user", "--mount", "sh", "-c", f"mount -t tmpfs -o size=96k tmpfs '{out}' && exec \"$@\"; exit 77", "sh"]
+        if shutil.which("unshare") is None or subprocess.run([*small, "true"], capture_output=True).returncode != 0:
+            self.skipTest("no small file system can be mounted here")
+        inside = f"'{PROGRAM}' run --odometry '{self.long_street()}' --out '{out}'; echo code $?; ls -A '{out}/disparity'; cat '{out}/report.json'"
+        done = subprocess.run([*small, "sh", "-c", inside], capture_output=True, text=True, timeout=240)
+        self.assertIn("code 1\n", done.stdout)
+        self.assertRegex(done.stderr, r"^egosgm: error: .*disparity/\d{6}\.png.*No space left on device.*\n$")
+        left = done.stdout.split("code 1\n")[1]
+        self.assertNotIn(".part", left)
+        self.assertFalse(json.loads(left[left.index("{"):])["finished"])
+
+    @unittest.skipUnless(os.geteuid() == 0, "rights are taken from another user: needs root")
+    def test_a_folder_without_rights(self):
+        out, cache = self.new_folder(), self.new_folder()
+        for folder in (self.folder, out):
+            folder.chmod(0o755)
+        shutil.chown(cache, "nobody")
+        nobody = {"user": "nobody", "env": dict(os.environ, POCL_CACHE_DIR=str(cache), HOME=str(cache))}
+        try:
+            egosgm("--version", **nobody)
+        except PermissionError:
+            self.skipTest("another user cannot run the program where it lies")
+        self.assert_refused(["run", "--odometry", self.street, "--out", out], out, "Permission denied", code=1, **nobody)
+        self.assertEqual(list(out.iterdir()), [])
+
+
+class Resume(LongRuns):
+    """An earlier run in OUT: in the way, replaced, or gone on with."""
+    FRAMES = 12
+    KINDS = ("--write", "variance,color,search")
+
+    def assert_same_run(self, out, expected):
+        files = sorted(file.relative_to(expected) for file in expected.rglob("*") if file.is_file())
+        self.assertEqual(sorted(file.relative_to(out) for file in out.rglob("*") if file.is_file()), files)
+        for file in files:
+            if file.name != "report.json":
+                self.assertEqual((out / file).read_bytes(), (expected / file).read_bytes(), file)
+        mine, undisturbed = self.report(out), self.report(expected)
+        for report in (mine, undisturbed):
+            for frame in report["frames"]:
+                del frame["ms"]
+        self.assertEqual(mine, undisturbed)
+
+    def test_equals_an_undisturbed_run(self):
+        street, expected = self.street_of(self.FRAMES), self.new_folder()
+        self.assert_works("run", "--odometry", street, "--out", expected, *self.KINDS)
+        for stop in (signal.SIGKILL, signal.SIGINT):
+            out = self.new_folder()
+            for lines in (3, 5):
+                process = self.start(street, out, "--resume", *self.KINDS, lines=lines)
+                process.send_signal(stop)
+                process.communicate()
+                self.assertLess(self.assert_whole(out, at_least=lines), self.FRAMES)
+            kept = {file: file.stat().st_ino for file in out.rglob("0*.*")}
+            self.assertGreaterEqual(len(kept), 4 * 3)
+            self.assert_works("run", "--odometry", street, "--out", out, "--resume", *self.KINDS)
+            self.assert_same_run(out, expected)
+            for file, inode in kept.items():
+                self.assertEqual(file.stat().st_ino, inode, f"{file} was there and was written again")
+
+    def test_an_earlier_run_is_in_the_way(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "color")
+        before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+        again = ["run", "--odometry", self.street, "--out", out, "--frames", "1:2"]
+        self.assert_refused(again, out, "--resume", "--overwrite")
+        self.assert_refused([*again, "--resume"], "first_frame", "--overwrite")
+        self.assert_refused([*again, "--resume", "--overwrite"], "contradict")
+        self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
+        (out / "color/mine.png").write_text("not a map")
+        self.assert_works(*again, "--overwrite")
+        self.assertEqual([file.name for file in sorted((out / "disparity").iterdir())], ["000001.png", "000002.png"])
+        self.assertEqual([file.name for file in (out / "color").iterdir()], ["mine.png"])
+
+    def test_other_settings_cannot_go_on(self):
+        out = self.new_folder()
+        run = ["run", "--odometry", self.street, "--out", out]
+        self.assert_works(*run, "--frames", ":1", "--quiet")
+        self.assert_refused([*run, "--resume", "--set", "banded_sgm.p2=99"], "banded_sgm.p2", "160", "99")
+        self.assert_refused([*run, "--resume", "--poses", self.street / "poses.txt"], "motion")
+        self.assert_works(*run, "--resume")
+        self.assertEqual(self.assert_whole(out), FRAMES)
+        (out / "report.json").write_text("[]")
+        self.assert_refused([*run, "--resume"], out / "report.json")
+        (out / "report.json").unlink()
+        self.assert_refused([*run, "--resume"], out, "report.json")
+
+
+if __name__ == "__main__":
+    unittest.main()

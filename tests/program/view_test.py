@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm view: pictures, videos, the window."""
+import os
+import pathlib
+import shutil
+import signal
+import struct
+import subprocess
+import time
+import unittest
+
+from program_case import FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest
+
+
+class View(ProgramTest):
+    """A smaller sequence, since what is looked at is the same."""
+
+    def png_size(self, file):
+        return struct.unpack(">II", file.read_bytes()[16:24])
+
+    def test_pictures_and_a_video_without_a_display(self):
+        out = self.new_folder()
+        headless = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        video = ["--video", out / "street.avi"]  # OpenCV writes it without FFmpeg
+        text = self.assert_works("view", "--odometry", self.street, "--pictures", out / "pictures", *video, "--cell-width", 200,
+                                 env=headless)
+        self.assertIn("frame 000003", text)
+        pictures = sorted((out / "pictures").iterdir())
+        self.assertEqual([file.name for file in pictures], [f"00000{i}.png" for i in range(FRAMES)])
+        width, height = self.png_size(pictures[0])
+        self.assertEqual(width, 404)  # two panels and a gap
+        self.assertGreater(height, 3 * HEIGHT * 200 / WIDTH)  # three rows, the last one for the error
+        self.assertEqual([file.name for file in out.iterdir() if file.is_file()], ["street.avi"])
+        content = (out / "street.avi").read_bytes()
+        self.assertEqual((content[:4], content[8:12]), (b"RIFF", b"AVI "))
+        self.assertEqual(content.count(b"00dc") // 2, FRAMES)  # each frame stands in the stream and in the index
+
+    def test_without_truth_there_is_no_error_panel(self):
+        street, heights = self.broken_street(), []
+        for name in ("with", "without"):
+            self.assert_works("view", "--odometry", street, "--pictures", street / name, "--frames", "0", "--quiet")
+            heights.append(self.png_size(street / name / "000000.png")[1])
+            shutil.rmtree(street / "truth", ignore_errors=True)
+        self.assertGreater(heights[0], heights[1])
+
+    def test_what_cannot_be_shown_is_refused(self):
+        headless = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+        view = ["view", "--odometry", self.street]
+        self.assert_refused(view, "--video", "--pictures", env=headless)
+        for name in ("DISPLAY", "WAYLAND_DISPLAY"):  # a display that is not there
+            self.assert_refused(view, f":77777 ({name})", "--video", "--pictures", env={**headless, name: ":77777"})
+        self.assert_refused([*view, "--video", self.folder / "street.mkv"], ".mp4 or .avi")
+        self.assert_refused([*view, "--pictures", self.folder / "p", "--fps", 0], "--fps 0")
+        self.assert_refused([*view, "--pictures", self.folder / "p", "--cell-width", 0], "1..32768")
+        self.assert_refused([*view, "--pictures", self.street / "calib.txt/p"], "calib.txt", code=1)
+
+    @unittest.skipUnless(shutil.which("Xvfb"), "no Xvfb")
+    def test_the_window_plays_until_it_is_told_to_stop(self):
+        # A number of its own: those that Xvfb finds free may be taken in another root folder on this machine.
+        display = f":{1000 + os.getpid() % 50000}"
+        with subprocess.Popen(["Xvfb", display, "-nolisten", "tcp"], stderr=subprocess.DEVNULL) as screen:
+            try:
+                self.wait_until(pathlib.Path(f"/tmp/.X11-unix/X{display[1:]}").exists)
+                process = subprocess.Popen([PROGRAM, "view", "--odometry", self.street], stderr=subprocess.PIPE, text=True,
+                                           env=dict(os.environ, DISPLAY=display))
+                with self.assertRaises(subprocess.TimeoutExpired):  # it stays open after the last frame
+                    process.wait(timeout=8)
+                process.send_signal(signal.SIGINT)
+                _, errors = process.communicate(timeout=60)
+                self.assertEqual(process.returncode, 130, errors)
+                self.assertNotIn("error", errors)
+            finally:
+                screen.terminate()
+
+    def wait_until(self, is_so):
+        for _ in range(100):
+            if is_so():
+                return
+            time.sleep(0.1)
+        self.fail("waited 10 s in vain")
+
+
+if __name__ == "__main__":
+    unittest.main()

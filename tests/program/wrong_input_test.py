@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wrong arguments and broken files: one line each that names the value and the remedy."""
+import struct
+import unittest
+import zlib
+
+from program_case import HEIGHT, WIDTH, ProgramTest, egosgm, grey_png
+
+
+class WrongArguments(ProgramTest):
+    def run_with(self, *arguments):
+        return ["run", "--odometry", self.street, "--out", self.folder / "never", *arguments]
+
+    def tearDown(self):
+        self.assertFalse((self.folder / "never").exists(), "refused, but wrote")
+
+    def test_mistyped_names_get_a_suggestion(self):
+        self.assert_refused(["rnu"], "rnu", "did you mean run?")
+        self.assert_refused(["--versoin"], "--version")
+        self.assert_refused(self.run_with("--disparites", 64), "--disparites", "did you mean --disparities?")
+        self.assert_refused(self.run_with("--disparites=64"), "did you mean --disparities?")
+        self.assert_refused(self.run_with("--set", "banded_sgm.p_2=64"), "banded_sgm.p_2", "banded_sgm.p2")
+        self.assert_refused(self.run_with("--write", "colour"), "colour", "did you mean color?")
+
+    def test_mistyped_paths_get_a_suggestion(self):
+        mistyped = self.street.parent / "stret"
+        self.assert_refused(["run", "--odometry", mistyped, "--out", self.folder / "never"], mistyped, f"did you mean {self.street}?")
+        self.assert_refused(["eval", f"--estimate={mistyped}/truth/left_disp_occ/000000.png", "--truth", self.street],
+                            f"did you mean {self.street}/truth/left_disp_occ/000000.png?")
+        self.assert_refused(self.run_with("--poses", self.street / "pose.txt"), f"did you mean {self.street / 'poses.txt'}?")
+        done = egosgm("run", "--odometry", self.street.parent / "another", "--out", self.folder / "never")
+        self.assertNotIn("did you mean", done.stderr)
+
+    def test_missing_and_contradicting_arguments(self):
+        self.assert_refused([], "subcommand")
+        self.assert_refused(["run"], "--out")
+        self.assert_refused(["run", "--out", self.folder / "never"], "--odometry")
+        self.assert_refused(self.run_with("--kitti", self.street, "--scene", 1), "more than one input")
+        self.assert_refused(self.run_with("--scene", 1), "--scene")
+        self.assert_refused(["run", "--left", "a.png", "--out", self.folder / "never"], "--right")
+        self.assert_refused(["run", "--kitti", self.street, "--out", self.folder / "never"], "--scene")
+        self.assert_refused(self.run_with("--device"), "--device")
+        self.assert_refused(self.run_with("surplus"), "surplus")
+
+    def test_values_out_of_range(self):
+        self.assert_refused(self.run_with("--disparities", 0), "disparities", "0")
+        self.assert_refused(self.run_with("--disparities", "many"), "many")
+        self.assert_refused(self.run_with("--paths", 5), "paths", "5")
+        self.assert_refused(self.run_with("--preset", "best"), "best")
+        self.assert_refused(self.run_with("--search", "some"), "some")
+        self.assert_refused(self.run_with("--temporal", "maybe"), "maybe")
+        self.assert_refused(self.run_with("--frames", "a:b"), "a:b")
+        self.assert_refused(self.run_with("--frames", "3:1"), "3:1")
+        self.assert_refused(self.run_with("--set", "banded_sgm.p2"), "stage.option=value")
+        self.assert_refused(self.run_with("--set", "forward_warp.process_noise_px2=nan"), "process_noise_px2")
+        self.assert_refused(self.run_with("--device", "abacus"), "abacus")
+        self.assert_refused(["synth", "--out", self.folder / "never", "--frames", 0], "frames")
+        self.assert_refused(["synth", "--out", self.folder / "never", "--width", "wide"], "wide")
+
+    def test_configuration_files(self):
+        config = self.new_folder() / "config.toml"
+        self.assert_refused(self.run_with("--config", config), config)
+        config.write_text("banded_sgm.p_1 = 3\n")
+        self.assert_refused(self.run_with("--config", config), config, "banded_sgm.p1")
+        config.write_bytes(bytes(range(256)))
+        self.assert_refused(self.run_with("--config", config), config)
+
+    def test_scenes_that_do_not_exist(self):
+        folder = self.new_folder()
+        for name in ("image_0", "image_1", "calib"):
+            (folder / name).mkdir()
+        (folder / "image_0/000007_10.png").write_bytes(grey_png(8, 8))
+        self.assert_refused(["run", "--kitti", folder, "--scene", 8, "--out", self.folder / "never"], "8", "000007")
+
+
+class BrokenInput(ProgramTest):
+    def assert_sequence_refused(self, street, *named, code=2, frames_left=None, options=()):
+        out = self.new_folder() / "out"
+        self.assert_refused(["run", "--odometry", street, "--out", out, *options], *named, code=code)
+        if frames_left is None:
+            self.assertFalse(out.exists(), "refused before the run, but wrote")
+        else:
+            self.assertEqual(self.assert_whole(out), frames_left)
+            report = self.report(out)
+            self.assertFalse(report["finished"])
+            self.assertEqual(len(report["frames"]), frames_left)
+
+    def test_empty_folder(self):
+        empty = self.new_folder()
+        self.assert_sequence_refused(empty, empty, "image_0")
+
+    def test_missing_frame(self):
+        street = self.broken_street()
+        (street / "image_0/000002.png").unlink()
+        (street / "image_1/000002.png").unlink()
+        self.assert_sequence_refused(street, "000002.png", "--frames")
+
+    def test_missing_right_image(self):
+        street = self.broken_street()
+        (street / "image_1/000002.png").unlink()
+        self.assert_sequence_refused(street, "000002.png")
+
+    def test_truncated_image(self):
+        street = self.broken_street()
+        file = street / "image_1/000002.png"
+        file.write_bytes(file.read_bytes()[:-1500])
+        self.assert_sequence_refused(street, file, frames_left=2)
+
+    def test_image_that_is_none(self):
+        street = self.broken_street()
+        file = street / "image_0/000001.png"
+        file.write_text("not an image")
+        self.assert_sequence_refused(street, file)
+        file.write_bytes(b"")
+        self.assert_sequence_refused(street, file)
+
+    def test_sizes_that_differ(self):
+        street = self.broken_street()
+        file = street / "image_1/000000.png"
+        file.write_bytes(grey_png(WIDTH - 1, HEIGHT))
+        self.assert_sequence_refused(street, file)
+
+    def test_size_that_changes(self):
+        street = self.broken_street()
+        for side in (0, 1):
+            (street / f"image_{side}/000003.png").write_bytes(grey_png(WIDTH, HEIGHT + 1))
+        self.assert_sequence_refused(street, "000003.png", f"{WIDTH}x{HEIGHT}")
+
+    def test_a_header_that_promises_gigabytes(self):
+        street = self.broken_street()
+        for side in (0, 1):
+            for file in (street / f"image_{side}").iterdir():
+                data = bytearray(grey_png(8, 8))
+                data[16:24] = struct.pack(">II", 100000, 100000)
+                data[29:33] = struct.pack(">I", zlib.crc32(bytes(data[12:29])))
+                file.write_bytes(bytes(data))
+        self.assert_sequence_refused(street, "000000.png")
+
+    def test_calibrations(self):
+        good = (self.street / "calib.txt").read_text().splitlines()
+        left = good[0].split()
+
+        def with_left(index, value):
+            return " ".join(left[:index] + [value] + left[index + 1:])
+
+        def with_right_shift(value):
+            row = good[1].split()
+            row[4] = value
+            return " ".join(row)
+
+        for name, rows in {
+                "zero focal length": [with_left(1, "0"), good[1]],
+                "NaN": [with_left(1, "nan"), good[1]],
+                "too few numbers": [" ".join(left[:-1]), good[1]],
+                "no number": [with_left(3, "wide"), good[1]],
+                "zero baseline": [good[0], with_right_shift("0")],
+                "negative baseline": [good[0], with_right_shift("100")],
+                "one camera": [good[0]],
+                "empty": [],
+        }.items():
+            with self.subTest(name):
+                street = self.broken_street()
+                (street / "calib.txt").write_text("\n".join(rows) + "\n")
+                self.assert_sequence_refused(street, "calib.txt")
+        street = self.broken_street()
+        (street / "calib.txt").unlink()
+        self.assert_sequence_refused(street, "calib.txt")
+
+    def test_poses(self):
+        rows = (self.street / "poses.txt").read_text().splitlines()
+        stretched = "2 0 0 0 0 1 0 0 0 0 1 0"
+        mirrored = "-1 0 0 0 0 1 0 0 0 0 1 0"
+        for name, bad in {"too few numbers": "1 0 0", "not a rotation": stretched, "a reflection": mirrored, "words": "a " * 12,
+                          "NaN": "nan " * 12}.items():
+            with self.subTest(name):
+                poses = self.new_folder() / "poses.txt"
+                poses.write_text("\n".join([rows[0], bad, *rows[2:]]) + "\n")
+                self.assert_sequence_refused(self.street, f"{poses}:2", options=["--poses", poses])
+        poses = self.new_folder() / "poses.txt"
+        poses.write_text(rows[0] + "\n")
+        self.assert_sequence_refused(self.street, poses, options=["--poses", poses])
+        self.assert_sequence_refused(self.street, "nowhere", options=["--poses", "nowhere"])
+        self.assert_refused(["eval-poses", "--estimate", poses, "--truth", self.street / "poses.txt"])
+
+
+if __name__ == "__main__":
+    unittest.main()
