@@ -91,7 +91,7 @@ class DeviceBuffers(ProgramTest):
     def test_depth_is_that_of_runs_disparities(self):
         out, own = self.new_folder(), self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "pfm", "--quiet")
-        subprocess.run([EXAMPLES / "egosgm_example_device_buffers", self.street], cwd=own, check=True, timeout=240)
+        subprocess.run([EXAMPLES / "egosgm_example_device_buffers", self.street], cwd=own, check=True, timeout=600)
         camera = self.report(out)["calibration"]
         single = lambda value: struct.unpack("<f", struct.pack("<f", value))[0]
         focal_times_baseline = single(camera["fx"] * camera["baseline_m"])
@@ -173,7 +173,7 @@ class Batch(BatchTest):
         self.assertTrue(place.keys() <= set(command))
         for index in range(pods):
             done = subprocess.run([*(place.get(word, word) for word in command), "--programs", self.programs, *map(str, METHOD)],
-                                  capture_output=True, text=True, timeout=240, env=dict(os.environ, JOB_COMPLETION_INDEX=str(index)))
+                                  capture_output=True, text=True, timeout=600, env=dict(os.environ, JOB_COMPLETION_INDEX=str(index)))
             self.assertEqual((done.returncode, done.stderr), (0, ""))
         self.assert_works(*self.batch(out, "--merge", "--quiet"))
         self.assert_same(out)

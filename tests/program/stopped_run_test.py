@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs that end early: full disks, interrupts, kills; and runs that go on or are replaced."""
+import fcntl
 import json
 import os
 import resource
@@ -10,10 +11,12 @@ import unittest
 
 from program_case import FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png
 
+F_SETPIPE_SZ = 1031  # fcntl has it since Python 3.10
+
 
 class LongRuns(ProgramTest):
     """What tests of stopped runs are made of."""
-    LONG = 60
+    LONG = 20
 
     def street_of(self, frames):
         """The sequence forth and back, again and again."""
@@ -30,9 +33,13 @@ class LongRuns(ProgramTest):
         return self.street_of(self.LONG)
 
     def start(self, street, out, *arguments, lines=1):
-        """A run that has reported `lines` frames."""
-        process = subprocess.Popen([PROGRAM, "run", "--odometry", street, "--out", out, *arguments], stdout=subprocess.PIPE,
+        """A run that has reported `lines` frames and waits to be read before it goes on, however busy the machine is."""
+        reading, writing = os.pipe2(os.O_CLOEXEC | os.O_DIRECT)
+        fcntl.fcntl(writing, F_SETPIPE_SZ, 4096)  # room for one line: with O_DIRECT, each takes a page
+        process = subprocess.Popen([PROGRAM, "run", "--odometry", street, "--out", out, *arguments], stdout=writing,
                                    stderr=subprocess.PIPE, text=True)
+        os.close(writing)
+        process.stdout = os.fdopen(reading)
         for _ in range(lines):
             process.stdout.readline()
         return process
@@ -47,12 +54,9 @@ class Disk(LongRuns):
 
     def test_a_full_disk_leaves_whole_files(self):
         street, out = self.long_street(), self.new_folder()
-        process = subprocess.Popen([PROGRAM, "run", "--odometry", street, "--out", out], stdout=subprocess.PIPE,
-                                   stderr=subprocess.PIPE, text=True)
-        for _ in range(3):  # by then the driver has written its kernel cache
-            process.stdout.readline()
+        process = self.start(street, out, lines=3)  # by then the driver has written its kernel cache
         resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (4096, 4096))  # EFBIG: ENOSPC without a file system of its own
-        _, errors = process.communicate(timeout=120)
+        _, errors = process.communicate(timeout=600)
         self.assertEqual(process.returncode, 1, errors)
         self.assertRegex(errors, r"^egosgm: error: .*disparity/\d{6}\.png.*\n$")
         self.assert_whole(out, at_least=3)
@@ -62,7 +66,7 @@ class Disk(LongRuns):
         for stop in (signal.SIGINT, signal.SIGTERM):
             process = self.start(street, out, "--overwrite")
             process.send_signal(stop)
-            _, errors = process.communicate(timeout=120)
+            _, errors = process.communicate(timeout=600)
             self.assertEqual(process.returncode, 130, errors)
             self.assertIn("interrupted", errors)
             report = self.report(out)
@@ -84,7 +88,7 @@ class Disk(LongRuns):
         street, out = self.long_street(), self.new_folder()
         process = self.start(street, out, lines=frames)
         broken(street)
-        _, errors = process.communicate(timeout=120)
+        _, errors = process.communicate(timeout=600)
         self.assertEqual(process.returncode, 2, errors)
         self.assertEqual(len(errors.splitlines()), 1, errors)
         for text in named:
@@ -108,7 +112,7 @@ class Disk(LongRuns):
         if shutil.which("unshare") is None or subprocess.run([*small, "true"], capture_output=True).returncode != 0:
             self.skipTest("no small file system can be mounted here")
         inside = f"'{PROGRAM}' run --odometry '{self.long_street()}' --out '{out}'; echo code $?; ls -A '{out}/disparity'; cat '{out}/report.json'"
-        done = subprocess.run([*small, "sh", "-c", inside], capture_output=True, text=True, timeout=240)
+        done = subprocess.run([*small, "sh", "-c", inside], capture_output=True, text=True, timeout=600)
         self.assertIn("code 1\n", done.stdout)
         self.assertRegex(done.stderr, r"^egosgm: error: .*disparity/\d{6}\.png.*No space left on device.*\n$")
         left = done.stdout.split("code 1\n")[1]
