@@ -75,6 +75,22 @@ TEST(Defines, FloatsArriveUnchanged) {
   }
 }
 
+TEST(Buffer, LargerThanTheDeviceAllowsNamesTheLimit) {
+  ocl::Context context(testing::any_device());
+  context.enter("Census");
+  const auto limit = context.device().getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>();
+  try {
+    ocl::Buffer<std::uint8_t>(context, limit + 1);
+    FAIL() << "made a buffer of " << limit + 1 << " bytes";
+  } catch (const DeviceError& error) {
+    EXPECT_EQ(error.code(), CL_MEM_OBJECT_ALLOCATION_FAILURE);
+    for (const std::string& part : {std::string("Census: needs a buffer"), std::to_string(limit >> 20) + " MiB",
+                                    std::string("fewer disparities")}) {
+      EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+    }
+  }
+}
+
 TEST(Programs, RefuseAMissingDefine) {
   ocl::Context context(testing::any_device());
   context.enter("SearchBand");

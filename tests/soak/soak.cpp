@@ -19,6 +19,8 @@ namespace {
 constexpr int kImages = 5;
 // What an allocator may keep in addition after a tenth of the frames.
 constexpr long kMaxGrowthKib = 4096;
+// With fewer, a tenth of them has not used every kernel yet: nothing is said of memory.
+constexpr int kLeastFramesForGrowth = 100;
 
 long resident_kib() {
   std::ifstream status("/proc/self/statm");
@@ -91,7 +93,8 @@ int soak(int frames, shared::ImageSize size, int disparities, const std::string&
     if (frame == frames / 10) early_kib = resident_kib(), early_files = open_files();
   }
   const long grown_kib = resident_kib() - early_kib, grown_files = open_files() - early_files;
-  const bool flat = grown_kib <= kMaxGrowthKib && grown_files == 0 && pipeline.device_memory_bytes() == device_bytes;
+  const bool resident_is_flat = frames < kLeastFramesForGrowth || grown_kib <= kMaxGrowthKib;
+  const bool flat = resident_is_flat && grown_files == 0 && pipeline.device_memory_bytes() == device_bytes;
   fmt::print(
       "{} frames of {}x{}, D = {}: checksum {:016x}; resident {:.1f} MiB after a tenth of them, {:+} KiB at the "
       "end; open files {:+}; device memory {:.1f} MiB, {}\n",
