@@ -26,6 +26,7 @@ struct RectifyArguments {
   RawPairArguments input;
   std::string calib, out, unit = "m";
   double alpha = 0;
+  bool is_fisheye = false;
   bool quiet = false;
 };
 
@@ -48,7 +49,10 @@ class Rectifier {
       return;
     }
     if (arguments.calib.empty()) throw InvalidArgument("no calibration: give --calib FILE");
-    rig_ = read_opencv_rig(arguments.calib, metres_in(arguments.unit));
+    rig_ = read_opencv_rig(arguments.calib, metres_in(arguments.unit), arguments.is_fisheye);
+    if (!rig_ && arguments.is_fisheye) {
+      throw InvalidArgument("--fisheye: " + arguments.calib + " is no calibration of OpenCV's (K1, D1, K2, D2, R, T)");
+    }
     if (!rig_) calibration_ = vision::read_calibration(arguments.calib);
   }
 
@@ -204,6 +208,8 @@ Command add_rectify(CLI::App& program) {
           "OpenCV's stereo calibration (M1, D1, M2, D2, R, T; YAML, XML or JSON), a folder with intrinsics.yml "
           "and extrinsics.yml, or, for images that are rectified already, what `run --calib` reads")
       ->type_name("FILE");
+  command->add_flag("--fisheye", arguments->is_fisheye,
+                    "OpenCV's calibration is one of cv::fisheye: D1 and D2 hold four coefficients of the angle");
   command->add_option("--unit", arguments->unit, "unit of T in OpenCV's calibration")
       ->type_name("m|cm|mm")
       ->capture_default_str();

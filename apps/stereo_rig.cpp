@@ -82,8 +82,12 @@ cv::Mat require_matrix(const cv::Mat& matrix, const fs::path& file, const char* 
   return matrix;
 }
 
-cv::Mat require_distortion(const cv::Mat& matrix, const fs::path& file, const char* name) {
-  if (matrix.empty()) return cv::Mat::zeros(5, 1, CV_64F);
+cv::Mat require_distortion(const cv::Mat& matrix, const fs::path& file, const char* name, bool is_fisheye) {
+  if (matrix.empty()) return cv::Mat::zeros(is_fisheye ? 4 : 5, 1, CV_64F);
+  if (is_fisheye && matrix.total() != 4) {
+    throw InvalidArgument(
+        fmt::format("{}: {} has {} numbers; OpenCV's fisheye model has 4", file.string(), name, matrix.total()));
+  }
   for (const std::size_t count : {4, 5, 8, 12, 14}) {
     if (matrix.total() == count && cv::checkRange(matrix)) return matrix.reshape(1, static_cast<int>(count));
   }
@@ -142,7 +146,7 @@ cv::Rect largest_rectangle(const cv::Mat& valid) {
   return best;
 }
 
-std::optional<StereoRig> opencv_rig(const fs::path& file, double unit_m) {
+std::optional<StereoRig> opencv_rig(const fs::path& file, double unit_m, bool is_fisheye) {
   std::vector<cv::FileStorage> files;
   if (fs::is_directory(file)) {
     for (const char* name : {"intrinsics.yml", "extrinsics.yml"}) files.push_back(open_storage(file / name));
@@ -157,16 +161,17 @@ std::optional<StereoRig> opencv_rig(const fs::path& file, double unit_m) {
   const cv::Mat left = find_matrix(files, {"M1", "K1", "cameraMatrix1", "camera_matrix_1", "cameraMatrixL", "KL"});
   if (left.empty()) return std::nullopt;
   StereoRig rig;
+  rig.is_fisheye = is_fisheye;
   const auto matrix = [&](const char* name, std::size_t elements, Names names) {
     return require_matrix(find_matrix(files, names), file, name, elements);
   };
   rig.left.matrix = require_matrix(left, file, "M1", 9).reshape(1, 3);
   rig.right.matrix =
       matrix("M2", 9, {"M2", "K2", "cameraMatrix2", "camera_matrix_2", "cameraMatrixR", "KR"}).reshape(1, 3);
-  rig.left.distortion =
-      require_distortion(find_matrix(files, {"D1", "distCoeffs1", "dist_coeffs_1", "distCoeffsL", "DL"}), file, "D1");
-  rig.right.distortion =
-      require_distortion(find_matrix(files, {"D2", "distCoeffs2", "dist_coeffs_2", "distCoeffsR", "DR"}), file, "D2");
+  rig.left.distortion = require_distortion(
+      find_matrix(files, {"D1", "distCoeffs1", "dist_coeffs_1", "distCoeffsL", "DL"}), file, "D1", is_fisheye);
+  rig.right.distortion = require_distortion(
+      find_matrix(files, {"D2", "distCoeffs2", "dist_coeffs_2", "distCoeffsR", "DR"}), file, "D2", is_fisheye);
   rig.R = find_matrix(files, {"R"});
   if (rig.R.total() == 3) cv::Rodrigues(rig.R.clone(), rig.R);
   rig.R = require_matrix(rig.R, file, "R", 9).reshape(1, 3);
@@ -188,15 +193,24 @@ StereoRig euroc_rig(const fs::path& mav0) {
     const fs::path file = mav0 / fmt::format("cam{}", i) / "sensor.yaml";
     const std::vector<cv::FileStorage> files{open_storage(file)};
     const cv::Mat k = require_matrix(find_matrix(files, {"intrinsics"}), file, "intrinsics", 4);
-    if (const std::string model = files[0]["distortion_model"].string(); model != "radial-tangential") {
-      throw InvalidArgument(
-          fmt::format("{}: distortion_model \"{}\": only radial-tangential is known", file.string(), model));
+    const std::string model = files[0]["distortion_model"].string();
+    if (model != "radial-tangential" && model != "equidistant") {
+      throw InvalidArgument(fmt::format("{}: distortion_model \"{}\": only radial-tangential and equidistant are known",
+                                        file.string(), model));
     }
+    const bool is_fisheye = model == "equidistant";
+    if (i == 1 && is_fisheye != rig.is_fisheye) {
+      throw InvalidArgument(
+          fmt::format("{}: distortion_model \"{}\": the other camera has another one: calibrate both "
+                      "with one model",
+                      file.string(), model));
+    }
+    rig.is_fisheye = is_fisheye;
     StereoRig::Camera& camera = i == 0 ? rig.left : rig.right;
     camera.matrix =
         (cv::Mat_<double>(3, 3) << k.at<double>(0), 0, k.at<double>(2), 0, k.at<double>(1), k.at<double>(3), 0, 0, 1);
-    camera.distortion =
-        require_distortion(find_matrix(files, {"distortion_coefficients"}), file, "distortion_coefficients");
+    camera.distortion = require_distortion(find_matrix(files, {"distortion_coefficients"}), file,
+                                           "distortion_coefficients", is_fisheye);
     body_from_camera[i] = require_matrix(find_matrix(files, {"T_BS"}), file, "T_BS", 16).reshape(1, 4);
     if (i == 0) rig.size = find_size(files);
   }
@@ -208,8 +222,8 @@ StereoRig euroc_rig(const fs::path& mav0) {
 
 }  // namespace
 
-std::optional<StereoRig> read_opencv_rig(const fs::path& file, double unit_m) {
-  return blaming(file, [&] { return opencv_rig(file, unit_m); });
+std::optional<StereoRig> read_opencv_rig(const fs::path& file, double unit_m, bool is_fisheye) {
+  return blaming(file, [&] { return opencv_rig(file, unit_m, is_fisheye); });
 }
 
 StereoRig read_euroc_rig(const fs::path& mav0) {
@@ -226,6 +240,9 @@ Rectification rectification_of(const StereoRig& rig, cv::Size size, double alpha
   cv::Mat R1, R2, P1, P2, Q;
   if (rig.given[0]) {
     R1 = *rig.given[0], R2 = *rig.given[1], P1 = *rig.given[2], P2 = *rig.given[3];
+  } else if (rig.is_fisheye) {
+    cv::fisheye::stereoRectify(rig.left.matrix, rig.left.distortion, rig.right.matrix, rig.right.distortion, size,
+                               rig.R, rig.T, R1, R2, P1, P2, Q, cv::CALIB_ZERO_DISPARITY, size, alpha);
   } else {
     cv::stereoRectify(rig.left.matrix, rig.left.distortion, rig.right.matrix, rig.right.distortion, size, rig.R, rig.T,
                       R1, R2, P1, P2, Q, cv::CALIB_ZERO_DISPARITY, alpha, size);
@@ -239,7 +256,11 @@ Rectification rectification_of(const StereoRig& rig, cv::Size size, double alpha
                         .doffs_px = P2.at<double>(0, 2) - P1.at<double>(0, 2)};
   result.calibration.validate();
   const auto map = [&](const StereoRig::Camera& camera, const cv::Mat& R, const cv::Mat& P, cv::Mat(&maps)[2]) {
-    cv::initUndistortRectifyMap(camera.matrix, camera.distortion, R, P, size, CV_32FC1, maps[0], maps[1]);
+    if (rig.is_fisheye) {
+      cv::fisheye::initUndistortRectifyMap(camera.matrix, camera.distortion, R, P, size, CV_32FC1, maps[0], maps[1]);
+    } else {
+      cv::initUndistortRectifyMap(camera.matrix, camera.distortion, R, P, size, CV_32FC1, maps[0], maps[1]);
+    }
     cv::Mat valid;
     cv::remap(cv::Mat(size, CV_8UC1, cv::Scalar(255)), valid, maps[0], maps[1], cv::INTER_LINEAR);
     return cv::Mat(valid == 255);

@@ -181,9 +181,10 @@ class Doctor(InputTest):
         self.assert_refused(["doctor", self.folder / "nowhere"], "nowhere")
 
 
-class Rectify(InputTest):
-    """The street as a rig would see it whose cameras are turned and distorted, rectified back."""
+class RectifyTest(InputTest):
+    """The street as a rig would see it whose cameras are turned and distorted."""
 
+    MODEL = "radial-tangential"
     DISTORTION = ([-0.12, 0.03, 0.001, -0.0005, 0.0], [-0.1, 0.02, -0.0008, 0.0006, 0.0])
 
     def rig(self):
@@ -193,17 +194,20 @@ class Rectify(InputTest):
         R = [rotation([0, 0, 1], 0.8), rotation([1, 0, 0], -1.5) @ rotation([0, 0, 1], -0.7)]
         return K, R, numpy.array([[f, 0, cx], [0, f, cy], [0, 0, 1]]), baseline
 
-    def raw(self, image, side):
-        """Where each raw pixel lies in the rectified image."""
-        K, R, P, _ = self.rig()
+    def undistorted(self, xd, yd, side):
         k1, k2, p1, p2, k3 = self.DISTORTION[side]
-        v, u = numpy.mgrid[0:HEIGHT, 0:WIDTH]
-        xd, yd = (u - K[side][0, 2]) / K[side][0, 0], (v - K[side][1, 2]) / K[side][1, 1]
         x, y = xd, yd
         for _ in range(20):
             r = x * x + y * y
             radial = 1 + r * (k1 + r * (k2 + r * k3))
             x, y = (xd - 2 * p1 * x * y - p2 * (r + 2 * x * x)) / radial, (yd - p1 * (r + 2 * y * y) - 2 * p2 * x * y) / radial
+        return x, y
+
+    def raw(self, image, side):
+        """Where each raw pixel lies in the rectified image."""
+        K, R, P, _ = self.rig()
+        v, u = numpy.mgrid[0:HEIGHT, 0:WIDTH]
+        x, y = self.undistorted((u - K[side][0, 2]) / K[side][0, 0], (v - K[side][1, 2]) / K[side][1, 1], side)
         ray = R[side] @ numpy.stack([x.ravel(), y.ravel(), numpy.ones(x.size)])
         at = P @ (ray / ray[2])
         return sampled(image, at[0].reshape(x.shape), at[1].reshape(x.shape))
@@ -261,6 +265,38 @@ class Rectify(InputTest):
                 self.assertLess(here, 0.5 * min(left, right, up, down))
                 self.assertLess(max(abs(left - right), abs(up - down)), 0.1 * left)
 
+    def euroc(self, drop=()):
+        folder = self.new_folder() / "mav0"
+        K, R, P, baseline = self.rig()
+        body_from_left = numpy.eye(4)
+        body_from_left[:3, :3] = rotation([0, 1, 0], 90)
+        left_from_right = numpy.eye(4)
+        left_from_right[:3, :3] = R[0].T @ R[1]
+        left_from_right[:3, 3] = R[0].T @ [baseline, 0, 0]
+        for side, pose in enumerate((body_from_left, body_from_left @ left_from_right)):
+            camera = folder / f"cam{side}"
+            (camera / "data").mkdir(parents=True)
+            numbers = ", ".join(f"{value:.12g}" for value in pose.ravel())
+            fu, fv, cu, cv = K[side][0, 0], K[side][1, 1], K[side][0, 2], K[side][1, 2]
+            (camera / "sensor.yaml").write_text(
+                "# General sensor definitions.\nsensor_type: camera\ncomment: VI-Sensor cam0 (MT9M034)\n\n# Sensor extrinsics wrt. the body-frame.\n"
+                f"T_BS:\n  cols: 4\n  rows: 4\n  data: [{numbers}]\n\nrate_hz: 20\nresolution: [{WIDTH}, {HEIGHT}]\ncamera_model: pinhole\n"
+                f"intrinsics: [{fu:.12g}, {fv:.12g}, {cu:.12g}, {cv:.12g}] #fu, fv, cu, cv\ndistortion_model: {self.MODEL}\n"
+                f"distortion_coefficients: {self.DISTORTION[side][:4]}\n")
+            with open(camera / "data.csv", "w", newline="") as file:
+                writer = csv.writer(file)
+                writer.writerow(["#timestamp [ns]", "filename"])
+                for i, time in enumerate((1403636579763555584, 1403636579813555456)):
+                    if (side, i) in drop:
+                        continue
+                    writer.writerow([time, f"{time}.png"])
+                    shutil.copy(self.raw_folder / f"cam{side}/{9 + i}.png", camera / "data" / f"{time}.png")
+        return folder
+
+
+class Rectify(RectifyTest):
+    """Rectified back."""
+
     def test_raw_pairs_of_a_known_rig_become_the_street_again(self):
         findings = self.run_doctor(*self.PAIRS[:2], "--right", self.raw_folder / "cam1/*.png", "--calib", self.street / "calib.txt")
         self.assertIn("rectify again", findings.stdout)
@@ -303,34 +339,6 @@ class Rectify(InputTest):
             self.assertTrue((read_grey(out / f"image_{side}/000000.png") == images[side]).all())
         self.assertIn("rectified already", text)
 
-    def euroc(self, drop=()):
-        folder = self.new_folder() / "mav0"
-        K, R, P, baseline = self.rig()
-        body_from_left = numpy.eye(4)
-        body_from_left[:3, :3] = rotation([0, 1, 0], 90)
-        left_from_right = numpy.eye(4)
-        left_from_right[:3, :3] = R[0].T @ R[1]
-        left_from_right[:3, 3] = R[0].T @ [baseline, 0, 0]
-        for side, pose in enumerate((body_from_left, body_from_left @ left_from_right)):
-            camera = folder / f"cam{side}"
-            (camera / "data").mkdir(parents=True)
-            numbers = ", ".join(f"{value:.12g}" for value in pose.ravel())
-            fu, fv, cu, cv = K[side][0, 0], K[side][1, 1], K[side][0, 2], K[side][1, 2]
-            (camera / "sensor.yaml").write_text(
-                "# General sensor definitions.\nsensor_type: camera\ncomment: VI-Sensor cam0 (MT9M034)\n\n# Sensor extrinsics wrt. the body-frame.\n"
-                f"T_BS:\n  cols: 4\n  rows: 4\n  data: [{numbers}]\n\nrate_hz: 20\nresolution: [{WIDTH}, {HEIGHT}]\ncamera_model: pinhole\n"
-                f"intrinsics: [{fu:.12g}, {fv:.12g}, {cu:.12g}, {cv:.12g}] #fu, fv, cu, cv\ndistortion_model: radial-tangential\n"
-                f"distortion_coefficients: {self.DISTORTION[side][:4]}\n")
-            with open(camera / "data.csv", "w", newline="") as file:
-                writer = csv.writer(file)
-                writer.writerow(["#timestamp [ns]", "filename"])
-                for i, time in enumerate((1403636579763555584, 1403636579813555456)):
-                    if (side, i) in drop:
-                        continue
-                    writer.writerow([time, f"{time}.png"])
-                    shutil.copy(self.raw_folder / f"cam{side}/{9 + i}.png", camera / "data" / f"{time}.png")
-        return folder
-
     def test_euroc_folders(self):
         out = self.new_folder() / "out"
         folder = self.euroc()
@@ -371,6 +379,49 @@ class Rectify(InputTest):
         self.assertFalse(out.exists())
         self.assert_refused(["rectify", *self.PAIRS, "--calib", file, "--out", self.street], "not empty")
         self.assert_refused(["rectify", *self.PAIRS, "--out", out], "--calib FILE")
+
+
+class RectifyFisheye(RectifyTest):
+    """cv::fisheye's model: four coefficients of the angle to the optical axis."""
+
+    MODEL = "equidistant"
+    DISTORTION = ([0.06, -0.02, 0.004, -0.001], [0.05, -0.015, 0.003, -0.0008])
+
+    def undistorted(self, xd, yd, side):
+        k1, k2, k3, k4 = self.DISTORTION[side]
+        distorted = numpy.hypot(xd, yd)
+        angle = distorted
+        for _ in range(30):
+            s = angle * angle
+            angle = distorted / (1 + s * (k1 + s * (k2 + s * (k3 + s * k4))))
+        scale = numpy.tan(angle) / numpy.maximum(distorted, 1e-12)
+        return scale * xd, scale * yd
+
+    def test_raw_pairs_of_a_known_rig_become_the_street_again(self):
+        out, text = self.rectify(*self.PAIRS, "--fisheye")
+        self.assert_like_the_street(out)
+        self.assertIn("baseline 0.5400 m", text)
+        with self.assertRaises(AssertionError):  # and with the other model they do not
+            self.assert_like_the_street(self.rectify(*self.PAIRS)[0])
+
+    def test_without_projections_opencv_finds_them(self):
+        out, _ = self.rectify(*self.PAIRS, "--fisheye", calib=self.opencv_yaml(given=False))
+        findings = self.examine(out)
+        self.assertIn("baseline 0.54 m", findings["calibration"]["text"])
+        self.assertEqual(findings["rows"]["verdict"], "ok")
+
+    def test_equidistant_euroc_folders(self):
+        out = self.new_folder() / "out"
+        self.assertIn("baseline 0.5400 m", self.assert_works("rectify", "--euroc", self.euroc(), "--out", out))
+        self.assertEqual(self.examine(out)["rows"]["verdict"], "ok")
+
+    def test_refuses_other_numbers_of_coefficients(self):
+        file = self.new_folder() / "stereo.yml"
+        file.write_text(self.opencv_yaml().replace("rows: 1\n   cols: 4", "rows: 1\n   cols: 5").replace("0.06, -0.02", "0.06, 0, -0.02"))
+        self.assert_refused(["rectify", *self.PAIRS, "--fisheye", "--calib", file, "--out", self.folder / "never"], file, "D1 has 5 numbers",
+                            "fisheye model has 4")
+        self.assert_refused(["rectify", *self.PAIRS, "--fisheye", "--calib", self.street / "calib.txt", "--out", self.folder / "never"],
+                            "--fisheye", "calib.txt")
 
 
 class Camera(InputTest):
