@@ -111,7 +111,7 @@ void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_fro
   if (bands_) {
     auto& [find_spans, splat_bands, spans] = *bands_;
     const int bands = (size_.height + band_rows_ - 1) / band_rows_;
-    find_spans(context_, ocl::every_row(context_, size_), size_, range_, left, right, belief.disparity, spans);
+    find_spans(context_, ocl::every_row(context_, size_), size_, left, right, belief.disparity, spans);
     splat_bands(context_, ocl::every_row(context_, {1, bands}), size_, range_, left, right, options_.process_noise_px2,
                 band_rows_, spans, belief.disparity, belief.variance, predicted.disparity, predicted.variance);
     return;

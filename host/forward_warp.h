@@ -52,7 +52,7 @@ class ForwardWarp {
     Atomics(ocl::Context& context, shared::ImageSize size);
   };
   struct Bands {
-    ocl::Kernel<Size, Range, ViewMotion, ViewMotion, In, ocl::Buffer<cl_int>> find_spans;
+    ocl::Kernel<Size, ViewMotion, ViewMotion, In, ocl::Buffer<cl_int>> find_spans;
     ocl::Kernel<Size, Range, ViewMotion, ViewMotion, const float, const cl_int, const ocl::Buffer<cl_int>, In, In, Out,
                 Out>
         splat_bands;

@@ -12,7 +12,7 @@ inline constexpr Tuning kCpuTuning{
 // Up to four compute units are busy with fewer tiles, too, and wait less often (bench/NOTES.md).
 inline constexpr int kFewComputeUnits = 4;
 inline constexpr Tuning kSmallCpuTuning{
-    .tile_width = 256, .tile_height = 48, .warp_band_rows = 32, .speckle_strip_rows = 24, .row_group = 1};
+    .tile_width = 256, .tile_height = 48, .warp_band_rows = 96, .speckle_strip_rows = 24, .row_group = 1};
 inline constexpr Tuning kGpuTuning{.tile_width = 128, .tile_height = 24, .warp_band_rows = 32};  // not measured yet
 
 /// `tuning` with the defaults of the device's class where it says nothing.

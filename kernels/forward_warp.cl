@@ -118,32 +118,59 @@ kernel void decode(const ImageSize size, global const uint* zbuffer, global floa
 
 #else
 
-// The first and the last row that each source row lands on; the first lies behind the last where it lands on none. A
-// work-item a row and view.
-kernel void find_spans(const ImageSize size, const DisparityRange range, const DisparityMotion left,
-                       const DisparityMotion right, global const float* disparity, global int* spans) {
+// The row on which a pixel lands, as a real number; `w` by which its depth shrinks.
+static inline float row_of(const DisparityMotion motion, const float wx, const float wy, const float wd, float* w) {
+  *w = motion.w[0] * wx + motion.w[1] * wy + motion.w[2] * wd + motion.w[3];
+  return (motion.y[0] * wx + motion.y[1] * wy + motion.y[2] * wd + motion.y[3]) / *w + motion.cy;
+}
+
+// Rows between which everything lands that a source row's valid disparities [least, most] can land on: the quotient of
+// two linear functions has its extremes in the corners of (x, disparity) where its denominator keeps its sign. A row
+// more on both sides for the rounding; every row where a corner comes near the camera, which makes more of it.
+static inline int2 span_of(const ImageSize size, const DisparityMotion motion, const int y, const float least,
+                           const float most) {
+  float first = INFINITY;
+  float last = -INFINITY;
+  for (int corner = 0; corner < 4; ++corner) {
+    const float wx = (corner & 1 ? size.width - 1 : 0) - motion.cx;
+    const float wd = (corner & 2 ? most : least) + motion.doffs;
+    float w;
+    const float row = row_of(motion, wx, (float)y - motion.cy, wd, &w);
+    if (!(w > 0.01f) || !(fabs(row) < 1e6f)) return (int2)(0, size.height - 1);
+    first = fmin(first, row);
+    last = fmax(last, row);
+  }
+  return (int2)((int)floor(first) - 1, (int)ceil(last) + 1);
+}
+
+// Between which rows each source row lands; the first lies behind the last where it lands on none. A work-item a row
+// and view.
+kernel void find_spans(const ImageSize size, const DisparityMotion left, const DisparityMotion right,
+                       global const float* disparity, global int* spans) {
   const int y = get_global_id(0);
   const int view = get_global_id(1);
   const size_t row = (size_t)view * size.height + y;
-  const DisparityMotion motion = view == EGOSGM_LEFT ? left : right;
-  Ints first = size.height;
-  Ints last = -1;
+  Floats least = INFINITY;
+  Floats most = INVALID;
   for (int x = 0; x < size.width; x += PIXELS) {
     const Floats d = load_pixels(disparity + row * size.width, x, size.width);
-    const Moved moved = move_pixels(size, range, motion, 0.0f, x, y, d, 0.0f);
-    first = (moved.lands & (moved.y < first)) ? moved.y : first;
-    last = (moved.lands & (moved.y > last)) ? moved.y : last;
+    const Floats valid_or_most = d > INVALID ? d : (Floats)(INFINITY);
+    least = valid_or_most < least ? valid_or_most : least;
+    most = d > most ? d : most;
   }
-  int firsts[PIXELS];
-  int lasts[PIXELS];
-  vstore16(first, 0, firsts);
-  vstore16(last, 0, lasts);
+  float leasts[PIXELS];
+  float mosts[PIXELS];
+  vstore16(least, 0, leasts);
+  vstore16(most, 0, mosts);
   for (int i = 1; i < PIXELS; ++i) {
-    firsts[0] = min(firsts[0], firsts[i]);
-    lasts[0] = max(lasts[0], lasts[i]);
+    leasts[0] = fmin(leasts[0], leasts[i]);
+    mosts[0] = fmax(mosts[0], mosts[i]);
   }
-  spans[2 * row] = firsts[0];
-  spans[2 * row + 1] = lasts[0];
+  const bool has_any = mosts[0] > EGOSGM_INVALID_DISPARITY;
+  const int2 span =
+      has_any ? span_of(size, view == EGOSGM_LEFT ? left : right, y, leasts[0], mosts[0]) : (int2)(size.height, -1);
+  spans[2 * row] = span.x;
+  spans[2 * row + 1] = span.y;
 }
 
 // Moves and splats what lands on a band of `band_rows` rows. A work-item a band and view; no other touches its rows.
