@@ -59,7 +59,8 @@ CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const Pi
 const StereoMaps& CoarseMatch::operator()(const FrameImages& images) {
   const ocl::Context::Within within(context_, "CoarseMatch");
   Shrink& shrink = images.type == PixelType::kU8 ? shrink_u8_ : shrink_u16_;
-  shrink(context_, ocl::every_pixels(context_, coarse_, kShrunkAtOnce), size_, images.pixels, images_);
+  const int at_once = (coarse_.width + kShrunkAtOnce - 1) / kShrunkAtOnce;
+  shrink(context_, ocl::every_pixel(context_, {at_once, coarse_.height}), size_, images.pixels, images_);
   band_.full_range();
   census_(images_, codes_);
   step_penalties_(images_, penalties_);

@@ -452,12 +452,13 @@ inline Winners load_winners(global const ulong* row, const int x, const int widt
 // (options.h).
 kernel void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
                    global float* variances) {
-  const int x = get_global_id(0) * PIXELS;
-  if (x >= q.width) return;
+  const int width = q.width;
   const size_t row = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width;
-  const Winners winner = load_winners(winners + row, x, q.width);
-  const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
-  const Ints steps = FIELD(winner, 48);
-  store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities + row, x, q.width);
-  store_pixels(matching_variance(q, steps, rise_before, rise_after), variances + row, x, q.width);
+  FOR_PIXELS(x, width) {
+    const Winners winner = load_winners(winners + row, x, width);
+    const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
+    const Ints steps = FIELD(winner, 48);
+    store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities + row, x, width);
+    store_pixels(matching_variance(q, steps, rise_before, rise_after), variances + row, x, width);
+  }
 }

@@ -6,8 +6,8 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-// Lane by lane: gather instructions are slower (and what a compiler makes of a loop).
-static inline Floats gather(global const float* row, const Ints x) {
+// Lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of loads that may be joined.
+static inline Floats gather(volatile global const float* row, const Ints x) {
 #if PIXELS == 1
   return row[x];
 #else
@@ -18,24 +18,24 @@ static inline Floats gather(global const float* row, const Ints x) {
 
 kernel void check(const ImageSize size, const float max_difference, const int keep_outside,
                   global const float* disparity, global float* kept_disparity, global float* variance) {
-  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   const int width = size.width;
-  if (x >= width) return;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t other_row = ((size_t)(1 - view) * size.height + y) * width;
 
-  const Floats d = load_pixels(disparity + row, x, width);
-  const Floats zero = 0.0f;
-  // Asked of the floats, with comparisons that NaN fails, before they become integers.
-  const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + (view == EGOSGM_LEFT ? -d : d));
-  const Ints valid = d > INVALID;
-  const Ints inside = valid & (at >= zero) & (at < (Floats)(width));
-  const Floats other = gather(disparity + other_row, INTS_OF_FLOATS(inside ? at : zero));
-  const Ints agree = (other > INVALID) & (fabs(other - d) <= max_difference);
-  const Ints keeps = inside ? agree : valid & ((Ints)(keep_outside) != 0);
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats zero = 0.0f;
+    // Asked of the floats, with comparisons that NaN fails, before they become integers.
+    const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + (view == EGOSGM_LEFT ? -d : d));
+    const Ints valid = d > INVALID;
+    const Ints inside = valid & (at >= zero) & (at < (Floats)(width));
+    const Floats other = gather(disparity + other_row, INTS_OF_FLOATS(inside ? at : zero));
+    const Ints agree = (other > INVALID) & (fabs(other - d) <= max_difference);
+    const Ints keeps = inside ? agree : valid & ((Ints)(keep_outside) != 0);
 
-  store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);
-  clear_dropped(keeps ? (Ints)(0) : (d != INVALID), variance + row, x, width);
+    store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);
+    clear_dropped(keeps ? (Ints)(0) : (d != INVALID), variance + row, x, width);
+  }
 }

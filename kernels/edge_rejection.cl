@@ -13,10 +13,8 @@ static inline Ints is_jump(const Floats d, const Floats near, const Floats far, 
 
 kernel void reject(const ImageSize size, const float max_jump, global const float* disparity,
                    global float* kept_disparity, global float* variance) {
-  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int width = size.width;
-  if (x >= width) return;
   const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
   global const float* here = disparity + row;
   // Above and below the image, the pixel itself is read, which is no jump.
@@ -25,11 +23,13 @@ kernel void reject(const ImageSize size, const float max_jump, global const floa
   global const float* below = here + (y + 1 < size.height ? width : 0);
   global const float* far_below = below + (y + 2 < size.height ? width : 0);
 
-  const Floats d = load_pixels(here, x, width);
-  const Ints jumps = is_jump(d, load_pixels(here, x - 1, width), load_pixels(here, x - 2, width), max_jump) |
-                     is_jump(d, load_pixels(here, x + 1, width), load_pixels(here, x + 2, width), max_jump) |
-                     is_jump(d, load_pixels(above, x, width), load_pixels(far_above, x, width), max_jump) |
-                     is_jump(d, load_pixels(below, x, width), load_pixels(far_below, x, width), max_jump);
-  store_pixels(jumps ? INVALID : d, kept_disparity + row, x, width);
-  clear_dropped(jumps, variance + row, x, width);
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(here, x, width);
+    const Ints jumps = is_jump(d, load_pixels(here, x - 1, width), load_pixels(here, x - 2, width), max_jump) |
+                       is_jump(d, load_pixels(here, x + 1, width), load_pixels(here, x + 2, width), max_jump) |
+                       is_jump(d, load_pixels(above, x, width), load_pixels(far_above, x, width), max_jump) |
+                       is_jump(d, load_pixels(below, x, width), load_pixels(far_below, x, width), max_jump);
+    store_pixels(jumps ? INVALID : d, kept_disparity + row, x, width);
+    clear_dropped(jumps, variance + row, x, width);
+  }
 }

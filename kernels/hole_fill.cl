@@ -15,37 +15,38 @@ static inline Floats larger_of(const Floats a, const Floats b) { return a > b ? 
 
 kernel void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
                       global const float* variance, global float* filled_disparity, global float* filled_variance) {
-  const int x = get_global_id(0) * PIXELS;
   const int width = size.width;
-  if (x >= width) return;
   const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
 
-  const Floats d = load_pixels(disparity + row, x, width);
-  const Floats left = load_pixels(disparity + row, x - 1, width);
-  const Floats right = load_pixels(disparity + row, x + 1, width);
-  const Ints fills = is_gap(d, left, right, gamma);
-  const Floats filled = larger_of(load_pixels(variance + row, x - 1, width), load_pixels(variance + row, x + 1, width));
-  store_pixels(fills ? mean_of(left, right) : d, filled_disparity + row, x, width);
-  store_pixels(fills ? filled : load_pixels(variance + row, x, width), filled_variance + row, x, width);
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats left = load_pixels(disparity + row, x - 1, width);
+    const Floats right = load_pixels(disparity + row, x + 1, width);
+    const Ints fills = is_gap(d, left, right, gamma);
+    const Floats filled =
+        larger_of(load_pixels(variance + row, x - 1, width), load_pixels(variance + row, x + 1, width));
+    store_pixels(fills ? mean_of(left, right) : d, filled_disparity + row, x, width);
+    store_pixels(fills ? filled : load_pixels(variance + row, x, width), filled_variance + row, x, width);
+  }
 }
 
 kernel void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
                          global const float* variance, global float* filled_disparity, global float* filled_variance) {
-  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int width = size.width;
-  if (x >= width) return;
   const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
   // At the border the row itself, whose pixels are valid or no neighbours.
   const size_t row_above = y >= 1 ? row - width : row;
   const size_t row_below = y + 1 < size.height ? row + width : row;
 
-  const Floats d = load_pixels(disparity + row, x, width);
-  const Floats above = load_pixels(disparity + row_above, x, width);
-  const Floats below = load_pixels(disparity + row_below, x, width);
-  const Ints fills = is_gap(d, above, below, gamma);
-  const Floats filled =
-      larger_of(load_pixels(variance + row_above, x, width), load_pixels(variance + row_below, x, width));
-  store_pixels(fills ? mean_of(above, below) : d, filled_disparity + row, x, width);
-  store_pixels(fills ? filled : load_pixels(variance + row, x, width), filled_variance + row, x, width);
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats above = load_pixels(disparity + row_above, x, width);
+    const Floats below = load_pixels(disparity + row_below, x, width);
+    const Ints fills = is_gap(d, above, below, gamma);
+    const Floats filled =
+        larger_of(load_pixels(variance + row_above, x, width), load_pixels(variance + row_below, x, width));
+    store_pixels(fills ? mean_of(above, below) : d, filled_disparity + row, x, width);
+    store_pixels(fills ? filled : load_pixels(variance + row, x, width), filled_variance + row, x, width);
+  }
 }

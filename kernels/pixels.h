@@ -25,6 +25,9 @@ typedef int16 Ints;
 #define LANE_INDICES (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 #endif
 
+// A work-item's blocks of PIXELS pixels of a row: all of them where there is one work-item a row, else one.
+#define FOR_PIXELS(x, width) for (int x = get_global_id(0) * PIXELS; x < (width); x += (int)get_global_size(0) * PIXELS)
+
 #define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
 
 // Pixels x .. x + PIXELS - 1 of a row; what lies outside of it is invalid.

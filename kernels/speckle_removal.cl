@@ -3,8 +3,6 @@
 // parents[run] is never above run, so that the root of a region is its first run, whatever the order in which runs are
 // joined. A device may go on after a kernel that failed: indices that are read from memory are held below what they
 // can be, which also ends every loop.
-#include "shared.h"
-
 // lint: ROW_GROUP=1
 // lint: ROW_GROUP=64
 
@@ -20,6 +18,8 @@
 #else
 #define PIXELS 1
 #endif
+
+#include "pixels.h"
 
 // vload16 goes byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on all.
 typedef struct __attribute__((packed)) {
@@ -240,35 +240,35 @@ uint beginnings(global const ushort* runs, int x, int width) {
 // Adds every run to its root. Only roots are added to, and only others are read.
 kernel void measure(const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
                     volatile global uint* sizes) {
-  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= size.width) return;
-
+  const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * size.width;
-  for (uint left = beginnings(runs + row, x, size.width); left != 0; left &= left - 1) {
-    const size_t run = row + x + lowest_bit(left);
-    uint root = run;
-    while (parents[root] < root) root = parents[root];
-    roots[run] = root;
-    if (root != run) atomic_add(&sizes[root], sizes[run]);
+  FOR_PIXELS(x, width) {
+    for (uint left = beginnings(runs + row, x, width); left != 0; left &= left - 1) {
+      const size_t run = row + x + lowest_bit(left);
+      uint root = run;
+      while (parents[root] < root) root = parents[root];
+      roots[run] = root;
+      if (root != run) atomic_add(&sizes[root], sizes[run]);
+    }
   }
 }
 
 kernel void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
                  global const uint* sizes, global float* disparity, global float* variance) {
-  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= size.width) return;
-
+  const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * size.width;
-  for (uint left = beginnings(runs + row, x, size.width); left != 0; left &= left - 1) {
-    const int run = x + lowest_bit(left);
-    if (sizes[min((size_t)roots[row + run], row + run)] > max_size) continue;
-    for (int i = run; i < size.width && runs[row + i] == run; ++i) {
-      disparity[row + i] = EGOSGM_INVALID_DISPARITY;
-      variance[row + i] = 0.0f;
+  FOR_PIXELS(x, width) {
+    for (uint left = beginnings(runs + row, x, width); left != 0; left &= left - 1) {
+      const int run = x + lowest_bit(left);
+      if (sizes[min((size_t)roots[row + run], row + run)] > max_size) continue;
+      for (int i = run; i < size.width && runs[row + i] == run; ++i) {
+        disparity[row + i] = EGOSGM_INVALID_DISPARITY;
+        variance[row + i] = 0.0f;
+      }
     }
   }
 }

@@ -49,10 +49,8 @@ static inline Ints penalty(const Ints most, const Ints least, const Ints slope, 
 
 kernel void penalties(const ImageSize size, const int most, const int least, const int slope,
                       global const uchar* images, global uchar* planes) {
-  const int x = get_global_id(0) * PIXELS;
   const int y = get_global_id(1);
   const int width = size.width;
-  if (x >= width) return;
   const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
   const size_t plane = 2 * (size_t)size.height * width;
   // Outside the image there is no step: the border's pixel stands in.
@@ -60,9 +58,11 @@ kernel void penalties(const ImageSize size, const int most, const int least, con
   global const Pixel* above = here - (y > 0 ? width : 0);
   global uchar* at = planes + row;
 
-  const Ints grey = grey_at(here, x, width);
-  store_bytes(penalty(most, least, slope, grey, grey_at(here, x - 1, width)), at, x, width);
-  store_bytes(penalty(most, least, slope, grey, grey_at(above, x, width)), at + plane, x, width);
-  store_bytes(penalty(most, least, slope, grey, grey_at(above, x - 1, width)), at + 2 * plane, x, width);
-  store_bytes(penalty(most, least, slope, grey, grey_at(above, x + 1, width)), at + 3 * plane, x, width);
+  FOR_PIXELS(x, width) {
+    const Ints grey = grey_at(here, x, width);
+    store_bytes(penalty(most, least, slope, grey, grey_at(here, x - 1, width)), at, x, width);
+    store_bytes(penalty(most, least, slope, grey, grey_at(above, x, width)), at + plane, x, width);
+    store_bytes(penalty(most, least, slope, grey, grey_at(above, x - 1, width)), at + 2 * plane, x, width);
+    store_bytes(penalty(most, least, slope, grey, grey_at(above, x + 1, width)), at + 3 * plane, x, width);
+  }
 }

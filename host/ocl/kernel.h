@@ -20,12 +20,11 @@ inline Range every_pixel(const Context& context, shared::ImageSize size, int vie
   return {cl::NDRange((size.width + local - 1) / local * local, size.height, views), cl::NDRange(local, 1, 1)};
 }
 
-/// A work-item `pixels` neighbours in a row (kernels/pixels.h) and view, the same ids otherwise.
+/// For kernels that go over a row by FOR_PIXELS (kernels/pixels.h): a work-item a pixel and view where `pixels` is 1,
+/// else a work-item a row and view, whose compilers then know the loop. Global ids 1 and 2 are y and view.
 inline Range every_pixels(const Context& context, shared::ImageSize size, int pixels, int views = 2) {
-  std::size_t local = pixels > 1 ? 16 : 64;
-  while (local > context.max_work_group_size()) local /= 2;
-  const std::size_t columns = (size.width + pixels - 1) / pixels;
-  return {cl::NDRange((columns + local - 1) / local * local, size.height, views), cl::NDRange(local, 1, 1)};
+  if (pixels == 1) return every_pixel(context, size, views);
+  return {cl::NDRange(1, size.height, views), cl::NDRange(1, 1, 1)};
 }
 
 /// A work-item a row and view: global ids are y, view. A CPU's work-groups hold one: it deals out groups, and rows are
