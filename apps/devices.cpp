@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "egosgm/device.h"
 
 namespace egosgm::app {
@@ -26,8 +27,8 @@ std::string reason_of_default(const DeviceInfo& chosen) {
 void print_device(std::size_t index, const DeviceInfo& info, bool is_default) {
   constexpr double kGibibyte = 1024.0 * 1024.0 * 1024.0;
   fmt::print("{} {}  {}\n", is_default ? '*' : ' ', index, info.name);
-  fmt::print("     {}, {}, {} compute units, {:.1f} GiB memory, {:.1f} GiB in one buffer\n", info.type, info.vendor,
-             info.compute_units, static_cast<double>(info.memory_bytes) / kGibibyte,
+  fmt::print("     {}, {}, {}, {:.1f} GiB memory, {:.1f} GiB in one buffer\n", info.type, info.vendor,
+             counted(info.compute_units, "compute unit"), static_cast<double>(info.memory_bytes) / kGibibyte,
              static_cast<double>(info.max_allocation_bytes) / kGibibyte);
   fmt::print("     {}; {}; driver {}\n", info.platform, info.version, info.driver);
 }
