@@ -32,7 +32,7 @@ std::atomic<cl_context> failing_context = nullptr;
 
 std::atomic<bool> sources_forbidden = false;
 std::atomic<long> references = 0;
-long buffers_created = 0;
+std::atomic<long> buffers_created = 0;
 std::atomic<int> transfers = 0;
 
 std::mutex queues_mutex;
