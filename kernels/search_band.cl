@@ -126,7 +126,25 @@ kernel void gather_blocks(const ImageSize size, global const float* disparity, g
   ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range;
 }
 
-// What CoarseMatch found in a block and one coarse pixel around it, in full pixels. A work-item a block and view.
+// Keeps the EGOSGM_COARSE_OUTLIERS + 1 least values of each lane, in rising order; the most, in falling order.
+void insert_least(float4* least, float4 value) {
+  for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
+    const float4 before = least[i];
+    least[i] = value < before ? value : before;
+    value = value < before ? before : value;
+  }
+}
+void insert_most(float4* most, float4 value) {
+  for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
+    const float4 before = most[i];
+    most[i] = value > before ? value : before;
+    value = value > before ? before : value;
+  }
+}
+
+// What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at
+// either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. A work-item a
+// block and view.
 kernel void gather_coarse(const ImageSize size, global const float* coarse, global BlockRange* ranges) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
@@ -140,19 +158,35 @@ kernel void gather_coarse(const ImageSize size, global const float* coarse, glob
 #if EGOSGM_BLOCK != 2 * EGOSGM_COARSE
 #error "a block and what lies around it are four coarse pixels wide"
 #endif
-  float4 least = INFINITY;
-  float4 most = -INFINITY;
+  // Of each column the outermost ones, then of all four.
+  float4 least[EGOSGM_COARSE_OUTLIERS + 1];  // in rising order
+  float4 most[EGOSGM_COARSE_OUTLIERS + 1];   // in falling order
+  for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
+    least[i] = INFINITY;
+    most[i] = -INFINITY;
+  }
   int4 count = 0;
   for (int v = max(2 * y - 1, 0); v <= min(2 * y + 2, height - 1); ++v) {
     const float4 d = four(coarse + ((size_t)view * height + v) * width, 2 * x - 1, width);
     const int4 valid = d > EGOSGM_INVALID_DISPARITY;
-    least = select(least, d, valid & (d < least));
-    most = select(most, d, valid & (d > most));
     count -= valid;
+    insert_least(least, valid ? d : INFINITY);
+    insert_most(most, valid ? d : -INFINITY);
+  }
+  for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
+    // The other columns go to lane 0, which alone is read then.
+    float4 low = least[i];
+    float4 high = most[i];
+    for (int lane = 1; lane < 4; ++lane) {
+      low = low.yzwx;
+      high = high.yzwx;
+      insert_least(least, (float4)(low.x, INFINITY, INFINITY, INFINITY));
+      insert_most(most, (float4)(high.x, -INFINITY, -INFINITY, -INFINITY));
+    }
   }
   BlockRange range;
-  range.min = EGOSGM_COARSE * fmin(fmin(least.x, least.y), fmin(least.z, least.w));
-  range.max = EGOSGM_COARSE * fmax(fmax(most.x, most.y), fmax(most.z, most.w));
+  range.min = EGOSGM_COARSE * least[EGOSGM_COARSE_OUTLIERS].x;
+  range.max = EGOSGM_COARSE * most[EGOSGM_COARSE_OUTLIERS].x;
   range.count = count.x + count.y + count.z + count.w;
   ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range;
 }

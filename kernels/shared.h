@@ -44,6 +44,8 @@ typedef float f32;
 #define EGOSGM_COARSE 4
 // SearchBand looks at a block's coarse pixels and the ones around them, and believes this many that have a disparity.
 #define EGOSGM_COARSE_MIN_COUNT 8
+// Of these, so many of the least and of the largest are taken for mismatches. REQUIRES: less than half of the count.
+#define EGOSGM_COARSE_OUTLIERS 2
 
 // The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside.
 // KalmanUpdate then takes the measurement instead of fusing it, as where the two differ by more than the gate, and the

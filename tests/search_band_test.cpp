@@ -187,6 +187,12 @@ TEST(SearchBand, ReachesWhatTheCoarseMatchFoundElsewhere) {
   EXPECT_EQ(bands[20 * 64 + 21].last, 82);
   EXPECT_EQ(bands[4096 + 20 * 64 + 20].last, 127) << "the right view";
 
+  // Two of the coarse pixels that stand out are mismatches, three are not.
+  coarse[3 * 16 + 3] = 30, coarse[4 * 16 + 6] = 31;
+  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 82);
+  coarse[6 * 16 + 4] = 29;
+  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 118);
+
   for (float& d : coarse) d = d > 0 ? 11.2f : d;  // 44.8: within 3 px of what is searched anyway
   EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 42);
   for (float& d : coarse) d = d > 0 ? 11.3f : d;

@@ -34,22 +34,22 @@ shared::Band band_of(shared::DisparityRange range, float from, float to) {
 
 bool is_valid(float disparity) { return disparity > EGOSGM_INVALID_DISPARITY; }
 
-/// What the coarse match found around a block, in full pixels; first > second: not enough.
+/// What the coarse match found around a block, in full pixels, but for the outermost; first > second: not enough.
 std::pair<float, float> found_around(shared::ImageSize size, const std::vector<float>& coarse, int view, int block_x,
                                      int block_y) {
   const int width = (size.width + 3) / 4, height = (size.height + 3) / 4;
-  float least = kInfinity, most = -kInfinity;
-  int count = 0;
+  std::vector<float> found;
   for (int y = 2 * block_y - 1; y <= 2 * block_y + 2; ++y) {
     for (int x = 2 * block_x - 1; x <= 2 * block_x + 2; ++x) {
       if (coarse.empty() || x < 0 || y < 0 || x >= width || y >= height) continue;
       const float d = coarse[(static_cast<std::size_t>(view) * height + y) * width + x];
       if (!is_valid(d)) continue;
-      least = std::min(least, 4 * d), most = std::max(most, 4 * d), ++count;
+      found.push_back(4 * d);
     }
   }
-  if (count < EGOSGM_COARSE_MIN_COUNT) return {kInfinity, -kInfinity};
-  return {least, most};
+  if (found.size() < EGOSGM_COARSE_MIN_COUNT) return {kInfinity, -kInfinity};
+  std::sort(found.begin(), found.end());
+  return {found[EGOSGM_COARSE_OUTLIERS], found[found.size() - 1 - EGOSGM_COARSE_OUTLIERS]};
 }
 
 shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
