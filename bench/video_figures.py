@@ -157,14 +157,20 @@ def recovery(video, at, frames=4):
             for name, run in runs.items()}
 
 
-def long_run(video, restart, **options):
-    """bad_or_missing a frame: of one run over all frames, and of one that starts at frame `restart`. And the later resets."""
+def there_and_back(frames, last):
+    """Numbers of `frames` frames that drive from 0 to `last`, back, there again: frame i and i + 2 last are the same image, reached
+    by the same motion, so that only the filter's past can tell them apart."""
+    return [last - abs(last - i % (2 * last)) for i in range(frames)]
+
+
+def long_run(video, numbers, restart, **options):
+    """bad_or_missing frame by frame: of one run over `numbers`, and of one that starts at place `restart`. And the later resets."""
     def errors(numbers):
-        frames = {k: (share([bad_or_missing(frame.disparity, video.truth(k))]), frame.report.full_range)
-                  for k, frame in play(video, numbers, **options)}
-        return {k: error for k, (error, _) in frames.items()}, sum(full for k, (_, full) in frames.items() if k != numbers[0])
-    through, resets = errors(video.numbers)
-    return through, errors(range(restart, len(video.numbers)))[0], resets
+        frames = [(share([bad_or_missing(frame.disparity, video.truth(k))]), frame.report.full_range)
+                  for k, frame in play(video, numbers, **options)]
+        return [error for error, _ in frames], sum(full for _, full in frames[1:])
+    through, resets = errors(numbers)
+    return through, errors(numbers[restart:])[0], resets
 
 
 def uncovered_ages(video, oldest):

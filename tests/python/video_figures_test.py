@@ -55,6 +55,27 @@ def test_flicker_is_the_mean_change(monkeypatch):
     assert figures.flicker(Still(), 1) == pytest.approx(0.25, abs=1e-6)
 
 
+def test_there_and_back_meets_the_same_images_moving_the_same_way():
+    numbers = figures.there_and_back(500, 195)
+    assert numbers[:3] == [0, 1, 2] and max(numbers) == 195 and numbers[195:198] == [195, 194, 193]
+    assert set(np.abs(np.diff(numbers))) == {1}
+    assert numbers[9:110] == numbers[399:500]
+
+
+def test_a_long_run_starts_again_at_a_place(monkeypatch):
+    played = []
+
+    def play(video, numbers, **options):
+        played.append(numbers)
+        report = type("Report", (), {"full_range": True})
+        return [(k, type("Frame", (), {"disparity": np.full((24, 48), 5 if k == 2 else 10, np.float32), "report": report})) for k in numbers]
+    monkeypatch.setattr(figures, "play", play)
+    video = type("Video", (Still,), {"truth": lambda self, k: np.full((24, 48), 10, np.float32)})()
+    through, fresh, resets = figures.long_run(video, [0, 1, 2, 1], 2)
+    assert (through, fresh, resets) == ([0, 0, 100, 0], [100, 0], 3)
+    assert played == [[0, 1, 2, 1], [2, 1]]
+
+
 def test_thin_things_stand_out_from_both_sides():
     row = np.full((1, 40), 5.0)
     row[0, 10:13] = 20  # a pole
