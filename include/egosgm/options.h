@@ -55,9 +55,9 @@ struct BandedSgmOptions {
   int p1 = 10;    // penalty of a step of one disparity
   // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: p2 - p2_slope * g, but not
   // below p2_at_edges (nor above p2).
-  int p2 = 160;  // p1 <= p2 <= 190
-  int p2_at_edges = 100;
-  int p2_slope = 1;
+  int p2 = 170;  // p1 <= p2 <= 190
+  int p2_at_edges = 70;
+  int p2_slope = 2;
   // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved)
   // path sums above the minimum add up to s_max, at most 8 a side.
   int s_max = 80;
@@ -81,7 +81,7 @@ struct SadCheckOptions {
   float max_difference = 0.0f;  // mean absolute grey difference of the 3x3 windows (8-bit scale); 0: no check
 };
 struct SpeckleRemovalOptions {
-  int max_size_px = 100;           // connected regions up to this size are dropped; 0: none
+  int max_size_px = 40;            // connected regions up to this size are dropped; 0: none
   float max_difference_px = 2.0f;  // neighbours within this belong to one region
 };
 struct KalmanUpdateOptions {
