@@ -23,7 +23,12 @@ py::array as_array(const py::object& object, const std::string& name, const char
   return array;
 }
 
-bool rows_are_contiguous(const py::array& array) { return array.shape(1) < 2 || array.strides(1) == array.itemsize(); }
+// Asked of NumPy: pybind11 before 2.12 does not know where NumPy 2 keeps it.
+py::ssize_t element_bytes(const py::array& array) { return array.attr("itemsize").cast<py::ssize_t>(); }
+
+bool rows_are_contiguous(const py::array& array) {
+  return array.shape(1) < 2 || array.strides(1) == element_bytes(array);
+}
 
 py::array contiguous(const py::array& array) { return py::module_::import("numpy").attr("ascontiguousarray")(array); }
 
@@ -79,7 +84,7 @@ cv::Mat map_of(const py::object& map, const char* name, py::array& keep) {
     py::object floats = py::module_::import("numpy").attr("asarray")(keep, py::dtype::of<float>());
     keep = floats;
   }
-  if (!rows_are_contiguous(keep) || keep.strides(0) < keep.shape(1) * keep.itemsize()) keep = contiguous(keep);
+  if (!rows_are_contiguous(keep) || keep.strides(0) < keep.shape(1) * element_bytes(keep)) keep = contiguous(keep);
   return cv::Mat(static_cast<int>(keep.shape(0)), static_cast<int>(keep.shape(1)), CV_32FC1,
                  const_cast<void*>(keep.data()), static_cast<std::size_t>(keep.strides(0)));
 }

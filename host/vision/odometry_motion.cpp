@@ -15,8 +15,8 @@ namespace {
 // Narrow: patches across a depth edge follow neither surface, and pull all one way.
 constexpr double kCauchy2 = 2;
 // Matches on one surface share errors of their patches' shape: on rendered scenes, whose motion is known, squared
-// errors are this many times what independent residuals would give.
-constexpr double kCorrelated = 3;
+// errors are this many times what independent residuals would give (1.2 to 4.5 times, by scene and size).
+constexpr double kCorrelated = 2.3;
 constexpr std::size_t kFullPart = 3;  // matches from which on a part of the image counts in full
 constexpr double kPart_px = 80;       // side of a part of the image in RANSAC
 
