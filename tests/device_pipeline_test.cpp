@@ -71,44 +71,61 @@ cl_command_queue_properties queue_properties(const Device& device) {
   return device.handle().device.getInfo<CL_DEVICE_QUEUE_PROPERTIES>();
 }
 
+DevicePipeline pipeline_on(const OwnQueue& queue) {
+  const Scene scene(ShortVideo::kSize);
+  return {queue.get(), scene.calibration(), ShortVideo::kSize.width, ShortVideo::kSize.height, ShortVideo::options()};
+}
+
+/// A short video's frames in the memory of a queue, a pipeline on it, and what the host's way gives.
+struct VideoOnDevice {
+  const ShortVideo video;
+  const OwnQueue queue;
+  const std::vector<OutputMemory> expected;
+  std::vector<cl_mem> pixels;
+  DevicePipeline device = pipeline_on(queue);
+
+  explicit VideoOnDevice(PixelType type = PixelType::kU8, cl_command_queue_properties properties = 0)
+      : video(type), queue(properties), expected(video.through(Device::select())) {
+    for (int index = 0; index < ShortVideo::kFrames; ++index) pixels.push_back(queue.upload(video, index));
+  }
+  ~VideoOnDevice() {
+    for (cl_mem memory : pixels) clReleaseMemObject(memory);
+  }
+  VideoOnDevice(const VideoOnDevice&) = delete;
+  VideoOnDevice& operator=(const VideoOnDevice&) = delete;
+
+  DeviceMaps enqueue(int index, cl_event* done = nullptr) {
+    return device.enqueue({pixels[index], video.type()}, video.motion(index), done);
+  }
+  void expect_same(const DeviceMaps& maps, int index) const {
+    const auto same = [&](cl_mem map, int view, const testing::MapMemory<float>& values) {
+      return testing::same_bits(queue.view_of(map, view), values.values(), ShortVideo::kSize);
+    };
+    EXPECT_TRUE(same(maps.disparity, EGOSGM_LEFT, expected[index].disparity)) << index;
+    EXPECT_TRUE(same(maps.disparity, EGOSGM_RIGHT, expected[index].right_disparity)) << index;
+    EXPECT_TRUE(same(maps.variance, EGOSGM_LEFT, expected[index].variance)) << index;
+    EXPECT_TRUE(same(maps.variance, EGOSGM_RIGHT, expected[index].right_variance)) << index;
+  }
+};
+
 class DevicePipelineTest : public ::testing::Test {
  protected:
-  DevicePipeline pipeline(const OwnQueue& queue, const PipelineOptions& options = ShortVideo::options()) const {
-    const Scene scene(ShortVideo::kSize);
-    return {queue.get(), scene.calibration(), ShortVideo::kSize.width, ShortVideo::kSize.height, options};
-  }
-
-  void expect_same(const OwnQueue& queue, const DeviceMaps& maps, const OutputMemory& expected) const {
-    const auto same = [&](cl_mem map, int view, const std::vector<float>& values) {
-      return testing::same_bits(queue.view_of(map, view), values, ShortVideo::kSize);
-    };
-    EXPECT_TRUE(same(maps.disparity, EGOSGM_LEFT, expected.disparity.values()));
-    EXPECT_TRUE(same(maps.disparity, EGOSGM_RIGHT, expected.right_disparity.values()));
-    EXPECT_TRUE(same(maps.variance, EGOSGM_LEFT, expected.variance.values()));
-    EXPECT_TRUE(same(maps.variance, EGOSGM_RIGHT, expected.right_variance.values()));
-  }
-
   const testing::FaultLayer layer_{FAULT_LAYER};
 };
 
 TEST_F(DevicePipelineTest, GivesTheBitsOfTheHostsWay) {
   for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
     for (const cl_command_queue_properties profiling : {0, CL_QUEUE_PROFILING_ENABLE}) {
-      const ShortVideo video(type);
-      const std::vector<OutputMemory> expected = video.through(Device::select());
-      const OwnQueue queue(profiling);
-      DevicePipeline device = pipeline(queue);
+      VideoOnDevice frames(type, profiling);
       for (int index = 0; index < ShortVideo::kFrames; ++index) {
-        cl_mem pixels = queue.upload(video, index);
         cl_event done = nullptr;
-        const DeviceMaps maps = device.enqueue({pixels, type}, video.motion(index), &done);
+        const DeviceMaps maps = frames.enqueue(index, &done);
         ASSERT_NE(done, nullptr);
         EXPECT_EQ(clWaitForEvents(1, &done), CL_SUCCESS);
         clReleaseEvent(done);
         EXPECT_EQ(maps.full_range, index == 0);
         EXPECT_EQ(maps.full_range_reason, index == 0 ? "first frame" : "");
-        expect_same(queue, maps, expected[index]);
-        clReleaseMemObject(pixels);
+        frames.expect_same(maps, index);
       }
     }
   }
@@ -116,86 +133,66 @@ TEST_F(DevicePipelineTest, GivesTheBitsOfTheHostsWay) {
 
 // All frames are on the queue at once, behind a gate: whatever waited for the device would wait for ever.
 TEST_F(DevicePipelineTest, WaitsForNothingAndCopiesNothing) {
-  const ShortVideo video;
-  const std::vector<OutputMemory> expected = video.through(Device::select());
-  const OwnQueue queue;
-  DevicePipeline device = pipeline(queue);
-  std::vector<cl_mem> pixels;
-  for (int index = 0; index < ShortVideo::kFrames; ++index) pixels.push_back(queue.upload(video, index));
-
-  cl_event gate = clCreateUserEvent(queue.context(), nullptr);
-  clEnqueueBarrierWithWaitList(queue.get(), 1, &gate, nullptr);
+  VideoOnDevice frames;
+  cl_event gate = clCreateUserEvent(frames.queue.context(), nullptr);
+  clEnqueueBarrierWithWaitList(frames.queue.get(), 1, &gate, nullptr);
   const long buffers = layer_.buffers_created();
   const int transfers = layer_.transfers();
   DeviceMaps maps;
-  for (int index = 0; index < ShortVideo::kFrames; ++index) {
-    maps = device.enqueue({pixels[index], PixelType::kU8}, video.motion(index));
-  }
+  for (int index = 0; index < ShortVideo::kFrames; ++index) maps = frames.enqueue(index);
   EXPECT_EQ(layer_.buffers_created(), buffers);
   EXPECT_EQ(layer_.transfers(), transfers);
   clSetUserEventStatus(gate, CL_COMPLETE);
-  expect_same(queue, maps, expected.back());
+  frames.expect_same(maps, ShortVideo::kFrames - 1);
   clReleaseEvent(gate);
-  for (cl_mem memory : pixels) clReleaseMemObject(memory);
 }
 
 TEST_F(DevicePipelineTest, FramesOfTheHostGoInBetween) {
-  const ShortVideo video;
-  const std::vector<OutputMemory> expected = video.through(Device::select());
-  const OwnQueue queue;
-  DevicePipeline device = pipeline(queue);
+  VideoOnDevice frames;
+  const ShortVideo& video = frames.video;
   for (int round = 0; round < 2; ++round) {
     for (int index = 0; index < ShortVideo::kFrames; ++index) {
       if (index % 2 == round) {
         OutputMemory outputs(ShortVideo::kSize);
-        device.host().process(video.image(index, EGOSGM_LEFT), video.image(index, EGOSGM_RIGHT), video.motion(index),
-                              outputs.views());
-        EXPECT_TRUE(same_outputs(outputs, expected[index], ShortVideo::kSize)) << index;
+        frames.device.host().process(video.image(index, EGOSGM_LEFT), video.image(index, EGOSGM_RIGHT),
+                                     video.motion(index), outputs.views());
+        EXPECT_TRUE(same_outputs(outputs, frames.expected[index], ShortVideo::kSize)) << index;
       } else {
-        cl_mem pixels = queue.upload(video, index);
-        expect_same(queue, device.enqueue({pixels, PixelType::kU8}, video.motion(index)), expected[index]);
-        clReleaseMemObject(pixels);
+        frames.expect_same(frames.enqueue(index), index);
       }
     }
-    device.host().reset();
+    frames.device.host().reset();
   }
 }
 
 TEST_F(DevicePipelineTest, GoesOnAfterAFrameThatFailed) {
-  const ShortVideo video;
-  const std::vector<OutputMemory> expected = video.through(Device::select());
-  const OwnQueue queue;
-  DevicePipeline device = pipeline(queue);
-  std::vector<cl_mem> pixels;
-  for (int index = 0; index < ShortVideo::kFrames; ++index) pixels.push_back(queue.upload(video, index));
-  const auto enqueue = [&](int index) { return device.enqueue({pixels[index], PixelType::kU8}, video.motion(index)); };
-
+  VideoOnDevice frames;
   layer_.disarm();
-  enqueue(0);
+  frames.enqueue(0);
   const int enqueues = layer_.enqueues();
-  device.host().reset();
-  enqueue(0);
+  frames.device.host().reset();
+  frames.enqueue(0);
   for (int at = 0; at < enqueues; at += 7) {  // at once: the frame never was
     layer_.arm(at, CL_OUT_OF_RESOURCES, 0);
-    EXPECT_THROW(for (;;) enqueue(1), DeviceError) << at;
+    EXPECT_THROW(for (;;) frames.enqueue(1), DeviceError) << at;
     layer_.disarm();
-    device.host().reset();
-    expect_same(queue, enqueue(0), expected[0]);
-    expect_same(queue, enqueue(1), expected[1]);
-    device.host().reset();
-    enqueue(0);
+    frames.device.host().reset();
+    frames.expect_same(frames.enqueue(0), 0);
+    frames.expect_same(frames.enqueue(1), 1);
+    frames.device.host().reset();
+    frames.enqueue(0);
   }
   for (const bool asks_for_the_end : {false, true}) {  // on the device: the next frame says so
     layer_.arm(5, CL_OUT_OF_RESOURCES, 1);
     cl_event done = nullptr;
     try {
-      device.enqueue({pixels[1], PixelType::kU8}, video.motion(1), asks_for_the_end ? &done : nullptr);
+      frames.enqueue(1, asks_for_the_end ? &done : nullptr);
       layer_.disarm();
-      clFinish(queue.get());
-      EXPECT_THROW(enqueue(2), DeviceError);
+      clFinish(frames.queue.get());
+      EXPECT_THROW(frames.enqueue(2), DeviceError);
     } catch (const DeviceError&) {  // it was quick, so the frame never was
       EXPECT_TRUE(asks_for_the_end);
-      device.host().reset();
+      frames.device.host().reset();
     }
     layer_.disarm();
     if (done) {
@@ -204,11 +201,10 @@ TEST_F(DevicePipelineTest, GoesOnAfterAFrameThatFailed) {
     }
   }
   for (int index = 0; index < ShortVideo::kFrames; ++index) {
-    const DeviceMaps maps = enqueue(index);
+    const DeviceMaps maps = frames.enqueue(index);
     EXPECT_EQ(maps.full_range_reason, index == 0 ? "reset" : "");
-    expect_same(queue, maps, expected[index]);
+    frames.expect_same(maps, index);
   }
-  for (cl_mem memory : pixels) clReleaseMemObject(memory);
 }
 
 TEST_F(DevicePipelineTest, KeepsNothingOfTheCallers) {
@@ -216,7 +212,7 @@ TEST_F(DevicePipelineTest, KeepsNothingOfTheCallers) {
   const long before = layer_.references();
   {
     const OwnQueue queue;
-    DevicePipeline device = pipeline(queue);
+    DevicePipeline device = pipeline_on(queue);
     cl_mem pixels = queue.upload(video, 0);
     device.enqueue({pixels, PixelType::kU8}, std::nullopt);
     clReleaseMemObject(pixels);
@@ -235,7 +231,7 @@ TEST_F(DevicePipelineTest, RefusesWhatDoesNotFit) {
   }
   expect_refused([&] { DevicePipeline(queue.get(), any, 8, 8, {}, "no such folder"); },
                  {"no such folder/manifest.json"});
-  DevicePipeline device = pipeline(queue);
+  DevicePipeline device = pipeline_on(queue);
   expect_refused([&] { device.enqueue({}, std::nullopt); }, {"no images"});
   cl_mem pixels = other.upload(video, 0);
   expect_refused([&] { device.enqueue({pixels, PixelType::kU8}, std::nullopt); }, {"another context"});
@@ -292,24 +288,22 @@ bool has_svm(const Device& device) {
 TEST_F(DevicePipelineTest, SharedVirtualMemoryGivesTheBitsOfTheHostsWay) {
   if (!has_svm(Device::select())) GTEST_SKIP() << "the device has no shared virtual memory";
   for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
-    const ShortVideo video(type);
-    const std::vector<OutputMemory> expected = video.through(Device::select());
-    const OwnQueue queue;
-    DevicePipeline device = pipeline(queue);
-    SvmMemory pixels(queue, 2 * view_bytes(type));
+    VideoOnDevice frames(type);
+    SvmMemory pixels(frames.queue, 2 * view_bytes(type));
     for (int index = 0; index < ShortVideo::kFrames; ++index) {
-      pixels.write(video, index);
+      pixels.write(frames.video, index);
       const int transfers = layer_.transfers();
-      const DeviceMaps maps = device.enqueue({.type = type, .svm_pixels = pixels.get()}, video.motion(index));
+      const DeviceMaps maps =
+          frames.device.enqueue({.type = type, .svm_pixels = pixels.get()}, frames.video.motion(index));
       EXPECT_EQ(layer_.transfers(), transfers);
-      expect_same(queue, maps, expected[index]);
+      frames.expect_same(maps, index);
     }
   }
 }
 
 TEST_F(DevicePipelineTest, RefusesWhatIsNoSharedVirtualMemory) {
   const OwnQueue queue;
-  DevicePipeline device = pipeline(queue);
+  DevicePipeline device = pipeline_on(queue);
   const std::vector<std::uint8_t> plain(2 * view_bytes(PixelType::kU8));
   const auto expect_not_enqueued = [&](const DeviceImages& images, const std::vector<std::string>& named) {
     layer_.disarm();  // counts from here

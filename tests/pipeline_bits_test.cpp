@@ -7,21 +7,8 @@
 #include "egosgm/pipeline.h"
 #include "tests/support/pipeline_video.h"
 
-namespace egosgm {
+namespace egosgm::testing {
 namespace {
-
-using testing::ImageMemory;
-using testing::Layout;
-using testing::make_pipeline;
-using testing::options;
-using testing::OutputMemory;
-using testing::process;
-using testing::process_all;
-using testing::Result;
-using testing::Setting;
-using testing::settings;
-using testing::standard;
-using testing::Video;
 
 TEST(Pipeline, GivesTheSameBitsAgainAndElsewhere) {
   const Setting setting = standard();
@@ -190,4 +177,4 @@ TEST(Pipeline, FillsOnlyWhatIsAskedFor) {
 }
 
 }  // namespace
-}  // namespace egosgm
+}  // namespace egosgm::testing

@@ -9,21 +9,8 @@
 #include "tests/support/expect_refused.h"
 #include "tests/support/pipeline_video.h"
 
-namespace egosgm {
+namespace egosgm::testing {
 namespace {
-
-using testing::expect_refused;
-using testing::ImageMemory;
-using testing::kSize;
-using testing::make_pipeline;
-using testing::options;
-using testing::OutputMemory;
-using testing::process;
-using testing::process_all;
-using testing::Scene;
-using testing::Setting;
-using testing::standard;
-using testing::Video;
 
 TEST(Pipeline, RefusesFramesOutOfTurn) {
   const Setting setting = standard();
@@ -153,4 +140,4 @@ TEST(Pipeline, RefusesWhatItCannotBeBuiltFor) {
 }
 
 }  // namespace
-}  // namespace egosgm
+}  // namespace egosgm::testing

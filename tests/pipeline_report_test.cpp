@@ -8,19 +8,8 @@
 #include "tests/support/compare.h"
 #include "tests/support/pipeline_video.h"
 
-namespace egosgm {
+namespace egosgm::testing {
 namespace {
-
-using testing::make_pipeline;
-using testing::OutputMemory;
-using testing::process;
-using testing::process_all;
-using testing::Result;
-using testing::Setting;
-using testing::settings;
-using testing::standard;
-using testing::valid_part;
-using testing::Video;
 
 TEST(Pipeline, SaysWhyAFrameWasSearchedInFull) {
   Setting setting = standard();
@@ -63,7 +52,7 @@ TEST(Pipeline, PredictsAgainAfterAFrameWithoutMotion) {
   const Result gap = process(broken, setting, video, 1, std::nullopt);
   EXPECT_EQ(gap.report.predicted_fraction, 0);
   EXPECT_EQ(valid_part(gap.outputs.predicted.values()), 0);
-  EXPECT_TRUE(testing::same_bits(gap.outputs.disparity.values(), gap.outputs.measured.values(), setting.size));
+  EXPECT_TRUE(same_bits(gap.outputs.disparity.values(), gap.outputs.measured.values(), setting.size));
   const Result after = process(broken, setting, video, 2);
   EXPECT_FALSE(after.report.full_range);
   EXPECT_GT(after.report.predicted_fraction, 0.5);
@@ -81,7 +70,7 @@ TEST(Pipeline, WithoutTimeEveryFrameIsAlone) {
   const Result result = process(pipeline, setting, video, 2);
   const Result alone = process(other, setting, video, 2, std::nullopt);
   EXPECT_TRUE(same_outputs(result.outputs, alone.outputs, setting.size));
-  EXPECT_TRUE(testing::same_bits(result.outputs.disparity.values(), result.outputs.measured.values(), setting.size));
+  EXPECT_TRUE(same_bits(result.outputs.disparity.values(), result.outputs.measured.values(), setting.size));
   EXPECT_EQ(result.report.predicted_fraction, 0);
 }
 
@@ -182,4 +171,4 @@ TEST(Pipeline, KeepsEveryDisparityInItsRange) {
 }
 
 }  // namespace
-}  // namespace egosgm
+}  // namespace egosgm::testing

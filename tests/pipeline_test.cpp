@@ -12,44 +12,29 @@
 #include "tests/support/pipeline_video.h"
 #include "tests/support/stage_chain.h"
 
-namespace egosgm {
+namespace egosgm::testing {
 namespace {
 
-using testing::ImageMemory;
-using testing::make_pipeline;
-using testing::OutputMemory;
-using testing::process;
-using testing::Result;
-using testing::ScenePair;
-using testing::Setting;
-using testing::setting_name;
-using testing::settings;
-using testing::standard;
-using testing::valid_part;
-using testing::Video;
-
 reference::Pipeline make_twin(const Setting& setting) {
-  return {setting.size, setting.options, BandedSgm::code_padding(testing::range_of(setting.options))};
+  return {setting.size, setting.options, BandedSgm::code_padding(range_of(setting.options))};
 }
 
-void expect_same(const std::string& stage, const testing::HostMaps& actual, const testing::HostMaps& expected,
-                 shared::ImageSize size) {
-  EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << "disparity of " << stage;
-  EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << "variance of " << stage;
+void expect_same(const std::string& stage, const HostMaps& actual, const HostMaps& expected, shared::ImageSize size) {
+  EXPECT_TRUE(same_bits(actual.disparity, expected.disparity, size)) << "disparity of " << stage;
+  EXPECT_TRUE(same_bits(actual.variance, expected.variance, size)) << "variance of " << stage;
 }
 
 void expect_same(const reference::Pass& actual, const reference::Pass& expected, const Setting& setting) {
   const shared::ImageSize size = setting.size;
-  const int padding = BandedSgm::code_padding(testing::range_of(setting.options));
+  const int padding = BandedSgm::code_padding(range_of(setting.options));
   const int words = Census::words(setting.options.banded_sgm.cost);
-  EXPECT_TRUE(testing::same_bits(actual.images, expected.images, size)) << "images";
-  EXPECT_TRUE(testing::same_bits(actual.coarse, expected.coarse, CoarseMatch::coarse_size(size))) << "coarse match";
-  EXPECT_TRUE(testing::same_bits(actual.band.bands, expected.band.bands, size)) << "bands";
-  EXPECT_TRUE(testing::same_bits(actual.band.cell_offsets, expected.band.cell_offsets, size)) << "cell offsets";
-  EXPECT_TRUE(testing::same_bits(actual.band.row_sums, expected.band.row_sums, {1, size.height})) << "row sums";
-  EXPECT_TRUE(testing::same_bits(actual.codes, expected.codes, {(size.width + 2 * padding) * words, size.height}))
-      << "codes";
-  EXPECT_TRUE(testing::same_bits(actual.penalties, expected.penalties, size)) << "penalties";
+  EXPECT_TRUE(same_bits(actual.images, expected.images, size)) << "images";
+  EXPECT_TRUE(same_bits(actual.coarse, expected.coarse, CoarseMatch::coarse_size(size))) << "coarse match";
+  EXPECT_TRUE(same_bits(actual.band.bands, expected.band.bands, size)) << "bands";
+  EXPECT_TRUE(same_bits(actual.band.cell_offsets, expected.band.cell_offsets, size)) << "cell offsets";
+  EXPECT_TRUE(same_bits(actual.band.row_sums, expected.band.row_sums, {1, size.height})) << "row sums";
+  EXPECT_TRUE(same_bits(actual.codes, expected.codes, {(size.width + 2 * padding) * words, size.height})) << "codes";
+  EXPECT_TRUE(same_bits(actual.penalties, expected.penalties, size)) << "penalties";
   expect_same("matched", actual.matched, expected.matched, size);
   expect_same("smoothed", actual.smoothed, expected.smoothed, size);
   expect_same("consistent", actual.consistent, expected.consistent, size);
@@ -81,24 +66,24 @@ std::vector<T> half(const std::vector<T>& both, int view) {
 
 void expect_outputs(const OutputMemory& outputs, const reference::Frame& expected, shared::ImageSize size) {
   const bool has_prediction = !expected.predicted.disparity.empty();
-  const testing::HostMaps predicted = has_prediction ? expected.predicted : testing::empty_maps(size);
+  const HostMaps predicted = has_prediction ? expected.predicted : empty_maps(size);
   const reference::Pass& pass = expected.passes.back();
-  const testing::HostMaps& measured = has_prediction ? pass.measured : expected.result;  // they share memory
+  const HostMaps& measured = has_prediction ? pass.measured : expected.result;  // they share memory
   const std::vector<float> maps[] = {half(expected.result.disparity, 0), half(expected.result.variance, 0),
                                      half(expected.result.disparity, 1), half(expected.result.variance, 1),
                                      half(predicted.disparity, 0),       half(predicted.variance, 0),
                                      half(measured.disparity, 0),        half(measured.variance, 0)};
   const auto actual = outputs.maps();
   for (std::size_t i = 0; i < actual.size(); ++i) {
-    EXPECT_TRUE(testing::same_bits(actual[i].second->values(), maps[i], size)) << "output " << actual[i].first;
+    EXPECT_TRUE(same_bits(actual[i].second->values(), maps[i], size)) << "output " << actual[i].first;
   }
   std::vector<std::uint16_t> widths;
   for (const shared::Band& band : half(pass.band.bands, 0)) {
     widths.push_back(static_cast<std::uint16_t>(band.last - band.first + 1));
   }
-  EXPECT_TRUE(testing::same_bits(outputs.search_width.values(), widths, size)) << "output search_width";
+  EXPECT_TRUE(same_bits(outputs.search_width.values(), widths, size)) << "output search_width";
   const std::vector<std::uint8_t> marks = dynamic_map(size, {}, maps[4], maps[6]);
-  EXPECT_TRUE(testing::same_bits(outputs.dynamic.values(), marks, size)) << "output dynamic";
+  EXPECT_TRUE(same_bits(outputs.dynamic.values(), marks, size)) << "output dynamic";
   EXPECT_TRUE(outputs.padding_is_untouched());
 }
 
@@ -124,7 +109,7 @@ class PipelineTest : public ::testing::TestWithParam<Setting> {};
 TEST_P(PipelineTest, EveryStageOfThreeFramesEqualsItsTwin) {
   const Setting& setting = GetParam();
   const Video video(setting);
-  testing::StageChain chain(video.calibration(), setting.size, setting.options, setting.type);
+  StageChain chain(video.calibration(), setting.size, setting.options, setting.type);
   reference::Pipeline twin = make_twin(setting);
   for (int index = 0; index < video.size(); ++index) {
     SCOPED_TRACE("frame " + std::to_string(index));
@@ -164,7 +149,7 @@ TEST(PipelineScene, ReachesEveryStage) {
   const reference::Frame second = twin.process(video.twin_images(1), video.twin_motions(1));
   ASSERT_EQ(first.passes.size(), 2u);
   EXPECT_NEAR(first.passes[0].offset.offset_px, setting.vertical_offset_px, 0.3);
-  const auto differ = [](const testing::HostMaps& a, const testing::HostMaps& b) { return a.disparity != b.disparity; };
+  const auto differ = [](const HostMaps& a, const HostMaps& b) { return a.disparity != b.disparity; };
   EXPECT_TRUE(differ(second.warped, second.without_edges));
   EXPECT_TRUE(differ(second.without_edges, second.filled));
   EXPECT_TRUE(differ(second.filled, second.predicted));
@@ -237,4 +222,4 @@ TEST_P(PipelineTest, SubmitAndCollectGiveTheBitsOfProcess) {
 }
 
 }  // namespace
-}  // namespace egosgm
+}  // namespace egosgm::testing

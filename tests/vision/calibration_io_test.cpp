@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 
 #include "egosgm/vision/file_io.h"
+#include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
-#include "tests/vision/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 const std::string kP0 = "700 0 600 0 0 710 180 0 0 0 1 0";
 const std::string kP1 = "700 0 600 -350 0 710 180 0 0 0 1 0";

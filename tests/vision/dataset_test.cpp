@@ -5,12 +5,14 @@
 
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
-#include "tests/vision/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 const std::string kProjections =
     "P0: 700 0 600 0 0 700 180 0 0 0 1 0\nP1: 700 0 600 -350 0 700 180 0 0 0 1 0\n"

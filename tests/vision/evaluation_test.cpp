@@ -7,12 +7,14 @@
 
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/file_io.h"
+#include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
-#include "tests/vision/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 constexpr float kNo = kInvalidDisparity;
 

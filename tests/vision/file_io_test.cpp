@@ -11,11 +11,13 @@
 
 #include <fstream>
 
-#include "tests/vision/expect_refused.h"
+#include "tests/support/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 std::size_t count_entries(const std::filesystem::path& folder) {
   return static_cast<std::size_t>(

@@ -10,11 +10,13 @@
 #include <random>
 
 #include "egosgm/vision/file_io.h"
-#include "tests/vision/expect_refused.h"
+#include "tests/support/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 cv::Mat random_image(std::mt19937& random, int width, int height, int type) {
   cv::Mat image(height, width, type);

@@ -19,12 +19,14 @@
 #include "egosgm/vision/poses_io.h"
 #include "egosgm/vision/synthetic.h"
 #include "host/vision/odometry_geometry.h"
+#include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
-#include "tests/vision/expect_refused.h"
 #include "tests/vision/odometry_motions.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 struct Drive {
   SyntheticSequence sequence;

@@ -5,10 +5,12 @@
 
 #include <cmath>
 
-#include "tests/vision/expect_refused.h"
+#include "tests/support/expect_refused.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 using Poses = std::vector<Eigen::Isometry3d>;
 

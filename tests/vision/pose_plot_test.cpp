@@ -7,10 +7,12 @@
 #include <regex>
 #include <sstream>
 
-#include "tests/vision/expect_refused.h"
+#include "tests/support/expect_refused.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 using Poses = std::vector<Eigen::Isometry3d>;
 

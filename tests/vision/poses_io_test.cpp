@@ -6,12 +6,14 @@
 #include <random>
 
 #include "egosgm/vision/file_io.h"
+#include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
-#include "tests/vision/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 const std::string kIdentity = "1 0 0 0 0 1 0 0 0 0 1 0\n";
 

@@ -6,10 +6,12 @@
 #include <limits>
 
 #include "egosgm/image.h"
-#include "tests/vision/expect_refused.h"
+#include "tests/support/expect_refused.h"
 
 namespace egosgm::vision {
 namespace {
+
+using testing::expect_refused;
 
 constexpr float kNo = kInvalidDisparity;
 const cv::Vec3b kBlack(0, 0, 0), kGrey(128, 128, 128);
