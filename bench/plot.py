@@ -9,6 +9,7 @@ import argparse
 import json
 import pathlib
 import sys
+import textwrap
 
 TYPICAL = (1242, 375, 128)  # width, height, disparities of the tables that show one size
 OURS, THEIRS, ACCENT = "#1b6ca8", "#9aa5b1", "#d1495b"
@@ -125,7 +126,19 @@ def paper_table(content):
 
 def tidy(axes):
     axes.spines[["top", "right"]].set_visible(False)
+    axes.set_axisbelow(True)
     axes.grid(True, alpha=0.25)
+    for axis in (axes.xaxis, axes.yaxis):
+        if axis.get_scale() == "log":
+            label_each_decade(axis)
+
+
+def label_each_decade(axis):
+    """Plain numbers, also where the data lie within one decade or two, which powers of ten leave without a scale."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def label(axes, x, y):
@@ -137,11 +150,11 @@ def label(axes, x, y):
 
 def draw_compare(plt, content):
     shapes = [s for s in shapes_of(content["rows"]) if s[2] == TYPICAL[2]] or shapes_of(content["rows"])
-    figure, panels = plt.subplots(1, len(shapes), figsize=(4.2 * len(shapes) + 1, 3.6), squeeze=False, sharey=True)
+    figure, panels = plt.subplots(1, len(shapes), figsize=(4.2 * len(shapes) + 3, 3.6), squeeze=False, sharey=True)
     for axes, s in zip(panels[0], shapes):
         rows = {row["name"]: row["median_ms"] for row in content["rows"] if shape(row) == s}
         names = [name for name in reversed(CONTENDERS) if name in rows]
-        bars = axes.barh(names, [rows[name] for name in names], color=[OURS if name.startswith("egosgm") else THEIRS for name in names])
+        bars = axes.barh([CONTENDERS[name] for name in names], [rows[name] for name in names], color=[OURS if name.startswith("egosgm") else THEIRS for name in names])
         axes.bar_label(bars, fmt="%.0f", padding=2, fontsize=8)
         axes.set_title(f"{s[0]}×{s[1]}, D = {s[2]}", fontsize=10)
         axes.set_xlabel("ms a frame (median)")
@@ -222,7 +235,8 @@ def draw_error_against_search(plt, content):
             opencv = name.startswith("opencv")
             axes.plot(*at, "s" if opencv else "x", color=THEIRS if opencv else ACCENT, ms=5)
             if name == "default" or any(max(a, b) > 1.2 * min(a, b) for a, b in zip(at, configurations["default"])):  # else they overlap
-                axes.annotate(name, at, fontsize=6, xytext=(3, 2), textcoords="offset points")
+                beside = {"xytext": (-4, 2), "ha": "right"} if at[0] > 50 else {"xytext": (3, 2)}
+                axes.annotate(name, at, fontsize=6, textcoords="offset points", **beside)
         axes.set_xscale("log")
         label(axes, "search [% of all cells]", "bad or missing, non-occluded [%]")
     return figure
@@ -248,7 +262,7 @@ def draw_uncertainty(plt, content):
     for curve, color in zip(curves, (OURS, ACCENT, THEIRS, "#e0a458")):
         axes.plot([at["predicted_px"] for at in curve["bins"]], [at["actual_px"] for at in curve["bins"]], "o-", ms=4, color=color, label=curve["input"])
     ends = [at[name] for curve in curves for at in curve["bins"] for name in ("predicted_px", "actual_px")]
-    axes.plot([min(ends), max(ends)], [min(ends), max(ends)], color="#cccccc", zorder=0)
+    axes.plot([min(ends), max(ends)], [min(ends), max(ends)], color="#cccccc", zorder=0, label="as predicted")
     axes.set_xscale("log")
     axes.set_yscale("log")
     label(axes, "predicted deviation, of a tenth of the pixels each [px]", "actual deviation, errors cut at 3 px [px]")
@@ -315,8 +329,9 @@ def main():
         text += [table(content) + f"\n{caption(content)}\n" for table in tables]
         for name, draw in drawings.items() if plt else ():
             figure = draw(plt, content)
-            figure.text(0.01, 0.005, caption(content), fontsize=6, color="#666666")
-            figure.tight_layout(rect=(0, 0.03, 1, 1))
+            lines = textwrap.wrap(caption(content), width=int(20 * figure.get_figwidth()))
+            figure.text(0.01, 0.005, "\n".join(lines), fontsize=6, color="#666666")
+            figure.tight_layout(rect=(0, 0.14 * len(lines) / figure.get_figheight(), 1, 1))
             figure.savefig(out / f"{name}.png", dpi=150)
             figure.savefig(out / f"{name}.svg", metadata={"Date": None})
             plt.close(figure)
