@@ -11,6 +11,7 @@
 #include "host/census.h"
 #include "host/coarse_match.h"
 #include "host/consistency_check.h"
+#include "host/dynamic_map.h"
 #include "host/edge_rejection.h"
 #include "host/edge_variance.h"
 #include "host/forward_warp.h"
@@ -87,7 +88,8 @@ class Chain {
         speckle_removal_(context, size_, {}),
         sad_check_(context, size_, PixelType::kU8, {.max_difference = 20.0f}),
         kalman_update_(context, size_, {}),
-        edge_variance_(context, size_, {}) {
+        edge_variance_(context, size_, {}),
+        dynamic_map_(context, size_, {}) {
     images_.pixels.write(context, street.images);
     belief_.disparity.write(context, street.disparity);
     belief_.variance.write(context, street.variance);
@@ -125,6 +127,7 @@ class Chain {
         {"SpeckleRemoval", [this] { speckle_removal_(matched_); }, map},
         {"KalmanUpdate", [this] { kalman_update_(predicted_, matched_, updated_); }, 3 * maps},
         {"EdgeVariance", [this] { edge_variance_(updated_, warped_); }, 8 * map},
+        {"DynamicMap", [this] { dynamic_map_(&predicted_, matched_, warped_); }, 4 * map + grey / 2},
         {"SadCheck", [this] { sad_check_(images_.pixels, updated_, checked_); }, grey + 2 * maps},
     };
   }
@@ -171,6 +174,7 @@ class Chain {
   SadCheck sad_check_;
   KalmanUpdate kalman_update_;
   EdgeVariance edge_variance_;
+  DynamicMap dynamic_map_;
 };
 
 void measure(benchmark::State& state, ocl::Context& context, const Stage& stage, double copy_gb_s) {

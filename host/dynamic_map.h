@@ -1,18 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "egosgm/options.h"
-#include "kernels/shared.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
 
 namespace egosgm {
 
-/// What contradicts a static world, of one view: 255 at a pixel with a prediction and a measurement where, of the
+/// What contradicts a static world, of the left view: 255 at a pixel with a prediction and a measurement where, of the
 /// pixels of its 9x9 window that have both, at least half differ by more than `min_difference_px`, if a third of the
 /// window has both; else 0.
-std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, const DynamicMapOptions& options,
-                                      const std::vector<float>& predicted, const std::vector<float>& measured);
+class DynamicMap {
+ public:
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  DynamicMap(ocl::Context& context, shared::ImageSize size, const DynamicMapOptions& options, int pixels = 0);
+
+  /// Without a prediction (null) nothing contradicts it. `scratch` is overwritten.
+  const ocl::Buffer<cl_uchar>& operator()(const StereoMaps* predicted, const StereoMaps& measured, StereoMaps& scratch);
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const int pixels_;
+  const float min_difference_px_;
+  ocl::Buffer<cl_uchar> marks_;
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<float>, ocl::Buffer<float>>
+      count_rows_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              const ocl::Buffer<float>, ocl::Buffer<cl_uchar>>
+      mark_;
+};
 
 }  // namespace egosgm

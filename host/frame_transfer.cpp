@@ -7,7 +7,6 @@
 #include <string>
 
 #include "egosgm/error.h"
-#include "host/dynamic_map.h"
 
 namespace egosgm {
 namespace {
@@ -103,12 +102,10 @@ void report_commands(ocl::Context& context, const std::vector<ocl::Command>& com
   }
 }
 
-FrameTransfer::FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-                             const DynamicMapOptions& dynamic_map)
+FrameTransfer::FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range)
     : context_((context.enter("FrameTransfer"), context)),
       size_(size),
       range_(range),
-      dynamic_map_(dynamic_map),
       images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(size)), PixelType::kU8},
       upload_(context, images_.pixels),
       disparity_(context, pixel_count(size)),
@@ -177,11 +174,12 @@ void FrameTransfer::download(const FrameResults& results, const FrameOutputs& ou
   has_prediction_ = results.predicted;
   context_.let_wait(ocl::Queue::kDownload, context_.last_kernel());
   if (results.predicted) {
-    fetch_left(results.predicted->disparity, outputs.predicted.data || outputs.dynamic.data, predicted_);
+    fetch_left(results.predicted->disparity, outputs.predicted.data, predicted_);
     fetch_left(results.predicted->variance, outputs.predicted_variance.data, predicted_variance_);
   }
-  fetch_left(results.measured->disparity, outputs.measured.data || outputs.dynamic.data, measured_);
+  fetch_left(results.measured->disparity, outputs.measured.data, measured_);
   fetch_left(results.measured->variance, outputs.measured_variance.data, measured_variance_);
+  if (results.dynamic) fetch(*results.dynamic, pixel_count(size_), dynamic_);
   if (outputs.search_width.data) fetch(results.band->bands(), pixel_count(size_), bands_);
   fetch(results.band->row_sums(), row_sums_.size(), row_sums_);
   fetch(*results.vertical_offset_px, 1, vertical_offset_px_);
@@ -200,16 +198,13 @@ void FrameTransfer::collect(FrameReport& report) const {
   if (has_prediction_) {
     copy_rows(predicted_.data(), outputs_.predicted);
     copy_rows(predicted_variance_.data(), outputs_.predicted_variance);
-    if (outputs_.dynamic.data) {
-      copy_rows(dynamic_map(size_, dynamic_map_, predicted_, measured_).data(), outputs_.dynamic);
-    }
   } else {
     fill_rows(kInvalidDisparity, outputs_.predicted);
     fill_rows(0.0f, outputs_.predicted_variance);
-    fill_rows(std::uint8_t{0}, outputs_.dynamic);
   }
   copy_rows(measured_.data(), outputs_.measured);
   copy_rows(measured_variance_.data(), outputs_.measured_variance);
+  copy_rows(dynamic_.data(), outputs_.dynamic);
   copy_rows(bands_.data(), outputs_.search_width,
             [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
 

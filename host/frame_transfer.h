@@ -18,14 +18,14 @@ struct FrameResults {
   const StereoMaps* measured;   // (or they are the result)
   const SearchBand* band;
   const ocl::Buffer<float>* vertical_offset_px;
+  const ocl::Buffer<cl_uchar>* dynamic;  // null where it was not asked for
 };
 
 /// Checks what the caller gave, brings a frame's images to the device and its results back: one for each frame that may
 /// be under way. Transfers have queues of their own; with those of the kernels they are tied here.
 class FrameTransfer {
  public:
-  FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-                const DynamicMapOptions& dynamic_map = {});
+  FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
 
   /// Throws InvalidArgument for a size that no pipeline can have.
   static void validate_size(int width, int height);
@@ -61,12 +61,12 @@ class FrameTransfer {
   ocl::Context& context_;
   const shared::ImageSize size_;
   const shared::DisparityRange range_;
-  const DynamicMapOptions dynamic_map_;
   FrameImages images_;
   ocl::Upload upload_;
   MapReadback disparity_, variance_, right_disparity_, right_variance_;
   Scratch predicted_, predicted_variance_, measured_, measured_variance_, vertical_offset_px_;
   std::vector<shared::Band> bands_;
+  std::vector<cl_uchar> dynamic_;
   std::vector<shared::RowSum> row_sums_;
   cl::Event scratch_fetched_;
   bool has_prediction_ = false;

@@ -58,6 +58,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("kalman_update.keep_predicted", o.kalman_update.keep_predicted);
   visit("kalman_update.min_variance_px2", o.kalman_update.min_variance_px2);
   visit("edge_variance.weight", o.edge_variance.weight);
+  visit("dynamic_map.enabled", o.dynamic_map.enabled);
   visit("dynamic_map.min_difference_px", o.dynamic_map.min_difference_px);
 }
 

@@ -15,6 +15,7 @@
 #include "host/census.h"
 #include "host/coarse_match.h"
 #include "host/consistency_check.h"
+#include "host/dynamic_map.h"
 #include "host/edge_rejection.h"
 #include "host/edge_variance.h"
 #include "host/forward_warp.h"
@@ -98,6 +99,7 @@ struct Pipeline::Impl {
   SpeckleRemoval speckle_removal;
   KalmanUpdate kalman_update;
   EdgeVariance edge_variance;
+  DynamicMap dynamic_map;
   std::array<FrameTransfer, kMaxUnderWay> transfers;
 
   ocl::Buffer<cl_uint> codes;
@@ -132,8 +134,8 @@ struct Pipeline::Impl {
         speckle_removal(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
         kalman_update(context, size, options.kalman_update),
         edge_variance(context, size, options.edge_variance),
-        transfers{{{context, size, range_of(options), options.dynamic_map},
-                   {context, size, range_of(options), options.dynamic_map}}},
+        dynamic_map(context, size, options.dynamic_map),
+        transfers{{{context, size, range_of(options)}, {context, size, range_of(options)}}},
         codes(context, Census::words(options.banded_sgm.cost, size, BandedSgm::code_padding(range_of(options)))),
         penalties(context, StepPenalties::plane_count(size)),
         predicted(context, size),
@@ -197,17 +199,21 @@ struct Pipeline::Impl {
   }
 
   /// All that happens on the device. `reason`: see `full_range_reason`.
-  FrameResults run_stages(const FrameImages& uploaded, const std::optional<Motion>& motion, const char* reason) {
+  FrameResults run_stages(const FrameImages& uploaded, const std::optional<Motion>& motion, const char* reason,
+                          bool wants_dynamic) {
     if (!reason) predict(*motion);
     const FrameImages& images = match(uploaded, reason);
     if (!reason) update(images);
     StereoMaps* result = reason ? measured : updated;
     edge_variance(*result, scratch);
+    const StereoMaps* prediction = reason ? nullptr : &predicted;
+    const auto* dynamic = wants_dynamic ? &dynamic_map(prediction, *measured, scratch) : nullptr;
     return {.result = result,
-            .predicted = reason ? nullptr : &predicted,
+            .predicted = prediction,
             .measured = measured,
             .band = &search_band,
-            .vertical_offset_px = &vertical_alignment.offset_px()};
+            .vertical_offset_px = &vertical_alignment.offset_px(),
+            .dynamic = dynamic};
   }
 
   void submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
@@ -220,7 +226,7 @@ struct Pipeline::Impl {
     const char* reason = full_range_reason(motion);
     const FrameImages& uploaded = frame.transfer->upload(left, right);
     if (!under_way.empty()) context.let_wait(ocl::Queue::kKernels, under_way.back().transfer->scratch_fetched());
-    const FrameResults results = run_stages(uploaded, motion, reason);
+    const FrameResults results = run_stages(uploaded, motion, reason, outputs.dynamic.data);
     frame.transfer->download(results, outputs);
 
     drain.is_dismissed = true;
@@ -261,7 +267,7 @@ struct Pipeline::Impl {
     ocl::Drain drain{context};
     release_results();
     const char* reason = full_range_reason(motion);
-    const FrameResults results = run_stages(images, motion, reason);
+    const FrameResults results = run_stages(images, motion, reason, options.dynamic_map.enabled);
     const cl::Event end = done ? context.end_of_recorded() : cl::Event();
 
     drain.is_dismissed = true;
@@ -274,7 +280,8 @@ struct Pipeline::Impl {
     return {.disparity = results.result->disparity.get()(),
             .variance = results.result->variance.get()(),
             .full_range = is_full_range(reason),
-            .full_range_reason = reason_text(reason)};
+            .full_range_reason = reason_text(reason),
+            .dynamic = results.dynamic ? results.dynamic->get()() : nullptr};
   }
 
   FrameReport collect() {

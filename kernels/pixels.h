@@ -57,6 +57,25 @@ static inline void store_pixels(const Floats pixels, global float* row, const in
 #endif
 }
 
+typedef struct __attribute__((packed)) {
+  uchar16 lanes;
+} PackedBytes;
+
+// The same of bytes. REQUIRES: values from 0 to 255; x lies in the row.
+static inline void store_bytes(const Ints values, global uchar* row, const int x, const int width) {
+#if PIXELS == 1
+  row[x] = (uchar)values;
+#else
+  if (x + PIXELS <= width) {
+    ((global PackedBytes*)(row + x))->lanes = convert_uchar16(values);
+    return;
+  }
+  int lanes[PIXELS];
+  vstore16(values, 0, lanes);
+  for (int i = 0; i < width - x; ++i) row[x + i] = (uchar)lanes[i];
+#endif
+}
+
 // Pixels that are dropped lose their variance. In place: a block without any costs no more than a load and a store.
 static inline void clear_dropped(const Ints dropped, global float* variances, const int x, const int width) {
   store_pixels(dropped ? (Floats)(0.0f) : load_pixels(variances, x, width), variances, x, width);

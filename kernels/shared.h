@@ -55,6 +55,11 @@ typedef float f32;
 // EdgeVariance looks this many pixels to all sides.
 #define EGOSGM_EDGE_RADIUS 4
 
+// DynamicMap looks this many pixels to all sides, and believes this many of the window that have a prediction and a
+// measurement: a third of it.
+#define EGOSGM_DYNAMIC_RADIUS 4
+#define EGOSGM_DYNAMIC_MIN_COUNT 27
+
 // The variance of a hole that MedianFilter fills.
 #define EGOSGM_FILLED_VARIANCE_PX2 1.0f
 

@@ -13,10 +13,6 @@
 // lint: PIXEL_BYTES=2 PIXELS=1
 // lint: PIXEL_BYTES=2 PIXELS=16
 
-typedef struct __attribute__((packed)) {
-  uchar16 lanes;
-} PackedBytes;
-
 // Grey values of pixels x .. x + PIXELS - 1; outside the row its border's.
 static inline Ints grey_at(global const Pixel* row, const int x, const int width) {
 #if PIXELS == 1
@@ -26,20 +22,6 @@ static inline Ints grey_at(global const Pixel* row, const int x, const int width
   int lanes[PIXELS];
   for (int i = 0; i < PIXELS; ++i) lanes[i] = to_8_bit(row[clamp(x + i, 0, width - 1)]);
   return vload16(0, lanes);
-#endif
-}
-
-static inline void store_bytes(const Ints values, global uchar* row, const int x, const int width) {
-#if PIXELS == 1
-  row[x] = (uchar)values;
-#else
-  if (x + PIXELS <= width) {
-    ((global PackedBytes*)(row + x))->lanes = convert_uchar16(values);
-    return;
-  }
-  int lanes[PIXELS];
-  vstore16(values, 0, lanes);
-  for (int i = 0; i < width - x; ++i) row[x + i] = (uchar)lanes[i];
 #endif
 }
 

@@ -55,9 +55,10 @@ class OwnQueue {
     }
     return pixels;
   }
-  std::vector<float> view_of(cl_mem maps, int view) const {
-    std::vector<float> values(static_cast<std::size_t>(ShortVideo::kSize.width) * ShortVideo::kSize.height);
-    const std::size_t bytes = values.size() * sizeof(float);
+  template <typename T = float>
+  std::vector<T> view_of(cl_mem maps, int view) const {
+    std::vector<T> values(static_cast<std::size_t>(ShortVideo::kSize.width) * ShortVideo::kSize.height);
+    const std::size_t bytes = values.size() * sizeof(T);
     clEnqueueReadBuffer(queue_, maps, CL_TRUE, view * bytes, bytes, values.data(), 0, nullptr, nullptr);
     return values;
   }
@@ -71,9 +72,11 @@ cl_command_queue_properties queue_properties(const Device& device) {
   return device.handle().device.getInfo<CL_DEVICE_QUEUE_PROPERTIES>();
 }
 
-DevicePipeline pipeline_on(const OwnQueue& queue) {
+DevicePipeline pipeline_on(const OwnQueue& queue, bool wants_dynamic = true) {
   const Scene scene(ShortVideo::kSize);
-  return {queue.get(), scene.calibration(), ShortVideo::kSize.width, ShortVideo::kSize.height, ShortVideo::options()};
+  PipelineOptions options = ShortVideo::options();
+  options.dynamic_map.enabled = wants_dynamic;
+  return {queue.get(), scene.calibration(), ShortVideo::kSize.width, ShortVideo::kSize.height, options};
 }
 
 /// A short video's frames in the memory of a queue, a pipeline on it, and what the host's way gives.
@@ -105,6 +108,9 @@ struct VideoOnDevice {
     EXPECT_TRUE(same(maps.disparity, EGOSGM_RIGHT, expected[index].right_disparity)) << index;
     EXPECT_TRUE(same(maps.variance, EGOSGM_LEFT, expected[index].variance)) << index;
     EXPECT_TRUE(same(maps.variance, EGOSGM_RIGHT, expected[index].right_variance)) << index;
+    EXPECT_TRUE(testing::same_bits(queue.view_of<std::uint8_t>(maps.dynamic, EGOSGM_LEFT),
+                                   expected[index].dynamic.values(), ShortVideo::kSize))
+        << index;
   }
 };
 
@@ -204,6 +210,20 @@ TEST_F(DevicePipelineTest, GoesOnAfterAFrameThatFailed) {
     const DeviceMaps maps = frames.enqueue(index);
     EXPECT_EQ(maps.full_range_reason, index == 0 ? "reset" : "");
     frames.expect_same(maps, index);
+  }
+}
+
+TEST_F(DevicePipelineTest, ADynamicMapThatIsNotAskedForCostsNothing) {
+  VideoOnDevice frames;
+  DevicePipeline without = pipeline_on(frames.queue, /*wants_dynamic=*/false);
+  for (int index = 0; index < ShortVideo::kFrames; ++index) {
+    layer_.disarm();  // counts from here
+    EXPECT_NE(frames.enqueue(index).dynamic, nullptr);
+    const int enqueues = layer_.enqueues();
+    layer_.disarm();
+    const DeviceMaps maps = without.enqueue({frames.pixels[index], frames.video.type()}, frames.video.motion(index));
+    EXPECT_EQ(maps.dynamic, nullptr);
+    EXPECT_EQ(layer_.enqueues(), enqueues - (index == 0 ? 1 : 2)) << index;  // cleared, or two kernels
   }
 }
 

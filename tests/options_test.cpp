@@ -77,6 +77,7 @@ TEST(Options, HasANameForEveryMember) {
       {"kalman_update.keep_predicted", [](auto& o) { o.kalman_update.keep_predicted = false; }},
       {"kalman_update.min_variance_px2", [](auto& o) { o.kalman_update.min_variance_px2 = 77; }},
       {"edge_variance.weight", [](auto& o) { o.edge_variance.weight = 77; }},
+      {"dynamic_map.enabled", [](auto& o) { o.dynamic_map.enabled = true; }},
       {"dynamic_map.min_difference_px", [](auto& o) { o.dynamic_map.min_difference_px = 77; }},
   };
   const auto defaults = texts({});

@@ -26,13 +26,14 @@ struct DeviceImages {
 };
 
 /// What a frame gives, in the pipeline's own buffers: floats, the left view's height x width, then the right view's.
-/// Disparity [px], kInvalidDisparity where there is none; variance [px^2]. Retain neither: they are read by commands of
+/// Disparity [px], kInvalidDisparity where there is none; variance [px^2]. Retain none: they are read by commands of
 /// the same queue (or that wait for `done` of `enqueue`), which are enqueued before the next frame is.
 struct DeviceMaps {
   cl_mem disparity = nullptr;
   cl_mem variance = nullptr;
   bool full_range = false;  // as in FrameReport
   std::string full_range_reason;
+  cl_mem dynamic = nullptr;  // bytes, the left view's, as in FrameOutputs; null unless options.dynamic_map.enabled
 };
 
 /// A Pipeline whose kernels run on the caller's queue, between the caller's own commands, on images that are there

@@ -93,6 +93,7 @@ struct EdgeVarianceOptions {
   float weight = 0.01f;  // of the squared range of disparities in a 9x9 window: the least variance; 0: off
 };
 struct DynamicMapOptions {
+  bool enabled = false;            // of every frame, for DeviceMaps::dynamic; FrameOutputs::dynamic needs no option
   float min_difference_px = 1.0f;  // of prediction and measurement, to contradict each other; changes no disparity
 };
 

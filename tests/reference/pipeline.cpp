@@ -5,6 +5,7 @@
 #include "tests/reference/census.h"
 #include "tests/reference/coarse_match.h"
 #include "tests/reference/consistency_check.h"
+#include "tests/reference/dynamic_map.h"
 #include "tests/reference/edge_rejection.h"
 #include "tests/reference/edge_variance.h"
 #include "tests/reference/forward_warp.h"
@@ -46,6 +47,11 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
 
   frame.result = edge_variance(size_, options_.edge_variance.weight,
                                has_prediction ? frame.updated : frame.passes.back().measured);
+  frame.dynamic.assign(static_cast<std::size_t>(size_.width) * size_.height, 0);
+  if (has_prediction) {
+    frame.dynamic =
+        dynamic_map(size_, options_.dynamic_map.min_difference_px, frame.predicted, frame.passes.back().measured);
+  }
   if (has_prediction && options_.search == SearchMode::kFull) frame.full_range_reason = "search is full";
   offset_ = frame.passes.back().offset;
   has_offset_ = true;

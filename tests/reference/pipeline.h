@@ -43,6 +43,7 @@ struct Frame {
   std::vector<Pass> passes;  // two where nothing was known of the vertical offset
   testing::HostMaps fused, fused_smoothed, fused_consistent, updated;
   testing::HostMaps result;
+  std::vector<std::uint8_t> dynamic;
   float vertical_offset_px = 0;  // that the last pass was resampled by
 };
 

@@ -7,6 +7,7 @@
 #include "host/census.h"
 #include "host/coarse_match.h"
 #include "host/consistency_check.h"
+#include "host/dynamic_map.h"
 #include "host/edge_rejection.h"
 #include "host/edge_variance.h"
 #include "host/forward_warp.h"
@@ -50,6 +51,7 @@ class StageChain {
         speckle_removal_(context_, size, options.speckle_removal),
         kalman_update_(context_, size, options.kalman_update),
         edge_variance_(context_, size, options.edge_variance),
+        dynamic_map_(context_, size, options.dynamic_map),
         sad_check_(context_, size, type, options.sad_check),
         transfer_(context_, size, range_of(options)),
         codes_(context_, Census::words(options.banded_sgm.cost, size, code_padding())),
@@ -70,6 +72,7 @@ class StageChain {
     StereoMaps& result = has_prediction ? updated_ : measured_;
     edge_variance_(result, scratch_);
     frame.result = download(context_, result);
+    frame.dynamic = dynamic_map_(has_prediction ? &predicted_ : nullptr, measured_, scratch_).read(context_);
     std::swap(belief_, result);
     has_belief_ = true;
     return frame;
@@ -158,6 +161,7 @@ class StageChain {
   SpeckleRemoval speckle_removal_;
   KalmanUpdate kalman_update_;
   EdgeVariance edge_variance_;
+  DynamicMap dynamic_map_;
   SadCheck sad_check_;
   FrameTransfer transfer_;
   ocl::Buffer<cl_uint> codes_;
