@@ -1,13 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Looks at a sequence while it is matched: in a window, as a video, as pictures.
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <cstdlib>
 #include <filesystem>
 #include <opencv2/highgui.hpp>
 #include <opencv2/imgproc.hpp>
@@ -25,6 +19,7 @@
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/window.h"
 
 namespace egosgm::app {
 namespace {
@@ -207,38 +202,16 @@ class Window {
   std::size_t at_ = 0;
 };
 
-/// In a process of its own, since the windowing libraries end theirs where the display cannot be reached. REQUIRES: one
-/// thread.
-bool window_can_be_opened() {
-  const pid_t child = fork();
-  if (child < 0) return true;  // let it be tried
-  if (child == 0) {
-    const rlimit no_core{0, 0};
-    setrlimit(RLIMIT_CORE, &no_core);
-    const int nowhere = open("/dev/null", O_WRONLY);
-    for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) dup2(nowhere, stream);
-    try {
-      cv::namedWindow("egosgm");
-      cv::destroyAllWindows();
-    } catch (const cv::Exception&) {
-      _exit(1);
-    }
-    _exit(0);
-  }
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-}
-
 void require_display() {
   constexpr const char* kRemedy = "give --video FILE.mp4 or --pictures DIR";
-  for (const char* name : {"DISPLAY", "WAYLAND_DISPLAY"}) {
-    const char* value = std::getenv(name);
-    if (!value || !*value) continue;
-    if (window_can_be_opened()) return;
-    throw InvalidArgument(
-        fmt::format("no window can be opened on the display {} ({}): correct it, or {}", value, name, kRemedy));
+  const auto open_window = [] {
+    cv::namedWindow("egosgm");
+    cv::destroyAllWindows();
+  };
+  try {
+    if (vision::has_display(open_window)) return;
+  } catch (const InvalidArgument& error) {
+    throw InvalidArgument(fmt::format("{}, or {}", error.what(), kRemedy));
   }
   throw InvalidArgument(fmt::format("there is no display (DISPLAY is not set): {}", kRemedy));
 }

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 #include <mutex>
 #include <opencv2/highgui.hpp>
@@ -23,10 +22,12 @@
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/odometry.h"
 #include "egosgm/vision/render.h"
+#include "egosgm/vision/window.h"
 
 namespace {
 
 using Clock = std::chrono::steady_clock;
+constexpr const char* kWindow = "EgoSGM: q quits";
 
 /// Reads in a thread of its own, as fast as frames come, and keeps only the newest.
 class NewestFrame {
@@ -103,13 +104,13 @@ bool show(cv::Mat picture, const std::string& text, bool display) {
   std::printf("%s\n", text.c_str());
   if (!display) return true;
   cv::putText(picture, text, {8, 24}, cv::FONT_HERSHEY_SIMPLEX, 0.6, {255, 255, 255}, 1, cv::LINE_AA);
-  cv::imshow("EgoSGM: q quits", picture);
+  cv::imshow(kWindow, picture);
   return cv::waitKey(1) != 'q';
 }
 
 void run(const std::string& source, const egosgm::Calibration& calibration, const egosgm::PipelineOptions& options) {
   using namespace egosgm;
-  const bool display = std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY");
+  const bool display = vision::has_display([] { cv::namedWindow(kWindow); });
   NewestFrame newest(source);
   std::optional<Pipeline> pipeline;
   std::optional<vision::StereoOdometry> odometry;

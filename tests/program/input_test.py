@@ -437,9 +437,10 @@ class Camera(InputTest):
         file.write_bytes(f"YUV4MPEG2 W{2 * WIDTH} H{HEIGHT} F{rate}:1 Ip A1:1 Cmono\n".encode() + b"".join(pictures * repeat))
         return file
 
-    def run_camera(self, *arguments):
+    def run_camera(self, *arguments, **display):
         headless = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-        return subprocess.run([EXAMPLES / "egosgm_example_camera", *map(str, arguments)], capture_output=True, text=True, timeout=600, env=headless)
+        return subprocess.run([EXAMPLES / "egosgm_example_camera", *map(str, arguments)], capture_output=True, text=True, timeout=600,
+                              env={**headless, **display})
 
     def test_frames_are_dropped_rather_than_late(self):
         frames = 25 * FRAMES
@@ -468,6 +469,11 @@ class Camera(InputTest):
             done = self.run_camera(*arguments)
             self.assertNotEqual(done.returncode, 0, arguments)
             self.assertTrue(done.stderr)
+
+    def test_a_display_that_cannot_be_reached_is_named(self):
+        done = self.run_camera(self.video(1, frames=1), self.street / "calib.txt", DISPLAY=":77777")
+        self.assertEqual((done.returncode, done.stderr),
+                         (1, "camera: no window can be opened on the display :77777 (DISPLAY): correct or unset it\n"))
 
 
 @unittest.skipUnless(DATA and pathlib.Path(DATA).is_dir(), "no real data")
