@@ -220,8 +220,8 @@ int view(const ViewArguments& arguments) {
   if (!(arguments.frames_per_second > 0 && arguments.frames_per_second <= 1000))
     throw InvalidArgument(fmt::format("--fps {}: choose a number above 0, up to 1000", arguments.frames_per_second));
   const bool window = arguments.video.empty() && arguments.pictures.empty();
-  if (window) require_display();
   catch_interrupts();
+  if (window) require_display();
   DrawnSequence drawn(arguments);
   return window ? Window(drawn, arguments)() : write_files(drawn, arguments);
 }
