@@ -13,7 +13,6 @@
 #include "host/consistency_check.h"
 #include "host/dynamic_map.h"
 #include "host/edge_rejection.h"
-#include "host/edge_variance.h"
 #include "host/forward_warp.h"
 #include "host/frame_transfer.h"
 #include "host/hole_fill.h"
@@ -21,6 +20,7 @@
 #include "host/median_filter.h"
 #include "host/ocl/device_handle.h"
 #include "host/ocl/errors.h"
+#include "host/output_variance.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -88,7 +88,8 @@ class Chain {
         speckle_removal_(context, size_, {}),
         sad_check_(context, size_, PixelType::kU8, {.max_difference = 20.0f}),
         kalman_update_(context, size_, {}),
-        edge_variance_(context, size_, {}),
+        output_variance_(context, size_, {}),
+        variance_(context, 2 * pixel_count(size_)),
         dynamic_map_(context, size_, {}) {
     images_.pixels.write(context, street.images);
     belief_.disparity.write(context, street.disparity);
@@ -126,8 +127,8 @@ class Chain {
         {"MedianFilter", [this] { median_filter_(matched_, Holes::kLeave); }, 2 * map},
         {"SpeckleRemoval", [this] { speckle_removal_(matched_); }, map},
         {"KalmanUpdate", [this] { kalman_update_(predicted_, matched_, updated_); }, 3 * maps},
-        {"EdgeVariance", [this] { edge_variance_(updated_, warped_); }, 8 * map},
         {"DynamicMap", [this] { dynamic_map_(&predicted_, matched_, warped_); }, 4 * map + grey / 2},
+        {"OutputVariance", [this] { output_variance_(updated_, 2, warped_, variance_); }, 9 * map},
         {"SadCheck", [this] { sad_check_(images_.pixels, updated_, checked_); }, grey + 2 * maps},
     };
   }
@@ -173,7 +174,8 @@ class Chain {
   SpeckleRemoval speckle_removal_;
   SadCheck sad_check_;
   KalmanUpdate kalman_update_;
-  EdgeVariance edge_variance_;
+  OutputVariance output_variance_;
+  ocl::Buffer<float> variance_;
   DynamicMap dynamic_map_;
 };
 

@@ -107,6 +107,7 @@ FrameTransfer::FrameTransfer(ocl::Context& context, shared::ImageSize size, shar
       size_(size),
       range_(range),
       images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(size)), PixelType::kU8},
+      output_variance_(context, 2 * pixel_count(size)),
       upload_(context, images_.pixels),
       disparity_(context, pixel_count(size)),
       variance_(context, pixel_count(size)),
@@ -185,9 +186,9 @@ void FrameTransfer::download(const FrameResults& results, const FrameOutputs& ou
   fetch(*results.vertical_offset_px, 1, vertical_offset_px_);
 
   disparity_.fetch(results.result->disparity, 0, pixel_count(size_));  // always: the report counts its valid pixels
-  fetch_view(results.result->variance, EGOSGM_LEFT, outputs.variance, variance_);
+  fetch_view(*results.variance, EGOSGM_LEFT, outputs.variance, variance_);
   fetch_view(results.result->disparity, EGOSGM_RIGHT, outputs.right_disparity, right_disparity_);
-  fetch_view(results.result->variance, EGOSGM_RIGHT, outputs.right_variance, right_variance_);
+  fetch_view(*results.variance, EGOSGM_RIGHT, outputs.right_variance, right_variance_);
 }
 
 void FrameTransfer::collect(FrameReport& report) const {

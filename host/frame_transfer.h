@@ -13,9 +13,10 @@ namespace egosgm {
 
 /// What the stages of a frame leave on the device.
 struct FrameResults {
-  const StereoMaps* result;     // no later frame writes it before this one is collected
-  const StereoMaps* predicted;  // null where there is no prediction. From here on, the next frame writes them:
-  const StereoMaps* measured;   // (or they are the result)
+  const StereoMaps* result;            // no later frame writes it before this one is collected,
+  const ocl::Buffer<float>* variance;  // nor this, which is given out in place of the result's
+  const StereoMaps* predicted;         // null where there is no prediction. From here on, the next frame writes them:
+  const StereoMaps* measured;          // (or they are the result)
   const SearchBand* band;
   const ocl::Buffer<float>* vertical_offset_px;
   const ocl::Buffer<cl_uchar>* dynamic;  // null where it was not asked for
@@ -35,6 +36,9 @@ class FrameTransfer {
   /// Copies the images, enqueues their way to the device, and lets what is enqueued for it from now on wait for them.
   /// REQUIRES: what `validate` asks; no frame of this transfer is under way.
   const FrameImages& upload(const ImageView& left, const ImageView& right);
+
+  /// A place for the variance that is given out, of both views; this transfer's until it is released.
+  ocl::Buffer<float>& output_variance() { return output_variance_; }
 
   /// Enqueues the way back, behind all that was enqueued for the device.
   void download(const FrameResults& results, const FrameOutputs& outputs);
@@ -62,6 +66,7 @@ class FrameTransfer {
   const shared::ImageSize size_;
   const shared::DisparityRange range_;
   FrameImages images_;
+  ocl::Buffer<float> output_variance_;
   ocl::Upload upload_;
   MapReadback disparity_, variance_, right_disparity_, right_variance_;
   Scratch predicted_, predicted_variance_, measured_, measured_variance_, vertical_offset_px_;

@@ -57,8 +57,10 @@ void for_each(Options& o, Visit&& visit) {
   visit("kalman_update.gate_px", o.kalman_update.gate_px);
   visit("kalman_update.keep_predicted", o.kalman_update.keep_predicted);
   visit("kalman_update.min_variance_px2", o.kalman_update.min_variance_px2);
-  visit("edge_variance.weight", o.edge_variance.weight);
   visit("dynamic_map.enabled", o.dynamic_map.enabled);
+  visit("output_variance.enabled", o.output_variance.enabled);
+  visit("output_variance.scale", o.output_variance.scale);
+  visit("output_variance.roughness_weight", o.output_variance.roughness_weight);
   visit("dynamic_map.min_difference_px", o.dynamic_map.min_difference_px);
 }
 
@@ -158,7 +160,7 @@ PipelineOptions PipelineOptions::paper() {
   options.search_band.from_neighbours = false;
   options.coarse_match.enabled = false;
   options.kalman_update.gate_px = 0.0f;
-  options.edge_variance.weight = 0.0f;
+  options.output_variance.enabled = false;
   return options;
 }
 

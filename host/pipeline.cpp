@@ -17,7 +17,6 @@
 #include "host/consistency_check.h"
 #include "host/dynamic_map.h"
 #include "host/edge_rejection.h"
-#include "host/edge_variance.h"
 #include "host/forward_warp.h"
 #include "host/frame_transfer.h"
 #include "host/hole_fill.h"
@@ -26,6 +25,7 @@
 #include "host/ocl/device_handle.h"
 #include "host/ocl/errors.h"
 #include "host/ocl/svm.h"
+#include "host/output_variance.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -68,6 +68,13 @@ struct Memory {
   VerticalAlignment::State alignment = 0;
 };
 
+/// What a frame makes that no later frame rests on.
+struct Wanted {
+  int variance_views;            // that need the variance which is given out, the left one first
+  ocl::Buffer<float>* variance;  // its place
+  bool dynamic;
+};
+
 struct FrameUnderWay {
   FrameTransfer* transfer;
   Memory before;  // to go back to if it fails
@@ -98,7 +105,7 @@ struct Pipeline::Impl {
   MedianFilter median_filter;
   SpeckleRemoval speckle_removal;
   KalmanUpdate kalman_update;
-  EdgeVariance edge_variance;
+  OutputVariance output_variance;
   DynamicMap dynamic_map;
   std::array<FrameTransfer, kMaxUnderWay> transfers;
 
@@ -133,7 +140,7 @@ struct Pipeline::Impl {
         median_filter(context, size, options.median_filter),
         speckle_removal(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
         kalman_update(context, size, options.kalman_update),
-        edge_variance(context, size, options.edge_variance),
+        output_variance(context, size, options.output_variance),
         dynamic_map(context, size, options.dynamic_map),
         transfers{{{context, size, range_of(options)}, {context, size, range_of(options)}}},
         codes(context, Census::words(options.banded_sgm.cost, size, BandedSgm::code_padding(range_of(options)))),
@@ -200,15 +207,17 @@ struct Pipeline::Impl {
 
   /// All that happens on the device. `reason`: see `full_range_reason`.
   FrameResults run_stages(const FrameImages& uploaded, const std::optional<Motion>& motion, const char* reason,
-                          bool wants_dynamic) {
+                          const Wanted& wanted) {
     if (!reason) predict(*motion);
     const FrameImages& images = match(uploaded, reason);
     if (!reason) update(images);
-    StereoMaps* result = reason ? measured : updated;
-    edge_variance(*result, scratch);
+    const StereoMaps* result = reason ? measured : updated;
     const StereoMaps* prediction = reason ? nullptr : &predicted;
-    const auto* dynamic = wants_dynamic ? &dynamic_map(prediction, *measured, scratch) : nullptr;
+    const bool is_output_variance = options.output_variance.enabled && wanted.variance_views > 0;
+    if (is_output_variance) output_variance(*result, wanted.variance_views, scratch, *wanted.variance);
+    const auto* dynamic = wanted.dynamic ? &dynamic_map(prediction, *measured, scratch) : nullptr;
     return {.result = result,
+            .variance = is_output_variance ? wanted.variance : &result->variance,
             .predicted = prediction,
             .measured = measured,
             .band = &search_band,
@@ -226,7 +235,9 @@ struct Pipeline::Impl {
     const char* reason = full_range_reason(motion);
     const FrameImages& uploaded = frame.transfer->upload(left, right);
     if (!under_way.empty()) context.let_wait(ocl::Queue::kKernels, under_way.back().transfer->scratch_fetched());
-    const FrameResults results = run_stages(uploaded, motion, reason, outputs.dynamic.data);
+    const int views = outputs.right_variance.data ? 2 : outputs.variance.data ? 1 : 0;
+    const FrameResults results = run_stages(
+        uploaded, motion, reason, {views, &frame.transfer->output_variance(), outputs.dynamic.data != nullptr});
     frame.transfer->download(results, outputs);
 
     drain.is_dismissed = true;
@@ -263,11 +274,12 @@ struct Pipeline::Impl {
 
   DeviceMaps enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done) {
     expect_device_frame_not_failed();
-    begin_frame();
+    FrameTransfer& transfer = begin_frame();
     ocl::Drain drain{context};
     release_results();
     const char* reason = full_range_reason(motion);
-    const FrameResults results = run_stages(images, motion, reason, options.dynamic_map.enabled);
+    const FrameResults results =
+        run_stages(images, motion, reason, {2, &transfer.output_variance(), options.dynamic_map.enabled});
     const cl::Event end = done ? context.end_of_recorded() : cl::Event();
 
     drain.is_dismissed = true;
@@ -278,7 +290,7 @@ struct Pipeline::Impl {
     }
     advance(results);
     return {.disparity = results.result->disparity.get()(),
-            .variance = results.result->variance.get()(),
+            .variance = results.variance->get()(),
             .full_range = is_full_range(reason),
             .full_range_reason = reason_text(reason),
             .dynamic = results.dynamic ? results.dynamic->get()() : nullptr};

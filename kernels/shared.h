@@ -52,8 +52,13 @@ typedef float f32;
 // next frame searches wide around it.
 #define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
 
-// EdgeVariance looks this many pixels to all sides.
-#define EGOSGM_EDGE_RADIUS 4
+// OutputVariance: the filter's variance, each value cut, at every fourth pixel of the surroundings; the sum of two second
+// differences of disparities, each cut, at every pixel nearer by.
+#define EGOSGM_VARIANCE_RADIUS 8
+#define EGOSGM_VARIANCE_STEP 4
+#define EGOSGM_MAX_MEAN_VARIANCE_PX2 4.0f
+#define EGOSGM_ROUGHNESS_RADIUS 3
+#define EGOSGM_MAX_ROUGHNESS_PX 2.0f
 
 // DynamicMap looks this many pixels to all sides, and believes this many of the window that have a prediction and a
 // measurement: a third of it.

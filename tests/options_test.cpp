@@ -76,8 +76,10 @@ TEST(Options, HasANameForEveryMember) {
       {"kalman_update.gate_px", [](auto& o) { o.kalman_update.gate_px = 77; }},
       {"kalman_update.keep_predicted", [](auto& o) { o.kalman_update.keep_predicted = false; }},
       {"kalman_update.min_variance_px2", [](auto& o) { o.kalman_update.min_variance_px2 = 77; }},
-      {"edge_variance.weight", [](auto& o) { o.edge_variance.weight = 77; }},
       {"dynamic_map.enabled", [](auto& o) { o.dynamic_map.enabled = true; }},
+      {"output_variance.enabled", [](auto& o) { o.output_variance.enabled = false; }},
+      {"output_variance.scale", [](auto& o) { o.output_variance.scale = 77; }},
+      {"output_variance.roughness_weight", [](auto& o) { o.output_variance.roughness_weight = 77; }},
       {"dynamic_map.min_difference_px", [](auto& o) { o.dynamic_map.min_difference_px = 77; }},
   };
   const auto defaults = texts({});
@@ -204,7 +206,7 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
   EXPECT_GT(paper.forward_warp.process_noise_px2, 0) << "a constant q,";
   EXPECT_EQ(paper.forward_warp.motion_noise, 0) << "and nothing else";
   EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged";
-  EXPECT_EQ(paper.edge_variance.weight, 0) << "the variance is the filter's";
+  EXPECT_FALSE(paper.output_variance.enabled) << "the variance is the filter's";
   EXPECT_EQ(paper.banded_sgm.p2, PipelineOptions().banded_sgm.p2)
       << "the matcher, which the paper leaves open, is the default's";
   EXPECT_EQ(paper.banded_sgm.paths, 8);

@@ -56,6 +56,7 @@ void expect_same(const reference::Frame& actual, const reference::Frame& expecte
   expect_same("updated", actual.updated, expected.updated, setting.size);
   expect_same("result", actual.result, expected.result, setting.size);
   EXPECT_TRUE(same_bits(actual.dynamic, expected.dynamic, setting.size)) << "dynamic map";
+  EXPECT_TRUE(same_bits(actual.output_variance, expected.output_variance, setting.size)) << "output_variance";
 }
 
 template <typename T>
@@ -68,11 +69,10 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
   const bool has_prediction = !expected.predicted.disparity.empty();
   const HostMaps predicted = has_prediction ? expected.predicted : empty_maps(size);
   const reference::Pass& pass = expected.passes.back();
-  const HostMaps& measured = has_prediction ? pass.measured : expected.result;  // they share memory
-  const std::vector<float> maps[] = {half(expected.result.disparity, 0), half(expected.result.variance, 0),
-                                     half(expected.result.disparity, 1), half(expected.result.variance, 1),
+  const std::vector<float> maps[] = {half(expected.result.disparity, 0), half(expected.output_variance, 0),
+                                     half(expected.result.disparity, 1), half(expected.output_variance, 1),
                                      half(predicted.disparity, 0),       half(predicted.variance, 0),
-                                     half(measured.disparity, 0),        half(measured.variance, 0)};
+                                     half(pass.measured.disparity, 0),   half(pass.measured.variance, 0)};
   const auto actual = outputs.maps();
   for (std::size_t i = 0; i < actual.size(); ++i) {
     EXPECT_TRUE(same_bits(actual[i].second->values(), maps[i], size)) << "output " << actual[i].first;

@@ -43,8 +43,7 @@ struct SearchBandOptions {
   bool from_neighbours = true;     // unpredicted pixels search the range of the predictions around them
   int neighbour_min_count = 8;     // with fewer predictions than this around, the whole range
   float neighbour_margin_px = 4.0f;
-  // A band is widened to reach what CoarseMatch found around the pixel, and a margin more, where that lies beyond it by
-  // more than the tolerance.
+  // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
   float coarse_tolerance_px = 3.0f;
   float coarse_margin_px = 2.0f;
 };
@@ -89,8 +88,10 @@ struct KalmanUpdateOptions {
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   float min_variance_px2 = 0.02f;
 };
-struct EdgeVarianceOptions {
-  float weight = 0.01f;  // of the squared range of disparities in a 9x9 window: the least variance; 0: off
+struct OutputVarianceOptions {
+  bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
+  // Of the filter's variance, averaged, and of the square of how far the disparities around are from a plane's.
+  float scale = 0.48f, roughness_weight = 0.72f;
 };
 struct DynamicMapOptions {
   bool enabled = false;            // of every frame, for DeviceMaps::dynamic; FrameOutputs::dynamic needs no option
@@ -115,12 +116,11 @@ struct EGOSGM_EXPORT PipelineOptions {
   SadCheckOptions sad_check;
   SpeckleRemovalOptions speckle_removal;
   KalmanUpdateOptions kalman_update;
-  EdgeVarianceOptions edge_variance;
+  OutputVarianceOptions output_variance;
   DynamicMapOptions dynamic_map;
 
-  /// Fućek et al. (IFAC 2017) in what the paper says of prediction, search and fusion: constant q, three sigmas without
-  /// a least half-width, unpredicted pixels search everything, no gate. The matcher, which it leaves open, is the
-  /// default's.
+  /// Fućek et al. (IFAC 2017): constant q, three sigmas without a least half-width, unpredicted pixels search
+  /// everything, no gate, the filter's variance. The matcher, which the paper leaves open, is the default's.
   static PipelineOptions paper();
 
   /// Throws InvalidArgument, naming the option, its value and what is allowed.

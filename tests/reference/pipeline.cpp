@@ -7,11 +7,11 @@
 #include "tests/reference/consistency_check.h"
 #include "tests/reference/dynamic_map.h"
 #include "tests/reference/edge_rejection.h"
-#include "tests/reference/edge_variance.h"
 #include "tests/reference/forward_warp.h"
 #include "tests/reference/hole_fill.h"
 #include "tests/reference/kalman_update.h"
 #include "tests/reference/median_filter.h"
+#include "tests/reference/output_variance.h"
 #include "tests/reference/sad_check.h"
 #include "tests/reference/speckle_removal.h"
 #include "tests/reference/step_penalties.h"
@@ -45,13 +45,15 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   }
   if (has_prediction) update(images, frame);
 
-  frame.result = edge_variance(size_, options_.edge_variance.weight,
-                               has_prediction ? frame.updated : frame.passes.back().measured);
   frame.dynamic.assign(static_cast<std::size_t>(size_.width) * size_.height, 0);
   if (has_prediction) {
     frame.dynamic =
         dynamic_map(size_, options_.dynamic_map.min_difference_px, frame.predicted, frame.passes.back().measured);
   }
+  frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
+  frame.output_variance = options_.output_variance.enabled
+                              ? output_variance(size_, options_.output_variance, frame.result)
+                              : frame.result.variance;
   if (has_prediction && options_.search == SearchMode::kFull) frame.full_range_reason = "search is full";
   offset_ = frame.passes.back().offset;
   has_offset_ = true;

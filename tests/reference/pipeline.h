@@ -42,9 +42,10 @@ struct Frame {
   testing::HostMaps warped, without_edges, filled, predicted;
   std::vector<Pass> passes;  // two where nothing was known of the vertical offset
   testing::HostMaps fused, fused_smoothed, fused_consistent, updated;
-  testing::HostMaps result;
+  testing::HostMaps result;  // on which the next frame rests
   std::vector<std::uint8_t> dynamic;
-  float vertical_offset_px = 0;  // that the last pass was resampled by
+  std::vector<float> output_variance;  // given out in place of the result's
+  float vertical_offset_px = 0;        // that the last pass was resampled by
 };
 
 /// The twins of the stages, in the order of host/pipeline.cpp.

@@ -9,12 +9,12 @@
 #include "host/consistency_check.h"
 #include "host/dynamic_map.h"
 #include "host/edge_rejection.h"
-#include "host/edge_variance.h"
 #include "host/forward_warp.h"
 #include "host/frame_transfer.h"
 #include "host/hole_fill.h"
 #include "host/kalman_update.h"
 #include "host/median_filter.h"
+#include "host/output_variance.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -50,7 +50,7 @@ class StageChain {
         median_filter_(context_, size, options.median_filter),
         speckle_removal_(context_, size, options.speckle_removal),
         kalman_update_(context_, size, options.kalman_update),
-        edge_variance_(context_, size, options.edge_variance),
+        output_variance_(context_, size, options.output_variance),
         dynamic_map_(context_, size, options.dynamic_map),
         sad_check_(context_, size, type, options.sad_check),
         transfer_(context_, size, range_of(options)),
@@ -70,9 +70,11 @@ class StageChain {
     ++frames_;
     if (has_prediction) update(frame);
     StereoMaps& result = has_prediction ? updated_ : measured_;
-    edge_variance_(result, scratch_);
     frame.result = download(context_, result);
     frame.dynamic = dynamic_map_(has_prediction ? &predicted_ : nullptr, measured_, scratch_).read(context_);
+    output_variance_(result, 2, scratch_, transfer_.output_variance());
+    frame.output_variance =
+        options_.output_variance.enabled ? transfer_.output_variance().read(context_) : frame.result.variance;
     std::swap(belief_, result);
     has_belief_ = true;
     return frame;
@@ -160,7 +162,7 @@ class StageChain {
   MedianFilter median_filter_;
   SpeckleRemoval speckle_removal_;
   KalmanUpdate kalman_update_;
-  EdgeVariance edge_variance_;
+  OutputVariance output_variance_;
   DynamicMap dynamic_map_;
   SadCheck sad_check_;
   FrameTransfer transfer_;

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/output_variance.h"
+
+namespace egosgm {
+namespace {
+
+const cl::Program& build(ocl::Context& context, int pixels) {
+  context.enter("OutputVariance");
+  return context.program("output_variance.cl", ocl::Defines().set("PIXELS", pixels));
+}
+
+}  // namespace
+
+OutputVariance::OutputVariance(ocl::Context& context, shared::ImageSize size, const OutputVarianceOptions& options,
+                               int pixels)
+    : context_((context.enter("OutputVariance"), context)),
+      size_(size),
+      options_(options),
+      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
+      mean_roughness_(context, 2 * pixel_count(size)),
+      second_differences_(build(context, pixels_), "second_differences"),
+      row_means_(build(context, pixels_), "row_means"),
+      combine_(build(context, pixels_), "combine") {}
+
+void OutputVariance::operator()(const StereoMaps& maps, int views, StereoMaps& scratch, ocl::Buffer<float>& variance) {
+  context_.enter("OutputVariance");
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, views);
+  second_differences_(context_, pixels, size_, maps.disparity, scratch.disparity);
+  row_means_(context_, pixels, size_, maps.variance, scratch.disparity, scratch.variance, mean_roughness_);
+  combine_(context_, pixels, size_, options_.scale, options_.roughness_weight, maps.disparity, scratch.variance,
+           mean_roughness_, variance);
+}
+
+}  // namespace egosgm

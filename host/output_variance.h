@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// The variance that is given out, of a disparity that may lie on a wrong surface too, from the filter's, which is that
+/// of a pixel on the right one: scale * (mean of the filter's over 17x17 pixels) + roughness_weight * (mean over 7x7
+/// pixels of how far the disparity is from a plane's)^2.
+class OutputVariance {
+ public:
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  OutputVariance(ocl::Context& context, shared::ImageSize size, const OutputVarianceOptions& options, int pixels = 0);
+
+  /// Writes `variance` [px^2], 0 where there is no disparity, of the left view or of both. The disparities of `scratch`
+  /// and its variances are overwritten.
+  void operator()(const StereoMaps& maps, int views, StereoMaps& scratch, ocl::Buffer<float>& variance);
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const OutputVarianceOptions options_;
+  const int pixels_;
+  ocl::Buffer<float> mean_roughness_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, ocl::Buffer<float>> second_differences_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>,
+              ocl::Buffer<float>>
+      row_means_;
+  ocl::Kernel<const shared::ImageSize, const float, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              const ocl::Buffer<float>, ocl::Buffer<float>>
+      combine_;
+};
+
+}  // namespace egosgm

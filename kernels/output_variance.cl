@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// The variance that is given out: the filter's, averaged over the surroundings of a pixel, and how rough the
+// disparities around it are. Most surfaces are planes, whose disparities have no second difference; where those around
+// a pixel have, or where there are holes, it is likely to be wrong.
+#include "pixels.h"
+
+// lint: PIXELS=1
+// lint: PIXELS=16
+
+static inline Floats cut(const Floats value, const float most) { return value < most ? value : (Floats)(most); }
+
+// What lies outside of the image is negative.
+static inline Floats counted(const Floats value) { return value >= 0.0f ? (Floats)(1.0f) : (Floats)(0.0f); }
+static inline Floats if_inside(const Floats value) { return value >= 0.0f ? value : (Floats)(0.0f); }
+
+// |before - 2 at + after|; beside a hole as much as can be.
+static inline Floats second_difference(const Floats before, const Floats at, const Floats after) {
+  const Ints valid = (before > INVALID) & (at > INVALID) & (after > INVALID);
+  return valid ? cut(fabs((before + after) - 2.0f * at), EGOSGM_MAX_ROUGHNESS_PX) : (Floats)(EGOSGM_MAX_ROUGHNESS_PX);
+}
+
+// Sum of the horizontal and the vertical one. A pixel at the image's edge is its own neighbour.
+kernel void second_differences(const ImageSize size, global const float* disparity, global float* roughness) {
+  const int y = get_global_id(1);
+  const int width = size.width;
+  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  global const float* above = disparity + (y > 0 ? row - width : row);
+  global const float* below = disparity + (y + 1 < size.height ? row + width : row);
+  FOR_PIXELS(x, width) {
+    const Ints at = x + LANE_INDICES;
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats left = at > 0 ? load_pixels(disparity + row, x - 1, width) : d;
+    const Floats right = at < width - 1 ? load_pixels(disparity + row, x + 1, width) : d;
+    const Floats across = second_difference(left, d, right);
+    const Floats down = second_difference(load_pixels(above, x, width), d, load_pixels(below, x, width));
+    store_pixels(across + down, roughness + row, x, width);
+  }
+}
+
+// Means along the row: of the variances, each cut, at every fourth pixel; of the roughness at every pixel.
+kernel void row_means(const ImageSize size, global const float* variance, global const float* roughness,
+                      global float* mean_variance, global float* mean_roughness) {
+  const int width = size.width;
+  const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
+  FOR_PIXELS(x, width) {
+    Floats sum = 0.0f;
+    Floats count = 0.0f;
+    for (int u = -EGOSGM_VARIANCE_RADIUS; u <= EGOSGM_VARIANCE_RADIUS; u += EGOSGM_VARIANCE_STEP) {
+      const Floats p = load_pixels(variance + row, x + u, width);
+      sum += cut(if_inside(p), EGOSGM_MAX_MEAN_VARIANCE_PX2);
+      count += counted(p);
+    }
+    store_pixels(sum / count, mean_variance + row, x, width);
+
+    sum = 0.0f;
+    count = 0.0f;
+    for (int u = -EGOSGM_ROUGHNESS_RADIUS; u <= EGOSGM_ROUGHNESS_RADIUS; ++u) {
+      const Floats r = load_pixels(roughness + row, x + u, width);
+      sum += if_inside(r);
+      count += counted(r);
+    }
+    store_pixels(sum / count, mean_roughness + row, x, width);
+  }
+}
+
+// Mean of every step-th row within the radius, as far as the image reaches.
+static inline Floats column_mean(global const float* view, const ImageSize size, const int x, const int y,
+                                 const int radius, const int step) {
+  Floats sum = 0.0f;
+  float count = 0.0f;
+  for (int v = y - radius; v <= y + radius; v += step) {
+    if (v < 0 || v >= size.height) continue;
+    sum += load_pixels(view + (size_t)v * size.width, x, size.width);
+    count += 1.0f;
+  }
+  return sum / count;
+}
+
+kernel void combine(const ImageSize size, const float scale, const float roughness_weight,
+                    global const float* disparity, global const float* mean_variance,
+                    global const float* mean_roughness, global float* variance) {
+  const int y = get_global_id(1);
+  const int width = size.width;
+  const size_t view = (size_t)get_global_id(2) * size.height * width;
+  const size_t row = view + (size_t)y * width;
+  FOR_PIXELS(x, width) {
+    const Floats p = column_mean(mean_variance + view, size, x, y, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP);
+    const Floats r = column_mean(mean_roughness + view, size, x, y, EGOSGM_ROUGHNESS_RADIUS, 1);
+    const Ints valid = load_pixels(disparity + row, x, width) > INVALID;
+    store_pixels(valid ? scale * p + roughness_weight * (r * r) : (Floats)(0.0f), variance + row, x, width);
+  }
+}

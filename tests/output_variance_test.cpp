@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/output_variance.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/reference/output_variance.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+constexpr float kUntouched = -77;
+
+std::vector<float> output_variance(shared::ImageSize size, const testing::HostMaps& in,
+                                   const OutputVarianceOptions& options, int pixels = 0, int views = 2) {
+  ocl::Context context(testing::any_device());
+  OutputVariance stage(context, size, options, pixels);
+  const StereoMaps maps = testing::upload(context, size, in);
+  StereoMaps scratch = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));
+  ocl::Buffer<float> variance(context, in.variance.size());
+  variance.write(context, std::vector<float>(in.variance.size(), kUntouched));
+  stage(maps, views, scratch, variance);
+  const testing::HostMaps after = testing::download(context, maps);
+  EXPECT_EQ(after.disparity, in.disparity);
+  EXPECT_EQ(after.variance, in.variance);
+  return variance.read(context);
+}
+
+class OutputVarianceTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(OutputVarianceTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const double holes : {0.0, 0.3, 0.98}) {
+    const testing::HostMaps maps = testing::random_maps(size, -40, 90, holes, 7);
+    const std::vector<float> expected = reference::output_variance(size, {}, maps);
+    for (const int pixels : {1, 16}) {
+      EXPECT_TRUE(testing::same_bits(output_variance(size, maps, {}, pixels), expected, size))
+          << holes << " holes, by " << pixels;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, OutputVarianceTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+/// Both views alike.
+template <typename Disparity, typename Variance>
+testing::HostMaps maps_of(shared::ImageSize size, Disparity&& disparity, Variance&& variance) {
+  testing::HostMaps maps;
+  for (int view = 0; view < 2; ++view) {
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        maps.disparity.push_back(disparity(x, y));
+        maps.variance.push_back(variance(x, y));
+      }
+    }
+  }
+  return maps;
+}
+
+TEST(OutputVariance, IsTheFiltersOnAPlane) {
+  const shared::ImageSize size{37, 21};
+  const auto slanted = [](int x, int y) { return 20 + 0.25f * static_cast<float>(x) - 0.5f * static_cast<float>(y); };
+  const testing::HostMaps maps = maps_of(size, slanted, [](int, int) { return 0.25f; });
+  const std::vector<float> out = output_variance(size, maps, {.scale = 0.5f, .roughness_weight = 100});
+  for (int y = 4; y < size.height - 4; ++y) {  // at the image's edge a slant is no plane: the outside repeats it
+    for (int x = 4; x < size.width - 4; ++x) ASSERT_EQ(out[y * size.width + x], 0.125f) << x << ", " << y;
+  }
+}
+
+TEST(OutputVariance, GrowsThreePixelsAroundWhatIsNoPlane) {
+  const shared::ImageSize size{25, 11};
+  const auto step = [](int x, int) { return x < 12 ? 10.0f : 10.75f; };
+  const testing::HostMaps maps = maps_of(size, step, [](int, int) { return 1.0f; });
+  const std::vector<float> out = output_variance(size, maps, {.scale = 1, .roughness_weight = 1});
+  const float* row = out.data() + static_cast<std::ptrdiff_t>(5) * size.width;
+  EXPECT_EQ(row[7], 1);  // columns 11 and 12 have second differences of 0.75
+  const auto near = [](float mean) { return 1 + mean * mean; };
+  EXPECT_FLOAT_EQ(row[8], near(0.75f / 7));
+  EXPECT_FLOAT_EQ(row[9], near(1.5f / 7));
+  EXPECT_FLOAT_EQ(row[14], near(1.5f / 7));
+  EXPECT_FLOAT_EQ(row[15], near(0.75f / 7));
+  EXPECT_EQ(row[16], 1);
+}
+
+TEST(OutputVariance, TakesAHoleForRough) {
+  const shared::ImageSize size{25, 25};
+  const auto is_hole = [](int x, int y) { return x == 12 && y == 12; };
+  const testing::HostMaps maps = maps_of(
+      size, [&](int x, int y) { return is_hole(x, y) ? kNone : 10.0f; },
+      [&](int x, int y) { return is_hole(x, y) ? 0.0f : 1.0f; });
+  const std::vector<float> out = output_variance(size, maps, {.scale = 0, .roughness_weight = 1});
+  EXPECT_EQ(out[12 * 25 + 12], 0) << "the hole itself";
+  EXPECT_EQ(out[12 * 25 + 7], 0) << "far from it";
+  const float mean = (2 * EGOSGM_MAX_ROUGHNESS_PX + 4 * EGOSGM_MAX_ROUGHNESS_PX) / 49;  // its own, and its neighbours'
+  EXPECT_NEAR(out[12 * 25 + 11], mean * mean, 1e-6f);
+}
+
+TEST(OutputVariance, CutsAVarianceThatSaysOnlyThatItIsLarge) {
+  const testing::HostMaps maps = maps_of(
+      {1, 1}, [](int, int) { return 5.0f; }, [](int, int) { return EGOSGM_ESCAPED_VARIANCE_PX2; });
+  EXPECT_EQ(output_variance({1, 1}, maps, {.scale = 1})[0], EGOSGM_MAX_MEAN_VARIANCE_PX2);
+}
+
+TEST(OutputVariance, DoesNotMixTheViews) {
+  // The last row of the left view lies above the first of the right one.
+  const testing::HostMaps maps{{5, 5, 90, 90}, {0.25f, 0.25f, 1, 1}};
+  EXPECT_EQ(output_variance({2, 1}, maps, {.scale = 1}), maps.variance);
+}
+
+TEST(OutputVariance, LeavesTheRightViewAloneIfAsked) {
+  const testing::HostMaps maps{{5, 5, 90, 90}, {0.25f, 0.25f, 1, 1}};
+  EXPECT_EQ(output_variance({2, 1}, maps, {.scale = 1}, 0, 1),
+            (std::vector<float>{0.25f, 0.25f, kUntouched, kUntouched}));
+}
+
+}  // namespace
+}  // namespace egosgm

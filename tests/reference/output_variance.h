@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "egosgm/options.h"
+#include "kernels/shared.h"
+#include "tests/support/random_maps.h"
+
+namespace egosgm::reference {
+
+std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
+                                   const testing::HostMaps& maps);
+
+}  // namespace egosgm::reference
