@@ -21,8 +21,9 @@
 namespace egosgm::app {
 namespace {
 
-const std::vector<std::string> kKinds{"variance", "color", "predicted", "measured", "right", "interpolated", "search",
-                                      "dynamic",  "pfm",   "overview",  "cloud",    "depth", "depth_m"};
+const std::vector<std::string> kKinds{
+    "variance", "color",   "predicted", "measured", "right", "interpolated", "interpolated_certain",
+    "search",   "dynamic", "pfm",       "overview", "cloud", "depth",        "depth_m"};
 
 const char* extension_of(const std::string& kind) {
   if (kind == "variance" || kind == "pfm" || kind == "depth_m") return ".pfm";
@@ -42,6 +43,9 @@ const char* const kWriteListHelp =
     "  pfm            disparity as float, PFM: also negative ones and those above 256\n"
     "  right, predicted, measured, interpolated\n"
     "                 these disparity maps, KITTI's PNG\n"
+    "  interpolated_certain\n"
+    "                 the same, but variances above 4 px^2 become holes before they are filled: of a video a little "
+    "better\n"
     "  search         disparities searched at each pixel, 16-bit PNG\n"
     "  dynamic        255 where prediction and measurement contradict each other, as on what moves by itself, 8-bit "
     "PNG\n"
@@ -83,7 +87,8 @@ RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds
       panels_(disparities) {
   vision::make_folder(folder_ / "disparity");
   for (const std::string& kind : kinds_) vision::make_folder(folder_ / kind);
-  if (wants("variance") || wants("overview") || wants("cloud")) variance_.create(size, CV_32FC1);
+  if (wants("variance") || wants("overview") || wants("cloud") || wants("interpolated_certain"))
+    variance_.create(size, CV_32FC1);
   if (wants("right")) right_.create(size, CV_32FC1);
   if (wants("predicted")) predicted_.create(size, CV_32FC1);
   if (wants("measured")) measured_.create(size, CV_32FC1);
@@ -127,6 +132,11 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
        }},
       {"interpolated",
        [&](const Path& path) { vision::write_disparity_png(path, vision::interpolate_background(disparity_)); }},
+      {"interpolated_certain",
+       [&](const Path& path) {
+         const cv::Mat certain = vision::drop_uncertain(disparity_, variance_);
+         vision::write_disparity_png(path, vision::interpolate_background(certain));
+       }},
       {"color", [&](const Path& path) { vision::write_png(path, panels_.disparity(disparity_)); }},
       {"cloud",
        [&](const Path& path) {

@@ -226,6 +226,16 @@ def errors_and_variances(video, frames, **options):
     return pairs
 
 
+def interpolated(video, number, max_variances, **options):
+    """Percent bad after background interpolation of one frame, of the pixels whose variance is at most each of the bounds [px^2]."""
+    figures = []
+    for k, frame in play(video, **options):
+        for bound in max_variances if k == number else ():
+            certain = np.where(frame.variance > bound, egosgm.INVALID_DISPARITY, frame.disparity).astype(np.float32)
+            figures.append(share([bad_or_missing(egosgm.interpolate_background(certain), video.truth(k))]))
+    return figures
+
+
 def calibration_of_variance(pairs, bins=10):
     """What the variances are worth. `ratio`: mean of error^2 / variance, errors cut at 3 px, since a few mismatches would decide it.
     `removed`: percent of the bad pixels among the tenth of each frame with the largest variances. `bins`: predicted and actual

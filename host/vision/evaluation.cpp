@@ -232,6 +232,17 @@ cv::Mat interpolate_background(const cv::Mat& disparity) {
   return filled;
 }
 
+cv::Mat drop_uncertain(const cv::Mat& disparity, const cv::Mat& variance, float max_variance_px2) {
+  require_map(disparity, "drop_uncertain");
+  require_map(variance, "drop_uncertain");
+  if (disparity.size() != variance.size()) {
+    throw InvalidArgument("drop_uncertain: disparity and variance differ in size");
+  }
+  cv::Mat certain = disparity.clone();
+  certain.setTo(kInvalidDisparity, variance > max_variance_px2);
+  return certain;
+}
+
 EvaluationPairs pair_with_truth(const fs::path& estimate, const fs::path& truth) {
   std::error_code error;
   for (const fs::path& path : {estimate, truth}) {

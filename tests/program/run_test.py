@@ -36,7 +36,7 @@ class Run(ProgramTest):
 
     def test_writes_what_is_asked_for(self):
         out = self.new_folder()
-        kinds = "variance,color,predicted,measured,right,interpolated,search,dynamic,pfm,overview,cloud,depth,depth_m"
+        kinds = "variance,color,predicted,measured,right,interpolated,interpolated_certain,search,dynamic,pfm,overview,cloud,depth,depth_m"
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", kinds, "--frames", "1:2", "--quiet")
         for kind in kinds.split(","):
             extension = "pfm" if kind in ("variance", "pfm", "depth_m") else "ply" if kind == "cloud" else "png"

@@ -46,10 +46,18 @@ EGOSGM_EXPORT DisparityMetrics metrics_of(const DisparityCounts& counts);
 /// The mean of each image's figures, images whose figure is NaN left out (KITTI 2012).
 EGOSGM_EXPORT DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images);
 
+/// Of OutputVariance: what is above is wrong about as often as what the background would fill in.
+constexpr float kCertainVariancePx2 = 4.0f;
+
 /// Fills the holes from the background, as KITTI's development kit does: in each row, a run of invalid pixels between
 /// two valid ones gets the smaller of the two, the ends of a row its nearest valid value; then the top and bottom of
 /// each column get its nearest valid value. A map without any valid pixel stays so. Thread-safe.
 EGOSGM_EXPORT cv::Mat interpolate_background(const cv::Mat& disparity);
+
+/// Disparities [px] without those of a variance [px^2] above the bound: of a video, interpolate_background of what is
+/// left is a little better than of all. Both CV_32FC1 of one size, else InvalidArgument. Thread-safe.
+EGOSGM_EXPORT cv::Mat drop_uncertain(const cv::Mat& disparity, const cv::Mat& variance,
+                                     float max_variance_px2 = kCertainVariancePx2);
 
 /// An estimate and the truth it is compared with.
 struct EvaluationPair {
