@@ -36,6 +36,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("search_band.neighbour_margin_px", o.search_band.neighbour_margin_px);
   visit("search_band.coarse_tolerance_px", o.search_band.coarse_tolerance_px);
   visit("search_band.coarse_margin_px", o.search_band.coarse_margin_px);
+  visit("search_band.ridge_step_px", o.search_band.ridge_step_px);
   visit("vertical_alignment.enabled", o.vertical_alignment.enabled);
   visit("vertical_alignment.gain", o.vertical_alignment.gain);
   visit("banded_sgm.cost", o.banded_sgm.cost);

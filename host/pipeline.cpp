@@ -164,6 +164,7 @@ struct Pipeline::Impl {
 
   void predict(const Motion& motion) {
     forward_warp(*memory.belief, motion, scratch);
+    search_band.find_ridges(scratch);
     edge_rejection(scratch, predicted);
     hole_fill(predicted, scratch);
     consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);

@@ -32,19 +32,24 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       row_group_(row_group > 0 ? row_group : ocl::row_group(context)),
       block_ranges_(context, 2 * pixel_count(blocks_)),
       coarse_ranges_(context, 2 * pixel_count(blocks_)),
-      no_coarse_(context, 2 * pixel_count(blocks_)),
+      ridges_(context, 2 * pixel_count(blocks_)),
+      ridges_with_coarse_(context, 2 * pixel_count(blocks_)),
+      none_(context, 2 * pixel_count(blocks_)),
+      found_(context, 2 * pixel_count(blocks_)),
       block_bands_(context, 2 * pixel_count(blocks_)),
       bands_(context, 2 * pixel_count(size)),
       cell_offsets_(context, 2 * pixel_count(size)),
       row_sums_(context, 2 * static_cast<std::size_t>(size.height)),
       gather_blocks_(build(context, row_group_), "gather_blocks"),
+      gather_ridges_(build(context, row_group_), "gather_ridges"),
       gather_coarse_(build(context, row_group_), "gather_coarse"),
       bands_of_blocks_(build(context, row_group_), "bands_of_blocks"),
       bands_of_pixels_(build(context, row_group_), "bands_of_pixels"),
       sum_rows_(build(context, row_group_), "sum_rows"),
       full_range_(build(context, row_group_), "full_range") {
-  no_coarse_.write(context, std::vector(no_coarse_.size(), shared::BlockRange{}));
-  block_bands_.write(context, std::vector(block_bands_.size(), whole(range)));  // kept without bands from neighbours
+  for (ocl::Buffer<shared::BlockRange>* ranges : {&block_ranges_, &ridges_, &none_}) {
+    ranges->write(context, std::vector(ranges->size(), shared::BlockRange{}));
+  }
   clear(context, range, bands_, cell_offsets_);
 }
 
@@ -56,19 +61,28 @@ void SearchBand::clear(ocl::Context& context, shared::DisparityRange range, ocl:
   context.wait();
 }
 
+void SearchBand::find_ridges(const StereoMaps& warped) {
+  if (options_.ridge_step_px <= 0) return;
+  context_.enter("SearchBand");
+  gather_ridges_(context_, ocl::every_pixel(context_, blocks_), size_, options_.ridge_step_px, warped.disparity,
+                 ridges_);
+}
+
 void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* coarse) {
   context_.enter("SearchBand");
   const ocl::Range blocks = ocl::every_pixel(context_, blocks_);
-  if (coarse) gather_coarse_(context_, blocks, size_, coarse->disparity, coarse_ranges_);
-  const ocl::Buffer<shared::BlockRange>& found = coarse ? coarse_ranges_ : no_coarse_;
-  if (options_.from_neighbours) {
-    gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
-    bands_of_blocks_(context_, blocks, size_, range_, options_.neighbour_margin_px, options_.neighbour_min_count,
-                     options_.coarse_margin_px, block_ranges_, found, block_bands_);
+  if (coarse) {
+    gather_coarse_(context_, blocks, size_, options_.ridge_step_px, coarse->disparity, ridges_, coarse_ranges_,
+                   ridges_with_coarse_);
   }
+  if (options_.from_neighbours) gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
+  bands_of_blocks_(context_, blocks, size_, range_, options_.from_neighbours, options_.neighbour_margin_px,
+                   options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_,
+                   coarse ? coarse_ranges_ : none_, options_.ridge_step_px > 0 ? EGOSGM_RIDGE_BLOCKS_Y : -1,
+                   coarse ? ridges_with_coarse_ : ridges_, found_, block_bands_);
   bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}), size_, range_, options_.sigmas,
                    options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
-                   options_.coarse_margin_px, found, block_bands_, bands_);
+                   options_.coarse_margin_px, found_, block_bands_, bands_);
   sum_rows_(context_, ocl::group_a_row(size_, row_group_), size_, predicted.disparity, bands_, cell_offsets_,
             row_sums_);
 }

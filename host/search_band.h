@@ -11,16 +11,20 @@ namespace egosgm {
 ///
 /// A predicted pixel searches d +- max(min_half_width_px, sigmas * sqrt(p)), another one the range that the predictions
 /// around it span, one with none near everything. Where CoarseMatch found disparities beyond that by more than
-/// coarse_tolerance_px, as on an object that moves by itself, the band reaches there too. Bands hold whole chunks of
-/// EGOSGM_LANES lanes; lanes outside of the disparity range, of which there may be up to EGOSGM_LANES - 1 at its end,
-/// do not exist for BandedSgm.
+/// coarse_tolerance_px, as on an object that moves by itself, the band reaches there too; and to ridges above and
+/// below, things of a few pixels' width, which CoarseMatch does not see. Bands hold whole chunks of EGOSGM_LANES lanes;
+/// lanes outside of the disparity range, of which there may be up to EGOSGM_LANES - 1 at its end, do not exist for
+/// BandedSgm.
 class SearchBand {
  public:
   /// `row_group`: work-items that share a row when chunks are summed up; 0: one on a CPU, many elsewhere. Same bits.
   SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
              const SearchBandOptions& options, int row_group = 0);
 
-  /// Bands from the prediction, and from what CoarseMatch found, where there is one.
+  /// Looks for ridges in a prediction that nothing was dropped of yet, for the calls after it. Does nothing where
+  /// ridge_step_px is 0.
+  void find_ridges(const StereoMaps& warped);
+  /// Bands from the prediction and its ridges, and from what CoarseMatch found, where there is one.
   void operator()(const StereoMaps& predicted, const StereoMaps* coarse = nullptr);
   /// Every pixel searches everything.
   void full_range();
@@ -43,24 +47,26 @@ class SearchBand {
 
  private:
   using Disparities = const ocl::Buffer<float>;
+  using Ranges = ocl::Buffer<shared::BlockRange>;
 
   ocl::Context& context_;
   const shared::ImageSize size_, blocks_;
   const shared::DisparityRange range_;
   const SearchBandOptions options_;
   const int row_group_;
-  ocl::Buffer<shared::BlockRange> block_ranges_, coarse_ranges_, no_coarse_;
+  Ranges block_ranges_, coarse_ranges_, ridges_, ridges_with_coarse_, none_, found_;
   ocl::Buffer<shared::Band> block_bands_;
   ocl::Buffer<shared::Band> bands_;
   ocl::Buffer<cl_uint> cell_offsets_;
   ocl::Buffer<shared::RowSum> row_sums_;
-  ocl::Kernel<const shared::ImageSize, Disparities, ocl::Buffer<shared::BlockRange>> gather_blocks_, gather_coarse_;
-  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const cl_int, const float,
-              const ocl::Buffer<shared::BlockRange>, const ocl::Buffer<shared::BlockRange>, ocl::Buffer<shared::Band>>
+  ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_blocks_;
+  ocl::Kernel<const shared::ImageSize, const float, Disparities, Ranges> gather_ridges_;
+  ocl::Kernel<const shared::ImageSize, const float, Disparities, const Ranges, Ranges, Ranges> gather_coarse_;
+  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const cl_int, const float, const cl_int,
+              const float, const Ranges, const Ranges, const cl_int, const Ranges, Ranges, ocl::Buffer<shared::Band>>
       bands_of_blocks_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
-              const float, const float, const ocl::Buffer<shared::BlockRange>, const ocl::Buffer<shared::Band>,
-              ocl::Buffer<shared::Band>>
+              const float, const float, const Ranges, const ocl::Buffer<shared::Band>, ocl::Buffer<shared::Band>>
       bands_of_pixels_;
   ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
               ocl::Buffer<shared::RowSum>>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span; and
-// what CoarseMatch found there, where that lies elsewhere.
+// what CoarseMatch found there and what thin things stand above or below, where these lie elsewhere.
 #include "shared.h"
 
 // lint: ROW_GROUP=1
@@ -68,11 +68,13 @@ Band first_of(const Bands bands) {
   return band;
 }
 
-// Eight disparities of a row from x on; what lies beyond the row is invalid.
+// Eight disparities of a row from x on; what lies before or beyond the row is invalid.
 float8 eight(global const float* row, int x, int width) {
-  if (x + EGOSGM_BLOCK <= width) return vload8(0, row + x);
+  if (x >= 0 && x + EGOSGM_BLOCK <= width) return vload8(0, row + x);
   float values[EGOSGM_BLOCK];
-  for (int i = 0; i < EGOSGM_BLOCK; ++i) values[i] = x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
+  for (int i = 0; i < EGOSGM_BLOCK; ++i) {
+    values[i] = x + i >= 0 && x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
+  }
   return vload8(0, values);
 }
 
@@ -96,6 +98,46 @@ void store_eight(global Band* row, int x, int width, uint16 words) {
   for (int i = 0; i < 2 * (width - x); ++i) to[i] = values[i];
 }
 
+// What pixels that are looked through one after another span, lane by lane.
+typedef struct {
+  float8 least, most;
+  int8 count;
+} Spans;
+
+Spans no_spans() {
+  Spans spans;
+  spans.least = INFINITY;
+  spans.most = -INFINITY;
+  spans.count = 0;
+  return spans;
+}
+
+Spans with(Spans spans, const float8 d, const int8 counts) {
+  spans.least = select(spans.least, d, counts & (d < spans.least));
+  spans.most = select(spans.most, d, counts & (d > spans.most));
+  spans.count -= counts;
+  return spans;
+}
+
+BlockRange range_of(const Spans spans) {
+  BlockRange range;
+  const float4 least4 = fmin(spans.least.lo, spans.least.hi);
+  const float4 most4 = fmax(spans.most.lo, spans.most.hi);
+  const int4 count4 = spans.count.lo + spans.count.hi;
+  range.min = fmin(fmin(least4.x, least4.y), fmin(least4.z, least4.w));
+  range.max = fmax(fmax(most4.x, most4.y), fmax(most4.z, most4.w));
+  range.count = count4.x + count4.y + count4.z + count4.w;
+  return range;
+}
+
+BlockRange joined(const BlockRange a, const BlockRange b) {
+  BlockRange both;
+  both.min = b.count > 0 && (a.count == 0 || b.min < a.min) ? b.min : a.min;
+  both.max = b.count > 0 && (a.count == 0 || b.max > a.max) ? b.max : a.max;
+  both.count = a.count + b.count;
+  return both;
+}
+
 // A work-item a block and view.
 kernel void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
@@ -105,25 +147,49 @@ kernel void gather_blocks(const ImageSize size, global const float* disparity, g
   const int view = get_global_id(2);
   if (x >= blocks_x || y >= blocks_y) return;
 
-  float8 least = INFINITY;
-  float8 most = -INFINITY;
-  int8 count = 0;
+  Spans spans = no_spans();
   const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
   for (int row = y * EGOSGM_BLOCK; row < end; ++row) {
     const float8 d = eight(disparity + ((size_t)view * size.height + row) * size.width, x * EGOSGM_BLOCK, size.width);
-    const int8 valid = d > EGOSGM_INVALID_DISPARITY;
-    least = select(least, d, valid & (d < least));
-    most = select(most, d, valid & (d > most));
-    count -= valid;
+    spans = with(spans, d, d > EGOSGM_INVALID_DISPARITY);
   }
-  BlockRange range;
-  const float4 least4 = fmin(least.lo, least.hi);
-  const float4 most4 = fmax(most.lo, most.hi);
-  const int4 count4 = count.lo + count.hi;
-  range.min = fmin(fmin(least4.x, least4.y), fmin(least4.z, least4.w));
-  range.max = fmax(fmax(most4.x, most4.y), fmax(most4.z, most4.w));
-  range.count = count4.x + count4.y + count4.z + count4.w;
-  ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range;
+  ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range_of(spans);
+}
+
+// Which of the eight pixels from x on lie nearer than one of the `reach` pixels to their left by more than `step`, and
+// than one to their right.
+int8 ridges_from(global const float* row, int x, int width, int reach, float step) {
+  const float8 d = eight(row, x, width);
+  float8 left = INFINITY;
+  float8 right = INFINITY;
+  for (int i = 1; i <= reach; ++i) {
+    const float8 before = eight(row, x - i, width);
+    const float8 after = eight(row, x + i, width);
+    left = ((before > EGOSGM_INVALID_DISPARITY) & (before < left)) ? before : left;
+    right = ((after > EGOSGM_INVALID_DISPARITY) & (after < right)) ? after : right;
+  }
+  return d > EGOSGM_INVALID_DISPARITY & left < d - step & right < d - step;
+}
+
+// What is a ridge in a block, before EdgeRejection drops it: of every other row, since poles are upright. A work-item a
+// block and view.
+kernel void gather_ridges(const ImageSize size, const float step, global const float* disparity,
+                          global BlockRange* ridges) {
+  const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const int x = get_global_id(0);
+  const int y = get_global_id(1);
+  const int view = get_global_id(2);
+  if (x >= blocks_x || y >= blocks_y) return;
+
+  Spans spans = no_spans();
+  const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
+  for (int v = y * EGOSGM_BLOCK; v < end; v += 2) {
+    global const float* row = disparity + ((size_t)view * size.height + v) * size.width;
+    const int8 found = ridges_from(row, x * EGOSGM_BLOCK, size.width, EGOSGM_RIDGE_REACH, step);
+    spans = with(spans, eight(row, x * EGOSGM_BLOCK, size.width), found);
+  }
+  ridges[((size_t)view * blocks_y + y) * blocks_x + x] = range_of(spans);
 }
 
 // Keeps the EGOSGM_COARSE_OUTLIERS + 1 least values of each lane, in rising order; the most, in falling order.
@@ -143,9 +209,11 @@ void insert_most(float4* most, float4 value) {
 }
 
 // What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at
-// either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. A work-item a
-// block and view.
-kernel void gather_coarse(const ImageSize size, global const float* coarse, global BlockRange* ranges) {
+// either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. And the block's
+// ridges, with its own coarse ones. A work-item a block and view.
+kernel void gather_coarse(const ImageSize size, const float step, global const float* coarse,
+                          global const BlockRange* ridges, global BlockRange* ranges,
+                          global BlockRange* ridges_with_coarse) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
@@ -188,14 +256,28 @@ kernel void gather_coarse(const ImageSize size, global const float* coarse, glob
   range.min = EGOSGM_COARSE * least[EGOSGM_COARSE_OUTLIERS].x;
   range.max = EGOSGM_COARSE * most[EGOSGM_COARSE_OUTLIERS].x;
   range.count = count.x + count.y + count.z + count.w;
-  ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range;
+  const size_t here = ((size_t)view * blocks_y + y) * blocks_x + x;
+  ranges[here] = range;
+
+  // Of the lanes, two lie in the block.
+  const int8 inside = (int8)(-1, -1, 0, 0, 0, 0, 0, 0);
+  Spans spans = no_spans();
+  for (int v = 2 * y; step > 0.0f && v <= min(2 * y + 1, height - 1); ++v) {
+    global const float* row = coarse + ((size_t)view * height + v) * width;
+    const int8 found = inside & ridges_from(row, 2 * x, width, EGOSGM_COARSE_RIDGE_REACH, step / (EGOSGM_COARSE / 2));
+    spans = with(spans, EGOSGM_COARSE * eight(row, 2 * x, width), found);
+  }
+  ridges_with_coarse[here] = step > 0.0f ? joined(ridges[here], range_of(spans)) : ridges[here];
 }
 
-// The band of a block's unpredicted pixels: what the predictions in the 3x3 blocks around it and the coarse match span.
-// A work-item a block and view.
-kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, const float margin, const int min_count,
-                            const float coarse_margin, global const BlockRange* ranges,
-                            global const BlockRange* coarse_ranges, global Band* bands) {
+// The band of a block's unpredicted pixels: what the predictions in the 3x3 blocks around it, the coarse match and the
+// ridges near span, up to `ridge_blocks` above and below (-1: none). `found`: what the latter two span, for the
+// predicted ones. A work-item a block and view.
+kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
+                            const float margin, const int min_count, const float coarse_margin,
+                            global const BlockRange* ranges, global const BlockRange* coarse_ranges,
+                            const int ridge_blocks, global const BlockRange* ridges, global BlockRange* found,
+                            global Band* bands) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int x = get_global_id(0);
@@ -215,18 +297,28 @@ kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, co
     }
   }
   const size_t here = ((size_t)view * blocks_y + y) * blocks_x + x;
-  const BlockRange coarse = coarse_ranges[here];
+  BlockRange near = {INFINITY, -INFINITY, 0};
+  for (int v = max(y - ridge_blocks, 0); v <= min(y + ridge_blocks, blocks_y - 1); ++v) {
+    for (int u = max(x - EGOSGM_RIDGE_BLOCKS_X, 0); u <= min(x + EGOSGM_RIDGE_BLOCKS_X, blocks_x - 1); ++u) {
+      near = joined(near, ridges[((size_t)view * blocks_y + v) * blocks_x + u]);
+    }
+  }
   const bool has_around = count > 0 && count >= (uint)max(min_count, 0);
-  const bool has_coarse = coarse.count >= EGOSGM_COARSE_MIN_COUNT;
-  float from = has_around || has_coarse ? INFINITY : -INFINITY;
+  const bool has_coarse = coarse_ranges[here].count >= EGOSGM_COARSE_MIN_COUNT;
+  BlockRange both = near;
+  if (has_coarse) both = joined(coarse_ranges[here], near);
+  found[here] = both;
+
+  const bool has_any = from_neighbours && (has_around || has_coarse);  // a ridge alone does not tell what is behind
+  float from = has_any ? INFINITY : -INFINITY;
   float to = -from;
-  if (has_around) {
+  if (has_any && has_around) {
     from = least - margin;
     to = most + margin;
   }
-  if (has_coarse) {
-    from = fmin(from, coarse.min - coarse_margin);
-    to = fmax(to, coarse.max + coarse_margin);
+  if (has_any && both.count > 0) {
+    from = fmin(from, both.min - coarse_margin);
+    to = fmax(to, both.max + coarse_margin);
   }
   bands[here] = first_of(bands_of(range, from, to));
 }
@@ -234,9 +326,8 @@ kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, co
 // A work-item a block's row of pixels and view.
 kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
-                            const float coarse_tolerance, const float coarse_margin,
-                            global const BlockRange* coarse_ranges, global const Band* block_bands,
-                            global Band* bands) {
+                            const float coarse_tolerance, const float coarse_margin, global const BlockRange* found,
+                            global const Band* block_bands, global Band* bands) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int block = get_global_id(0);
@@ -252,8 +343,8 @@ kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   // A variance that is not a number searches everything.
   const float8 half_width = deviation <= min_half_width ? (float8)min_half_width : deviation;
   const float8 reach = half_width <= (float)range.count ? half_width : (float8)range.count;
-  const BlockRange coarse = coarse_ranges[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + block];
-  const int8 believed = coarse.count >= EGOSGM_COARSE_MIN_COUNT ? -1 : 0;
+  const BlockRange coarse = found[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + block];
+  const int8 believed = coarse.count > 0 ? -1 : 0;
   const float8 low = d - reach;
   const float8 high = d + reach;
   const int8 contradicted = believed & ((coarse.min < low - coarse_tolerance) | (coarse.max > high + coarse_tolerance));

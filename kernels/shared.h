@@ -47,6 +47,14 @@ typedef float f32;
 // Of these, so many of the least and of the largest are taken for mismatches. REQUIRES: less than half of the count.
 #define EGOSGM_COARSE_OUTLIERS 2
 
+// SearchBand calls a ridge what lies nearer than something at most this many pixels to its left, and to its right: a
+// pole. CoarseMatch's maps are looked through too, that many of their pixels far.
+#define EGOSGM_RIDGE_REACH 4
+#define EGOSGM_COARSE_RIDGE_REACH 2
+// A ridge is searched for in the blocks this far above, below and beside its own.
+#define EGOSGM_RIDGE_BLOCKS_X 1
+#define EGOSGM_RIDGE_BLOCKS_Y 3
+
 // The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside.
 // KalmanUpdate then takes the measurement instead of fusing it, as where the two differ by more than the gate, and the
 // next frame searches wide around it.

@@ -50,6 +50,7 @@ TEST(Options, HasANameForEveryMember) {
       {"search_band.neighbour_margin_px", [](auto& o) { o.search_band.neighbour_margin_px = 77; }},
       {"search_band.coarse_tolerance_px", [](auto& o) { o.search_band.coarse_tolerance_px = 77; }},
       {"search_band.coarse_margin_px", [](auto& o) { o.search_band.coarse_margin_px = 77; }},
+      {"search_band.ridge_step_px", [](auto& o) { o.search_band.ridge_step_px = 77; }},
       {"coarse_match.enabled", [](auto& o) { o.coarse_match.enabled = false; }},
       {"coarse_match.p1", [](auto& o) { o.coarse_match.p1 = 77; }},
       {"coarse_match.p2", [](auto& o) { o.coarse_match.p2 = 77; }},

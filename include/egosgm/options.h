@@ -33,8 +33,7 @@ struct ConsistencyCheckOptions {
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
   int p1 = 6;           // penalties as in BandedSgmOptions, for a census of 5x5 coarse pixels
-  int p2 = 60;
-  int p2_at_edges = 40;
+  int p2 = 60, p2_at_edges = 40;
   float max_difference_px = 1.0f;  // of the left-right check, in coarse pixels
 };
 struct SearchBandOptions {
@@ -46,6 +45,7 @@ struct SearchBandOptions {
   // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
   float coarse_tolerance_px = 3.0f;
   float coarse_margin_px = 2.0f;
+  float ridge_step_px = 0.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
 };
 
 struct BandedSgmOptions {

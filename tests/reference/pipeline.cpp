@@ -78,7 +78,8 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
     pass.coarse = coarse_match(size_, options_, pass.images, images.bits);
   }
   pass.band = everything ? full_range(size_, range_, frame.predicted.disparity)
-                         : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse);
+                         : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse,
+                                       frame.warped.disparity);
 
   const auto middle = pass.images.begin() + static_cast<std::ptrdiff_t>(pass.images.size() / 2);
   const std::vector<std::uint64_t> both[2] = {codes(size_, {pass.images.begin(), middle}, images.bits, sgm.cost),

@@ -52,9 +52,69 @@ std::pair<float, float> found_around(shared::ImageSize size, const std::vector<f
   return {found[EGOSGM_COARSE_OUTLIERS], found[found.size() - 1 - EGOSGM_COARSE_OUTLIERS]};
 }
 
+/// Is it nearer than something close on its left, and on its right?
+bool is_ridge(shared::ImageSize size, const std::vector<float>& disparity, int view, int x, int y, int reach,
+              float step) {
+  const auto at = [&](int u) {
+    return u < 0 || u >= size.width ? EGOSGM_INVALID_DISPARITY
+                                    : disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + u];
+  };
+  bool has_left = false, has_right = false;
+  for (int i = 1; i <= reach; ++i) {
+    has_left |= is_valid(at(x - i)) && at(x - i) < at(x) - step;
+    has_right |= is_valid(at(x + i)) && at(x + i) < at(x) - step;
+  }
+  return is_valid(at(x)) && has_left && has_right;
+}
+
+/// The ridges of a map whose blocks have `side` x `side` pixels, by block; first > second: none.
+std::vector<std::pair<float, float>> ridges_of(shared::ImageSize size, shared::ImageSize blocks, int side, int rows,
+                                               const std::vector<float>& disparity, int reach, float step) {
+  const std::size_t count = static_cast<std::size_t>(blocks.width) * blocks.height;
+  std::vector<std::pair<float, float>> ridges(2 * count, {kInfinity, -kInfinity});
+  for (int view = 0; view < 2 && !disparity.empty() && step > 0; ++view) {
+    for (int y = 0; y < size.height; y += rows) {
+      for (int x = 0; x < size.width; ++x) {
+        if (!is_ridge(size, disparity, view, x, y, reach, step)) continue;
+        const float d = disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
+        auto& [least, most] = ridges[view * count + static_cast<std::size_t>(y / side) * blocks.width + x / side];
+        least = std::min(least, d), most = std::max(most, d);
+      }
+    }
+  }
+  return ridges;
+}
+
+void join(std::pair<float, float>& range, std::pair<float, float> other) {
+  range = {std::min(range.first, other.first), std::max(range.second, other.second)};
+}
+
+/// What the ridges of the warped and of the coarse map span around each block.
+std::vector<std::pair<float, float>> ridges_around(shared::ImageSize size, shared::ImageSize blocks, float step,
+                                                   const std::vector<float>& warped, const std::vector<float>& coarse) {
+  const auto fine = ridges_of(size, blocks, EGOSGM_BLOCK, 2, warped, EGOSGM_RIDGE_REACH, step);
+  const auto found = ridges_of({(size.width + 3) / 4, (size.height + 3) / 4}, blocks, EGOSGM_BLOCK / EGOSGM_COARSE, 1,
+                               coarse, EGOSGM_COARSE_RIDGE_REACH, step / 2);
+  std::vector<std::pair<float, float>> around(fine.size(), {kInfinity, -kInfinity});
+  for (int i = 0; i < static_cast<int>(fine.size()); ++i) {
+    const int view = i / (blocks.width * blocks.height);
+    const int y = i / blocks.width % blocks.height, x = i % blocks.width;
+    for (int v = std::max(0, y - EGOSGM_RIDGE_BLOCKS_Y); v <= std::min(blocks.height - 1, y + EGOSGM_RIDGE_BLOCKS_Y);
+         ++v) {
+      for (int u = std::max(0, x - EGOSGM_RIDGE_BLOCKS_X); u <= std::min(blocks.width - 1, x + EGOSGM_RIDGE_BLOCKS_X);
+           ++u) {
+        const int near = (view * blocks.height + v) * blocks.width + u;
+        join(around[i], fine[near]);
+        join(around[i], {4 * found[near].first, 4 * found[near].second});
+      }
+    }
+  }
+  return around;
+}
+
 shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                             const testing::HostMaps& predicted, std::pair<float, float> found, int view, int block_x,
-                             int block_y) {
+                             const testing::HostMaps& predicted, std::pair<float, float> coarse,
+                             std::pair<float, float> found, int view, int block_x, int block_y) {
   float least = kInfinity, most = -kInfinity;
   int count = 0;
   for (int y = std::max(0, (block_y - 1) * EGOSGM_BLOCK); y < std::min(size.height, (block_y + 2) * EGOSGM_BLOCK);
@@ -67,9 +127,10 @@ shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange rang
     }
   }
   const bool is_found = found.first <= found.second;
+  const bool is_coarse = coarse.first <= coarse.second;
   const float coarse_from = found.first - options.coarse_margin_px, coarse_to = found.second + options.coarse_margin_px;
   if (count == 0 || count < options.neighbour_min_count) {
-    return is_found ? band_of(range, coarse_from, coarse_to) : band_of(range, -kInfinity, kInfinity);
+    return is_coarse ? band_of(range, coarse_from, coarse_to) : band_of(range, -kInfinity, kInfinity);
   }
   const float from = least - options.neighbour_margin_px, to = most + options.neighbour_margin_px;
   return is_found ? band_of(range, std::min(from, coarse_from), std::max(to, coarse_to)) : band_of(range, from, to);
@@ -108,18 +169,21 @@ void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, Searc
 }  // namespace
 
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted, const std::vector<float>& coarse) {
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse,
+                        const std::vector<float>& warped) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   std::vector<shared::Band> of_blocks;
-  std::vector<std::pair<float, float>> found;
+  std::vector<std::pair<float, float>> found =
+      ridges_around(size, {blocks_x, blocks_y}, options.ridge_step_px, warped, coarse);
   for (int view = 0; view < 2; ++view) {
     for (int y = 0; y < blocks_y; ++y) {
       for (int x = 0; x < blocks_x; ++x) {
-        found.push_back(found_around(size, coarse, view, x, y));
-        of_blocks.push_back(options.from_neighbours
-                                ? from_neighbours(size, range, options, predicted, found.back(), view, x, y)
-                                : band_of(range, -kInfinity, kInfinity));
+        const std::pair<float, float> of_coarse = found_around(size, coarse, view, x, y);
+        join(found[of_blocks.size()], of_coarse);
+        of_blocks.push_back(options.from_neighbours ? from_neighbours(size, range, options, predicted, of_coarse,
+                                                                      found[of_blocks.size()], view, x, y)
+                                                    : band_of(range, -kInfinity, kInfinity));
       }
     }
   }

@@ -15,9 +15,10 @@ struct SearchBands {
   std::vector<shared::RowSum> row_sums;
 };
 
-/// `coarse`: what reference::coarse_match gives; empty: none.
+/// `coarse`: what reference::coarse_match gives; `warped`: where ridges are looked for, empty: nowhere.
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted, const std::vector<float>& coarse = {});
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse = {},
+                        const std::vector<float>& warped = {});
 SearchBands full_range(shared::ImageSize size, shared::DisparityRange range, const std::vector<float>& predicted = {});
 
 }  // namespace egosgm::reference

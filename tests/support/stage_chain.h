@@ -86,6 +86,7 @@ class StageChain {
   void predict(const Motion& motion, reference::Frame& frame) {
     forward_warp_(belief_, motion, scratch_);
     frame.warped = download(context_, scratch_);
+    search_band_.find_ridges(scratch_);
     edge_rejection_(scratch_, predicted_);
     frame.without_edges = download(context_, predicted_);
     hole_fill_(predicted_, scratch_);
