@@ -110,7 +110,7 @@ bool BatchFolder::is_done(const BatchEntry& entry) const {
   if (!fs::exists(file)) return false;
   const std::string before = read(file).value("input", "");
   if (before == entry.arguments) return true;
-  throw InvalidArgument(fmt::format("{} holds the results of \"{}\", the list now says \"{}\": choose another name",
+  throw InvalidArgument(fmt::format(R"({} holds the results of "{}", the list now says "{}": choose another name)",
                                     folder_of(entry).string(), before, entry.arguments));
 }
 

@@ -25,11 +25,11 @@ std::string reason_of_default(const DeviceInfo& chosen) {
 }
 
 void print_device(std::size_t index, const DeviceInfo& info, bool is_default) {
-  constexpr double kGibibyte = 1024.0 * 1024.0 * 1024.0;
+  constexpr double gibibyte = 1024.0 * 1024.0 * 1024.0;
   fmt::print("{} {}  {}\n", is_default ? '*' : ' ', index, info.name);
   fmt::print("     {}, {}, {}, {:.1f} GiB memory, {:.1f} GiB in one buffer\n", info.type, info.vendor,
-             counted(info.compute_units, "compute unit"), static_cast<double>(info.memory_bytes) / kGibibyte,
-             static_cast<double>(info.max_allocation_bytes) / kGibibyte);
+             counted(info.compute_units, "compute unit"), static_cast<double>(info.memory_bytes) / gibibyte,
+             static_cast<double>(info.max_allocation_bytes) / gibibyte);
   fmt::print("     {}; {}; driver {}\n", info.platform, info.version, info.driver);
 }
 

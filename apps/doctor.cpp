@@ -45,7 +45,7 @@ struct Finding {
 };
 
 double quantile(std::vector<double> values, double at) {
-  const auto place = static_cast<std::ptrdiff_t>(at * static_cast<double>(values.size() - 1) + 0.5);
+  const auto place = std::lround(at * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + place, values.end());
   return values[static_cast<std::size_t>(place)];
 }

@@ -82,7 +82,7 @@ class EnergyMeter::Nvml {
   std::uint64_t sum_mj_ = 0;
 };
 
-EnergyMeter::EnergyMeter(fs::path powercap) : nvml_(Nvml::load()) {
+EnergyMeter::EnergyMeter(const fs::path& powercap) : nvml_(Nvml::load()) {
   std::error_code error;
   for (fs::directory_iterator entry(powercap, error), end; !error && entry != end; entry.increment(error)) {
     if (!is_package(entry->path())) continue;

@@ -15,7 +15,7 @@ namespace egosgm::app {
 /// is in it. Thread-safe.
 class EnergyMeter {
  public:
-  explicit EnergyMeter(std::filesystem::path powercap = "/sys/class/powercap");
+  explicit EnergyMeter(const std::filesystem::path& powercap = "/sys/class/powercap");
   ~EnergyMeter();
 
   /// Reads the counters; at least once in their turn (a quarter of an hour at the least), or a turn is lost.

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 namespace egosgm::app {
@@ -20,7 +21,7 @@ std::size_t terminal_columns() {
 }
 
 std::string clock_text(double seconds) {
-  const int s = static_cast<int>(seconds + 0.5);
+  const int s = static_cast<int>(std::lround(seconds));
   return fmt::format("{}:{:02}", s / 60, s % 60);
 }
 

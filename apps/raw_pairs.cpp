@@ -223,8 +223,8 @@ std::unique_ptr<RawPairs> open_euroc(const fs::path& mav0) {
 }  // namespace
 
 std::unique_ptr<ImageSource> open_images(const std::string& pattern) {
-  static const std::array<const char*, 9> kImages{".png",  ".jpg", ".jpeg", ".bmp", ".tif",
-                                                  ".tiff", ".pgm", ".ppm",  ".webp"};
+  static const std::array<const char*, 9> extensions{".png",  ".jpg", ".jpeg", ".bmp", ".tif",
+                                                     ".tiff", ".pgm", ".ppm",  ".webp"};
   std::string wild = pattern;
   const std::size_t name = wild.find_last_of('/') + 1;
   if (const std::size_t percent = wild.find('%', name); percent != std::string::npos) {
@@ -236,7 +236,7 @@ std::unique_ptr<ImageSource> open_images(const std::string& pattern) {
   std::string extension = fs::path(pattern).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
-  if (std::find(kImages.begin(), kImages.end(), extension) != kImages.end()) {
+  if (std::find(extensions.begin(), extensions.end(), extension) != extensions.end()) {
     return std::make_unique<Files>(std::vector<fs::path>{pattern});
   }
   return std::make_unique<Video>(pattern);

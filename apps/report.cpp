@@ -85,12 +85,12 @@ std::vector<std::size_t> chosen_frames(const vision::StereoSequence& sequence, c
 }
 
 std::string base64(const std::vector<std::uint8_t>& bytes) {
-  constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  constexpr const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
     const auto at = [&](std::size_t k) { return k < bytes.size() ? std::uint32_t{bytes[k]} : 0u; };
     const std::uint32_t group = at(i) << 16 | at(i + 1) << 8 | at(i + 2);
-    for (int shift = 18; shift >= 0; shift -= 6) text += kDigits[group >> shift & 63];
+    for (int shift = 18; shift >= 0; shift -= 6) text += digits[group >> shift & 63];
   }
   const std::size_t missing = (3 - bytes.size() % 3) % 3;
   text.replace(text.size() - missing, missing, missing, '=');
@@ -132,15 +132,15 @@ class Page {
     // Nothing in a text may end the script element.
     for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;) json.replace(at, 1, "\\u003c");
     std::string page(templates().at("report.html"));
-    constexpr std::string_view kPlace = "@DATA@";
-    return page.replace(page.find(kPlace), kPlace.size(), json);
+    constexpr std::string_view place = "@DATA@";
+    return page.replace(page.find(place), place.size(), json);
   }
 
  private:
   void add_truth(Json& data) {
     data["metrics"] = Json::object();
     if (arguments_.truth.empty()) {
-      notes_.push_back("Without truth there are no errors: egosgm report OUT --truth DIR compares.");
+      notes_.emplace_back("Without truth there are no errors: egosgm report OUT --truth DIR compares.");
       return;
     }
     vision::DisparityCounts pooled;
@@ -172,7 +172,7 @@ class Page {
       data["pictures"].push_back({{"frame", frame.number}, {"name", frame.name}, {"layers", std::move(layers)}});
     }
     if (sequence_.frames.front().left.empty()) {
-      notes_.push_back("The left images are no longer where the run read them, so they are not shown.");
+      notes_.emplace_back("The left images are no longer where the run read them, so they are not shown.");
     }
     for (const char* kind : {"variance", "search"}) {
       if (!fs::exists(folder_ / kind)) {

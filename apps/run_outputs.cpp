@@ -74,7 +74,7 @@ std::set<std::string> parse_write_list(const std::string& list) {
 
 std::vector<std::string> output_folders() {
   std::vector<std::string> folders = kKinds;
-  folders.push_back("disparity");
+  folders.emplace_back("disparity");
   return folders;
 }
 

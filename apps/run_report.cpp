@@ -70,9 +70,9 @@ nlohmann::ordered_json json_of(const Eigen::Isometry3d& motion) {
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 4; ++column) matrix.push_back(motion.matrix()(row, column));
   }
-  constexpr double kDegrees = 180.0 / 3.14159265358979323846;
+  constexpr double degrees = 180.0 / 3.14159265358979323846;
   return {{"translation_m", {t.x(), t.y(), t.z()}},
-          {"rotation_deg", Eigen::AngleAxisd(motion.rotation()).angle() * kDegrees},
+          {"rotation_deg", Eigen::AngleAxisd(motion.rotation()).angle() * degrees},
           {"current_from_previous", matrix}};
 }
 
