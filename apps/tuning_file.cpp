@@ -24,7 +24,7 @@ std::string key_of(const DeviceInfo& device) { return device.name + ", driver " 
 }
 
 Json read(const std::filesystem::path& file) {
-  const Json json = Json::parse(vision::read_file(file, kMaxBytes), nullptr, /*allow_exceptions=*/false);
+  Json json = Json::parse(vision::read_file(file, kMaxBytes), nullptr, /*allow_exceptions=*/false);
   if (!json.is_object()) refuse(file, "not a tuning file");
   return json;
 }

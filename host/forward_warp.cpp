@@ -4,8 +4,6 @@
 namespace egosgm {
 namespace {
 
-constexpr cl_int band_rows_ = 32;  // more move fewer sources twice, fewer balance better
-
 const cl::Program& build(ocl::Context& context, int pixels) {
   context.enter("ForwardWarp");
   return context.program("forward_warp.cl", ocl::Defines().set("PIXELS", pixels));

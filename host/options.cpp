@@ -70,18 +70,18 @@ struct Choice {
   const char* name;
   Enum value;
 };
-constexpr Choice<MatchingCost> kChoices(MatchingCost, int i) {
+constexpr Choice<MatchingCost> choice(MatchingCost, int i) {
   constexpr Choice<MatchingCost> choices[] = {{"census13x11", MatchingCost::kCensus13x11},
                                               {"census9x7", MatchingCost::kCensus9x7},
                                               {"census5x5", MatchingCost::kCensus5x5},
                                               {"sad3x3", MatchingCost::kSad3x3}};
   return i < 4 ? choices[i] : Choice<MatchingCost>{nullptr, {}};
 }
-constexpr Choice<SearchMode> kChoices(SearchMode, int i) {
+constexpr Choice<SearchMode> choice(SearchMode, int i) {
   constexpr Choice<SearchMode> choices[] = {{"band", SearchMode::kBand}, {"full", SearchMode::kFull}};
   return i < 2 ? choices[i] : Choice<SearchMode>{nullptr, {}};
 }
-constexpr Choice<Scheduling> kChoices(Scheduling, int i) {
+constexpr Choice<Scheduling> choice(Scheduling, int i) {
   constexpr Choice<Scheduling> choices[] = {
       {"automatic", Scheduling::kAutomatic}, {"wavefront", Scheduling::kWavefront}, {"paths", Scheduling::kPaths}};
   return i < 3 ? choices[i] : Choice<Scheduling>{nullptr, {}};
@@ -93,12 +93,12 @@ std::string text_of(float value) {
   char buffer[32];
   const auto result =
       std::to_chars(buffer, buffer + sizeof buffer, value);  // the shortest that reads back to the same bits
-  return std::string(buffer, result.ptr);
+  return {buffer, result.ptr};
 }
 template <typename Enum>
 std::string text_of(Enum value) {
-  for (int i = 0; kChoices(value, i).name; ++i) {
-    if (kChoices(value, i).value == value) return kChoices(value, i).name;
+  for (int i = 0; choice(value, i).name; ++i) {
+    if (choice(value, i).value == value) return choice(value, i).name;
   }
   return "?";
 }
@@ -130,12 +130,12 @@ void parse(std::string_view name, std::string_view text, bool& value) {
 template <typename Enum>
 void parse(std::string_view name, std::string_view text, Enum& value) {
   std::string allowed;
-  for (int i = 0; kChoices(value, i).name; ++i) {
-    if (text == kChoices(value, i).name) {
-      value = kChoices(value, i).value;
+  for (int i = 0; choice(value, i).name; ++i) {
+    if (text == choice(value, i).name) {
+      value = choice(value, i).value;
       return;
     }
-    allowed += std::string(i ? ", " : "one of ") + kChoices(value, i).name;
+    allowed += std::string(i ? ", " : "one of ") + choice(value, i).name;
   }
   refuse(name, text, allowed);
 }

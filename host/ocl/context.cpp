@@ -184,8 +184,8 @@ const cl::Program& Context::program(const std::string& file, const Defines& defi
 }
 
 cl::Program Context::created(const ProgramSource& source) const {
-  if (!folder_) return cl::Program(context_, source.text);
-  return cl::Program(context_, {device_}, {folder_->binary(source)});
+  if (!folder_) return {context_, source.text};
+  return {context_, {device_}, {folder_->binary(source)}};
 }
 
 std::vector<std::pair<ProgramSource, cl::Program>> Context::programs() const {

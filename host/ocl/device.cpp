@@ -133,7 +133,7 @@ std::vector<Device> Device::list() {
       continue;  // a platform without a device
     }
     for (const cl::Device& device : found) {
-      devices.push_back(Device(std::make_shared<const Handle>(Handle::of(device))));
+      devices.emplace_back(std::make_shared<const Handle>(Handle::of(device)));
     }
   }
   std::stable_sort(devices.begin(), devices.end(), [](const Device& a, const Device& b) {

@@ -48,7 +48,7 @@ std::string read(const std::filesystem::path& file) {
 }
 
 Json read_manifest(const std::filesystem::path& file) {
-  const Json manifest = Json::parse(read(file), nullptr, /*allow_exceptions=*/false);
+  Json manifest = Json::parse(read(file), nullptr, /*allow_exceptions=*/false);
   if (manifest.is_discarded() || !manifest.is_object()) {
     throw InvalidArgument(file.string() + ": is no manifest of programs" + kRemedy);
   }

@@ -40,7 +40,7 @@ cl::Buffer buffer_in_svm(const cl::Context& context, const cl::Device& device, c
                           " of a pair: left image, then right image, without gaps");
   }
   if (status != CL_SUCCESS) throw cl::Error(status, "clCreateBuffer");
-  const cl::Buffer buffer(memory);
+  cl::Buffer buffer(memory);
   if (!uses_svm(buffer)) {
     throw InvalidArgument(
         "enqueue: the images' pointer is not what clSVMAlloc returned in the queue's context: give that, or a cl_mem");

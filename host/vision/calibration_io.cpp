@@ -90,6 +90,7 @@ std::vector<double> parse_numbers(const Entries& entries, const Entry& entry, st
                    std::to_string(count) + "; is the row complete?");
   }
   std::vector<double> numbers;
+  numbers.reserve(count);
   for (std::string_view token : tokens) numbers.push_back(parse_finite(entries, entry, token));
   return numbers;
 }

@@ -347,7 +347,7 @@ std::vector<StereoFrame> open_pair(const NameParts& left, const NameParts& right
     if (!is_file(file)) throw InvalidArgument(file.string() + ": no such image; give an existing PNG file");
   }
   return select_frames(
-      {0}, {0}, range, what, [&](int) { return left_file; }, [&](int) { return right_file; });
+      {0}, {0}, range, what, [&](int) { return fs::path(left_file); }, [&](int) { return fs::path(right_file); });
 }
 
 }  // namespace
@@ -493,7 +493,7 @@ cv::Size check_image_sizes(const StereoSequence& sequence) {
 
 std::vector<Eigen::Isometry3d> poses_of_frames(const StereoSequence& sequence, const fs::path& poses_file) {
   std::vector<Eigen::Isometry3d> rows = read_poses(poses_file);
-  const std::size_t last = static_cast<std::size_t>(sequence.frames.back().number);
+  const auto last = static_cast<std::size_t>(sequence.frames.back().number);
   if (rows.size() > last) {
     std::vector<Eigen::Isometry3d> poses;
     for (const StereoFrame& frame : sequence.frames) poses.push_back(rows[static_cast<std::size_t>(frame.number)]);

@@ -99,7 +99,8 @@ Sums correlate(const Patch& patch, const float* region, float column, float row)
 
 // Root of the summed squared deviation of the region's values, whole pixels from (column, row).
 float deviation(const float* region, float column, float row) {
-  const float* first = region + static_cast<int>(row + 0.5f) * kRegionStride + static_cast<int>(column + 0.5f);
+  const auto nearest = [](float position) { return static_cast<int>(std::floor(position + 0.5f)); };
+  const float* first = region + nearest(row) * kRegionStride + nearest(column);
   float sum[kPatchRows] = {}, sum2[kPatchRows] = {};
   for (int i = 0; i < kPatchRows; ++i) {
     const float* values = first + i * kRegionStride;

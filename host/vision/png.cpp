@@ -113,7 +113,7 @@ cv::Size parse_png_size(std::string_view bytes, const std::filesystem::path& fil
                           " is larger than the limit of " + std::to_string(kMaxImageSide) + " a side and " +
                           std::to_string(kMaxImagePixels) + " pixels; give a smaller one");
   }
-  return cv::Size(static_cast<int>(width), static_cast<int>(height));
+  return {static_cast<int>(width), static_cast<int>(height)};
 }
 
 cv::Mat decode_png(std::string_view bytes, const std::filesystem::path& file) {

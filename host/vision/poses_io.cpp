@@ -58,6 +58,7 @@ std::vector<Eigen::Isometry3d> read_poses(const std::filesystem::path& file) {
   while (!rows.empty() && trim(rows.back().text).empty()) rows.pop_back();
   if (rows.empty()) throw InvalidArgument(file.string() + ": holds no poses; give a row of 12 numbers per frame");
   std::vector<Eigen::Isometry3d> poses;
+  poses.reserve(rows.size());
   for (const TextRow& row : rows) poses.push_back(parse_pose(file, row));
   return poses;
 }

@@ -87,7 +87,7 @@ Road::Place Road::locate(double x, double z) const {
 }
 
 Street::Street(const SyntheticOptions& o)
-    : options(o), focal_px(0.58 * o.width), road(o, road_end_m(o)), dome_centre(0, 300), dome_radius_m(600) {
+    : options(o), focal_px(0.58 * o.width), road(o, road_end_m(o)), dome_centre(0, 300) {
   const double driven_m = o.frames * o.speed_m;
   if (driven_m > 500) {
     dome_centre = road.at(driven_m / 2);

@@ -80,7 +80,7 @@ struct Street {
   double focal_px;
   Road road;
   Eigen::Vector2d dome_centre;  // (x, z); its height is 0
-  double dome_radius_m;
+  double dome_radius_m = 600;
 
  private:
   void build();

@@ -23,7 +23,7 @@ double power_of_two(int exponent) {
 float value_noise(double x, double y, uint32_t seed) {
   const double fx = std::floor(x), fy = std::floor(y);
   const auto ix = static_cast<int32_t>(fx), iy = static_cast<int32_t>(fy);
-  float a = static_cast<float>(x - fx), b = static_cast<float>(y - fy);
+  auto a = static_cast<float>(x - fx), b = static_cast<float>(y - fy);
   a = a * a * (3 - 2 * a), b = b * b * (3 - 2 * b);
   const float top = lattice(ix, iy, seed) * (1 - a) + lattice(ix + 1, iy, seed) * a;
   const float bottom = lattice(ix, iy + 1, seed) * (1 - a) + lattice(ix + 1, iy + 1, seed) * a;

@@ -12,6 +12,8 @@
 #include <cstdlib>
 #include <map>
 #include <mutex>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -30,7 +32,7 @@ int context_to_fail = -1, last_good_command = 0;
 std::atomic<int> contexts_created = 0, commands_of_it = 0;
 std::atomic<cl_context> failing_context = nullptr;
 
-std::atomic<bool> sources_forbidden = false;
+std::atomic<bool> sources_forbidden = false, builds_are_reused = false;
 std::atomic<long> references = 0;
 std::atomic<long> buffers_created = 0;
 std::atomic<int> transfers = 0;
@@ -123,15 +125,62 @@ cl_program CL_API_CALL create_program_of_binary(cl_context c, cl_uint n, const c
                                                 const unsigned char** b, cl_int* s, cl_int* e) {
   return fails() ? refuse<cl_program>(e) : counted(next->clCreateProgramWithBinary(c, n, d, l, b, s, e));
 }
+// PoCL 3.1 takes 25 ms to find a program in its cache, as it parses the source first. Where builds are reused, a source
+// that was built before with the same options, for one device, is built of that binary instead, and its kernels are
+// those of this second program, which lives as long as the first.
+std::mutex builds_mutex;
+std::map<std::pair<std::string, std::string>, std::vector<unsigned char>> binaries;  // of source and options
+std::map<cl_program, cl_program> stand_ins;
+
+std::string source_of(cl_program program) {
+  size_t size = 0;
+  next->clGetProgramInfo(program, CL_PROGRAM_SOURCE, 0, nullptr, &size);
+  std::string source(size, 0);
+  next->clGetProgramInfo(program, CL_PROGRAM_SOURCE, size, source.data(), nullptr);
+  return source;
+}
+std::vector<unsigned char> binary_of(cl_program program) {
+  size_t size = 0;
+  next->clGetProgramInfo(program, CL_PROGRAM_BINARY_SIZES, sizeof size, &size, nullptr);
+  std::vector<unsigned char> binary(size);
+  unsigned char* bytes = binary.data();
+  next->clGetProgramInfo(program, CL_PROGRAM_BINARIES, sizeof bytes, &bytes, nullptr);
+  return binary;
+}
+cl_program built_of(const std::vector<unsigned char>& binary, cl_program program, cl_device_id device,
+                    const char* options) {
+  cl_context context = nullptr;
+  next->clGetProgramInfo(program, CL_PROGRAM_CONTEXT, sizeof context, &context, nullptr);
+  const unsigned char* bytes = binary.data();
+  const size_t size = binary.size();
+  const cl_program built = next->clCreateProgramWithBinary(context, 1, &device, &size, &bytes, nullptr, nullptr);
+  if (built) next->clBuildProgram(built, 1, &device, options, nullptr, nullptr);
+  return built;
+}
+cl_program stand_in(cl_program program) {
+  const std::lock_guard lock(builds_mutex);
+  const auto found = stand_ins.find(program);
+  return found == stand_ins.end() ? program : found->second;
+}
 cl_int CL_API_CALL build(cl_program p, cl_uint n, const cl_device_id* d, const char* o,
                          void(CL_CALLBACK* f)(cl_program, void*), void* u) {
-  return fails() ? status : next->clBuildProgram(p, n, d, o, f, u);
+  if (fails()) return status;
+  if (!builds_are_reused || n != 1) return next->clBuildProgram(p, n, d, o, f, u);
+  const std::lock_guard lock(builds_mutex);
+  std::vector<unsigned char>& binary = binaries[{source_of(p), o ? o : ""}];
+  if (!binary.empty()) {
+    stand_ins[p] = built_of(binary, p, *d, o);
+    return CL_SUCCESS;
+  }
+  const cl_int result = next->clBuildProgram(p, n, d, o, f, u);
+  if (result == CL_SUCCESS) binary = binary_of(p);
+  return result;
 }
 cl_int CL_API_CALL program_info(cl_program p, cl_program_info i, size_t n, void* v, size_t* s) {
-  return fails() ? status : next->clGetProgramInfo(p, i, n, v, s);
+  return fails() ? status : next->clGetProgramInfo(stand_in(p), i, n, v, s);
 }
 cl_kernel CL_API_CALL create_kernel(cl_program p, const char* n, cl_int* e) {
-  return fails() ? refuse<cl_kernel>(e) : counted(next->clCreateKernel(p, n, e));
+  return fails() ? refuse<cl_kernel>(e) : counted(next->clCreateKernel(stand_in(p), n, e));
 }
 cl_int CL_API_CALL device_info(cl_device_id d, cl_device_info i, size_t n, void* v, size_t* s) {
   if (fails()) return status;
@@ -266,6 +315,16 @@ cl_int CL_API_CALL release_queue(cl_command_queue queue) {
   return release<&cl_icd_dispatch::clReleaseCommandQueue>(queue);
 }
 
+cl_int CL_API_CALL release_program(cl_program program) {
+  cl_uint owners = 0;
+  next->clGetProgramInfo(program, CL_PROGRAM_REFERENCE_COUNT, sizeof owners, &owners, nullptr);
+  if (owners == 1) {
+    const std::lock_guard lock(builds_mutex);
+    if (const auto found = stand_ins.extract(program)) next->clReleaseProgram(found.mapped());
+  }
+  return release<&cl_icd_dispatch::clReleaseProgram>(program);
+}
+
 void unknown_call() {
   std::fputs("the fault layer does not know an OpenCL call that this program makes: add it\n", stderr);
   std::abort();
@@ -280,6 +339,7 @@ extern "C" void fault_arm(int at, int code, int how) {
   kind = how == 2 ? kRelease : how == 1 ? kLater : kAtOnce;
 }
 extern "C" void fault_forbid_sources(int forbidden) { sources_forbidden = forbidden != 0; }
+extern "C" void fault_reuse_builds(int reused) { builds_are_reused = reused != 0; }
 extern "C" void fault_separate_memory(int separate) { separate_memory = separate; }
 extern "C" void fault_hide_svm(int hidden) { svm_is_hidden = hidden; }
 extern "C" int fault_releases() { return releases; }
@@ -358,6 +418,7 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   COUNT(Kernel, cl_kernel);
   COUNT(Event, cl_event);
 #undef COUNT
+  layer.clReleaseProgram = release_program;
   layer.clRetainCommandQueue = retain_queue;
   layer.clReleaseCommandQueue = release_queue;
   *count = sizeof(layer) / sizeof(void*);

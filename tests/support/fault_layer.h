@@ -21,6 +21,7 @@ struct FaultLayer {
   /// `code` after it was done. -1: none.
   void (*arm)(int at, int code, int how);
   void (*forbid_sources)(int forbidden);  // 1: no program can be made of its source from now on
+  void (*reuse_builds)(int reused);       // 1: a program built before is taken from its binary from now on, at once
   void (*separate_memory)(int separate);  // 1: devices say from now on that they have memory of their own
   void (*hide_svm)(int hidden);           // 1: devices do not know shared virtual memory from now on
   int (*calls)();                         // since `arm`: calls that can fail,
@@ -37,6 +38,7 @@ struct FaultLayer {
     if (!layer) throw std::runtime_error(std::string("run this test with OPENCL_LAYERS=") + file);
     find(layer, "fault_arm", arm);
     find(layer, "fault_forbid_sources", forbid_sources);
+    find(layer, "fault_reuse_builds", reuse_builds);
     find(layer, "fault_separate_memory", separate_memory);
     find(layer, "fault_hide_svm", hide_svm);
     find(layer, "fault_calls", calls);
