@@ -21,6 +21,7 @@
 #include "host/ocl/device_handle.h"
 #include "host/ocl/errors.h"
 #include "host/output_variance.h"
+#include "host/prediction_check.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -88,6 +89,9 @@ class Chain {
         speckle_removal_(context, size_, {}),
         sad_check_(context, size_, PixelType::kU8, {.max_difference = 20.0f}),
         kalman_update_(context, size_, {}),
+        prediction_check_(context, size_, {}),
+        before_(context, 1),
+        after_(context, 1),
         output_variance_(context, size_, {}),
         variance_(context, 2 * pixel_count(size_)),
         dynamic_map_(context, size_, {}) {
@@ -95,6 +99,7 @@ class Chain {
     belief_.disparity.write(context, street.disparity);
     belief_.variance.write(context, street.variance);
     full_band_.full_range();
+    prediction_check_(nullptr, predicted_, matched_, before_);
     predicted_.variance = filled_.variance = rejected_.variance = warped_.variance;  // taken over, run after run
     for (int pass = 0; pass < 2; ++pass) {  // fills the maps, and pays for what only a first launch costs
       for (const Stage& stage : stages()) stage.enqueue();
@@ -126,7 +131,8 @@ class Chain {
          searched},
         {"MedianFilter", [this] { median_filter_(matched_, Holes::kLeave); }, 2 * map},
         {"SpeckleRemoval", [this] { speckle_removal_(matched_); }, map},
-        {"KalmanUpdate", [this] { kalman_update_(predicted_, matched_, updated_); }, 3 * maps},
+        {"KalmanUpdate", [this] { kalman_update_(before_, updated_, predicted_, matched_, updated_); }, 3 * maps},
+        {"PredictionCheck", [this] { prediction_check_(&before_, predicted_, matched_, after_); }, map / 4},
         {"DynamicMap", [this] { dynamic_map_(&predicted_, matched_, warped_); }, 4 * map + grey / 2},
         {"OutputVariance", [this] { output_variance_(updated_, 2, warped_, variance_); }, 9 * map},
         {"SadCheck", [this] { sad_check_(images_.pixels, updated_, checked_); }, grey + 2 * maps},
@@ -174,6 +180,8 @@ class Chain {
   SpeckleRemoval speckle_removal_;
   SadCheck sad_check_;
   KalmanUpdate kalman_update_;
+  PredictionCheck prediction_check_;
+  PredictionCheck::State before_, after_;
   OutputVariance output_variance_;
   ocl::Buffer<float> variance_;
   DynamicMap dynamic_map_;

@@ -20,14 +20,16 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       gate_px_(options.gate_px > 0 ? options.gate_px : std::numeric_limits<float>::max()),
       keep_predicted_(options.keep_predicted),
+      ask_neighbours_(options.ask_neighbours),
       min_variance_px2_(options.min_variance_px2),
       update_(build(context, pixels_), "update") {}
 
-void KalmanUpdate::operator()(const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated) {
+void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check, const StereoMaps& warped,
+                              const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated) {
   context_.enter("KalmanUpdate");
-  update_(context_, ocl::every_pixels(context_, size_, pixels_), size_, gate_px_, keep_predicted_, min_variance_px2_,
-          predicted.disparity, predicted.variance, measured.disparity, measured.variance, updated.disparity,
-          updated.variance);
+  update_(context_, ocl::every_pixels(context_, size_, pixels_), size_, gate_px_, keep_predicted_, ask_neighbours_,
+          min_variance_px2_, check, warped.disparity, predicted.disparity, predicted.variance, measured.disparity,
+          measured.variance, updated.disparity, updated.variance);
 }
 
 }  // namespace egosgm

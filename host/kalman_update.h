@@ -8,23 +8,27 @@
 namespace egosgm {
 
 /// Fuses prediction and measurement, pixel by pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the
-/// two differ by more than the gate, or only the measurement is there, the measurement is taken.
+/// two differ by more than the gate, or only the measurement is there, the measurement is taken, unless the pixels
+/// around, by what is both predicted and measured there, speak against it.
 class KalmanUpdate {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
 
-  /// REQUIRES: `updated` is neither `predicted` nor `measured`.
-  void operator()(const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated);
+  /// `check`: what PredictionCheck says of this frame. `warped`: predictions before any was dropped. REQUIRES:
+  /// `updated` is neither `predicted` nor `measured`; it may be `warped`.
+  void operator()(const ocl::Buffer<shared::PredictionState>& check, const StereoMaps& warped,
+                  const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
   const float gate_px_;
-  const cl_int keep_predicted_;
+  const cl_int keep_predicted_, ask_neighbours_;
   const float min_variance_px2_;
-  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const float, const ocl::Buffer<float>,
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const cl_int, const float,
+              const ocl::Buffer<shared::PredictionState>, const ocl::Buffer<float>, const ocl::Buffer<float>,
               const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>,
               ocl::Buffer<float>>
       update_;

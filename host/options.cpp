@@ -57,8 +57,10 @@ void for_each(Options& o, Visit&& visit) {
   visit("speckle_removal.max_difference_px", o.speckle_removal.max_difference_px);
   visit("kalman_update.gate_px", o.kalman_update.gate_px);
   visit("kalman_update.keep_predicted", o.kalman_update.keep_predicted);
+  visit("kalman_update.ask_neighbours", o.kalman_update.ask_neighbours);
   visit("kalman_update.min_variance_px2", o.kalman_update.min_variance_px2);
   visit("dynamic_map.enabled", o.dynamic_map.enabled);
+  visit("prediction_check.enabled", o.prediction_check.enabled);
   visit("output_variance.enabled", o.output_variance.enabled);
   visit("output_variance.scale", o.output_variance.scale);
   visit("output_variance.roughness_weight", o.output_variance.roughness_weight);
@@ -161,6 +163,8 @@ PipelineOptions PipelineOptions::paper() {
   options.search_band.from_neighbours = false;
   options.coarse_match.enabled = false;
   options.kalman_update.gate_px = 0.0f;
+  options.kalman_update.ask_neighbours = false;
+  options.prediction_check.enabled = false;
   options.output_variance.enabled = false;
   return options;
 }

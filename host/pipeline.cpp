@@ -26,6 +26,7 @@
 #include "host/ocl/errors.h"
 #include "host/ocl/svm.h"
 #include "host/output_variance.h"
+#include "host/prediction_check.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -105,6 +106,7 @@ struct Pipeline::Impl {
   MedianFilter median_filter;
   SpeckleRemoval speckle_removal;
   KalmanUpdate kalman_update;
+  PredictionCheck prediction_check;
   OutputVariance output_variance;
   DynamicMap dynamic_map;
   std::array<FrameTransfer, kMaxUnderWay> transfers;
@@ -114,6 +116,7 @@ struct Pipeline::Impl {
   StereoMaps predicted, scratch;
   std::array<StereoMaps, 4> pool;  // the belief, the one to go back to, and what a frame takes of the rest:
   StereoMaps *measured = nullptr, *updated = nullptr;
+  std::array<PredictionCheck::State, 4> prediction_states;  // of each in the pool, as a belief
   Memory memory;
   std::vector<FrameUnderWay> under_way;    // the oldest first
   Clock::time_point collected;             // the last one before them
@@ -140,6 +143,7 @@ struct Pipeline::Impl {
         median_filter(context, size, options.median_filter),
         speckle_removal(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
         kalman_update(context, size, options.kalman_update),
+        prediction_check(context, size, options.prediction_check, tuning.row_group),
         output_variance(context, size, options.output_variance),
         dynamic_map(context, size, options.dynamic_map),
         transfers{{{context, size, range_of(options)}, {context, size, range_of(options)}}},
@@ -147,7 +151,8 @@ struct Pipeline::Impl {
         penalties(context, StepPenalties::plane_count(size)),
         predicted(context, size),
         scratch(context, size),
-        pool{{{context, size}, {context, size}, {context, size}, {context, size}}} {
+        pool{{{context, size}, {context, size}, {context, size}, {context, size}}},
+        prediction_states{{{context, 1}, {context, 1}, {context, 1}, {context, 1}}} {
     if (options.coarse_match.enabled && options.temporal && options.search == SearchMode::kBand) {
       coarse_match.emplace(context, size, options);
     }
@@ -163,9 +168,9 @@ struct Pipeline::Impl {
   }
 
   void predict(const Motion& motion) {
-    forward_warp(*memory.belief, motion, scratch);
-    search_band.find_ridges(scratch);
-    edge_rejection(scratch, predicted);
+    forward_warp(*memory.belief, motion, *updated);
+    search_band.find_ridges(*updated);
+    edge_rejection(*updated, predicted);
     hole_fill(predicted, scratch);
     consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);
   }
@@ -176,7 +181,7 @@ struct Pipeline::Impl {
     } else if (options.search == SearchMode::kFull) {
       search_band.full_range(predicted);
     } else {
-      search_band(predicted, coarse_match ? &(*coarse_match)(images) : nullptr);
+      search_band(predicted, coarse_match ? &(*coarse_match)(images) : nullptr, &prediction_state(*memory.belief));
     }
     stages_of(images.type).census(images.pixels, codes);
     stages_of(images.type).step_penalties(images.pixels, penalties);
@@ -200,10 +205,16 @@ struct Pipeline::Impl {
   }
 
   void update(const FrameImages& images) {
-    kalman_update(predicted, *measured, *updated);
+    prediction_check(&prediction_state(*memory.belief), predicted, *measured, prediction_state(*updated));
+    kalman_update(prediction_state(*updated), *updated, predicted, *measured, *updated);  // which held the warped map
     median_filter(*updated, Holes::kFill);
     consistency(*updated, options.consistency.update_px, OutsideView::kKeep, scratch);
     stages_of(images.type).sad_check(images.pixels, scratch, *updated);
+  }
+
+  /// What is known of the predictions of the frame that left, or will leave, `belief`.
+  PredictionCheck::State& prediction_state(const StereoMaps& belief) {
+    return prediction_states[&belief - pool.data()];
   }
 
   /// All that happens on the device. `reason`: see `full_range_reason`.
@@ -211,6 +222,7 @@ struct Pipeline::Impl {
                           const Wanted& wanted) {
     if (!reason) predict(*motion);
     const FrameImages& images = match(uploaded, reason);
+    if (reason) prediction_check(nullptr, predicted, *measured, prediction_state(*measured));
     if (!reason) update(images);
     const StereoMaps* result = reason ? measured : updated;
     const StereoMaps* prediction = reason ? nullptr : &predicted;

@@ -45,6 +45,7 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       gather_coarse_(build(context, row_group_), "gather_coarse"),
       bands_of_blocks_(build(context, row_group_), "bands_of_blocks"),
       bands_of_pixels_(build(context, row_group_), "bands_of_pixels"),
+      widen_(build(context, row_group_), "widen"),
       sum_rows_(build(context, row_group_), "sum_rows"),
       full_range_(build(context, row_group_), "full_range") {
   for (ocl::Buffer<shared::BlockRange>* ranges : {&block_ranges_, &ridges_, &none_}) {
@@ -68,7 +69,8 @@ void SearchBand::find_ridges(const StereoMaps& warped) {
                  ridges_);
 }
 
-void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* coarse) {
+void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* coarse,
+                            const ocl::Buffer<shared::PredictionState>* last) {
   context_.enter("SearchBand");
   const ocl::Range blocks = ocl::every_pixel(context_, blocks_);
   if (coarse) {
@@ -83,6 +85,7 @@ void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* coars
   bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}), size_, range_, options_.sigmas,
                    options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
                    options_.coarse_margin_px, found_, block_bands_, bands_);
+  if (last) widen_(context_, ocl::group_a_row(size_, 1), size_, whole(range_), *last, bands_);
   sum_rows_(context_, ocl::group_a_row(size_, row_group_), size_, predicted.disparity, bands_, cell_offsets_,
             row_sums_);
 }

@@ -24,8 +24,10 @@ class SearchBand {
   /// Looks for ridges in a prediction that nothing was dropped of yet, for the calls after it. Does nothing where
   /// ridge_step_px is 0.
   void find_ridges(const StereoMaps& warped);
-  /// Bands from the prediction and its ridges, and from what CoarseMatch found, where there is one.
-  void operator()(const StereoMaps& predicted, const StereoMaps* coarse = nullptr);
+  /// Bands from the prediction and its ridges, and from what CoarseMatch found, where there is one; the whole range
+  /// where `last`, what PredictionCheck said of the frame before, says that its predictions were wrong.
+  void operator()(const StereoMaps& predicted, const StereoMaps* coarse = nullptr,
+                  const ocl::Buffer<shared::PredictionState>* last = nullptr);
   /// Every pixel searches everything.
   void full_range();
   /// The same where there is a prediction that is not searched by: `row_sums` counts its pixels.
@@ -68,6 +70,9 @@ class SearchBand {
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
               const float, const float, const Ranges, const ocl::Buffer<shared::Band>, ocl::Buffer<shared::Band>>
       bands_of_pixels_;
+  ocl::Kernel<const shared::ImageSize, const shared::Band, const ocl::Buffer<shared::PredictionState>,
+              ocl::Buffer<shared::Band>>
+      widen_;
   ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
               ocl::Buffer<shared::RowSum>>
       sum_rows_;

@@ -8,7 +8,6 @@
 static inline Ints has_both(const Floats predicted, const Floats measured) {
   return (predicted > INVALID) & (measured > INVALID);
 }
-static inline Floats one_where(const Ints condition) { return condition ? (Floats)(1.0f) : (Floats)(0.0f); }
 
 // Of 2 EGOSGM_DYNAMIC_RADIUS + 1 pixels of the row: how many have both, and how many of those differ.
 kernel void count_rows(const ImageSize size, const float min_difference, global const float* predicted,

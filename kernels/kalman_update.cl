@@ -1,17 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two
 // contradict each other, by more than the gate or because the measurement escaped its band, the measurement is taken,
-// with a variance for which the next frame searches wide.
+// with a variance for which the next frame searches wide; unless the pixels around speak against it.
 #include "pixels.h"
 
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-kernel void update(const ImageSize size, const float gate, const int keep_predicted, const float min_variance,
+// What the pixels around say of a measurement and of the prediction `other`: how many measure the former, and how many
+// vouch for either, as their prediction and their measurement are near it.
+typedef struct {
+  Floats measuring, for_measured, for_other;
+} Support;
+
+static Support ask_around(const ImageSize size, const int x, const int y, const Floats measured, const Floats other,
+                          global const float* predictions, global const float* measurements) {
+  Support support = {0.0f, 0.0f, 0.0f};
+  const Floats near = EGOSGM_SUPPORT_PX;
+  for (int v = y - EGOSGM_SUPPORT_RADIUS; v <= y + EGOSGM_SUPPORT_RADIUS; v += EGOSGM_SUPPORT_STEP) {
+    if (v < 0 || v >= size.height) continue;
+    const size_t row = (size_t)v * size.width;
+    for (int u = x - EGOSGM_SUPPORT_RADIUS; u <= x + EGOSGM_SUPPORT_RADIUS; u += EGOSGM_SUPPORT_STEP) {
+      const Floats z = load_pixels(measurements + row, u, size.width);
+      const Floats d = load_pixels(predictions + row, u, size.width);
+      const Ints measures = fabs(z - measured) < near;
+      support.measuring += one_where(measures);
+      support.for_measured += one_where(measures & (fabs(d - measured) < near));
+      support.for_other += one_where((fabs(z - other) < near) & (fabs(d - other) < near));
+    }
+  }
+  return support;
+}
+
+// `check`: of this frame; wrong predictions would vouch for each other, and nobody is asked.
+// `warped`: the prediction before anything was dropped from it; may be `updated`. ask_neighbours: whether a prediction
+// that is nearer than what contradicts it stays, once, if more than twice as many of the pixels around vouch for it and
+// less than half measure the other; and whether a measurement goes that contradicts a dropped prediction, if none
+// vouches for it and less than EGOSGM_SUPPORT_MOST measure the same.
+kernel void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
+                   const float min_variance, global const PredictionState* check, global const float* warped,
                    global const float* predicted, global const float* predicted_variance, global const float* measured,
                    global const float* measured_variance, global float* updated, global float* updated_variance) {
   const int width = size.width;
-  const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width;
+  const int y = get_global_id(1);
+  const size_t view = (size_t)get_global_id(2) * size.height * width;
+  const size_t row = view + (size_t)y * width;
+  const int asks = ask_neighbours & (check->is_wrong == 0) & (check->was_wrong == 0);
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(predicted + row, x, width);
@@ -22,22 +56,36 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
     const Ints has_measurement = z > INVALID;
     const Floats escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
     const Ints has_both = has_prediction & has_measurement;
-    const Ints agrees = (fabs(z - d) <= gate) & (r < escaped);
-    const Ints fuses = has_both & agrees;
+    const Ints fuses = has_both & (fabs(z - d) <= gate) & (r < escaped);
     const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
 
     const Floats zero = 0.0f;
-    const Floats least = min_variance;
     const Floats sum = p + r;
     const Floats gain = sum > zero ? p / sum : zero;
     const Floats fused = d + gain * (z - d);
     const Floats fused_variance = (1.0f - gain) * p;
 
-    const Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
     const Floats contradicted = r < escaped ? escaped : r;
-    const Floats variance = fuses ? fused_variance : has_both ? contradicted : has_measurement ? r : p;
+    Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
+    Floats variance = fuses ? fused_variance : has_both ? contradicted : has_measurement ? r : p;
+
+    const Floats other = has_prediction ? d : load_pixels(warped + row, x, width);
+    const Ints was_dropped = (d <= INVALID) & (other > INVALID) & (fabs(z - other) > gate);
+    const Ints is_doubtful = has_measurement & (was_dropped | (has_prediction & !fuses & (p < escaped) & (z < other)));
+    if (asks && any_of(is_doubtful)) {
+      const Support support = ask_around(size, x, y, z, other, predicted + view, measured + view);
+      const Floats half_of_them = EGOSGM_SUPPORT_HALF;
+      const Floats most_of_them = EGOSGM_SUPPORT_MOST;
+      const Ints stays = is_doubtful & (z < other) & (2.0f * support.for_measured < support.for_other) &
+                         (support.measuring < half_of_them);
+      const Ints goes =
+          was_dropped & has_measurement & (support.for_measured <= zero) & (support.measuring < most_of_them);
+      value = stays ? other : goes ? INVALID : value;
+      variance = stays ? escaped : variance;
+    }
+    const Floats least = min_variance;
     const Floats bounded = variance < least ? least : variance;
     store_pixels(value, updated + row, x, width);
-    store_pixels((has_measurement | predicts) ? bounded : zero, updated_variance + row, x, width);
+    store_pixels(value > INVALID ? bounded : zero, updated_variance + row, x, width);
   }
 }

@@ -30,6 +30,16 @@ typedef int16 Ints;
 
 #define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
 
+// What conditions count as; and whether one holds in any pixel, for what most blocks need not do.
+static inline Floats one_where(const Ints condition) { return condition ? (Floats)(1.0f) : (Floats)(0.0f); }
+static inline int any_of(const Ints condition) {
+#if PIXELS == 1
+  return condition;
+#else
+  return any(condition);
+#endif
+}
+
 // Pixels x .. x + PIXELS - 1 of a row; what lies outside of it is invalid.
 static inline Floats load_pixels(global const float* row, const int x, const int width) {
 #if PIXELS == 1

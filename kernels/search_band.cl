@@ -477,6 +477,13 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
 
 #endif
 
+// Every pixel searches everything after predictions that were wrong. A work-item a row.
+kernel void widen(const ImageSize size, const Band band, global const PredictionState* last, global Band* bands) {
+  const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width;
+  const int count = last->is_wrong ? size.width : 0;
+  for (int x = 0; x < count; ++x) bands[row + x] = band;
+}
+
 // `band`: the one of every pixel.
 kernel void full_range(const ImageSize size, const DisparityRange range, const Band band, global Band* bands,
                        global uint* cell_offsets, global RowSum* row_sums) {

@@ -60,13 +60,26 @@ typedef float f32;
 // next frame searches wide around it.
 #define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
 
-// OutputVariance: the filter's variance, each value cut, at every fourth pixel of the surroundings; the sum of two second
-// differences of disparities, each cut, at every pixel nearer by.
+// OutputVariance: the filter's variance, each value cut, at every fourth pixel of the surroundings; the sum of two
+// second differences of disparities, each cut, at every pixel nearer by.
 #define EGOSGM_VARIANCE_RADIUS 8
 #define EGOSGM_VARIANCE_STEP 4
 #define EGOSGM_MAX_MEAN_VARIANCE_PX2 4.0f
 #define EGOSGM_ROUGHNESS_RADIUS 3
 #define EGOSGM_MAX_ROUGHNESS_PX 2.0f
+
+// KalmanUpdate asks every fourth pixel this far to all sides: 25. Near is what differs by less than this.
+#define EGOSGM_SUPPORT_RADIUS 8
+#define EGOSGM_SUPPORT_STEP 4
+#define EGOSGM_SUPPORT_PX 2.0f
+// A measurement that at least so many of them have too stands against a prediction, or against none that vouches.
+#define EGOSGM_SUPPORT_HALF 13
+#define EGOSGM_SUPPORT_MOST 18
+
+// PredictionCheck looks at every so many rows of the left view. Prediction and measurement differ where they do by more
+// than this.
+#define EGOSGM_CHECKED_ROWS 4
+#define EGOSGM_CHECKED_DIFFERENCE_PX 1.0f
 
 // DynamicMap looks this many pixels to all sides, and believes this many of the window that have a prediction and a
 // measurement: a third of it.
@@ -117,6 +130,19 @@ typedef struct {
   u32 count;
 } BlockRange;
 
+// Of the pixels that PredictionCheck looks at: those with a prediction, those that have a measurement too, and those
+// among them where the two differ.
+typedef struct {
+  u32 predicted, both, differing;
+} PredictionCounts;
+
+// What PredictionCheck says of a frame's predictions: their counts, whether they were wrong, and whether those of the
+// frame before were.
+typedef struct {
+  PredictionCounts counts;
+  u32 is_wrong, was_wrong;
+} PredictionState;
+
 // What a sweep of BandedSgm needs to know.
 typedef struct {
   i32 width, height;
@@ -141,7 +167,8 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 12 &&
-                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 40 && sizeof(DisparityMotion) == 84,
+                  sizeof(BlockRange) == 12 && sizeof(PredictionState) == 20 && sizeof(SgmParameters) == 40 &&
+                  sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

@@ -13,14 +13,20 @@ namespace {
 
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
-testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& predicted,
-                         const testing::HostMaps& measured, int pixels = 0) {
+/// `in_place`: the warped map lies where the updated one will.
+testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& warped,
+                         const testing::HostMaps& predicted, const testing::HostMaps& measured, int pixels = 0,
+                         bool in_place = false, const shared::PredictionState& check = {}) {
   ocl::Context context(testing::any_device());
   KalmanUpdate update(context, size, options, pixels);
+  const StereoMaps before = testing::upload(context, size, warped);
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const StereoMaps measurement = testing::upload(context, size, measured);
-  StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  update(prediction, measurement, out);
+  // What was there must not shine through.
+  StereoMaps out = testing::upload(context, size, in_place ? warped : testing::random_maps(size, 0, 9, 0.5, 99));
+  ocl::Buffer<shared::PredictionState> checked(context, 1);
+  checked.write(context, {check});
+  update(checked, in_place ? out : before, prediction, measurement, out);
   return testing::download(context, out);
 }
 
@@ -32,8 +38,10 @@ struct Estimate {
 constexpr Estimate kNothing{kNone, 0};
 
 Estimate update_pixel(const KalmanUpdateOptions& options, Estimate predicted, Estimate measured) {
-  const testing::HostMaps updated = update({1, 1}, options, {{predicted.disparity, kNone}, {predicted.variance, 0}},
-                                           {{measured.disparity, kNone}, {measured.variance, 0}});
+  const testing::HostMaps warped{{kNone, kNone}, {0, 0}};
+  const testing::HostMaps updated =
+      update({1, 1}, options, warped, {{predicted.disparity, kNone}, {predicted.variance, 0}},
+             {{measured.disparity, kNone}, {measured.variance, 0}});
   EXPECT_EQ(updated.disparity[1], kNone);
   EXPECT_EQ(updated.variance[1], 0);
   return {updated.disparity[0], updated.variance[0]};
@@ -43,18 +51,21 @@ class KalmanUpdateTest : public ::testing::TestWithParam<shared::ImageSize> {};
 
 TEST_P(KalmanUpdateTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
-  const testing::HostMaps predicted = testing::random_maps(size, -20, 20, 0.3, 6);
-  testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.3, 7);
+  // Few disparities, so that some pixels vouch for each other.
+  testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 6);
+  testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 7);
+  const testing::HostMaps warped = testing::random_maps(size, -8, 8, 0.3, 8);
   for (std::size_t i = 0; i < measured.disparity.size(); ++i) {
-    const bool both = measured.disparity[i] != kNone && predicted.disparity[i] != kNone;
-    if (both) measured.disparity[i] += predicted.disparity[i];
+    if (i % 7 == 0) predicted.variance[i] += EGOSGM_ESCAPED_VARIANCE_PX2;
+    if (i % 11 == 0) measured.variance[i] += EGOSGM_ESCAPED_VARIANCE_PX2;
+    if (i % 5 == 0 && measured.disparity[i] != kNone) measured.disparity[i] -= 6;
   }
   for (const KalmanUpdateOptions& options :
-       {KalmanUpdateOptions{}, KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
-    const testing::HostMaps expected = reference::kalman_update(options.gate_px, options.keep_predicted,
-                                                                options.min_variance_px2, predicted, measured);
+       {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false},
+        KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
+    const testing::HostMaps expected = reference::kalman_update(size, options, warped.disparity, predicted, measured);
     for (const int pixels : {1, 16}) {
-      const testing::HostMaps actual = update(size, options, predicted, measured, pixels);
+      const testing::HostMaps actual = update(size, options, warped, predicted, measured, pixels, pixels == 1);
       EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
           << "gate " << options.gate_px << ", by " << pixels;
       EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
@@ -92,6 +103,88 @@ TEST(KalmanUpdate, TakesWhatIsThere) {
   EXPECT_EQ(update_pixel({.keep_predicted = true}, {10, 5}, kNothing), (Estimate{10, 5}));
   EXPECT_EQ(update_pixel({.keep_predicted = false}, {10, 5}, kNothing), kNothing);
   EXPECT_EQ(update_pixel({}, kNothing, kNothing), kNothing);
+}
+
+/// 21x21 pixels: all have `around` as prediction and measurement, but for the pixel in the middle.
+struct Surroundings {
+  static constexpr shared::ImageSize kSize{21, 21};
+  static constexpr int kMiddle = 10 * 21 + 10;
+  testing::HostMaps warped, predicted, measured;
+
+  explicit Surroundings(float around) : predicted(all(around)), measured(all(around)) { warped = predicted; }
+
+  static testing::HostMaps all(float disparity) {
+    const std::size_t pixels = 2 * kSize.width * kSize.height;
+    return {std::vector<float>(pixels, disparity), std::vector<float>(pixels, 1)};
+  }
+  Estimate updated_in_the_middle(const KalmanUpdateOptions& options = {},
+                                 const shared::PredictionState& check = {}) const {
+    const testing::HostMaps updated = update(kSize, options, warped, predicted, measured, 0, false, check);
+    return {updated.disparity[kMiddle], updated.variance[kMiddle]};
+  }
+  /// Measures `disparity` in every row from `row` on.
+  void measure_from(int row, float disparity) {
+    for (int i = row * kSize.width; i < kSize.width * kSize.height; ++i) measured.disparity[i] = disparity;
+  }
+};
+
+constexpr float kEscaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+
+TEST(KalmanUpdate, KeepsAPredictionThatTheNeighboursVouchForOnce) {
+  Surroundings maps(20);
+  maps.measured.disparity[Surroundings::kMiddle] = 10;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 1, 0}), (Estimate{10, kEscaped})) << "the predictions are wrong";
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 0, 1}), (Estimate{10, kEscaped})) << "they were";
+  maps.predicted.variance[Surroundings::kMiddle] = kEscaped;  // was kept before
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kEscaped}));
+}
+
+TEST(KalmanUpdate, TakesWhatComesNearerOrWhatMostMeasure) {
+  Surroundings nearer(20);
+  nearer.measured.disparity[Surroundings::kMiddle] = 30;
+  EXPECT_EQ(nearer.updated_in_the_middle(), (Estimate{30, kEscaped}));
+  Surroundings most(20);
+  most.measure_from(10, 10);  // three of five rows
+  EXPECT_EQ(most.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  Surroundings few(20);
+  few.measure_from(14, 10);
+  few.measured.disparity[Surroundings::kMiddle] = 10;
+  EXPECT_EQ(few.updated_in_the_middle(), (Estimate{20, kEscaped}));
+}
+
+TEST(KalmanUpdate, DropsWhatNoneSpeaksForWhereADroppedPredictionContradicts) {
+  Surroundings maps(20);
+  maps.predicted.disparity[Surroundings::kMiddle] = kNone;
+  maps.measured.disparity[Surroundings::kMiddle] = 30;
+  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
+  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{30, 1}));
+  maps.warped.disparity[Surroundings::kMiddle] = 28;  // within the gate
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
+  maps.warped.disparity[Surroundings::kMiddle] = kNone;  // nothing was there
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
+  maps.warped.disparity[Surroundings::kMiddle] = 20;
+  maps.predicted.disparity[2 * 21 + 2] = maps.measured.disparity[2 * 21 + 2] = 31;  // one vouches
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
+}
+
+TEST(KalmanUpdate, TakesWhatMostMeasureThoughNoneVouches) {
+  Surroundings maps(20);
+  maps.predicted.disparity[Surroundings::kMiddle] = kNone;
+  maps.measure_from(6, 30);                  // four of five rows,
+  maps.measured.disparity[6 * 21 + 2] = 20;  // but for two pixels: 18 of 25
+  maps.measured.disparity[6 * 21 + 6] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
+  maps.measured.disparity[6 * 21 + 14] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
+}
+
+TEST(KalmanUpdate, KeepsADroppedPredictionThatTheNeighboursVouchFor) {
+  Surroundings maps(20);
+  maps.predicted.disparity[Surroundings::kMiddle] = kNone;
+  maps.measured.disparity[Surroundings::kMiddle] = 10;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kEscaped}));
 }
 
 TEST(KalmanUpdate, NeverClaimsMoreThanTheFloor) {

@@ -161,6 +161,25 @@ TEST(PipelineScene, ReachesEveryStage) {
   EXPECT_TRUE(differ(second.fused_smoothed, second.fused_consistent));
 }
 
+TEST(Pipeline, SearchesEverythingAfterAWrongPrediction) {
+  const Setting setting = standard();
+  const Video video(setting, 6);
+  Pipeline pipeline = make_pipeline(setting);
+  reference::Pipeline twin = make_twin(setting);
+  constexpr int kWrong = 2;
+  for (int index = 0; index < video.size(); ++index) {
+    SCOPED_TRACE("frame " + std::to_string(index));
+    Motion motion = video.motion(index);
+    if (index == kWrong) motion.current_from_previous.translation().z() -= 1;
+    const reference::Frame expected = twin.process(video.twin_images(index), video.twin_motions(motion));
+    const Result actual = process(pipeline, setting, video, index, motion);
+    expect_outputs(actual.outputs, expected, setting.size);
+    expect_report(actual.report, expected, setting);
+    EXPECT_EQ(actual.report.predicted_fraction > 0.5, index != 0);
+    EXPECT_EQ(actual.report.search_fraction == 1, index == 0 || index == kWrong + 1);
+  }
+}
+
 TEST(Pipeline, FindsTheTrueDisparities) {
   Setting setting = standard();
   for (const double doffs_px : {0.0, 12.25}) {

@@ -26,9 +26,7 @@ struct HoleFillOptions {
   float max_difference_px = 1.0f;  // gamma (eqs. 7-8): neighbours that differ by less fill the gap between them
 };
 struct ConsistencyCheckOptions {
-  float prediction_px = 3.0f;   // largest left-right difference of the prediction,
-  float measurement_px = 3.0f;  // of the measurement,
-  float update_px = 3.0f;       // and of the update
+  float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
 };
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
@@ -43,8 +41,7 @@ struct SearchBandOptions {
   int neighbour_min_count = 8;     // with fewer predictions than this around, the whole range
   float neighbour_margin_px = 4.0f;
   // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
-  float coarse_tolerance_px = 3.0f;
-  float coarse_margin_px = 2.0f;
+  float coarse_tolerance_px = 3.0f, coarse_margin_px = 2.0f;
   float ridge_step_px = 0.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
 };
 
@@ -55,14 +52,12 @@ struct BandedSgmOptions {
   // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: p2 - p2_slope * g, but not
   // below p2_at_edges (nor above p2).
   int p2 = 170;  // p1 <= p2 <= 190
-  int p2_at_edges = 70;
-  int p2_slope = 2;
+  int p2_at_edges = 70, p2_slope = 2;
   // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved)
   // path sums above the minimum add up to s_max, at most 8 a side.
   int s_max = 80;
   float variance_floor_px2 = 0.15f;
-  float variance_per_step_px2 = 0.1f;
-  float variance_per_square_px2 = 0.045f;
+  float variance_per_step_px2 = 0.1f, variance_per_square_px2 = 0.045f;
   Scheduling scheduling = Scheduling::kAutomatic;
   // Memory for the path sums. An image that needs more is matched in horizontal stripes that overlap by 32 rows, almost
   // as well (docs/reliability.md). 0: what the device has.
@@ -86,7 +81,12 @@ struct SpeckleRemovalOptions {
 struct KalmanUpdateOptions {
   float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
+  bool ask_neighbours = true;  // which of the two they speak for, instead; what none speaks for is dropped
   float min_variance_px2 = 0.02f;
+};
+struct PredictionCheckOptions {
+  bool enabled =
+      true;  // after a frame whose predictions were wrong (a gap, a wrong motion), the next searches everything
 };
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
@@ -116,6 +116,7 @@ struct EGOSGM_EXPORT PipelineOptions {
   SadCheckOptions sad_check;
   SpeckleRemovalOptions speckle_removal;
   KalmanUpdateOptions kalman_update;
+  PredictionCheckOptions prediction_check;
   OutputVarianceOptions output_variance;
   DynamicMapOptions dynamic_map;
 

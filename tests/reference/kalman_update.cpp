@@ -21,24 +21,80 @@ Estimate fuse(const Estimate& predicted, const Estimate& measured) {
   return {predicted.disparity + gain * (measured.disparity - predicted.disparity), (1 - gain) * predicted.variance};
 }
 
-Estimate update(float gate_px, bool keep_predicted, const Estimate& predicted, const Estimate& measured) {
-  if (!is_valid(measured)) return keep_predicted ? predicted : kNone;
-  if (!is_valid(predicted)) return measured;
-  const bool beyond_gate = gate_px > 0 && std::abs(measured.disparity - predicted.disparity) > gate_px;
-  if (!beyond_gate && measured.variance < EGOSGM_ESCAPED_VARIANCE_PX2) return fuse(predicted, measured);
-  return {measured.disparity, std::max(measured.variance, EGOSGM_ESCAPED_VARIANCE_PX2)};
+/// One view, and what the pixels of it say.
+class View {
+ public:
+  View(shared::ImageSize size, const float* predicted, const float* measured)
+      : size_(size), predicted_(predicted), measured_(measured) {}
+
+  /// Of the pixels around, those whose measurement is near `disparity`; and those whose prediction is, too.
+  int measuring(int x, int y, float disparity) const {
+    return count(x, y, [&](std::size_t i) { return is_near(measured_[i], disparity); });
+  }
+  int vouching(int x, int y, float disparity) const {
+    return count(x, y,
+                 [&](std::size_t i) { return is_near(measured_[i], disparity) && is_near(predicted_[i], disparity); });
+  }
+
+ private:
+  static bool is_near(float a, float b) { return a != EGOSGM_INVALID_DISPARITY && std::abs(a - b) < EGOSGM_SUPPORT_PX; }
+
+  template <typename Condition>
+  int count(int x, int y, Condition&& condition) const {
+    int found = 0;
+    for (int v = -2; v <= 2; ++v) {
+      for (int u = -2; u <= 2; ++u) {
+        const int column = x + u * EGOSGM_SUPPORT_STEP, row = y + v * EGOSGM_SUPPORT_STEP;
+        if (column < 0 || column >= size_.width || row < 0 || row >= size_.height) continue;
+        found += condition(static_cast<std::size_t>(row) * size_.width + column);
+      }
+    }
+    return found;
+  }
+
+  const shared::ImageSize size_;
+  const float *predicted_, *measured_;
+};
+
+bool contradict(float gate_px, float a, float b) { return gate_px > 0 && std::abs(a - b) > gate_px; }
+
+Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int y, float warped,
+                const Estimate& predicted, const Estimate& measured) {
+  if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
+  const float z = measured.disparity, escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+  // Less than half of the 25; less than 18.
+  const auto vouch = [&](float disparity) { return view.vouching(x, y, disparity); };
+  const auto stays = [&](float other) {
+    return options.ask_neighbours && z < other && 2 * vouch(z) < vouch(other) && 2 * view.measuring(x, y, z) < 25;
+  };
+  if (!is_valid(predicted)) {
+    if (warped == EGOSGM_INVALID_DISPARITY || !contradict(options.gate_px, z, warped)) return measured;
+    if (stays(warped)) return {warped, escaped};
+    const bool goes = options.ask_neighbours && vouch(z) == 0 && view.measuring(x, y, z) < 18;
+    return goes ? kNone : measured;
+  }
+  if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < escaped) {
+    return fuse(predicted, measured);
+  }
+  if (predicted.variance < escaped && stays(predicted.disparity)) return {predicted.disparity, escaped};
+  return {z, std::max(measured.variance, escaped)};
 }
 
 }  // namespace
 
-testing::HostMaps kalman_update(float gate_px, bool keep_predicted, float min_variance_px2,
-                                const testing::HostMaps& predicted, const testing::HostMaps& measured) {
+testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOptions& options,
+                                const std::vector<float>& warped, const testing::HostMaps& predicted,
+                                const testing::HostMaps& measured) {
   testing::HostMaps out = predicted;
-  for (std::size_t i = 0; i < out.disparity.size(); ++i) {
-    const Estimate estimate = update(gate_px, keep_predicted, {predicted.disparity[i], predicted.variance[i]},
-                                     {measured.disparity[i], measured.variance[i]});
+  const int pixels = size.width * size.height;
+  for (int i = 0; i < 2 * pixels; ++i) {
+    const int first = i / pixels * pixels;
+    const View view(size, &predicted.disparity[first], &measured.disparity[first]);
+    const Estimate estimate =
+        update(options, view, (i - first) % size.width, (i - first) / size.width, warped[i],
+               {predicted.disparity[i], predicted.variance[i]}, {measured.disparity[i], measured.variance[i]});
     out.disparity[i] = estimate.disparity;
-    out.variance[i] = is_valid(estimate) ? std::max(estimate.variance, min_variance_px2) : 0;
+    out.variance[i] = is_valid(estimate) ? std::max(estimate.variance, options.min_variance_px2) : 0;
   }
   return out;
 }

@@ -12,6 +12,7 @@
 #include "tests/reference/kalman_update.h"
 #include "tests/reference/median_filter.h"
 #include "tests/reference/output_variance.h"
+#include "tests/reference/prediction_check.h"
 #include "tests/reference/sad_check.h"
 #include "tests/reference/speckle_removal.h"
 #include "tests/reference/step_penalties.h"
@@ -42,6 +43,10 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     const VerticalOffset known = pass == 0 ? offset_ : frame.passes.back().offset;
     frame.vertical_offset_px = known.offset_px;
     frame.passes.push_back(match(images, frame, known));
+  }
+  if (options_.prediction_check.enabled) {
+    prediction_ =
+        check_prediction(size_, prediction_, frame.predicted.disparity, frame.passes.back().measured.disparity);
   }
   if (has_prediction) update(images, frame);
 
@@ -81,6 +86,10 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
                          : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse,
                                        frame.warped.disparity);
 
+  if (!everything && prediction_.is_wrong) {
+    pass.band = full_range(size_, range_, frame.predicted.disparity);
+  }
+
   const auto middle = pass.images.begin() + static_cast<std::ptrdiff_t>(pass.images.size() / 2);
   const std::vector<std::uint64_t> both[2] = {codes(size_, {pass.images.begin(), middle}, images.bits, sgm.cost),
                                               codes(size_, {middle, pass.images.end()}, images.bits, sgm.cost)};
@@ -113,9 +122,9 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
 
 void Pipeline::update(const Images& images, Frame& frame) const {
   const Pass& pass = frame.passes.back();
-  const KalmanUpdateOptions& kalman = options_.kalman_update;
-  frame.fused =
-      kalman_update(kalman.gate_px, kalman.keep_predicted, kalman.min_variance_px2, frame.predicted, pass.measured);
+  KalmanUpdateOptions kalman = options_.kalman_update;
+  kalman.ask_neighbours &= !prediction_.is_wrong && !prediction_.was_wrong;
+  frame.fused = kalman_update(size_, kalman, frame.warped.disparity, frame.predicted, pass.measured);
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
   frame.fused_consistent = consistency_check(size_, options_.consistency.update_px, true, frame.fused_smoothed);
   frame.updated = options_.sad_check.max_difference > 0 ? sad_check(size_, options_.sad_check, pass.images,

@@ -144,8 +144,8 @@ class Video {
     }
     return images;
   }
-  reference::ViewMotions twin_motions(int index) const {
-    Motion scaled = motion(index);
+  reference::ViewMotions twin_motions(int index) const { return twin_motions(motion(index)); }
+  reference::ViewMotions twin_motions(Motion scaled) const {
     scaled.covariance *= static_cast<double>(setting_.options.forward_warp.motion_noise);
     return {disparity_motion(calibration(), scaled, EGOSGM_LEFT),
             disparity_motion(calibration(), scaled, EGOSGM_RIGHT)};

@@ -15,6 +15,7 @@
 #include "host/kalman_update.h"
 #include "host/median_filter.h"
 #include "host/output_variance.h"
+#include "host/prediction_check.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -50,6 +51,7 @@ class StageChain {
         median_filter_(context_, size, options.median_filter),
         speckle_removal_(context_, size, options.speckle_removal),
         kalman_update_(context_, size, options.kalman_update),
+        prediction_check_(context_, size, options.prediction_check),
         output_variance_(context_, size, options.output_variance),
         dynamic_map_(context_, size, options.dynamic_map),
         sad_check_(context_, size, type, options.sad_check),
@@ -67,6 +69,8 @@ class StageChain {
       frame.passes.push_back(match(vertical_alignment_.realign(uploaded), has_prediction));
     }
     vertical_alignment_.commit();
+    prediction_check_(has_prediction ? &prediction_states_[frames_ % 2] : nullptr, predicted_, measured_,
+                      prediction_states_[(frames_ + 1) % 2]);
     ++frames_;
     if (has_prediction) update(frame);
     StereoMaps& result = has_prediction ? updated_ : measured_;
@@ -84,10 +88,10 @@ class StageChain {
   int code_padding() const { return BandedSgm::code_padding(range_of(options_)); }
 
   void predict(const Motion& motion, reference::Frame& frame) {
-    forward_warp_(belief_, motion, scratch_);
-    frame.warped = download(context_, scratch_);
-    search_band_.find_ridges(scratch_);
-    edge_rejection_(scratch_, predicted_);
+    forward_warp_(belief_, motion, updated_);
+    frame.warped = download(context_, updated_);
+    search_band_.find_ridges(updated_);
+    edge_rejection_(updated_, predicted_);
     frame.without_edges = download(context_, predicted_);
     hole_fill_(predicted_, scratch_);
     frame.filled = download(context_, scratch_);
@@ -102,7 +106,7 @@ class StageChain {
     if (has_prediction && options_.search == SearchMode::kBand) {
       const StereoMaps* coarse = options_.coarse_match.enabled ? &coarse_match_(images) : nullptr;
       if (coarse) pass.coarse = coarse->disparity.read(context_);
-      search_band_(predicted_, coarse);
+      search_band_(predicted_, coarse, &prediction_states_[frames_ % 2]);
     } else {
       has_prediction ? search_band_.full_range(predicted_) : search_band_.full_range();
     }
@@ -127,7 +131,7 @@ class StageChain {
   }
 
   void update(reference::Frame& frame) {
-    kalman_update_(predicted_, measured_, updated_);
+    kalman_update_(prediction_states_[frames_ % 2], updated_, predicted_, measured_, updated_);
     frame.fused = download(context_, updated_);
     median_filter_(updated_, Holes::kFill);
     frame.fused_smoothed = download(context_, updated_);
@@ -163,6 +167,7 @@ class StageChain {
   MedianFilter median_filter_;
   SpeckleRemoval speckle_removal_;
   KalmanUpdate kalman_update_;
+  PredictionCheck prediction_check_;
   OutputVariance output_variance_;
   DynamicMap dynamic_map_;
   SadCheck sad_check_;
@@ -171,6 +176,7 @@ class StageChain {
   ocl::Buffer<cl_uchar> penalties_;
   StereoMaps predicted_{context_, size_}, measured_{context_, size_}, scratch_{context_, size_},
       updated_{context_, size_}, belief_{context_, size_};
+  PredictionCheck::State prediction_states_[2]{{context_, 1}, {context_, 1}};
   const FrameImages* images_ = nullptr;
   bool has_belief_ = false;
   int frames_ = 0;

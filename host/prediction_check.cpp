@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/prediction_check.h"
+
+namespace egosgm {
+namespace {
+
+const cl::Program& build(ocl::Context& context, int row_group) {
+  context.enter("PredictionCheck");
+  return context.program("prediction_check.cl", ocl::Defines().set("ROW_GROUP", row_group));
+}
+
+int checked_rows(shared::ImageSize size) { return (size.height + EGOSGM_CHECKED_ROWS - 1) / EGOSGM_CHECKED_ROWS; }
+
+PredictionCheck::State none(ocl::Context& context) {
+  PredictionCheck::State state(context, 1);
+  state.write(context, {{}});
+  return state;
+}
+
+}  // namespace
+
+PredictionCheck::PredictionCheck(ocl::Context& context, shared::ImageSize size, const PredictionCheckOptions& options,
+                                 int row_group)
+    : context_((context.enter("PredictionCheck"), context)),
+      size_(size),
+      is_enabled_(options.enabled),
+      row_group_(row_group > 0 ? row_group : ocl::row_group(context)),
+      nothing_(none(context)),
+      row_counts_(context, checked_rows(size)),
+      count_rows_(build(context, row_group_), "count_rows"),
+      judge_(build(context, row_group_), "judge") {}
+
+void PredictionCheck::operator()(const State* before, const StereoMaps& predicted, const StereoMaps& measured,
+                                 State& after) {
+  context_.enter("PredictionCheck");
+  const cl_int rows = is_enabled_ && before ? checked_rows(size_) : 0;
+  if (rows > 0) {
+    count_rows_(context_, ocl::group_a_row({size_.width, rows}, row_group_, /*views=*/1), size_.width,
+                predicted.disparity, measured.disparity, row_counts_);
+  }
+  judge_(context_, {cl::NDRange(1), cl::NDRange(1)}, rows, row_counts_, before ? *before : nothing_, after);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// Whether a frame's predictions were right, by the left view: they were wrong where less than three quarters as many
+/// pixels have one as a frame before, or where the share of those that differ from the measurement by more than 1 px is
+/// more than twice as large, and 2 % of them. KalmanUpdate then does not ask the neighbours, in this frame and the
+/// next, and SearchBand lets the next one search everything: what a wrong prediction left must not hide what is there.
+class PredictionCheck {
+ public:
+  /// What is known of a frame's predictions: one element.
+  using State = ocl::Buffer<shared::PredictionState>;
+
+  /// `row_group`: work-items that share a row; 0: by the device. Same bits.
+  PredictionCheck(ocl::Context& context, shared::ImageSize size, const PredictionCheckOptions& options,
+                  int row_group = 0);
+
+  /// `before`: of the frame before; null: this one has no predictions.
+  void operator()(const State* before, const StereoMaps& predicted, const StereoMaps& measured, State& after);
+
+  /// Of a frame of which nothing is known.
+  const State& nothing() const { return nothing_; }
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const bool is_enabled_;
+  const int row_group_;
+  const State nothing_;
+  ocl::Buffer<shared::PredictionCounts> row_counts_;
+  ocl::Kernel<const cl_int, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<shared::PredictionCounts>>
+      count_rows_;
+  ocl::Kernel<const cl_int, const ocl::Buffer<shared::PredictionCounts>, const State, State> judge_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether a frame's predictions were right. A gap leaves many pixels without one, a wrong motion contradicts what is
+// measured, each far more than a frame before.
+#include "shared.h"
+
+#ifndef ROW_GROUP
+#error "ROW_GROUP: work-items that share a row"
+#endif
+
+// lint: ROW_GROUP=1
+// lint: ROW_GROUP=64
+
+// Counts of every EGOSGM_CHECKED_ROWS-th row. A work-group of ROW_GROUP a row.
+kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_rows(const int width,
+                                                                              global const float* predicted,
+                                                                              global const float* measured,
+                                                                              global PredictionCounts* row_counts) {
+  const int lane = get_local_id(0);
+  const size_t row = (size_t)get_global_id(1) * EGOSGM_CHECKED_ROWS * width;
+  local PredictionCounts lanes[ROW_GROUP];
+  uint with_prediction = 0;
+  uint with_both = 0;
+  uint that_differ = 0;
+  for (int x = lane; x < width; x += ROW_GROUP) {
+    const float d = predicted[row + x];
+    const float z = measured[row + x];
+    const int both = (d > EGOSGM_INVALID_DISPARITY) & (z > EGOSGM_INVALID_DISPARITY);
+    with_prediction += d > EGOSGM_INVALID_DISPARITY ? 1 : 0;
+    with_both += both;
+    that_differ += both & (fabs(z - d) > EGOSGM_CHECKED_DIFFERENCE_PX);
+  }
+  lanes[lane].predicted = with_prediction;
+  lanes[lane].both = with_both;
+  lanes[lane].differing = that_differ;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (lane == 0) {
+    PredictionCounts sum = lanes[0];
+    for (int i = 1; i < ROW_GROUP; ++i) {
+      sum.predicted += lanes[i].predicted;
+      sum.both += lanes[i].both;
+      sum.differing += lanes[i].differing;
+    }
+    row_counts[get_global_id(1)] = sum;
+  }
+}
+
+// Less than three quarters as many predictions as a frame before; or twice its share of contradictions and 2 % more.
+static inline int are_wrong(const PredictionCounts now, const PredictionCounts before) {
+  const ulong differing = (ulong)now.differing * before.both;
+  const ulong differed = (ulong)before.differing * now.both;
+  const ulong both = (ulong)now.both * before.both;
+  return before.both > 0 &&
+         (4 * (ulong)now.predicted < 3 * (ulong)before.predicted || differing > 2 * differed + both / 50);
+}
+
+kernel void judge(const int rows, global const PredictionCounts* row_counts, global const PredictionState* before,
+                  global PredictionState* after) {
+  PredictionCounts sum = {0, 0, 0};
+  for (int i = 0; i < rows; ++i) {
+    sum.predicted += row_counts[i].predicted;
+    sum.both += row_counts[i].both;
+    sum.differing += row_counts[i].differing;
+  }
+  after->counts = sum;
+  after->is_wrong = are_wrong(sum, before->counts);
+  after->was_wrong = before->is_wrong;
+}
