@@ -44,7 +44,6 @@ struct SearchBandOptions {
   float coarse_tolerance_px = 3.0f, coarse_margin_px = 2.0f;
   float ridge_step_px = 0.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
 };
-
 struct BandedSgmOptions {
   MatchingCost cost = MatchingCost::kCensus13x11;
   int paths = 8;  // 4 (horizontal and vertical) or 8

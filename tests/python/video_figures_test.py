@@ -67,7 +67,7 @@ def test_a_long_run_starts_again_at_a_place(monkeypatch):
 
     def play(video, numbers, **options):
         played.append(numbers)
-        report = type("Report", (), {"full_range": True})
+        report = type("Report", (), {"search_fraction": 1})
         return [(k, type("Frame", (), {"disparity": np.full((24, 48), 5 if k == 2 else 10, np.float32), "report": report})) for k in numbers]
     monkeypatch.setattr(figures, "play", play)
     video = type("Video", (Still,), {"truth": lambda self, k: np.full((24, 48), 10, np.float32)})()
