@@ -120,7 +120,7 @@ void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_fro
        landed, moved_key, moved_variance, zbuffer, predicted.variance);
   splat_disparity(context_, pixels, size_, landed, moved_key, zbuffer);
   splat_variance(context_, pixels, size_, landed, moved_key, moved_variance, zbuffer, predicted.variance);
-  decode(context_, pixels, size_, zbuffer, predicted.disparity);
+  decode(context_, pixels, size_, range_, zbuffer, predicted.disparity, predicted.variance);
 }
 
 }  // namespace egosgm

@@ -58,6 +58,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("kalman_update.gate_px", o.kalman_update.gate_px);
   visit("kalman_update.keep_predicted", o.kalman_update.keep_predicted);
   visit("kalman_update.ask_neighbours", o.kalman_update.ask_neighbours);
+  visit("kalman_update.innovation_sigmas", o.kalman_update.innovation_sigmas);
   visit("kalman_update.min_variance_px2", o.kalman_update.min_variance_px2);
   visit("dynamic_map.enabled", o.dynamic_map.enabled);
   visit("prediction_check.enabled", o.prediction_check.enabled);
@@ -164,6 +165,7 @@ PipelineOptions PipelineOptions::paper() {
   options.coarse_match.enabled = false;
   options.kalman_update.gate_px = 0.0f;
   options.kalman_update.ask_neighbours = false;
+  options.kalman_update.innovation_sigmas = 0.0f;
   options.prediction_check.enabled = false;
   options.output_variance.enabled = false;
   return options;

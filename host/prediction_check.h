@@ -23,9 +23,6 @@ class PredictionCheck {
   /// `before`: of the frame before; null: this one has no predictions.
   void operator()(const State* before, const StereoMaps& predicted, const StereoMaps& measured, State& after);
 
-  /// Of a frame of which nothing is known.
-  const State& nothing() const { return nothing_; }
-
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;

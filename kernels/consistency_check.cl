@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Left-right consistency: the left pixel x sees what the right pixel x - d sees, the right pixel x what the left pixel
-// x + d sees.
+// x + d sees. A pixel without a disparity keeps its variance, by which ForwardWarp says that it is hidden.
 #include "pixels.h"
 
 // lint: PIXELS=1

@@ -2,9 +2,11 @@
 // Forward warp of both views' disparity maps by the camera's motion (eqs. 1-6), nearest surface first.
 //
 // Several sources may land on one target. The largest disparity wins, of equal ones the one with the largest variance,
-// so the result does not depend on the order in which they come. GPUs, a pixel a work-item: disparities bid by atomic
-// maxima of keys that are ordered as they are, then variances do among the sources that reached the winner. CPUs, where
-// atomics are slow: a work-item owns a band of target rows and looks through the source rows that reach into it.
+// so the result does not depend on the order in which they come. What came nearer than the range still hides what is
+// behind it: such a target has no disparity, and the largest variance. GPUs, a pixel a work-item: disparities bid by
+// atomic maxima of keys that are ordered as they are, then variances do among the sources that reached the winner.
+// CPUs, where atomics are slow: a work-item owns a band of target rows and looks through the source rows that reach
+// into it.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -47,8 +49,7 @@ static inline Moved move_pixels(const ImageSize size, const DisparityRange range
   const Floats target_x = nearest(u + motion.cx);
   const Floats target_y = nearest(v + motion.cy);
   moved.lands = (disparity > INVALID) & (w > least_ratio) & (target_x >= zero) & (target_x < (Floats)(size.width)) &
-                (target_y >= zero) & (target_y < (Floats)(size.height)) & (moved.disparity >= (Floats)(range.min)) &
-                (moved.disparity <= (Floats)(range.min + range.count - 1));
+                (target_y >= zero) & (target_y < (Floats)(size.height)) & (moved.disparity >= (Floats)(range.min));
   moved.x = INTS_OF_FLOATS(moved.lands ? target_x : zero);
   moved.y = INTS_OF_FLOATS(moved.lands ? target_y : zero);
   const Floats p = phi * phi * variance + process_noise + motion_variance(motion, u, v, metric_disparity);
@@ -109,11 +110,15 @@ kernel void splat_variance(const ImageSize size, global const int* landed, globa
   atomic_max((global uint*)predicted_variance + first + target, as_uint(moved_variance[i]));
 }
 
-kernel void decode(const ImageSize size, global const uint* zbuffer, global float* disparity) {
+kernel void decode(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
+                   global float* disparity, global float* variance) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
   const size_t i = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width + x;
-  disparity[i] = zbuffer[i] == 0 ? EGOSGM_INVALID_DISPARITY : disparity_of(zbuffer[i]);
+  const float d = zbuffer[i] == 0 ? EGOSGM_INVALID_DISPARITY : disparity_of(zbuffer[i]);
+  const int is_beyond = d > range.min + range.count - 1;
+  disparity[i] = is_beyond ? EGOSGM_INVALID_DISPARITY : d;
+  if (is_beyond) variance[i] = EGOSGM_MAX_VARIANCE_PX2;
 }
 
 #else
@@ -215,6 +220,14 @@ kernel void splat_bands(const ImageSize size, const DisparityRange range, const 
         }
       }
     }
+  }
+  for (int i = 0; i < pixels; i += PIXELS) {
+    const Floats d = load_pixels(band, i, pixels);
+    const Ints is_beyond = d > (Floats)(range.min + range.count - 1);
+    if (!any_of(is_beyond)) continue;
+    store_pixels(is_beyond ? INVALID : d, band, i, pixels);
+    const Floats hidden = EGOSGM_MAX_VARIANCE_PX2;
+    store_pixels(is_beyond ? hidden : load_pixels(band_variance, i, pixels), band_variance, i, pixels);
   }
 }
 

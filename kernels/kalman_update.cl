@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two
+// Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. An innovation z - d' of more
+// deviations than p' + r allows says that p' is too small: something moves by itself, so p' grows. Where the two
 // contradict each other, by more than the gate or because the measurement escaped its band, the measurement is taken,
-// with a variance for which the next frame searches wide; unless the pixels around speak against it.
+// with a variance for which the next frame searches wide; unless the pixels around speak against it. What is hidden by
+// a surface nearer than the range (ForwardWarp) has no disparity: whatever is measured there is a mismatch.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -35,12 +37,14 @@ static Support ask_around(const ImageSize size, const int x, const int y, const 
 // `check`: of this frame; wrong predictions would vouch for each other, and nobody is asked.
 // `warped`: the prediction before anything was dropped from it; may be `updated`. ask_neighbours: whether a prediction
 // that is nearer than what contradicts it stays, once, if more than twice as many of the pixels around vouch for it and
-// less than half measure the other; and whether a measurement goes that contradicts a dropped prediction, if none
-// vouches for it and less than EGOSGM_SUPPORT_MOST measure the same.
+// less than EGOSGM_SUPPORT_MOST measure the other; and whether a measurement goes that contradicts a dropped
+// prediction, if none vouches for it. innovation_weight: p' is raised until this times the squared innovation is no
+// more than p' + r.
 kernel void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
-                   const float min_variance, global const PredictionState* check, global const float* warped,
-                   global const float* predicted, global const float* predicted_variance, global const float* measured,
-                   global const float* measured_variance, global float* updated, global float* updated_variance) {
+                   const float innovation_weight, const float min_variance, global const PredictionState* check,
+                   global const float* warped, global const float* predicted, global const float* predicted_variance,
+                   global const float* measured, global const float* measured_variance, global float* updated,
+                   global float* updated_variance) {
   const int width = size.width;
   const int y = get_global_id(1);
   const size_t view = (size_t)get_global_id(2) * size.height * width;
@@ -53,17 +57,21 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
     const Floats p = load_pixels(predicted_variance + row, x, width);
     const Floats r = load_pixels(measured_variance + row, x, width);
     const Ints has_prediction = d > INVALID;
-    const Ints has_measurement = z > INVALID;
+    const Ints is_hidden = (d <= INVALID) & (p > (Floats)(0.0f));
+    const Ints has_measurement = (z > INVALID) & ~is_hidden;
     const Floats escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
     const Ints has_both = has_prediction & has_measurement;
     const Ints fuses = has_both & (fabs(z - d) <= gate) & (r < escaped);
     const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
 
     const Floats zero = 0.0f;
-    const Floats sum = p + r;
-    const Floats gain = sum > zero ? p / sum : zero;
-    const Floats fused = d + gain * (z - d);
-    const Floats fused_variance = (1.0f - gain) * p;
+    const Floats innovation = z - d;
+    const Floats unexplained = innovation_weight * innovation * innovation - r;
+    const Floats prior = p > unexplained ? p : unexplained;
+    const Floats sum = prior + r;
+    const Floats gain = sum > zero ? prior / sum : zero;
+    const Floats fused = d + gain * innovation;
+    const Floats fused_variance = (1.0f - gain) * prior;
 
     const Floats contradicted = r < escaped ? escaped : r;
     Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
@@ -74,12 +82,10 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
     const Ints is_doubtful = has_measurement & (was_dropped | (has_prediction & !fuses & (p < escaped) & (z < other)));
     if (asks && any_of(is_doubtful)) {
       const Support support = ask_around(size, x, y, z, other, predicted + view, measured + view);
-      const Floats half_of_them = EGOSGM_SUPPORT_HALF;
       const Floats most_of_them = EGOSGM_SUPPORT_MOST;
       const Ints stays = is_doubtful & (z < other) & (2.0f * support.for_measured < support.for_other) &
-                         (support.measuring < half_of_them);
-      const Ints goes =
-          was_dropped & has_measurement & (support.for_measured <= zero) & (support.measuring < most_of_them);
+                         (support.measuring < most_of_them);
+      const Ints goes = was_dropped & has_measurement & (support.for_measured <= zero);
       value = stays ? other : goes ? INVALID : value;
       variance = stays ? escaped : variance;
     }

@@ -190,6 +190,22 @@ TEST(ForwardWarp, DropsWhatLeavesTheDisparityRange) {
   EXPECT_EQ(count_valid(warp(belief, translation(0, 0, -0.25)).disparity, EGOSGM_LEFT), 0u);  // 66.7
 }
 
+// 1 m away, 0.25 m forward: column 53 moves to 54 and out of the range; what lies far away in column 54 stays there.
+TEST(ForwardWarp, WhatComesNearerThanTheRangeHidesWhatIsBehind) {
+  for (const int pixels : {1, 16}) {
+    testing::HostMaps belief = testing::empty_maps(kSize);
+    belief.disparity[at(kSize, EGOSGM_LEFT, 54, 30)] = 1;
+    const Motion forward = translation(0, 0, -0.25);
+    EXPECT_EQ(count_valid(warp(kSize, kCalibration, kRange, 0.25f, belief, forward, pixels).disparity, EGOSGM_LEFT),
+              1u);
+    belief.disparity[at(kSize, EGOSGM_LEFT, 53, 30)] = 50;
+    const testing::HostMaps hidden = warp(kSize, kCalibration, kRange, 0.25f, belief, forward, pixels);
+    EXPECT_EQ(hidden.disparity, testing::empty_maps(kSize).disparity);
+    EXPECT_EQ(hidden.variance[at(kSize, EGOSGM_LEFT, 54, 30)], EGOSGM_MAX_VARIANCE_PX2);
+    EXPECT_EQ(std::count(hidden.variance.begin(), hidden.variance.end(), 0.0f), 2 * 101 * 61 - 1);
+  }
+}
+
 TEST(ForwardWarp, SurvivesWildMotions) {
   std::mt19937 random(14);
   testing::HostMaps belief = testing::random_maps(kSize, -300, 3000, 0.1, 15);
@@ -207,7 +223,7 @@ TEST(ForwardWarp, SurvivesWildMotions) {
       EXPECT_TRUE(testing::same_bits(predicted.variance, expected.variance, kSize)) << metres << " m";
       for (std::size_t i = 0; i < predicted.disparity.size(); ++i) {
         const float d = predicted.disparity[i], p = predicted.variance[i];
-        ASSERT_TRUE(d == kNone ? p == 0 : d >= 0 && d <= 63 && p >= 0.25f && p <= EGOSGM_MAX_VARIANCE_PX2)
+        ASSERT_TRUE(d == kNone ? p == 0 || p == EGOSGM_MAX_VARIANCE_PX2 : d >= 0 && d <= 63 && p >= 0.25f && p <= EGOSGM_MAX_VARIANCE_PX2)
             << d << ", variance " << p << ", " << metres << " m";
       }
     }

@@ -61,7 +61,7 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
     if (i % 5 == 0 && measured.disparity[i] != kNone) measured.disparity[i] -= 6;
   }
   for (const KalmanUpdateOptions& options :
-       {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false},
+       {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false, .innovation_sigmas = 0},
         KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
     const testing::HostMaps expected = reference::kalman_update(size, options, warped.disparity, predicted, measured);
     for (const int pixels : {1, 16}) {
@@ -82,6 +82,15 @@ TEST(KalmanUpdate, WeighsByTheVariances) {
   EXPECT_EQ(update_pixel({}, {10, 1}, {12, 3}), (Estimate{10.5f, 0.75f}));
 }
 
+// An innovation of 2 px at two deviations asks for p' + r = 1 px^2.
+TEST(KalmanUpdate, BelievesAPredictionLessThatIsTooFarOff) {
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 2}, {10, 0.25f}, {12, 0.25f}), (Estimate{11.5f, 0.1875f}));
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 2}, {10, 0.25f}, {8, 0.25f}), (Estimate{8.5f, 0.1875f}));
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 2}, {10, 0.25f}, {11, 0.25f}), (Estimate{10.5f, 0.125f}));
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 1}, {10, 0.25f}, {11, 0.25f}), (Estimate{10.75f, 0.1875f}));
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 0}, {10, 0.25f}, {12, 0.25f}), (Estimate{11, 0.125f}));
+}
+
 TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));
   // With a variance for which the next frame searches wide.
@@ -89,7 +98,7 @@ TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12.25f, 1}), (Estimate{12.25f, wide}));
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {7.75f, 1}), (Estimate{7.75f, wide}));
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {7.75f, 2 * wide}), (Estimate{7.75f, 2 * wide}));
-  EXPECT_EQ(update_pixel({.gate_px = 0}, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
+  EXPECT_EQ(update_pixel({.gate_px = 0, .innovation_sigmas = 0}, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
 }
 
 TEST(KalmanUpdate, TakesAMeasurementThatEscapedItsBand) {
@@ -103,6 +112,14 @@ TEST(KalmanUpdate, TakesWhatIsThere) {
   EXPECT_EQ(update_pixel({.keep_predicted = true}, {10, 5}, kNothing), (Estimate{10, 5}));
   EXPECT_EQ(update_pixel({.keep_predicted = false}, {10, 5}, kNothing), kNothing);
   EXPECT_EQ(update_pixel({}, kNothing, kNothing), kNothing);
+}
+
+TEST(KalmanUpdate, DropsWhatIsMeasuredWhereANearerSurfaceHidesIt) {
+  for (const bool ask_neighbours : {false, true}) {
+    const KalmanUpdateOptions options{.keep_predicted = true, .ask_neighbours = ask_neighbours};
+    EXPECT_EQ(update_pixel(options, {kNone, EGOSGM_MAX_VARIANCE_PX2}, {12, 3}), kNothing);
+    EXPECT_EQ(update_pixel(options, {kNone, EGOSGM_MAX_VARIANCE_PX2}, kNothing), kNothing);
+  }
 }
 
 /// 21x21 pixels: all have `around` as prediction and measurement, but for the pixel in the middle.
@@ -121,6 +138,10 @@ struct Surroundings {
                                  const shared::PredictionState& check = {}) const {
     const testing::HostMaps updated = update(kSize, options, warped, predicted, measured, 0, false, check);
     return {updated.disparity[kMiddle], updated.variance[kMiddle]};
+  }
+  void drop_prediction() {
+    predicted.disparity[kMiddle] = kNone;
+    predicted.variance[kMiddle] = 0;
   }
   /// Measures `disparity` in every row from `row` on.
   void measure_from(int row, float disparity) {
@@ -146,8 +167,11 @@ TEST(KalmanUpdate, TakesWhatComesNearerOrWhatMostMeasure) {
   nearer.measured.disparity[Surroundings::kMiddle] = 30;
   EXPECT_EQ(nearer.updated_in_the_middle(), (Estimate{30, kEscaped}));
   Surroundings most(20);
-  most.measure_from(10, 10);  // three of five rows
+  most.measure_from(10, 10);                 // three of five rows,
+  most.measured.disparity[6 * 21 + 2] = 10;  // and a pixel: 16 of 25
   EXPECT_EQ(most.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  most.measured.disparity[6 * 21 + 2] = 20;
+  EXPECT_EQ(most.updated_in_the_middle(), (Estimate{20, kEscaped}));
   Surroundings few(20);
   few.measure_from(14, 10);
   few.measured.disparity[Surroundings::kMiddle] = 10;
@@ -156,7 +180,7 @@ TEST(KalmanUpdate, TakesWhatComesNearerOrWhatMostMeasure) {
 
 TEST(KalmanUpdate, DropsWhatNoneSpeaksForWhereADroppedPredictionContradicts) {
   Surroundings maps(20);
-  maps.predicted.disparity[Surroundings::kMiddle] = kNone;
+  maps.drop_prediction();
   maps.measured.disparity[Surroundings::kMiddle] = 30;
   EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
   EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{30, 1}));
@@ -169,26 +193,15 @@ TEST(KalmanUpdate, DropsWhatNoneSpeaksForWhereADroppedPredictionContradicts) {
   EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
 }
 
-TEST(KalmanUpdate, TakesWhatMostMeasureThoughNoneVouches) {
-  Surroundings maps(20);
-  maps.predicted.disparity[Surroundings::kMiddle] = kNone;
-  maps.measure_from(6, 30);                  // four of five rows,
-  maps.measured.disparity[6 * 21 + 2] = 20;  // but for two pixels: 18 of 25
-  maps.measured.disparity[6 * 21 + 6] = 20;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
-  maps.measured.disparity[6 * 21 + 14] = 20;
-  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
-}
-
 TEST(KalmanUpdate, KeepsADroppedPredictionThatTheNeighboursVouchFor) {
   Surroundings maps(20);
-  maps.predicted.disparity[Surroundings::kMiddle] = kNone;
+  maps.drop_prediction();
   maps.measured.disparity[Surroundings::kMiddle] = 10;
   EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kEscaped}));
 }
 
 TEST(KalmanUpdate, NeverClaimsMoreThanTheFloor) {
-  const KalmanUpdateOptions options{.min_variance_px2 = 0.25f};
+  const KalmanUpdateOptions options{.innovation_sigmas = 0, .min_variance_px2 = 0.25f};
   EXPECT_EQ(update_pixel(options, {10, 0.25f}, {10, 0.25f}), (Estimate{10, 0.25f}));
   EXPECT_EQ(update_pixel(options, kNothing, {12, 0.125f}), (Estimate{12, 0.25f}));
   EXPECT_EQ(update_pixel(options, {10, 0.125f}, kNothing), (Estimate{10, 0.25f}));

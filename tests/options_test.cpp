@@ -77,6 +77,7 @@ TEST(Options, HasANameForEveryMember) {
       {"kalman_update.gate_px", [](auto& o) { o.kalman_update.gate_px = 77; }},
       {"kalman_update.keep_predicted", [](auto& o) { o.kalman_update.keep_predicted = false; }},
       {"kalman_update.ask_neighbours", [](auto& o) { o.kalman_update.ask_neighbours = false; }},
+      {"kalman_update.innovation_sigmas", [](auto& o) { o.kalman_update.innovation_sigmas = 77; }},
       {"kalman_update.min_variance_px2", [](auto& o) { o.kalman_update.min_variance_px2 = 77; }},
       {"dynamic_map.enabled", [](auto& o) { o.dynamic_map.enabled = true; }},
       {"prediction_check.enabled", [](auto& o) { o.prediction_check.enabled = false; }},
@@ -208,7 +209,8 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
   EXPECT_EQ(paper.search_band.min_half_width_px, 0);
   EXPECT_GT(paper.forward_warp.process_noise_px2, 0) << "a constant q,";
   EXPECT_EQ(paper.forward_warp.motion_noise, 0) << "and nothing else";
-  EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged";
+  EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged,";
+  EXPECT_EQ(paper.kalman_update.innovation_sigmas, 0) << "by the variances as they are";
   EXPECT_FALSE(paper.output_variance.enabled) << "the variance is the filter's";
   EXPECT_EQ(paper.banded_sgm.p2, PipelineOptions().banded_sgm.p2)
       << "the matcher, which the paper leaves open, is the default's";

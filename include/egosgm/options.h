@@ -16,7 +16,7 @@ enum class SearchMode { kBand, kFull };
 enum class Scheduling { kAutomatic, kWavefront, kPaths };
 
 struct ForwardWarpOptions {
-  float process_noise_px2 = 0.05f;  // constant part of q, added to every variance (eq. 6)
+  float process_noise_px2 = 0.01f;  // constant part of q, added to every variance (eq. 6)
   float motion_noise = 1.0f;        // factor of the other part, J Sigma J^T by the motion's covariance Sigma
 };
 struct EdgeRejectionOptions {
@@ -81,11 +81,11 @@ struct KalmanUpdateOptions {
   float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   bool ask_neighbours = true;  // which of the two they speak for, instead; what none speaks for is dropped
+  float innovation_sigmas = 2.0f;  // where the two differ by more deviations, p' is raised until they do not; 0: never
   float min_variance_px2 = 0.02f;
 };
 struct PredictionCheckOptions {
-  bool enabled =
-      true;  // after a frame whose predictions were wrong (a gap, a wrong motion), the next searches everything
+  bool enabled = true;  // where predictions were wrong (a gap, a wrong motion), the next frame searches everything
 };
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface

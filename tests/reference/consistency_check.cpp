@@ -13,7 +13,10 @@ testing::HostMaps consistency_check(shared::ImageSize size, float max_difference
     const bool is_left = i < pixels;
     const std::size_t x = i % size.width, y = i % pixels / size.width;
     const float d = in.disparity[i];
-    if (d == EGOSGM_INVALID_DISPARITY) continue;
+    if (d == EGOSGM_INVALID_DISPARITY) {
+      out.variance[i] = in.variance[i];  // by which ForwardWarp says that it is hidden
+      continue;
+    }
     const float other_x = std::nearbyint(is_left ? static_cast<float>(x) - d : static_cast<float>(x) + d);
     const bool inside = other_x >= 0 && other_x < static_cast<float>(size.width);
     if (!inside && !keep_outside) continue;

@@ -17,6 +17,7 @@ testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, cons
   if (max_jump_px == 0) return out;
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   for (std::size_t i = 0; i < 2 * pixels; ++i) {
+    if (in.disparity[i] == EGOSGM_INVALID_DISPARITY) continue;
     const int x = static_cast<int>(i % size.width), y = static_cast<int>(i % pixels / size.width);
     for (const Step step : {Step{-1, 0}, Step{1, 0}, Step{0, -1}, Step{0, 1}}) {
       for (int distance = 1; distance <= 2; ++distance) {

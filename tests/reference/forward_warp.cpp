@@ -34,7 +34,7 @@ void warp_view(shared::ImageSize size, shared::DisparityRange range, const share
       const float target_x = std::nearbyint(u + m.cx), target_y = std::nearbyint(v + m.cy);
       if (!(target_x >= 0 && target_x < static_cast<float>(size.width))) continue;
       if (!(target_y >= 0 && target_y < static_cast<float>(size.height))) continue;
-      if (!(d >= static_cast<float>(range.min) && d <= static_cast<float>(range.min + range.count - 1))) continue;
+      if (!(d >= static_cast<float>(range.min))) continue;
       float p = phi * phi * variance[source] + process_noise_px2 + variance_of_motion(m, u, v, metric);
       if (!(p < EGOSGM_MAX_VARIANCE_PX2)) p = EGOSGM_MAX_VARIANCE_PX2;
 
@@ -44,6 +44,11 @@ void warp_view(shared::ImageSize size, shared::DisparityRange range, const share
         out_variance[target] = p;
       }
     }
+  }
+  for (std::size_t i = 0; i < static_cast<std::size_t>(size.width) * size.height; ++i) {
+    if (!(out_disparity[i] > static_cast<float>(range.min + range.count - 1))) continue;
+    out_disparity[i] = EGOSGM_INVALID_DISPARITY;
+    out_variance[i] = EGOSGM_MAX_VARIANCE_PX2;
   }
 }
 

@@ -15,10 +15,16 @@ constexpr Estimate kNone{EGOSGM_INVALID_DISPARITY, 0};
 
 bool is_valid(const Estimate& estimate) { return estimate.disparity != EGOSGM_INVALID_DISPARITY; }
 
-Estimate fuse(const Estimate& predicted, const Estimate& measured) {
-  const float sum = predicted.variance + measured.variance;
-  const float gain = sum > 0 ? predicted.variance / sum : 0;
-  return {predicted.disparity + gain * (measured.disparity - predicted.disparity), (1 - gain) * predicted.variance};
+Estimate fuse(float innovation_sigmas, const Estimate& predicted, const Estimate& measured) {
+  const float innovation = measured.disparity - predicted.disparity;
+  float prior = predicted.variance;
+  if (innovation_sigmas > 0) {
+    const float least_sum = 1 / (innovation_sigmas * innovation_sigmas) * innovation * innovation;
+    prior = std::max(prior, least_sum - measured.variance);
+  }
+  const float sum = prior + measured.variance;
+  const float gain = sum > 0 ? prior / sum : 0;
+  return {predicted.disparity + gain * innovation, (1 - gain) * prior};
 }
 
 /// One view, and what the pixels of it say.
@@ -60,21 +66,23 @@ bool contradict(float gate_px, float a, float b) { return gate_px > 0 && std::ab
 
 Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int y, float warped,
                 const Estimate& predicted, const Estimate& measured) {
+  const bool is_hidden = !is_valid(predicted) && predicted.variance > 0;
+  if (is_hidden) return kNone;
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
   const float z = measured.disparity, escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
-  // Less than half of the 25; less than 18.
+  // Less than 16 of the 25.
   const auto vouch = [&](float disparity) { return view.vouching(x, y, disparity); };
   const auto stays = [&](float other) {
-    return options.ask_neighbours && z < other && 2 * vouch(z) < vouch(other) && 2 * view.measuring(x, y, z) < 25;
+    return options.ask_neighbours && z < other && 2 * vouch(z) < vouch(other) && view.measuring(x, y, z) < 16;
   };
   if (!is_valid(predicted)) {
     if (warped == EGOSGM_INVALID_DISPARITY || !contradict(options.gate_px, z, warped)) return measured;
     if (stays(warped)) return {warped, escaped};
-    const bool goes = options.ask_neighbours && vouch(z) == 0 && view.measuring(x, y, z) < 18;
+    const bool goes = options.ask_neighbours && vouch(z) == 0;
     return goes ? kNone : measured;
   }
   if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < escaped) {
-    return fuse(predicted, measured);
+    return fuse(options.innovation_sigmas, predicted, measured);
   }
   if (predicted.variance < escaped && stays(predicted.disparity)) return {predicted.disparity, escaped};
   return {z, std::max(measured.variance, escaped)};
