@@ -90,7 +90,7 @@ struct PredictionCheckOptions {
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
   // Of the filter's variance, averaged, and of the square of how far the disparities around are from a plane's.
-  float scale = 0.48f, roughness_weight = 0.72f;
+  float scale = 0.75f, roughness_weight = 0.72f;
 };
 struct DynamicMapOptions {
   bool enabled = false;            // of every frame, for DeviceMaps::dynamic; FrameOutputs::dynamic needs no option
