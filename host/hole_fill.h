@@ -9,7 +9,7 @@ namespace egosgm {
 
 /// Closes the gaps of a pixel that forward motion tears into a map: an invalid pixel between two horizontal neighbours
 /// that differ by less than gamma gets their mean and the larger of their variances; then the same vertically (eqs.
-/// 7-8).
+/// 7-8). A pixel between two hidden ones (ForwardWarp) is hidden too.
 class HoleFill {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.

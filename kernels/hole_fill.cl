@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Hole fill (eqs. 7-8): gaps of a pixel between horizontal neighbours that differ by less than gamma, then, on that
-// result, between vertical ones.
+// result, between vertical ones. Between hidden neighbours (ForwardWarp), a pixel is hidden too.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -9,6 +9,8 @@
 static inline Ints is_gap(const Floats centre, const Floats before, const Floats after, const float gamma) {
   return (centre <= INVALID) & (before > INVALID) & (after > INVALID) & (fabs(before - after) < gamma);
 }
+
+static inline Ints is_hidden(const Floats d, const Floats variance) { return (d <= INVALID) & (variance > 0.0f); }
 
 static inline Floats mean_of(const Floats a, const Floats b) { return 0.5f * (a + b); }
 static inline Floats larger_of(const Floats a, const Floats b) { return a > b ? a : b; }
@@ -23,10 +25,12 @@ kernel void fill_rows(const ImageSize size, const float gamma, global const floa
     const Floats left = load_pixels(disparity + row, x - 1, width);
     const Floats right = load_pixels(disparity + row, x + 1, width);
     const Ints fills = is_gap(d, left, right, gamma);
-    const Floats filled =
-        larger_of(load_pixels(variance + row, x - 1, width), load_pixels(variance + row, x + 1, width));
-    store_pixels(fills ? mean_of(left, right) : d, filled_disparity + row, x, width);
-    store_pixels(fills ? filled : load_pixels(variance + row, x, width), filled_variance + row, x, width);
+    const Floats p = load_pixels(variance + row, x, width);
+    const Floats p_left = load_pixels(variance + row, x - 1, width);
+    const Floats p_right = load_pixels(variance + row, x + 1, width);
+    const Ints hides = is_hidden(left, p_left) & is_hidden(right, p_right) & ~is_hidden(d, p);
+    store_pixels(fills ? mean_of(left, right) : hides ? INVALID : d, filled_disparity + row, x, width);
+    store_pixels(fills | hides ? larger_of(p_left, p_right) : p, filled_variance + row, x, width);
   }
 }
 
@@ -44,9 +48,11 @@ kernel void fill_columns(const ImageSize size, const float gamma, global const f
     const Floats above = load_pixels(disparity + row_above, x, width);
     const Floats below = load_pixels(disparity + row_below, x, width);
     const Ints fills = is_gap(d, above, below, gamma);
-    const Floats filled =
-        larger_of(load_pixels(variance + row_above, x, width), load_pixels(variance + row_below, x, width));
-    store_pixels(fills ? mean_of(above, below) : d, filled_disparity + row, x, width);
-    store_pixels(fills ? filled : load_pixels(variance + row, x, width), filled_variance + row, x, width);
+    const Floats p = load_pixels(variance + row, x, width);
+    const Floats p_above = load_pixels(variance + row_above, x, width);
+    const Floats p_below = load_pixels(variance + row_below, x, width);
+    const Ints hides = is_hidden(above, p_above) & is_hidden(below, p_below) & ~is_hidden(d, p);
+    store_pixels(fills ? mean_of(above, below) : hides ? INVALID : d, filled_disparity + row, x, width);
+    store_pixels(fills | hides ? larger_of(p_above, p_below) : p, filled_variance + row, x, width);
   }
 }

@@ -37,9 +37,9 @@ static Support ask_around(const ImageSize size, const int x, const int y, const 
 // `check`: of this frame; wrong predictions would vouch for each other, and nobody is asked.
 // `warped`: the prediction before anything was dropped from it; may be `updated`. ask_neighbours: whether a prediction
 // that is nearer than what contradicts it stays, once, if more than twice as many of the pixels around vouch for it and
-// less than EGOSGM_SUPPORT_MOST measure the other; and whether a measurement goes that contradicts a dropped
-// prediction, if none vouches for it. innovation_weight: p' is raised until this times the squared innovation is no
-// more than p' + r.
+// less than half measure the other; and whether a measurement goes that contradicts a dropped prediction, if none
+// vouches for it and less than EGOSGM_SUPPORT_MOST measure the same. innovation_weight: p' is raised until this times
+// the squared innovation is no more than p' + r.
 kernel void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
                    const float innovation_weight, const float min_variance, global const PredictionState* check,
                    global const float* warped, global const float* predicted, global const float* predicted_variance,
@@ -82,10 +82,12 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
     const Ints is_doubtful = has_measurement & (was_dropped | (has_prediction & !fuses & (p < escaped) & (z < other)));
     if (asks && any_of(is_doubtful)) {
       const Support support = ask_around(size, x, y, z, other, predicted + view, measured + view);
+      const Floats half_of_them = EGOSGM_SUPPORT_HALF;
       const Floats most_of_them = EGOSGM_SUPPORT_MOST;
       const Ints stays = is_doubtful & (z < other) & (2.0f * support.for_measured < support.for_other) &
-                         (support.measuring < most_of_them);
-      const Ints goes = was_dropped & has_measurement & (support.for_measured <= zero);
+                         (support.measuring < half_of_them);
+      const Ints goes =
+          was_dropped & has_measurement & (support.for_measured <= zero) & (support.measuring < most_of_them);
       value = stays ? other : goes ? INVALID : value;
       variance = stays ? escaped : variance;
     }

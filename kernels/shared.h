@@ -72,8 +72,9 @@ typedef float f32;
 #define EGOSGM_SUPPORT_RADIUS 8
 #define EGOSGM_SUPPORT_STEP 4
 #define EGOSGM_SUPPORT_PX 2.0f
-// A measurement that at least so many of them have too stands against a prediction.
-#define EGOSGM_SUPPORT_MOST 16
+// A measurement that at least so many of them have too stands against a prediction, or against none that vouches.
+#define EGOSGM_SUPPORT_HALF 13
+#define EGOSGM_SUPPORT_MOST 18
 
 // PredictionCheck looks at every so many rows of the left view. Prediction and measurement differ where they do by more
 // than this.

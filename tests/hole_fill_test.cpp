@@ -32,7 +32,8 @@ testing::HostMaps left_view(shared::ImageSize size, const std::vector<float>& di
 }
 
 std::vector<float> fill_left(shared::ImageSize size, const std::vector<float>& disparity) {
-  const std::vector<float> variance(disparity.size(), 1.0f);
+  std::vector<float> variance;
+  for (const float d : disparity) variance.push_back(d == kNone ? 0.0f : 1.0f);
   std::vector<float> filled = fill(size, 1, left_view(size, disparity, variance)).disparity;
   filled.resize(disparity.size());
   return filled;
@@ -43,7 +44,8 @@ class HoleFillTest : public ::testing::TestWithParam<shared::ImageSize> {};
 TEST_P(HoleFillTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const float max_difference_px : {0.0f, 1.0f, 100.0f}) {
-    const testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.4, 4);
+    testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.4, 4);
+    for (std::size_t i = 0; i < maps.variance.size(); i += 2) maps.variance[i] = 7;  // also where nothing is
     const testing::HostMaps expected = reference::hole_fill(size, max_difference_px, maps);
     for (const int pixels : {1, 16}) {
       const testing::HostMaps actual = fill(size, max_difference_px, maps, pixels);
@@ -62,6 +64,16 @@ TEST(HoleFill, FillsAGapWithTheMeanAndTheLargerVariance) {
     const testing::HostMaps filled = fill(size, 1, left_view(size, {10, kNone, 10.5f}, {0.5f, 0, 0.25f}));
     EXPECT_EQ(filled.disparity, (std::vector<float>{10, 10.25f, 10.5f, kNone, kNone, kNone}));
     EXPECT_EQ(filled.variance, (std::vector<float>{0.5f, 0.5f, 0.25f, 0, 0, 0}));
+  }
+}
+
+TEST(HoleFill, HidesWhatLiesBetweenHiddenPixels) {
+  for (const shared::ImageSize size : {shared::ImageSize{5, 1}, shared::ImageSize{1, 5}}) {
+    const testing::HostMaps filled = fill(size, 1, left_view(size, {kNone, 10, kNone, kNone, kNone}, {7, 1, 7, 0, 7}));
+    EXPECT_EQ(filled.disparity, testing::empty_maps(size).disparity);
+    EXPECT_EQ(filled.variance, (std::vector<float>{7, 7, 7, 7, 7, 0, 0, 0, 0, 0}));
+    const std::vector<float> seen{kNone, 10, 10, kNone, kNone};
+    EXPECT_EQ(fill(size, 1, left_view(size, seen, {7, 1, 1, 7, 7})).disparity, left_view(size, seen, {}).disparity);
   }
 }
 

@@ -7,9 +7,18 @@
 namespace egosgm::reference {
 namespace {
 
+bool is_hidden(const testing::HostMaps& maps, std::size_t i) {
+  return maps.disparity[i] == EGOSGM_INVALID_DISPARITY && maps.variance[i] > 0;
+}
+
 // Fills pixel i from its neighbours i - step and i + step.
 void fill(const testing::HostMaps& in, std::size_t i, std::size_t step, float max_difference_px,
           testing::HostMaps& out) {
+  if (is_hidden(in, i - step) && is_hidden(in, i + step) && !is_hidden(in, i)) {
+    out.disparity[i] = EGOSGM_INVALID_DISPARITY;
+    out.variance[i] = std::max(in.variance[i - step], in.variance[i + step]);
+    return;
+  }
   const float before = in.disparity[i - step], after = in.disparity[i + step];
   if (in.disparity[i] != EGOSGM_INVALID_DISPARITY) return;
   if (before == EGOSGM_INVALID_DISPARITY || after == EGOSGM_INVALID_DISPARITY) return;

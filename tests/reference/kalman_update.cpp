@@ -70,15 +70,15 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
   if (is_hidden) return kNone;
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
   const float z = measured.disparity, escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
-  // Less than 16 of the 25.
+  // Less than half of the 25; less than 18.
   const auto vouch = [&](float disparity) { return view.vouching(x, y, disparity); };
   const auto stays = [&](float other) {
-    return options.ask_neighbours && z < other && 2 * vouch(z) < vouch(other) && view.measuring(x, y, z) < 16;
+    return options.ask_neighbours && z < other && 2 * vouch(z) < vouch(other) && 2 * view.measuring(x, y, z) < 25;
   };
   if (!is_valid(predicted)) {
     if (warped == EGOSGM_INVALID_DISPARITY || !contradict(options.gate_px, z, warped)) return measured;
     if (stays(warped)) return {warped, escaped};
-    const bool goes = options.ask_neighbours && vouch(z) == 0;
+    const bool goes = options.ask_neighbours && vouch(z) == 0 && view.measuring(x, y, z) < 18;
     return goes ? kNone : measured;
   }
   if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < escaped) {
