@@ -120,7 +120,7 @@ class Chain {
         {"HoleFill", [this] { hole_fill_(rejected_, filled_); }, 2 * maps},
         {"ConsistencyCheck", [this] { consistency_(filled_, 3.0f, OutsideView::kKeep, predicted_); }, 2 * maps},
         {"CoarseMatch", [this] { coarse_match_(images_); }, grey},
-        {"SearchBand", [this] { search_band_(predicted_, &coarse_match_.found()); }, maps + band},
+        {"SearchBand", [this] { search_band_(predicted_, &predicted_, &coarse_match_.found()); }, maps + band},
         // Resampling both images, and the estimate on every fourth row of the left view.
         {"VerticalAlignment", [this] { align(); }, 2 * grey + (grey + map / 2) / 4},
         {"Census", [this] { census_(images_.pixels, codes_); }, grey + codes},

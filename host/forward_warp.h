@@ -19,8 +19,8 @@ shared::DisparityMotion disparity_motion(const Calibration& calibration, const M
 /// Predicts the maps of both views by the camera's motion (eqs. 1-6): every disparity lands on the pixel nearest to
 /// where its point is seen next, with the variance p' = Phi^2 p + q. The nearest surface wins; of equal disparities the
 /// one that is known least. What falls behind the camera, outside of the image or outside of the disparity range is
-/// dropped; what came nearer than the range still hides what is behind it, and
-/// leaves no disparity there, but the largest variance.
+/// dropped; what came nearer than the range still hides what is behind it, and leaves no disparity there, but the
+/// largest variance.
 class ForwardWarp {
  public:
   /// `pixels` of a work-item: 1 (and atomics) or 16 (and bands of `band_rows` rows); 0: by the device. Same bits.

@@ -8,8 +8,9 @@
 namespace egosgm {
 
 /// Fuses prediction and measurement, pixel by pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the
-/// two differ by more than the gate, or only the measurement is there, the measurement is taken, unless the pixels
-/// around, by what is both predicted and measured there, speak against it.
+/// two differ by more than the gate, or as nearly all around do (something moves by itself), or only the measurement is
+/// there, the measurement is taken, unless the pixels around, by what is both predicted and measured there, speak
+/// against it.
 class KalmanUpdate {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.

@@ -162,6 +162,7 @@ PipelineOptions PipelineOptions::paper() {
   options.search_band.sigmas = 3.0f;
   options.search_band.min_half_width_px = 0.0f;
   options.search_band.from_neighbours = false;
+  options.search_band.ridge_step_px = 0.0f;
   options.coarse_match.enabled = false;
   options.kalman_update.gate_px = 0.0f;
   options.kalman_update.ask_neighbours = false;

@@ -169,7 +169,6 @@ struct Pipeline::Impl {
 
   void predict(const Motion& motion) {
     forward_warp(*memory.belief, motion, *updated);
-    search_band.find_ridges(*updated);
     edge_rejection(*updated, predicted);
     hole_fill(predicted, scratch);
     consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);
@@ -181,7 +180,8 @@ struct Pipeline::Impl {
     } else if (options.search == SearchMode::kFull) {
       search_band.full_range(predicted);
     } else {
-      search_band(predicted, coarse_match ? &(*coarse_match)(images) : nullptr, &prediction_state(*memory.belief));
+      const StereoMaps* coarse = coarse_match ? &(*coarse_match)(images) : nullptr;
+      search_band(predicted, updated, coarse, &prediction_state(*memory.belief));
     }
     stages_of(images.type).census(images.pixels, codes);
     stages_of(images.type).step_penalties(images.pixels, penalties);

@@ -9,8 +9,9 @@ namespace egosgm {
 
 /// Whether a frame's predictions were right, by the left view: they were wrong where less than three quarters as many
 /// pixels have one as a frame before, or where the share of those that differ from the measurement by more than 1 px is
-/// more than twice as large, and 2 % of them. KalmanUpdate then does not ask the neighbours, in this frame and the
-/// next, and SearchBand lets the next one search everything: what a wrong prediction left must not hide what is there.
+/// more than twice as large, and 2 % of them. KalmanUpdate then does not ask the neighbours and believes the
+/// predictions less, in this frame and the next, and SearchBand lets the next one search everything: what a wrong
+/// prediction left must not hide what is there.
 class PredictionCheck {
  public:
   /// What is known of a frame's predictions: one element.

@@ -48,7 +48,7 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       widen_(build(context, row_group_), "widen"),
       sum_rows_(build(context, row_group_), "sum_rows"),
       full_range_(build(context, row_group_), "full_range") {
-  for (ocl::Buffer<shared::BlockRange>* ranges : {&block_ranges_, &ridges_, &none_}) {
+  for (ocl::Buffer<shared::BlockRange>* ranges : {&block_ranges_, &none_}) {
     ranges->write(context, std::vector(ranges->size(), shared::BlockRange{}));
   }
   clear(context, range, bands_, cell_offsets_);
@@ -62,26 +62,22 @@ void SearchBand::clear(ocl::Context& context, shared::DisparityRange range, ocl:
   context.wait();
 }
 
-void SearchBand::find_ridges(const StereoMaps& warped) {
-  if (options_.ridge_step_px <= 0) return;
-  context_.enter("SearchBand");
-  gather_ridges_(context_, ocl::every_pixel(context_, blocks_), size_, options_.ridge_step_px, warped.disparity,
-                 ridges_);
-}
-
-void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* coarse,
+void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* warped, const StereoMaps* coarse,
                             const ocl::Buffer<shared::PredictionState>* last) {
   context_.enter("SearchBand");
   const ocl::Range blocks = ocl::every_pixel(context_, blocks_);
+  const bool has_ridges = warped && options_.ridge_step_px > 0;
+  if (has_ridges) gather_ridges_(context_, blocks, size_, options_.ridge_step_px, warped->disparity, ridges_);
+  const Ranges& ridges = has_ridges ? ridges_ : none_;
   if (coarse) {
-    gather_coarse_(context_, blocks, size_, options_.ridge_step_px, coarse->disparity, ridges_, coarse_ranges_,
+    gather_coarse_(context_, blocks, size_, options_.ridge_step_px, coarse->disparity, ridges, coarse_ranges_,
                    ridges_with_coarse_);
   }
   if (options_.from_neighbours) gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
   bands_of_blocks_(context_, blocks, size_, range_, options_.from_neighbours, options_.neighbour_margin_px,
                    options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_,
-                   coarse ? coarse_ranges_ : none_, options_.ridge_step_px > 0 ? EGOSGM_RIDGE_BLOCKS_Y : -1,
-                   coarse ? ridges_with_coarse_ : ridges_, found_, block_bands_);
+                   coarse ? coarse_ranges_ : none_, options_.ridge_step_px > 0 ? EGOSGM_RIDGE_BLOCKS : -1,
+                   coarse ? ridges_with_coarse_ : ridges, found_, block_bands_);
   bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}), size_, range_, options_.sigmas,
                    options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
                    options_.coarse_margin_px, found_, block_bands_, bands_);

@@ -12,7 +12,7 @@ namespace egosgm {
 /// A predicted pixel searches d +- max(min_half_width_px, sigmas * sqrt(p)), another one the range that the predictions
 /// around it span, one with none near everything. Where CoarseMatch found disparities beyond that by more than
 /// coarse_tolerance_px, as on an object that moves by itself, the band reaches there too; and to ridges above and
-/// below, things of a few pixels' width, which CoarseMatch does not see. Bands hold whole chunks of EGOSGM_LANES lanes;
+/// below, things of a few pixels' width, which CoarseMatch hardly sees. Bands hold whole chunks of EGOSGM_LANES lanes;
 /// lanes outside of the disparity range, of which there may be up to EGOSGM_LANES - 1 at its end, do not exist for
 /// BandedSgm.
 class SearchBand {
@@ -21,12 +21,10 @@ class SearchBand {
   SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
              const SearchBandOptions& options, int row_group = 0);
 
-  /// Looks for ridges in a prediction that nothing was dropped of yet, for the calls after it. Does nothing where
-  /// ridge_step_px is 0.
-  void find_ridges(const StereoMaps& warped);
-  /// Bands from the prediction and its ridges, and from what CoarseMatch found, where there is one; the whole range
-  /// where `last`, what PredictionCheck said of the frame before, says that its predictions were wrong.
-  void operator()(const StereoMaps& predicted, const StereoMaps* coarse = nullptr,
+  /// Bands from the prediction, from ridges of it before anything was dropped (`warped`), and from what CoarseMatch
+  /// found, where there are these; the whole range where `last`, what PredictionCheck said of the frame before, says
+  /// that its predictions were wrong.
+  void operator()(const StereoMaps& predicted, const StereoMaps* warped = nullptr, const StereoMaps* coarse = nullptr,
                   const ocl::Buffer<shared::PredictionState>* last = nullptr);
   /// Every pixel searches everything.
   void full_range();

@@ -10,8 +10,6 @@ static inline Ints is_gap(const Floats centre, const Floats before, const Floats
   return (centre <= INVALID) & (before > INVALID) & (after > INVALID) & (fabs(before - after) < gamma);
 }
 
-static inline Ints is_hidden(const Floats d, const Floats variance) { return (d <= INVALID) & (variance > 0.0f); }
-
 static inline Floats mean_of(const Floats a, const Floats b) { return 0.5f * (a + b); }
 static inline Floats larger_of(const Floats a, const Floats b) { return a > b ? a : b; }
 

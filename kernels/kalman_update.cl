@@ -1,24 +1,32 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. An innovation z - d' of more
-// deviations than p' + r allows says that p' is too small: something moves by itself, so p' grows. Where the two
-// contradict each other, by more than the gate or because the measurement escaped its band, the measurement is taken,
-// with a variance for which the next frame searches wide; unless the pixels around speak against it. What is hidden by
-// a surface nearer than the range (ForwardWarp) has no disparity: whatever is measured there is a mismatch.
+// deviations than p' + r allows says that p' is too small, so p' grows. Where the two contradict each other, by more
+// than the gate or because the measurement escaped its band, or where nearly all pixels around are off to the same
+// side, as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide;
+// unless the pixels around speak against it. What is hidden by a surface nearer than the range (ForwardWarp) has no
+// disparity: whatever is measured there is a mismatch.
 #include "pixels.h"
 
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-// What the pixels around say of a measurement and of the prediction `other`: how many measure the former, and how many
-// vouch for either, as their prediction and their measurement are near it.
+// What the pixels around say of a measurement and of the prediction `other`: how many measure the former, how many
+// vouch for either, as their prediction and their measurement are near it, and how many are off to the same side.
 typedef struct {
-  Floats measuring, for_measured, for_other;
+  Floats measuring, for_measured, for_other, moving;
 } Support;
+
+// Whether a pixel is off as one does that moves by itself, nearer or farther.
+static Ints is_off_too(const Floats d, const Floats z, const Ints is_nearer) {
+  const Floats innovation = is_nearer ? z - d : d - z;
+  return (d > INVALID) & (z > INVALID) & (innovation > (Floats)(EGOSGM_MOVING_AROUND_PX));
+}
 
 static Support ask_around(const ImageSize size, const int x, const int y, const Floats measured, const Floats other,
                           global const float* predictions, global const float* measurements) {
-  Support support = {0.0f, 0.0f, 0.0f};
+  Support support = {0.0f, 0.0f, 0.0f, 0.0f};
   const Floats near = EGOSGM_SUPPORT_PX;
+  const Ints is_nearer = measured > other;
   for (int v = y - EGOSGM_SUPPORT_RADIUS; v <= y + EGOSGM_SUPPORT_RADIUS; v += EGOSGM_SUPPORT_STEP) {
     if (v < 0 || v >= size.height) continue;
     const size_t row = (size_t)v * size.width;
@@ -29,17 +37,20 @@ static Support ask_around(const ImageSize size, const int x, const int y, const 
       support.measuring += one_where(measures);
       support.for_measured += one_where(measures & (fabs(d - measured) < near));
       support.for_other += one_where((fabs(z - other) < near) & (fabs(d - other) < near));
+      support.moving += one_where(is_off_too(d, z, is_nearer));
     }
   }
   return support;
 }
 
-// `check`: of this frame; wrong predictions would vouch for each other, and nobody is asked.
+// `check`: of this frame; wrong predictions would vouch for each other, so that nobody is asked, and every innovation
+// of more than a deviation raises p'.
 // `warped`: the prediction before anything was dropped from it; may be `updated`. ask_neighbours: whether a prediction
 // that is nearer than what contradicts it stays, once, if more than twice as many of the pixels around vouch for it and
-// less than half measure the other; and whether a measurement goes that contradicts a dropped prediction, if none
-// vouches for it and less than EGOSGM_SUPPORT_MOST measure the same. innovation_weight: p' is raised until this times
-// the squared innovation is no more than p' + r.
+// less than half measure the other; whether both go if none vouches for either and less than half measure it, or less
+// than EGOSGM_SUPPORT_MOST where the prediction was dropped; and whether a measurement is taken that differs as those
+// of EGOSGM_MOVING_COUNT around do. innovation_weight: p' is raised until this times the squared innovation is no more
+// than p' + r; 0: never.
 kernel void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
                    const float innovation_weight, const float min_variance, global const PredictionState* check,
                    global const float* warped, global const float* predicted, global const float* predicted_variance,
@@ -49,7 +60,9 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
   const int y = get_global_id(1);
   const size_t view = (size_t)get_global_id(2) * size.height * width;
   const size_t row = view + (size_t)y * width;
-  const int asks = ask_neighbours & (check->is_wrong == 0) & (check->was_wrong == 0);
+  const int are_right = (check->is_wrong == 0) & (check->was_wrong == 0);
+  const int asks = ask_neighbours & are_right;
+  const float weight = are_right || innovation_weight <= 0.0f ? innovation_weight : fmax(innovation_weight, 1.0f);
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(predicted + row, x, width);
@@ -57,8 +70,7 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
     const Floats p = load_pixels(predicted_variance + row, x, width);
     const Floats r = load_pixels(measured_variance + row, x, width);
     const Ints has_prediction = d > INVALID;
-    const Ints is_hidden = (d <= INVALID) & (p > (Floats)(0.0f));
-    const Ints has_measurement = (z > INVALID) & ~is_hidden;
+    const Ints has_measurement = (z > INVALID) & ~is_hidden(d, p);
     const Floats escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
     const Ints has_both = has_prediction & has_measurement;
     const Ints fuses = has_both & (fabs(z - d) <= gate) & (r < escaped);
@@ -66,7 +78,7 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
 
     const Floats zero = 0.0f;
     const Floats innovation = z - d;
-    const Floats unexplained = innovation_weight * innovation * innovation - r;
+    const Floats unexplained = weight * innovation * innovation - r;
     const Floats prior = p > unexplained ? p : unexplained;
     const Floats sum = prior + r;
     const Floats gain = sum > zero ? prior / sum : zero;
@@ -80,16 +92,24 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
     const Floats other = has_prediction ? d : load_pixels(warped + row, x, width);
     const Ints was_dropped = (d <= INVALID) & (other > INVALID) & (fabs(z - other) > gate);
     const Ints is_doubtful = has_measurement & (was_dropped | (has_prediction & !fuses & (p < escaped) & (z < other)));
-    if (asks && any_of(is_doubtful)) {
+    const Floats moving = EGOSGM_MOVING_PX;
+    Ints is_off = fuses & (fabs(innovation) > moving);
+    for (int side = -1; asks && any_of(is_off) && side <= 1; side += 2) {  // first of all, these two of the 25
+      const int u = x + side * EGOSGM_SUPPORT_STEP;
+      is_off &= is_off_too(load_pixels(predicted + row, u, width), load_pixels(measured + row, u, width), z > d);
+    }
+    if (asks && any_of(is_doubtful | is_off)) {
       const Support support = ask_around(size, x, y, z, other, predicted + view, measured + view);
       const Floats half_of_them = EGOSGM_SUPPORT_HALF;
       const Floats most_of_them = EGOSGM_SUPPORT_MOST;
+      const Floats nearly_all = EGOSGM_MOVING_COUNT;
       const Ints stays = is_doubtful & (z < other) & (2.0f * support.for_measured < support.for_other) &
                          (support.measuring < half_of_them);
-      const Ints goes =
-          was_dropped & has_measurement & (support.for_measured <= zero) & (support.measuring < most_of_them);
-      value = stays ? other : goes ? INVALID : value;
-      variance = stays ? escaped : variance;
+      const Ints goes = is_doubtful & (support.for_measured <= zero) &
+                        (support.measuring < (was_dropped ? most_of_them : half_of_them));
+      const Ints moves = is_off & (support.moving >= nearly_all);
+      value = stays ? other : goes ? INVALID : moves ? z : value;
+      variance = (stays | moves) ? escaped : variance;
     }
     const Floats least = min_variance;
     const Floats bounded = variance < least ? least : variance;

@@ -40,6 +40,9 @@ static inline int any_of(const Ints condition) {
 #endif
 }
 
+// Whether ForwardWarp says that a surface nearer than the range hides what is behind: no disparity, but a variance.
+static inline Ints is_hidden(const Floats d, const Floats variance) { return (d <= INVALID) & (variance > 0.0f); }
+
 // Pixels x .. x + PIXELS - 1 of a row; what lies outside of it is invalid.
 static inline Floats load_pixels(global const float* row, const int x, const int width) {
 #if PIXELS == 1

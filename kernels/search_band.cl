@@ -138,14 +138,23 @@ BlockRange joined(const BlockRange a, const BlockRange b) {
   return both;
 }
 
+ImageSize blocks_of(const ImageSize size) {
+  ImageSize blocks;
+  blocks.width = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  blocks.height = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  return blocks;
+}
+size_t index_of(const ImageSize size, int view, int x, int y) {
+  return ((size_t)view * size.height + y) * size.width + x;
+}
+
 // A work-item a block and view.
 kernel void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
-  const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
-  const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const ImageSize blocks = blocks_of(size);
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= blocks_x || y >= blocks_y) return;
+  if (x >= blocks.width || y >= blocks.height) return;
 
   Spans spans = no_spans();
   const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
@@ -153,7 +162,7 @@ kernel void gather_blocks(const ImageSize size, global const float* disparity, g
     const float8 d = eight(disparity + ((size_t)view * size.height + row) * size.width, x * EGOSGM_BLOCK, size.width);
     spans = with(spans, d, d > EGOSGM_INVALID_DISPARITY);
   }
-  ranges[((size_t)view * blocks_y + y) * blocks_x + x] = range_of(spans);
+  ranges[index_of(blocks, view, x, y)] = range_of(spans);
 }
 
 // Which of the eight pixels from x on lie nearer than one of the `reach` pixels to their left by more than `step`, and
@@ -171,16 +180,15 @@ int8 ridges_from(global const float* row, int x, int width, int reach, float ste
   return d > EGOSGM_INVALID_DISPARITY & left < d - step & right < d - step;
 }
 
-// What is a ridge in a block, before EdgeRejection drops it: of every other row, since poles are upright. A work-item a
-// block and view.
+// What is a ridge in a block, before EdgeRejection drops it: of every other row, since poles are upright; a single
+// pixel is none. A work-item a block and view.
 kernel void gather_ridges(const ImageSize size, const float step, global const float* disparity,
                           global BlockRange* ridges) {
-  const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
-  const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const ImageSize blocks = blocks_of(size);
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= blocks_x || y >= blocks_y) return;
+  if (x >= blocks.width || y >= blocks.height) return;
 
   Spans spans = no_spans();
   const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
@@ -189,7 +197,8 @@ kernel void gather_ridges(const ImageSize size, const float step, global const f
     const int8 found = ridges_from(row, x * EGOSGM_BLOCK, size.width, EGOSGM_RIDGE_REACH, step);
     spans = with(spans, eight(row, x * EGOSGM_BLOCK, size.width), found);
   }
-  ridges[((size_t)view * blocks_y + y) * blocks_x + x] = range_of(spans);
+  const BlockRange found = range_of(spans);
+  ridges[index_of(blocks, view, x, y)] = found.count < EGOSGM_RIDGE_MIN_COUNT ? range_of(no_spans()) : found;
 }
 
 // Keeps the EGOSGM_COARSE_OUTLIERS + 1 least values of each lane, in rising order; the most, in falling order.
@@ -214,14 +223,13 @@ void insert_most(float4* most, float4 value) {
 kernel void gather_coarse(const ImageSize size, const float step, global const float* coarse,
                           global const BlockRange* ridges, global BlockRange* ranges,
                           global BlockRange* ridges_with_coarse) {
-  const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
-  const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const ImageSize blocks = blocks_of(size);
   const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= blocks_x || y >= blocks_y) return;
+  if (x >= blocks.width || y >= blocks.height) return;
 
 #if EGOSGM_BLOCK != 2 * EGOSGM_COARSE
 #error "a block and what lies around it are four coarse pixels wide"
@@ -256,7 +264,7 @@ kernel void gather_coarse(const ImageSize size, const float step, global const f
   range.min = EGOSGM_COARSE * least[EGOSGM_COARSE_OUTLIERS].x;
   range.max = EGOSGM_COARSE * most[EGOSGM_COARSE_OUTLIERS].x;
   range.count = count.x + count.y + count.z + count.w;
-  const size_t here = ((size_t)view * blocks_y + y) * blocks_x + x;
+  const size_t here = index_of(blocks, view, x, y);
   ranges[here] = range;
 
   // Of the lanes, two lie in the block.
@@ -278,30 +286,27 @@ kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, co
                             global const BlockRange* ranges, global const BlockRange* coarse_ranges,
                             const int ridge_blocks, global const BlockRange* ridges, global BlockRange* found,
                             global Band* bands) {
-  const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
-  const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const ImageSize blocks = blocks_of(size);
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= blocks_x || y >= blocks_y) return;
+  if (x >= blocks.width || y >= blocks.height) return;
 
   float least = INFINITY;
   float most = -INFINITY;
   uint count = 0;
-  for (int v = max(y - 1, 0); v <= min(y + 1, blocks_y - 1); ++v) {
-    for (int u = max(x - 1, 0); u <= min(x + 1, blocks_x - 1); ++u) {
-      const BlockRange block = ranges[((size_t)view * blocks_y + v) * blocks_x + u];
+  for (int v = max(y - 1, 0); v <= min(y + 1, blocks.height - 1); ++v) {
+    for (int u = max(x - 1, 0); u <= min(x + 1, blocks.width - 1); ++u) {
+      const BlockRange block = ranges[index_of(blocks, view, u, v)];
       least = fmin(least, block.min);
       most = fmax(most, block.max);
       count += block.count;
     }
   }
-  const size_t here = ((size_t)view * blocks_y + y) * blocks_x + x;
+  const size_t here = index_of(blocks, view, x, y);
   BlockRange near = {INFINITY, -INFINITY, 0};
-  for (int v = max(y - ridge_blocks, 0); v <= min(y + ridge_blocks, blocks_y - 1); ++v) {
-    for (int u = max(x - EGOSGM_RIDGE_BLOCKS_X, 0); u <= min(x + EGOSGM_RIDGE_BLOCKS_X, blocks_x - 1); ++u) {
-      near = joined(near, ridges[((size_t)view * blocks_y + v) * blocks_x + u]);
-    }
+  for (int v = max(y - ridge_blocks, 0); v <= min(y + ridge_blocks, blocks.height - 1); ++v) {
+    near = joined(near, ridges[index_of(blocks, view, x, v)]);
   }
   const bool has_around = count > 0 && count >= (uint)max(min_count, 0);
   const bool has_coarse = coarse_ranges[here].count >= EGOSGM_COARSE_MIN_COUNT;
@@ -328,12 +333,11 @@ kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, co
                             const float min_half_width, global const float* disparity, global const float* variance,
                             const float coarse_tolerance, const float coarse_margin, global const BlockRange* found,
                             global const Band* block_bands, global Band* bands) {
-  const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
-  const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const ImageSize blocks = blocks_of(size);
   const int block = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (block >= blocks_x) return;
+  if (block >= blocks.width) return;
 
   const int x = block * EGOSGM_BLOCK;
   const size_t row = ((size_t)view * size.height + y) * size.width;
@@ -343,7 +347,8 @@ kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   // A variance that is not a number searches everything.
   const float8 half_width = deviation <= min_half_width ? (float8)min_half_width : deviation;
   const float8 reach = half_width <= (float)range.count ? half_width : (float8)range.count;
-  const BlockRange coarse = found[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + block];
+  const size_t own_block = index_of(blocks, view, block, y / EGOSGM_BLOCK);
+  const BlockRange coarse = found[own_block];
   const int8 believed = coarse.count > 0 ? -1 : 0;
   const float8 low = d - reach;
   const float8 high = d + reach;
@@ -353,7 +358,7 @@ kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   const float8 from = (contradicted & (found_low < low)) ? found_low : low;
   const float8 to = (contradicted & (found_high > high)) ? found_high : high;
   const Bands own = bands_of(range, predicted ? from : 0.0f, predicted ? to : 0.0f);
-  const Band around = block_bands[((size_t)view * blocks_y + y / EGOSGM_BLOCK) * blocks_x + block];
+  const Band around = block_bands[own_block];
 
   const uint8 origin = as_uint8(predicted ? own.origin : around.origin) & 0xffff;
   const uint8 chunks = as_uint8(predicted ? own.chunks : around.chunks);

@@ -49,11 +49,12 @@ typedef float f32;
 
 // SearchBand calls a ridge what lies nearer than something at most this many pixels to its left, and to its right: a
 // pole. CoarseMatch's maps are looked through too, that many of their pixels far.
-#define EGOSGM_RIDGE_REACH 4
+#define EGOSGM_RIDGE_REACH 6
 #define EGOSGM_COARSE_RIDGE_REACH 2
-// A ridge is searched for in the blocks this far above, below and beside its own.
-#define EGOSGM_RIDGE_BLOCKS_X 1
-#define EGOSGM_RIDGE_BLOCKS_Y 3
+// Of a warped map's block, at least so many pixels must be ridges. They are searched for in their own block and in this
+// many above and below.
+#define EGOSGM_RIDGE_MIN_COUNT 2
+#define EGOSGM_RIDGE_BLOCKS 6
 
 // The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside.
 // KalmanUpdate then takes the measurement instead of fusing it, as where the two differ by more than the gate, and the
@@ -75,6 +76,10 @@ typedef float f32;
 // A measurement that at least so many of them have too stands against a prediction, or against none that vouches.
 #define EGOSGM_SUPPORT_HALF 13
 #define EGOSGM_SUPPORT_MOST 18
+// What is measured further off than this moves by itself, where so many of them are off to the same side by the latter.
+#define EGOSGM_MOVING_PX 1.0f
+#define EGOSGM_MOVING_AROUND_PX 0.75f
+#define EGOSGM_MOVING_COUNT 21
 
 // PredictionCheck looks at every so many rows of the left view. Prediction and measurement differ where they do by more
 // than this.

@@ -51,7 +51,7 @@ class KalmanUpdateTest : public ::testing::TestWithParam<shared::ImageSize> {};
 
 TEST_P(KalmanUpdateTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
-  // Few disparities, so that some pixels vouch for each other.
+  // Few disparities, so that some pixels vouch for each other; on the left most are off to the same side.
   testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 6);
   testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 7);
   const testing::HostMaps warped = testing::random_maps(size, -8, 8, 0.3, 8);
@@ -59,6 +59,10 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
     if (i % 7 == 0) predicted.variance[i] += EGOSGM_ESCAPED_VARIANCE_PX2;
     if (i % 11 == 0) measured.variance[i] += EGOSGM_ESCAPED_VARIANCE_PX2;
     if (i % 5 == 0 && measured.disparity[i] != kNone) measured.disparity[i] -= 6;
+    if (static_cast<int>(i) % size.width < size.width / 2 && i % 23 != 0) {
+      predicted.disparity[i] = 0;
+      measured.disparity[i] = 0.25f * static_cast<float>(i % 9) + 0.5f;
+    }
   }
   for (const KalmanUpdateOptions& options :
        {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false, .innovation_sigmas = 0},
@@ -96,8 +100,9 @@ TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   // With a variance for which the next frame searches wide.
   const float wide = EGOSGM_ESCAPED_VARIANCE_PX2;
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12.25f, 1}), (Estimate{12.25f, wide}));
-  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {7.75f, 1}), (Estimate{7.75f, wide}));
-  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {7.75f, 2 * wide}), (Estimate{7.75f, 2 * wide}));
+  const KalmanUpdateOptions alone{.gate_px = 2, .ask_neighbours = false};
+  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 1}), (Estimate{7.75f, wide}));
+  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 2 * wide}), (Estimate{7.75f, 2 * wide}));
   EXPECT_EQ(update_pixel({.gate_px = 0, .innovation_sigmas = 0}, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
 }
 
@@ -206,6 +211,64 @@ TEST(KalmanUpdate, KeepsADroppedPredictionThatTheNeighboursVouchFor) {
   maps.drop_prediction();
   maps.measured.disparity[Surroundings::kMiddle] = 10;
   EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kEscaped}));
+}
+
+TEST(KalmanUpdate, DropsBothWhereNoneVouchesForEither) {
+  Surroundings maps(20);
+  for (float& disparity : maps.measured.disparity) disparity = kNone;
+  maps.measured.disparity[Surroundings::kMiddle] = 10;
+  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
+  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kEscaped}));
+  maps.measure_from(10, 10);  // three of five rows
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  maps.measured.disparity[18 * 21 + 18] = maps.measured.disparity[18 * 21 + 14] = 20;  // one vouches for either
+  maps.predicted.disparity[18 * 21 + 10] = 10;
+  maps.measured.disparity[18 * 21 + 6] = maps.measured.disparity[18 * 21 + 2] = kNone;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  maps.measure_from(0, kNone);
+  maps.measured.disparity[Surroundings::kMiddle] = 30;  // nearer: a thin thing that was lost
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, kEscaped}));
+}
+
+/// All are measured `off` nearer than predicted, the pixel in the middle `innovation`.
+Surroundings shifted(float off, float innovation) {
+  Surroundings maps(20);
+  for (float& disparity : maps.measured.disparity) disparity += off;
+  maps.measured.disparity[Surroundings::kMiddle] = 20 + innovation;
+  return maps;
+}
+
+TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
+  for (const float sign : {1.0f, -1.0f}) {
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kEscaped}));
+    const Estimate fused{20 + sign * 0.625f, 0.5f};
+    EXPECT_EQ(shifted(sign * 0.75f, sign * 1.25f).updated_in_the_middle(), fused) << "the others not far enough";
+    EXPECT_EQ(shifted(sign * -0.875f, sign * 1.25f).updated_in_the_middle(), fused) << "to the other side";
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1).updated_in_the_middle(), (Estimate{20 + sign * 0.5f, 0.5f}));
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle({.ask_neighbours = false}), fused);
+  }
+  Surroundings maps = shifted(0.875f, 1.25f);
+  for (const int still : {2, 6, 10, 14}) maps.measured.disparity[2 * 21 + still] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kEscaped})) << "21 of 25";
+  maps.measured.disparity[2 * 21 + 18] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "20 of 25";
+  for (const int beside : {6, 14}) {
+    Surroundings between = shifted(0.875f, 1.25f);
+    between.measured.disparity[10 * 21 + beside] = 20;
+    EXPECT_EQ(between.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "but not beside";
+  }
+}
+
+TEST(KalmanUpdate, CountsEveryInnovationAfterWrongPredictions) {
+  Surroundings maps(20);
+  maps.measured.disparity[Surroundings::kMiddle] = 22;  // 4 px^2: p' is raised from 1 to 3
+  const Estimate raised{21.5f, 0.75f};
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21, 0.5f}));
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 1, 0}), raised);
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 0, 1}), raised);
+  EXPECT_EQ(maps.updated_in_the_middle({.innovation_sigmas = 0}, {{}, 1, 0}), (Estimate{21, 0.5f}));
+  EXPECT_EQ(maps.updated_in_the_middle({.innovation_sigmas = 0.5f}, {{}, 1, 0}),
+            maps.updated_in_the_middle({.innovation_sigmas = 0.5f}));
 }
 
 TEST(KalmanUpdate, NeverClaimsMoreThanTheFloor) {

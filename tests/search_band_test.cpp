@@ -34,11 +34,8 @@ reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range,
   StereoMaps found(context, {(size.width + 3) / 4, (size.height + 3) / 4});
   if (!coarse.empty()) found.disparity.write(context, coarse);
   StereoMaps before(context, size);
-  if (!warped.empty()) {
-    before.disparity.write(context, warped);
-    stage.find_ridges(before);
-  }
-  stage(predicted, coarse.empty() ? nullptr : &found);
+  if (!warped.empty()) before.disparity.write(context, warped);
+  stage(predicted, warped.empty() ? nullptr : &before, coarse.empty() ? nullptr : &found);
   return read(context, stage);
 }
 
@@ -224,52 +221,55 @@ TEST(SearchBand, ReachesWhatTheCoarseMatchFoundElsewhere) {
   EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 48);
 }
 
-/// A plane of `background` that a pole of `width` pixels at x 20 stands before, in rows 32 to 39, nothing in the right
-/// view.
-std::vector<float> plane_with_pole(int width, float background, float pole) {
-  std::vector<float> map(2 * 64 * 64, EGOSGM_INVALID_DISPARITY);
-  for (int i = 0; i < 64 * 64; ++i) {
+/// 64x120 pixels: a plane of `background` that a pole of `width` pixels at x 20 stands before, from row 56 on, nothing
+/// in the right view.
+std::vector<float> plane_with_pole(int width, float background, float pole, int rows = 8) {
+  std::vector<float> map(2 * 64 * 120, EGOSGM_INVALID_DISPARITY);
+  for (int i = 0; i < 64 * 120; ++i) {
     const int x = i % 64, y = i / 64;
-    map[i] = x >= 20 && x < 20 + width && y >= 32 && y < 40 ? pole : background;
+    map[i] = x >= 20 && x < 20 + width && y >= 56 && y < 56 + rows ? pole : background;
   }
   return map;
 }
 
 TEST(SearchBand, ReachesAThinThingAboveAndBelow) {
-  const shared::ImageSize size{64, 64};
+  const shared::ImageSize size{64, 120};
   auto maps = nothing(size);
-  for (int i = 0; i < 64 * 64; ++i) maps.disparity[i] = i % 64 < 40 ? 10 : EGOSGM_INVALID_DISPARITY;
+  for (int i = 0; i < 64 * 120; ++i) maps.disparity[i] = i % 64 < 40 ? 10 : EGOSGM_INVALID_DISPARITY;
   const SearchBandOptions options{.min_half_width_px = 2, .coarse_margin_px = 2, .ridge_step_px = 2};
   const auto last_of = [&](const std::vector<float>& warped, int x, int y, const SearchBandOptions& o,
                            const std::vector<float>& coarse = {}) {
     return run(size, {0, 128}, o, maps, 0, coarse, warped).bands[y * 64 + x].last;
   };
   const auto pole = plane_with_pole(3, 10, 50);
-  EXPECT_EQ(last_of(pole, 21, 36, options), 52);
-  EXPECT_EQ(last_of(pole, 21, 8, options), 52) << "three blocks above";
-  EXPECT_EQ(last_of(pole, 21, 63, options), 52) << "three blocks below";
-  EXPECT_EQ(last_of(pole, 21, 7, options), 12) << "four blocks above";
-  EXPECT_EQ(last_of(pole, 31, 36, options), 52) << "a block beside";
-  EXPECT_EQ(last_of(pole, 32, 36, options), 12) << "two blocks beside";
-  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, {}, pole).bands[36 * 64 + 21].first, 8) << "and what was predicted";
-  maps.disparity[36 * 64 + 22] = EGOSGM_INVALID_DISPARITY;
-  EXPECT_EQ(last_of(pole, 22, 36, options), 52) << "unpredicted: the pole and what is around";
-  EXPECT_EQ(last_of(pole, 22, 36, {.neighbour_min_count = 1000, .ridge_step_px = 2}), 127)
+  EXPECT_EQ(last_of(pole, 21, 60, options), 52);
+  EXPECT_EQ(last_of(pole, 21, 8, options), 52) << "six blocks above";
+  EXPECT_EQ(last_of(pole, 21, 111, options), 52) << "six blocks below";
+  EXPECT_EQ(last_of(pole, 21, 7, options), 12) << "seven blocks above";
+  EXPECT_EQ(last_of(pole, 21, 112, options), 12) << "seven blocks below";
+  EXPECT_EQ(last_of(pole, 15, 60, options), 12) << "beside its block";
+  EXPECT_EQ(last_of(pole, 24, 60, options), 12);
+  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, {}, pole).bands[60 * 64 + 21].first, 8) << "and what was predicted";
+  maps.disparity[60 * 64 + 22] = EGOSGM_INVALID_DISPARITY;
+  EXPECT_EQ(last_of(pole, 22, 60, options), 52) << "unpredicted: the pole and what is around";
+  EXPECT_EQ(last_of(pole, 22, 60, {.neighbour_min_count = 1000, .ridge_step_px = 2}), 127)
       << "what is behind the pole is not known";
 
-  EXPECT_EQ(last_of(plane_with_pole(4, 10, 50), 21, 36, options), 52);
-  EXPECT_EQ(last_of(plane_with_pole(8, 10, 50), 21, 36, options), 12) << "too wide: not a thin thing";
-  EXPECT_EQ(last_of(plane_with_pole(3, 10, 5), 21, 36, options), 12) << "a gap in what is near";
-  EXPECT_EQ(last_of(pole, 21, 36, {.min_half_width_px = 2, .ridge_step_px = 0}), 12);
-  EXPECT_EQ(last_of(pole, 21, 36, {.min_half_width_px = 2, .ridge_step_px = 41}), 12);
+  EXPECT_EQ(last_of(plane_with_pole(6, 10, 50), 21, 60, options), 52);
+  EXPECT_EQ(last_of(plane_with_pole(12, 10, 50), 21, 60, options), 12) << "too wide: not a thin thing";
+  EXPECT_EQ(last_of(plane_with_pole(3, 10, 5), 21, 60, options), 12) << "a gap in what is near";
+  EXPECT_EQ(last_of(plane_with_pole(1, 10, 50, 3), 21, 60, options), 52) << "two pixels, in every other row";
+  EXPECT_EQ(last_of(plane_with_pole(1, 10, 50, 2), 21, 60, options), 12) << "one";
+  EXPECT_EQ(last_of(pole, 21, 60, {.min_half_width_px = 2, .ridge_step_px = 0}), 12);
+  EXPECT_EQ(last_of(pole, 21, 60, {.min_half_width_px = 2, .ridge_step_px = 41}), 12);
 
   // A coarse pixel of 80 px, alone between others of 10 px.
-  std::vector<float> coarse(2 * 16 * 16, EGOSGM_INVALID_DISPARITY);
-  for (int i = 0; i < 256; ++i) coarse[i] = i == 8 * 16 + 5 ? 20.0f : 2.5f;
-  EXPECT_EQ(last_of({}, 21, 36, options, coarse), 82);
+  std::vector<float> coarse(2 * 16 * 30, EGOSGM_INVALID_DISPARITY);
+  for (int i = 0; i < 16 * 30; ++i) coarse[i] = i == 14 * 16 + 5 ? 20.0f : 2.5f;
+  EXPECT_EQ(last_of({}, 21, 60, options, coarse), 82);
   EXPECT_EQ(last_of({}, 21, 8, options, coarse), 82);
   EXPECT_EQ(last_of({}, 21, 7, options, coarse), 12);
-  EXPECT_EQ(last_of(pole, 21, 36, {.min_half_width_px = 2, .ridge_step_px = 36}, coarse), 52) << "half of 36, of 17.5";
+  EXPECT_EQ(last_of(pole, 21, 60, {.min_half_width_px = 2, .ridge_step_px = 36}, coarse), 52) << "half of 36, of 17.5";
 }
 
 TEST(SearchBand, CountsCellsAndLanesOfARow) {

@@ -42,7 +42,7 @@ struct SearchBandOptions {
   float neighbour_margin_px = 4.0f;
   // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
   float coarse_tolerance_px = 3.0f, coarse_margin_px = 2.0f;
-  float ridge_step_px = 0.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
+  float ridge_step_px = 3.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
 };
 struct BandedSgmOptions {
   MatchingCost cost = MatchingCost::kCensus13x11;
@@ -80,8 +80,8 @@ struct SpeckleRemovalOptions {
 struct KalmanUpdateOptions {
   float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
-  bool ask_neighbours = true;  // which of the two they speak for, instead; what none speaks for is dropped
-  float innovation_sigmas = 2.5f;  // where the two differ by more deviations, p' is raised until they do not; 0: never
+  bool ask_neighbours = true;  // which of the two they speak for, instead; and whether all of them move
+  float innovation_sigmas = 4.0f;  // where the two differ by more deviations, p' is raised until they do not; 0: never
   float min_variance_px2 = 0.02f;
 };
 struct PredictionCheckOptions {

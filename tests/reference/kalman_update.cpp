@@ -41,8 +41,22 @@ class View {
     return count(x, y,
                  [&](std::size_t i) { return is_near(measured_[i], disparity) && is_near(predicted_[i], disparity); });
   }
+  /// Of the pixels around, those measured nearer than predicted (sign 1), or farther (-1), by more than 0.75 px.
+  int moving(int x, int y, float sign) const {
+    return count(x, y, [&](std::size_t i) { return is_moving(i, sign); });
+  }
+  /// Those to the left and to the right among them.
+  bool is_between_moving(int x, int y, float sign) const {
+    const std::size_t i = static_cast<std::size_t>(y) * size_.width + x;
+    return x >= EGOSGM_SUPPORT_STEP && x + EGOSGM_SUPPORT_STEP < size_.width &&
+           is_moving(i - EGOSGM_SUPPORT_STEP, sign) && is_moving(i + EGOSGM_SUPPORT_STEP, sign);
+  }
 
  private:
+  bool is_moving(std::size_t i, float sign) const {
+    return predicted_[i] != EGOSGM_INVALID_DISPARITY && measured_[i] != EGOSGM_INVALID_DISPARITY &&
+           sign * (measured_[i] - predicted_[i]) > 0.75f;
+  }
   static bool is_near(float a, float b) { return a != EGOSGM_INVALID_DISPARITY && std::abs(a - b) < EGOSGM_SUPPORT_PX; }
 
   template <typename Condition>
@@ -70,21 +84,30 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
   if (is_hidden) return kNone;
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
   const float z = measured.disparity, escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
-  // Less than half of the 25; less than 18.
+  // Less than half of the 25; less than 18; 21 and more.
   const auto vouch = [&](float disparity) { return view.vouching(x, y, disparity); };
   const auto stays = [&](float other) {
     return options.ask_neighbours && z < other && 2 * vouch(z) < vouch(other) && 2 * view.measuring(x, y, z) < 25;
   };
+  const auto goes = [&](int enough) {
+    return options.ask_neighbours && vouch(z) == 0 && view.measuring(x, y, z) < enough;
+  };
   if (!is_valid(predicted)) {
     if (warped == EGOSGM_INVALID_DISPARITY || !contradict(options.gate_px, z, warped)) return measured;
     if (stays(warped)) return {warped, escaped};
-    const bool goes = options.ask_neighbours && vouch(z) == 0 && view.measuring(x, y, z) < 18;
-    return goes ? kNone : measured;
+    return goes(18) ? kNone : measured;
   }
+  const float innovation = z - predicted.disparity;
   if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < escaped) {
-    return fuse(options.innovation_sigmas, predicted, measured);
+    const bool moves = options.ask_neighbours && std::abs(innovation) > 1 &&
+                       view.is_between_moving(x, y, innovation > 0 ? 1.0f : -1.0f) &&
+                       view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 21;
+    return moves ? Estimate{z, escaped} : fuse(options.innovation_sigmas, predicted, measured);
   }
-  if (predicted.variance < escaped && stays(predicted.disparity)) return {predicted.disparity, escaped};
+  if (predicted.variance < escaped) {
+    if (stays(predicted.disparity)) return {predicted.disparity, escaped};
+    if (innovation < 0 && goes(13)) return kNone;
+  }
   return {z, std::max(measured.variance, escaped)};
 }
 

@@ -67,20 +67,26 @@ bool is_ridge(shared::ImageSize size, const std::vector<float>& disparity, int v
   return is_valid(at(x)) && has_left && has_right;
 }
 
-/// The ridges of a map whose blocks have `side` x `side` pixels, by block; first > second: none.
+/// The ridges of a map whose blocks have `side` x `side` pixels, by block, where there are `enough`; first > second:
+/// not.
 std::vector<std::pair<float, float>> ridges_of(shared::ImageSize size, shared::ImageSize blocks, int side, int rows,
-                                               const std::vector<float>& disparity, int reach, float step) {
+                                               const std::vector<float>& disparity, int reach, float step, int enough) {
   const std::size_t count = static_cast<std::size_t>(blocks.width) * blocks.height;
   std::vector<std::pair<float, float>> ridges(2 * count, {kInfinity, -kInfinity});
+  std::vector<int> pixels(2 * count, 0);
   for (int view = 0; view < 2 && !disparity.empty() && step > 0; ++view) {
     for (int y = 0; y < size.height; y += rows) {
       for (int x = 0; x < size.width; ++x) {
         if (!is_ridge(size, disparity, view, x, y, reach, step)) continue;
         const float d = disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
-        auto& [least, most] = ridges[view * count + static_cast<std::size_t>(y / side) * blocks.width + x / side];
-        least = std::min(least, d), most = std::max(most, d);
+        const std::size_t block = view * count + static_cast<std::size_t>(y / side) * blocks.width + x / side;
+        auto& [least, most] = ridges[block];
+        least = std::min(least, d), most = std::max(most, d), ++pixels[block];
       }
     }
+  }
+  for (std::size_t i = 0; i < ridges.size(); ++i) {
+    if (pixels[i] < enough) ridges[i] = {kInfinity, -kInfinity};
   }
   return ridges;
 }
@@ -89,24 +95,20 @@ void join(std::pair<float, float>& range, std::pair<float, float> other) {
   range = {std::min(range.first, other.first), std::max(range.second, other.second)};
 }
 
-/// What the ridges of the warped and of the coarse map span around each block.
+/// What the ridges of the warped and of the coarse map span in each block, and in those above and below.
 std::vector<std::pair<float, float>> ridges_around(shared::ImageSize size, shared::ImageSize blocks, float step,
                                                    const std::vector<float>& warped, const std::vector<float>& coarse) {
-  const auto fine = ridges_of(size, blocks, EGOSGM_BLOCK, 2, warped, EGOSGM_RIDGE_REACH, step);
+  const auto fine = ridges_of(size, blocks, EGOSGM_BLOCK, 2, warped, EGOSGM_RIDGE_REACH, step, EGOSGM_RIDGE_MIN_COUNT);
   const auto found = ridges_of({(size.width + 3) / 4, (size.height + 3) / 4}, blocks, EGOSGM_BLOCK / EGOSGM_COARSE, 1,
-                               coarse, EGOSGM_COARSE_RIDGE_REACH, step / 2);
+                               coarse, EGOSGM_COARSE_RIDGE_REACH, step / 2, 1);
   std::vector<std::pair<float, float>> around(fine.size(), {kInfinity, -kInfinity});
   for (int i = 0; i < static_cast<int>(fine.size()); ++i) {
     const int view = i / (blocks.width * blocks.height);
     const int y = i / blocks.width % blocks.height, x = i % blocks.width;
-    for (int v = std::max(0, y - EGOSGM_RIDGE_BLOCKS_Y); v <= std::min(blocks.height - 1, y + EGOSGM_RIDGE_BLOCKS_Y);
-         ++v) {
-      for (int u = std::max(0, x - EGOSGM_RIDGE_BLOCKS_X); u <= std::min(blocks.width - 1, x + EGOSGM_RIDGE_BLOCKS_X);
-           ++u) {
-        const int near = (view * blocks.height + v) * blocks.width + u;
-        join(around[i], fine[near]);
-        join(around[i], {4 * found[near].first, 4 * found[near].second});
-      }
+    for (int v = std::max(0, y - EGOSGM_RIDGE_BLOCKS); v <= std::min(blocks.height - 1, y + EGOSGM_RIDGE_BLOCKS); ++v) {
+      const int near = (view * blocks.height + v) * blocks.width + x;
+      join(around[i], fine[near]);
+      join(around[i], {4 * found[near].first, 4 * found[near].second});
     }
   }
   return around;

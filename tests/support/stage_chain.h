@@ -90,7 +90,6 @@ class StageChain {
   void predict(const Motion& motion, reference::Frame& frame) {
     forward_warp_(belief_, motion, updated_);
     frame.warped = download(context_, updated_);
-    search_band_.find_ridges(updated_);
     edge_rejection_(updated_, predicted_);
     frame.without_edges = download(context_, predicted_);
     hole_fill_(predicted_, scratch_);
@@ -106,7 +105,7 @@ class StageChain {
     if (has_prediction && options_.search == SearchMode::kBand) {
       const StereoMaps* coarse = options_.coarse_match.enabled ? &coarse_match_(images) : nullptr;
       if (coarse) pass.coarse = coarse->disparity.read(context_);
-      search_band_(predicted_, coarse, &prediction_states_[frames_ % 2]);
+      search_band_(predicted_, &updated_, coarse, &prediction_states_[frames_ % 2]);
     } else {
       has_prediction ? search_band_.full_range(predicted_) : search_band_.full_range();
     }
