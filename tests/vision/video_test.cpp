@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a frame knows from the ones before it must not cost what a single frame sees: thin things, and what moves.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "egosgm/pipeline.h"
+#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/synthetic.h"
+
+namespace egosgm::vision {
+namespace {
+
+/// From this frame on, a video has settled.
+constexpr int kSteadyFrom = 3;
+
+struct Video {
+  SyntheticSequence sequence;
+  std::vector<SyntheticFrame> frames;
+
+  explicit Video(const SyntheticOptions& options) : sequence(options) {
+    for (int k = 0; k < options.frames; ++k) frames.push_back(sequence.render(k));
+  }
+};
+
+/// Percent of the pixels in `masks`, of the steady frames, that are off by more than 3 px or have no disparity.
+double bad_or_missing(const Video& video, const std::vector<cv::Mat>& masks, bool temporal) {
+  PipelineOptions options;
+  options.temporal = temporal;
+  const cv::Size size = video.frames.front().left.size();
+  Pipeline pipeline(video.sequence.calibration(), size.width, size.height, options);
+  cv::Mat disparity(size, CV_32FC1);
+  FrameOutputs outputs;
+  outputs.disparity = map_view(disparity);
+  double bad = 0, all = 0;
+  for (int k = 0; k < static_cast<int>(video.frames.size()); ++k) {
+    const SyntheticFrame& frame = video.frames[k];
+    const std::optional<Motion> motion = k > 0 ? std::optional(video.sequence.motion(k)) : std::nullopt;
+    pipeline.process(image_view(frame.left), image_view(frame.right), motion, outputs);
+    if (k < kSteadyFrom) continue;
+    const cv::Mat error = cv::abs(disparity - frame.left_disparity);  // huge where there is no disparity
+    bad += cv::countNonZero((error > 3) & masks[k] & frame.left_noc);
+    all += cv::countNonZero(masks[k] & frame.left_noc);
+  }
+  EXPECT_GT(all, 500) << "pixels";
+  return 100 * bad / all;
+}
+
+std::vector<cv::Mat> masks_of(const Video& video, const std::function<cv::Mat(const SyntheticFrame&)>& mask_of) {
+  std::vector<cv::Mat> masks;
+  for (const SyntheticFrame& frame : video.frames) masks.push_back(mask_of(frame));
+  return masks;
+}
+
+/// What is narrower than seven pixels and stands out from both sides.
+cv::Mat thin_things(const SyntheticFrame& frame) {
+  cv::Mat wider;
+  cv::morphologyEx(frame.left_disparity, wider, cv::MORPH_OPEN, cv::Mat::ones(1, 7, CV_8U));
+  return frame.left_disparity - wider > 3;
+}
+
+TEST(Video, ThinThingsSurvive) {
+  for (const int width : {2, 3, 4}) {
+    SyntheticOptions options;
+    options.frames = 8;
+    options.supersampling = 2;
+    options.pole_width_px = width;
+    options.pole_spacing_m = 3;
+    const Video video(options);
+    const std::vector<cv::Mat> poles = masks_of(video, thin_things);
+    EXPECT_LE(bad_or_missing(video, poles, true), bad_or_missing(video, poles, false) + 5) << "poles of " << width;
+  }
+}
+
+TEST(Video, VehiclesThatMoveAreFollowed) {
+  for (const unsigned seed : {1u, 2u}) {
+    SyntheticOptions options;
+    options.frames = 10;
+    options.supersampling = 2;
+    options.seed = seed;
+    options.moving_object = true;
+    const Video video(options);
+    const std::vector<cv::Mat> vehicles =
+        masks_of(video, [](const SyntheticFrame& frame) { return frame.left_moving; });
+    EXPECT_LE(bad_or_missing(video, vehicles, true), bad_or_missing(video, vehicles, false) + 1) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace egosgm::vision
