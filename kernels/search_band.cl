@@ -165,10 +165,19 @@ kernel void gather_blocks(const ImageSize size, global const float* disparity, g
   ranges[index_of(blocks, view, x, y)] = range_of(spans);
 }
 
+float8 infinite_where_invalid(const float8 d) { return d > EGOSGM_INVALID_DISPARITY ? d : INFINITY; }
+
 // Which of the eight pixels from x on lie nearer than one of the `reach` pixels to their left by more than `step`, and
-// than one to their right.
+// than one to their right. REQUIRES: reach <= 8.
 int8 ridges_from(global const float* row, int x, int width, int reach, float step) {
   const float8 d = eight(row, x, width);
+  // Hardly ever does one lie that much nearer than anything around.
+  const float8 around = fmin(infinite_where_invalid(d), fmin(infinite_where_invalid(eight(row, x - 8, width)),
+                                                             infinite_where_invalid(eight(row, x + 8, width))));
+  const float4 least4 = fmin(around.lo, around.hi);
+  const float2 least2 = fmin(least4.lo, least4.hi);
+  if (!any(d - step > fmin(least2.x, least2.y))) return 0;
+
   float8 left = INFINITY;
   float8 right = INFINITY;
   for (int i = 1; i <= reach; ++i) {
