@@ -171,9 +171,9 @@ float8 infinite_where_invalid(const float8 d) { return d > EGOSGM_INVALID_DISPAR
 // than one to their right. REQUIRES: reach <= 8.
 int8 ridges_from(global const float* row, int x, int width, int reach, float step) {
   const float8 d = eight(row, x, width);
-  // Hardly ever does one lie that much nearer than anything around.
-  const float8 around = fmin(infinite_where_invalid(d), fmin(infinite_where_invalid(eight(row, x - 8, width)),
-                                                             infinite_where_invalid(eight(row, x + 8, width))));
+  // Hardly ever does one lie that much nearer than anything here or to the right.
+  const float8 right_of = infinite_where_invalid(eight(row, x + 8, width));
+  const float8 around = fmin(infinite_where_invalid(d), right_of);
   const float4 least4 = fmin(around.lo, around.hi);
   const float2 least2 = fmin(least4.lo, least4.hi);
   if (!any(d - step > fmin(least2.x, least2.y))) return 0;

@@ -257,6 +257,15 @@ TEST(SearchBand, ReachesAThinThingAboveAndBelow) {
 
   EXPECT_EQ(last_of(plane_with_pole(6, 10, 50), 21, 60, options), 52);
   EXPECT_EQ(last_of(plane_with_pole(12, 10, 50), 21, 60, options), 12) << "too wide: not a thin thing";
+  auto wide = plane_with_pole(0, 10, 50);
+  for (int i = 0; i < 64 * 120; ++i) {
+    if (i / 64 >= 56 && i / 64 < 64 && i % 64 >= 14 && i % 64 < 26) wide[i] = EGOSGM_INVALID_DISPARITY;
+  }
+  for (int y = 56; y < 64; ++y) {
+    wide[y * 64 + 19] = wide[y * 64 + 20] = 50;  // in the middle of a block whose other pixels are unknown
+    wide[y * 64 + 14] = wide[y * 64 + 24] = 10;  // before it and behind it
+  }
+  EXPECT_EQ(last_of(wide, 21, 60, options), 52) << "what it stands before lies in the blocks beside";
   EXPECT_EQ(last_of(plane_with_pole(3, 10, 5), 21, 60, options), 12) << "a gap in what is near";
   EXPECT_EQ(last_of(plane_with_pole(1, 10, 50, 3), 21, 60, options), 52) << "two pixels, in every other row";
   EXPECT_EQ(last_of(plane_with_pole(1, 10, 50, 2), 21, 60, options), 12) << "one";
