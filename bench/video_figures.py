@@ -238,8 +238,8 @@ def interpolated(video, number, max_variances, **options):
 
 def calibration_of_variance(pairs, bins=10):
     """What the variances are worth. `ratio`: mean of error^2 / variance, errors cut at 3 px, since a few mismatches would decide it.
-    `removed`: percent of the bad pixels among the tenth of each frame with the largest variances. `bins`: predicted and actual
-    deviation of pixels in order of their variance."""
+    `flatness`: the largest such ratio of the `bins` parts of the pixels in order of their variance, by the smallest. `removed`: percent
+    of the bad pixels among the tenth of each frame with the largest variances. `bins`: predicted and actual deviation of those parts."""
     errors, variances = (np.concatenate(values) for values in zip(*pairs))
     cut = np.minimum(errors, BAD_PX)**2
     removed = []
@@ -247,8 +247,9 @@ def calibration_of_variance(pairs, bins=10):
         worst = np.argsort(variance, kind="stable")[int(0.9 * len(variance)):]
         removed.append((np.sum(error[worst] > BAD_PX), np.sum(error > BAD_PX)))
     parts = np.array_split(np.argsort(variances, kind="stable"), bins)
+    ratios = [cut[part].mean() / variances[part].mean() for part in parts]
     return {"ratio": float(np.mean(cut / variances)), "ratio_not_bad": float(np.mean((errors**2 / variances)[errors <= BAD_PX])),
-            "removed": share(removed),
+            "flatness": float(max(ratios) / min(ratios)), "removed": share(removed),
             "bins": [{"predicted_px": float(np.sqrt(variances[part].mean())), "actual_px": float(np.sqrt(cut[part].mean()))} for part in parts]}
 
 

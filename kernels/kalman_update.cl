@@ -11,22 +11,15 @@
 // lint: PIXELS=16
 
 // What the pixels around say of a measurement and of the prediction `other`: how many measure the former, how many
-// vouch for either, as their prediction and their measurement are near it, and how many are off to the same side.
+// vouch for either, as their prediction and their measurement are near it.
 typedef struct {
-  Floats measuring, for_measured, for_other, moving;
+  Floats measuring, for_measured, for_other;
 } Support;
-
-// Whether a pixel is off as one does that moves by itself, nearer or farther.
-static Ints is_off_too(const Floats d, const Floats z, const Ints is_nearer) {
-  const Floats innovation = is_nearer ? z - d : d - z;
-  return (d > INVALID) & (z > INVALID) & (innovation > (Floats)(EGOSGM_MOVING_AROUND_PX));
-}
 
 static Support ask_around(const ImageSize size, const int x, const int y, const Floats measured, const Floats other,
                           global const float* predictions, global const float* measurements) {
-  Support support = {0.0f, 0.0f, 0.0f, 0.0f};
+  Support support = {0.0f, 0.0f, 0.0f};
   const Floats near = EGOSGM_SUPPORT_PX;
-  const Ints is_nearer = measured > other;
   for (int v = y - EGOSGM_SUPPORT_RADIUS; v <= y + EGOSGM_SUPPORT_RADIUS; v += EGOSGM_SUPPORT_STEP) {
     if (v < 0 || v >= size.height) continue;
     const size_t row = (size_t)v * size.width;
@@ -37,10 +30,38 @@ static Support ask_around(const ImageSize size, const int x, const int y, const 
       support.measuring += one_where(measures);
       support.for_measured += one_where(measures & (fabs(d - measured) < near));
       support.for_other += one_where((fabs(z - other) < near) & (fabs(d - other) < near));
-      support.moving += one_where(is_off_too(d, z, is_nearer));
     }
   }
   return support;
+}
+
+static Ints is_off_to(const Floats side, const Floats d, const Floats z) {
+  return (d > INVALID) & (z > INVALID) & ((z - d) * side > (Floats)(EGOSGM_MOVING_AROUND_PX));
+}
+
+// Which of `moves` do so together with EGOSGM_MOVING_COUNT of the 25 around. The two beside are asked first and no row
+// once too many are not off: that decides nearly everywhere.
+static Ints move_together(const ImageSize size, const int x, const int y, const Floats side, Ints moves,
+                          global const float* predictions, global const float* measurements) {
+  const int step = EGOSGM_SUPPORT_STEP;
+  for (int u = x - step; u <= x + step && any_of(moves); u += 2 * step) {
+    const size_t row = (size_t)y * size.width;
+    moves &= is_off_to(side, load_pixels(predictions + row, u, size.width),
+                       load_pixels(measurements + row, u, size.width));
+  }
+  const Floats needed = EGOSGM_MOVING_COUNT;
+  Floats off = 0.0f;
+  for (int v = y - EGOSGM_SUPPORT_RADIUS; v <= y + EGOSGM_SUPPORT_RADIUS && any_of(moves); v += step) {
+    const int is_inside = v >= 0 && v < size.height;
+    const size_t row = is_inside ? (size_t)v * size.width : 0;
+    for (int u = x - EGOSGM_SUPPORT_RADIUS; is_inside && u <= x + EGOSGM_SUPPORT_RADIUS; u += step) {
+      off += one_where(is_off_to(side, load_pixels(predictions + row, u, size.width),
+                                 load_pixels(measurements + row, u, size.width)));
+    }
+    const Floats to_come = (y + EGOSGM_SUPPORT_RADIUS - v) / step * 5;
+    moves &= off + to_come >= needed;
+  }
+  return moves;
 }
 
 // `check`: of this frame; wrong predictions would vouch for each other, so that nobody is asked, and every innovation
@@ -93,23 +114,23 @@ kernel void update(const ImageSize size, const float gate, const int keep_predic
     const Ints was_dropped = (d <= INVALID) & (other > INVALID) & (fabs(z - other) > gate);
     const Ints is_doubtful = has_measurement & (was_dropped | (has_prediction & !fuses & (p < escaped) & (z < other)));
     const Floats moving = EGOSGM_MOVING_PX;
-    Ints is_off = fuses & (fabs(innovation) > moving);
-    for (int side = -1; asks && any_of(is_off) && side <= 1; side += 2) {  // first of all, these two of the 25
-      const int u = x + side * EGOSGM_SUPPORT_STEP;
-      is_off &= is_off_too(load_pixels(predicted + row, u, width), load_pixels(measured + row, u, width), z > d);
-    }
-    if (asks && any_of(is_doubtful | is_off)) {
+    Ints moves = fuses & (fabs(innovation) > moving);
+    if (asks && any_of(is_doubtful)) {
       const Support support = ask_around(size, x, y, z, other, predicted + view, measured + view);
       const Floats half_of_them = EGOSGM_SUPPORT_HALF;
       const Floats most_of_them = EGOSGM_SUPPORT_MOST;
-      const Floats nearly_all = EGOSGM_MOVING_COUNT;
       const Ints stays = is_doubtful & (z < other) & (2.0f * support.for_measured < support.for_other) &
                          (support.measuring < half_of_them);
       const Ints goes = is_doubtful & (support.for_measured <= zero) &
                         (support.measuring < (was_dropped ? most_of_them : half_of_them));
-      const Ints moves = is_off & (support.moving >= nearly_all);
-      value = stays ? other : goes ? INVALID : moves ? z : value;
-      variance = (stays | moves) ? escaped : variance;
+      value = stays ? other : goes ? INVALID : value;
+      variance = stays ? escaped : variance;
+    }
+    if (asks && any_of(moves)) {
+      const Floats side = innovation > zero ? (Floats)(1.0f) : (Floats)(-1.0f);
+      moves = move_together(size, x, y, side, moves, predicted + view, measured + view);
+      value = moves ? z : value;
+      variance = moves ? escaped : variance;
     }
     const Floats least = min_variance;
     const Floats bounded = variance < least ? least : variance;

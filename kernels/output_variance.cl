@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The variance that is given out: the filter's, averaged over the surroundings of a pixel, and how rough the
-// disparities around it are. Most surfaces are planes, whose disparities have no second difference; where those around
-// a pixel have, or where there are holes, it is likely to be wrong.
+// The variance that is given out: the filter's, averaged over the surroundings of a pixel, to the power 1.5, and how
+// rough the disparities around it are. Most surfaces are planes, whose disparities have no second difference; where
+// those around a pixel have, or where there are holes, it is likely to be wrong.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -87,6 +87,6 @@ kernel void combine(const ImageSize size, const float scale, const float roughne
     const Floats p = column_mean(mean_variance + view, size, x, y, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP);
     const Floats r = column_mean(mean_roughness + view, size, x, y, EGOSGM_ROUGHNESS_RADIUS, 1);
     const Ints valid = load_pixels(disparity + row, x, width) > INVALID;
-    store_pixels(valid ? scale * p + roughness_weight * (r * r) : (Floats)(0.0f), variance + row, x, width);
+    store_pixels(valid ? scale * (p * sqrt(p)) + roughness_weight * (r * r) : (Floats)(0.0f), variance + row, x, width);
   }
 }

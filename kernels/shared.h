@@ -65,9 +65,9 @@ typedef float f32;
 // second differences of disparities, each cut, at every pixel nearer by.
 #define EGOSGM_VARIANCE_RADIUS 8
 #define EGOSGM_VARIANCE_STEP 4
-#define EGOSGM_MAX_MEAN_VARIANCE_PX2 4.0f
+#define EGOSGM_MAX_MEAN_VARIANCE_PX2 2.0f
 #define EGOSGM_ROUGHNESS_RADIUS 3
-#define EGOSGM_MAX_ROUGHNESS_PX 2.0f
+#define EGOSGM_MAX_ROUGHNESS_PX 1.5f
 
 // KalmanUpdate asks every fourth pixel this far to all sides: 25. Near is what differs by less than this.
 #define EGOSGM_SUPPORT_RADIUS 8

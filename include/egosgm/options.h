@@ -89,8 +89,8 @@ struct PredictionCheckOptions {
 };
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
-  // Of the filter's variance, averaged, and of the square of how far the disparities around are from a plane's.
-  float scale = 0.75f, roughness_weight = 0.72f;
+  // Of the filter's variance, averaged, to the power 1.5, and of the square of how far the disparities around are from a plane's.
+  float scale = 1.8f, roughness_weight = 1.6f;
 };
 struct DynamicMapOptions {
   bool enabled = false;            // of every frame, for DeviceMaps::dynamic; FrameOutputs::dynamic needs no option

@@ -97,9 +97,16 @@ def test_a_calibrated_variance_gives_one():
     errors = np.abs(random.normal(size=20000)) * np.sqrt(variance)
     worth = figures.calibration_of_variance([(errors, variance)])
     assert worth["ratio"] == pytest.approx(1, abs=0.05)
+    assert worth["flatness"] == pytest.approx(1, abs=0.2)
     for at in worth["bins"]:
         assert at["actual_px"] == pytest.approx(at["predicted_px"], rel=0.1)
     assert np.isnan(worth["removed"]), "none is bad"
+
+
+def test_a_variance_that_is_too_small_where_it_is_large():
+    errors = np.repeat([1.0, 2.0], 50)
+    worth = figures.calibration_of_variance([(errors, np.repeat([1.0, 2.0], 50))])
+    assert worth["flatness"] == pytest.approx(2)
 
 
 def test_the_worst_tenth_by_variance():

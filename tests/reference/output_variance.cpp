@@ -75,7 +75,7 @@ std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceO
         const float r =
             window_mean({size, rough.data()}, x, y, EGOSGM_ROUGHNESS_RADIUS, 1, 2 * EGOSGM_MAX_ROUGHNESS_PX);
         const bool is_valid = disparity(x, y) != EGOSGM_INVALID_DISPARITY;
-        out.push_back(is_valid ? options.scale * p + options.roughness_weight * (r * r) : 0);
+        out.push_back(is_valid ? options.scale * (p * std::sqrt(p)) + options.roughness_weight * (r * r) : 0);
       }
     }
   }
