@@ -180,7 +180,7 @@ class LeftMatcher {
         banded_sgm_(context_, size_, range_, options.banded_sgm),
         images_(context_, 2 * pixel_count(size_)),
         codes_(context_, Census::words(options.banded_sgm.cost, size_, BandedSgm::code_padding(range_))),
-        penalties_(context_, StepPenalties::plane_count(size_)),
+        penalties_(context_, StepPenalties::count(size_)),
         measured_(context_, size_),
         disparity_(pixel_count(size_)) {
     for (const cv::Mat* view : {&clip.frames.back().left, &clip.frames.back().right}) {

@@ -64,7 +64,7 @@ class Chain {
         motion_(street.motion),
         images_{ocl::Buffer<cl_uchar>(context, street.images.size()), PixelType::kU8},
         codes_(context, Census::words(kCost, size_, padding())),
-        penalties_(context, StepPenalties::plane_count(size_)),
+        penalties_(context, StepPenalties::count(size_)),
         belief_(context, size_),
         warped_(context, size_),
         rejected_(context, size_),

@@ -52,7 +52,7 @@ CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const Pi
       consistency_(context, coarse_),
       images_(context, 2 * 2 * pixel_count(coarse_)),
       codes_(context, Census::words(matcher_.cost, coarse_, BandedSgm::code_padding(range_))),
-      penalties_(context, StepPenalties::plane_count(coarse_)),
+      penalties_(context, StepPenalties::count(coarse_)),
       matched_(context, coarse_),
       checked_(context, coarse_) {}
 

@@ -148,7 +148,7 @@ struct Pipeline::Impl {
         dynamic_map(context, size, options.dynamic_map),
         transfers{{{context, size, range_of(options)}, {context, size, range_of(options)}}},
         codes(context, Census::words(options.banded_sgm.cost, size, BandedSgm::code_padding(range_of(options)))),
-        penalties(context, StepPenalties::plane_count(size)),
+        penalties(context, StepPenalties::count(size)),
         predicted(context, size),
         scratch(context, size),
         pool{{{context, size}, {context, size}, {context, size}, {context, size}}},

@@ -14,10 +14,11 @@ class StepPenalties {
   StepPenalties(ocl::Context& context, shared::ImageSize size, PixelType type, const BandedSgmOptions& options,
                 int pixels = 0);
 
-  /// `images`: both views' pixels. `planes`: `plane_count(size)` bytes.
-  void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& planes);
+  /// `images`: both views' pixels. `steps`: `count(size)` penalties.
+  void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& steps);
 
-  static std::size_t plane_count(shared::ImageSize size) { return 4 * 2 * pixel_count(size); }
+  static constexpr int kStepsAPixel = 4;
+  static std::size_t count(shared::ImageSize size) { return kStepsAPixel * 2 * pixel_count(size); }
 
  private:
   ocl::Context& context_;

@@ -10,7 +10,6 @@ namespace egosgm {
 namespace {
 
 constexpr int kViews = 2;
-constexpr int kPenaltyPlanes = 4 * kViews;  // StepPenalties::plane_count
 
 }  // namespace
 
@@ -34,7 +33,7 @@ StripeMemory::StripeMemory(ocl::Context& context, shared::ImageSize size, shared
       stripe_size_{size.width, rows},
       words_a_row_(words_a_row),
       codes_(context, kViews * words_a_row * rows),
-      penalties_(context, StepPenalties::plane_count(stripe_size_)),
+      penalties_(context, StepPenalties::count(stripe_size_)),
       bands_(context, kViews * pixel_count(stripe_size_)),
       cell_offsets_(context, kViews * pixel_count(stripe_size_)),
       measured_(context, stripe_size_) {
@@ -42,7 +41,8 @@ StripeMemory::StripeMemory(ocl::Context& context, shared::ImageSize size, shared
 }
 
 std::uint64_t StripeMemory::bytes(int width, int rows, std::size_t words_a_row) {
-  const std::uint64_t a_pixel = kPenaltyPlanes + kViews * (sizeof(shared::Band) + sizeof(cl_uint) + 2 * sizeof(float));
+  const std::uint64_t a_pixel =
+      kViews * (StepPenalties::kStepsAPixel + sizeof(shared::Band) + sizeof(cl_uint) + 2 * sizeof(float));
   return rows * (kViews * words_a_row * sizeof(cl_uint) + width * a_pixel);
 }
 
@@ -59,7 +59,7 @@ void StripeMemory::load_rows(const ocl::Buffer<T>& image, ocl::Buffer<T>& here, 
 void StripeMemory::load(const MatchInputs& image, const Stripe& stripe) {
   const std::size_t width = size_.width;
   load_rows(image.codes, codes_, kViews, words_a_row_, stripe.first_row);
-  load_rows(image.penalties, penalties_, kPenaltyPlanes, width, stripe.first_row);
+  load_rows(image.penalties, penalties_, kViews, StepPenalties::kStepsAPixel * width, stripe.first_row);
   load_rows(image.bands, bands_, kViews, width, stripe.first_row);
   load_rows(image.cell_offsets, cell_offsets_, kViews, width, stripe.first_row);
 }

@@ -246,7 +246,6 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
   global const Code* codes = (global const Code*)all_codes;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
   const uchar16 p1 = (uchar16)((uchar)q.p1);
-  const size_t plane = 2 * (size_t)width * height;
   slots += (size_t)view * 3 * (width + height) * SLOT + SLOT_PADDING;
 
   uchar16 t[DIRECTIONS][MAX_CHUNKS];
@@ -276,7 +275,7 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
         row_cells + ((size_t)offsets[row_start + image_x] + (backward ? band_at->chunks : 0)) * EGOSGM_LANES;
 
     // P2 of a step lies at its lower or right pixel.
-    global const uchar* penalty_at = penalties + row_start + image_x;
+    global const uchar* penalty_at = penalties + 4 * (row_start + image_x);
 
     // Slots of the paths from the left, from above, from the upper left and from the upper right; the latter three move
     // on with x.
@@ -286,7 +285,7 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
     uchar16 last = (uchar16)(ABSENT);
     int last_lane = -1;  // of `last`, or -1 where the path from the left must be read from its slot
 
-    for (int x = from; x < to; ++x, band_at += step, penalty_at += step, own += code_step, other -= code_step) {
+    for (int x = from; x < to; ++x, band_at += step, penalty_at += 4 * step, own += code_step, other -= code_step) {
       const Band band = *band_at;
       const int lane = band.origin - q.min_disparity;
       const long moved = (long)x * SLOT;
@@ -296,7 +295,7 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
       const Band wiped[4] = {band_at[before[0]], band_at[before[1]], band_at[before[2]], band_at[before[3]]};
       uchar16 p2[DIRECTIONS];
 #pragma unroll
-      for (int i = 0; i < DIRECTIONS; ++i) p2[i] = (uchar16)(penalty_at[i * plane + (backward ? before[i] : 0)]);
+      for (int i = 0; i < DIRECTIONS; ++i) p2[i] = (uchar16)(penalty_at[i + (backward ? 4 * before[i] : 0)]);
       // Where offsets and bands do not belong together, after a kernel that failed, still not before the row.
       if (backward) cells -= min((long)(EGOSGM_LANES * band.chunks), (long)(cells - row_cells));
 

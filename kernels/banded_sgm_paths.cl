@@ -131,7 +131,7 @@ inline Path path_of(const SgmParameters q, const int direction, const bool backw
   path.other = codes + ((size_t)(1 - view) * q.height + path.y) * stride + (q.width - 1 - along) + q.min_disparity;
   path.own_step = path.y_step * stride + view_sign * path.x_step;
   path.other_step = path.y_step * stride - view_sign * path.x_step;
-  path.penalties = penalties + (size_t)direction * 2 * q.width * q.height;
+  path.penalties = penalties + direction;
   path.penalty_offset = backward ? -path.pixel_step : 0;
   return path;
 }
@@ -142,7 +142,7 @@ inline Pixel pixel_at(const SgmParameters q, const Path path, const int i, globa
   if (i < path.length) {
     const size_t at = path.pixel + i * path.pixel_step;
     const size_t row_start = at - (path.x + i * path.x_step);
-    pixel.p2 = path.penalties[i > 0 ? at + path.penalty_offset : at];  // where a path begins, any P2 gives the same
+    pixel.p2 = path.penalties[4 * (i > 0 ? at + path.penalty_offset : at)];  // where a path begins, any P2 gives the same
     pixel.first_quad = (bands[at].origin - q.min_disparity) / QUAD;
     pixel.quads = bands[at].chunks * (EGOSGM_LANES / QUAD);
     pixel.cells = (row_start * MAX_CHUNKS + offsets[at]) * EGOSGM_LANES;

@@ -89,6 +89,25 @@ static inline void store_bytes(const Ints values, global uchar* row, const int x
 #endif
 }
 
+typedef struct __attribute__((packed)) {
+  int16 lanes;
+} PackedInts;
+
+// The same of words of four bytes each, the lowest first.
+static inline void store_words(const Ints words, global uchar* row, const int x, const int width) {
+#if PIXELS == 1
+  ((global int*)row)[x] = words;
+#else
+  if (x + PIXELS <= width) {
+    ((global PackedInts*)(row + 4 * x))->lanes = words;
+    return;
+  }
+  int lanes[PIXELS];
+  vstore16(words, 0, lanes);
+  for (int i = 0; i < width - x; ++i) ((global int*)row)[x + i] = lanes[i];
+#endif
+}
+
 // Pixels that are dropped lose their variance. In place: a block without any costs no more than a load and a store.
 static inline void clear_dropped(const Ints dropped, global float* variances, const int x, const int width) {
   store_pixels(dropped ? (Floats)(0.0f) : load_pixels(variances, x, width), variances, x, width);

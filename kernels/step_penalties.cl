@@ -3,8 +3,8 @@
 // since that is where surfaces end (Hirschmueller 2008, section 2.3): P2(p, q) = max(least, most - slope |I(p) -
 // I(q)|), grey values of 8 bits.
 //
-// Four planes of a byte a pixel and view: the steps to the left, to above, to the upper left and to the upper right
-// neighbour.
+// Four bytes a pixel: the steps to the left, to above, to the upper left and to the upper right neighbour. Side by side,
+// as what a sweep reads in short rows of a tile should lie in few places.
 #include "grey.h"
 #include "pixels.h"
 
@@ -30,21 +30,20 @@ static inline Ints penalty(const Ints most, const Ints least, const Ints slope, 
 }
 
 kernel void penalties(const ImageSize size, const int most, const int least, const int slope,
-                      global const uchar* images, global uchar* planes) {
+                      global const uchar* images, global uchar* steps) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
-  const size_t plane = 2 * (size_t)size.height * width;
   // Outside the image there is no step: the border's pixel stands in.
   global const Pixel* here = (global const Pixel*)images + row;
   global const Pixel* above = here - (y > 0 ? width : 0);
-  global uchar* at = planes + row;
 
   FOR_PIXELS(x, width) {
     const Ints grey = grey_at(here, x, width);
-    store_bytes(penalty(most, least, slope, grey, grey_at(here, x - 1, width)), at, x, width);
-    store_bytes(penalty(most, least, slope, grey, grey_at(above, x, width)), at + plane, x, width);
-    store_bytes(penalty(most, least, slope, grey, grey_at(above, x - 1, width)), at + 2 * plane, x, width);
-    store_bytes(penalty(most, least, slope, grey, grey_at(above, x + 1, width)), at + 3 * plane, x, width);
+    const Ints left = penalty(most, least, slope, grey, grey_at(here, x - 1, width));
+    const Ints up = penalty(most, least, slope, grey, grey_at(above, x, width));
+    const Ints upper_left = penalty(most, least, slope, grey, grey_at(above, x - 1, width));
+    const Ints upper_right = penalty(most, least, slope, grey, grey_at(above, x + 1, width));
+    store_words(left | up << 8 | upper_left << 16 | upper_right << 24, steps + 4 * row, x, width);
   }
 }

@@ -98,9 +98,9 @@ Match match(const Case& c, int max_memory_mib = 0) {
   } else {
     band.full_range();
   }
-  const auto planes = reference::step_penalties(c.size, m.grey, 8, m.options);
-  ocl::Buffer<cl_uchar> penalties(context, planes.size());
-  penalties.write(context, {planes.begin(), planes.end()});
+  const auto steps = reference::step_penalties(c.size, m.grey, 8, m.options);
+  ocl::Buffer<cl_uchar> penalties(context, steps.size());
+  penalties.write(context, {steps.begin(), steps.end()});
   sgm(device_codes, penalties, band, measured);
 
   m.parameters = {c.size.width,

@@ -21,10 +21,10 @@ std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<st
   }
   ocl::Context context(testing::any_device());
   StepPenalties penalties(context, size, type, options, pixels);
-  ocl::Buffer<cl_uchar> images(context, raw.size()), planes(context, StepPenalties::plane_count(size));
+  ocl::Buffer<cl_uchar> images(context, raw.size()), steps(context, StepPenalties::count(size));
   images.write(context, raw);
-  penalties(images, planes);
-  return planes.read(context);
+  penalties(images, steps);
+  return steps.read(context);
 }
 
 class StepPenaltiesTest : public ::testing::TestWithParam<shared::ImageSize> {};
@@ -40,7 +40,8 @@ TEST_P(StepPenaltiesTest, EqualsReference) {
     const BandedSgmOptions options{.p2 = 180, .p2_at_edges = 33, .p2_slope = 2};
     for (const int pixels : {1, 16}) {
       EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, options, pixels),
-                                     reference::step_penalties(size, grey, bits, options), size))
+                                     reference::step_penalties(size, grey, bits, options),
+                                     {4 * size.width, size.height}))
           << "by " << pixels;
     }
   }
@@ -49,14 +50,17 @@ TEST_P(StepPenaltiesTest, EqualsReference) {
 INSTANTIATE_TEST_SUITE_P(Sizes, StepPenaltiesTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
 
 TEST(StepPenalties, FallWithTheStepInGrey) {
-  // One row in each view; plane 0 holds the steps to the left.
-  const std::vector<std::uint8_t> planes =
-      penalties({4, 1}, {10, 10, 40, 240, 0, 0, 0, 0}, PixelType::kU8, {.p2 = 100, .p2_at_edges = 20, .p2_slope = 2});
-  EXPECT_EQ(std::vector<std::uint8_t>(planes.begin(), planes.begin() + 8),
-            (std::vector<std::uint8_t>{100, 100, 40, 20, 100, 100, 100, 100}));
-  // With a row alone, the steps to the upper left and right meet its own pixels, those to above none.
-  EXPECT_EQ(std::vector<std::uint8_t>(planes.begin() + 8, planes.begin() + 12),
-            (std::vector<std::uint8_t>{100, 100, 100, 100}));
+  const std::vector<std::uint8_t> steps = penalties({3, 2}, {10, 40, 240, 10, 30, 35, 0, 0, 0, 0, 0, 0}, PixelType::kU8,
+                                                    {.p2 = 100, .p2_at_edges = 20, .p2_slope = 2});
+  // To the left, to above, to the upper left and to the upper right; outside of the image there is none.
+  using Steps = std::vector<std::uint8_t>;
+  const auto at = [&](int pixel) { return Steps(steps.begin() + 4 * pixel, steps.begin() + 4 * pixel + 4); };
+  EXPECT_EQ(at(0), (Steps{100, 100, 100, 40})) << "the row above is the first one itself";
+  EXPECT_EQ(at(1), (Steps{40, 100, 40, 20}));
+  EXPECT_EQ(at(3), (Steps{100, 100, 100, 40}));
+  EXPECT_EQ(at(4), (Steps{60, 80, 60, 20}));
+  EXPECT_EQ(at(5), (Steps{90, 20, 90, 20}));
+  EXPECT_EQ(at(6), (Steps{100, 100, 100, 100})) << "of the right view";
   // A lower p2 alone is a lower penalty everywhere.
   EXPECT_EQ(penalties({1, 1}, {10, 10}, PixelType::kU8, {.p2 = 50, .p2_at_edges = 100}),
             std::vector<std::uint8_t>(8, 50));

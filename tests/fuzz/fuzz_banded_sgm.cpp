@@ -95,8 +95,8 @@ void run(std::string_view input) {
   const auto padded =
       reference::padded_codes(m.size, codes[0], codes[1], BandedSgm::code_padding(m.range), m.options.cost);
   m.codes.write(m.context, {padded.begin(), padded.end()});
-  const auto planes = reference::step_penalties(m.size, grey, 8, m.options);
-  m.penalties.write(m.context, {planes.begin(), planes.end()});
+  const auto steps = reference::step_penalties(m.size, grey, 8, m.options);
+  m.penalties.write(m.context, {steps.begin(), steps.end()});
   m.bands.write(m.context, bands);
   m.cell_offsets.write(m.context, offsets);
   m.sgm({m.codes, m.penalties, m.bands, m.cell_offsets}, m.measured);

@@ -13,22 +13,22 @@ int step_penalty(const BandedSgmOptions& options, int p, int q) {
 std::vector<std::uint8_t> step_penalties(shared::ImageSize size, const std::vector<std::uint16_t>& images, int bits,
                                          const BandedSgmOptions& options) {
   constexpr int kSteps[4][2] = {{-1, 0}, {0, -1}, {-1, -1}, {1, -1}};
-  std::vector<std::uint8_t> planes;
-  for (const auto& [dx, dy] : kSteps) {
-    for (int view = 0; view < 2; ++view) {
-      for (int y = 0; y < size.height; ++y) {
-        for (int x = 0; x < size.width; ++x) {
-          const auto at = [&](int u, int v) {
-            const int inside_u = std::clamp(u, 0, size.width - 1), inside_v = std::clamp(v, 0, size.height - 1);
-            return images[(static_cast<std::size_t>(view) * size.height + inside_v) * size.width + inside_u] >>
-                   (bits - 8);
-          };
-          planes.push_back(static_cast<std::uint8_t>(step_penalty(options, at(x, y), at(x + dx, y + dy))));
+  std::vector<std::uint8_t> penalties;
+  for (int view = 0; view < 2; ++view) {
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const auto at = [&](int u, int v) {
+          const int inside_u = std::clamp(u, 0, size.width - 1), inside_v = std::clamp(v, 0, size.height - 1);
+          return images[(static_cast<std::size_t>(view) * size.height + inside_v) * size.width + inside_u] >>
+                 (bits - 8);
+        };
+        for (const auto& [dx, dy] : kSteps) {
+          penalties.push_back(static_cast<std::uint8_t>(step_penalty(options, at(x, y), at(x + dx, y + dy))));
         }
       }
     }
   }
-  return planes;
+  return penalties;
 }
 
 }  // namespace egosgm::reference

@@ -57,7 +57,7 @@ class StageChain {
         sad_check_(context_, size, type, options.sad_check),
         transfer_(context_, size, range_of(options)),
         codes_(context_, Census::words(options.banded_sgm.cost, size, code_padding())),
-        penalties_(context_, StepPenalties::plane_count(size)) {}
+        penalties_(context_, StepPenalties::count(size)) {}
 
   reference::Frame process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion) {
     reference::Frame frame;
