@@ -30,13 +30,16 @@ typedef int16 Ints;
 
 #define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
 
-// What conditions count as; and whether one holds in any pixel, for what most blocks need not do.
+// What conditions count as; and whether one holds in any pixel, for what most blocks need not do. any() asks lane by
+// lane on some compilers (PoCL 3.1).
 static inline Floats one_where(const Ints condition) { return condition ? (Floats)(1.0f) : (Floats)(0.0f); }
 static inline int any_of(const Ints condition) {
 #if PIXELS == 1
   return condition;
 #else
-  return any(condition);
+  const int8 halves = condition.lo | condition.hi;
+  const long2 pairs = as_long2(halves.lo | halves.hi);
+  return (pairs.x | pairs.y) != 0;
 #endif
 }
 
