@@ -9,6 +9,8 @@
 #include "bench/inputs.h"
 #include "bench/opencv_matcher.h"
 #include "bench/report.h"
+#include "egosgm/error.h"
+#include "egosgm/named_options.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/odometry.h"
@@ -25,6 +27,7 @@ constexpr const char* kHelp =
     "  --size WxH        only this size (else 640x480, 1242x375, 1920x1080)\n"
     "  --disparities N   only this range (else 64, 128, 256)\n"
     "  --rounds N        turns (11)\n"
+    "  --set NAME=VALUE  also a banded frame with this option; repeat it for several\n"
     "  --threads N       of PoCL and of OpenCV (2)\n"
     "  --json FILE       write the rows\n"
     "  --benchmark_filter=REGEX and what else Google Benchmark knows\n"
@@ -113,9 +116,10 @@ Contender full_both(const Clip& clip, PipelineOptions options, const Device& dev
           }};
 }
 
-Contender banded_frame(const Clip& clip, const PipelineOptions& options, const Device& device) {
+Contender banded_frame(const std::string& name, const Clip& clip, const PipelineOptions& options,
+                       const Device& device) {
   const auto matcher = std::make_shared<Matcher>(clip, options, device);
-  return {"egosgm_banded_frame", [&clip, matcher] {
+  return {name, [&clip, matcher] {
             matcher->reset();
             for (std::size_t i = 0; i < Clip::kSteadyFrom; ++i) (*matcher)(clip.frames[i], clip.frames[i].motion);
             FrameReport report;
@@ -224,14 +228,25 @@ Contender full_left(const Clip& clip, const PipelineOptions& options, const Devi
   return {"egosgm_full_left", [matcher] { return Turn{seconds_of([&] { (*matcher)(); }), {}}; }};
 }
 
-std::vector<Contender> contenders(const Clip& clip, int disparities, const Device& device) {
+PipelineOptions with(PipelineOptions options, const std::string& setting) {
+  const std::size_t equals = setting.find('=');
+  if (equals == std::string::npos) throw InvalidArgument("--set " + setting + ": write NAME=VALUE");
+  set_option(options, setting.substr(0, equals), setting.substr(equals + 1));
+  return options;
+}
+
+std::vector<Contender> contenders(const Clip& clip, int disparities, const std::vector<std::string>& settings,
+                                  const Device& device) {
   PipelineOptions options;
   options.disparities = disparities;
   std::vector<Contender> list;
   for (const OpencvMode& mode : kOpencvModes) list.push_back(opencv(mode, clip, disparities));
   list.push_back(full_left(clip, options, device));
   list.push_back(full_both(clip, options, device));
-  list.push_back(banded_frame(clip, options, device));
+  list.push_back(banded_frame("egosgm_banded_frame", clip, options, device));
+  for (const std::string& setting : settings) {
+    list.push_back(banded_frame("egosgm_banded_frame " + setting, clip, with(options, setting), device));
+  }
   list.push_back(video_frame(clip, options, device));
   return list;
 }
@@ -244,16 +259,17 @@ void take_turn(benchmark::State& state, const Contender& contender) {
   }
 }
 
-void compare(const Clip& clip, int disparities, const Device& device, int rounds, std::vector<Row>& rows) {
+void compare(const Clip& clip, int disparities, const Device& device, const Arguments& arguments,
+             std::vector<Row>& rows) {
   const shared::ImageSize size{clip.frames.front().left.cols, clip.frames.front().left.rows};
-  const std::vector<Contender> list = contenders(clip, disparities, device);
+  const std::vector<Contender> list = contenders(clip, disparities, arguments.settings, device);
   for (const Contender& contender : list) {
     contender.turn();  // pays for what only a first turn costs
     benchmark::RegisterBenchmark(benchmark_name(contender.name, size, disparities).c_str(),
                                  [&contender](benchmark::State& state) { take_turn(state, contender); })
         ->UseManualTime()
         ->Iterations(1)
-        ->Repetitions(rounds);
+        ->Repetitions(arguments.rounds);
   }
   std::vector<Row> found;
   run_registered(found);
@@ -302,7 +318,7 @@ int run(int argc, char** argv) {
       std::printf("OpenCV %s, %d threads each\n", CV_VERSION, arguments.threads);
     }
     for (const int disparities : arguments.disparities ? std::vector{*arguments.disparities} : all_ranges) {
-      compare(clip, disparities, device, arguments.rounds, rows);
+      compare(clip, disparities, device, arguments, rows);
     }
   }
   print_ratios(rows);

@@ -148,6 +148,8 @@ Arguments parse_arguments(int argc, char** argv, const char* help, int default_r
       arguments.json = *json;
     } else if (const auto sweep = value_of("--sweep", argc, argv, i)) {
       arguments.sweep = *sweep;
+    } else if (const auto setting = value_of("--set", argc, argv, i)) {
+      arguments.settings.push_back(*setting);
     } else {
       rest.push_back(argv[i]);
     }

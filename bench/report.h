@@ -21,6 +21,7 @@ struct Arguments {
   int threads = 2;                        // --threads N: compute units of PoCL and threads of OpenCV
   std::string json;                       // --json FILE
   std::string sweep;                      // --sweep NAME (egosgm_scaling)
+  std::vector<std::string> settings;      // --set NAME=VALUE, repeated (egosgm_compare)
 };
 
 /// How the rounds of what is registered together follow one another.
