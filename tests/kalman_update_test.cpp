@@ -259,6 +259,18 @@ TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
   }
 }
 
+TEST(KalmanUpdate, CountsNoPixelOutsideOfTheImageAmongThoseThatMove) {
+  Surroundings maps(20);
+  maps.measured = Surroundings::all(21.25f);
+  const testing::HostMaps updated = update(Surroundings::kSize, {}, maps.warped, maps.predicted, maps.measured);
+  const auto moved = [&](int view, int x, int y) { return updated.disparity[(view * 21 + y) * 21 + x] == 21.25f; };
+  for (const int view : {0, 1}) {
+    EXPECT_TRUE(moved(view, 8, 8) && moved(view, 12, 12));
+    EXPECT_FALSE(moved(view, 10, 7) || moved(view, 10, 13)) << "20 of 25 lie in the image";
+    EXPECT_FALSE(moved(view, 7, 10) || moved(view, 13, 10));
+  }
+}
+
 TEST(KalmanUpdate, CountsEveryInnovationAfterWrongPredictions) {
   Surroundings maps(20);
   maps.measured.disparity[Surroundings::kMiddle] = 22;  // 4 px^2: p' is raised from 1 to 3
