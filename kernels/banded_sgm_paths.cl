@@ -142,7 +142,8 @@ inline Pixel pixel_at(const SgmParameters q, const Path path, const int i, globa
   if (i < path.length) {
     const size_t at = path.pixel + i * path.pixel_step;
     const size_t row_start = at - (path.x + i * path.x_step);
-    pixel.p2 = path.penalties[4 * (i > 0 ? at + path.penalty_offset : at)];  // where a path begins, any P2 gives the same
+    // Where a path begins, any P2 gives the same.
+    pixel.p2 = path.penalties[4 * (i > 0 ? at + path.penalty_offset : at)];
     pixel.first_quad = (bands[at].origin - q.min_disparity) / QUAD;
     pixel.quads = bands[at].chunks * (EGOSGM_LANES / QUAD);
     pixel.cells = (row_start * MAX_CHUNKS + offsets[at]) * EGOSGM_LANES;
