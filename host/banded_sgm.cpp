@@ -14,7 +14,7 @@ int ceil_div(int a, int b) { return (a + b - 1) / b; }
 
 std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range) {
   const std::size_t slot = static_cast<std::size_t>(SearchBand::max_chunks(range) + 2) * EGOSGM_LANES;
-  return 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
+  return 2 * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
 }
 
 std::size_t cell_bytes(shared::ImageSize size, shared::DisparityRange range) {
@@ -93,8 +93,8 @@ BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, s
       slots(context, slot_bytes(size, range)),
       sums(context, cell_bytes(size, range)),
       winners(context, 2 * pixel_count(size)),
-      forward(build(context, range, options, tile), "sweep_forward"),
-      backward(build(context, range, options, tile), "sweep_backward"),
+      to_middle(build(context, range, options, tile), "sweep_to_middle"),
+      from_middle(build(context, range, options, tile), "sweep_from_middle"),
       refine(build(context, range, options, tile), "refine") {}
 
 BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
@@ -153,30 +153,29 @@ void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, int views
 
 void BandedSgm::sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMaps& measured, int views) {
   const Tile tile = wavefront.tile;
-  const int tile_rows = ceil_div(size_.height, tile.height);
+  const int tile_rows = ceil_div(ceil_div(size_.height, 2), tile.height);
   const int tile_columns = ceil_div(size_.width + tile.height, tile.width) + 1;
-  const bool is_whole = takes_whole_views(views);
-  const ocl::Range tiles{cl::NDRange(is_whole ? 1 : tile_rows, views), cl::NDRange(1, 1)};
+  const bool is_whole = takes_whole_sweeps(views);
+  const ocl::Range tiles{cl::NDRange(is_whole ? 1 : tile_rows, views, 2), cl::NDRange(1, 1, 1)};
   const int first_wave = is_whole ? EGOSGM_ALL_TILES : 0;
   const int end_wave = is_whole ? EGOSGM_ALL_TILES + 1 : tile_columns + 2 * (tile_rows - 1);
 
   wavefront.slots.fill(context_, 255);
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
-    wavefront.forward(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands, inputs.cell_offsets,
-                      inputs.penalties, wavefront.slots, wavefront.sums);
+    wavefront.to_middle(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands,
+                        inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums);
   }
-  wavefront.slots.fill(context_, 255);
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
-    wavefront.backward(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands,
-                       inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners);
+    wavefront.from_middle(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands,
+                          inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners);
   }
   wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters_,
                    wavefront.winners, measured.disparity, measured.variance);
 }
 
-bool BandedSgm::takes_whole_views(int views) const {
-  if (launches_ != Launches::kAutomatic) return launches_ == Launches::kViews;
-  return context_.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(views);
+bool BandedSgm::takes_whole_sweeps(int views) const {
+  if (launches_ != Launches::kAutomatic) return launches_ == Launches::kSweeps;
+  return context_.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(2 * views);
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {

@@ -26,9 +26,10 @@ class BandedSgm {
     int width = kCpuTuning.tile_width, height = kCpuTuning.tile_height;
   };
 
-  /// Of the wavefronts: one for every wave of tiles, or one a sweep, whose work-items take a view each and wait for
-  /// nobody. Automatic: the latter where the device has no more compute units than there are views.
-  enum class Launches { kAutomatic, kWaves, kViews };
+  /// Of the wavefronts, two sweeps a view, to the middle of the image and from there: one for every wave of tiles, or
+  /// one for each half of the way, whose work-items take a sweep each and wait for nobody. Automatic: the latter where
+  /// the device has no more compute units than there are sweeps.
+  enum class Launches { kAutomatic, kWaves, kSweeps };
 
   /// `group`: how paths share work-groups, where they do; by default what suits the device. `tile`, `launches`: where
   /// they do not. Same bits.
@@ -52,12 +53,13 @@ class BandedSgm {
 
   static int code_padding(shared::DisparityRange range);
 
-  using Forward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
-                              const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
-                              ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
-  using Backward = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
+  using ToMiddle = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
                                const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
-                               ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>>;
+                               ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
+  using FromMiddle =
+      ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
+                  const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
+                  ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>>;
   using Refine =
       ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
 
@@ -67,17 +69,17 @@ class BandedSgm {
               const BandedSgmOptions& options, Tile tile);
 
     Tile tile;
-    ocl::Buffer<cl_uchar> slots;  // path costs under way, one row of disparities a path and view
-    ocl::Buffer<cl_uchar> sums;   // the forward sweep's sums, 8 bits a cell
+    ocl::Buffer<cl_uchar> slots;  // path costs under way, one row of disparities a path, sweep and view
+    ocl::Buffer<cl_uchar> sums;   // of the sweep that comes first, 8 bits a cell
     ocl::Buffer<cl_ulong> winners;
-    Forward forward;
-    Backward backward;
+    ToMiddle to_middle;
+    FromMiddle from_middle;
     Refine refine;
   };
 
   void match(const MatchInputs& inputs, StereoMaps& measured, int views);
   void sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMaps& measured, int views);
-  bool takes_whole_views(int views) const;
+  bool takes_whole_sweeps(int views) const;
 
   ocl::Context& context_;
   const shared::ImageSize size_;  // of what is matched at once: the image, or a stripe

@@ -3,15 +3,18 @@
 //
 // Four of the eight paths come to a pixel from pixels that a sweep from the top left has done: from the left, the upper
 // left, above and the upper right. The other four are the same sweep over the image turned by 180 degrees. So two
-// sweeps do it all. In a sweep, a pixel needs the one before it and three of the row above; tiles skewed by a column a
-// row need the tiles to the left, above and to the upper right, so all tiles (i, j) with j + 2 i = wave run at once: a
-// launch a wave, a work-item a tile. Where a device has no more compute units than there are views, a work-item takes
-// all tiles of a view, row by row, and nobody waits.
+// sweeps do it all. They need each other's sums only where both have been: each goes to the middle of the image first,
+// the forward one down to it and the backward one up, and then on, over the sums of the other one, to the winners.
+//
+// In a sweep, a pixel needs the one before it and three of the row above; tiles skewed by a column a row need the tiles
+// to the left, above and to the upper right, so all tiles (i, j) with j + 2 i = wave run at once: a launch a wave, a
+// work-item a tile. Where a device has no more compute units than there are sweeps, a work-item takes all tiles of a
+// sweep up to the middle or from there, row by row, and nobody waits.
 //
 // Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d
 // +- 1) + P1, P2(p, q)), which is the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of
-// q, or outside the disparity range. The forward sweep leaves half the sum of its four paths, in 8 bits, in `sums`; the
-// backward sweep adds its own and finds the winner.
+// q, or outside the disparity range. The sweep that comes first leaves half the sum of its four paths, in 8 bits, in
+// `sums`; the other one adds its own and finds the winner.
 //
 // A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a
 // pixel reads its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them
@@ -89,12 +92,26 @@ inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535)
 
 constant uchar16 kLane = (uchar16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 
-inline uchar minimum(uchar16 v) {
-  v = min(v, v.s89abcdef89abcdef);
-  v = min(v, v.s4567456745674567);
-  v = min(v, v.s2323232323232323);
-  v = min(v, v.s1111111111111111);
-  return v.s0;
+// The least lane of each vector, in all lanes.
+inline void minima(const uchar16* v, uchar16* least) {
+#if PATHS == 8
+  const uchar16 a = min((uchar16)(v[0].lo, v[1].lo), (uchar16)(v[0].hi, v[1].hi));
+  const uchar16 b = min((uchar16)(v[2].lo, v[3].lo), (uchar16)(v[2].hi, v[3].hi));
+  uchar16 of_four = min((uchar16)(a.s0123, a.s89ab, b.s0123, b.s89ab), (uchar16)(a.s4567, a.scdef, b.s4567, b.scdef));
+  of_four = min(of_four, of_four.s23016745ab89efcd);
+  of_four = min(of_four, of_four.s1032547698badcfe);
+  least[0] = (uchar16)(of_four.s0);
+  least[1] = (uchar16)(of_four.s4);
+  least[2] = (uchar16)(of_four.s8);
+  least[3] = (uchar16)(of_four.sc);
+#else
+  uchar16 of_two = min((uchar16)(v[0].lo, v[1].lo), (uchar16)(v[0].hi, v[1].hi));
+  of_two = min(of_two, of_two.s45670123cdef89ab);
+  of_two = min(of_two, of_two.s23016745ab89efcd);
+  of_two = min(of_two, of_two.s1032547698badcfe);
+  least[0] = (uchar16)(of_two.s0);
+  least[1] = (uchar16)(of_two.s8);
+#endif
 }
 
 // 255 in the lanes from `first` on, 0 in those before it.
@@ -230,23 +247,29 @@ inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
   return (ulong)(ushort)candidate->disparity | (ulong)rise_before << 16 | (ulong)rise_after << 32 | (ulong)steps << 48;
 }
 
-// 65535 in the lanes outside of [first, last].
-inline ushort16 barred(const int first, const int last) { return widened(~lanes_from(first) | lanes_from(last + 1)); }
+// 65535 in the lanes outside of [first, last]: the others are no more than last - first above first.
+inline ushort16 barred(const int first, const int last) {
+  return as_ushort16(convert_ushort16(kLane) - (ushort16)((ushort)first) > (ushort16)((ushort)(last - first)));
+}
 
 // The least total of 16 lanes in its upper bits, its lane in the lower four: the smallest disparity wins a tie.
 inline int ranked(const ushort16 totals) {
   return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane));
 }
 
-inline void sweep_tile(const bool backward, const SgmParameters q, const int tile_x, const int tile_y, const int view,
-                       global const uint* all_codes, global const Band* bands, global const uint* offsets,
-                       global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners) {
+// The rows that a sweep takes before it comes to those that the other one has been to.
+inline int own_rows(const int height, const bool backward) { return backward ? height / 2 : height - height / 2; }
+
+inline void sweep_tile(const bool meets, const bool backward, const SgmParameters q, const int tile_x,
+                       const int first_y, const int end_y, const int view, global const uint* all_codes,
+                       global const Band* bands, global const uint* offsets, global const uchar* penalties,
+                       global uchar* slots, global uchar* sums, global ulong* winners) {
   const int width = q.width, height = q.height;
   const size_t first_pixel = (size_t)view * width * height;
   global const Code* codes = (global const Code*)all_codes;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
   const uchar16 p1 = (uchar16)((uchar)q.p1);
-  slots += (size_t)view * 3 * (width + height) * SLOT + SLOT_PADDING;
+  slots += (size_t)(2 * view + backward) * 3 * (width + height) * SLOT + SLOT_PADDING;
 
   uchar16 t[DIRECTIONS][MAX_CHUNKS];
   ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS];
@@ -254,25 +277,27 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
   const int step = backward ? -1 : 1;
   const int code_step = view == EGOSGM_LEFT ? step : -step;
 
-  for (int row = 0; row < TILE_HEIGHT; ++row) {
-    const int y = tile_y * TILE_HEIGHT + row;
+  for (int y = first_y; y < end_y; ++y) {
+    const int row = y - first_y;
     const int from = max(0, tile_x * TILE_WIDTH - row), to = min(width, (tile_x + 1) * TILE_WIDTH - row);
-    if (y >= height || from >= to) continue;
+    if (from >= to) continue;
     const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
     const size_t row_start = first_pixel + (size_t)image_y * width;
-    const long up = y > 0 ? -step * (long)width : 0;
+    // To the pixels before this one on the four paths. Where there is none, to one whose band and penalty do no harm:
+    // wiping some place in the slot, and a step from nowhere.
+    const long above = y > 0 ? -step * (long)width : 0, above_right = y > 0 ? above + step : 0;
+    long left = from > 0 ? -step : 0;
 
     const int along = view == EGOSGM_LEFT ? image_x : width - 1 - image_x;
     global const Code* own = codes + ((size_t)view * height + image_y) * code_stride + q.padding + along;
     global const Code* other =
         codes + ((size_t)(1 - view) * height + image_y) * code_stride + q.padding + (width - 1 - along);
-    const long above = image_y > 0 ? -(long)code_stride : 0, below = image_y + 1 < height ? (long)code_stride : 0;
+    const long row_above = image_y > 0 ? -(long)code_stride : 0,
+               row_below = image_y + 1 < height ? (long)code_stride : 0;
 
-    // Cells lie in the image's order: a backward sweep comes to a pixel's cells from their end.
     global const Band* band_at = bands + row_start + image_x;
+    global const uint* offset_at = offsets + row_start + image_x;
     global uchar* row_cells = sums + row_start * MAX_CHUNKS * EGOSGM_LANES;
-    global uchar* cells =
-        row_cells + ((size_t)offsets[row_start + image_x] + (backward ? band_at->chunks : 0)) * EGOSGM_LANES;
 
     // P2 of a step lies at its lower or right pixel.
     global const uchar* penalty_at = penalties + 4 * (row_start + image_x);
@@ -284,24 +309,24 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
                              slots + (size_t)(2 * height + 2 * width + y) * SLOT};
     uchar16 last = (uchar16)(ABSENT);
     int last_lane = -1;  // of `last`, or -1 where the path from the left must be read from its slot
+    Band wiped[4] = {band_at[left], band_at[above], band_at[above + left], band_at[above]};
 
-    for (int x = from; x < to; ++x, band_at += step, penalty_at += 4 * step, own += code_step, other -= code_step) {
+    for (int x = from; x < to;
+         ++x, band_at += step, offset_at += step, penalty_at += 4 * step, own += code_step, other -= code_step) {
       const Band band = *band_at;
       const int lane = band.origin - q.min_disparity;
       const long moved = (long)x * SLOT;
-      // The bands before this one on the three paths from above. Where there is none, wiping some place in the slot
-      // does no harm.
-      const long before[4] = {x > 0 ? -step : 0, up, x > 0 ? up - step : up, x + 1 < width ? up + step : up};
-      const Band wiped[4] = {band_at[before[0]], band_at[before[1]], band_at[before[2]], band_at[before[3]]};
+      wiped[3] = band_at[above_right];
+      const long before[4] = {left, above, above + left, above_right};
       uchar16 p2[DIRECTIONS];
 #pragma unroll
       for (int i = 0; i < DIRECTIONS; ++i) p2[i] = (uchar16)(penalty_at[i + (backward ? 4 * before[i] : 0)]);
-      // Where offsets and bands do not belong together, after a kernel that failed, still not before the row.
-      if (backward) cells -= min((long)(EGOSGM_LANES * band.chunks), (long)(cells - row_cells));
+      // Where offsets and bands do not belong together, after a kernel that failed, still not beyond the row.
+      global uchar* cells = row_cells + EGOSGM_LANES * min((int)*offset_at, width * MAX_CHUNKS - band.chunks);
 
       if (band.chunks == 1) {
         const uchar16 absent = absent_from(q.disparities - lane);
-        const uchar16 cost = absent | matching_cost(own, other + band.origin, above, below);
+        const uchar16 cost = absent | matching_cost(own, other + band.origin, row_above, row_below);
         uchar16 r[DIRECTIONS];
         if (lane == last_lane) {
           r[0] = path_cost_beside(last, cost, p1, p2[0]);
@@ -314,15 +339,17 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
           r[i] = path_cost_from(slot[i] + (moved + lane), cost, p1, p2[i]);
           wipe(slot[i] + moved, wiped[i], q.min_disparity);
         }
+        uchar16 least[DIRECTIONS];
+        minima(r, least);
 #pragma unroll
         for (int i = 0; i < DIRECTIONS; ++i) {
-          r[i] = (r[i] - (uchar16)(minimum(r[i]))) | absent;
+          r[i] = (r[i] - least[i]) | absent;
           store(r[i], slot[i] + (i > 0 ? moved + lane : lane));
         }
         last = r[0];
         last_lane = lane;
         const uchar16 sum = half_sum(r);
-        if (!backward) {
+        if (!meets) {
           store(sum, cells);
         } else {
           const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells))) | widened(absent);
@@ -338,16 +365,16 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
         for (int v = 0; v < band.chunks; ++v) {
           const int at = lane + EGOSGM_LANES * v;
           const uchar16 cost = absent_from(q.disparities - at) |
-                               matching_cost(own, other + band.origin + EGOSGM_LANES * v, above, below);
+                               matching_cost(own, other + band.origin + EGOSGM_LANES * v, row_above, row_below);
 #pragma unroll
           for (int i = 0; i < DIRECTIONS; ++i) {
             t[i][v] = path_cost_from(slot[i] + (i > 0 ? moved + at : at), cost, p1, p2[i]);
             least[i] = min(least[i], t[i][v]);
           }
         }
+        minima(least, least);
 #pragma unroll
         for (int i = 0; i < DIRECTIONS; ++i) {
-          least[i] = (uchar16)(minimum(least[i]));
           if (!covers(band, wiped[i])) wipe(slot[i] + (i > 0 ? moved : 0), wiped[i], q.min_disparity);
         }
         last_lane = -1;
@@ -364,7 +391,7 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
             store(r[i], slot[i] + (i > 0 ? moved + at : at));
           }
           const uchar16 sum = half_sum(r);
-          if (!backward) {
+          if (!meets) {
             store(sum, cells + EGOSGM_LANES * v);
           } else {
             const ushort16 total =
@@ -378,7 +405,7 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
             best = min(best, allowed);
           }
         }
-        if (backward) {
+        if (meets) {
           const ushort winner_total = minimum_of_totals(best);
           const ushort16 lanes = best_chunk * (ushort16)(EGOSGM_LANES) + convert_ushort16(kLane);
           const int best_lane = minimum_of_totals(lanes | as_ushort16(best != (ushort16)(winner_total)));
@@ -390,41 +417,53 @@ inline void sweep_tile(const bool backward, const SgmParameters q, const int til
           candidates[x - from].disparity = band.origin + best_lane;
         }
       }
-      if (!backward) cells += EGOSGM_LANES * band.chunks;
+      // The next one's: what was to the upper right is above it.
+      wiped[0] = band;
+      wiped[2] = wiped[1];
+      wiped[1] = wiped[3];
+      left = -step;
     }
     // Apart from the sweep, whose pixels wait for each other: these do not.
-    if (backward) {
-      for (int x = from; x < to; ++x) winners[row_start + width - 1 - x] = winner_of(q, &candidates[x - from]);
+    if (meets) {
+      for (int i = 0; i < to - from; ++i) winners[row_start + image_x + step * i] = winner_of(q, &candidates[i]);
     }
   }
 }
 
-// The tile of a wave in this work-item's row of tiles, or all tiles of its view.
-inline void sweep(const bool backward, const SgmParameters q, const int wave, const int tile_columns,
+// The tile of a wave in this work-item's row of tiles, or all tiles of its view and direction.
+inline void sweep(const bool meets, const SgmParameters q, const int wave, const int tile_columns,
                   global const uint* all_codes, global const Band* bands, global const uint* offsets,
                   global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners) {
   const int view = get_global_id(1);
+  const bool backward = get_global_id(2) > 0;
   const bool all = wave == EGOSGM_ALL_TILES;
+  const int first_y = meets ? own_rows(q.height, backward) : 0;
+  const int end_y = meets ? q.height : own_rows(q.height, backward);
   const int first_row = get_global_id(0);
-  const int end_row = all ? (q.height + TILE_HEIGHT - 1) / TILE_HEIGHT : first_row + 1;
+  const int end_row = all ? (end_y - first_y + TILE_HEIGHT - 1) / TILE_HEIGHT : first_row + 1;
   for (int tile_y = first_row; tile_y < end_row; ++tile_y) {
     const int tile_of_wave = wave - 2 * tile_y;
     const int first = all ? 0 : max(tile_of_wave, 0), end = all ? tile_columns : min(tile_of_wave + 1, tile_columns);
+    const int y = first_y + tile_y * TILE_HEIGHT;
     for (int tile_x = first; tile_x < end; ++tile_x) {
-      sweep_tile(backward, q, tile_x, tile_y, view, all_codes, bands, offsets, penalties, slots, sums, winners);
+      sweep_tile(meets, backward, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
+                 slots, sums, winners);
     }
   }
 }
 
-kernel void sweep_forward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
-                          global const Band* bands, global const uint* offsets, global const uchar* penalties,
-                          global uchar* slots, global uchar* sums) {
+// Both sweeps to the middle of the image, where they leave their sums.
+kernel void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
+                            global const Band* bands, global const uint* offsets, global const uchar* penalties,
+                            global uchar* slots, global uchar* sums) {
   sweep(false, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0);
 }
 
-kernel void sweep_backward(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
-                           global const Band* bands, global const uint* offsets, global const uchar* penalties,
-                           global uchar* slots, global const uchar* sums, global ulong* winners) {
+// Both on from there, over the sums of the other one, to the winners.
+kernel void sweep_from_middle(const SgmParameters q, const int wave, const int tile_columns,
+                              global const uint* all_codes, global const Band* bands, global const uint* offsets,
+                              global const uchar* penalties, global uchar* slots, global const uchar* sums,
+                              global ulong* winners) {
   sweep(true, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, (global uchar*)sums, winners);
 }
 

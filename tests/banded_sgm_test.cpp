@@ -259,7 +259,7 @@ std::vector<Case> changed(std::vector<Case> cases, Change change) {
 }
 
 void along_paths(Case& c) { c.scheduling = Scheduling::kPaths; }
-void view_by_view(Case& c) { c.launches = BandedSgm::Launches::kViews; }
+void whole_sweeps(Case& c) { c.launches = BandedSgm::Launches::kSweeps; }
 
 /// Groups of other shapes than the default: single work-items, paths that do not share out evenly, more lanes than
 /// quads, a minimum in one, two and three steps.
@@ -278,8 +278,8 @@ std::vector<Case> in_groups() {
 using ::testing::ValuesIn;
 INSTANTIATE_TEST_SUITE_P(Banded, BandedSgmTest, ValuesIn(kBanded), name);
 INSTANTIATE_TEST_SUITE_P(FullRange, BandedSgmTest, ValuesIn(kFullRange), name);
-INSTANTIATE_TEST_SUITE_P(BandedViews, BandedSgmTest, ValuesIn(changed(kBanded, view_by_view)), name);
-INSTANTIATE_TEST_SUITE_P(FullRangeViews, BandedSgmTest, ValuesIn(changed(kFullRange, view_by_view)), name);
+INSTANTIATE_TEST_SUITE_P(BandedSweeps, BandedSgmTest, ValuesIn(changed(kBanded, whole_sweeps)), name);
+INSTANTIATE_TEST_SUITE_P(FullRangeSweeps, BandedSgmTest, ValuesIn(changed(kFullRange, whole_sweeps)), name);
 INSTANTIATE_TEST_SUITE_P(BandedPaths, BandedSgmTest, ValuesIn(changed(kBanded, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(FullRangePaths, BandedSgmTest, ValuesIn(changed(kFullRange, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(GroupedPaths, BandedSgmTest, ValuesIn(in_groups()), name);

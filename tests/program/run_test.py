@@ -83,7 +83,7 @@ class Run(ProgramTest):
             self.assertEqual(len(kernels), frame["launches"])
             self.assertEqual({rows[span["tid"]] for span in kernels}, {"device: kernels"})
             self.assertEqual({rows[span["tid"]] for span in commands}, {"device: upload", "device: kernels", "device: download"})
-            self.assertIn(("BandedSgm", "sweep_forward"), {(span["cat"], span["name"]) for span in kernels})
+            self.assertIn(("BandedSgm", "sweep_to_middle"), {(span["cat"], span["name"]) for span in kernels})
         for span in spans:
             self.assertGreaterEqual(span["dur"], 0)
             if span["cat"] != "host":
