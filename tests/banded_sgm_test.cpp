@@ -26,6 +26,7 @@ struct Case {
   Scheduling scheduling = Scheduling::kWavefront;
   std::optional<BandedSgmPaths::Group> group = {};
   BandedSgm::Launches launches = BandedSgm::Launches::kWaves;
+  BandedSgm::Tile tile = {};
 };
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
@@ -36,6 +37,9 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   if (c.cost == MatchingCost::kSad3x3) text += "_sad";
   if (c.cost == MatchingCost::kCensus9x7) text += "_census9x7";
   text += c.banded ? "_banded" : "_full";
+  if (c.tile.width != BandedSgm::Tile().width) {
+    text += "_tiles" + std::to_string(c.tile.width) + "x" + std::to_string(c.tile.height);
+  }
   if (c.group) text += "_lanes" + std::to_string(c.group->lanes) + "_lines" + std::to_string(c.group->lines);
   return text;
 }
@@ -85,7 +89,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
   const int padding = BandedSgm::code_padding(c.range);
   m.options = {.cost = c.cost, .paths = c.paths, .scheduling = c.scheduling, .max_memory_mib = max_memory_mib};
   SearchBand band(context, c.size, c.range, {.min_half_width_px = 1});
-  BandedSgm sgm(context, c.size, c.range, m.options, c.group, {}, c.launches);
+  BandedSgm sgm(context, c.size, c.range, m.options, c.group, c.tile, c.launches);
   const auto padded = reference::padded_codes(c.size, m.codes[0], m.codes[1], padding, c.cost);
   ocl::Buffer<cl_uint> device_codes(context, padded.size());
   device_codes.write(context, {padded.begin(), padded.end()});
@@ -275,11 +279,24 @@ std::vector<Case> in_groups() {
   return cases;
 }
 
+/// Several tiles a row, a column and a wave in an image that is small enough for oclgrind, which looks for races.
+std::vector<Case> in_small_tiles() {
+  std::vector<Case> cases;
+  for (const BandedSgm::Tile tile : {BandedSgm::Tile{7, 3}, {9, 4}, {5, 5}}) {
+    for (const bool banded : {false, true}) {
+      cases.push_back({.size = {31, 23}, .range = {0, 37}, .banded = banded, .tile = tile});
+    }
+  }
+  return cases;
+}
+
 using ::testing::ValuesIn;
 INSTANTIATE_TEST_SUITE_P(Banded, BandedSgmTest, ValuesIn(kBanded), name);
 INSTANTIATE_TEST_SUITE_P(FullRange, BandedSgmTest, ValuesIn(kFullRange), name);
 INSTANTIATE_TEST_SUITE_P(BandedSweeps, BandedSgmTest, ValuesIn(changed(kBanded, whole_sweeps)), name);
 INSTANTIATE_TEST_SUITE_P(FullRangeSweeps, BandedSgmTest, ValuesIn(changed(kFullRange, whole_sweeps)), name);
+INSTANTIATE_TEST_SUITE_P(SmallTiles, BandedSgmTest, ValuesIn(in_small_tiles()), name);
+INSTANTIATE_TEST_SUITE_P(SmallTilesSweeps, BandedSgmTest, ValuesIn(changed(in_small_tiles(), whole_sweeps)), name);
 INSTANTIATE_TEST_SUITE_P(BandedPaths, BandedSgmTest, ValuesIn(changed(kBanded, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(FullRangePaths, BandedSgmTest, ValuesIn(changed(kFullRange, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(GroupedPaths, BandedSgmTest, ValuesIn(in_groups()), name);
