@@ -99,8 +99,8 @@ class Run(ProgramTest):
     def test_tune_keeps_sizes_that_run_uses_and_change_no_bit(self):
         folder = self.new_folder()
         plain, tuned, file = folder / "plain", folder / "tuned", folder / "egosgm/tuning.json"
-        # With more compute units than views each diagonal of tiles is a launch: so the sizes show.
-        environment = dict(os.environ, XDG_CONFIG_HOME=str(folder), POCL_MAX_PTHREAD_COUNT="3")
+        # With more compute units than sweeps each diagonal of tiles is a launch: so the sizes show.
+        environment = dict(os.environ, XDG_CONFIG_HOME=str(folder), POCL_MAX_PTHREAD_COUNT="5")
         self.assert_works("tune", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "SpeckleRemoval", env=environment)
         stored = json.loads(file.read_text())
         self.assertEqual(len(stored), 1)
