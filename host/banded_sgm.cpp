@@ -21,6 +21,11 @@ std::size_t cell_bytes(shared::ImageSize size, shared::DisparityRange range) {
   return 2 * pixel_count(size) * SearchBand::max_chunks(range) * EGOSGM_LANES;
 }
 
+/// The wavefronts' sums begin with a row that is nobody's: see `sweep_tile`.
+std::size_t wavefront_sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  return cell_bytes(size, range) + cell_bytes({size.width, 1}, range) / 2;
+}
+
 const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
                          BandedSgm::Tile tile) {
   return context.program("banded_sgm.cl", ocl::Defines()
@@ -46,8 +51,8 @@ struct Demand {
 };
 
 Demand demand(shared::ImageSize size, shared::DisparityRange range, bool paths) {
-  const std::uint64_t sums = cell_bytes(size, range);
-  if (paths) return {sums, 4 * sums};
+  const std::uint64_t path_sums = cell_bytes(size, range), sums = wavefront_sum_bytes(size, range);
+  if (paths) return {path_sums, 4 * path_sums};
   const std::uint64_t slots = slot_bytes(size, range), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
   return {std::max({sums, slots, winners}), sums + slots + winners};
 }
@@ -91,7 +96,7 @@ BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, s
                                 const BandedSgmOptions& options, Tile chosen)
     : tile(chosen),
       slots(context, slot_bytes(size, range)),
-      sums(context, cell_bytes(size, range)),
+      sums(context, wavefront_sum_bytes(size, range)),
       winners(context, 2 * pixel_count(size)),
       to_middle(build(context, range, options, tile), "sweep_to_middle"),
       from_middle(build(context, range, options, tile), "sweep_from_middle"),

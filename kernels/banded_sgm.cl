@@ -198,17 +198,24 @@ inline uchar16 half_sum(const uchar16* r) {
 #endif
 }
 
-// Makes what a predecessor with `band` left in a slot absent; `slot` at the range's first disparity.
-inline void wipe(global uchar* slot, const Band band, const int min_disparity) {
-  global uchar* at = slot + (band.origin - min_disparity);
+// What of a band a predecessor's slot is wiped by, in one word: its origin and its chunks.
+inline uint extent_at(global const Band* band) { return *(global const uint*)band; }
+inline int origin_of(const uint extent) { return (short)extent; }
+inline int chunks_of(const uint extent) { return extent >> 16; }
+inline bool is_narrow(const uint extent) { return extent < 2u << 16; }
+
+// Makes what a predecessor with `extent` left in a slot absent, `at` being its first disparity's place.
+inline void wipe(global uchar* at, const uint extent) {
   store((uchar16)(ABSENT), at);
-  for (int v = 1; v < band.chunks; ++v) store((uchar16)(ABSENT), at + EGOSGM_LANES * v);
+  if (!is_narrow(extent)) {
+    for (int v = 1; v < chunks_of(extent); ++v) store((uchar16)(ABSENT), at + EGOSGM_LANES * v);
+  }
 }
 
-// Whether what a predecessor with `band` left in a slot is overwritten by a pixel with `own`.
-inline bool covers(const Band own, const Band band) {
-  return own.origin <= band.origin &&
-         band.origin + EGOSGM_LANES * band.chunks <= own.origin + EGOSGM_LANES * own.chunks;
+// Whether what a predecessor with `extent` left in a slot is overwritten by a pixel with `own`.
+inline bool covers(const uint own, const uint extent) {
+  return origin_of(own) <= origin_of(extent) &&
+         origin_of(extent) + EGOSGM_LANES * chunks_of(extent) <= origin_of(own) + EGOSGM_LANES * chunks_of(own);
 }
 
 // Both together: steps to the left and to the right of the winner until the sums above its own add up to `limit`.
@@ -260,10 +267,13 @@ inline int ranked(const ushort16 totals) {
 // The rows that a sweep takes before it comes to those that the other one has been to.
 inline int own_rows(const int height, const bool backward) { return backward ? height / 2 : height - height / 2; }
 
-inline void sweep_tile(const bool meets, const bool backward, const SgmParameters q, const int tile_x,
-                       const int first_y, const int end_y, const int view, global const uint* all_codes,
-                       global const Band* bands, global const uint* offsets, global const uchar* penalties,
-                       global uchar* slots, global uchar* sums, global ulong* winners) {
+// Both flags are constants wherever it is called: each direction has code of its own, whose steps need no registers.
+__attribute__((always_inline)) inline void sweep_tile(const bool meets, const bool backward, const SgmParameters q,
+                                                      const int tile_x, const int first_y, const int end_y,
+                                                      const int view, global const uint* all_codes,
+                                                      global const Band* bands, global const uint* offsets,
+                                                      global const uchar* penalties, global uchar* slots,
+                                                      global uchar* sums, global ulong* winners) {
   const int width = q.width, height = q.height;
   const size_t first_pixel = (size_t)view * width * height;
   global const Code* codes = (global const Code*)all_codes;
@@ -286,7 +296,7 @@ inline void sweep_tile(const bool meets, const bool backward, const SgmParameter
     // To the pixels before this one on the four paths. Where there is none, to one whose band and penalty do no harm:
     // wiping some place in the slot, and a step from nowhere.
     const long above = y > 0 ? -step * (long)width : 0, above_right = y > 0 ? above + step : 0;
-    long left = from > 0 ? -step : 0;
+    const long left = from > 0 ? -step : 0;
 
     const int along = view == EGOSGM_LEFT ? image_x : width - 1 - image_x;
     global const Code* own = codes + ((size_t)view * height + image_y) * code_stride + q.padding + along;
@@ -295,100 +305,121 @@ inline void sweep_tile(const bool meets, const bool backward, const SgmParameter
     const long row_above = image_y > 0 ? -(long)code_stride : 0,
                row_below = image_y + 1 < height ? (long)code_stride : 0;
 
-    global const Band* band_at = bands + row_start + image_x;
-    global const uint* offset_at = offsets + row_start + image_x;
-    global uchar* row_cells = sums + row_start * MAX_CHUNKS * EGOSGM_LANES;
+    global const Band* row_bands = bands + row_start + image_x;
+    // The sums move along with the pixel; a backward sweep comes from their end. Where offsets and bands do not belong
+    // together, after a kernel that failed, it stays within the sums, which begin with a row that is nobody's.
+    const int cells_of_row = width * MAX_CHUNKS, offset = (int)offsets[row_start + image_x];
+    const int first_cell = backward ? clamp(offset + chunks_of(extent_at(row_bands)), 0, cells_of_row)
+                                    : clamp(offset, 0, cells_of_row - (to - from) * MAX_CHUNKS);
+    global uchar* cells = sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
 
-    // P2 of a step lies at its lower or right pixel.
-    global const uchar* penalty_at = penalties + 4 * (row_start + image_x);
+    // P2 of a step lies at its lower or right pixel: for a backward sweep that is the pixel before.
+    global const uchar* row_penalties = penalties + 4 * (row_start + image_x);
+    uchar16 next_p2[2] = {(uchar16)(row_penalties[4 * left]), (uchar16)(row_penalties[4 * (above + left) + 2])};
 
     // Slots of the paths from the left, from above, from the upper left and from the upper right; the latter three move
     // on with x.
-    global uchar* slot[4] = {slots + (size_t)y * SLOT, slots + (size_t)height * SLOT,
-                             slots + ((long)2 * height + width - y) * SLOT,
-                             slots + (size_t)(2 * height + 2 * width + y) * SLOT};
+    global uchar* slot[4] = {slots + (size_t)y * SLOT, slots + (size_t)(height + from) * SLOT,
+                             slots + ((long)2 * height + width - y + from) * SLOT,
+                             slots + (size_t)(2 * height + 2 * width + y + from) * SLOT};
+    uint wiped[4] = {extent_at(row_bands + left), extent_at(row_bands + above), extent_at(row_bands + (above + left)),
+                     0};
     uchar16 last = (uchar16)(ABSENT);
-    int last_lane = -1;  // of `last`, or -1 where the path from the left must be read from its slot
-    Band wiped[4] = {band_at[left], band_at[above], band_at[above + left], band_at[above]};
-
-    for (int x = from; x < to;
-         ++x, band_at += step, offset_at += step, penalty_at += 4 * step, own += code_step, other -= code_step) {
-      const Band band = *band_at;
-      const int lane = band.origin - q.min_disparity;
-      const long moved = (long)x * SLOT;
-      wiped[3] = band_at[above_right];
-      const long before[4] = {left, above, above + left, above_right};
-      uchar16 p2[DIRECTIONS];
+    if (from > 0 && is_narrow(wiped[0])) last = load(slot[0] + (origin_of(wiped[0]) - q.min_disparity));
+    uint moved = -(uint)q.min_disparity;
+    const long end = step * (long)(to - from);
+    Candidate* candidate = candidates;
+    for (long k = 0; k != end; k += step, own += code_step, other -= code_step, moved += SLOT) {
+      const uint extent = extent_at(row_bands + k);
+      const int origin = origin_of(extent);
+      const long at_above = k + above, at_right = k + above_right;
+      wiped[3] = extent_at(row_bands + at_right);
+      uchar16 p2[4];
+      if (backward) {
+        p2[0] = next_p2[0];
+        p2[1] = (uchar16)(row_penalties[4 * at_above + 1]);
+        p2[2] = next_p2[1];
+        p2[3] = (uchar16)(row_penalties[4 * at_right + 3]);
+        next_p2[0] = (uchar16)(row_penalties[4 * k]);
+        next_p2[1] = (uchar16)(row_penalties[4 * at_above + 2]);
+      } else {
 #pragma unroll
-      for (int i = 0; i < DIRECTIONS; ++i) p2[i] = (uchar16)(penalty_at[i + (backward ? 4 * before[i] : 0)]);
-      // Where offsets and bands do not belong together, after a kernel that failed, still not beyond the row.
-      global uchar* cells = row_cells + EGOSGM_LANES * min((int)*offset_at, width * MAX_CHUNKS - band.chunks);
+        for (int n = 0; n < DIRECTIONS; ++n) p2[n] = (uchar16)(row_penalties[4 * k + n]);
+      }
+      // Its first disparity's place in the slot of the path from the left, and from `slot` on in those that move.
+      const uint lane = (uint)origin - (uint)q.min_disparity, moved_lane = moved + (uint)origin;
 
-      if (band.chunks == 1) {
-        const uchar16 absent = absent_from(q.disparities - lane);
-        const uchar16 cost = absent | matching_cost(own, other + band.origin, row_above, row_below);
+      if (is_narrow(extent)) {
+        const uchar16 absent = absent_from(q.disparities - (int)lane);
+        const uchar16 cost = absent | matching_cost(own, other + origin, row_above, row_below);
+        if (backward) cells -= EGOSGM_LANES;
         uchar16 r[DIRECTIONS];
-        if (lane == last_lane) {
+        if (extent == wiped[0]) {
           r[0] = path_cost_beside(last, cost, p1, p2[0]);
         } else {
           r[0] = path_cost_from(slot[0] + lane, cost, p1, p2[0]);
-          wipe(slot[0], wiped[0], q.min_disparity);
+          wipe(slot[0] + (origin_of(wiped[0]) - q.min_disparity), wiped[0]);
         }
 #pragma unroll
-        for (int i = 1; i < DIRECTIONS; ++i) {
-          r[i] = path_cost_from(slot[i] + (moved + lane), cost, p1, p2[i]);
-          wipe(slot[i] + moved, wiped[i], q.min_disparity);
+        for (int n = 1; n < DIRECTIONS; ++n) {
+          r[n] = path_cost_from(slot[n] + moved_lane, cost, p1, p2[n]);
+          wipe(slot[n] + (moved + (uint)origin_of(wiped[n])), wiped[n]);
         }
         uchar16 least[DIRECTIONS];
         minima(r, least);
 #pragma unroll
-        for (int i = 0; i < DIRECTIONS; ++i) {
-          r[i] = (r[i] - least[i]) | absent;
-          store(r[i], slot[i] + (i > 0 ? moved + lane : lane));
+        for (int n = 0; n < DIRECTIONS; ++n) {
+          r[n] = (r[n] - least[n]) | absent;
+          store(r[n], slot[n] + (n > 0 ? moved_lane : lane));
         }
         last = r[0];
-        last_lane = lane;
         const uchar16 sum = half_sum(r);
         if (!meets) {
           store(sum, cells);
         } else {
+          const int first = row_bands[k].first, last_of_band = row_bands[k].last;
           const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells))) | widened(absent);
-          const int rank = ranked(total | barred(band.first - band.origin, band.last - band.origin));
-          candidates[x - from].totals = (ulong8)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
-          candidates[x - from].rank = rank;
-          candidates[x - from].disparity = band.origin + (rank & 15);
+          const int rank = ranked(total | barred(first - origin, last_of_band - origin));
+          candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
+          candidate->rank = rank;
+          candidate->disparity = origin + (rank & 15);
         }
+        if (!backward) cells += EGOSGM_LANES;
       } else {
+        const int chunks = chunks_of(extent);
+        if (backward) cells -= EGOSGM_LANES * chunks;
         uchar16 least[DIRECTIONS];
 #pragma unroll
-        for (int i = 0; i < DIRECTIONS; ++i) least[i] = (uchar16)(ABSENT);
-        for (int v = 0; v < band.chunks; ++v) {
-          const int at = lane + EGOSGM_LANES * v;
-          const uchar16 cost = absent_from(q.disparities - at) |
-                               matching_cost(own, other + band.origin + EGOSGM_LANES * v, row_above, row_below);
+        for (int n = 0; n < DIRECTIONS; ++n) least[n] = (uchar16)(ABSENT);
+        for (int v = 0; v < chunks; ++v) {
+          const int at = EGOSGM_LANES * v;
+          const uchar16 cost = absent_from(q.disparities - (int)lane - at) |
+                               matching_cost(own, other + origin + EGOSGM_LANES * v, row_above, row_below);
 #pragma unroll
-          for (int i = 0; i < DIRECTIONS; ++i) {
-            t[i][v] = path_cost_from(slot[i] + (i > 0 ? moved + at : at), cost, p1, p2[i]);
-            least[i] = min(least[i], t[i][v]);
+          for (int n = 0; n < DIRECTIONS; ++n) {
+            t[n][v] = path_cost_from(slot[n] + (n > 0 ? moved_lane : lane) + at, cost, p1, p2[n]);
+            least[n] = min(least[n], t[n][v]);
           }
         }
         minima(least, least);
 #pragma unroll
-        for (int i = 0; i < DIRECTIONS; ++i) {
-          if (!covers(band, wiped[i])) wipe(slot[i] + (i > 0 ? moved : 0), wiped[i], q.min_disparity);
+        for (int n = 0; n < DIRECTIONS; ++n) {
+          if (!covers(extent, wiped[n])) {
+            wipe(slot[n] + ((n > 0 ? moved : -(uint)q.min_disparity) + (uint)origin_of(wiped[n])), wiped[n]);
+          }
         }
-        last_lane = -1;
         ushort16 best = (ushort16)(65535), best_chunk = 0;
         store_end(totals);
-        store_end(totals + MAX_STEPS + EGOSGM_LANES * band.chunks);
-        for (int v = 0; v < band.chunks; ++v) {
-          const int at = lane + EGOSGM_LANES * v;
-          const uchar16 absent = absent_from(q.disparities - at);
+        store_end(totals + MAX_STEPS + EGOSGM_LANES * chunks);
+        const int band_first = row_bands[k].first - origin, band_last = row_bands[k].last - origin;
+        for (int v = 0; v < chunks; ++v) {
+          const int at = EGOSGM_LANES * v;
+          const uchar16 absent = absent_from(q.disparities - (int)lane - at);
           uchar16 r[DIRECTIONS];
 #pragma unroll
-          for (int i = 0; i < DIRECTIONS; ++i) {
-            r[i] = (t[i][v] - least[i]) | absent;
-            store(r[i], slot[i] + (i > 0 ? moved + at : at));
+          for (int n = 0; n < DIRECTIONS; ++n) {
+            r[n] = (t[n][v] - least[n]) | absent;
+            store(r[n], slot[n] + (n > 0 ? moved_lane : lane) + at);
           }
           const uchar16 sum = half_sum(r);
           if (!meets) {
@@ -397,8 +428,7 @@ inline void sweep_tile(const bool meets, const bool backward, const SgmParameter
             const ushort16 total =
                 (convert_ushort16(sum) + convert_ushort16(load(cells + EGOSGM_LANES * v))) | widened(absent);
             store_totals(total, totals + MAX_STEPS + EGOSGM_LANES * v);
-            const int first = band.first - band.origin - EGOSGM_LANES * v,
-                      last_of_band = first + band.last - band.first;
+            const int first = band_first - at, last_of_band = band_last - at;
             const bool is_inner = first <= 0 && last_of_band >= EGOSGM_LANES - 1;
             const ushort16 allowed = is_inner ? total : total | barred(first, last_of_band);
             best_chunk = select(best_chunk, (ushort16)((ushort)v), allowed < best);
@@ -410,18 +440,19 @@ inline void sweep_tile(const bool meets, const bool backward, const SgmParameter
           const ushort16 lanes = best_chunk * (ushort16)(EGOSGM_LANES) + convert_ushort16(kLane);
           const int best_lane = minimum_of_totals(lanes | as_ushort16(best != (ushort16)(winner_total)));
           // The winner's neighbourhood, with the winner in lane 0.
-          ushort* window = (ushort*)&candidates[x - from].totals;
+          ushort* window = (ushort*)&candidate->totals;
           store_totals(((const Totals*)(totals + best_lane))->totals, window);
           window[2 * MAX_STEPS] = totals[best_lane + 2 * MAX_STEPS];
-          candidates[x - from].rank = winner_total << 4;
-          candidates[x - from].disparity = band.origin + best_lane;
+          candidate->rank = winner_total << 4;
+          candidate->disparity = origin + best_lane;
         }
+        if (!backward) cells += EGOSGM_LANES * chunks;
       }
       // The next one's: what was to the upper right is above it.
-      wiped[0] = band;
+      if (meets) ++candidate;
+      wiped[0] = extent;
       wiped[2] = wiped[1];
       wiped[1] = wiped[3];
-      left = -step;
     }
     // Apart from the sweep, whose pixels wait for each other: these do not.
     if (meets) {
@@ -446,8 +477,13 @@ inline void sweep(const bool meets, const SgmParameters q, const int wave, const
     const int first = all ? 0 : max(tile_of_wave, 0), end = all ? tile_columns : min(tile_of_wave + 1, tile_columns);
     const int y = first_y + tile_y * TILE_HEIGHT;
     for (int tile_x = first; tile_x < end; ++tile_x) {
-      sweep_tile(meets, backward, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
-                 slots, sums, winners);
+      if (backward) {
+        sweep_tile(meets, true, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
+                   slots, sums, winners);
+      } else {
+        sweep_tile(meets, false, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
+                   slots, sums, winners);
+      }
     }
   }
 }
