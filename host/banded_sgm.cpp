@@ -13,17 +13,15 @@ namespace {
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
 
 std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range) {
-  const std::size_t slot = static_cast<std::size_t>(SearchBand::max_chunks(range) + 2) * EGOSGM_LANES;
+  const int vectors = (SearchBand::max_chunks(range) + 1) / 2;
+  const std::size_t slot = static_cast<std::size_t>(vectors + 2) * 2 * EGOSGM_LANES;
   return 2 * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
 }
 
-std::size_t cell_bytes(shared::ImageSize size, shared::DisparityRange range) {
-  return 2 * pixel_count(size) * SearchBand::max_chunks(range) * EGOSGM_LANES;
-}
-
-/// The wavefronts' sums begin with a row that is nobody's: see `sweep_tile`.
-std::size_t wavefront_sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
-  return cell_bytes(size, range) + cell_bytes({size.width, 1}, range) / 2;
+/// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind a chunk, as two are read at once.
+std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  const std::size_t pixels = 2 * pixel_count(size) + size.width;
+  return (pixels * SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
 }
 
 const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
@@ -34,7 +32,7 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
                                               .set("CODE_BYTES", 4 * Census::words(options.cost))
                                               .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
                                               .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
-                                              .set("PARTIAL_CHUNKS", range.count % EGOSGM_LANES != 0)
+                                              .set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
                                               .set("TILE_WIDTH", tile.width)
                                               .set("TILE_HEIGHT", tile.height)
                                               .set("PIXELS", ocl::pixels_a_work_item(context)));
@@ -51,8 +49,8 @@ struct Demand {
 };
 
 Demand demand(shared::ImageSize size, shared::DisparityRange range, bool paths) {
-  const std::uint64_t path_sums = cell_bytes(size, range), sums = wavefront_sum_bytes(size, range);
-  if (paths) return {path_sums, 4 * path_sums};
+  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(size, range) : sum_bytes(size, range);
+  if (paths) return {sums, 4 * sums};
   const std::uint64_t slots = slot_bytes(size, range), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
   return {std::max({sums, slots, winners}), sums + slots + winners};
 }
@@ -96,7 +94,7 @@ BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, s
                                 const BandedSgmOptions& options, Tile chosen)
     : tile(chosen),
       slots(context, slot_bytes(size, range)),
-      sums(context, wavefront_sum_bytes(size, range)),
+      sums(context, sum_bytes(size, range)),
       winners(context, 2 * pixel_count(size)),
       to_middle(build(context, range, options, tile), "sweep_to_middle"),
       from_middle(build(context, range, options, tile), "sweep_from_middle"),
@@ -184,7 +182,7 @@ bool BandedSgm::takes_whole_sweeps(int views) const {
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {
-  return std::abs(range.min) + (SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
+  return std::abs(range.min) + (SearchBand::max_chunks(range) + 2) * EGOSGM_LANES;
 }
 
 }  // namespace egosgm

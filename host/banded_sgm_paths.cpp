@@ -13,14 +13,11 @@ namespace {
 constexpr int kStraight = 0;
 constexpr int kDiagonals[] = {1, 2};
 
+constexpr int kQuad = 4;
 constexpr int kQuadsALane = 4;
 constexpr int kGroupSize = 32;
 
 int groups_of(int lines, int lines_a_group) { return (lines + lines_a_group - 1) / lines_a_group; }
-
-std::size_t cell_bytes(shared::ImageSize size, shared::DisparityRange range) {
-  return 2 * pixel_count(size) * SearchBand::max_chunks(range) * EGOSGM_LANES;
-}
 
 const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
                          BandedSgmPaths::Group group) {
@@ -39,10 +36,14 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
 
 BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range) {
   const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), 256));
-  const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / 4;
+  const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / kQuad;
   int lanes = 1;
   while (lanes * kQuadsALane < quads && 2 * lanes <= limit) lanes *= 2;
   return {lanes, std::max(1, std::min(limit, kGroupSize) / lanes)};
+}
+
+std::size_t BandedSgmPaths::sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  return 2 * pixel_count(size) * (SearchBand::max_chunks(range) * EGOSGM_LANES + kQuad);
 }
 
 BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
@@ -51,10 +52,10 @@ BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, sh
       size_(size),
       paths_(options.paths),
       group_(group),
-      forward_first_(context, cell_bytes(size, range)),
-      forward_second_(context, cell_bytes(size, range)),
-      backward_first_(context, cell_bytes(size, range)),
-      backward_second_(context, cell_bytes(size, range)),
+      forward_first_(context, sum_bytes(size, range)),
+      forward_second_(context, sum_bytes(size, range)),
+      backward_first_(context, sum_bytes(size, range)),
+      backward_second_(context, sum_bytes(size, range)),
       follow_paths_(build(context, range, options, group), "follow_paths"),
       find_winners_(build(context, range, options, group), "find_winners") {}
 

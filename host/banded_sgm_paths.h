@@ -24,6 +24,8 @@ class BandedSgmPaths {
 
   /// A few quads of disparities a lane, and a group that fills a GPU's smallest unit, as far as the device allows it.
   static Group default_group(const ocl::Context& context, shared::DisparityRange range);
+  /// Of one of the four buffers of partial sums: a byte a cell, and a quad a pixel, whose band may begin within one.
+  static std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range);
 
  private:
   using Parameters = const shared::SgmParameters;
@@ -40,7 +42,7 @@ class BandedSgmPaths {
   const shared::ImageSize size_;
   const int paths_;
   const Group group_;
-  Sums forward_first_, forward_second_, backward_first_, backward_second_;  // partial sums of paths, a byte a cell each
+  Sums forward_first_, forward_second_, backward_first_, backward_second_;  // partial sums of paths
   ocl::Kernel<Parameters, const cl_int, const cl_int, Codes, Penalties, Bands, Offsets, Sums, Sums, Sums, Sums>
       follow_paths_;
   ocl::Kernel<Parameters, Bands, Offsets, const Sums, const Sums, const Sums, const Sums, Maps, Maps> find_winners_;

@@ -12,8 +12,8 @@ namespace egosgm {
 /// A predicted pixel searches d +- max(min_half_width_px, sigmas * sqrt(p)), another one the range that the predictions
 /// around it span, one with none near everything. Where CoarseMatch found disparities beyond that by more than
 /// coarse_tolerance_px, as on an object that moves by itself, the band reaches there too; and to ridges above and
-/// below, things of a few pixels' width, which CoarseMatch hardly sees. Bands hold whole chunks of EGOSGM_LANES lanes;
-/// lanes outside of the disparity range, of which there may be up to EGOSGM_LANES - 1 at its end, do not exist for
+/// below, things of a few pixels' width, which CoarseMatch hardly sees. Bands hold one chunk of EGOSGM_LANES lanes, or
+/// an even number of chunks; lanes outside of the disparity range, which there may be at its end, do not exist for
 /// BandedSgm.
 class SearchBand {
  public:
@@ -39,7 +39,9 @@ class SearchBand {
   const ocl::Buffer<shared::RowSum>& row_sums() const { return row_sums_; }
 
   /// No pixel has more chunks than this.
-  static int max_chunks(shared::DisparityRange range) { return (range.count + EGOSGM_LANES - 1) / EGOSGM_LANES; }
+  static int max_chunks(shared::DisparityRange range) {
+    return range.count <= EGOSGM_LANES ? 1 : (range.count + 2 * EGOSGM_LANES - 1) / (2 * EGOSGM_LANES) * 2;
+  }
   /// What a device that goes on after a kernel that failed must find: bands that fit the range, and offsets below a
   /// row's end. Waits.
   static void clear(ocl::Context& context, shared::DisparityRange range, ocl::Buffer<shared::Band>& bands,

@@ -18,8 +18,13 @@
 //
 // A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a
 // pixel reads its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them
-// before it writes its own.
+// before it writes its own. Vectors hold two chunks. Most pixels in bands have one, and those before them the same one:
+// two paths then share a vector, nothing is looked at beside it, and nothing is wiped.
 #include "sgm_cells.h"
+
+#ifndef __ENDIAN_LITTLE__
+#error "bands and penalties are read as words: a little-endian device"
+#endif
 
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=9 TILE_HEIGHT=4 PIXELS=16
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=9 TILE_HEIGHT=4 PIXELS=16
@@ -45,7 +50,7 @@
 #error "COST_SAD: 0 for the Hamming distance of codes, 1 for a 3x3 sum of absolute differences of grey values"
 #endif
 #ifndef PARTIAL_CHUNKS
-#error "PARTIAL_CHUNKS: 1 if the range is not a multiple of EGOSGM_LANES"
+#error "PARTIAL_CHUNKS: 1 if the range is not a multiple of two chunks"
 #endif
 #ifndef TILE_WIDTH
 #error "TILE_WIDTH: columns of a tile"
@@ -56,8 +61,10 @@
 
 #define ABSENT 255
 #define MAX_COST 63
-#define SLOT_PADDING EGOSGM_LANES
-#define SLOT (MAX_CHUNKS * EGOSGM_LANES + 2 * SLOT_PADDING)
+#define VECTOR (2 * EGOSGM_LANES)
+#define MAX_VECTORS ((MAX_CHUNKS + 1) / 2)
+#define SLOT_PADDING VECTOR
+#define SLOT (MAX_VECTORS * VECTOR + 2 * SLOT_PADDING)
 #define DIRECTIONS (PATHS / 2)
 #define MAX_STEPS 8
 
@@ -66,16 +73,24 @@
 typedef struct __attribute__((packed)) {
   uchar16 lanes;
 } Lanes;
+typedef struct __attribute__((packed)) {
+  uchar8 lanes;
+} Chunk;
 #if CODE_BYTES == 4
 typedef uint Code;
+typedef uint8 ChunkCodes;
 typedef uint16 Codes;
 #else
 typedef ulong Code;
+typedef ulong8 ChunkCodes;
 typedef ulong16 Codes;
 #endif
 typedef struct __attribute__((packed)) {
   Codes codes;
 } PackedCodes;
+typedef struct __attribute__((packed)) {
+  ChunkCodes codes;
+} PackedChunkCodes;
 typedef struct __attribute__((packed)) {
   ushort16 totals;
 } Totals;
@@ -85,7 +100,10 @@ typedef struct __attribute__((packed)) {
 
 inline uchar16 load(global const uchar* from) { return ((global const Lanes*)from)->lanes; }
 inline void store(const uchar16 lanes, global uchar* to) { ((global Lanes*)to)->lanes = lanes; }
+inline uchar8 load_chunk(global const uchar* from) { return ((global const Chunk*)from)->lanes; }
+inline void store_chunk(const uchar8 lanes, global uchar* to) { ((global Chunk*)to)->lanes = lanes; }
 inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
+inline ChunkCodes load_chunk_codes(global const Code* from) { return ((global const PackedChunkCodes*)from)->codes; }
 inline ushort8 load_totals(const ushort* from) { return ((const HalfTotals*)from)->totals; }
 inline void store_totals(const ushort16 totals, ushort* to) { ((Totals*)to)->totals = totals; }
 inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535); }
@@ -114,13 +132,20 @@ inline void minima(const uchar16* v, uchar16* least) {
 #endif
 }
 
-// 255 in the lanes from `first` on, 0 in those before it.
-inline uchar16 lanes_from(const int first) {
-  return as_uchar16(kLane >= (uchar16)((uchar)clamp(first, 0, EGOSGM_LANES)));
+// The same of vectors that hold two paths, a chunk of each.
+inline void minima_of_chunks(const uchar16* v, uchar16* least) {
+  uchar16 of_four = min((uchar16)(v[0].s0123, v[0].s89ab, v[1].s0123, v[1].s89ab),
+                        (uchar16)(v[0].s4567, v[0].scdef, v[1].s4567, v[1].scdef));
+  of_four = min(of_four, of_four.s23016745ab89efcd);
+  of_four = min(of_four, of_four.s1032547698badcfe);
+  least[0] = of_four.s0000000044444444;
+  least[1] = of_four.s88888888cccccccc;
 }
 
-// The lanes that lie outside of the disparity range, `first` being its end. Bands of whole chunks in a range of whole
-// chunks have none.
+// 255 in the lanes from `first` on, 0 in those before it.
+inline uchar16 lanes_from(const int first) { return as_uchar16(kLane >= (uchar16)((uchar)clamp(first, 0, VECTOR))); }
+
+// The lanes that lie outside of the disparity range, `first` being its end. In a range of whole vectors there are none.
 #if PARTIAL_CHUNKS
 #define absent_from(first) lanes_from(first)
 #else
@@ -130,40 +155,51 @@ inline uchar16 lanes_from(const int first) {
 // 65535 where a lane is 255; lanes are 0 or 255.
 inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
 
-inline ushort minimum_of_totals(const ushort16 totals) {
-  ushort8 v = min(totals.lo, totals.hi);
+inline ushort minimum_of_chunk(ushort8 v) {
   v = min(v, v.s45674567);
   v = min(v, v.s23232323);
   v = min(v, v.s11111111);
   return v.s0;
 }
 
+inline ushort minimum_of_totals(const ushort16 totals) { return minimum_of_chunk(min(totals.lo, totals.hi)); }
+
 // Bits set in each code; compilers know this form and use what the device has.
-#define REPEATED(byte) ((Codes)(~(Code)0 / 255 * (byte)))
-inline Codes bit_count(Codes x) {
-  x -= x >> (Codes)(1) & REPEATED(0x55);
-  x = (x & REPEATED(0x33)) + (x >> (Codes)(2) & REPEATED(0x33));
-  x = (x + (x >> (Codes)(4))) & REPEATED(0x0f);
-  return x * REPEATED(0x01) >> (Codes)(8 * CODE_BYTES - 8);
+#define REPEATED(Codes, byte) ((Codes)(~(Code)0 / 255 * (byte)))
+#define BIT_COUNT(Codes, x)                                                    \
+  x -= x >> (Codes)(1) & REPEATED(Codes, 0x55);                                \
+  x = (x & REPEATED(Codes, 0x33)) + (x >> (Codes)(2) & REPEATED(Codes, 0x33)); \
+  x = (x + (x >> (Codes)(4))) & REPEATED(Codes, 0x0f);                         \
+  x = x * REPEATED(Codes, 0x01) >> (Codes)(8 * CODE_BYTES - 8)
+
+// Matching cost of 16 disparities, or 8. `own` and `other` point at the pixel's code and at the first disparity's in
+// their padded rows, which run in opposite directions.
+#if COST_SAD
+#define MATCHING_COST(N, Codes, load)                                                     \
+  ushort##N sum = 0;                                                                      \
+  for (int dy = -1; dy <= 1; ++dy) {                                                      \
+    const long row = dy < 0 ? above : dy > 0 ? below : 0;                                 \
+    for (int dx = -1; dx <= 1; ++dx) {                                                    \
+      sum += convert_ushort##N(abs_diff((Codes)(own[row + dx]), load(other + row - dx))); \
+    }                                                                                     \
+  }                                                                                       \
+  return convert_uchar##N(min(sum / (ushort)9, (ushort##N)(MAX_COST)))
+#else
+// A product would melt into the bit count, which compilers then do not know any more.
+#define MATCHING_COST(N, Codes, load)            \
+  Codes x = (Codes)(own[0]) ^ load(other);       \
+  BIT_COUNT(Codes, x);                           \
+  const uchar##N distance = convert_uchar##N(x); \
+  return COST_SCALE == 2 ? add_sat(distance, distance) : distance
+#endif
+
+inline uchar16 matching_cost(global const Code* own, global const Code* other, const long above, const long below) {
+  MATCHING_COST(16, Codes, load_codes);
 }
 
-// Matching cost of 16 disparities. `own` and `other` point at the pixel's code and at the first disparity's in their
-// padded rows, which run in opposite directions.
-inline uchar16 matching_cost(global const Code* own, global const Code* other, const long above, const long below) {
-#if COST_SAD
-  ushort16 sum = 0;
-  for (int dy = -1; dy <= 1; ++dy) {
-    const long row = dy < 0 ? above : dy > 0 ? below : 0;
-    for (int dx = -1; dx <= 1; ++dx) {
-      sum += convert_ushort16(abs_diff((Codes)(own[row + dx]), load_codes(other + row - dx)));
-    }
-  }
-  return convert_uchar16(min(sum / (ushort)9, (ushort16)(MAX_COST)));
-#else
-  const uchar16 distance = convert_uchar16(bit_count((Codes)(own[0]) ^ load_codes(other)));
-  // A product would melt into the bit count, which compilers then do not know any more.
-  return COST_SCALE == 2 ? add_sat(distance, distance) : distance;
-#endif
+inline uchar8 matching_cost_of_chunk(global const Code* own, global const Code* other, const long above,
+                                     const long below) {
+  MATCHING_COST(8, ChunkCodes, load_chunk_codes);
 }
 
 // t(d) of one path, from the predecessor's costs at the same 16 disparities and at those one below and one above.
@@ -184,6 +220,14 @@ inline uchar16 path_cost_beside(const uchar16 before, const uchar16 cost, const 
   return path_cost(cost, before, below, above, p1, p2);
 }
 
+// The same of two paths at once, a chunk of each.
+inline uchar16 path_cost_of_chunks(const uchar16 before, const uchar16 cost, const uchar16 p1, const uchar16 p2) {
+  const ulong2 lanes = as_ulong2(before);
+  const uchar16 below = as_uchar16(lanes << (ulong2)(8) | (ulong2)(ABSENT)),
+                above = as_uchar16(lanes >> (ulong2)(8) | (ulong2)((ulong)ABSENT << 56));
+  return path_cost(cost, before, below, above, p1, p2);
+}
+
 // (a + b + 1) / 2 in the form that compilers turn into one instruction; rhadd goes a longer way (PoCL 3.1).
 inline uchar16 mean(const uchar16 a, const uchar16 b) {
   return convert_uchar16((convert_ushort16(a) + convert_ushort16(b) + (ushort16)(1)) >> (ushort16)(1));
@@ -198,17 +242,19 @@ inline uchar16 half_sum(const uchar16* r) {
 #endif
 }
 
-// What of a band a predecessor's slot is wiped by, in one word: its origin and its chunks.
+// Of a band what says where a pixel's costs lie in a slot, in one word: its origin and its chunks.
 inline uint extent_at(global const Band* band) { return *(global const uint*)band; }
 inline int origin_of(const uint extent) { return (short)extent; }
 inline int chunks_of(const uint extent) { return extent >> 16; }
-inline bool is_narrow(const uint extent) { return extent < 2u << 16; }
+// Bands that fit one vector.
+inline bool is_narrow(const uint extent) { return extent < 3u << 16; }
+inline bool is_chunk(const uint extent) { return extent < 2u << 16; }
 
 // Makes what a predecessor with `extent` left in a slot absent, `at` being its first disparity's place.
 inline void wipe(global uchar* at, const uint extent) {
   store((uchar16)(ABSENT), at);
   if (!is_narrow(extent)) {
-    for (int v = 1; v < chunks_of(extent); ++v) store((uchar16)(ABSENT), at + EGOSGM_LANES * v);
+    for (int v = 1; v < chunks_of(extent) / 2; ++v) store((uchar16)(ABSENT), at + VECTOR * v);
   }
 }
 
@@ -258,14 +304,130 @@ inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
 inline ushort16 barred(const int first, const int last) {
   return as_ushort16(convert_ushort16(kLane) - (ushort16)((ushort)first) > (ushort16)((ushort)(last - first)));
 }
+inline ushort8 barred_of_chunk(const int first, const int last) {
+  return as_ushort8(convert_ushort8(kLane.lo) - (ushort8)((ushort)first) > (ushort8)((ushort)(last - first)));
+}
 
 // The least total of 16 lanes in its upper bits, its lane in the lower four: the smallest disparity wins a tie.
 inline int ranked(const ushort16 totals) {
   return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane));
 }
+inline int ranked_in_chunk(const ushort8 totals) {
+  return minimum_of_chunk((totals << (ushort8)(4)) | convert_ushort8(kLane.lo));
+}
+
+// Whether a pixel has one chunk, all of it in the disparity range, and those before it on all paths have the same: as
+// most pixels in bands. Then a path's costs stay in their places, and nothing else is in a slot to look at or to wipe.
+inline bool goes_straight(const SgmParameters q, const uint extent, const uint* before, const int lane) {
+#if PATHS == 8
+  const uint differences = (extent ^ before[0]) | (extent ^ before[1]) | (extent ^ before[2]) | (extent ^ before[3]);
+#if PARTIAL_CHUNKS
+  if (lane + EGOSGM_LANES > q.disparities) return false;
+#endif
+  return differences == 0 && is_chunk(extent);
+#else
+  return false;
+#endif
+}
+
+// What StepPenalties left at pixels around the next one of a backward sweep, a byte a path: before it, above that,
+// above.
+typedef struct {
+  uint before, above_before, above;
+} Penalties;
+
+// P2 of the steps to the next pixel, a byte a path. They lie at a step's lower or right pixel: for a backward sweep
+// that is the one it comes from.
+inline uint penalties_to(const bool backward, Penalties* around, global const uint* here, const long above_right) {
+  const uint own = here[0];
+  if (!backward) return own;
+  const uint right = here[above_right];
+  const uint steps =
+      (around->before & 0xff) | (around->above & 0xff00) | (around->above_before & 0xff0000) | (right & 0xff000000);
+  around->before = own;
+  around->above_before = around->above;
+  around->above = right;
+  return steps;
+}
 
 // The rows that a sweep takes before it comes to those that the other one has been to.
 inline int own_rows(const int height, const bool backward) { return backward ? height / 2 : height - height / 2; }
+
+// A pixel with more than one vector.
+typedef struct {
+  global uchar* at[DIRECTIONS];        // its first disparity's place in the slot of each path
+  global uchar* wiped_at[DIRECTIONS];  // and that of its predecessor's
+  uint wiped[DIRECTIONS];              // the predecessors' extents
+  bool is_wiped[DIRECTIONS];           // whether its own costs do not overwrite theirs
+  uchar16 p1, p2[DIRECTIONS];
+  global const Code *own, *other;  // its code, and that of its first disparity
+  long row_above, row_below;       // to the codes of these rows
+  int disparities;                 // of the range, from its first one on
+  global uchar* cells;
+  global const Band* band;
+} Pixel;
+
+__attribute__((always_inline)) inline void match_vectors(const bool meets, const int vectors, const Pixel pixel,
+                                                         Candidate* candidate) {
+  uchar16 t[DIRECTIONS][MAX_VECTORS];
+  uchar16 least[DIRECTIONS];
+#pragma unroll
+  for (int n = 0; n < DIRECTIONS; ++n) least[n] = (uchar16)(ABSENT);
+  for (int v = 0; v < vectors; ++v) {
+    const int at = VECTOR * v;
+    const uchar16 cost = absent_from(pixel.disparities - at) |
+                         matching_cost(pixel.own, pixel.other + at, pixel.row_above, pixel.row_below);
+#pragma unroll
+    for (int n = 0; n < DIRECTIONS; ++n) {
+      t[n][v] = path_cost_from(pixel.at[n] + at, cost, pixel.p1, pixel.p2[n]);
+      least[n] = min(least[n], t[n][v]);
+    }
+  }
+  minima(least, least);
+#pragma unroll
+  for (int n = 0; n < DIRECTIONS; ++n) {
+    if (pixel.is_wiped[n]) wipe(pixel.wiped_at[n], pixel.wiped[n]);
+  }
+  ushort totals[MAX_VECTORS * VECTOR + 2 * MAX_STEPS];
+  ushort16 best = (ushort16)(65535), best_vector = 0;
+  const int origin = pixel.band->origin;
+  const int band_first = pixel.band->first - origin, band_last = pixel.band->last - origin;
+  for (int v = 0; v < vectors; ++v) {
+    const int at = VECTOR * v;
+    const uchar16 absent = absent_from(pixel.disparities - at);
+    uchar16 r[DIRECTIONS];
+#pragma unroll
+    for (int n = 0; n < DIRECTIONS; ++n) {
+      r[n] = (t[n][v] - least[n]) | absent;
+      store(r[n], pixel.at[n] + at);
+    }
+    const uchar16 sum = half_sum(r);
+    if (!meets) {
+      store(sum, pixel.cells + at);
+    } else {
+      const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(pixel.cells + at))) | widened(absent);
+      store_totals(total, totals + MAX_STEPS + at);
+      const int first = band_first - at, last_of_band = band_last - at;
+      const bool is_inner = first <= 0 && last_of_band >= VECTOR - 1;
+      const ushort16 allowed = is_inner ? total : total | barred(first, last_of_band);
+      best_vector = select(best_vector, (ushort16)((ushort)v), allowed < best);
+      best = min(best, allowed);
+    }
+  }
+  if (meets) {
+    store_end(totals);
+    store_end(totals + MAX_STEPS + VECTOR * vectors);
+    const ushort winner_total = minimum_of_totals(best);
+    const ushort16 lanes = best_vector * (ushort16)(VECTOR) + convert_ushort16(kLane);
+    const int best_lane = minimum_of_totals(lanes | as_ushort16(best != (ushort16)(winner_total)));
+    // The winner's neighbourhood, with the winner in lane 0.
+    ushort* window = (ushort*)&candidate->totals;
+    store_totals(((const Totals*)(totals + best_lane))->totals, window);
+    window[2 * MAX_STEPS] = totals[best_lane + 2 * MAX_STEPS];
+    candidate->rank = winner_total << 4;
+    candidate->disparity = origin + best_lane;
+  }
+}
 
 // Both flags are constants wherever it is called: each direction has code of its own, whose steps need no registers.
 __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bool backward, const SgmParameters q,
@@ -281,8 +443,6 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
   const uchar16 p1 = (uchar16)((uchar)q.p1);
   slots += (size_t)(2 * view + backward) * 3 * (width + height) * SLOT + SLOT_PADDING;
 
-  uchar16 t[DIRECTIONS][MAX_CHUNKS];
-  ushort totals[MAX_CHUNKS * EGOSGM_LANES + 2 * MAX_STEPS];
   Candidate candidates[TILE_WIDTH];
   const int step = backward ? -1 : 1;
   const int code_step = view == EGOSGM_LEFT ? step : -step;
@@ -313,9 +473,8 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
                                     : clamp(offset, 0, cells_of_row - (to - from) * MAX_CHUNKS);
     global uchar* cells = sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
 
-    // P2 of a step lies at its lower or right pixel: for a backward sweep that is the pixel before.
-    global const uchar* row_penalties = penalties + 4 * (row_start + image_x);
-    uchar16 next_p2[2] = {(uchar16)(row_penalties[4 * left]), (uchar16)(row_penalties[4 * (above + left) + 2])};
+    global const uint* row_penalties = (global const uint*)penalties + row_start + image_x;
+    Penalties around = {row_penalties[left], row_penalties[above + left], row_penalties[above]};
 
     // Slots of the paths from the left, from above, from the upper left and from the upper right; the latter three move
     // on with x.
@@ -329,30 +488,66 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
     uint moved = -(uint)q.min_disparity;
     const long end = step * (long)(to - from);
     Candidate* candidate = candidates;
-    for (long k = 0; k != end; k += step, own += code_step, other -= code_step, moved += SLOT) {
+    for (long k = 0; k != end;) {
       const uint extent = extent_at(row_bands + k);
       const int origin = origin_of(extent);
-      const long at_above = k + above, at_right = k + above_right;
-      wiped[3] = extent_at(row_bands + at_right);
-      uchar16 p2[4];
-      if (backward) {
-        p2[0] = next_p2[0];
-        p2[1] = (uchar16)(row_penalties[4 * at_above + 1]);
-        p2[2] = next_p2[1];
-        p2[3] = (uchar16)(row_penalties[4 * at_right + 3]);
-        next_p2[0] = (uchar16)(row_penalties[4 * k]);
-        next_p2[1] = (uchar16)(row_penalties[4 * at_above + 2]);
-      } else {
-#pragma unroll
-        for (int n = 0; n < DIRECTIONS; ++n) p2[n] = (uchar16)(row_penalties[4 * k + n]);
-      }
+      wiped[3] = extent_at(row_bands + k + above_right);
+      uint steps = penalties_to(backward, &around, row_penalties + k, above_right);
       // Its first disparity's place in the slot of the path from the left, and from `slot` on in those that move.
       const uint lane = (uint)origin - (uint)q.min_disparity, moved_lane = moved + (uint)origin;
 
+      if (goes_straight(q, extent, wiped, (int)lane)) {
+        // As long as it goes on like this.
+        global uchar* at[4] = {slot[0] + lane, slot[1] + moved_lane, slot[2] + moved_lane, slot[3] + moved_lane};
+        uint along = 0;
+        while (true) {
+          if (backward) cells -= EGOSGM_LANES;
+          const uchar8 chunk_cost = matching_cost_of_chunk(own, other + origin, row_above, row_below);
+          const uchar16 cost = (uchar16)(chunk_cost, chunk_cost);
+          const uchar4 p2 = as_uchar4(steps);
+          const uchar16 before[2] = {(uchar16)(last.lo, load_chunk(at[2] + along)),
+                                     (uchar16)(load_chunk(at[1] + along), load_chunk(at[3] + along))};
+          uchar16 r[2] = {path_cost_of_chunks(before[0], cost, p1, p2.s0000000022222222),
+                          path_cost_of_chunks(before[1], cost, p1, p2.s1111111133333333)};
+          uchar16 least[2];
+          minima_of_chunks(r, least);
+          r[0] -= least[0];
+          r[1] -= least[1];
+          store_chunk(r[0].lo, at[0]);
+          store_chunk(r[1].lo, at[1] + along);
+          store_chunk(r[0].hi, at[2] + along);
+          store_chunk(r[1].hi, at[3] + along);
+          last = (uchar16)(r[0].lo, (uchar8)(ABSENT));
+          const uchar16 means = mean(r[0], r[1]);
+          const uchar8 sum = add_sat(means.lo, means.hi);
+          if (!meets) {
+            store_chunk(sum, cells);
+          } else {
+            const ushort8 total = convert_ushort8(sum) + convert_ushort8(load_chunk(cells));
+            const int first = row_bands[k].first - origin, last_of_band = row_bands[k].last - origin;
+            candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong2(total), ~0ul, ~0ul, ~0ul, ~0ul);
+            candidate->rank = ranked_in_chunk(total | barred_of_chunk(first, last_of_band));
+            candidate->disparity = origin + (candidate->rank & 15);
+            ++candidate;
+          }
+          if (!backward) cells += EGOSGM_LANES;
+          own += code_step;
+          other -= code_step;
+          k += step;
+          along += SLOT;
+          if (k == end || extent_at(row_bands + k) != extent || extent_at(row_bands + k + above_right) != extent) break;
+          steps = penalties_to(backward, &around, row_penalties + k, above_right);
+        }
+        moved += along;
+        continue;
+      }
+      const uchar4 each = as_uchar4(steps);
+      const uchar16 p2[4] = {each.s0000000000000000, each.s1111111111111111, each.s2222222222222222,
+                             each.s3333333333333333};
+      if (backward) cells -= EGOSGM_LANES * chunks_of(extent);
       if (is_narrow(extent)) {
-        const uchar16 absent = absent_from(q.disparities - (int)lane);
+        const uchar16 absent = lanes_from(EGOSGM_LANES * chunks_of(extent)) | absent_from(q.disparities - (int)lane);
         const uchar16 cost = absent | matching_cost(own, other + origin, row_above, row_below);
-        if (backward) cells -= EGOSGM_LANES;
         uchar16 r[DIRECTIONS];
         if (extent == wiped[0]) {
           r[0] = path_cost_beside(last, cost, p1, p2[0]);
@@ -374,85 +569,48 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
         }
         last = r[0];
         const uchar16 sum = half_sum(r);
-        if (!meets) {
-          store(sum, cells);
-        } else {
-          const int first = row_bands[k].first, last_of_band = row_bands[k].last;
+        if (meets) {
           const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells))) | widened(absent);
-          const int rank = ranked(total | barred(first - origin, last_of_band - origin));
+          const int first = row_bands[k].first - origin, last_of_band = row_bands[k].last - origin;
           candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
-          candidate->rank = rank;
-          candidate->disparity = origin + (rank & 15);
+          candidate->rank = ranked(total | barred(first, last_of_band));
+          candidate->disparity = origin + (candidate->rank & 15);
+        } else if (is_chunk(extent)) {
+          store_chunk(sum.lo, cells);
+        } else {
+          store(sum, cells);
         }
-        if (!backward) cells += EGOSGM_LANES;
       } else {
-        const int chunks = chunks_of(extent);
-        if (backward) cells -= EGOSGM_LANES * chunks;
-        uchar16 least[DIRECTIONS];
-#pragma unroll
-        for (int n = 0; n < DIRECTIONS; ++n) least[n] = (uchar16)(ABSENT);
-        for (int v = 0; v < chunks; ++v) {
-          const int at = EGOSGM_LANES * v;
-          const uchar16 cost = absent_from(q.disparities - (int)lane - at) |
-                               matching_cost(own, other + origin + EGOSGM_LANES * v, row_above, row_below);
-#pragma unroll
-          for (int n = 0; n < DIRECTIONS; ++n) {
-            t[n][v] = path_cost_from(slot[n] + (n > 0 ? moved_lane : lane) + at, cost, p1, p2[n]);
-            least[n] = min(least[n], t[n][v]);
-          }
-        }
-        minima(least, least);
+        Pixel pixel;
 #pragma unroll
         for (int n = 0; n < DIRECTIONS; ++n) {
-          if (!covers(extent, wiped[n])) {
-            wipe(slot[n] + ((n > 0 ? moved : -(uint)q.min_disparity) + (uint)origin_of(wiped[n])), wiped[n]);
-          }
+          const uint start = n > 0 ? moved : -(uint)q.min_disparity;
+          pixel.at[n] = slot[n] + (start + (uint)origin);
+          pixel.wiped_at[n] = slot[n] + (start + (uint)origin_of(wiped[n]));
+          pixel.is_wiped[n] = !covers(extent, wiped[n]);
+          pixel.wiped[n] = wiped[n];
+          pixel.p2[n] = p2[n];
         }
-        ushort16 best = (ushort16)(65535), best_chunk = 0;
-        store_end(totals);
-        store_end(totals + MAX_STEPS + EGOSGM_LANES * chunks);
-        const int band_first = row_bands[k].first - origin, band_last = row_bands[k].last - origin;
-        for (int v = 0; v < chunks; ++v) {
-          const int at = EGOSGM_LANES * v;
-          const uchar16 absent = absent_from(q.disparities - (int)lane - at);
-          uchar16 r[DIRECTIONS];
-#pragma unroll
-          for (int n = 0; n < DIRECTIONS; ++n) {
-            r[n] = (t[n][v] - least[n]) | absent;
-            store(r[n], slot[n] + (n > 0 ? moved_lane : lane) + at);
-          }
-          const uchar16 sum = half_sum(r);
-          if (!meets) {
-            store(sum, cells + EGOSGM_LANES * v);
-          } else {
-            const ushort16 total =
-                (convert_ushort16(sum) + convert_ushort16(load(cells + EGOSGM_LANES * v))) | widened(absent);
-            store_totals(total, totals + MAX_STEPS + EGOSGM_LANES * v);
-            const int first = band_first - at, last_of_band = band_last - at;
-            const bool is_inner = first <= 0 && last_of_band >= EGOSGM_LANES - 1;
-            const ushort16 allowed = is_inner ? total : total | barred(first, last_of_band);
-            best_chunk = select(best_chunk, (ushort16)((ushort)v), allowed < best);
-            best = min(best, allowed);
-          }
-        }
-        if (meets) {
-          const ushort winner_total = minimum_of_totals(best);
-          const ushort16 lanes = best_chunk * (ushort16)(EGOSGM_LANES) + convert_ushort16(kLane);
-          const int best_lane = minimum_of_totals(lanes | as_ushort16(best != (ushort16)(winner_total)));
-          // The winner's neighbourhood, with the winner in lane 0.
-          ushort* window = (ushort*)&candidate->totals;
-          store_totals(((const Totals*)(totals + best_lane))->totals, window);
-          window[2 * MAX_STEPS] = totals[best_lane + 2 * MAX_STEPS];
-          candidate->rank = winner_total << 4;
-          candidate->disparity = origin + best_lane;
-        }
-        if (!backward) cells += EGOSGM_LANES * chunks;
+        pixel.p1 = p1;
+        pixel.own = own;
+        pixel.other = other + origin;
+        pixel.row_above = row_above;
+        pixel.row_below = row_below;
+        pixel.disparities = q.disparities - (int)lane;
+        pixel.cells = cells;
+        pixel.band = row_bands + k;
+        match_vectors(meets, chunks_of(extent) / 2, pixel, candidate);
       }
       // The next one's: what was to the upper right is above it.
       if (meets) ++candidate;
+      if (!backward) cells += EGOSGM_LANES * chunks_of(extent);
       wiped[0] = extent;
       wiped[2] = wiped[1];
       wiped[1] = wiped[3];
+      own += code_step;
+      other -= code_step;
+      k += step;
+      moved += SLOT;
     }
     // Apart from the sweep, whose pixels wait for each other: these do not.
     if (meets) {

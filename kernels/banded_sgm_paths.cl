@@ -2,10 +2,10 @@
 // Semi-global matching in a band per pixel, the way for GPUs: LANES work-items follow a path across the image, LINES
 // paths a work-group. The same bits as banded_sgm.cl, whose head explains the recurrence and the sums.
 //
-// Disparities are dealt out in quads of four: quad k of the range belongs to lane k % LANES, whatever the band (bands
-// begin at quads). So a lane keeps the costs of its quads in registers from pixel to pixel, gives its neighbours only
-// the first and the last of each, and asks the others for nothing but the minimum. Costs come from the codes; there is
-// no cost volume.
+// Disparities are dealt out in quads of four: quad k of the range belongs to lane k % LANES, whatever the band, which
+// may begin and end within one. So a lane keeps the costs of its quads in registers from pixel to pixel, gives its
+// neighbours only the first and the last of each, and asks the others for nothing but the minimum. Costs come from the
+// codes; there is no cost volume.
 //
 // Three launches one after another: horizontal and vertical paths, one diagonal, the other; forward and backward paths
 // in the same launch. What a launch does to a cell's two partial sums: first = L0, second = L1; first = mean(first,
@@ -84,11 +84,11 @@ typedef struct {
   long penalty_offset;
 } Path;
 
-// A pixel on it: P2 of the step to it, which quads of the range its band holds, none beyond the end of the path, and
-// the place of their cells.
+// A pixel on it: P2 of the step to it, which lanes of the range its band holds, [first, end), none beyond the end of
+// the path, and the place of the cells of the quads that they lie in.
 typedef struct {
   int p2;
-  int first_quad, quads;
+  int first, end;
   size_t cells;
 } Pixel;
 
@@ -136,6 +136,11 @@ inline Path path_of(const SgmParameters q, const int direction, const bool backw
   return path;
 }
 
+// A quad more a pixel than its band has, as it may begin within one.
+inline size_t cells_of(const size_t row_start, const size_t pixel, const uint offset) {
+  return (row_start * MAX_CHUNKS + offset) * EGOSGM_LANES + QUAD * pixel;
+}
+
 inline Pixel pixel_at(const SgmParameters q, const Path path, const int i, global const Band* bands,
                       global const uint* offsets) {
   Pixel pixel = {0, 0, 0, 0};
@@ -144,19 +149,19 @@ inline Pixel pixel_at(const SgmParameters q, const Path path, const int i, globa
     const size_t row_start = at - (path.x + i * path.x_step);
     // Where a path begins, any P2 gives the same.
     pixel.p2 = path.penalties[4 * (i > 0 ? at + path.penalty_offset : at)];
-    pixel.first_quad = (bands[at].origin - q.min_disparity) / QUAD;
-    pixel.quads = bands[at].chunks * (EGOSGM_LANES / QUAD);
-    pixel.cells = (row_start * MAX_CHUNKS + offsets[at]) * EGOSGM_LANES;
+    pixel.first = bands[at].origin - q.min_disparity;
+    pixel.end = min(pixel.first + bands[at].chunks * EGOSGM_LANES, q.disparities);
+    pixel.cells = cells_of(row_start, at, offsets[at]);
   }
   return pixel;
 }
 
 inline bool holds(const Pixel pixel, const int quad) {
-  return quad >= pixel.first_quad && quad < pixel.first_quad + pixel.quads;
+  return QUAD * quad + QUAD > pixel.first && QUAD * quad < pixel.end;
 }
 
 // A quad's place in the sums.
-inline size_t cell_of(const Pixel pixel, const int quad) { return pixel.cells + QUAD * (quad - pixel.first_quad); }
+inline size_t cell_of(const Pixel pixel, const int quad) { return pixel.cells + QUAD * (quad - pixel.first / QUAD); }
 
 #if COST_SAD
 inline uint difference(global const Code* own, global const Code* other, const long above, const long below) {
@@ -172,7 +177,7 @@ inline uint difference(global const Code* own, global const Code* other, const l
 inline Matches fetch(const SgmParameters q, const Path path, const int i, const Pixel pixel, const int lane) {
   Matches matches;
   global const Code* own = path.own + i * path.own_step;
-  matches.own = pixel.quads > 0 ? own[0] : 0;
+  matches.own = pixel.end > 0 ? own[0] : 0;
   UNROLLED for (int v = 0; v < QUADS_A_LANE; ++v) {
     const int quad = lane + v * LANES;
     matches.others[v] = 0;
@@ -279,8 +284,8 @@ kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
         const int4 below = (int4)((int)(before[quad] >> 16) - least, same.xyz),
                    above = (int4)(same.yzw, (int)(before[quad + 2] & 0xffff) - least);
         path_costs = costs_of(&matches, v) + min(min(same, min(below, above) + q.p1), (int4)(pixel.p2));
-        path_costs = select(path_costs, (int4)(ABSENT),
-                            (int4)(QUAD * quad, QUAD * quad + 1, QUAD * quad + 2, QUAD * quad + 3) >= q.disparities);
+        const int4 at = QUAD * quad + (int4)(0, 1, 2, 3);
+        path_costs = select(path_costs, (int4)(ABSENT), at < pixel.first || at >= pixel.end);
       }
       after[quad + 1] = (uint)path_costs.w << 16 | (uint)path_costs.x;
       lowest = min(lowest, path_costs);
@@ -300,10 +305,10 @@ kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
   }
 }
 
-// The partial sums of a pixel's cells, and the cells that exist.
+// The partial sums of a pixel's cells, and which of them exist, [first, end).
 typedef struct {
   global const uchar *forward_first, *forward_second, *backward_first, *backward_second;
-  int count;
+  int first, end;
 } Cells;
 
 // Half the sums over all paths, of four cells.
@@ -330,7 +335,7 @@ inline int total_of(const Cells cells, const int at) {
 // Steps to one side of the winner until the sums above its own add up to `limit`.
 inline int count_steps(const Cells cells, const int winner, const int total, const int step, const int limit) {
   int sum = 0, steps = 0;
-  for (int at = winner + step; steps < MAX_STEPS && at >= 0 && at < cells.count; at += step) {
+  for (int at = winner + step; steps < MAX_STEPS && at >= cells.first && at < cells.end; at += step) {
     sum += max(0, total_of(cells, at) - total);
     if (sum >= limit) break;
     ++steps;
@@ -351,14 +356,19 @@ kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winn
   const bool is_inside = x < q.width;
   const size_t pixel = row_start + (is_inside ? x : 0);
   const Band band = bands[pixel];
-  const size_t first_cell = (row_start * MAX_CHUNKS + offsets[pixel]) * EGOSGM_LANES;
-  const Cells cells = {forward_first + first_cell, forward_second + first_cell, backward_first + first_cell,
+  const size_t first_cell = cells_of(row_start, pixel, offsets[pixel]);
+  const int first_lane = band.origin - q.min_disparity, first_of_quad = first_lane % QUAD;
+  const int cells_origin = band.origin - first_of_quad;
+  const Cells cells = {forward_first + first_cell,
+                       forward_second + first_cell,
+                       backward_first + first_cell,
                        backward_second + first_cell,
-                       min(band.chunks * EGOSGM_LANES, q.min_disparity + q.disparities - band.origin)};
+                       first_of_quad,
+                       first_of_quad + min(band.chunks * EGOSGM_LANES, q.disparities - first_lane)};
 
   // The total in the upper half, so that the smallest disparity wins a tie.
   uint best = NO_WINNER;
-  const int first = band.first - band.origin, last = band.last - band.origin;
+  const int first = band.first - cells_origin, last = band.last - cells_origin;
   for (int at = QUAD * lane; is_inside && at <= last; at += QUAD * LANES) {
     const int4 index = at + (int4)(0, 1, 2, 3);
     const uint4 ranked = convert_uint4(totals_of(cells, at)) << 16 | as_uint4(index);
@@ -368,11 +378,11 @@ kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winn
   best = minimum_of_line(minima[line], lane, best);
   if (is_inside && lane == 0) {
     const int total = best >> 16, winner = best & 0xffff;
-    const bool fits = winner > 0 && winner + 1 < cells.count;
+    const bool fits = winner > cells.first && winner + 1 < cells.end;
     const int rise_before = fits ? total_of(cells, winner - 1) - total : 0,
               rise_after = fits ? total_of(cells, winner + 1) - total : 0;
     const int steps = count_steps(cells, winner, total, -1, q.s_max) + count_steps(cells, winner, total, 1, q.s_max);
-    disparities[pixel] = refined(band.origin + winner, rise_before, rise_after);
+    disparities[pixel] = refined(cells_origin + winner, rise_before, rise_after);
     variances[pixel] = matching_variance(q, steps, rise_before, rise_after);
   }
 }

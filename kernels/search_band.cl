@@ -19,8 +19,8 @@ typedef struct {
   int8 origin, chunks, first, last;
 } Bands;
 
-int8 floor_to_step(int8 lane) { return lane & ~(EGOSGM_BAND_STEP - 1); }
-int8 ceil_to_step(int8 lane) { return floor_to_step(lane + (EGOSGM_BAND_STEP - 1)); }
+int8 floor_to(int8 step, int8 lane) { return lane & ~(step - 1); }
+int8 ceil_to(int8 step, int8 lane) { return floor_to(step, lane + (step - 1)); }
 
 // convert_int8_rtn for what fits, in instructions that every device has.
 int8 floor_int(float8 value) {
@@ -28,11 +28,11 @@ int8 floor_int(float8 value) {
   return towards_zero + (value < convert_float8(towards_zero));
 }
 
-// The bands that search [from, to], cut to the range. A band has as few chunks as cover that: with begin and end
-// counted from range.min, its origin is a multiple of the step in [end - lanes, begin], and not above
-// ceil_to_step(count) - lanes, so that hardly a lane lies beyond the range. If there is none, one chunk more has one.
-// Slack is shared out to both sides, as far as this allows. Chunks never exceed ceil(count / EGOSGM_LANES), because
-// from the origin range.min that many cover everything.
+// The bands that search [from, to], cut to the range. A band has as few chunks as cover that, one or an even number:
+// with begin and end counted from range.min, its origin is a multiple of the step (of 1 with one chunk) in [end -
+// lanes, begin], and not above ceil_to(step, count) - lanes, so that hardly a lane lies beyond the range. If there is
+// none, the next number of chunks has one. Slack is shared out to both sides, as far as this allows. Chunks never
+// exceed SearchBand::max_chunks, because from the origin range.min that many cover everything.
 Bands bands_of(const DisparityRange range, float8 from, float8 to) {
   const float8 lowest = range.min;
   const float8 highest = range.min + range.count - 1;
@@ -41,14 +41,17 @@ Bands bands_of(const DisparityRange range, float8 from, float8 to) {
 
   const int8 begin = floor_int(from) - range.min;
   const int8 end = 1 - floor_int(-to) - range.min;
-  const int8 last_origin = floor_to_step(begin);
-  int8 chunks = (end - begin + (EGOSGM_LANES - 1)) / EGOSGM_LANES;
-  chunks -= ceil_to_step(end - chunks * EGOSGM_LANES) > last_origin;
+  const int8 has_one = end - begin <= EGOSGM_LANES;
+  int8 pairs = (end - begin + (2 * EGOSGM_LANES - 1)) / (2 * EGOSGM_LANES);
+  pairs -= ceil_to(EGOSGM_BAND_STEP, end - pairs * (2 * EGOSGM_LANES)) > floor_to(EGOSGM_BAND_STEP, begin);
+  const int8 chunks = has_one ? 1 : 2 * pairs;
+  const int8 step = has_one ? 1 : EGOSGM_BAND_STEP;
 
+  const int8 last_origin = floor_to(step, begin);
   const int8 lanes = chunks * EGOSGM_LANES;
-  const int8 centred = floor_to_step(begin - (lanes - (end - begin)) / 2);
-  const int8 first_origin = max(ceil_to_step(end - lanes), (int8)(0));
-  const int8 limit = max(ceil_to_step(range.count) - lanes, (int8)(0));
+  const int8 centred = floor_to(step, begin - (lanes - (end - begin)) / 2);
+  const int8 first_origin = max(ceil_to(step, end - lanes), (int8)(0));
+  const int8 limit = max(ceil_to(step, range.count) - lanes, (int8)(0));
   const int8 origin = max(min(centred, min(last_origin, limit)), first_origin);
 
   Bands bands;

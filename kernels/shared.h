@@ -29,9 +29,9 @@ typedef float f32;
 #define EGOSGM_LEFT 0
 #define EGOSGM_RIGHT 1
 
-// Disparities are matched in chunks of this many lanes.
-#define EGOSGM_LANES 16
-// The first lane of a band is min_disparity plus a multiple of this.
+// Disparities are matched in chunks of this many lanes: one, or an even number of them.
+#define EGOSGM_LANES 8
+// The first lane of a band with more than one chunk is min_disparity plus a multiple of this.
 #define EGOSGM_BAND_STEP 4
 
 // Predictions are summed up over blocks of this many pixels a side, for the bands of pixels without one.

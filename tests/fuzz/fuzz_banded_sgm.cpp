@@ -50,16 +50,18 @@ Matcher& matcher(int index) {
   return *matchers[static_cast<std::size_t>(index) % matchers.size()];
 }
 
-/// A band that SearchBand could give: whole chunks from a lane on, of which a part can win. Only where the range itself
-/// does not consist of whole chunks, the last one may reach beyond it.
+/// A band that SearchBand could give: one chunk or pairs of them from a lane on, of which a part can win. Only where
+/// the range itself does not consist of such, the last one may reach beyond it.
 shared::Band random_band(Bytes& bytes, shared::DisparityRange range) {
-  const bool whole = range.count % EGOSGM_LANES == 0;
-  const int lanes = SearchBand::max_chunks(range) * EGOSGM_LANES, least = whole ? EGOSGM_LANES : 1;
-  const int lane = bytes.below((range.count - least) / EGOSGM_BAND_STEP + 1) * EGOSGM_BAND_STEP;
-  const int most = whole ? (lanes - lane) / EGOSGM_LANES : (lanes - lane + EGOSGM_LANES - 1) / EGOSGM_LANES;
+  const bool one = range.count <= EGOSGM_LANES || bytes.below(2) > 0;
+  const int unit = (one ? 1 : 2) * EGOSGM_LANES, step = one ? 1 : EGOSGM_BAND_STEP;
+  const bool whole = range.count % unit == 0;
+  const int lanes = SearchBand::max_chunks(range) * EGOSGM_LANES, least = whole ? unit : 1;
+  const int lane = bytes.below((range.count - least) / step + 1) * step;
+  const int most = one ? 1 : whole ? (lanes - lane) / unit : (lanes - lane + unit - 1) / unit;
   shared::Band band{};
   band.origin = static_cast<cl_short>(range.min + lane);
-  band.chunks = static_cast<cl_ushort>(1 + bytes.below(most));
+  band.chunks = static_cast<cl_ushort>(one ? 1 : 2 + 2 * bytes.below(most));
   const int last_lane = std::min(range.min + range.count, band.origin + band.chunks * EGOSGM_LANES) - 1;
   band.first = static_cast<cl_short>(band.origin + bytes.below(last_lane - band.origin + 1));
   band.last = static_cast<cl_short>(band.first + bytes.below(last_lane - band.first + 1));

@@ -16,14 +16,15 @@ shared::Band band_of(shared::DisparityRange range, float from, float to) {
   const float lowest = static_cast<float>(range.min), highest = static_cast<float>(range.min + range.count - 1);
   const int first = static_cast<int>(std::floor(std::clamp(from, lowest, highest)));
   const int last = static_cast<int>(std::ceil(std::clamp(to, lowest, highest)));
-  for (int chunks = 1;; ++chunks) {
+  for (int chunks = 1;; chunks += chunks > 1 ? 2 : 1) {
+    const int step = chunks > 1 ? EGOSGM_BAND_STEP : 1;
     const int lanes = chunks * EGOSGM_LANES;
     const int slack = lanes - (last - first + 1);
     if (slack < 0) continue;
     int best = -1;
-    for (int origin = 0; range.min + origin <= first; origin += EGOSGM_BAND_STEP) {
+    for (int origin = 0; range.min + origin <= first; origin += step) {
       if (range.min + origin + lanes <= last) continue;
-      if (origin > 0 && origin + lanes >= range.count + EGOSGM_BAND_STEP) continue;
+      if (origin > 0 && origin + lanes >= range.count + step) continue;
       if (best < 0 || range.min + origin <= first - slack / 2) best = origin;
     }
     if (best < 0) continue;
