@@ -500,7 +500,7 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
         // As long as it goes on like this.
         global uchar* at[4] = {slot[0] + lane, slot[1] + moved_lane, slot[2] + moved_lane, slot[3] + moved_lane};
         uint along = 0;
-        while (true) {
+        while (k != end) {
           if (backward) cells -= EGOSGM_LANES;
           const uchar8 chunk_cost = matching_cost_of_chunk(own, other + origin, row_above, row_below);
           const uchar16 cost = (uchar16)(chunk_cost, chunk_cost);
