@@ -65,6 +65,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("output_variance.enabled", o.output_variance.enabled);
   visit("output_variance.scale", o.output_variance.scale);
   visit("output_variance.roughness_weight", o.output_variance.roughness_weight);
+  visit("output_variance.jump_weight", o.output_variance.jump_weight);
   visit("dynamic_map.min_difference_px", o.dynamic_map.min_difference_px);
 }
 

@@ -27,8 +27,8 @@ void OutputVariance::operator()(const StereoMaps& maps, int views, StereoMaps& s
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, views);
   second_differences_(context_, pixels, size_, maps.disparity, scratch.disparity);
   row_means_(context_, pixels, size_, maps.variance, scratch.disparity, scratch.variance, mean_roughness_);
-  combine_(context_, pixels, size_, options_.scale, options_.roughness_weight, maps.disparity, scratch.variance,
-           mean_roughness_, variance);
+  combine_(context_, pixels, size_, options_.scale, options_.roughness_weight, options_.jump_weight, maps.disparity,
+           scratch.variance, mean_roughness_, variance);
 }
 
 }  // namespace egosgm

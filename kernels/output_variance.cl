@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The variance that is given out: the filter's, averaged over the surroundings of a pixel, to the power 1.5, and how
-// rough the disparities around it are. Most surfaces are planes, whose disparities have no second difference; where
-// those around a pixel have, or where there are holes, it is likely to be wrong.
+// The variance that is given out: the filter's, averaged over the surroundings of a pixel, to the power 1.5, how rough
+// the disparities around it are, and how far they jump beside it. Most surfaces are planes, whose disparities have no
+// second difference; where those around a pixel have, or where there are holes, it is likely to be wrong. Beside a jump
+// it may lie on the wrong side.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -76,7 +77,22 @@ static inline Floats column_mean(global const float* view, const ImageSize size,
   return sum / count;
 }
 
-kernel void combine(const ImageSize size, const float scale, const float roughness_weight,
+// The largest of the differences to the disparities EGOSGM_JUMP_DISTANCE pixels off.
+static inline Floats jump_beside(global const float* view, const ImageSize size, const int x, const int y,
+                                 const Floats d) {
+  Floats most = 0.0f;
+  for (int v = y - EGOSGM_JUMP_DISTANCE; v <= y + EGOSGM_JUMP_DISTANCE; v += EGOSGM_JUMP_DISTANCE) {
+    if (v < 0 || v >= size.height) continue;
+    for (int u = x - EGOSGM_JUMP_DISTANCE; u <= x + EGOSGM_JUMP_DISTANCE; u += EGOSGM_JUMP_DISTANCE) {
+      const Floats other = load_pixels(view + (size_t)v * size.width, u, size.width);
+      const Floats difference = fabs(other - d);
+      most = ((other > INVALID) & (difference > most)) ? difference : most;
+    }
+  }
+  return cut(most, EGOSGM_MAX_JUMP_PX);
+}
+
+kernel void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,
                     global const float* disparity, global const float* mean_variance,
                     global const float* mean_roughness, global float* variance) {
   const int y = get_global_id(1);
@@ -86,7 +102,9 @@ kernel void combine(const ImageSize size, const float scale, const float roughne
   FOR_PIXELS(x, width) {
     const Floats p = column_mean(mean_variance + view, size, x, y, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP);
     const Floats r = column_mean(mean_roughness + view, size, x, y, EGOSGM_ROUGHNESS_RADIUS, 1);
-    const Ints valid = load_pixels(disparity + row, x, width) > INVALID;
-    store_pixels(valid ? scale * (p * sqrt(p)) + roughness_weight * (r * r) : (Floats)(0.0f), variance + row, x, width);
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats j = jump_beside(disparity + view, size, x, y, d);
+    const Floats sum = scale * (p * sqrt(p)) + roughness_weight * (r * r) + jump_weight * (j * j);
+    store_pixels(d > INVALID ? sum : (Floats)(0.0f), variance + row, x, width);
   }
 }

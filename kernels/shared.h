@@ -62,12 +62,15 @@ typedef float f32;
 #define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
 
 // OutputVariance: the filter's variance, each value cut, at every fourth pixel of the surroundings; the sum of two
-// second differences of disparities, each cut, at every pixel nearer by.
+// second differences of disparities, each cut, at every pixel nearer by; and how far the disparities this far off to
+// eight sides are from a pixel's own, each cut.
 #define EGOSGM_VARIANCE_RADIUS 8
 #define EGOSGM_VARIANCE_STEP 4
 #define EGOSGM_MAX_MEAN_VARIANCE_PX2 2.0f
 #define EGOSGM_ROUGHNESS_RADIUS 3
 #define EGOSGM_MAX_ROUGHNESS_PX 1.5f
+#define EGOSGM_JUMP_DISTANCE 2
+#define EGOSGM_MAX_JUMP_PX 10.0f
 
 // KalmanUpdate asks every fourth pixel this far to all sides: 25. Near is what differs by less than this.
 #define EGOSGM_SUPPORT_RADIUS 8

@@ -84,6 +84,7 @@ TEST(Options, HasANameForEveryMember) {
       {"output_variance.enabled", [](auto& o) { o.output_variance.enabled = false; }},
       {"output_variance.scale", [](auto& o) { o.output_variance.scale = 77; }},
       {"output_variance.roughness_weight", [](auto& o) { o.output_variance.roughness_weight = 77; }},
+      {"output_variance.jump_weight", [](auto& o) { o.output_variance.jump_weight = 77; }},
       {"dynamic_map.min_difference_px", [](auto& o) { o.dynamic_map.min_difference_px = 77; }},
   };
   const auto defaults = texts({});

@@ -66,7 +66,8 @@ TEST(OutputVariance, IsTheFiltersToThePowerOneAndAHalfOnAPlane) {
   const shared::ImageSize size{37, 21};
   const auto slanted = [](int x, int y) { return 20 + 0.25f * static_cast<float>(x) - 0.5f * static_cast<float>(y); };
   const testing::HostMaps maps = maps_of(size, slanted, [](int, int) { return 0.25f; });
-  const std::vector<float> out = output_variance(size, maps, {.scale = 0.5f, .roughness_weight = 100});
+  const std::vector<float> out =
+      output_variance(size, maps, {.scale = 0.5f, .roughness_weight = 100, .jump_weight = 0});
   for (int y = 4; y < size.height - 4; ++y) {  // at the image's edge a slant is no plane: the outside repeats it
     for (int x = 4; x < size.width - 4; ++x) ASSERT_EQ(out[y * size.width + x], 0.0625f) << x << ", " << y;
   }
@@ -76,7 +77,7 @@ TEST(OutputVariance, GrowsThreePixelsAroundWhatIsNoPlane) {
   const shared::ImageSize size{25, 11};
   const auto step = [](int x, int) { return x < 12 ? 10.0f : 10.75f; };
   const testing::HostMaps maps = maps_of(size, step, [](int, int) { return 1.0f; });
-  const std::vector<float> out = output_variance(size, maps, {.scale = 1, .roughness_weight = 1});
+  const std::vector<float> out = output_variance(size, maps, {.scale = 1, .roughness_weight = 1, .jump_weight = 0});
   const float* row = out.data() + static_cast<std::ptrdiff_t>(5) * size.width;
   EXPECT_EQ(row[7], 1);  // columns 11 and 12 have second differences of 0.75
   const auto near = [](float mean) { return 1 + mean * mean; };
@@ -93,11 +94,34 @@ TEST(OutputVariance, TakesAHoleForRough) {
   const testing::HostMaps maps = maps_of(
       size, [&](int x, int y) { return is_hole(x, y) ? kNone : 10.0f; },
       [&](int x, int y) { return is_hole(x, y) ? 0.0f : 1.0f; });
-  const std::vector<float> out = output_variance(size, maps, {.scale = 0, .roughness_weight = 1});
+  const std::vector<float> out = output_variance(size, maps, {.scale = 0, .roughness_weight = 1, .jump_weight = 0});
   EXPECT_EQ(out[12 * 25 + 12], 0) << "the hole itself";
   EXPECT_EQ(out[12 * 25 + 7], 0) << "far from it";
   const float mean = (2 * EGOSGM_MAX_ROUGHNESS_PX + 4 * EGOSGM_MAX_ROUGHNESS_PX) / 49;  // its own, and its neighbours'
   EXPECT_NEAR(out[12 * 25 + 11], mean * mean, 1e-6f);
+}
+
+TEST(OutputVariance, GrowsTwoPixelsToEitherSideOfAJump) {
+  const shared::ImageSize size{25, 9};
+  const OutputVarianceOptions only_jumps{.scale = 0, .roughness_weight = 0, .jump_weight = 2};
+  const auto middle_row_beside = [&](float disparity, float low, float high) {
+    const auto step = [=](int x, int y) { return x == 8 && y == 4 ? disparity : x < 12 ? low : high; };
+    const testing::HostMaps maps = maps_of(size, step, [](int, int) { return 1.0f; });
+    const std::vector<float> out = output_variance(size, maps, only_jumps);
+    return std::vector<float>(out.begin() + 4 * size.width + 9, out.begin() + 4 * size.width + 15);
+  };
+  EXPECT_EQ(middle_row_beside(10, 10, 13), (std::vector<float>{0, 18, 18, 18, 18, 0}));
+  EXPECT_EQ(middle_row_beside(10, 10, 90), (std::vector<float>{0, 200, 200, 200, 200, 0})) << "cut at 10 px";
+  EXPECT_EQ(middle_row_beside(kNone, 10, 10), (std::vector<float>{0, 0, 0, 0, 0, 0})) << "a hole is no jump";
+  EXPECT_EQ(middle_row_beside(14, 10, 10), (std::vector<float>{0, 32, 0, 0, 0, 0})) << "two to the right of the speck";
+}
+
+TEST(OutputVariance, LooksForJumpsAboveAndBelow) {
+  const shared::ImageSize size{9, 9};
+  const auto step = [](int, int y) { return y < 4 ? 10.0f : 12.0f; };
+  const testing::HostMaps maps = maps_of(size, step, [](int, int) { return 1.0f; });
+  const std::vector<float> out = output_variance(size, maps, {.scale = 0, .roughness_weight = 0, .jump_weight = 1});
+  for (int y = 0; y < size.height; ++y) EXPECT_EQ(out[y * size.width + 4], y >= 2 && y <= 5 ? 4 : 0) << "row " << y;
 }
 
 TEST(OutputVariance, CutsAVarianceThatSaysOnlyThatItIsLarge) {

@@ -78,7 +78,7 @@ struct SpeckleRemovalOptions {
   float max_difference_px = 2.0f;  // neighbours within this belong to one region
 };
 struct KalmanUpdateOptions {
-  float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
+  float gate_px = 2.75f;       // where prediction and measurement differ by more, the measurement is taken; 0: no gate
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   bool ask_neighbours = true;  // which of the two they speak for, instead; and whether all of them move
   float innovation_sigmas = 4.0f;  // where the two differ by more deviations, p' is raised until they do not; 0: never
@@ -89,8 +89,8 @@ struct PredictionCheckOptions {
 };
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
-  // Of the filter's variance, averaged, to the power 1.5, and of the square of how far the disparities around are from a plane's.
-  float scale = 1.8f, roughness_weight = 1.6f;
+  // Of the averaged variance to the power 1.5; of the squares of the distance from a plane and of jumps beside [px^2].
+  float scale = 1.7f, roughness_weight = 1.6f, jump_weight = 0.02f;
 };
 struct DynamicMapOptions {
   bool enabled = false;            // of every frame, for DeviceMaps::dynamic; FrameOutputs::dynamic needs no option

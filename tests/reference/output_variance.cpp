@@ -58,6 +58,20 @@ float window_mean(const Plane& plane, int x, int y, int radius, int step, float 
   });
 }
 
+/// The largest of the differences to the valid disparities EGOSGM_JUMP_DISTANCE pixels off, to eight sides.
+float jump_beside(const Plane& disparity, int x, int y) {
+  float most = 0;
+  for (const int dy : {-EGOSGM_JUMP_DISTANCE, 0, EGOSGM_JUMP_DISTANCE}) {
+    for (const int dx : {-EGOSGM_JUMP_DISTANCE, 0, EGOSGM_JUMP_DISTANCE}) {
+      const int u = x + dx, v = y + dy;
+      if (u < 0 || u >= disparity.size.width || v < 0 || v >= disparity.size.height) continue;
+      if (disparity(u, v) == EGOSGM_INVALID_DISPARITY) continue;
+      most = std::max(most, std::abs(disparity(u, v) - disparity(x, y)));
+    }
+  }
+  return std::min(most, EGOSGM_MAX_JUMP_PX);
+}
+
 }  // namespace
 
 std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
@@ -75,7 +89,10 @@ std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceO
         const float r =
             window_mean({size, rough.data()}, x, y, EGOSGM_ROUGHNESS_RADIUS, 1, 2 * EGOSGM_MAX_ROUGHNESS_PX);
         const bool is_valid = disparity(x, y) != EGOSGM_INVALID_DISPARITY;
-        out.push_back(is_valid ? options.scale * (p * std::sqrt(p)) + options.roughness_weight * (r * r) : 0);
+        const float j = jump_beside(disparity, x, y);
+        const float sum =
+            options.scale * (p * std::sqrt(p)) + options.roughness_weight * (r * r) + options.jump_weight * (j * j);
+        out.push_back(is_valid ? sum : 0);
       }
     }
   }
