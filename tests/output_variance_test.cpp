@@ -132,9 +132,9 @@ TEST(OutputVariance, CutsAVarianceThatSaysOnlyThatItIsLarge) {
 }
 
 TEST(OutputVariance, DoesNotMixTheViews) {
-  // The last row of the left view lies above the first of the right one.
-  const testing::HostMaps maps{{5, 5, 90, 90}, {0.25f, 0.25f, 1, 1}};
-  EXPECT_EQ(output_variance({2, 1}, maps, {.scale = 1}), (std::vector<float>{0.125f, 0.125f, 1, 1}));
+  // The last rows of the left view lie above the first ones of the right one.
+  const testing::HostMaps maps{{5, 5, 5, 90, 90, 90}, {0.25f, 0.25f, 0.25f, 1, 1, 1}};
+  EXPECT_EQ(output_variance({1, 3}, maps, {.scale = 1}), (std::vector<float>{0.125f, 0.125f, 0.125f, 1, 1, 1}));
 }
 
 TEST(OutputVariance, LeavesTheRightViewAloneIfAsked) {
