@@ -320,11 +320,11 @@ inline int ranked_in_chunk(const ushort8 totals) {
 // most pixels in bands. Then a path's costs stay in their places, and nothing else is in a slot to look at or to wipe.
 inline bool goes_straight(const SgmParameters q, const uint extent, const uint* before, const int lane) {
 #if PATHS == 8
-  const uint differences = (extent ^ before[0]) | (extent ^ before[1]) | (extent ^ before[2]) | (extent ^ before[3]);
+  if (!is_chunk(extent)) return false;
 #if PARTIAL_CHUNKS
   if (lane + EGOSGM_LANES > q.disparities) return false;
 #endif
-  return differences == 0 && is_chunk(extent);
+  return ((extent ^ before[0]) | (extent ^ before[1]) | (extent ^ before[2]) | (extent ^ before[3])) == 0;
 #else
   return false;
 #endif
