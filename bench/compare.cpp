@@ -198,7 +198,7 @@ class LeftMatcher {
     images_.write(context_, pixels_);
     census_(images_, codes_);
     step_penalties_(images_, penalties_);
-    banded_sgm_(codes_, penalties_, search_band_, measured_, 1);
+    banded_sgm_(codes_, penalties_, search_band_, measured_, RightView::kNone);
     const ocl::Drain drain{context_};
     cl::Event done;
     context_.queue().enqueueReadBuffer(measured_.disparity.get(), CL_FALSE, 0, disparity_.size() * sizeof(float),

@@ -38,6 +38,14 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
                                               .set("PIXELS", ocl::pixels_a_work_item(context)));
 }
 
+std::size_t rank_count(shared::ImageSize size, shared::DisparityRange range) {
+  return static_cast<std::size_t>(size.height) * (size.width + 2 * BandedSgm::code_padding(range));
+}
+
+const cl::Program& build_read_off(ocl::Context& context) {
+  return context.program("read_off.cl", ocl::Defines().set("PIXELS", ocl::pixels_a_work_item(context)));
+}
+
 bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
   if (scheduling != Scheduling::kAutomatic) return scheduling == Scheduling::kPaths;
   return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
@@ -50,9 +58,10 @@ struct Demand {
 
 Demand demand(shared::ImageSize size, shared::DisparityRange range, bool paths) {
   const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(size, range) : sum_bytes(size, range);
-  if (paths) return {sums, 4 * sums};
+  const std::uint64_t ranks = rank_count(size, range) * sizeof(cl_uint);
+  if (paths) return {sums, 4 * sums + ranks};
   const std::uint64_t slots = slot_bytes(size, range), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
-  return {std::max({sums, slots, winners}), sums + slots + winners};
+  return {std::max({sums, slots, winners}), sums + slots + winners + ranks};
 }
 
 std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCost cost) {
@@ -119,8 +128,11 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.s_max,
                   options.variance_floor_px2,
                   options.variance_per_step_px2,
-                  options.variance_per_square_px2},
-      launches_(launches) {
+                  options.variance_per_square_px2,
+                  /*reads_off=*/0},
+      launches_(launches),
+      ranks_(context, rank_count(size_, range)),
+      read_off_(build_read_off(context), "read_off") {
   if (follows_paths(context, options.scheduling)) {
     paths_.emplace(context, size_, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
   } else {
@@ -132,29 +144,39 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
 }
 
 void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties,
-                           const SearchBand& band, StereoMaps& measured, int views) {
-  (*this)({codes, penalties, band.bands(), band.cell_offsets()}, measured, views);
+                           const SearchBand& band, StereoMaps& measured, RightView right) {
+  (*this)({codes, penalties, band.bands(), band.cell_offsets()}, measured, right);
 }
 
-void BandedSgm::operator()(const MatchInputs& image, StereoMaps& measured, int views) {
+void BandedSgm::operator()(const MatchInputs& image, StereoMaps& measured, RightView right) {
   context_.enter("BandedSgm");
-  if (!stripe_memory_) return match(image, measured, views);
+  if (!stripe_memory_) return match(image, measured, right);
   for (const Stripe& stripe : stripes_) {
     stripe_memory_->load(image, stripe);
-    match(stripe_memory_->inputs(), stripe_memory_->measured(), views);
+    match(stripe_memory_->inputs(), stripe_memory_->measured(), right);
     stripe_memory_->store(stripe, measured);
   }
 }
 
-void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, int views) {
+void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, RightView right) {
+  const int views = right == RightView::kMatched ? 2 : 1;
+  shared::SgmParameters parameters = parameters_;
+  parameters.reads_off = right == RightView::kReadOff;
+  if (parameters.reads_off) ranks_.fill(context_, ~cl_uint{0});
   if (paths_) {
-    (*paths_)(parameters_, inputs, measured, views);
+    (*paths_)(parameters, inputs, measured, ranks_, views);
   } else {
-    sweep(*wavefront_, inputs, measured, views);
+    sweep(parameters, inputs, measured, views);
+  }
+  if (parameters.reads_off) {
+    read_off_(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), /*views=*/1), parameters,
+              ranks_, measured.disparity, measured.variance);
   }
 }
 
-void BandedSgm::sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMaps& measured, int views) {
+void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
+                      int views) {
+  Wavefront& wavefront = *wavefront_;
   const Tile tile = wavefront.tile;
   const int tile_rows = ceil_div(ceil_div(size_.height, 2), tile.height);
   const int tile_columns = ceil_div(size_.width + tile.height, tile.width) + 1;
@@ -165,14 +187,14 @@ void BandedSgm::sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMap
 
   wavefront.slots.fill(context_, 255);
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
-    wavefront.to_middle(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands,
+    wavefront.to_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands,
                         inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums);
   }
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
-    wavefront.from_middle(context_, tiles, parameters_, wave, tile_columns, inputs.codes, inputs.bands,
-                          inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners);
+    wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands,
+                          inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners, ranks_);
   }
-  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters_,
+  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters,
                    wavefront.winners, measured.disparity, measured.variance);
 }
 

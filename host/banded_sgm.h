@@ -44,12 +44,12 @@ class BandedSgm {
   /// In which the image is matched; one: as a whole.
   const std::vector<Stripe>& stripes() const { return stripes_; }
 
-  /// `codes`: what Census makes with a padding of `code_padding(range)`. `views`: 1 matches the left view only.
-  /// `penalties`: what StepPenalties makes.
+  /// `codes`: what Census makes with a padding of `code_padding(range)`. `penalties`: what StepPenalties makes. Of
+  /// `penalties` and `band` the right view's part is read where it is matched.
   void operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band,
-                  StereoMaps& measured, int views = 2);
+                  StereoMaps& measured, RightView right = RightView::kMatched);
 
-  void operator()(const MatchInputs& image, StereoMaps& measured, int views = 2);
+  void operator()(const MatchInputs& image, StereoMaps& measured, RightView right = RightView::kMatched);
 
   static int code_padding(shared::DisparityRange range);
 
@@ -59,9 +59,11 @@ class BandedSgm {
   using FromMiddle =
       ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
                   const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
-                  ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>>;
+                  ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>, ocl::Buffer<cl_uint>>;
   using Refine =
       ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
+  using ReadOff =
+      ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_uint>, ocl::Buffer<float>, ocl::Buffer<float>>;
 
  private:
   struct Wavefront {
@@ -77,8 +79,8 @@ class BandedSgm {
     Refine refine;
   };
 
-  void match(const MatchInputs& inputs, StereoMaps& measured, int views);
-  void sweep(Wavefront& wavefront, const MatchInputs& inputs, StereoMaps& measured, int views);
+  void match(const MatchInputs& inputs, StereoMaps& measured, RightView right);
+  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured, int views);
   bool takes_whole_sweeps(int views) const;
 
   ocl::Context& context_;
@@ -86,6 +88,8 @@ class BandedSgm {
   const std::vector<Stripe> stripes_;
   const shared::SgmParameters parameters_;
   const Launches launches_;
+  ocl::Buffer<cl_uint> ranks_;  // of the left pixels that a right one may be, in rows padded as the codes'
+  ReadOff read_off_;
   std::optional<StripeMemory> stripe_memory_;  // where there is more than one
   std::optional<Wavefront> wavefront_;         // one of the two
   std::optional<BandedSgmPaths> paths_;

@@ -69,7 +69,7 @@ void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, 
 }
 
 void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs,
-                                StereoMaps& measured, int views) {
+                                StereoMaps& measured, ocl::Buffer<cl_uint>& ranks, int views) {
   follow(kStraight, parameters, inputs, views);
   if (paths_ == 8) {
     for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);
@@ -78,8 +78,8 @@ void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const M
   const ocl::Range pixels{
       cl::NDRange(static_cast<std::size_t>(groups_of(size_.width, group_.lines)) * work_items, size_.height, views),
       cl::NDRange(work_items, 1, 1)};
-  find_winners_(context_, pixels, parameters, inputs.bands, inputs.cell_offsets, forward_first_, forward_second_,
-                backward_first_, backward_second_, measured.disparity, measured.variance);
+  find_winners_(context_, pixels, parameters, inputs.codes, inputs.bands, inputs.cell_offsets, forward_first_,
+                forward_second_, backward_first_, backward_second_, measured.disparity, measured.variance, ranks);
 }
 
 }  // namespace egosgm

@@ -20,7 +20,8 @@ class BandedSgmPaths {
                  const BandedSgmOptions& options, Group group);
 
   /// As BandedSgm.
-  void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured, int views);
+  void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
+                  ocl::Buffer<cl_uint>& ranks, int views);
 
   /// A few quads of disparities a lane, and a group that fills a GPU's smallest unit, as far as the device allows it.
   static Group default_group(const ocl::Context& context, shared::DisparityRange range);
@@ -45,7 +46,9 @@ class BandedSgmPaths {
   Sums forward_first_, forward_second_, backward_first_, backward_second_;  // partial sums of paths
   ocl::Kernel<Parameters, const cl_int, const cl_int, Codes, Penalties, Bands, Offsets, Sums, Sums, Sums, Sums>
       follow_paths_;
-  ocl::Kernel<Parameters, Bands, Offsets, const Sums, const Sums, const Sums, const Sums, Maps, Maps> find_winners_;
+  ocl::Kernel<Parameters, Codes, Bands, Offsets, const Sums, const Sums, const Sums, const Sums, Maps, Maps,
+              ocl::Buffer<cl_uint>>
+      find_winners_;
 };
 
 }  // namespace egosgm

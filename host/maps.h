@@ -23,4 +23,8 @@ struct StereoMaps {
       : disparity(context, 2 * pixel_count(size)), variance(context, 2 * pixel_count(size)) {}
 };
 
+/// How the right view's disparities come about: matched in bands of their own; read off the sums of the left view's
+/// match, which is half of the work, whole ones; or not at all, and what was there stays.
+enum class RightView { kMatched, kReadOff, kNone };
+
 }  // namespace egosgm

@@ -17,6 +17,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("min_disparity", o.min_disparity);
   visit("search", o.search);
   visit("temporal", o.temporal);
+  visit("track_right", o.track_right);
   visit("forward_warp.process_noise_px2", o.forward_warp.process_noise_px2);
   visit("forward_warp.motion_noise", o.forward_warp.motion_noise);
   visit("edge_rejection.max_jump_px", o.edge_rejection.max_jump_px);
@@ -24,6 +25,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("consistency.prediction_px", o.consistency.prediction_px);
   visit("consistency.measurement_px", o.consistency.measurement_px);
   visit("consistency.update_px", o.consistency.update_px);
+  visit("consistency.read_off_px", o.consistency.read_off_px);
   visit("coarse_match.enabled", o.coarse_match.enabled);
   visit("coarse_match.p1", o.coarse_match.p1);
   visit("coarse_match.p2", o.coarse_match.p2);
@@ -157,6 +159,7 @@ void expect_not_negative(const char* name, float value) {
 
 PipelineOptions PipelineOptions::paper() {
   PipelineOptions options;
+  options.track_right = true;
   options.forward_warp.process_noise_px2 = 0.5f;
   options.forward_warp.motion_noise = 0.0f;
   options.edge_rejection.max_jump_px = 3.0f;

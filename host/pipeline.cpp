@@ -27,6 +27,7 @@
 #include "host/ocl/svm.h"
 #include "host/output_variance.h"
 #include "host/prediction_check.h"
+#include "host/right_map.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -107,6 +108,7 @@ struct Pipeline::Impl {
   SpeckleRemoval speckle_removal;
   KalmanUpdate kalman_update;
   PredictionCheck prediction_check;
+  RightMap right_map;
   OutputVariance output_variance;
   DynamicMap dynamic_map;
   std::array<FrameTransfer, kMaxUnderWay> transfers;
@@ -144,6 +146,7 @@ struct Pipeline::Impl {
         speckle_removal(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
         kalman_update(context, size, options.kalman_update),
         prediction_check(context, size, options.prediction_check, tuning.row_group),
+        right_map(context, size, range_of(options)),
         output_variance(context, size, options.output_variance),
         dynamic_map(context, size, options.dynamic_map),
         transfers{{{context, size, range_of(options)}, {context, size, range_of(options)}}},
@@ -168,27 +171,36 @@ struct Pipeline::Impl {
   }
 
   void predict(const Motion& motion) {
-    forward_warp(*memory.belief, motion, *updated);
-    edge_rejection(*updated, predicted);
-    hole_fill(predicted, scratch);
-    consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);
+    forward_warp(*memory.belief, motion, *updated, tracked_views());
+    edge_rejection(*updated, predicted, tracked_views());
+    hole_fill(predicted, scratch, tracked_views());
+    if (options.track_right) {
+      consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);
+    } else {
+      std::swap(scratch, predicted);
+    }
   }
 
+  int tracked_views() const { return options.track_right ? 2 : 1; }
+
   void match_aligned(const FrameImages& images, bool full_range) {
+    const bool reads_off = !full_range && !options.track_right;
+    const int views = reads_off ? 1 : 2;
     if (full_range) {
       search_band.full_range();
     } else if (options.search == SearchMode::kFull) {
-      search_band.full_range(predicted);
+      search_band.full_range(predicted, views);
     } else {
       const StereoMaps* coarse = coarse_match ? &(*coarse_match)(images) : nullptr;
-      search_band(predicted, updated, coarse, &prediction_state(*memory.belief));
+      search_band(predicted, updated, coarse, &prediction_state(*memory.belief), views);
     }
     stages_of(images.type).census(images.pixels, codes);
-    stages_of(images.type).step_penalties(images.pixels, penalties);
-    banded_sgm(codes, penalties, search_band, scratch);
+    stages_of(images.type).step_penalties(images.pixels, penalties, views);
+    banded_sgm(codes, penalties, search_band, scratch, reads_off ? RightView::kReadOff : RightView::kMatched);
     median_filter(scratch, Holes::kLeave);
-    consistency(scratch, options.consistency.measurement_px, OutsideView::kDrop, *measured);
-    speckle_removal(*measured);
+    consistency(scratch, reads_off ? options.consistency.read_off_px : options.consistency.measurement_px,
+                OutsideView::kDrop, *measured);
+    speckle_removal(*measured, views);
   }
 
   /// Returns the images that were matched.
@@ -206,8 +218,10 @@ struct Pipeline::Impl {
 
   void update(const FrameImages& images) {
     prediction_check(&prediction_state(*memory.belief), predicted, *measured, prediction_state(*updated));
-    kalman_update(prediction_state(*updated), *updated, predicted, *measured, *updated);  // which held the warped map
-    median_filter(*updated, Holes::kFill);
+    kalman_update(prediction_state(*updated), *updated, predicted, *measured, *updated,  // which held the warped map
+                  tracked_views());
+    median_filter(*updated, Holes::kFill, tracked_views());
+    if (!options.track_right) right_map(*measured, options.consistency.update_px, *updated);
     consistency(*updated, options.consistency.update_px, OutsideView::kKeep, scratch);
     stages_of(images.type).sad_check(images.pixels, scratch, *updated);
   }

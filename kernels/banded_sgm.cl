@@ -20,6 +20,9 @@
 // pixel reads its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them
 // before it writes its own. Vectors hold two chunks. Most pixels in bands have one, and those before them the same one:
 // two paths then share a vector, nothing is looked at beside it, and nothing is wiped.
+//
+// Where the right view is read off the left one's sums, the sweep that finds the winners leaves at each right pixel the
+// least rank of the left pixels that it may be (sgm_cells.h).
 #include "sgm_cells.h"
 
 #ifndef __ENDIAN_LITTLE__
@@ -91,6 +94,12 @@ typedef struct __attribute__((packed)) {
 typedef struct __attribute__((packed)) {
   ChunkCodes codes;
 } PackedChunkCodes;
+typedef struct __attribute__((packed)) {
+  uint16 ranks;
+} Ranks;
+typedef struct __attribute__((packed)) {
+  uint8 ranks;
+} ChunkRanks;
 typedef struct __attribute__((packed)) {
   ushort16 totals;
 } Totals;
@@ -316,6 +325,21 @@ inline int ranked_in_chunk(const ushort8 totals) {
   return minimum_of_chunk((totals << (ushort8)(4)) | convert_ushort8(kLane.lo));
 }
 
+// Offers a left pixel to the right pixels of 16 lanes, or 8: the one of lane i lies i before `seen`. Lanes outside of the
+// band have totals of 65535.
+inline void offer(const ushort16 totals, const uchar16 cost, const uint lane, global uint* seen) {
+  const ushort16 lanes = (ushort16)((ushort)lane) + convert_ushort16(kLane);
+  const uint16 ranks = convert_uint16(RANK(totals, convert_ushort16(cost))) << (uint16)(16) | convert_uint16(lanes);
+  global Ranks* at = (global Ranks*)(seen - (VECTOR - 1));
+  at->ranks = min(at->ranks, ranks.sfedcba9876543210);
+}
+inline void offer_chunk(const ushort8 totals, const uchar8 cost, const uint lane, global uint* seen) {
+  const ushort8 lanes = (ushort8)((ushort)lane) + convert_ushort8(kLane.lo);
+  const uint8 ranks = convert_uint8(RANK(totals, convert_ushort8(cost))) << (uint8)(16) | convert_uint8(lanes);
+  global ChunkRanks* at = (global ChunkRanks*)(seen - (EGOSGM_LANES - 1));
+  at->ranks = min(at->ranks, ranks.s76543210);
+}
+
 // Whether a pixel has one chunk, all of it in the disparity range, and those before it on all paths have the same: as
 // most pixels in bands. Then a path's costs stay in their places, and nothing else is in a slot to look at or to wipe.
 inline bool goes_straight(const SgmParameters q, const uint extent, const uint* before, const int lane) {
@@ -365,11 +389,13 @@ typedef struct {
   int disparities;                 // of the range, from its first one on
   global uchar* cells;
   global const Band* band;
+  global uint* seen;  // the rank of the right pixel at its first disparity; null: none are kept
+  uint lane;          // of that disparity in the range
 } Pixel;
 
 __attribute__((always_inline)) inline void match_vectors(const bool meets, const int vectors, const Pixel pixel,
                                                          Candidate* candidate) {
-  uchar16 t[DIRECTIONS][MAX_VECTORS];
+  uchar16 t[DIRECTIONS][MAX_VECTORS], costs[MAX_VECTORS];
   uchar16 least[DIRECTIONS];
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) least[n] = (uchar16)(ABSENT);
@@ -377,6 +403,7 @@ __attribute__((always_inline)) inline void match_vectors(const bool meets, const
     const int at = VECTOR * v;
     const uchar16 cost = absent_from(pixel.disparities - at) |
                          matching_cost(pixel.own, pixel.other + at, pixel.row_above, pixel.row_below);
+    costs[v] = cost;
 #pragma unroll
     for (int n = 0; n < DIRECTIONS; ++n) {
       t[n][v] = path_cost_from(pixel.at[n] + at, cost, pixel.p1, pixel.p2[n]);
@@ -412,6 +439,7 @@ __attribute__((always_inline)) inline void match_vectors(const bool meets, const
       const ushort16 allowed = is_inner ? total : total | barred(first, last_of_band);
       best_vector = select(best_vector, (ushort16)((ushort)v), allowed < best);
       best = min(best, allowed);
+      if (pixel.seen) offer(allowed, costs[v], pixel.lane + at, pixel.seen - at);
     }
   }
   if (meets) {
@@ -435,7 +463,8 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
                                                       const int view, global const uint* all_codes,
                                                       global const Band* bands, global const uint* offsets,
                                                       global const uchar* penalties, global uchar* slots,
-                                                      global uchar* sums, global ulong* winners) {
+                                                      global uchar* sums, global ulong* winners,
+                                                      global uint* ranks) {
   const int width = q.width, height = q.height;
   const size_t first_pixel = (size_t)view * width * height;
   global const Code* codes = (global const Code*)all_codes;
@@ -446,6 +475,7 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
   Candidate candidates[TILE_WIDTH];
   const int step = backward ? -1 : 1;
   const int code_step = view == EGOSGM_LEFT ? step : -step;
+  const bool reads_off = meets && q.reads_off;
 
   for (int y = first_y; y < end_y; ++y) {
     const int row = y - first_y;
@@ -472,6 +502,8 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
     const int first_cell = backward ? clamp(offset + chunks_of(extent_at(row_bands)), 0, cells_of_row)
                                     : clamp(offset, 0, cells_of_row - (to - from) * MAX_CHUNKS);
     global uchar* cells = sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
+
+    global uint* seen = reads_off ? ranks + (size_t)image_y * code_stride + q.padding + image_x : 0;
 
     global const uint* row_penalties = (global const uint*)penalties + row_start + image_x;
     Penalties around = {row_penalties[left], row_penalties[above + left], row_penalties[above]};
@@ -526,7 +558,9 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
             const ushort8 total = convert_ushort8(sum) + convert_ushort8(load_chunk(cells));
             const int first = row_bands[k].first - origin, last_of_band = row_bands[k].last - origin;
             candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong2(total), ~0ul, ~0ul, ~0ul, ~0ul);
-            candidate->rank = ranked_in_chunk(total | barred_of_chunk(first, last_of_band));
+            const ushort8 allowed = total | barred_of_chunk(first, last_of_band);
+            candidate->rank = ranked_in_chunk(allowed);
+            if (reads_off) offer_chunk(allowed, chunk_cost, lane, seen + k - origin);
             candidate->disparity = origin + (candidate->rank & 15);
             ++candidate;
           }
@@ -573,7 +607,9 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
           const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(cells))) | widened(absent);
           const int first = row_bands[k].first - origin, last_of_band = row_bands[k].last - origin;
           candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
-          candidate->rank = ranked(total | barred(first, last_of_band));
+          const ushort16 allowed = total | barred(first, last_of_band);
+          candidate->rank = ranked(allowed);
+          if (reads_off) offer(allowed, cost, lane, seen + k - origin);
           candidate->disparity = origin + (candidate->rank & 15);
         } else if (is_chunk(extent)) {
           store_chunk(sum.lo, cells);
@@ -599,6 +635,8 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
         pixel.disparities = q.disparities - (int)lane;
         pixel.cells = cells;
         pixel.band = row_bands + k;
+        pixel.seen = reads_off ? seen + k - origin : 0;
+        pixel.lane = lane;
         match_vectors(meets, chunks_of(extent) / 2, pixel, candidate);
       }
       // The next one's: what was to the upper right is above it.
@@ -622,7 +660,8 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
 // The tile of a wave in this work-item's row of tiles, or all tiles of its view and direction.
 inline void sweep(const bool meets, const SgmParameters q, const int wave, const int tile_columns,
                   global const uint* all_codes, global const Band* bands, global const uint* offsets,
-                  global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners) {
+                  global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners,
+                  global uint* ranks) {
   const int view = get_global_id(1);
   const bool backward = get_global_id(2) > 0;
   const bool all = wave == EGOSGM_ALL_TILES;
@@ -637,10 +676,10 @@ inline void sweep(const bool meets, const SgmParameters q, const int wave, const
     for (int tile_x = first; tile_x < end; ++tile_x) {
       if (backward) {
         sweep_tile(meets, true, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
-                   slots, sums, winners);
+                   slots, sums, winners, ranks);
       } else {
         sweep_tile(meets, false, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
-                   slots, sums, winners);
+                   slots, sums, winners, ranks);
       }
     }
   }
@@ -650,15 +689,15 @@ inline void sweep(const bool meets, const SgmParameters q, const int wave, const
 kernel void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
                             global const Band* bands, global const uint* offsets, global const uchar* penalties,
                             global uchar* slots, global uchar* sums) {
-  sweep(false, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0);
+  sweep(false, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0, 0);
 }
 
 // Both on from there, over the sums of the other one, to the winners.
 kernel void sweep_from_middle(const SgmParameters q, const int wave, const int tile_columns,
                               global const uint* all_codes, global const Band* bands, global const uint* offsets,
                               global const uchar* penalties, global uchar* slots, global const uchar* sums,
-                              global ulong* winners) {
-  sweep(true, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, (global uchar*)sums, winners);
+                              global ulong* winners, global uint* ranks) {
+  sweep(true, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, (global uchar*)sums, winners, ranks);
 }
 
 #if PIXELS == 1

@@ -174,6 +174,26 @@ inline uint difference(global const Code* own, global const Code* other, const l
 }
 #endif
 
+// The codes of a quad of matches from `other` on; with COST_SAD their costs. `y`: the pixel's row.
+inline Codes fetch_quad(const SgmParameters q, global const Code* own, global const Code* other, const int y) {
+#if COST_SAD
+  const long stride = (long)q.width + 2 * (long)q.padding;
+  const long above = y > 0 ? -stride : 0, below = y + 1 < q.height ? stride : 0;
+  return (Codes)(difference(own, other, above, below), difference(own, other + 1, above, below),
+                 difference(own, other + 2, above, below), difference(own, other + 3, above, below));
+#else
+  return (Codes)(other[0], other[1], other[2], other[3]);
+#endif
+}
+
+inline int4 cost_of(const Code own, const Codes others) {
+#if COST_SAD
+  return convert_int4(others);
+#else
+  return convert_int4(popcount((Codes)(own) ^ others)) * COST_SCALE;
+#endif
+}
+
 inline Matches fetch(const SgmParameters q, const Path path, const int i, const Pixel pixel, const int lane) {
   Matches matches;
   global const Code* own = path.own + i * path.own_step;
@@ -183,26 +203,10 @@ inline Matches fetch(const SgmParameters q, const Path path, const int i, const 
     matches.others[v] = 0;
     if (holds(pixel, quad)) {
       global const Code* other = path.other + i * path.other_step + QUAD * quad;
-#if COST_SAD
-      const long stride = (long)q.width + 2 * (long)q.padding;
-      const int y = path.y + i * path.y_step;
-      const long above = y > 0 ? -stride : 0, below = y + 1 < q.height ? stride : 0;
-      matches.others[v] = (Codes)(difference(own, other, above, below), difference(own, other + 1, above, below),
-                                  difference(own, other + 2, above, below), difference(own, other + 3, above, below));
-#else
-      matches.others[v] = (Codes)(other[0], other[1], other[2], other[3]);
-#endif
+      matches.others[v] = fetch_quad(q, own, other, path.y + i * path.y_step);
     }
   }
   return matches;
-}
-
-inline int4 costs_of(const Matches* matches, const int v) {
-#if COST_SAD
-  return convert_int4(matches->others[v]);
-#else
-  return convert_int4(popcount((Codes)(matches->own) ^ matches->others[v])) * COST_SCALE;
-#endif
 }
 
 // The least value of a line's lanes, by one barrier or more for all work-items of the group. `minima`: 2 * LANES
@@ -283,7 +287,7 @@ kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
         const int4 same = costs[v];
         const int4 below = (int4)((int)(before[quad] >> 16) - least, same.xyz),
                    above = (int4)(same.yzw, (int)(before[quad + 2] & 0xffff) - least);
-        path_costs = costs_of(&matches, v) + min(min(same, min(below, above) + q.p1), (int4)(pixel.p2));
+        path_costs = cost_of(matches.own, matches.others[v]) + min(min(same, min(below, above) + q.p1), (int4)(pixel.p2));
         const int4 at = QUAD * quad + (int4)(0, 1, 2, 3);
         path_costs = select(path_costs, (int4)(ABSENT), at < pixel.first || at >= pixel.end);
       }
@@ -343,12 +347,28 @@ inline int count_steps(const Cells cells, const int winner, const int total, con
   return steps;
 }
 
+// Offers a left pixel to the right ones that a quad of its cells says it may be. `totals`: in the upper halves, the
+// whole of it NO_WINNER where the band has no cell. `lane`: of the first disparity in the range.
+inline void offer(const SgmParameters q, const int x, const int y, const int lane, const uint4 totals,
+                  global const uint* all_codes, global uint* ranks) {
+  const size_t stride = (size_t)q.width + 2 * (size_t)q.padding;
+  global const Code* codes = (global const Code*)all_codes + q.padding;
+  global const Code* own = codes + y * stride + x;
+  global const Code* other = codes + ((size_t)q.height + y) * stride + (q.width - 1 - x) + q.min_disparity + lane;
+  const ushort4 costs = convert_ushort4(cost_of(own[0], fetch_quad(q, own, other, y)));
+  uint each[QUAD];
+  vstore4(convert_uint4(RANK(convert_ushort4(totals >> 16), costs)) << 16 | as_uint4(lane + (int4)(0, 1, 2, 3)), 0,
+          each);
+  global uint* seen = ranks + y * stride + q.padding + x - q.min_disparity - lane;
+  for (int i = 0; i < QUAD; ++i) atomic_min(seen - i, each[i]);
+}
+
 // LANES work-items look at a pixel's cells, one of them at the winner's neighbours. Group ids: LINES pixels of a row,
 // row, view.
 kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winners(
-    const SgmParameters q, global const Band* bands, global const uint* offsets, global const uchar* forward_first,
-    global const uchar* forward_second, global const uchar* backward_first, global const uchar* backward_second,
-    global float* disparities, global float* variances) {
+    const SgmParameters q, global const uint* codes, global const Band* bands, global const uint* offsets,
+    global const uchar* forward_first, global const uchar* forward_second, global const uchar* backward_first,
+    global const uchar* backward_second, global float* disparities, global float* variances, global uint* ranks) {
   local uint minima[LINES][2 * LANES];
   const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
   const int x = get_group_id(0) * LINES + line;
@@ -374,6 +394,7 @@ kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winn
     const uint4 ranked = convert_uint4(totals_of(cells, at)) << 16 | as_uint4(index);
     const uint4 allowed = select(ranked, (uint4)(NO_WINNER), index < first || index > last);
     best = min(best, min(min(allowed.x, allowed.y), min(allowed.z, allowed.w)));
+    if (q.reads_off) offer(q, x, (int)get_group_id(1), cells_origin - q.min_disparity + at, allowed, codes, ranks);
   }
   best = minimum_of_line(minima[line], lane, best);
   if (is_inside && lane == 0) {

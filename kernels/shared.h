@@ -158,6 +158,7 @@ typedef struct {
   i32 padding;  // of the census codes' rows
   i32 p1, s_max;
   f32 variance_floor, variance_per_step, variance_per_square;
+  i32 reads_off;  // whether the left view leaves ranks for the right one (sgm_cells.h)
 } SgmParameters;
 
 // A point whose depth shrinks to less than this part of itself is as good as behind the camera.
@@ -175,7 +176,7 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 12 &&
-                  sizeof(BlockRange) == 12 && sizeof(PredictionState) == 20 && sizeof(SgmParameters) == 40 &&
+                  sizeof(BlockRange) == 12 && sizeof(PredictionState) == 20 && sizeof(SgmParameters) == 44 &&
                   sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared

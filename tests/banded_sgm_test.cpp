@@ -27,6 +27,7 @@ struct Case {
   std::optional<BandedSgmPaths::Group> group = {};
   BandedSgm::Launches launches = BandedSgm::Launches::kWaves;
   BandedSgm::Tile tile = {};
+  RightView right = RightView::kMatched;
 };
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
@@ -40,6 +41,7 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   if (c.tile.width != BandedSgm::Tile().width) {
     text += "_tiles" + std::to_string(c.tile.width) + "x" + std::to_string(c.tile.height);
   }
+  if (c.right == RightView::kReadOff) text += "_read_off";
   if (c.group) text += "_lanes" + std::to_string(c.group->lanes) + "_lines" + std::to_string(c.group->lines);
   return text;
 }
@@ -105,7 +107,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
   const auto steps = reference::step_penalties(c.size, m.grey, 8, m.options);
   ocl::Buffer<cl_uchar> penalties(context, steps.size());
   penalties.write(context, {steps.begin(), steps.end()});
-  sgm(device_codes, penalties, band, measured);
+  sgm(device_codes, penalties, band, measured, c.right);
 
   m.parameters = {c.size.width,
                   c.size.height,
@@ -116,7 +118,8 @@ Match match(const Case& c, int max_memory_mib = 0) {
                   m.options.s_max,
                   m.options.variance_floor_px2,
                   m.options.variance_per_step_px2,
-                  m.options.variance_per_square_px2};
+                  m.options.variance_per_square_px2,
+                  c.right == RightView::kReadOff};
   m.bands = band.bands().read(context);
   m.measured = {measured.disparity.read(context), measured.variance.read(context)};
   m.stripes = sgm.stripes();
@@ -171,7 +174,8 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
 TEST(BandedSgmStripes, EqualTheTwinOfEach) {
   for (const Scheduling scheduling : {Scheduling::kWavefront, Scheduling::kPaths}) {
     for (const MatchingCost cost : {MatchingCost::kCensus13x11, MatchingCost::kSad3x3}) {
-      const Case c{.size = {61, 301}, .range = {-5, 37}, .cost = cost, .scheduling = scheduling};
+      const RightView right = cost == MatchingCost::kSad3x3 ? RightView::kReadOff : RightView::kMatched;
+      const Case c{.size = {61, 301}, .range = {-5, 37}, .cost = cost, .scheduling = scheduling, .right = right};
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
       const auto expected = stripe_by_stripe(m, c.size);
@@ -265,6 +269,7 @@ std::vector<Case> changed(std::vector<Case> cases, Change change) {
 }
 
 void along_paths(Case& c) { c.scheduling = Scheduling::kPaths; }
+void read_off(Case& c) { c.right = RightView::kReadOff; }
 void whole_sweeps(Case& c) { c.launches = BandedSgm::Launches::kSweeps; }
 
 /// Groups of other shapes than the default: single work-items, paths that do not share out evenly, more lanes than
@@ -301,6 +306,13 @@ INSTANTIATE_TEST_SUITE_P(SmallTiles, BandedSgmTest, ValuesIn(in_small_tiles()), 
 INSTANTIATE_TEST_SUITE_P(SmallTilesSweeps, BandedSgmTest, ValuesIn(changed(in_small_tiles(), whole_sweeps)), name);
 INSTANTIATE_TEST_SUITE_P(BandedPaths, BandedSgmTest, ValuesIn(changed(kBanded, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(FullRangePaths, BandedSgmTest, ValuesIn(changed(kFullRange, along_paths)), name);
+INSTANTIATE_TEST_SUITE_P(ReadOff, BandedSgmTest, ValuesIn(changed(kBanded, read_off)), name);
+INSTANTIATE_TEST_SUITE_P(ReadOffFullRange, BandedSgmTest, ValuesIn(changed(kFullRange, read_off)), name);
+INSTANTIATE_TEST_SUITE_P(ReadOffSweeps, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), whole_sweeps)),
+                         name);
+INSTANTIATE_TEST_SUITE_P(ReadOffSmallTiles, BandedSgmTest, ValuesIn(changed(in_small_tiles(), read_off)), name);
+INSTANTIATE_TEST_SUITE_P(ReadOffPaths, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), along_paths)), name);
+INSTANTIATE_TEST_SUITE_P(ReadOffGroupedPaths, BandedSgmTest, ValuesIn(changed(in_groups(), read_off)), name);
 INSTANTIATE_TEST_SUITE_P(GroupedPaths, BandedSgmTest, ValuesIn(in_groups()), name);
 
 }  // namespace

@@ -27,11 +27,11 @@ struct HoleFillOptions {
 };
 struct ConsistencyCheckOptions {
   float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
+  float read_off_px = 2.0f;  // of the measurement, where the right view is read off the left one's path sums
 };
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
-  int p1 = 6;           // penalties as in BandedSgmOptions, for a census of 5x5 coarse pixels
-  int p2 = 60, p2_at_edges = 40;
+  int p1 = 6, p2 = 60, p2_at_edges = 40;  // as in BandedSgmOptions, for a census of 5x5 coarse pixels
   float max_difference_px = 1.0f;  // of the left-right check, in coarse pixels
 };
 struct SearchBandOptions {
@@ -98,10 +98,10 @@ struct DynamicMapOptions {
 };
 
 struct EGOSGM_EXPORT PipelineOptions {
-  int disparities = 128;  // D >= 1: the range is [min_disparity, min_disparity + disparities)
-  int min_disparity = 0;  // of either sign
+  int disparities = 128, min_disparity = 0;  // D >= 1 of them, from a first one of either sign on
   SearchMode search = SearchMode::kBand;
   bool temporal = true;  // false: every frame alone, full range, left-right checked (the plain matcher)
+  bool track_right = false;  // predict, match and filter the right view too; else it follows from the left one's match
 
   ForwardWarpOptions forward_warp;
   EdgeRejectionOptions edge_rejection;
@@ -119,8 +119,8 @@ struct EGOSGM_EXPORT PipelineOptions {
   OutputVarianceOptions output_variance;
   DynamicMapOptions dynamic_map;
 
-  /// Fućek et al. (IFAC 2017): constant q, three sigmas without a least half-width, unpredicted pixels search
-  /// everything, no gate, the filter's variance. The matcher, which the paper leaves open, is the default's.
+  /// Fućek et al. (IFAC 2017): both views tracked, constant q, three sigmas without a least half-width, unpredicted
+  /// pixels search everything, no gate, the filter's variance. The matcher, which the paper leaves open, is as default.
   static PipelineOptions paper();
 
   /// Throws InvalidArgument, naming the option, its value and what is allowed.

@@ -101,12 +101,15 @@ void run(std::string_view input) {
   m.penalties.write(m.context, {steps.begin(), steps.end()});
   m.bands.write(m.context, bands);
   m.cell_offsets.write(m.context, offsets);
-  m.sgm({m.codes, m.penalties, m.bands, m.cell_offsets}, m.measured);
+  const int reads_off = random() & 1;
+  m.sgm({m.codes, m.penalties, m.bands, m.cell_offsets}, m.measured,
+        reads_off ? RightView::kReadOff : RightView::kMatched);
 
   const BandedSgmOptions& o = m.options;
   const shared::SgmParameters parameters{
       m.size.width, m.size.height, m.range.min,          m.range.count,           BandedSgm::code_padding(m.range),
-      o.p1,         o.s_max,       o.variance_floor_px2, o.variance_per_step_px2, o.variance_per_square_px2};
+      o.p1,         o.s_max,       o.variance_floor_px2, o.variance_per_step_px2, o.variance_per_square_px2,
+      reads_off};
   const testing::HostMaps expected = reference::banded_sgm(parameters, o, codes, grey, bands);
   const testing::HostMaps actual = testing::download(m.context, m.measured);
   for (const auto& same : {testing::same_bits(actual.disparity, expected.disparity, m.size),

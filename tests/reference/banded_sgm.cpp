@@ -124,6 +124,28 @@ float offset(Cells& sums, int pixel, int winner) {
   return slope > 0 ? std::clamp((before - after) / (2 * slope), -0.5f, 0.5f) : 0.0f;
 }
 
+/// The right view read off the left one's sums: of the left pixels that a right one may be, that with the least sum and
+/// eight times its matching cost, and of those the one with the smallest disparity.
+void read_off(const View& left, const shared::Band* bands, Cells& sums, testing::HostMaps& maps) {
+  const shared::SgmParameters& q = left.q;
+  constexpr int kNone = 65535;
+  std::vector<std::pair<int, int>> least(static_cast<std::size_t>(q.width) * q.height, {kNone, 0});
+  for (int y = 0; y < q.height; ++y) {
+    for (int x = 0; x < q.width; ++x) {
+      const int pixel = y * q.width + x;
+      for (int d = bands[pixel].first; d <= bands[pixel].last; ++d) {
+        if (x - d < 0 || x - d >= q.width) continue;
+        auto& seen = least[pixel - d];
+        seen = std::min(seen, {sums.at(pixel, d) + 8 * left.cost(x, y, d), d});
+      }
+    }
+  }
+  for (const auto& [rank, disparity] : least) {
+    maps.disparity.push_back(rank == kNone ? EGOSGM_INVALID_DISPARITY : static_cast<float>(disparity));
+    maps.variance.push_back(rank == kNone ? 0 : q.variance_floor);
+  }
+}
+
 }  // namespace
 
 testing::HostMaps banded_sgm(const shared::SgmParameters& q, const BandedSgmOptions& options,
@@ -149,6 +171,10 @@ testing::HostMaps banded_sgm(const shared::SgmParameters& q, const BandedSgmOpti
       const bool escaped = has_both && std::min(sums.at(p, winner - 1), sums.at(p, winner + 1)) < sums.at(p, winner);
       maps.variance.push_back(escaped ? EGOSGM_ESCAPED_VARIANCE_PX2
                                       : q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n));
+    }
+    if (q.reads_off) {
+      read_off(v, band, sums, maps);
+      break;
     }
   }
   return maps;

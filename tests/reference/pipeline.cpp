@@ -13,6 +13,7 @@
 #include "tests/reference/median_filter.h"
 #include "tests/reference/output_variance.h"
 #include "tests/reference/prediction_check.h"
+#include "tests/reference/right_map.h"
 #include "tests/reference/sad_check.h"
 #include "tests/reference/speckle_removal.h"
 #include "tests/reference/step_penalties.h"
@@ -71,12 +72,15 @@ void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
       forward_warp(size_, range_, motions.left, motions.right, options_.forward_warp.process_noise_px2, *belief_);
   frame.without_edges = edge_rejection(size_, options_.edge_rejection.max_jump_px, frame.warped);
   frame.filled = hole_fill(size_, options_.hole_fill.max_difference_px, frame.without_edges);
-  frame.predicted = consistency_check(size_, options_.consistency.prediction_px, true, frame.filled);
+  frame.predicted = options_.track_right
+                        ? consistency_check(size_, options_.consistency.prediction_px, true, frame.filled)
+                        : frame.filled;
 }
 
 Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset known) const {
   const BandedSgmOptions& sgm = options_.banded_sgm;
   const bool everything = frame.predicted.disparity.empty() || options_.search == SearchMode::kFull;
+  const bool reads_off = !frame.predicted.disparity.empty() && !options_.track_right;
   Pass pass;
   pass.images = resample(size_, known.offset_px, images.greys);
   if (!everything && options_.coarse_match.enabled) {
@@ -103,14 +107,16 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
                                          sgm.s_max,
                                          sgm.variance_floor_px2,
                                          sgm.variance_per_step_px2,
-                                         sgm.variance_per_square_px2};
+                                         sgm.variance_per_square_px2,
+                                         reads_off};
   const std::vector<std::uint16_t> values(pass.images.begin(), pass.images.end());
   pass.penalties = step_penalties(size_, values, images.bits, sgm);
   std::vector<std::uint16_t> grey = values;
   for (std::uint16_t& value : grey) value = static_cast<std::uint16_t>(value >> (images.bits - 8));
   pass.matched = banded_sgm(parameters, sgm, both, grey, pass.band.bands);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
-  pass.consistent = consistency_check(size_, options_.consistency.measurement_px, false, pass.smoothed);
+  const ConsistencyCheckOptions& check = options_.consistency;
+  pass.consistent = consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed);
   pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
   pass.offset = known;
   if (options_.vertical_alignment.enabled) {
@@ -129,6 +135,10 @@ void Pipeline::update(const Images& images, Frame& frame) const {
   }
   frame.fused = kalman_update(size_, kalman, frame.warped.disparity, frame.predicted, pass.measured);
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
+  if (!options_.track_right) {
+    frame.fused_smoothed =
+        right_map(size_, range_, options_.consistency.update_px, pass.measured, frame.fused_smoothed);
+  }
   frame.fused_consistent = consistency_check(size_, options_.consistency.update_px, true, frame.fused_smoothed);
   frame.updated = options_.sad_check.max_difference > 0 ? sad_check(size_, options_.sad_check, pass.images,
                                                                     images.bits == 8 ? 1 : 257, frame.fused_consistent)

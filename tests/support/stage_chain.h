@@ -16,6 +16,7 @@
 #include "host/median_filter.h"
 #include "host/output_variance.h"
 #include "host/prediction_check.h"
+#include "host/right_map.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -52,6 +53,7 @@ class StageChain {
         speckle_removal_(context_, size, options.speckle_removal),
         kalman_update_(context_, size, options.kalman_update),
         prediction_check_(context_, size, options.prediction_check),
+        right_map_(context_, size, range_of(options)),
         output_variance_(context_, size, options.output_variance),
         dynamic_map_(context_, size, options.dynamic_map),
         sad_check_(context_, size, type, options.sad_check),
@@ -85,54 +87,63 @@ class StageChain {
   }
 
  private:
+  int tracked_views() const { return options_.track_right ? 2 : 1; }
   int code_padding() const { return BandedSgm::code_padding(range_of(options_)); }
 
   void predict(const Motion& motion, reference::Frame& frame) {
-    forward_warp_(belief_, motion, updated_);
+    forward_warp_(belief_, motion, updated_, tracked_views());
     frame.warped = download(context_, updated_);
-    edge_rejection_(updated_, predicted_);
+    edge_rejection_(updated_, predicted_, tracked_views());
     frame.without_edges = download(context_, predicted_);
-    hole_fill_(predicted_, scratch_);
+    hole_fill_(predicted_, scratch_, tracked_views());
     frame.filled = download(context_, scratch_);
-    consistency_(scratch_, options_.consistency.prediction_px, OutsideView::kKeep, predicted_);
+    if (options_.track_right) {
+      consistency_(scratch_, options_.consistency.prediction_px, OutsideView::kKeep, predicted_);
+    } else {
+      std::swap(scratch_, predicted_);
+    }
     frame.predicted = download(context_, predicted_);
   }
 
   reference::Pass match(const FrameImages& images, bool has_prediction) {
     images_ = &images;
+    const bool reads_off = has_prediction && !options_.track_right;
+    const int views = reads_off ? 1 : 2;
     reference::Pass pass;
     pass.images = greys(images);
     if (has_prediction && options_.search == SearchMode::kBand) {
       const StereoMaps* coarse = options_.coarse_match.enabled ? &coarse_match_(images) : nullptr;
       if (coarse) pass.coarse = coarse->disparity.read(context_);
-      search_band_(predicted_, &updated_, coarse, &prediction_states_[frames_ % 2]);
+      search_band_(predicted_, &updated_, coarse, &prediction_states_[frames_ % 2], views);
     } else {
-      has_prediction ? search_band_.full_range(predicted_) : search_band_.full_range();
+      has_prediction ? search_band_.full_range(predicted_, views) : search_band_.full_range();
     }
     pass.band = {search_band_.bands().read(context_), search_band_.cell_offsets().read(context_),
                  search_band_.row_sums().read(context_)};
     census_(images.pixels, codes_);
     const std::vector<cl_uint> codes = codes_.read(context_);
     pass.codes.assign(codes.begin(), codes.end());
-    step_penalties_(images.pixels, penalties_);
+    step_penalties_(images.pixels, penalties_, views);
     const std::vector<cl_uchar> penalties = penalties_.read(context_);
     pass.penalties.assign(penalties.begin(), penalties.end());
-    banded_sgm_(codes_, penalties_, search_band_, scratch_);
+    banded_sgm_(codes_, penalties_, search_band_, scratch_, reads_off ? RightView::kReadOff : RightView::kMatched);
     pass.matched = download(context_, scratch_);
     median_filter_(scratch_, Holes::kLeave);
     pass.smoothed = download(context_, scratch_);
-    consistency_(scratch_, options_.consistency.measurement_px, OutsideView::kDrop, measured_);
+    consistency_(scratch_, reads_off ? options_.consistency.read_off_px : options_.consistency.measurement_px,
+                 OutsideView::kDrop, measured_);
     pass.consistent = download(context_, measured_);
-    speckle_removal_(measured_);
+    speckle_removal_(measured_, views);
     pass.measured = download(context_, measured_);
     vertical_alignment_.estimate(images, measured_);
     return pass;
   }
 
   void update(reference::Frame& frame) {
-    kalman_update_(prediction_states_[frames_ % 2], updated_, predicted_, measured_, updated_);
+    kalman_update_(prediction_states_[frames_ % 2], updated_, predicted_, measured_, updated_, tracked_views());
     frame.fused = download(context_, updated_);
-    median_filter_(updated_, Holes::kFill);
+    median_filter_(updated_, Holes::kFill, tracked_views());
+    if (!options_.track_right) right_map_(measured_, options_.consistency.update_px, updated_);
     frame.fused_smoothed = download(context_, updated_);
     consistency_(updated_, options_.consistency.update_px, OutsideView::kKeep, scratch_);
     frame.fused_consistent = download(context_, scratch_);
@@ -167,6 +178,7 @@ class StageChain {
   SpeckleRemoval speckle_removal_;
   KalmanUpdate kalman_update_;
   PredictionCheck prediction_check_;
+  RightMap right_map_;
   OutputVariance output_variance_;
   DynamicMap dynamic_map_;
   SadCheck sad_check_;
