@@ -22,6 +22,7 @@
 #include "host/ocl/errors.h"
 #include "host/output_variance.h"
 #include "host/prediction_check.h"
+#include "host/right_map.h"
 #include "host/sad_check.h"
 #include "host/search_band.h"
 #include "host/speckle_removal.h"
@@ -94,7 +95,8 @@ class Chain {
         after_(context, 1),
         output_variance_(context, size_, {}),
         variance_(context, 2 * pixel_count(size_)),
-        dynamic_map_(context, size_, {}) {
+        dynamic_map_(context, size_, {}),
+        right_map_(context, size_, range_) {
     images_.pixels.write(context, street.images);
     belief_.disparity.write(context, street.disparity);
     belief_.variance.write(context, street.variance);
@@ -136,6 +138,7 @@ class Chain {
         {"DynamicMap", [this] { dynamic_map_(&predicted_, matched_, warped_); }, 4 * map + grey / 2},
         {"OutputVariance", [this] { output_variance_(updated_, 2, warped_, variance_); }, 9 * map},
         {"SadCheck", [this] { sad_check_(images_.pixels, updated_, checked_); }, grey + 2 * maps},
+        {"RightMap", [this] { right_map_(matched_, 1.0f, checked_); }, 5 * map / 2},
     };
   }
 
@@ -185,6 +188,7 @@ class Chain {
   OutputVariance output_variance_;
   ocl::Buffer<float> variance_;
   DynamicMap dynamic_map_;
+  RightMap right_map_;
 };
 
 void measure(benchmark::State& state, ocl::Context& context, const Stage& stage, double copy_gb_s) {

@@ -6,16 +6,6 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-// Lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of loads that may be joined.
-static inline Floats gather(volatile global const float* row, const Ints x) {
-#if PIXELS == 1
-  return row[x];
-#else
-  return (float16)(row[x.s0], row[x.s1], row[x.s2], row[x.s3], row[x.s4], row[x.s5], row[x.s6], row[x.s7], row[x.s8],
-                   row[x.s9], row[x.sa], row[x.sb], row[x.sc], row[x.sd], row[x.se], row[x.sf]);
-#endif
-}
-
 kernel void check(const ImageSize size, const float max_difference, const int keep_outside,
                   global const float* disparity, global float* kept_disparity, global float* variance) {
   const int y = get_global_id(1);

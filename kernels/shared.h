@@ -94,6 +94,9 @@ typedef float f32;
 #define EGOSGM_DYNAMIC_RADIUS 4
 #define EGOSGM_DYNAMIC_MIN_COUNT 27
 
+// The disparities of RightMap are whole numbers of such steps.
+#define EGOSGM_RIGHT_MAP_STEPS_PER_PX 65536.0f
+
 // The variance of a hole that MedianFilter fills.
 #define EGOSGM_FILLED_VARIANCE_PX2 1.0f
 

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// The right view's map by the left one's surfaces: the left pixel x lands on the right pixel nearest to x - d.
+//
+// Several may land on one pixel. Each bids a key, of which the largest wins, so the result does not depend on the order
+// in which they come: bit 31 where d was measured, below it d in steps of 2^-16 px, counted from one pixel below the
+// range, so that 0 is nobody's. A step is far less than the tolerance of a check or the 1/256 px of a disparity's PNG.
+// GPUs, a pixel a work-item: atomic maxima. CPUs, where atomics are slow: a work-item owns a row.
+#include "pixels.h"
+
+// lint: PIXELS=1
+// lint: PIXELS=16
+
+// Rows of keys are whole blocks.
+static inline size_t key_row(const int y, const int width) {
+  return (size_t)y * ((width + PIXELS - 1) / PIXELS * PIXELS);
+}
+
+static inline Ints load_keys(global const uint* keys) {
+#if PIXELS == 1
+  return as_int(*keys);
+#else
+  return as_int16(vload16(0, keys));
+#endif
+}
+
+// At targets from 0. Keys are compared without a sign.
+static inline void bid(const Ints keys, const Ints targets, global uint* row) {
+#if PIXELS == 1
+  if (targets >= 0) atomic_max(&row[targets], as_uint(keys));
+#else
+  uint key[PIXELS];
+  int target[PIXELS];
+  vstore16(as_uint16(keys), 0, key);
+  vstore16(targets, 0, target);
+  for (int i = 0; i < PIXELS; ++i) {
+    if (target[i] >= 0) row[target[i]] = max(row[target[i]], key[i]);
+  }
+#endif
+}
+
+// REQUIRES: on GPUs, keys of 0.
+kernel void splat(const ImageSize size, const int min_disparity, const float max_difference,
+                  global const float* disparity, global const float* measured, global uint* keys) {
+  const int y = get_global_id(1);
+  const int width = size.width;
+  const size_t row = (size_t)y * width;
+  global uint* bids = keys + key_row(y, width);
+#if PIXELS > 1
+  for (int x = 0; x < width; x += PIXELS) vstore16((uint16)(0), 0, bids + x);
+#endif
+
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats z = load_pixels(measured + row, x, width);
+    const Floats zero = 0.0f;
+    const Floats least = 1.0f;
+    const Floats most = 2147483520.0f;  // the largest below 2^31
+    // Asked of the floats, with comparisons that NaN fails, before they become integers.
+    const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) - d);
+    const Ints lands = (d > INVALID) & (at >= zero) & (at < (Floats)(width));
+    const Ints was_measured = (z > INVALID) & (fabs(z - d) <= max_difference);
+    const Floats steps = (d - (float)min_disparity + 1.0f) * EGOSGM_RIGHT_MAP_STEPS_PER_PX;
+    const Floats above = steps > least ? steps : least;
+    const Ints key = INTS_OF_FLOATS(above < most ? above : most) | (was_measured ? (Ints)(INT_MIN) : (Ints)(0));
+    bid(key, INTS_OF_FLOATS(lands ? at : (Floats)(-1.0f)), bids);
+  }
+}
+
+// The variance is that of the left pixel that the right one sees.
+kernel void decode(const ImageSize size, const int min_disparity, global const uint* keys, global float* disparity,
+                   global float* variance) {
+  const int y = get_global_id(1);
+  const int width = size.width;
+  const size_t row = (size_t)y * width;
+  const size_t right_row = ((size_t)EGOSGM_RIGHT * size.height + y) * width;
+  global const uint* bids = keys + key_row(y, width);
+
+  FOR_PIXELS(x, width) {
+    const Ints key = load_keys(bids + x);
+    const Floats zero = 0.0f;
+    const Floats d =
+        FLOATS_OF_INTS(key & INT_MAX) * (1.0f / EGOSGM_RIGHT_MAP_STEPS_PER_PX) - 1.0f + (float)min_disparity;
+    const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + d);
+    const Ints inside = (key != 0) & (at >= zero) & (at < (Floats)(width));
+    const Ints left = INTS_OF_FLOATS(inside ? at : zero);
+    const Ints valid = inside & (gather(disparity + row, left) > INVALID);
+    const Floats p = gather(variance + row, left);
+    store_pixels(valid ? d : INVALID, disparity + right_row, x, width);
+    store_pixels(valid ? p : zero, variance + right_row, x, width);
+  }
+}
