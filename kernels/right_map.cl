@@ -23,18 +23,16 @@ static inline Ints load_keys(global const uint* keys) {
 #endif
 }
 
-// At targets from 0. Keys are compared without a sign.
+// Keys are compared without a sign; 0 bids nothing. On CPUs no branch asks for it, which holes would make mispredict.
 static inline void bid(const Ints keys, const Ints targets, global uint* row) {
 #if PIXELS == 1
-  if (targets >= 0) atomic_max(&row[targets], as_uint(keys));
+  if (keys != 0) atomic_max(&row[targets], as_uint(keys));
 #else
   uint key[PIXELS];
   int target[PIXELS];
   vstore16(as_uint16(keys), 0, key);
   vstore16(targets, 0, target);
-  for (int i = 0; i < PIXELS; ++i) {
-    if (target[i] >= 0) row[target[i]] = max(row[target[i]], key[i]);
-  }
+  for (int i = 0; i < PIXELS; ++i) row[target[i]] = max(row[target[i]], key[i]);
 #endif
 }
 
@@ -56,13 +54,14 @@ kernel void splat(const ImageSize size, const int min_disparity, const float max
     const Floats least = 1.0f;
     const Floats most = 2147483520.0f;  // the largest below 2^31
     // Asked of the floats, with comparisons that NaN fails, before they become integers.
-    const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) - d);
+    const Floats here = FLOATS_OF_INTS(x + LANE_INDICES);
+    const Floats at = nearest(here - d);
     const Ints lands = (d > INVALID) & (at >= zero) & (at < (Floats)(width));
     const Ints was_measured = (z > INVALID) & (fabs(z - d) <= max_difference);
     const Floats steps = (d - (float)min_disparity + 1.0f) * EGOSGM_RIGHT_MAP_STEPS_PER_PX;
     const Floats above = steps > least ? steps : least;
     const Ints key = INTS_OF_FLOATS(above < most ? above : most) | (was_measured ? (Ints)(INT_MIN) : (Ints)(0));
-    bid(key, INTS_OF_FLOATS(lands ? at : (Floats)(-1.0f)), bids);
+    bid(lands ? key : (Ints)(0), INTS_OF_FLOATS(lands ? at : here), bids);
   }
 }
 
