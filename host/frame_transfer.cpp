@@ -182,7 +182,7 @@ void FrameTransfer::download(const FrameResults& results, const FrameOutputs& ou
   fetch_left(results.measured->variance, outputs.measured_variance.data, measured_variance_);
   if (results.dynamic) fetch(*results.dynamic, pixel_count(size_), dynamic_);
   if (outputs.search_width.data) fetch(results.band->bands(), pixel_count(size_), bands_);
-  fetch(results.band->row_sums(), row_sums_.size(), row_sums_);
+  fetch(results.band->row_sums(), static_cast<std::size_t>(results.band->searched_views()) * size_.height, row_sums_);
   fetch(*results.vertical_offset_px, 1, vertical_offset_px_);
 
   disparity_.fetch(results.result->disparity, 0, pixel_count(size_));  // always: the report counts its valid pixels
@@ -209,12 +209,13 @@ void FrameTransfer::collect(FrameReport& report) const {
   copy_rows(bands_.data(), outputs_.search_width,
             [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
 
-  const double pixels = static_cast<double>(pixel_count(size_)), cells = 2 * pixels * range_.count;
+  const double pixels = static_cast<double>(pixel_count(size_));
+  const double cells = static_cast<double>(row_sums_.size()) * size_.width * range_.count;
   std::uint64_t searched = 0, computed = 0, predicted_pixels = 0;
   for (std::size_t row = 0; row < row_sums_.size(); ++row) {
     searched += row_sums_[row].searched;
     computed += row_sums_[row].computed;
-    if (has_prediction_ && row < row_sums_.size() / 2) predicted_pixels += row_sums_[row].predicted;
+    if (has_prediction_ && row < static_cast<std::size_t>(size_.height)) predicted_pixels += row_sums_[row].predicted;
   }
   report.search_fraction = static_cast<double>(searched) / cells;
   report.computed_fraction = static_cast<double>(computed) / cells;

@@ -72,7 +72,7 @@ class FrameTransfer {
   Scratch predicted_, predicted_variance_, measured_, measured_variance_, vertical_offset_px_;
   std::vector<shared::Band> bands_;
   std::vector<cl_uchar> dynamic_;
-  std::vector<shared::RowSum> row_sums_;
+  std::vector<shared::RowSum> row_sums_;  // of the views that were searched
   cl::Event scratch_fetched_;
   bool has_prediction_ = false;
   FrameOutputs outputs_;

@@ -29,11 +29,11 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
       update_(build(context, pixels_), "update") {}
 
 void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check, const StereoMaps& warped,
-                              const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated) {
+                              const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated, int views) {
   context_.enter("KalmanUpdate");
-  update_(context_, ocl::every_pixels(context_, size_, pixels_), size_, gate_px_, keep_predicted_, ask_neighbours_,
-          innovation_weight_, min_variance_px2_, check, warped.disparity, predicted.disparity, predicted.variance,
-          measured.disparity, measured.variance, updated.disparity, updated.variance);
+  update_(context_, ocl::every_pixels(context_, size_, pixels_, views), size_, gate_px_, keep_predicted_,
+          ask_neighbours_, innovation_weight_, min_variance_px2_, check, warped.disparity, predicted.disparity,
+          predicted.variance, measured.disparity, measured.variance, updated.disparity, updated.variance);
 }
 
 }  // namespace egosgm

@@ -25,10 +25,10 @@ MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, const 
       filter_and_fill_(build(context, pixels_), "filter_and_fill"),
       filtered_(context, enabled_ ? 2 * pixel_count(size) : 0) {}
 
-void MedianFilter::operator()(StereoMaps& maps, Holes holes) {
+void MedianFilter::operator()(StereoMaps& maps, Holes holes, int views) {
   if (!enabled_) return;
   context_.enter("MedianFilter");
-  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_);
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, views);
   if (holes == Holes::kFill) {
     filter_and_fill_(context_, pixels, size_, kFillFrom, maps.disparity, filtered_, maps.variance);
   } else {

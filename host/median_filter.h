@@ -18,8 +18,9 @@ class MedianFilter {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   MedianFilter(ocl::Context& context, shared::ImageSize size, const MedianFilterOptions& options, int pixels = 0);
 
-  /// Replaces the disparities of `maps`; nothing happens where the option is off.
-  void operator()(StereoMaps& maps, Holes holes);
+  /// Replaces the disparities of `maps`; nothing happens where the option is off. `views`: 1 filters the left view
+  /// only; the right view's part of the disparities is then left undefined.
+  void operator()(StereoMaps& maps, Holes holes, int views = 2);
 
  private:
   ocl::Context& context_;

@@ -63,9 +63,10 @@ void SearchBand::clear(ocl::Context& context, shared::DisparityRange range, ocl:
 }
 
 void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* warped, const StereoMaps* coarse,
-                            const ocl::Buffer<shared::PredictionState>* last) {
+                            const ocl::Buffer<shared::PredictionState>* last, int views) {
   context_.enter("SearchBand");
-  const ocl::Range blocks = ocl::every_pixel(context_, blocks_);
+  searched_views_ = views;
+  const ocl::Range blocks = ocl::every_pixel(context_, blocks_, views);
   const bool has_ridges = warped && options_.ridge_step_px > 0;
   if (has_ridges) gather_ridges_(context_, blocks, size_, options_.ridge_step_px, warped->disparity, ridges_);
   const Ranges& ridges = has_ridges ? ridges_ : none_;
@@ -78,24 +79,28 @@ void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* warpe
                    options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_,
                    coarse ? coarse_ranges_ : none_, options_.ridge_step_px > 0 ? EGOSGM_RIDGE_BLOCKS : -1,
                    coarse ? ridges_with_coarse_ : ridges, found_, block_bands_);
-  bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}), size_, range_, options_.sigmas,
-                   options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
-                   options_.coarse_margin_px, found_, block_bands_, bands_);
-  if (last) widen_(context_, ocl::group_a_row(size_, 1), size_, whole(range_), *last, bands_);
-  sum_rows_(context_, ocl::group_a_row(size_, row_group_), size_, predicted.disparity, bands_, cell_offsets_,
-            row_sums_);
+  bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}, views), size_, range_,
+                   options_.sigmas, options_.min_half_width_px, predicted.disparity, predicted.variance,
+                   options_.coarse_tolerance_px, options_.coarse_margin_px, found_, block_bands_, bands_);
+  if (last) widen_(context_, ocl::group_a_row(size_, 1, views), size_, whole(range_), *last, bands_);
+  sum_rows(predicted);
 }
 
-void SearchBand::full_range() {
+void SearchBand::full_range(int views) {
   context_.enter("SearchBand");
-  full_range_(context_, ocl::every_pixel(context_, size_), size_, range_, whole(range_), bands_, cell_offsets_,
+  searched_views_ = views;
+  full_range_(context_, ocl::every_pixel(context_, size_, views), size_, range_, whole(range_), bands_, cell_offsets_,
               row_sums_);
 }
 
-void SearchBand::full_range(const StereoMaps& predicted) {
-  full_range();
-  sum_rows_(context_, ocl::group_a_row(size_, row_group_), size_, predicted.disparity, bands_, cell_offsets_,
-            row_sums_);
+void SearchBand::full_range(const StereoMaps& predicted, int views) {
+  full_range(views);
+  sum_rows(predicted);
+}
+
+void SearchBand::sum_rows(const StereoMaps& predicted) {
+  sum_rows_(context_, ocl::group_a_row(size_, row_group_, searched_views_), size_, predicted.disparity, bands_,
+            cell_offsets_, row_sums_);
 }
 
 }  // namespace egosgm

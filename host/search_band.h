@@ -23,20 +23,22 @@ class SearchBand {
 
   /// Bands from the prediction, from ridges of it before anything was dropped (`warped`), and from what CoarseMatch
   /// found, where there are these; the whole range where `last`, what PredictionCheck said of the frame before, says
-  /// that its predictions were wrong.
+  /// that its predictions were wrong. `views`: 1 searches the left view only, here and below.
   void operator()(const StereoMaps& predicted, const StereoMaps* warped = nullptr, const StereoMaps* coarse = nullptr,
-                  const ocl::Buffer<shared::PredictionState>* last = nullptr);
+                  const ocl::Buffer<shared::PredictionState>* last = nullptr, int views = 2);
   /// Every pixel searches everything.
-  void full_range();
+  void full_range(int views = 2);
   /// The same where there is a prediction that is not searched by: `row_sums` counts its pixels.
-  void full_range(const StereoMaps& predicted);
+  void full_range(const StereoMaps& predicted, int views = 2);
 
   /// One a pixel and view.
   const ocl::Buffer<shared::Band>& bands() const { return bands_; }
   /// One a pixel and view: the chunks of the pixels to the left of it in its row.
   const ocl::Buffer<cl_uint>& cell_offsets() const { return cell_offsets_; }
-  /// One a row and view: index view * height + y.
+  /// One a row and view: index view * height + y. Those of `searched_views()` count.
   const ocl::Buffer<shared::RowSum>& row_sums() const { return row_sums_; }
+  /// By the last call: 1 or 2.
+  int searched_views() const { return searched_views_; }
 
   /// No pixel has more chunks than this.
   static int max_chunks(shared::DisparityRange range) {
@@ -48,6 +50,8 @@ class SearchBand {
                     ocl::Buffer<cl_uint>& cell_offsets);
 
  private:
+  void sum_rows(const StereoMaps& predicted);
+
   using Disparities = const ocl::Buffer<float>;
   using Ranges = ocl::Buffer<shared::BlockRange>;
 
@@ -56,6 +60,7 @@ class SearchBand {
   const shared::DisparityRange range_;
   const SearchBandOptions options_;
   const int row_group_;
+  int searched_views_ = 2;
   Ranges block_ranges_, coarse_ranges_, ridges_, ridges_with_coarse_, none_, found_;
   ocl::Buffer<shared::Band> block_bands_;
   ocl::Buffer<shared::Band> bands_;

@@ -20,8 +20,8 @@ class SpeckleRemoval {
   SpeckleRemoval(ocl::Context& context, shared::ImageSize size, const SpeckleRemovalOptions& options,
                  int strip_rows = 0, int row_group = 0);
 
-  /// In place. With `max_size_px` 0 nothing is launched.
-  void operator()(StereoMaps& maps);
+  /// In place. With `max_size_px` 0 nothing is launched. `views`: 1 looks at the left view only.
+  void operator()(StereoMaps& maps, int views = 2);
 
  private:
   using Disparities = const ocl::Buffer<float>;
