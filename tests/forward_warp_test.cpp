@@ -20,13 +20,17 @@ constexpr shared::ImageSize kSize{101, 61};
 constexpr shared::DisparityRange kRange{0, 64};
 const Calibration kCalibration{.fx = 100, .fy = 100, .cx = 50, .cy = 30, .baseline_m = 0.5};  // Z = 50 / d
 
+// What lies in the output must not shine through.
+testing::HostMaps before(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
+
 testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, shared::DisparityRange range,
-                       float process_noise_px2, const testing::HostMaps& belief, const Motion& motion, int pixels = 0) {
+                       float process_noise_px2, const testing::HostMaps& belief, const Motion& motion, int pixels = 0,
+                       int views = 2) {
   ocl::Context context(testing::any_device());
   ForwardWarp warp(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
-  StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  warp(in, motion, out);
+  StereoMaps out = testing::upload(context, size, before(size));
+  warp(in, motion, out, views);
   return testing::download(context, out);
 }
 
@@ -97,6 +101,19 @@ TEST_P(ForwardWarpTest, EqualsReference) {
             << "min " << range.min << ", by " << pixels;
       }
     }
+  }
+}
+
+TEST_P(ForwardWarpTest, PredictsTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const testing::HostMaps belief = testing::random_maps(size, 0, 70, 0.2, 18), was = before(size);
+  std::mt19937 random(19);
+  const Motion motion = random_motion(random, 0.3, 0.02);
+  const testing::HostMaps both = warp(size, kCalibration, kRange, 0.25f, belief, motion);
+  for (const int pixels : {1, 16}) {
+    const testing::HostMaps one = warp(size, kCalibration, kRange, 0.25f, belief, motion, pixels, 1);
+    EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
+    EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
   }
 }
 
@@ -223,7 +240,8 @@ TEST(ForwardWarp, SurvivesWildMotions) {
       EXPECT_TRUE(testing::same_bits(predicted.variance, expected.variance, kSize)) << metres << " m";
       for (std::size_t i = 0; i < predicted.disparity.size(); ++i) {
         const float d = predicted.disparity[i], p = predicted.variance[i];
-        ASSERT_TRUE(d == kNone ? p == 0 || p == EGOSGM_MAX_VARIANCE_PX2 : d >= 0 && d <= 63 && p >= 0.25f && p <= EGOSGM_MAX_VARIANCE_PX2)
+        ASSERT_TRUE(d == kNone ? p == 0 || p == EGOSGM_MAX_VARIANCE_PX2
+                               : d >= 0 && d <= 63 && p >= 0.25f && p <= EGOSGM_MAX_VARIANCE_PX2)
             << d << ", variance " << p << ", " << metres << " m";
       }
     }

@@ -13,20 +13,22 @@ namespace {
 
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
+/// What lies in the output must not shine through.
+testing::HostMaps before_update(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
+
 /// `in_place`: the warped map lies where the updated one will.
 testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& warped,
                          const testing::HostMaps& predicted, const testing::HostMaps& measured, int pixels = 0,
-                         bool in_place = false, const shared::PredictionState& check = {}) {
+                         bool in_place = false, const shared::PredictionState& check = {}, int views = 2) {
   ocl::Context context(testing::any_device());
   KalmanUpdate update(context, size, options, pixels);
   const StereoMaps before = testing::upload(context, size, warped);
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const StereoMaps measurement = testing::upload(context, size, measured);
-  // What was there must not shine through.
-  StereoMaps out = testing::upload(context, size, in_place ? warped : testing::random_maps(size, 0, 9, 0.5, 99));
+  StereoMaps out = testing::upload(context, size, in_place ? warped : before_update(size));
   ocl::Buffer<shared::PredictionState> checked(context, 1);
   checked.write(context, {check});
-  update(checked, in_place ? out : before, prediction, measurement, out);
+  update(checked, in_place ? out : before, prediction, measurement, out, views);
   return testing::download(context, out);
 }
 
@@ -75,6 +77,21 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
       EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
           << "gate " << options.gate_px << ", by " << pixels;
     }
+  }
+}
+
+TEST_P(KalmanUpdateTest, UpdatesTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 9);
+  const testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 10);
+  const testing::HostMaps warped = testing::random_maps(size, -8, 8, 0.3, 11);
+  const testing::HostMaps both = update(size, {}, warped, predicted, measured);
+  for (const int pixels : {1, 16}) {
+    const bool in_place = pixels == 1;
+    const testing::HostMaps was = in_place ? warped : before_update(size);
+    const testing::HostMaps one = update(size, {}, warped, predicted, measured, pixels, in_place, {}, 1);
+    EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
+    EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
   }
 }
 

@@ -16,11 +16,11 @@ namespace {
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
 testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, Holes holes = Holes::kLeave,
-                         const MedianFilterOptions& options = {}, int pixels = 0) {
+                         const MedianFilterOptions& options = {}, int pixels = 0, int views = 2) {
   ocl::Context context(testing::any_device());
   MedianFilter filter(context, size, options, pixels);
   StereoMaps maps = testing::upload(context, size, in);
-  filter(maps, holes);
+  filter(maps, holes, views);
   return testing::download(context, maps);
 }
 
@@ -49,6 +49,19 @@ TEST_P(MedianFilterTest, EqualsReference) {
         EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << holes << " holes, by " << pixels;
         EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << holes << " holes, by " << pixels;
       }
+    }
+  }
+}
+
+TEST_P(MedianFilterTest, FiltersTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const testing::HostMaps maps = testing::random_maps(size, -40, 90, 0.2, 8);
+  for (const Holes holes : {Holes::kLeave, Holes::kFill}) {
+    const testing::HostMaps both = filter(size, maps, holes);
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps one = filter(size, maps, holes, {}, pixels, 1);
+      EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, one.disparity), size));
+      EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, maps.variance), size));
     }
   }
 }

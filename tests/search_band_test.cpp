@@ -4,12 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 
+#include "host/frame_transfer.h"
 #include "tests/reference/search_band.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
-#include "tests/support/random_maps.h"
+#include "tests/support/device_maps.h"
 
 namespace egosgm {
 namespace {
@@ -111,6 +113,38 @@ TEST_P(SearchBandTest, FullRangeEqualsReference) {
     SearchBand stage(context, size, range, {});
     stage.full_range();
     expect_same(read(context, stage), reference::full_range(size, range), size);
+  }
+}
+
+TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam(), quarter{(size.width + 3) / 4, (size.height + 3) / 4};
+  ocl::Context context(testing::any_device());
+  const StereoMaps predicted = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.6, 40));
+  const StereoMaps warped = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.3, 41));
+  const StereoMaps coarse = testing::upload(context, quarter, testing::random_maps(quarter, -1, 30, 0.3, 42));
+  const StereoMaps earlier = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.6, 43));
+  ocl::Buffer<shared::PredictionState> wrong(context, 1);
+  wrong.write(context, {{.counts = {}, .is_wrong = 1, .was_wrong = 0}});
+  for (const int row_group : {1, 64}) {
+    SearchBand stage(context, size, {-5, 128}, {}, row_group);
+    const std::function<void(int)> ways[] = {
+        [&](int views) { stage(predicted, &warped, &coarse, nullptr, views); },
+        [&](int views) { stage(predicted, nullptr, nullptr, &wrong, views); },
+        [&](int views) { stage.full_range(views); },
+        [&](int views) { stage.full_range(predicted, views); },
+    };
+    for (const auto& search : ways) {
+      search(2);
+      const reference::SearchBands both = read(context, stage);
+      stage(earlier);
+      const reference::SearchBands before = read(context, stage);
+      search(1);
+      expect_same(read(context, stage),
+                  {testing::left_and_right(both.bands, before.bands),
+                   testing::left_and_right(both.cell_offsets, before.cell_offsets),
+                   testing::left_and_right(both.row_sums, before.row_sums)},
+                  size);
+    }
   }
 }
 
@@ -294,6 +328,34 @@ TEST(SearchBand, CountsCellsAndLanesOfARow) {
   EXPECT_EQ(result.row_sums[0].predicted, 2u);
   EXPECT_EQ(result.row_sums[1].predicted, 0u);
   EXPECT_EQ(result.cell_offsets, (std::vector<cl_uint>{0, 1, 15, 0, 14, 28, 0, 14, 28, 0, 14, 28}));
+}
+
+// The left view has a prediction everywhere and searches 5 of 100 disparities, the right one has none and searches all.
+TEST(SearchBand, ReportsTheViewsThatWereSearched) {
+  const shared::ImageSize size{32, 8};
+  auto maps = nothing(size);
+  std::fill_n(maps.disparity.begin(), pixel_count(size), 50.0f);
+  ocl::Context context(testing::any_device());
+  SearchBand stage(context, size, {0, 100}, {.sigmas = 0, .min_half_width_px = 2});
+  FrameTransfer transfer(context, size, {0, 100});
+  const StereoMaps predicted = testing::upload(context, size, maps);
+  ocl::Buffer<float> offset_px(context, 1);
+  offset_px.write(context, {0});
+  const auto report_of = [&](int views) {
+    stage(predicted, nullptr, nullptr, nullptr, views);
+    transfer.download({&predicted, &predicted.variance, &predicted, &predicted, &stage, &offset_px, nullptr}, {});
+    context.wait();
+    FrameReport report;
+    transfer.collect(report);
+    transfer.release();
+    return report;
+  };
+  for (const int views : {2, 1, 2}) {
+    const FrameReport report = report_of(views);
+    EXPECT_DOUBLE_EQ(report.search_fraction, views == 1 ? 0.05 : 0.525);
+    EXPECT_DOUBLE_EQ(report.computed_fraction, views == 1 ? 0.08 : 0.6);
+    EXPECT_DOUBLE_EQ(report.predicted_fraction, 1);
+  }
 }
 
 }  // namespace

@@ -15,13 +15,13 @@ using testing::HostMaps;
 using testing::same_bits;
 
 HostMaps run(shared::ImageSize size, const SpeckleRemovalOptions& options, const HostMaps& maps, int strip_rows = 0,
-             int row_group = 0) {
+             int row_group = 0, int views = 2) {
   ocl::Context context(testing::any_device());
   SpeckleRemoval stage(context, size, options, strip_rows, row_group);
   StereoMaps on_device(context, size);
   on_device.disparity.write(context, maps.disparity);
   on_device.variance.write(context, maps.variance);
-  stage(on_device);
+  stage(on_device, views);
   return {on_device.disparity.read(context), on_device.variance.read(context)};
 }
 
@@ -58,6 +58,16 @@ TEST_P(SpeckleRemovalTest, StripsAndGroupsDoNotMatter) {
   for (const auto& [strip_rows, row_group] : {std::pair{1, 1}, {1, 64}, {2, 7}, {1000, 1}}) {
     EXPECT_TRUE(same_bits(run(size, {}, maps, strip_rows, row_group).disparity, expected.disparity, size))
         << strip_rows << " rows a strip, " << row_group << " work-items a row";
+  }
+}
+
+TEST_P(SpeckleRemovalTest, LooksAtTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const HostMaps maps = regions(size, 2.5f, 53), both = run(size, {}, maps);
+  for (const auto& [strip_rows, row_group] : {std::pair{1, 64}, {2, 1}}) {
+    const HostMaps one = run(size, {}, maps, strip_rows, row_group, 1);
+    EXPECT_TRUE(same_bits(one.disparity, testing::left_and_right(both.disparity, maps.disparity), size));
+    EXPECT_TRUE(same_bits(one.variance, testing::left_and_right(both.variance, maps.variance), size));
   }
 }
 

@@ -12,8 +12,10 @@
 namespace egosgm {
 namespace {
 
+constexpr cl_uchar kUntouched = 7;
+
 std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<std::uint16_t>& grey, PixelType type,
-                                    const BandedSgmOptions& options, int pixels = 0) {
+                                    const BandedSgmOptions& options, int pixels = 0, int views = 2) {
   std::vector<cl_uchar> raw;
   for (const std::uint16_t value : grey) {
     raw.push_back(static_cast<cl_uchar>(value));
@@ -23,27 +25,45 @@ std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<st
   StepPenalties penalties(context, size, type, options, pixels);
   ocl::Buffer<cl_uchar> images(context, raw.size()), steps(context, StepPenalties::count(size));
   images.write(context, raw);
-  penalties(images, steps);
+  steps.write(context, std::vector<cl_uchar>(steps.size(), kUntouched));
+  penalties(images, steps, views);
   return steps.read(context);
+}
+
+constexpr BandedSgmOptions kOptions{.p2 = 180, .p2_at_edges = 33, .p2_slope = 2};
+
+std::vector<std::uint16_t> random_grey(shared::ImageSize size, int bits) {
+  std::mt19937 random(1);
+  std::vector<std::uint16_t> grey;
+  for (std::size_t i = 0; i < 2 * pixel_count(size); ++i)
+    grey.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
+  return grey;
 }
 
 class StepPenaltiesTest : public ::testing::TestWithParam<shared::ImageSize> {};
 
 TEST_P(StepPenaltiesTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
-  std::mt19937 random(1);
   for (const PixelType type : {PixelType::kU8, PixelType::kU16}) {
     const int bits = type == PixelType::kU8 ? 8 : 16;
-    std::vector<std::uint16_t> grey;
-    for (std::size_t i = 0; i < 2 * pixel_count(size); ++i)
-      grey.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
-    const BandedSgmOptions options{.p2 = 180, .p2_at_edges = 33, .p2_slope = 2};
+    const std::vector<std::uint16_t> grey = random_grey(size, bits);
     for (const int pixels : {1, 16}) {
-      EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, options, pixels),
-                                     reference::step_penalties(size, grey, bits, options),
+      EXPECT_TRUE(testing::same_bits(penalties(size, grey, type, kOptions, pixels),
+                                     reference::step_penalties(size, grey, bits, kOptions),
                                      {4 * size.width, size.height}))
           << "by " << pixels;
     }
+  }
+}
+
+TEST_P(StepPenaltiesTest, AreWrittenOfTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const std::vector<std::uint16_t> grey = random_grey(size, 8);
+  const std::vector<std::uint8_t> before(StepPenalties::count(size), kUntouched);
+  const auto expected = testing::left_and_right(penalties(size, grey, PixelType::kU8, kOptions), before);
+  for (const int pixels : {1, 16}) {
+    EXPECT_TRUE(testing::same_bits(penalties(size, grey, PixelType::kU8, kOptions, pixels, 1), expected,
+                                   {4 * size.width, size.height}));
   }
 }
 

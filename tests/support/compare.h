@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <vector>
 
@@ -29,6 +30,14 @@ template <typename T>
           << first % pixels % size.width << ", " << first % pixels / size.width << ")";
   if constexpr (std::is_arithmetic_v<T>) failure << ": " << +actual[first] << ", expected " << +expected[first];
   return failure;
+}
+
+/// The left view of `left` and the right one of `right`: what a stage leaves that works on the left view alone.
+template <typename T>
+std::vector<T> left_and_right(std::vector<T> left, const std::vector<T>& right) {
+  const auto half = static_cast<std::ptrdiff_t>(left.size() / 2);
+  std::copy(right.begin() + half, right.end(), left.begin() + half);
+  return left;
 }
 
 /// The sizes that every kernel is tested at: nothing is a multiple of anything.
