@@ -38,14 +38,6 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
                                               .set("PIXELS", ocl::pixels_a_work_item(context)));
 }
 
-std::size_t rank_count(shared::ImageSize size, shared::DisparityRange range) {
-  return static_cast<std::size_t>(size.height) * (size.width + 2 * BandedSgm::code_padding(range));
-}
-
-const cl::Program& build_read_off(ocl::Context& context) {
-  return context.program("read_off.cl", ocl::Defines().set("PIXELS", ocl::pixels_a_work_item(context)));
-}
-
 bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
   if (scheduling != Scheduling::kAutomatic) return scheduling == Scheduling::kPaths;
   return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
@@ -58,7 +50,7 @@ struct Demand {
 
 Demand demand(shared::ImageSize size, shared::DisparityRange range, bool paths) {
   const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(size, range) : sum_bytes(size, range);
-  const std::uint64_t ranks = rank_count(size, range) * sizeof(cl_uint);
+  const std::uint64_t ranks = ReadOff::bytes(size, BandedSgm::code_padding(range));
   if (paths) return {sums, 4 * sums + ranks};
   const std::uint64_t slots = slot_bytes(size, range), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
   return {std::max({sums, slots, winners}), sums + slots + winners + ranks};
@@ -131,8 +123,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.variance_per_square_px2,
                   /*reads_off=*/0},
       launches_(launches),
-      ranks_(context, rank_count(size_, range)),
-      read_off_(build_read_off(context), "read_off") {
+      read_off_(context, size_, code_padding(range)) {
   if (follows_paths(context, options.scheduling)) {
     paths_.emplace(context, size_, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
   } else {
@@ -162,16 +153,13 @@ void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, RightView
   const int views = right == RightView::kMatched ? 2 : 1;
   shared::SgmParameters parameters = parameters_;
   parameters.reads_off = right == RightView::kReadOff;
-  if (parameters.reads_off) ranks_.fill(context_, ~cl_uint{0});
+  if (parameters.reads_off) read_off_.clear();
   if (paths_) {
-    (*paths_)(parameters, inputs, measured, ranks_, views);
+    (*paths_)(parameters, inputs, measured, read_off_.ranks(), views);
   } else {
     sweep(parameters, inputs, measured, views);
   }
-  if (parameters.reads_off) {
-    read_off_(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), /*views=*/1), parameters,
-              ranks_, measured.disparity, measured.variance);
-  }
+  if (parameters.reads_off) read_off_(parameters, measured);
 }
 
 void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
@@ -192,7 +180,8 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
   }
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands,
-                          inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners, ranks_);
+                          inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners,
+                          read_off_.ranks());
   }
   wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters,
                    wavefront.winners, measured.disparity, measured.variance);

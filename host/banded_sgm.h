@@ -7,6 +7,7 @@
 #include "host/banded_sgm_paths.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
+#include "host/read_off.h"
 #include "host/search_band.h"
 #include "host/stripes.h"
 #include "host/tuning_defaults.h"
@@ -62,8 +63,6 @@ class BandedSgm {
                   ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>, ocl::Buffer<cl_uint>>;
   using Refine =
       ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
-  using ReadOff =
-      ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_uint>, ocl::Buffer<float>, ocl::Buffer<float>>;
 
  private:
   struct Wavefront {
@@ -88,7 +87,6 @@ class BandedSgm {
   const std::vector<Stripe> stripes_;
   const shared::SgmParameters parameters_;
   const Launches launches_;
-  ocl::Buffer<cl_uint> ranks_;  // of the left pixels that a right one may be, in rows padded as the codes'
   ReadOff read_off_;
   std::optional<StripeMemory> stripe_memory_;  // where there is more than one
   std::optional<Wavefront> wavefront_;         // one of the two

@@ -29,8 +29,9 @@ void RightMap::operator()(const StereoMaps& measured, float max_difference_px, S
   context_.enter("RightMap");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, /*views=*/1);
   if (pixels_ == 1) keys_.fill(context_, 0);
-  splat_(context_, pixels, size_, min_disparity_, max_difference_px, maps.disparity, measured.disparity, keys_);
-  decode_(context_, pixels, size_, min_disparity_, keys_, maps.disparity, maps.variance);
+  splat_(context_, pixels, size_, min_disparity_, maps.disparity, keys_);
+  decode_(context_, pixels, size_, min_disparity_, max_difference_px, keys_, measured.disparity, measured.variance,
+          maps.disparity, maps.variance);
 }
 
 }  // namespace egosgm

@@ -6,16 +6,16 @@
 
 namespace egosgm {
 
-/// The right view's disparities and variances as the left view's surfaces say: every left pixel (x, d) lands on the
-/// right pixel nearest to x - d. What was measured wins over what was not, then the nearest surface; where nothing
-/// lands, there is no disparity.
+/// The right view's disparities and variances by the left view's. Where the right view was measured: those of the left
+/// pixel that it sees, or the measurement if they contradict it. Elsewhere those of the nearest left surface that lands
+/// there, every left pixel (x, d) on the right pixel nearest to x - d; or none.
 class RightMap {
  public:
   /// `pixels` of a work-item: 1 (and atomics) or 16 (a row); 0: by the device. Same bits.
   RightMap(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, int pixels = 0);
 
-  /// From the left half of `maps` to its right one. Measured is what differs by at most `max_difference_px` from what
-  /// `measured` has in its left half. REQUIRES: no disparity lies more than half a pixel below the range.
+  /// From the left half of `maps` and the right one of `measured` to the right half of `maps`. What differs by more
+  /// than `max_difference_px` contradicts. REQUIRES: no disparity lies more than half a pixel below the range.
   void operator()(const StereoMaps& measured, float max_difference_px, StereoMaps& maps);
 
  private:
@@ -23,11 +23,10 @@ class RightMap {
   const shared::ImageSize size_;
   const cl_int min_disparity_;
   const int pixels_;
-  ocl::Buffer<cl_uint> keys_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
-              ocl::Buffer<cl_uint>>
-      splat_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uint>, ocl::Buffer<float>, ocl::Buffer<float>>
+  ocl::Buffer<cl_int> keys_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<cl_int>> splat_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const ocl::Buffer<cl_int>, const ocl::Buffer<float>,
+              const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       decode_;
 };
 

@@ -325,17 +325,18 @@ inline int ranked_in_chunk(const ushort8 totals) {
   return minimum_of_chunk((totals << (ushort8)(4)) | convert_ushort8(kLane.lo));
 }
 
-// Offers a left pixel to the right pixels of 16 lanes, or 8: the one of lane i lies i before `seen`. Lanes outside of the
-// band have totals of 65535.
-inline void offer(const ushort16 totals, const uchar16 cost, const uint lane, global uint* seen) {
-  const ushort16 lanes = (ushort16)((ushort)lane) + convert_ushort16(kLane);
-  const uint16 ranks = convert_uint16(RANK(totals, convert_ushort16(cost))) << (uint16)(16) | convert_uint16(lanes);
+// Offers a left pixel to the right pixels of 16 lanes, or 8: the one of lane i lies i before `seen`. `behind`: of the
+// first lane. Lanes outside of the band have totals of 65535.
+inline void offer(const ushort16 totals, const uchar16 cost, const int behind, global uint* seen) {
+  const ushort16 each = (ushort16)((ushort)behind) - convert_ushort16(kLane);
+  const uint16 ranks =
+      convert_uint16(RANK(totals, convert_ushort16(cost), each)) << (uint16)(16) | convert_uint16(each);
   global Ranks* at = (global Ranks*)(seen - (VECTOR - 1));
   at->ranks = min(at->ranks, ranks.sfedcba9876543210);
 }
-inline void offer_chunk(const ushort8 totals, const uchar8 cost, const uint lane, global uint* seen) {
-  const ushort8 lanes = (ushort8)((ushort)lane) + convert_ushort8(kLane.lo);
-  const uint8 ranks = convert_uint8(RANK(totals, convert_ushort8(cost))) << (uint8)(16) | convert_uint8(lanes);
+inline void offer_chunk(const ushort8 totals, const uchar8 cost, const int behind, global uint* seen) {
+  const ushort8 each = (ushort8)((ushort)behind) - convert_ushort8(kLane.lo);
+  const uint8 ranks = convert_uint8(RANK(totals, convert_ushort8(cost), each)) << (uint8)(16) | convert_uint8(each);
   global ChunkRanks* at = (global ChunkRanks*)(seen - (EGOSGM_LANES - 1));
   at->ranks = min(at->ranks, ranks.s76543210);
 }
@@ -390,7 +391,6 @@ typedef struct {
   global uchar* cells;
   global const Band* band;
   global uint* seen;  // the rank of the right pixel at its first disparity; null: none are kept
-  uint lane;          // of that disparity in the range
 } Pixel;
 
 __attribute__((always_inline)) inline void match_vectors(const bool meets, const int vectors, const Pixel pixel,
@@ -439,7 +439,7 @@ __attribute__((always_inline)) inline void match_vectors(const bool meets, const
       const ushort16 allowed = is_inner ? total : total | barred(first, last_of_band);
       best_vector = select(best_vector, (ushort16)((ushort)v), allowed < best);
       best = min(best, allowed);
-      if (pixel.seen) offer(allowed, costs[v], pixel.lane + at, pixel.seen - at);
+      if (pixel.seen) offer(allowed, costs[v], pixel.disparities - 1 - at, pixel.seen - at);
     }
   }
   if (meets) {
@@ -463,8 +463,7 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
                                                       const int view, global const uint* all_codes,
                                                       global const Band* bands, global const uint* offsets,
                                                       global const uchar* penalties, global uchar* slots,
-                                                      global uchar* sums, global ulong* winners,
-                                                      global uint* ranks) {
+                                                      global uchar* sums, global ulong* winners, global uint* ranks) {
   const int width = q.width, height = q.height;
   const size_t first_pixel = (size_t)view * width * height;
   global const Code* codes = (global const Code*)all_codes;
@@ -560,7 +559,7 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
             candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong2(total), ~0ul, ~0ul, ~0ul, ~0ul);
             const ushort8 allowed = total | barred_of_chunk(first, last_of_band);
             candidate->rank = ranked_in_chunk(allowed);
-            if (reads_off) offer_chunk(allowed, chunk_cost, lane, seen + k - origin);
+            if (reads_off) offer_chunk(allowed, chunk_cost, q.disparities - 1 - (int)lane, seen + k - origin);
             candidate->disparity = origin + (candidate->rank & 15);
             ++candidate;
           }
@@ -609,7 +608,7 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
           candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
           const ushort16 allowed = total | barred(first, last_of_band);
           candidate->rank = ranked(allowed);
-          if (reads_off) offer(allowed, cost, lane, seen + k - origin);
+          if (reads_off) offer(allowed, cost, q.disparities - 1 - (int)lane, seen + k - origin);
           candidate->disparity = origin + (candidate->rank & 15);
         } else if (is_chunk(extent)) {
           store_chunk(sum.lo, cells);
@@ -636,7 +635,6 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
         pixel.cells = cells;
         pixel.band = row_bands + k;
         pixel.seen = reads_off ? seen + k - origin : 0;
-        pixel.lane = lane;
         match_vectors(meets, chunks_of(extent) / 2, pixel, candidate);
       }
       // The next one's: what was to the upper right is above it.

@@ -287,7 +287,8 @@ kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
         const int4 same = costs[v];
         const int4 below = (int4)((int)(before[quad] >> 16) - least, same.xyz),
                    above = (int4)(same.yzw, (int)(before[quad + 2] & 0xffff) - least);
-        path_costs = cost_of(matches.own, matches.others[v]) + min(min(same, min(below, above) + q.p1), (int4)(pixel.p2));
+        path_costs =
+            cost_of(matches.own, matches.others[v]) + min(min(same, min(below, above) + q.p1), (int4)(pixel.p2));
         const int4 at = QUAD * quad + (int4)(0, 1, 2, 3);
         path_costs = select(path_costs, (int4)(ABSENT), at < pixel.first || at >= pixel.end);
       }
@@ -357,8 +358,8 @@ inline void offer(const SgmParameters q, const int x, const int y, const int lan
   global const Code* other = codes + ((size_t)q.height + y) * stride + (q.width - 1 - x) + q.min_disparity + lane;
   const ushort4 costs = convert_ushort4(cost_of(own[0], fetch_quad(q, own, other, y)));
   uint each[QUAD];
-  vstore4(convert_uint4(RANK(convert_ushort4(totals >> 16), costs)) << 16 | as_uint4(lane + (int4)(0, 1, 2, 3)), 0,
-          each);
+  const ushort4 behind = convert_ushort4(q.disparities - 1 - lane - (int4)(0, 1, 2, 3));
+  vstore4(convert_uint4(RANK(convert_ushort4(totals >> 16), costs, behind)) << 16 | convert_uint4(behind), 0, each);
   global uint* seen = ranks + y * stride + q.padding + x - q.min_disparity - lane;
   for (int i = 0; i < QUAD; ++i) atomic_min(seen - i, each[i]);
 }

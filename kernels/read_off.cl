@@ -23,7 +23,7 @@ kernel void read_off(const SgmParameters q, global const uint* ranks, global flo
   FOR_PIXELS(x, q.width) {
     const Uints rank = load_ranks(seen, x);
     const Ints is_seen = rank < NO_RANK;
-    const Ints disparity = q.min_disparity + INTS_OF_UINTS(rank & 0xffffu);
+    const Ints disparity = q.min_disparity + q.disparities - 1 - INTS_OF_UINTS(rank & 0xffffu);
     store_pixels(is_seen ? FLOATS_OF_INTS(disparity) : INVALID, disparities + row, x, q.width);
     store_pixels(is_seen ? (Floats)(q.variance_floor) : (Floats)(0.0f), variances + row, x, q.width);
   }

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The right view's map by the left one's surfaces: the left pixel x lands on the right pixel nearest to x - d.
+// The right view's map by the left one's. Where the right view was measured, it has what the left pixel has that it
+// sees, or the measurement if that contradicts it. Elsewhere it has the nearest of the left surfaces that land there:
+// the left pixel x lands on the right pixel nearest to x - d.
 //
 // Several may land on one pixel. Each bids a key, of which the largest wins, so the result does not depend on the order
-// in which they come: bit 31 where d was measured, below it d in steps of 2^-16 px, counted from one pixel below the
-// range, so that 0 is nobody's. A step is far less than the tolerance of a check or the 1/256 px of a disparity's PNG.
-// GPUs, a pixel a work-item: atomic maxima. CPUs, where atomics are slow: a work-item owns a row.
+// in which they come: d in steps of 2^-16 px, counted from one pixel below the range, so that 0 is nobody's. GPUs, a
+// pixel a work-item: atomic maxima. CPUs, where atomics are slow: a work-item owns a row.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -15,41 +16,38 @@ static inline size_t key_row(const int y, const int width) {
   return (size_t)y * ((width + PIXELS - 1) / PIXELS * PIXELS);
 }
 
-static inline Ints load_keys(global const uint* keys) {
+static inline Ints load_keys(global const int* keys) {
 #if PIXELS == 1
-  return as_int(*keys);
+  return *keys;
 #else
-  return as_int16(vload16(0, keys));
+  return vload16(0, keys);
 #endif
 }
 
-// Keys are compared without a sign; 0 bids nothing. On CPUs no branch asks for it, which holes would make mispredict.
-static inline void bid(const Ints keys, const Ints targets, global uint* row) {
+// 0 bids nothing. On CPUs no branch asks for it, which holes would make mispredict.
+static inline void bid(const Ints keys, const Ints targets, global int* row) {
 #if PIXELS == 1
-  if (keys != 0) atomic_max(&row[targets], as_uint(keys));
+  if (keys != 0) atomic_max(&row[targets], keys);
 #else
-  uint key[PIXELS];
-  int target[PIXELS];
-  vstore16(as_uint16(keys), 0, key);
+  int key[PIXELS], target[PIXELS];
+  vstore16(keys, 0, key);
   vstore16(targets, 0, target);
   for (int i = 0; i < PIXELS; ++i) row[target[i]] = max(row[target[i]], key[i]);
 #endif
 }
 
 // REQUIRES: on GPUs, keys of 0.
-kernel void splat(const ImageSize size, const int min_disparity, const float max_difference,
-                  global const float* disparity, global const float* measured, global uint* keys) {
+kernel void splat(const ImageSize size, const int min_disparity, global const float* disparity, global int* keys) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = (size_t)y * width;
-  global uint* bids = keys + key_row(y, width);
+  global int* bids = keys + key_row(y, width);
 #if PIXELS > 1
-  for (int x = 0; x < width; x += PIXELS) vstore16((uint16)(0), 0, bids + x);
+  for (int x = 0; x < width; x += PIXELS) vstore16((int16)(0), 0, bids + x);
 #endif
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
-    const Floats z = load_pixels(measured + row, x, width);
     const Floats zero = 0.0f;
     const Floats least = 1.0f;
     const Floats most = 2147483520.0f;  // the largest below 2^31
@@ -57,34 +55,36 @@ kernel void splat(const ImageSize size, const int min_disparity, const float max
     const Floats here = FLOATS_OF_INTS(x + LANE_INDICES);
     const Floats at = nearest(here - d);
     const Ints lands = (d > INVALID) & (at >= zero) & (at < (Floats)(width));
-    const Ints was_measured = (z > INVALID) & (fabs(z - d) <= max_difference);
     const Floats steps = (d - (float)min_disparity + 1.0f) * EGOSGM_RIGHT_MAP_STEPS_PER_PX;
     const Floats above = steps > least ? steps : least;
-    const Ints key = INTS_OF_FLOATS(above < most ? above : most) | (was_measured ? (Ints)(INT_MIN) : (Ints)(0));
+    const Ints key = INTS_OF_FLOATS(above < most ? above : most);
     bid(lands ? key : (Ints)(0), INTS_OF_FLOATS(lands ? at : here), bids);
   }
 }
 
-// The variance is that of the left pixel that the right one sees.
-kernel void decode(const ImageSize size, const int min_disparity, global const uint* keys, global float* disparity,
+kernel void decode(const ImageSize size, const int min_disparity, const float max_difference, global const int* keys,
+                   global const float* measured, global const float* measured_variance, global float* disparity,
                    global float* variance) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = (size_t)y * width;
   const size_t right_row = ((size_t)EGOSGM_RIGHT * size.height + y) * width;
-  global const uint* bids = keys + key_row(y, width);
+  global const int* bids = keys + key_row(y, width);
 
   FOR_PIXELS(x, width) {
-    const Ints key = load_keys(bids + x);
     const Floats zero = 0.0f;
-    const Floats d =
-        FLOATS_OF_INTS(key & INT_MAX) * (1.0f / EGOSGM_RIGHT_MAP_STEPS_PER_PX) - 1.0f + (float)min_disparity;
+    const Floats z = load_pixels(measured + right_row, x, width);
+    const Ints key = load_keys(bids + x);
+    const Floats landed = FLOATS_OF_INTS(key) * (1.0f / EGOSGM_RIGHT_MAP_STEPS_PER_PX) - 1.0f + (float)min_disparity;
+    const Floats d = z > INVALID ? z : landed;
     const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + d);
-    const Ints inside = (key != 0) & (at >= zero) & (at < (Floats)(width));
+    const Ints inside = ((z > INVALID) | (key != 0)) & (at >= zero) & (at < (Floats)(width));
     const Ints left = INTS_OF_FLOATS(inside ? at : zero);
-    const Ints valid = inside & (gather(disparity + row, left) > INVALID);
-    const Floats p = gather(variance + row, left);
-    store_pixels(valid ? d : INVALID, disparity + right_row, x, width);
-    store_pixels(valid ? p : zero, variance + right_row, x, width);
+    const Floats seen = gather(disparity + row, left);
+    const Ints agrees = inside & (seen > INVALID) & (fabs(seen - d) <= max_difference);
+    const Floats p = gather(variance + row, left), r = load_pixels(measured_variance + right_row, x, width);
+    const Floats otherwise = z > INVALID ? z : INVALID, its_variance = z > INVALID ? r : zero;
+    store_pixels(agrees ? seen : otherwise, disparity + right_row, x, width);
+    store_pixels(agrees ? p : its_variance, variance + right_row, x, width);
   }
 }

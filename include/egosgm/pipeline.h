@@ -53,7 +53,7 @@ struct FrameReport {
   bool full_range = false;  // no prediction was used: everything was searched,
   std::string
       full_range_reason;  // because of this ("first frame", "no motion", "reset", "search is full", "not temporal")
-  double search_fraction = 0;           // cells that can win / (width * height * D), both views [0..1]
+  double search_fraction = 0;           // cells that can win / (width * height * D), of what was searched [0..1]
   double computed_fraction = 0;         // with the lanes that were computed and cannot win
   double predicted_fraction = 0;        // left pixels with a prediction
   double density = 0;                   // left pixels with a disparity

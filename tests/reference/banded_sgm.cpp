@@ -124,8 +124,8 @@ float offset(Cells& sums, int pixel, int winner) {
   return slope > 0 ? std::clamp((before - after) / (2 * slope), -0.5f, 0.5f) : 0.0f;
 }
 
-/// The right view read off the left one's sums: of the left pixels that a right one may be, that with the least sum and
-/// eight times its matching cost, and of those the one with the smallest disparity.
+/// The right view read off the left one's sums: of the left pixels that a right one may be, that with the least sum,
+/// eight times its matching cost and a unit a step behind the nearest disparity; of those the nearest.
 void read_off(const View& left, const shared::Band* bands, Cells& sums, testing::HostMaps& maps) {
   const shared::SgmParameters& q = left.q;
   constexpr int kNone = 65535;
@@ -135,12 +135,14 @@ void read_off(const View& left, const shared::Band* bands, Cells& sums, testing:
       const int pixel = y * q.width + x;
       for (int d = bands[pixel].first; d <= bands[pixel].last; ++d) {
         if (x - d < 0 || x - d >= q.width) continue;
+        const int behind = q.min_disparity + q.disparities - 1 - d;
         auto& seen = least[pixel - d];
-        seen = std::min(seen, {sums.at(pixel, d) + 8 * left.cost(x, y, d), d});
+        seen = std::min(seen, {sums.at(pixel, d) + 8 * left.cost(x, y, d) + behind, behind});
       }
     }
   }
-  for (const auto& [rank, disparity] : least) {
+  for (const auto& [rank, behind] : least) {
+    const int disparity = q.min_disparity + q.disparities - 1 - behind;
     maps.disparity.push_back(rank == kNone ? EGOSGM_INVALID_DISPARITY : static_cast<float>(disparity));
     maps.variance.push_back(rank == kNone ? 0 : q.variance_floor);
   }

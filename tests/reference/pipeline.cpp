@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/reference/pipeline.h"
 
+#include <algorithm>
+
 #include "tests/reference/banded_sgm.h"
 #include "tests/reference/census.h"
 #include "tests/reference/coarse_match.h"
@@ -116,8 +118,16 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
   pass.matched = banded_sgm(parameters, sgm, both, grey, pass.band.bands);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
-  pass.consistent = consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed);
+  pass.consistent =
+      consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed);
   pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
+  if (reads_off) {
+    const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);
+    std::copy(pass.consistent.disparity.begin() + right, pass.consistent.disparity.end(),
+              pass.measured.disparity.begin() + right);
+    std::copy(pass.consistent.variance.begin() + right, pass.consistent.variance.end(),
+              pass.measured.variance.begin() + right);
+  }
   pass.offset = known;
   if (options_.vertical_alignment.enabled) {
     pass.offset = estimate_offset(size_, options_.vertical_alignment.gain, pass.images, images.bits == 8 ? 1 : 256,
@@ -137,7 +147,7 @@ void Pipeline::update(const Images& images, Frame& frame) const {
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
   if (!options_.track_right) {
     frame.fused_smoothed =
-        right_map(size_, range_, options_.consistency.update_px, pass.measured, frame.fused_smoothed);
+        right_map(size_, range_.min, options_.consistency.update_px, pass.measured, frame.fused_smoothed);
   }
   frame.fused_consistent = consistency_check(size_, options_.consistency.update_px, true, frame.fused_smoothed);
   frame.updated = options_.sad_check.max_difference > 0 ? sad_check(size_, options_.sad_check, pass.images,
