@@ -15,9 +15,8 @@ class EdgeRejection {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   EdgeRejection(ocl::Context& context, shared::ImageSize size, const EdgeRejectionOptions& options, int pixels = 0);
 
-  /// `out` takes over the variances of `in`, which keeps its disparities only. `views`: 1 looks at the left view only;
-  /// the right view's part of the variances is then left undefined. REQUIRES: `out` is not `in`.
-  void operator()(StereoMaps& in, StereoMaps& out, int views = 2);
+  /// `out` takes over the variances of `in`, which keeps its disparities only. REQUIRES: `out` is not `in`.
+  void operator()(StereoMaps& in, StereoMaps& out);
 
  private:
   ocl::Context& context_;

@@ -20,9 +20,9 @@ HoleFill::HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFill
       fill_columns_(build(context, pixels_), "fill_columns"),
       rows_filled_(context, size) {}
 
-void HoleFill::operator()(const StereoMaps& in, StereoMaps& out, int views) {
+void HoleFill::operator()(const StereoMaps& in, StereoMaps& out) {
   context_.enter("HoleFill");
-  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, views);
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_);
   fill_rows_(context_, pixels, size_, max_difference_px_, in.disparity, in.variance, rows_filled_.disparity,
              rows_filled_.variance);
   fill_columns_(context_, pixels, size_, max_difference_px_, rows_filled_.disparity, rows_filled_.variance,

@@ -15,8 +15,8 @@ class HoleFill {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFillOptions& options, int pixels = 0);
 
-  /// `views`: 1 fills the left view only. REQUIRES: `out` is not `in`.
-  void operator()(const StereoMaps& in, StereoMaps& out, int views = 2);
+  /// REQUIRES: `out` is not `in`.
+  void operator()(const StereoMaps& in, StereoMaps& out);
 
  private:
   ocl::Context& context_;

@@ -172,13 +172,10 @@ struct Pipeline::Impl {
 
   void predict(const Motion& motion) {
     forward_warp(*memory.belief, motion, *updated, tracked_views());
-    edge_rejection(*updated, predicted, tracked_views());
-    hole_fill(predicted, scratch, tracked_views());
-    if (options.track_right) {
-      consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);
-    } else {
-      std::swap(scratch, predicted);
-    }
+    if (!options.track_right) right_map(options.consistency.prediction_px, *updated);
+    edge_rejection(*updated, predicted);
+    hole_fill(predicted, scratch);
+    consistency(scratch, options.consistency.prediction_px, OutsideView::kKeep, predicted);
   }
 
   int tracked_views() const { return options.track_right ? 2 : 1; }
@@ -198,9 +195,13 @@ struct Pipeline::Impl {
     stages_of(images.type).step_penalties(images.pixels, penalties, views);
     banded_sgm(codes, penalties, search_band, scratch, reads_off ? RightView::kReadOff : RightView::kMatched);
     median_filter(scratch, Holes::kLeave);
-    consistency(scratch, reads_off ? options.consistency.read_off_px : options.consistency.measurement_px,
-                OutsideView::kDrop, *measured);
+    consistency(scratch, tolerance_of_measurement(reads_off), OutsideView::kDrop, *measured);
     speckle_removal(*measured, views);
+  }
+
+  LeftRightTolerance tolerance_of_measurement(bool reads_off) const {
+    const ConsistencyCheckOptions& check = options.consistency;
+    return reads_off ? LeftRightTolerance(check.read_off_nearer_px, check.read_off_px) : check.measurement_px;
   }
 
   /// Returns the images that were matched.

@@ -325,18 +325,18 @@ inline int ranked_in_chunk(const ushort8 totals) {
   return minimum_of_chunk((totals << (ushort8)(4)) | convert_ushort8(kLane.lo));
 }
 
-// Offers a left pixel to the right pixels of 16 lanes, or 8: the one of lane i lies i before `seen`. `behind`: of the
-// first lane. Lanes outside of the band have totals of 65535.
-inline void offer(const ushort16 totals, const uchar16 cost, const int behind, global uint* seen) {
+// Offers a left pixel to the right pixels of 16 lanes, or 8: the one of lane i lies i before `seen`. `least`: of all
+// its totals. `behind`: of the first lane. Lanes outside of the band have totals of 65535.
+inline void offer(const ushort16 totals, const int least, const uchar16 cost, const int behind, global uint* seen) {
   const ushort16 each = (ushort16)((ushort)behind) - convert_ushort16(kLane);
   const uint16 ranks =
-      convert_uint16(RANK(totals, convert_ushort16(cost), each)) << (uint16)(16) | convert_uint16(each);
+      convert_uint16(RANK(totals, least, convert_ushort16(cost))) << (uint16)(16) | convert_uint16(each);
   global Ranks* at = (global Ranks*)(seen - (VECTOR - 1));
   at->ranks = min(at->ranks, ranks.sfedcba9876543210);
 }
-inline void offer_chunk(const ushort8 totals, const uchar8 cost, const int behind, global uint* seen) {
+inline void offer_chunk(const ushort8 totals, const int least, const uchar8 cost, const int behind, global uint* seen) {
   const ushort8 each = (ushort8)((ushort)behind) - convert_ushort8(kLane.lo);
-  const uint8 ranks = convert_uint8(RANK(totals, convert_ushort8(cost), each)) << (uint8)(16) | convert_uint8(each);
+  const uint8 ranks = convert_uint8(RANK(totals, least, convert_ushort8(cost))) << (uint8)(16) | convert_uint8(each);
   global ChunkRanks* at = (global ChunkRanks*)(seen - (EGOSGM_LANES - 1));
   at->ranks = min(at->ranks, ranks.s76543210);
 }
@@ -439,7 +439,6 @@ __attribute__((always_inline)) inline void match_vectors(const bool meets, const
       const ushort16 allowed = is_inner ? total : total | barred(first, last_of_band);
       best_vector = select(best_vector, (ushort16)((ushort)v), allowed < best);
       best = min(best, allowed);
-      if (pixel.seen) offer(allowed, costs[v], pixel.disparities - 1 - at, pixel.seen - at);
     }
   }
   if (meets) {
@@ -454,6 +453,12 @@ __attribute__((always_inline)) inline void match_vectors(const bool meets, const
     window[2 * MAX_STEPS] = totals[best_lane + 2 * MAX_STEPS];
     candidate->rank = winner_total << 4;
     candidate->disparity = origin + best_lane;
+    for (int v = 0; pixel.seen && v < vectors; ++v) {
+      const int at = VECTOR * v;
+      const ushort16 allowed =
+          ((const Totals*)(totals + MAX_STEPS + at))->totals | barred(band_first - at, band_last - at);
+      offer(allowed, winner_total, costs[v], pixel.disparities - 1 - at, pixel.seen - at);
+    }
   }
 }
 
@@ -559,7 +564,10 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
             candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong2(total), ~0ul, ~0ul, ~0ul, ~0ul);
             const ushort8 allowed = total | barred_of_chunk(first, last_of_band);
             candidate->rank = ranked_in_chunk(allowed);
-            if (reads_off) offer_chunk(allowed, chunk_cost, q.disparities - 1 - (int)lane, seen + k - origin);
+            if (reads_off) {
+              const int least = candidate->rank >> 4;
+              offer_chunk(allowed, least, chunk_cost, q.disparities - 1 - (int)lane, seen + k - origin);
+            }
             candidate->disparity = origin + (candidate->rank & 15);
             ++candidate;
           }
@@ -608,7 +616,9 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
           candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong4(total), ~0ul, ~0ul);
           const ushort16 allowed = total | barred(first, last_of_band);
           candidate->rank = ranked(allowed);
-          if (reads_off) offer(allowed, cost, q.disparities - 1 - (int)lane, seen + k - origin);
+          if (reads_off) {
+            offer(allowed, candidate->rank >> 4, cost, q.disparities - 1 - (int)lane, seen + k - origin);
+          }
           candidate->disparity = origin + (candidate->rank & 15);
         } else if (is_chunk(extent)) {
           store_chunk(sum.lo, cells);

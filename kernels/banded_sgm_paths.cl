@@ -327,7 +327,15 @@ inline ushort4 totals_of(const Cells cells, const int at) {
   return convert_ushort4(forward) + convert_ushort4(backward);
 }
 
-// The same of one.
+// The same in the upper halves, the index in the lower ones, so that the smallest disparity wins a tie; NO_WINNER
+// outside of the band.
+inline uint4 allowed_of(const Cells cells, const int at, const int first, const int last) {
+  const int4 index = at + (int4)(0, 1, 2, 3);
+  const uint4 ranked = convert_uint4(totals_of(cells, at)) << 16 | as_uint4(index);
+  return select(ranked, (uint4)(NO_WINNER), index < first || index > last);
+}
+
+// The total of one.
 inline int total_of(const Cells cells, const int at) {
   uchar forward = cells.forward_first[at], backward = cells.backward_first[at];
 #if PATHS == 4
@@ -349,8 +357,9 @@ inline int count_steps(const Cells cells, const int winner, const int total, con
 }
 
 // Offers a left pixel to the right ones that a quad of its cells says it may be. `totals`: in the upper halves, the
-// whole of it NO_WINNER where the band has no cell. `lane`: of the first disparity in the range.
-inline void offer(const SgmParameters q, const int x, const int y, const int lane, const uint4 totals,
+// whole of it NO_WINNER where the band has no cell. `least`: of all its totals. `lane`: of the first disparity in the
+// range.
+inline void offer(const SgmParameters q, const int x, const int y, const int lane, const uint4 totals, const uint least,
                   global const uint* all_codes, global uint* ranks) {
   const size_t stride = (size_t)q.width + 2 * (size_t)q.padding;
   global const Code* codes = (global const Code*)all_codes + q.padding;
@@ -358,8 +367,8 @@ inline void offer(const SgmParameters q, const int x, const int y, const int lan
   global const Code* other = codes + ((size_t)q.height + y) * stride + (q.width - 1 - x) + q.min_disparity + lane;
   const ushort4 costs = convert_ushort4(cost_of(own[0], fetch_quad(q, own, other, y)));
   uint each[QUAD];
-  const ushort4 behind = convert_ushort4(q.disparities - 1 - lane - (int4)(0, 1, 2, 3));
-  vstore4(convert_uint4(RANK(convert_ushort4(totals >> 16), costs, behind)) << 16 | convert_uint4(behind), 0, each);
+  const uint4 behind = convert_uint4(q.disparities - 1 - lane - (int4)(0, 1, 2, 3));
+  vstore4(convert_uint4(RANK(convert_ushort4(totals >> 16), least, costs)) << 16 | behind, 0, each);
   global uint* seen = ranks + y * stride + q.padding + x - q.min_disparity - lane;
   for (int i = 0; i < QUAD; ++i) atomic_min(seen - i, each[i]);
 }
@@ -387,17 +396,17 @@ kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winn
                        first_of_quad,
                        first_of_quad + min(band.chunks * EGOSGM_LANES, q.disparities - first_lane)};
 
-  // The total in the upper half, so that the smallest disparity wins a tie.
   uint best = NO_WINNER;
   const int first = band.first - cells_origin, last = band.last - cells_origin;
   for (int at = QUAD * lane; is_inside && at <= last; at += QUAD * LANES) {
-    const int4 index = at + (int4)(0, 1, 2, 3);
-    const uint4 ranked = convert_uint4(totals_of(cells, at)) << 16 | as_uint4(index);
-    const uint4 allowed = select(ranked, (uint4)(NO_WINNER), index < first || index > last);
+    const uint4 allowed = allowed_of(cells, at, first, last);
     best = min(best, min(min(allowed.x, allowed.y), min(allowed.z, allowed.w)));
-    if (q.reads_off) offer(q, x, (int)get_group_id(1), cells_origin - q.min_disparity + at, allowed, codes, ranks);
   }
   best = minimum_of_line(minima[line], lane, best);
+  for (int at = QUAD * lane; q.reads_off && is_inside && at <= last; at += QUAD * LANES) {
+    offer(q, x, (int)get_group_id(1), cells_origin - q.min_disparity + at, allowed_of(cells, at, first, last),
+          best >> 16, codes, ranks);
+  }
   if (is_inside && lane == 0) {
     const int total = best >> 16, winner = best & 0xffff;
     const bool fits = winner > cells.first && winner + 1 < cells.end;

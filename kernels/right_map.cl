@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The right view's map by the left one's. Where the right view was measured, it has what the left pixel has that it
-// sees, or the measurement if that contradicts it. Elsewhere it has the nearest of the left surfaces that land there:
-// the left pixel x lands on the right pixel nearest to x - d.
+// The right view's map by the left one's. Where the right view was measured, if it was, it has what the left pixel has
+// that it sees, or the measurement if that contradicts it. Elsewhere it has the nearest of the left surfaces that land
+// there: the left pixel x lands on the right pixel nearest to x - d.
 //
 // Several may land on one pixel. Each bids a key, of which the largest wins, so the result does not depend on the order
 // in which they come: d in steps of 2^-16 px, counted from one pixel below the range, so that 0 is nobody's. GPUs, a
@@ -62,9 +62,10 @@ kernel void splat(const ImageSize size, const int min_disparity, global const fl
   }
 }
 
-kernel void decode(const ImageSize size, const int min_disparity, const float max_difference, global const int* keys,
-                   global const float* measured, global const float* measured_variance, global float* disparity,
-                   global float* variance) {
+// REQUIRES: unless is_measured, any maps as `measured`.
+kernel void decode(const ImageSize size, const int min_disparity, const float max_difference, const int is_measured,
+                   global const int* keys, global const float* measured, global const float* measured_variance,
+                   global float* disparity, global float* variance) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -73,7 +74,7 @@ kernel void decode(const ImageSize size, const int min_disparity, const float ma
 
   FOR_PIXELS(x, width) {
     const Floats zero = 0.0f;
-    const Floats z = load_pixels(measured + right_row, x, width);
+    const Floats z = is_measured ? load_pixels(measured + right_row, x, width) : INVALID;
     const Ints key = load_keys(bids + x);
     const Floats landed = FLOATS_OF_INTS(key) * (1.0f / EGOSGM_RIGHT_MAP_STEPS_PER_PX) - 1.0f + (float)min_disparity;
     const Floats d = z > INVALID ? z : landed;

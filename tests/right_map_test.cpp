@@ -25,7 +25,11 @@ testing::HostMaps right_map(shared::ImageSize size, shared::DisparityRange range
   StereoMaps earlier = testing::upload(context, size, testing::random_maps(size, 0, 12, 0, 99));
   right_map(testing::upload(context, size, testing::random_maps(size, 0, 12, 0, 99)), 1, earlier);
   StereoMaps on_device = testing::upload(context, size, maps);
-  right_map(testing::upload(context, size, measured), max_difference_px, on_device);
+  if (measured.disparity.empty()) {
+    right_map(max_difference_px, on_device);
+  } else {
+    right_map(testing::upload(context, size, measured), max_difference_px, on_device);
+  }
   return testing::download(context, on_device);
 }
 
@@ -57,14 +61,17 @@ TEST_P(RightMapTest, EqualsReference) {
   const float max_disparity = size.width > 300 ? 150 : 12;
   const testing::HostMaps maps = testing::random_maps(size, -4.5f, max_disparity, 0.2, 5);
   const testing::HostMaps measured = testing::random_maps(size, -4, max_disparity, 0.5, 6);
-  for (const float max_difference_px : {0.0f, 1.0f, 1e6f}) {
-    const testing::HostMaps expected = reference::right_map(size, -4, max_difference_px, measured, maps);
-    for (const int pixels : {1, 16}) {
-      const testing::HostMaps actual = right_map(size, {-4, 160}, max_difference_px, measured, maps, pixels);
-      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
-          << max_difference_px << " px, by " << pixels;
-      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
-          << max_difference_px << " px, by " << pixels;
+  for (const bool is_measured : {false, true}) {
+    for (const float max_difference_px : {0.0f, 1.0f, 1e6f}) {
+      const testing::HostMaps z = is_measured ? measured : testing::HostMaps{};
+      const testing::HostMaps expected = reference::right_map(size, -4, max_difference_px, z, maps);
+      for (const int pixels : {1, 16}) {
+        const testing::HostMaps actual = right_map(size, {-4, 160}, max_difference_px, z, maps, pixels);
+        EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+            << max_difference_px << " px, by " << pixels << (is_measured ? ", measured" : "");
+        EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
+            << max_difference_px << " px, by " << pixels << (is_measured ? ", measured" : "");
+      }
     }
   }
 }

@@ -27,12 +27,12 @@ struct HoleFillOptions {
 };
 struct ConsistencyCheckOptions {
   float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
-  float read_off_px = 2.0f;  // of the measurement, where the right view is read off the left one's path sums
+  float read_off_px = 1.5f, read_off_nearer_px = 2.5f;  // of what is read off; where the left is nearer
 };
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
   int p1 = 6, p2 = 60, p2_at_edges = 40;  // as in BandedSgmOptions, for a census of 5x5 coarse pixels
-  float max_difference_px = 1.0f;  // of the left-right check, in coarse pixels
+  float max_difference_px = 1.0f;         // of the left-right check, in coarse pixels
 };
 struct SearchBandOptions {
   float sigmas = 2.0f;             // half-width of a predicted pixel's band, in standard deviations
@@ -100,7 +100,7 @@ struct DynamicMapOptions {
 struct EGOSGM_EXPORT PipelineOptions {
   int disparities = 128, min_disparity = 0;  // D >= 1 of them, from a first one of either sign on
   SearchMode search = SearchMode::kBand;
-  bool temporal = true;  // false: every frame alone, full range, left-right checked (the plain matcher)
+  bool temporal = true;     // false: every frame alone, full range, left-right checked (the plain matcher)
   bool track_right = true;  // predict, match, filter the right view too; false: it follows from the left one, faster
 
   ForwardWarpOptions forward_warp;

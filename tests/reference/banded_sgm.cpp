@@ -125,19 +125,21 @@ float offset(Cells& sums, int pixel, int winner) {
 }
 
 /// The right view read off the left one's sums: of the left pixels that a right one may be, that with the least sum,
-/// eight times its matching cost and a unit a step behind the nearest disparity; of those the nearest.
+/// of whose own least one three quarters do not count, and eight times its matching cost; of those the nearest.
 void read_off(const View& left, const shared::Band* bands, Cells& sums, testing::HostMaps& maps) {
   const shared::SgmParameters& q = left.q;
-  constexpr int kNone = 65535;
+  constexpr int kNone = 65535, kMost = 3 * 510 / 4 + 2;
   std::vector<std::pair<int, int>> least(static_cast<std::size_t>(q.width) * q.height, {kNone, 0});
   for (int y = 0; y < q.height; ++y) {
     for (int x = 0; x < q.width; ++x) {
       const int pixel = y * q.width + x;
+      int least_sum = kNone;
+      for (int d = bands[pixel].first; d <= bands[pixel].last; ++d) least_sum = std::min(least_sum, sums.at(pixel, d));
       for (int d = bands[pixel].first; d <= bands[pixel].last; ++d) {
         if (x - d < 0 || x - d >= q.width) continue;
         const int behind = q.min_disparity + q.disparities - 1 - d;
         auto& seen = least[pixel - d];
-        seen = std::min(seen, {sums.at(pixel, d) + 8 * left.cost(x, y, d) + behind, behind});
+        seen = std::min(seen, {sums.at(pixel, d) - 3 * least_sum / 4 + kMost + 8 * left.cost(x, y, d), behind});
       }
     }
   }

@@ -72,11 +72,12 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
   frame.warped =
       forward_warp(size_, range_, motions.left, motions.right, options_.forward_warp.process_noise_px2, *belief_);
+  if (!options_.track_right) {
+    frame.warped = right_map(size_, range_.min, options_.consistency.prediction_px, {}, frame.warped);
+  }
   frame.without_edges = edge_rejection(size_, options_.edge_rejection.max_jump_px, frame.warped);
   frame.filled = hole_fill(size_, options_.hole_fill.max_difference_px, frame.without_edges);
-  frame.predicted = options_.track_right
-                        ? consistency_check(size_, options_.consistency.prediction_px, true, frame.filled)
-                        : frame.filled;
+  frame.predicted = consistency_check(size_, options_.consistency.prediction_px, true, frame.filled);
 }
 
 Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset known) const {
@@ -118,8 +119,9 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
   pass.matched = banded_sgm(parameters, sgm, both, grey, pass.band.bands);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
-  pass.consistent =
-      consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed);
+  const LeftRightTolerance tolerance =
+      reads_off ? LeftRightTolerance(check.read_off_nearer_px, check.read_off_px) : check.measurement_px;
+  pass.consistent = consistency_check(size_, tolerance, false, pass.smoothed);
   pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
   if (reads_off) {
     const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);

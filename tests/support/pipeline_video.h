@@ -91,6 +91,7 @@ inline std::vector<Setting> settings() {
                    o.search = SearchMode::kFull;
                    o.banded_sgm.scheduling = Scheduling::kPaths;
                    o.consistency.read_off_px = 1;
+                   o.consistency.read_off_nearer_px = 5;
                  })});
   all.push_back({"right_follows_7x5", {7, 5}, options(16, 0, right_follows)});
   all.push_back({"full_search", kSize, options(24, 0, [](PipelineOptions& o) { o.search = SearchMode::kFull; })});

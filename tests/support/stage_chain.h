@@ -92,16 +92,13 @@ class StageChain {
 
   void predict(const Motion& motion, reference::Frame& frame) {
     forward_warp_(belief_, motion, updated_, tracked_views());
+    if (!options_.track_right) right_map_(options_.consistency.prediction_px, updated_);
     frame.warped = download(context_, updated_);
-    edge_rejection_(updated_, predicted_, tracked_views());
+    edge_rejection_(updated_, predicted_);
     frame.without_edges = download(context_, predicted_);
-    hole_fill_(predicted_, scratch_, tracked_views());
+    hole_fill_(predicted_, scratch_);
     frame.filled = download(context_, scratch_);
-    if (options_.track_right) {
-      consistency_(scratch_, options_.consistency.prediction_px, OutsideView::kKeep, predicted_);
-    } else {
-      std::swap(scratch_, predicted_);
-    }
+    consistency_(scratch_, options_.consistency.prediction_px, OutsideView::kKeep, predicted_);
     frame.predicted = download(context_, predicted_);
   }
 
@@ -130,8 +127,10 @@ class StageChain {
     pass.matched = download(context_, scratch_);
     median_filter_(scratch_, Holes::kLeave);
     pass.smoothed = download(context_, scratch_);
-    consistency_(scratch_, reads_off ? options_.consistency.read_off_px : options_.consistency.measurement_px,
-                 OutsideView::kDrop, measured_);
+    const ConsistencyCheckOptions& check = options_.consistency;
+    const LeftRightTolerance tolerance =
+        reads_off ? LeftRightTolerance(check.read_off_nearer_px, check.read_off_px) : check.measurement_px;
+    consistency_(scratch_, tolerance, OutsideView::kDrop, measured_);
     pass.consistent = download(context_, measured_);
     speckle_removal_(measured_, views);
     pass.measured = download(context_, measured_);
