@@ -40,8 +40,8 @@ TEST_P(ConsistencyCheckTest, EqualsReference) {
   for (std::size_t i = 0; i < maps.variance.size(); i += 3) maps.variance[i] = 7;  // also where nothing is
   for (const OutsideView outside : {OutsideView::kDrop, OutsideView::kKeep}) {
     for (const LeftRightTolerance tolerance : {LeftRightTolerance(0.5f), {3, 3}, {40, 40}, {1.25f, 4}, {4, 1.25f}}) {
-      const testing::HostMaps expected =
-          reference::consistency_check(size, tolerance, outside == OutsideView::kKeep, maps);
+      const testing::HostMaps expected = reference::consistency_check(size, tolerance.nearer_px, tolerance.farther_px,
+                                                                      outside == OutsideView::kKeep, maps);
       for (const int pixels : {1, 16}) {
         const testing::HostMaps actual = check(size, tolerance, maps, outside, pixels);
         EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))

@@ -5,7 +5,7 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps consistency_check(shared::ImageSize size, LeftRightTolerance tolerance, bool keep_outside,
+testing::HostMaps consistency_check(shared::ImageSize size, float nearer_px, float farther_px, bool keep_outside,
                                     const testing::HostMaps& in) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f)};
@@ -23,7 +23,7 @@ testing::HostMaps consistency_check(shared::ImageSize size, LeftRightTolerance t
     if (inside) {
       const float other = in.disparity[(is_left ? pixels : 0) + y * size.width + static_cast<std::size_t>(other_x)];
       const float left = is_left ? d : other, right = is_left ? other : d;
-      const float limit = left > right ? tolerance.nearer_px : tolerance.farther_px;
+      const float limit = left > right ? nearer_px : farther_px;
       if (other == EGOSGM_INVALID_DISPARITY || std::abs(left - right) > limit) continue;
     }
     out.disparity[i] = d;

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/consistency_check.h"
 #include "kernels/shared.h"
 #include "tests/support/random_maps.h"
 
 namespace egosgm::reference {
 
-testing::HostMaps consistency_check(shared::ImageSize size, LeftRightTolerance tolerance, bool keep_outside,
+testing::HostMaps consistency_check(shared::ImageSize size, float nearer_px, float farther_px, bool keep_outside,
                                     const testing::HostMaps& in);
 
 }  // namespace egosgm::reference
