@@ -19,12 +19,12 @@ ConsistencyCheck::ConsistencyCheck(ocl::Context& context, shared::ImageSize size
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       check_(build(context, pixels_), "check") {}
 
-void ConsistencyCheck::operator()(StereoMaps& in, LeftRightTolerance tolerance, OutsideView outside, StereoMaps& out) {
+void ConsistencyCheck::operator()(StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out) {
   context_.enter("ConsistencyCheck");
   const cl_int keep_outside = outside == OutsideView::kKeep;
   std::swap(in.variance, out.variance);
-  check_(context_, ocl::every_pixels(context_, size_, pixels_), size_, tolerance.nearer_px, tolerance.farther_px,
-         keep_outside, in.disparity, out.disparity, out.variance);
+  check_(context_, ocl::every_pixels(context_, size_, pixels_), size_, max_difference_px, keep_outside, in.disparity,
+         out.disparity, out.variance);
 }
 
 }  // namespace egosgm

@@ -9,14 +9,6 @@ namespace egosgm {
 /// What becomes of a disparity that points to a place outside of the other image, where nothing can contradict it.
 enum class OutsideView { kDrop, kKeep };
 
-/// How much nearer than what the right pixel has, or farther, the left one may be [px].
-struct LeftRightTolerance {
-  float nearer_px, farther_px;
-
-  LeftRightTolerance(float both_px) : nearer_px(both_px), farther_px(both_px) {}  // NOLINT(google-explicit-constructor)
-  LeftRightTolerance(float nearer, float farther) : nearer_px(nearer), farther_px(farther) {}
-};
-
 /// Keeps what both views agree on: the pixel that a disparity points to in the other view must be valid and within a
 /// tolerance. Each view is checked against the other as it came in.
 class ConsistencyCheck {
@@ -25,14 +17,14 @@ class ConsistencyCheck {
   ConsistencyCheck(ocl::Context& context, shared::ImageSize size, int pixels = 0);
 
   /// `out` takes over the variances of `in`, which keeps its disparities only. REQUIRES: `out` is not `in`.
-  void operator()(StereoMaps& in, LeftRightTolerance tolerance, OutsideView outside, StereoMaps& out);
+  void operator()(StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
-  ocl::Kernel<const shared::ImageSize, const float, const float, const cl_int, const ocl::Buffer<float>,
-              ocl::Buffer<float>, ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>,
+              ocl::Buffer<float>>
       check_;
 };
 

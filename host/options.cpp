@@ -26,7 +26,6 @@ void for_each(Options& o, Visit&& visit) {
   visit("consistency.measurement_px", o.consistency.measurement_px);
   visit("consistency.update_px", o.consistency.update_px);
   visit("consistency.read_off_px", o.consistency.read_off_px);
-  visit("consistency.read_off_nearer_px", o.consistency.read_off_nearer_px);
   visit("coarse_match.enabled", o.coarse_match.enabled);
   visit("coarse_match.p1", o.coarse_match.p1);
   visit("coarse_match.p2", o.coarse_match.p2);

@@ -195,13 +195,9 @@ struct Pipeline::Impl {
     stages_of(images.type).step_penalties(images.pixels, penalties, views);
     banded_sgm(codes, penalties, search_band, scratch, reads_off ? RightView::kReadOff : RightView::kMatched);
     median_filter(scratch, Holes::kLeave);
-    consistency(scratch, tolerance_of_measurement(reads_off), OutsideView::kDrop, *measured);
+    consistency(scratch, reads_off ? options.consistency.read_off_px : options.consistency.measurement_px,
+                OutsideView::kDrop, *measured);
     speckle_removal(*measured, views);
-  }
-
-  LeftRightTolerance tolerance_of_measurement(bool reads_off) const {
-    const ConsistencyCheckOptions& check = options.consistency;
-    return reads_off ? LeftRightTolerance(check.read_off_nearer_px, check.read_off_px) : check.measurement_px;
   }
 
   /// Returns the images that were matched.

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Left-right consistency: the left pixel x sees what the right pixel x - d sees, the right pixel x what the left pixel
-// x + d sees, and the left one's disparity may be larger by max_nearer, smaller by max_farther. A pixel without a
-// disparity keeps its variance, by which ForwardWarp says that it is hidden.
+// x + d sees. A pixel without a disparity keeps its variance, by which ForwardWarp says that it is hidden.
 #include "pixels.h"
 
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-kernel void check(const ImageSize size, const float max_nearer, const float max_farther, const int keep_outside,
+kernel void check(const ImageSize size, const float max_difference, const int keep_outside,
                   global const float* disparity, global float* kept_disparity, global float* variance) {
   const int y = get_global_id(1);
   const int view = get_global_id(2);
@@ -23,9 +22,7 @@ kernel void check(const ImageSize size, const float max_nearer, const float max_
     const Ints valid = d > INVALID;
     const Ints inside = valid & (at >= zero) & (at < (Floats)(width));
     const Floats other = gather(disparity + other_row, INTS_OF_FLOATS(inside ? at : zero));
-    const Floats left_is_nearer = view == EGOSGM_LEFT ? d - other : other - d;
-    const Ints agree = (other > INVALID) & (left_is_nearer <= (Floats)(max_nearer)) &
-                       (left_is_nearer >= (Floats)(-max_farther));
+    const Ints agree = (other > INVALID) & (fabs(other - d) <= max_difference);
     const Ints keeps = inside ? agree : valid & ((Ints)(keep_outside) != 0);
 
     store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);

@@ -9,8 +9,8 @@
 // with the least rank: this in its upper half, in the lower one how far the disparity lies behind the range's nearest
 // one, so that of what fits alike the nearer is taken. Sums are relative to a pixel's own paths and alone do not tell
 // which of two pixels fits better: of a pixel's least sum, 510 at most, three quarters do not count, and the matching
-// cost counts eight times. What is added keeps ranks above 0, and cells outside of the band, of 65535, where they are.
-#define RANK(totals, least, costs) add_sat(totals, ((costs) << 3) + (ushort)(384 - 3 * (int)(least) / 4))
+// cost counts twelve times. What is added keeps ranks above 0, and cells outside of the band, of 65535, where they are.
+#define RANK(totals, least, costs) add_sat(totals, (costs) * (ushort)(12) + (ushort)(384 - 3 * (int)(least) / 4))
 #define NO_RANK 0xffff0000u  // and above: of no left pixel, or of a disparity that it does not search
 
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, whose sums lie that much

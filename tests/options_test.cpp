@@ -45,7 +45,6 @@ TEST(Options, HasANameForEveryMember) {
       {"consistency.measurement_px", [](auto& o) { o.consistency.measurement_px = 77; }},
       {"consistency.update_px", [](auto& o) { o.consistency.update_px = 77; }},
       {"consistency.read_off_px", [](auto& o) { o.consistency.read_off_px = 77; }},
-      {"consistency.read_off_nearer_px", [](auto& o) { o.consistency.read_off_nearer_px = 77; }},
       {"search_band.sigmas", [](auto& o) { o.search_band.sigmas = 77; }},
       {"search_band.min_half_width_px", [](auto& o) { o.search_band.min_half_width_px = 77; }},
       {"search_band.from_neighbours", [](auto& o) { o.search_band.from_neighbours = false; }},

@@ -27,7 +27,7 @@ struct HoleFillOptions {
 };
 struct ConsistencyCheckOptions {
   float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
-  float read_off_px = 1.5f, read_off_nearer_px = 2.5f;  // of what is read off; where the left is nearer
+  float read_off_px = 1.6f;  // of the measurement, where the right view is read off the left one's path sums
 };
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for

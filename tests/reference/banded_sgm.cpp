@@ -125,7 +125,7 @@ float offset(Cells& sums, int pixel, int winner) {
 }
 
 /// The right view read off the left one's sums: of the left pixels that a right one may be, that with the least sum,
-/// of whose own least one three quarters do not count, and eight times its matching cost; of those the nearest.
+/// of whose own least one three quarters do not count, and twelve times its matching cost; of those the nearest.
 void read_off(const View& left, const shared::Band* bands, Cells& sums, testing::HostMaps& maps) {
   const shared::SgmParameters& q = left.q;
   constexpr int kNone = 65535, kMost = 3 * 510 / 4 + 2;
@@ -139,7 +139,7 @@ void read_off(const View& left, const shared::Band* bands, Cells& sums, testing:
         if (x - d < 0 || x - d >= q.width) continue;
         const int behind = q.min_disparity + q.disparities - 1 - d;
         auto& seen = least[pixel - d];
-        seen = std::min(seen, {sums.at(pixel, d) - 3 * least_sum / 4 + kMost + 8 * left.cost(x, y, d), behind});
+        seen = std::min(seen, {sums.at(pixel, d) - 3 * least_sum / 4 + kMost + 12 * left.cost(x, y, d), behind});
       }
     }
   }

@@ -63,8 +63,7 @@ std::vector<float> coarse_match(shared::ImageSize size, const PipelineOptions& o
                                          sgm.variance_per_square_px2,
                                          /*reads_off=*/0};
   const testing::HostMaps matched = banded_sgm(parameters, sgm, both, grey, full_range(coarse, range).bands);
-  const float tolerance = options.coarse_match.max_difference_px;
-  return consistency_check(coarse, tolerance, tolerance, false, matched).disparity;
+  return consistency_check(coarse, options.coarse_match.max_difference_px, false, matched).disparity;
 }
 
 }  // namespace egosgm::reference

@@ -5,7 +5,7 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps consistency_check(shared::ImageSize size, float nearer_px, float farther_px, bool keep_outside,
+testing::HostMaps consistency_check(shared::ImageSize size, float max_difference_px, bool keep_outside,
                                     const testing::HostMaps& in) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f)};
@@ -22,9 +22,7 @@ testing::HostMaps consistency_check(shared::ImageSize size, float nearer_px, flo
     if (!inside && !keep_outside) continue;
     if (inside) {
       const float other = in.disparity[(is_left ? pixels : 0) + y * size.width + static_cast<std::size_t>(other_x)];
-      const float left = is_left ? d : other, right = is_left ? other : d;
-      const float limit = left > right ? nearer_px : farther_px;
-      if (other == EGOSGM_INVALID_DISPARITY || std::abs(left - right) > limit) continue;
+      if (other == EGOSGM_INVALID_DISPARITY || std::abs(other - d) > max_difference_px) continue;
     }
     out.disparity[i] = d;
     out.variance[i] = in.variance[i];

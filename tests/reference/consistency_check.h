@@ -6,7 +6,7 @@
 
 namespace egosgm::reference {
 
-testing::HostMaps consistency_check(shared::ImageSize size, float nearer_px, float farther_px, bool keep_outside,
+testing::HostMaps consistency_check(shared::ImageSize size, float max_difference_px, bool keep_outside,
                                     const testing::HostMaps& in);
 
 }  // namespace egosgm::reference

@@ -77,8 +77,7 @@ void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
   }
   frame.without_edges = edge_rejection(size_, options_.edge_rejection.max_jump_px, frame.warped);
   frame.filled = hole_fill(size_, options_.hole_fill.max_difference_px, frame.without_edges);
-  const float tolerance = options_.consistency.prediction_px;
-  frame.predicted = consistency_check(size_, tolerance, tolerance, true, frame.filled);
+  frame.predicted = consistency_check(size_, options_.consistency.prediction_px, true, frame.filled);
 }
 
 Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset known) const {
@@ -120,9 +119,8 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
   pass.matched = banded_sgm(parameters, sgm, both, grey, pass.band.bands);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
-  const float nearer_px = reads_off ? check.read_off_nearer_px : check.measurement_px,
-              farther_px = reads_off ? check.read_off_px : check.measurement_px;
-  pass.consistent = consistency_check(size_, nearer_px, farther_px, false, pass.smoothed);
+  pass.consistent =
+      consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed);
   pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
   if (reads_off) {
     const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);
@@ -152,8 +150,7 @@ void Pipeline::update(const Images& images, Frame& frame) const {
     frame.fused_smoothed =
         right_map(size_, range_.min, options_.consistency.update_px, pass.measured, frame.fused_smoothed);
   }
-  const float tolerance = options_.consistency.update_px;
-  frame.fused_consistent = consistency_check(size_, tolerance, tolerance, true, frame.fused_smoothed);
+  frame.fused_consistent = consistency_check(size_, options_.consistency.update_px, true, frame.fused_smoothed);
   frame.updated = options_.sad_check.max_difference > 0 ? sad_check(size_, options_.sad_check, pass.images,
                                                                     images.bits == 8 ? 1 : 257, frame.fused_consistent)
                                                         : frame.fused_consistent;

@@ -90,8 +90,7 @@ inline std::vector<Setting> settings() {
                    o.track_right = false;
                    o.search = SearchMode::kFull;
                    o.banded_sgm.scheduling = Scheduling::kPaths;
-                   o.consistency.read_off_px = 1;
-                   o.consistency.read_off_nearer_px = 5;
+                   o.consistency.read_off_px = 3;
                  })});
   all.push_back({"right_follows_7x5", {7, 5}, options(16, 0, right_follows)});
   all.push_back({"full_search", kSize, options(24, 0, [](PipelineOptions& o) { o.search = SearchMode::kFull; })});

@@ -128,9 +128,7 @@ class StageChain {
     median_filter_(scratch_, Holes::kLeave);
     pass.smoothed = download(context_, scratch_);
     const ConsistencyCheckOptions& check = options_.consistency;
-    const LeftRightTolerance tolerance =
-        reads_off ? LeftRightTolerance(check.read_off_nearer_px, check.read_off_px) : check.measurement_px;
-    consistency_(scratch_, tolerance, OutsideView::kDrop, measured_);
+    consistency_(scratch_, reads_off ? check.read_off_px : check.measurement_px, OutsideView::kDrop, measured_);
     pass.consistent = download(context_, measured_);
     speckle_removal_(measured_, views);
     pass.measured = download(context_, measured_);
