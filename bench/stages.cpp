@@ -101,7 +101,7 @@ class Chain {
     belief_.disparity.write(context, street.disparity);
     belief_.variance.write(context, street.variance);
     full_band_.full_range();
-    prediction_check_(nullptr, predicted_, matched_, before_);
+    prediction_check_(nullptr, predicted_, predicted_, matched_, before_);
     predicted_.variance = filled_.variance = rejected_.variance = warped_.variance;  // taken over, run after run
     for (int pass = 0; pass < 2; ++pass) {  // fills the maps, and pays for what only a first launch costs
       for (const Stage& stage : stages()) stage.enqueue();
@@ -134,7 +134,7 @@ class Chain {
         {"MedianFilter", [this] { median_filter_(matched_, Holes::kLeave); }, 2 * map},
         {"SpeckleRemoval", [this] { speckle_removal_(matched_); }, map},
         {"KalmanUpdate", [this] { kalman_update_(before_, updated_, predicted_, matched_, updated_); }, 3 * maps},
-        {"PredictionCheck", [this] { prediction_check_(&before_, predicted_, matched_, after_); }, map / 4},
+        {"PredictionCheck", [this] { prediction_check_(&before_, predicted_, predicted_, matched_, after_); }, map / 4},
         {"DynamicMap", [this] { dynamic_map_(&predicted_, matched_, warped_); }, 4 * map + grey / 2},
         {"OutputVariance", [this] { output_variance_(updated_, 2, warped_, variance_); }, 9 * map},
         {"SadCheck", [this] { sad_check_(images_.pixels, updated_, checked_); }, grey + 2 * maps},

@@ -17,14 +17,23 @@ ConsistencyCheck::ConsistencyCheck(ocl::Context& context, shared::ImageSize size
     : context_((context.enter("ConsistencyCheck"), context)),
       size_(size),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
-      check_(build(context, pixels_), "check") {}
+      no_doubt_(context, 1),
+      check_(build(context, pixels_), "check") {
+  no_doubt_.write(context, {shared::PredictionState{}});
+}
 
 void ConsistencyCheck::operator()(StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out) {
+  (*this)(in, max_difference_px, max_difference_px, no_doubt_, outside, out);
+}
+
+void ConsistencyCheck::operator()(StereoMaps& in, float max_difference_px, float in_doubt_px,
+                                  const ocl::Buffer<shared::PredictionState>& last, OutsideView outside,
+                                  StereoMaps& out) {
   context_.enter("ConsistencyCheck");
   const cl_int keep_outside = outside == OutsideView::kKeep;
   std::swap(in.variance, out.variance);
-  check_(context_, ocl::every_pixels(context_, size_, pixels_), size_, max_difference_px, keep_outside, in.disparity,
-         out.disparity, out.variance);
+  check_(context_, ocl::every_pixels(context_, size_, pixels_), size_, max_difference_px, in_doubt_px, last,
+         keep_outside, in.disparity, out.disparity, out.variance);
 }
 
 }  // namespace egosgm

@@ -18,13 +18,17 @@ class ConsistencyCheck {
 
   /// `out` takes over the variances of `in`, which keeps its disparities only. REQUIRES: `out` is not `in`.
   void operator()(StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out);
+  /// With another tolerance where the predictions of the `last` frame were wrong.
+  void operator()(StereoMaps& in, float max_difference_px, float in_doubt_px,
+                  const ocl::Buffer<shared::PredictionState>& last, OutsideView outside, StereoMaps& out);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
-  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>,
-              ocl::Buffer<float>>
+  ocl::Buffer<shared::PredictionState> no_doubt_;
+  ocl::Kernel<const shared::ImageSize, const float, const float, const ocl::Buffer<shared::PredictionState>,
+              const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       check_;
 };
 

@@ -195,9 +195,18 @@ struct Pipeline::Impl {
     stages_of(images.type).step_penalties(images.pixels, penalties, views);
     banded_sgm(codes, penalties, search_band, scratch, reads_off ? RightView::kReadOff : RightView::kMatched);
     median_filter(scratch, Holes::kLeave);
-    consistency(scratch, reads_off ? options.consistency.read_off_px : options.consistency.measurement_px,
-                OutsideView::kDrop, *measured);
+    check_measurement(reads_off);
     speckle_removal(*measured, views);
+  }
+
+  void check_measurement(bool is_read_off) {
+    const ConsistencyCheckOptions& check = options.consistency;
+    if (is_read_off) {
+      consistency(scratch, check.read_off_px, check.measurement_px, prediction_state(*memory.belief),
+                  OutsideView::kDrop, *measured);
+    } else {
+      consistency(scratch, check.measurement_px, OutsideView::kDrop, *measured);
+    }
   }
 
   /// Returns the images that were matched.
@@ -214,7 +223,7 @@ struct Pipeline::Impl {
   }
 
   void update(const FrameImages& images) {
-    prediction_check(&prediction_state(*memory.belief), predicted, *measured, prediction_state(*updated));
+    prediction_check(&prediction_state(*memory.belief), *updated, predicted, *measured, prediction_state(*updated));
     kalman_update(prediction_state(*updated), *updated, predicted, *measured, *updated,  // which held the warped map
                   tracked_views());
     median_filter(*updated, Holes::kFill, tracked_views());
@@ -233,7 +242,8 @@ struct Pipeline::Impl {
                           const Wanted& wanted) {
     if (!reason) predict(*motion);
     const FrameImages& images = match(uploaded, reason);
-    if (reason && options.temporal) prediction_check(nullptr, predicted, *measured, prediction_state(*measured));
+    if (reason && options.temporal)
+      prediction_check(nullptr, predicted, predicted, *measured, prediction_state(*measured));
     if (!reason) update(images);
     const StereoMaps* result = reason ? measured : updated;
     const StereoMaps* prediction = reason ? nullptr : &predicted;

@@ -30,12 +30,12 @@ PredictionCheck::PredictionCheck(ocl::Context& context, shared::ImageSize size, 
       count_rows_(build(context, row_group_), "count_rows"),
       judge_(build(context, row_group_), "judge") {}
 
-void PredictionCheck::operator()(const State* before, const StereoMaps& predicted, const StereoMaps& measured,
-                                 State& after) {
+void PredictionCheck::operator()(const State* before, const StereoMaps& warped, const StereoMaps& predicted,
+                                 const StereoMaps& measured, State& after) {
   context_.enter("PredictionCheck");
   const cl_int rows = is_enabled_ && before ? checked_rows(size_) : 0;
   if (rows > 0) {
-    count_rows_(context_, ocl::group_a_row({size_.width, rows}, row_group_, /*views=*/1), size_.width,
+    count_rows_(context_, ocl::group_a_row({size_.width, rows}, row_group_, /*views=*/1), size_.width, warped.disparity,
                 predicted.disparity, measured.disparity, row_counts_);
   }
   judge_(context_, {cl::NDRange(1), cl::NDRange(1)}, rows, row_counts_, before ? *before : nothing_, after);

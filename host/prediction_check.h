@@ -9,9 +9,9 @@ namespace egosgm {
 
 /// Whether a frame's predictions were right, by the left view: they were wrong where less than three quarters as many
 /// pixels have one as a frame before, or where the share of those that differ from the measurement by more than 1 px is
-/// more than twice as large, and 2 % of them. KalmanUpdate then does not ask the neighbours and believes the
-/// predictions less, in this frame and the next, and SearchBand lets the next one search everything: what a wrong
-/// prediction left must not hide what is there.
+/// more than twice as large, and 2.5 % of them; predictions that only fill gaps do not count for that. KalmanUpdate
+/// then does not ask the neighbours and believes the predictions less, in this frame and the next, and SearchBand lets
+/// the next one search everything: what a wrong prediction left must not hide what is there.
 class PredictionCheck {
  public:
   /// What is known of a frame's predictions: one element.
@@ -21,8 +21,9 @@ class PredictionCheck {
   PredictionCheck(ocl::Context& context, shared::ImageSize size, const PredictionCheckOptions& options,
                   int row_group = 0);
 
-  /// `before`: of the frame before; null: this one has no predictions.
-  void operator()(const State* before, const StereoMaps& predicted, const StereoMaps& measured, State& after);
+  /// `before`: of the frame before; null: this one has no predictions, and any maps do.
+  void operator()(const State* before, const StereoMaps& warped, const StereoMaps& predicted,
+                  const StereoMaps& measured, State& after);
 
  private:
   ocl::Context& context_;
@@ -31,7 +32,8 @@ class PredictionCheck {
   const int row_group_;
   const State nothing_;
   ocl::Buffer<shared::PredictionCounts> row_counts_;
-  ocl::Kernel<const cl_int, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<shared::PredictionCounts>>
+  ocl::Kernel<const cl_int, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<shared::PredictionCounts>>
       count_rows_;
   ocl::Kernel<const cl_int, const ocl::Buffer<shared::PredictionCounts>, const State, State> judge_;
 };

@@ -12,6 +12,7 @@
 
 // Counts of every EGOSGM_CHECKED_ROWS-th row. A work-group of ROW_GROUP a row.
 kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_rows(const int width,
+                                                                              global const float* warped,
                                                                               global const float* predicted,
                                                                               global const float* measured,
                                                                               global PredictionCounts* row_counts) {
@@ -24,7 +25,9 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_rows(co
   for (int x = lane; x < width; x += ROW_GROUP) {
     const float d = predicted[row + x];
     const float z = measured[row + x];
-    const int both = (d > EGOSGM_INVALID_DISPARITY) & (z > EGOSGM_INVALID_DISPARITY);
+    // A prediction that only fills a gap is a guess, by which what comes into the view looks like a wrong motion.
+    const int both =
+        (warped[row + x] > EGOSGM_INVALID_DISPARITY) & (d > EGOSGM_INVALID_DISPARITY) & (z > EGOSGM_INVALID_DISPARITY);
     with_prediction += d > EGOSGM_INVALID_DISPARITY ? 1 : 0;
     with_both += both;
     that_differ += both & (fabs(z - d) > EGOSGM_CHECKED_DIFFERENCE_PX);
@@ -44,13 +47,13 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_rows(co
   }
 }
 
-// Less than three quarters as many predictions as a frame before; or twice its share of contradictions and 2 % more.
+// Less than three quarters as many predictions as a frame before; or twice its share of contradictions and 2.5 % more.
 static inline int are_wrong(const PredictionCounts now, const PredictionCounts before) {
   const ulong differing = (ulong)now.differing * before.both;
   const ulong differed = (ulong)before.differing * now.both;
   const ulong both = (ulong)now.both * before.both;
   return before.both > 0 &&
-         (4 * (ulong)now.predicted < 3 * (ulong)before.predicted || differing > 2 * differed + both / 50);
+         (4 * (ulong)now.predicted < 3 * (ulong)before.predicted || differing > 2 * differed + both / 40);
 }
 
 kernel void judge(const int rows, global const PredictionCounts* row_counts, global const PredictionState* before,

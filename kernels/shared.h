@@ -82,7 +82,7 @@ typedef float f32;
 // What is measured further off than this moves by itself, where so many of them are off to the same side by the latter.
 #define EGOSGM_MOVING_PX 1.0f
 #define EGOSGM_MOVING_AROUND_PX 0.75f
-#define EGOSGM_MOVING_COUNT 21
+#define EGOSGM_MOVING_COUNT 15
 
 // PredictionCheck looks at every so many rows of the left view. Prediction and measurement differ where they do by more
 // than this.

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "tests/reference/consistency_check.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
@@ -76,6 +78,23 @@ TEST(ConsistencyCheck, ToleratesADifferenceUpToTheLimit) {
   const std::vector<float> left{kNone, 1.25f}, right{0.75f, kNone};
   EXPECT_EQ(check_row(left, right, 0.5f), (std::vector<float>{kNone, 1.25f, 0.75f, kNone}));
   EXPECT_EQ(check_row(left, right, 0.4375f), (std::vector<float>(4, kNone)));
+}
+
+TEST(ConsistencyCheck, HasAnotherToleranceWhereTheLastPredictionsWereWrong) {
+  const shared::ImageSize size{2, 1};
+  const testing::HostMaps maps{{kNone, 1.25f, 0.75f, kNone}, {1, 1, 1, 1}};
+  ocl::Context context(testing::any_device());
+  ConsistencyCheck check(context, size);
+  StereoMaps out(context, size);
+  ocl::Buffer<shared::PredictionState> last(context, 1);
+  for (const cl_uint is_wrong : {0u, 1u}) {
+    for (const auto& [usual_px, in_doubt_px] : {std::pair{0.4375f, 0.5f}, {0.5f, 0.4375f}}) {
+      last.write(context, {{.counts = {}, .is_wrong = is_wrong, .was_wrong = 0}});
+      StereoMaps in = testing::upload(context, size, maps);
+      check(in, usual_px, in_doubt_px, last, OutsideView::kDrop, out);
+      EXPECT_EQ(out.disparity.read(context)[1], (is_wrong ? in_doubt_px : usual_px) == 0.5f ? 1.25f : kNone);
+    }
+  }
 }
 
 TEST(ConsistencyCheck, ChecksEachViewAgainstTheOtherAsItCame) {

@@ -36,7 +36,7 @@ TEST(Options, HasANameForEveryMember) {
       {"min_disparity", [](auto& o) { o.min_disparity = -77; }},
       {"search", [](auto& o) { o.search = SearchMode::kFull; }},
       {"temporal", [](auto& o) { o.temporal = false; }},
-      {"track_right", [](auto& o) { o.track_right = false; }},
+      {"track_right", [](auto& o) { o.track_right = true; }},
       {"forward_warp.process_noise_px2", [](auto& o) { o.forward_warp.process_noise_px2 = 77; }},
       {"forward_warp.motion_noise", [](auto& o) { o.forward_warp.motion_noise = 77; }},
       {"edge_rejection.max_jump_px", [](auto& o) { o.edge_rejection.max_jump_px = 77; }},

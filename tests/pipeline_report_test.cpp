@@ -110,10 +110,11 @@ TEST(Pipeline, ReportsWhatItDid) {
     }
     return names;
   };
-  const std::vector<std::string> steady{
-      "upload",         "ForwardWarp",     "EdgeRejection", "HoleFill",       "ConsistencyCheck", "VerticalAlignment",
-      "CoarseMatch",    "SearchBand",      "Census",        "StepPenalties",  "BandedSgm",        "MedianFilter",
-      "SpeckleRemoval", "PredictionCheck", "KalmanUpdate",  "OutputVariance", "DynamicMap",       "download"};
+  const std::vector<std::string> steady{"upload",         "ForwardWarp",      "RightMap",          "EdgeRejection",
+                                        "HoleFill",       "ConsistencyCheck", "VerticalAlignment", "CoarseMatch",
+                                        "SearchBand",     "Census",           "StepPenalties",     "BandedSgm",
+                                        "MedianFilter",   "SpeckleRemoval",   "PredictionCheck",   "KalmanUpdate",
+                                        "OutputVariance", "DynamicMap",       "download"};
   EXPECT_EQ(stages(reports[3]), steady);
   for (const FrameReport& report : reports) {
     EXPECT_GT(report.total_ms, 0);

@@ -27,15 +27,15 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
 /// `before` null: a frame that begins anew.
 shared::PredictionState check(shared::ImageSize size, const shared::PredictionState* before,
-                              const testing::HostMaps& predicted, const testing::HostMaps& measured,
-                              int row_group = 0) {
+                              const testing::HostMaps& warped, const testing::HostMaps& predicted,
+                              const testing::HostMaps& measured, int row_group = 0) {
   ocl::Context context(testing::any_device());
   PredictionCheck prediction_check(context, size, {}, row_group);
   PredictionCheck::State last(context, 1), next(context, 1);
   if (before) last.write(context, {*before});
   next.write(context, {{{9, 9, 9}, 9, 9}});  // must not shine through
-  prediction_check(before ? &last : nullptr, testing::upload(context, size, predicted),
-                   testing::upload(context, size, measured), next);
+  prediction_check(before ? &last : nullptr, testing::upload(context, size, warped),
+                   testing::upload(context, size, predicted), testing::upload(context, size, measured), next);
   return next.read(context).front();
 }
 
@@ -44,15 +44,16 @@ class PredictionCheckTest : public ::testing::TestWithParam<shared::ImageSize> {
 TEST_P(PredictionCheckTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const float spread : {1.1f, 4.0f}) {
+    const testing::HostMaps warped = testing::random_maps(size, 0, spread, 0.4, 30);
     const testing::HostMaps predicted = testing::random_maps(size, 0, spread, 0.3, 31);
     const testing::HostMaps measured = testing::random_maps(size, 0, spread, 0.2, 32);
     for (const shared::PredictionState& before :
          {shared::PredictionState{}, shared::PredictionState{{100, 80, 1}, 0, 1},
           shared::PredictionState{{90, 9, 4}, 1, 0}}) {
       const shared::PredictionState expected =
-          reference::check_prediction(size, before, predicted.disparity, measured.disparity);
+          reference::check_prediction(size, before, warped.disparity, predicted.disparity, measured.disparity);
       for (const int row_group : {1, 64}) {
-        EXPECT_EQ(check(size, &before, predicted, measured, row_group), expected) << "by " << row_group;
+        EXPECT_EQ(check(size, &before, warped, predicted, measured, row_group), expected) << "by " << row_group;
       }
     }
   }
@@ -61,13 +62,15 @@ TEST_P(PredictionCheckTest, EqualsReference) {
 INSTANTIATE_TEST_SUITE_P(Sizes, PredictionCheckTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
 
 /// 100 pixels, of a row that is looked at: `predicted` of them have a prediction of 10, `differing` of these a
-/// measurement of 12.
-shared::PredictionState after(const shared::PredictionState& before, int predicted, int differing) {
+/// measurement of 12, and the first `filled` were not warped.
+shared::PredictionState after(const shared::PredictionState& before, int predicted, int differing, int filled = 0) {
   const shared::ImageSize size{100, 1};
-  testing::HostMaps prediction{std::vector(200, 10.0f), std::vector(200, 1.0f)}, measurement = prediction;
+  testing::HostMaps prediction{std::vector(200, 10.0f), std::vector(200, 1.0f)}, measurement = prediction,
+                                                                                 warped = prediction;
   for (int x = predicted; x < 100; ++x) prediction.disparity[x] = kNone;
   for (int x = 0; x < differing; ++x) measurement.disparity[x] = 12;
-  return check(size, &before, prediction, measurement);
+  for (int x = 0; x < filled; ++x) warped.disparity[x] = kNone;
+  return check(size, &before, warped, prediction, measurement);
 }
 
 TEST(PredictionCheck, KnowsAGapAndAWrongMotion) {
@@ -75,16 +78,21 @@ TEST(PredictionCheck, KnowsAGapAndAWrongMotion) {
   EXPECT_FALSE(after(usual, 96, 4).is_wrong);
   EXPECT_FALSE(after(usual, 72, 4).is_wrong);
   EXPECT_TRUE(after(usual, 71, 4).is_wrong);
-  EXPECT_FALSE(after(usual, 96, 9).is_wrong);
-  EXPECT_TRUE(after(usual, 96, 10).is_wrong);
+  EXPECT_FALSE(after(usual, 96, 10).is_wrong);
+  EXPECT_TRUE(after(usual, 96, 11).is_wrong);
   EXPECT_FALSE(after({}, 10, 10).is_wrong) << "nothing to compare with";
+}
+
+TEST(PredictionCheck, CountsNoContradictionOfWhatOnlyFillsAGap) {
+  const shared::PredictionState usual{{96, 96, 4}, 0, 0};
+  EXPECT_EQ(after(usual, 96, 40, 38), (shared::PredictionState{{96, 58, 2}, 0, 0}));
 }
 
 TEST(PredictionCheck, RemembersThatTheLastOnesWereWrong) {
   const shared::PredictionState wrong{{96, 96, 40}, 1, 0};
   EXPECT_EQ(after(wrong, 96, 4), (shared::PredictionState{{96, 96, 4}, 0, 1}));
   const testing::HostMaps maps{std::vector(200, 10.0f), std::vector(200, 1.0f)};
-  EXPECT_EQ(check({100, 1}, nullptr, maps, maps), (shared::PredictionState{})) << "a frame without predictions";
+  EXPECT_EQ(check({100, 1}, nullptr, maps, maps, maps), (shared::PredictionState{})) << "a frame without predictions";
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ struct HoleFillOptions {
 };
 struct ConsistencyCheckOptions {
   float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
-  float read_off_px = 1.6f;  // of the measurement, where the right view is read off the left one's path sums
+  float read_off_px = 1.6f;  // of the measurement, where the right view is read off, unless predictions were wrong
 };
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
@@ -78,7 +78,7 @@ struct SpeckleRemovalOptions {
   float max_difference_px = 2.0f;  // neighbours within this belong to one region
 };
 struct KalmanUpdateOptions {
-  float gate_px = 2.75f;       // where prediction and measurement differ by more, the measurement is taken; 0: no gate
+  float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   bool ask_neighbours = true;  // which of the two they speak for, instead; and whether all of them move
   float innovation_sigmas = 4.0f;  // where the two differ by more deviations, p' is raised until they do not; 0: never
@@ -100,8 +100,8 @@ struct DynamicMapOptions {
 struct EGOSGM_EXPORT PipelineOptions {
   int disparities = 128, min_disparity = 0;  // D >= 1 of them, from a first one of either sign on
   SearchMode search = SearchMode::kBand;
-  bool temporal = true;     // false: every frame alone, full range, left-right checked (the plain matcher)
-  bool track_right = true;  // predict, match, filter the right view too; false: it follows from the left one, faster
+  bool temporal = true;      // false: every frame alone, full range, left-right checked (the plain matcher)
+  bool track_right = false;  // predict, match, filter the right view too, slower; false: it follows from the left one
 
   ForwardWarpOptions forward_warp;
   EdgeRejectionOptions edge_rejection;

@@ -84,7 +84,7 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
   if (is_hidden) return kNone;
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
   const float z = measured.disparity, escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
-  // Less than half of the 25; less than 18; 21 and more.
+  // Less than half of the 25; less than 18; 15 and more.
   const auto vouch = [&](float disparity) { return view.vouching(x, y, disparity); };
   const auto stays = [&](float other) {
     return options.ask_neighbours && z < other && 2 * vouch(z) < vouch(other) && 2 * view.measuring(x, y, z) < 25;
@@ -101,7 +101,7 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
   if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < escaped) {
     const bool moves = options.ask_neighbours && std::abs(innovation) > 1 &&
                        view.is_between_moving(x, y, innovation > 0 ? 1.0f : -1.0f) &&
-                       view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 21;
+                       view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 15;
     return moves ? Estimate{z, escaped} : fuse(options.innovation_sigmas, predicted, measured);
   }
   if (predicted.variance < escaped) {

@@ -48,8 +48,8 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     frame.passes.push_back(match(images, frame, known));
   }
   if (options_.prediction_check.enabled) {
-    prediction_ =
-        check_prediction(size_, prediction_, frame.predicted.disparity, frame.passes.back().measured.disparity);
+    prediction_ = check_prediction(size_, prediction_, frame.warped.disparity, frame.predicted.disparity,
+                                   frame.passes.back().measured.disparity);
   }
   if (has_prediction) update(images, frame);
 
@@ -119,8 +119,9 @@ Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset kn
   pass.matched = banded_sgm(parameters, sgm, both, grey, pass.band.bands);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
+  const bool is_narrow = reads_off && !prediction_.is_wrong;
   pass.consistent =
-      consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed);
+      consistency_check(size_, is_narrow ? check.read_off_px : check.measurement_px, false, pass.smoothed);
   pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
   if (reads_off) {
     const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);

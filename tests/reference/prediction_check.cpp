@@ -6,7 +6,8 @@
 namespace egosgm::reference {
 
 shared::PredictionState check_prediction(shared::ImageSize size, const shared::PredictionState& before,
-                                         const std::vector<float>& predicted, const std::vector<float>& measured) {
+                                         const std::vector<float>& warped, const std::vector<float>& predicted,
+                                         const std::vector<float>& measured) {
   if (predicted.empty()) return {};
   shared::PredictionCounts now{};
   for (int y = 0; y < size.height; y += EGOSGM_CHECKED_ROWS) {
@@ -14,7 +15,7 @@ shared::PredictionState check_prediction(shared::ImageSize size, const shared::P
       const std::size_t i = static_cast<std::size_t>(y) * size.width + x;
       if (predicted[i] == EGOSGM_INVALID_DISPARITY) continue;
       ++now.predicted;
-      if (measured[i] == EGOSGM_INVALID_DISPARITY) continue;
+      if (warped[i] == EGOSGM_INVALID_DISPARITY || measured[i] == EGOSGM_INVALID_DISPARITY) continue;
       ++now.both;
       now.differing += std::abs(measured[i] - predicted[i]) > EGOSGM_CHECKED_DIFFERENCE_PX;
     }
@@ -26,7 +27,7 @@ shared::PredictionState check_prediction(shared::ImageSize size, const shared::P
   const Exact all = static_cast<Exact>(now.both) * last.both;
   const bool are_few = static_cast<Exact>(now.predicted) * 4 < static_cast<Exact>(last.predicted) * 3;
   const bool contradict =
-      static_cast<Exact>(now.differing) * last.both > 2 * static_cast<Exact>(last.differing) * now.both + all / 50;
+      static_cast<Exact>(now.differing) * last.both > 2 * static_cast<Exact>(last.differing) * now.both + all / 40;
   return {now, are_few || contradict, before.is_wrong};
 }
 

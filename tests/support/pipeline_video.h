@@ -84,18 +84,18 @@ inline std::vector<Setting> settings() {
                    o.banded_sgm.p2_at_edges = 25;
                    o.banded_sgm.p2_slope = 9;
                  })});
-  const auto right_follows = [](PipelineOptions& o) { o.track_right = false; };
-  all.push_back({"right_follows", kSize, options(32, -10, right_follows), PixelType::kU16, {}, 12.25});
-  all.push_back({"right_follows_along_paths_full_search", kSize, options(24, 0, [](PipelineOptions& o) {
-                   o.track_right = false;
+  const auto track_both = [](PipelineOptions& o) { o.track_right = true; };
+  all.push_back({"both_tracked", kSize, options(32, -10, track_both), PixelType::kU16, {}, 12.25});
+  all.push_back({"both_tracked_7x5", {7, 5}, options(16, 0, track_both)});
+  all.push_back({"along_paths_full_search", kSize, options(24, 0, [](PipelineOptions& o) {
                    o.search = SearchMode::kFull;
                    o.banded_sgm.scheduling = Scheduling::kPaths;
                    o.consistency.read_off_px = 3;
                  })});
-  all.push_back({"right_follows_7x5", {7, 5}, options(16, 0, right_follows)});
   all.push_back({"full_search", kSize, options(24, 0, [](PipelineOptions& o) { o.search = SearchMode::kFull; })});
   all.push_back({"not_temporal", kSize, options(24, 0, [](PipelineOptions& o) { o.temporal = false; })});
   all.push_back({"not_aligned_sharp_jumps", kSize, options(24, 0, [](PipelineOptions& o) {
+                   o.track_right = true;
                    o.vertical_alignment.enabled = false;
                    o.banded_sgm.p1 = 3;
                    o.banded_sgm.p2 = 190;

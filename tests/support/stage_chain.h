@@ -71,7 +71,7 @@ class StageChain {
       frame.passes.push_back(match(vertical_alignment_.realign(uploaded), has_prediction));
     }
     vertical_alignment_.commit();
-    prediction_check_(has_prediction ? &prediction_states_[frames_ % 2] : nullptr, predicted_, measured_,
+    prediction_check_(has_prediction ? &prediction_states_[frames_ % 2] : nullptr, updated_, predicted_, measured_,
                       prediction_states_[(frames_ + 1) % 2]);
     ++frames_;
     if (has_prediction) update(frame);
@@ -128,7 +128,12 @@ class StageChain {
     median_filter_(scratch_, Holes::kLeave);
     pass.smoothed = download(context_, scratch_);
     const ConsistencyCheckOptions& check = options_.consistency;
-    consistency_(scratch_, reads_off ? check.read_off_px : check.measurement_px, OutsideView::kDrop, measured_);
+    if (reads_off) {
+      consistency_(scratch_, check.read_off_px, check.measurement_px, prediction_states_[frames_ % 2],
+                   OutsideView::kDrop, measured_);
+    } else {
+      consistency_(scratch_, check.measurement_px, OutsideView::kDrop, measured_);
+    }
     pass.consistent = download(context_, measured_);
     speckle_removal_(measured_, views);
     pass.measured = download(context_, measured_);
