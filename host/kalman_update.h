@@ -8,7 +8,7 @@
 namespace egosgm {
 
 /// Fuses prediction and measurement, pixel by pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the
-/// two differ by more than the gate, or as nearly all around do (something moves by itself), or only the measurement is
+/// two differ by more than the gate, or as most around do (something moves by itself), or only the measurement is
 /// there, the measurement is taken, unless the pixels around, by what is both predicted and measured there, speak
 /// against it.
 class KalmanUpdate {

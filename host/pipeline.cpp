@@ -242,8 +242,9 @@ struct Pipeline::Impl {
                           const Wanted& wanted) {
     if (!reason) predict(*motion);
     const FrameImages& images = match(uploaded, reason);
-    if (reason && options.temporal)
+    if (reason && options.temporal) {
       prediction_check(nullptr, predicted, predicted, *measured, prediction_state(*measured));
+    }
     if (!reason) update(images);
     const StereoMaps* result = reason ? measured : updated;
     const StereoMaps* prediction = reason ? nullptr : &predicted;

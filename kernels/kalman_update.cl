@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. An innovation z - d' of more
 // deviations than p' + r allows says that p' is too small, so p' grows. Where the two contradict each other, by more
-// than the gate or because the measurement escaped its band, or where nearly all pixels around are off to the same
-// side, as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide;
+// than the gate or because the measurement escaped its band, or where most pixels around are off to the same side,
+// as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide;
 // unless the pixels around speak against it. What is hidden by a surface nearer than the range (ForwardWarp) has no
 // disparity: whatever is measured there is a mismatch.
 #include "pixels.h"
