@@ -50,6 +50,7 @@ std::vector<Trial> trials(bool is_gpu) {
   for (const int width : {64, 96, 128, 192, 256}) {
     for (const int height : {16, 24, 32, 48}) matching.push_back(pair("tile_width", width, "tile_height", height));
   }
+  for (const char* lanes : {"16", "32"}) matching.push_back({{"block_lanes", lanes}});
   all.push_back({{"ForwardWarp"}, {}});
   for (const char* rows : {"16", "24", "32", "48", "64"}) all.back().candidates.push_back({{"warp_band_rows", rows}});
   all.push_back({{"SpeckleRemoval"}, {}});

@@ -12,30 +12,36 @@ namespace {
 
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
 
+/// Vectors of two chunks in the larger of kernels/block.h. One is read, and of a slot one is left, where a vector ends.
+constexpr int kBlockVectors = 2;
+
 std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range) {
   const int vectors = (SearchBand::max_chunks(range) + 1) / 2;
-  const std::size_t slot = static_cast<std::size_t>(vectors + 2) * 2 * EGOSGM_LANES;
+  const std::size_t slot = static_cast<std::size_t>(vectors + kBlockVectors * 2) * 2 * EGOSGM_LANES;
   return 2 * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
 }
 
-/// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind a chunk, as two are read at once.
+/// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind them the rest of a block.
 std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
   const std::size_t pixels = 2 * pixel_count(size) + size.width;
-  return (pixels * SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
+  return (pixels * SearchBand::max_chunks(range) + 2 * kBlockVectors - 1) * EGOSGM_LANES;
 }
 
 const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
                          BandedSgm::Tile tile) {
-  return context.program("banded_sgm.cl", ocl::Defines()
-                                              .set("MAX_CHUNKS", SearchBand::max_chunks(range))
-                                              .set("PATHS", options.paths)
-                                              .set("CODE_BYTES", 4 * Census::words(options.cost))
-                                              .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
-                                              .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
-                                              .set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
-                                              .set("TILE_WIDTH", tile.width)
-                                              .set("TILE_HEIGHT", tile.height)
-                                              .set("PIXELS", ocl::pixels_a_work_item(context)));
+  ocl::Defines defines;
+  defines.set("MAX_CHUNKS", SearchBand::max_chunks(range))
+      .set("PATHS", options.paths)
+      .set("CODE_BYTES", 4 * Census::words(options.cost))
+      .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
+      .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
+      .set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
+      .set("TILE_WIDTH", tile.width)
+      .set("TILE_HEIGHT", tile.height)
+      .set("PIXELS", ocl::pixels_a_work_item(context));
+  if (tile.block_lanes > 0) defines.set("BLOCK", tile.block_lanes);
+  if (ocl::counts_bits(context)) defines.set("COUNTS_BITS", 1);
+  return context.program("banded_sgm.cl", defines);
 }
 
 bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
@@ -193,7 +199,7 @@ bool BandedSgm::takes_whole_sweeps(int views) const {
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {
-  return std::abs(range.min) + (SearchBand::max_chunks(range) + 2) * EGOSGM_LANES;
+  return std::abs(range.min) + (SearchBand::max_chunks(range) + 2 * kBlockVectors) * EGOSGM_LANES;
 }
 
 }  // namespace egosgm

@@ -22,9 +22,11 @@ namespace egosgm {
 /// kStripeOverlap rows above and below a stripe instead of at the image's edge.
 class BandedSgm {
  public:
-  /// Of a wavefront; at most as high as wide.
+  /// Of a wavefront; at most as high as wide. `block_lanes`: disparities that are matched at once, 16 or 32 (see
+  /// kernels/block.h); 0: what suits the compiler.
   struct Tile {
     int width = kCpuTuning.tile_width, height = kCpuTuning.tile_height;
+    int block_lanes = 0;
   };
 
   /// Of the wavefronts, two sweeps a view, to the middle of the image and from there: one for every wave of tiles, or

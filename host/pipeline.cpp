@@ -141,7 +141,7 @@ struct Pipeline::Impl {
         stages_u8(context, size, PixelType::kU8, options, BandedSgm::code_padding(range_of(options))),
         stages_u16(context, size, PixelType::kU16, options, BandedSgm::code_padding(range_of(options))),
         banded_sgm(context, size, range_of(options), options.banded_sgm, path_group(tuning),
-                   {tuning.tile_width, tuning.tile_height}),
+                   {tuning.tile_width, tuning.tile_height, tuning.block_lanes}),
         median_filter(context, size, options.median_filter),
         speckle_removal(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
         kalman_update(context, size, options.kalman_update),

@@ -18,6 +18,7 @@ struct Size {
 
 constexpr Size kSizes[] = {{"tile_width", &Tuning::tile_width, 16, 1024},
                            {"tile_height", &Tuning::tile_height, 1, 1024},
+                           {"block_lanes", &Tuning::block_lanes, 16, 32},
                            {"path_lanes", &Tuning::path_lanes, 1, 256},
                            {"path_lines", &Tuning::path_lines, 1, 256},
                            {"warp_band_rows", &Tuning::warp_band_rows, 1, 4096},
@@ -38,6 +39,8 @@ void Tuning::validate() const {
   }
   expect((tile_width == 0) == (tile_height == 0), "tile_height", tile_height, "tile_width and tile_height together");
   expect(tile_height <= tile_width, "tile_height", tile_height, "at most tile_width");
+  expect(block_lanes == 0 || std::has_single_bit(static_cast<unsigned>(block_lanes)), "block_lanes", block_lanes,
+         "16 or 32");
   expect((path_lanes == 0) == (path_lines == 0), "path_lines", path_lines, "path_lanes and path_lines together");
   expect(path_lanes == 0 || std::has_single_bit(static_cast<unsigned>(path_lanes)), "path_lanes", path_lanes,
          "a power of two");

@@ -19,10 +19,12 @@
 // A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a
 // pixel reads its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them
 // before it writes its own. Vectors hold two chunks. Most pixels in bands have one, and those before them the same one:
-// two paths then share a vector, nothing is looked at beside it, and nothing is wiped.
+// two paths then share a vector, nothing is looked at beside it, and nothing is wiped. Bands of several vectors are
+// matched in blocks (block.h), of which the last one may hold a single vector.
 //
 // Where the right view is read off the left one's sums, the sweep that finds the winners leaves at each right pixel the
 // least rank of the left pixels that it may be (sgm_cells.h).
+#include "block.h"
 #include "sgm_cells.h"
 
 #ifndef __ENDIAN_LITTLE__
@@ -65,8 +67,10 @@
 #define ABSENT 255
 #define MAX_COST 63
 #define VECTOR (2 * EGOSGM_LANES)
+#define BLOCK_VECTORS (BLOCK / VECTOR)
 #define MAX_VECTORS ((MAX_CHUNKS + 1) / 2)
-#define SLOT_PADDING VECTOR
+#define MAX_BLOCKS ((MAX_VECTORS + BLOCK_VECTORS - 1) / BLOCK_VECTORS)
+#define SLOT_PADDING 32  // the larger block: one is read and left where a vector ends
 #define SLOT (MAX_VECTORS * VECTOR + 2 * SLOT_PADDING)
 #define DIRECTIONS (PATHS / 2)
 #define MAX_STEPS 8
@@ -79,6 +83,9 @@ typedef struct __attribute__((packed)) {
 typedef struct __attribute__((packed)) {
   uchar8 lanes;
 } Chunk;
+typedef struct __attribute__((packed)) {
+  Block lanes;
+} PackedBlock;
 #if CODE_BYTES == 4
 typedef uint Code;
 typedef uint8 ChunkCodes;
@@ -111,6 +118,8 @@ inline uchar16 load(global const uchar* from) { return ((global const Lanes*)fro
 inline void store(const uchar16 lanes, global uchar* to) { ((global Lanes*)to)->lanes = lanes; }
 inline uchar8 load_chunk(global const uchar* from) { return ((global const Chunk*)from)->lanes; }
 inline void store_chunk(const uchar8 lanes, global uchar* to) { ((global Chunk*)to)->lanes = lanes; }
+inline Block load_block(global const uchar* from) { return ((global const PackedBlock*)from)->lanes; }
+inline void store_block(const Block lanes, global uchar* to) { ((global PackedBlock*)to)->lanes = lanes; }
 inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
 inline ChunkCodes load_chunk_codes(global const Code* from) { return ((global const PackedChunkCodes*)from)->codes; }
 inline ushort8 load_totals(const ushort* from) { return ((const HalfTotals*)from)->totals; }
@@ -161,6 +170,16 @@ inline uchar16 lanes_from(const int first) { return as_uchar16(kLane >= (uchar16
 #define absent_from(first) ((uchar16)(0))
 #endif
 
+// The same of a block.
+inline Block block_from(const int first) {
+  return BLOCK_LANE >= (Block)((uchar)clamp(first, 0, BLOCK)) ? (Block)(ABSENT) : (Block)(0);
+}
+#if PARTIAL_CHUNKS
+#define absent_in_block(first) block_from(first)
+#else
+#define absent_in_block(first) ((Block)(0))
+#endif
+
 // 65535 where a lane is 255; lanes are 0 or 255.
 inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
 
@@ -206,6 +225,16 @@ inline uchar16 matching_cost(global const Code* own, global const Code* other, c
   MATCHING_COST(16, Codes, load_codes);
 }
 
+inline Block matching_cost_of_block(global const Code* own, global const Code* other, const long above,
+                                    const long below) {
+  const uchar16 first = matching_cost(own, other, above, below);
+#if BLOCK == 32
+  return (Block)(first, matching_cost(own, other + VECTOR, above, below));
+#else
+  return first;
+#endif
+}
+
 inline uchar8 matching_cost_of_chunk(global const Code* own, global const Code* other, const long above,
                                      const long below) {
   MATCHING_COST(8, ChunkCodes, load_chunk_codes);
@@ -248,6 +277,14 @@ inline uchar16 half_sum(const uchar16* r) {
   return add_sat(mean(r[0], r[1]), mean(r[2], r[3]));
 #else
   return add_sat(r[0], r[1]);
+#endif
+}
+
+inline Block half_sum_of_blocks(const Block* r) {
+#if PATHS == 8
+  return saturated_sum(mean_of(r[0], r[1]), mean_of(r[2], r[3]));
+#else
+  return saturated_sum(r[0], r[1]);
 #endif
 }
 
@@ -384,82 +421,127 @@ typedef struct {
   global uchar* wiped_at[DIRECTIONS];  // and that of its predecessor's
   uint wiped[DIRECTIONS];              // the predecessors' extents
   bool is_wiped[DIRECTIONS];           // whether its own costs do not overwrite theirs
-  uchar16 p1, p2[DIRECTIONS];
+  uchar p1, p2[DIRECTIONS];
   global const Code *own, *other;  // its code, and that of its first disparity
   long row_above, row_below;       // to the codes of these rows
   int disparities;                 // of the range, from its first one on
   global uchar* cells;
-  global const Band* band;
-  global uint* seen;  // the rank of the right pixel at its first disparity; null: none are kept
+  int origin, first, last;  // of its band; the latter two count from its origin
+  global uint* seen;        // the rank of the right pixel at its first disparity; null: none are kept
 } Pixel;
 
-__attribute__((always_inline)) inline void match_vectors(const bool meets, const int vectors, const Pixel pixel,
-                                                         Candidate* candidate) {
-  uchar16 t[DIRECTIONS][MAX_VECTORS], costs[MAX_VECTORS];
-  uchar16 least[DIRECTIONS];
-#pragma unroll
-  for (int n = 0; n < DIRECTIONS; ++n) least[n] = (uchar16)(ABSENT);
-  for (int v = 0; v < vectors; ++v) {
-    const int at = VECTOR * v;
-    const uchar16 cost = absent_from(pixel.disparities - at) |
-                         matching_cost(pixel.own, pixel.other + at, pixel.row_above, pixel.row_below);
-    costs[v] = cost;
-#pragma unroll
-    for (int n = 0; n < DIRECTIONS; ++n) {
-      t[n][v] = path_cost_from(pixel.at[n] + at, cost, pixel.p1, pixel.p2[n]);
-      least[n] = min(least[n], t[n][v]);
-    }
-  }
-  minima(least, least);
+// What comes of it between its two passes: path costs before their minima are taken off, and matching costs.
+typedef struct {
+  Block t[DIRECTIONS][MAX_BLOCKS], cost[MAX_BLOCKS];
+} PathCosts;
+
+// The first pass: path costs of a block, and their least in each lane.
+inline void follow_paths(const Pixel* pixel, const int b, const Block absent, PathCosts* costs, Block* least) {
+  const int at = BLOCK * b;
+  const Block cost = absent | matching_cost_of_block(pixel->own, pixel->other + at, pixel->row_above, pixel->row_below);
+  costs->cost[b] = cost;
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) {
-    if (pixel.is_wiped[n]) wipe(pixel.wiped_at[n], pixel.wiped[n]);
+    global const uchar* from = pixel->at[n] + at;
+    const Block beside = saturated_sum(least_of(load_block(from - 1), load_block(from + 1)), (Block)(pixel->p1));
+    const Block t = saturated_sum(cost, least_of(least_of(load_block(from), beside), (Block)(pixel->p2[n])));
+    costs->t[n][b] = t;
+    least[n] = least_of(least[n], t);
   }
-  ushort totals[MAX_VECTORS * VECTOR + 2 * MAX_STEPS];
-  ushort16 best = (ushort16)(65535), best_vector = 0;
-  const int origin = pixel.band->origin;
-  const int band_first = pixel.band->first - origin, band_last = pixel.band->last - origin;
-  for (int v = 0; v < vectors; ++v) {
-    const int at = VECTOR * v;
-    const uchar16 absent = absent_from(pixel.disparities - at);
-    uchar16 r[DIRECTIONS];
+}
+
+// The least total so far of each lane of a vector, and the vector that has it.
+typedef struct {
+  ushort16 total, vector;
+} Best;
+
+// Adds the other sweep's sums of a vector, and remembers the least.
+inline void add_sums(const Pixel* pixel, const int v, const uchar16 absent, const uchar16 sum, ushort* totals,
+                     Best* best) {
+  const int at = VECTOR * v;
+  const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(pixel->cells + at))) | widened(absent);
+  store_totals(total, totals + at);
+  const int first = pixel->first - at, last = pixel->last - at;
+  const bool is_inner = first <= 0 && last >= VECTOR - 1;
+  const ushort16 allowed = is_inner ? total : total | barred(first, last);
+  best->vector = select(best->vector, (ushort16)((ushort)v), allowed < best->total);
+  best->total = min(best->total, allowed);
+}
+
+// The second pass: leaves a block's path costs in their slots, and half of their sum, or adds the other half.
+inline void leave_block(const bool meets, const bool is_tail, const Pixel* pixel, const int b, const Block absent,
+                        const PathCosts* costs, const Block* least, ushort* totals, Best* best) {
+  Block r[DIRECTIONS];
 #pragma unroll
-    for (int n = 0; n < DIRECTIONS; ++n) {
-      r[n] = (t[n][v] - least[n]) | absent;
-      store(r[n], pixel.at[n] + at);
-    }
-    const uchar16 sum = half_sum(r);
-    if (!meets) {
-      store(sum, pixel.cells + at);
-    } else {
-      const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(pixel.cells + at))) | widened(absent);
-      store_totals(total, totals + MAX_STEPS + at);
-      const int first = band_first - at, last_of_band = band_last - at;
-      const bool is_inner = first <= 0 && last_of_band >= VECTOR - 1;
-      const ushort16 allowed = is_inner ? total : total | barred(first, last_of_band);
-      best_vector = select(best_vector, (ushort16)((ushort)v), allowed < best);
-      best = min(best, allowed);
-    }
+  for (int n = 0; n < DIRECTIONS; ++n) {
+    r[n] = (costs->t[n][b] - least[n]) | absent;
+    store_block(r[n], pixel->at[n] + BLOCK * b);
   }
+  const Block sum = half_sum_of_blocks(r);
   if (meets) {
-    store_end(totals);
-    store_end(totals + MAX_STEPS + VECTOR * vectors);
-    const ushort winner_total = minimum_of_totals(best);
-    const ushort16 lanes = best_vector * (ushort16)(VECTOR) + convert_ushort16(kLane);
-    const int best_lane = minimum_of_totals(lanes | as_ushort16(best != (ushort16)(winner_total)));
-    // The winner's neighbourhood, with the winner in lane 0.
-    ushort* window = (ushort*)&candidate->totals;
-    store_totals(((const Totals*)(totals + best_lane))->totals, window);
-    window[2 * MAX_STEPS] = totals[best_lane + 2 * MAX_STEPS];
-    candidate->rank = winner_total << 4;
-    candidate->disparity = origin + best_lane;
-    for (int v = 0; pixel.seen && v < vectors; ++v) {
-      const int at = VECTOR * v;
-      const ushort16 allowed =
-          ((const Totals*)(totals + MAX_STEPS + at))->totals | barred(band_first - at, band_last - at);
-      offer(allowed, winner_total, costs[v], pixel.disparities - 1 - at, pixel.seen - at);
+    add_sums(pixel, BLOCK_VECTORS * b, FIRST_VECTOR(absent), FIRST_VECTOR(sum), totals, best);
+    if (BLOCK_VECTORS == 2 && !is_tail) {
+      add_sums(pixel, BLOCK_VECTORS * b + 1, SECOND_VECTOR(absent), SECOND_VECTOR(sum), totals, best);
     }
+  } else if (is_tail) {
+    store(FIRST_VECTOR(sum), pixel->cells + BLOCK * b);
+  } else {
+    store_block(sum, pixel->cells + BLOCK * b);
   }
+}
+
+// The winner and its neighbourhood; and offers the pixel to the right ones.
+inline void find_winner(const Pixel* pixel, const int vectors, const PathCosts* costs, ushort* totals, const Best* best,
+                        Candidate* candidate) {
+  store_end(totals - MAX_STEPS);
+  store_end(totals + VECTOR * vectors);
+  const ushort winner_total = minimum_of_totals(best->total);
+  const ushort16 lanes = best->vector * (ushort16)(VECTOR) + convert_ushort16(kLane);
+  const int best_lane = minimum_of_totals(lanes | as_ushort16(best->total != (ushort16)(winner_total)));
+  // The winner's neighbourhood, with the winner in lane 0.
+  ushort* window = (ushort*)&candidate->totals;
+  store_totals(((const Totals*)(totals + best_lane - MAX_STEPS))->totals, window);
+  window[2 * MAX_STEPS] = totals[best_lane + MAX_STEPS];
+  candidate->rank = winner_total << 4;
+  candidate->disparity = pixel->origin + best_lane;
+  for (int v = 0; pixel->seen && v < vectors; ++v) {
+    const int at = VECTOR * v;
+    const ushort16 allowed = ((const Totals*)(totals + at))->totals | barred(pixel->first - at, pixel->last - at);
+    offer(allowed, winner_total, ((const uchar16*)costs->cost)[v], pixel->disparities - 1 - at, pixel->seen - at);
+  }
+}
+
+__attribute__((always_inline)) inline void match_blocks(const bool meets, const int vectors, const Pixel* pixel,
+                                                        Candidate* candidate) {
+  const int blocks = vectors / BLOCK_VECTORS;
+  const bool has_tail = vectors % BLOCK_VECTORS != 0;
+  const Block tail = block_from(VECTOR) | absent_in_block(pixel->disparities - BLOCK * blocks);
+  PathCosts costs;
+  Block least[DIRECTIONS];
+#pragma unroll
+  for (int n = 0; n < DIRECTIONS; ++n) least[n] = (Block)(ABSENT);
+  for (int b = 0; b < blocks; ++b)
+    follow_paths(pixel, b, absent_in_block(pixel->disparities - BLOCK * b), &costs, least);
+  if (has_tail) follow_paths(pixel, blocks, tail, &costs, least);
+
+  uchar16 minimum[DIRECTIONS];
+#pragma unroll
+  for (int n = 0; n < DIRECTIONS; ++n) minimum[n] = LEAST_OF_VECTORS(least[n]);
+  minima(minimum, minimum);
+#pragma unroll
+  for (int n = 0; n < DIRECTIONS; ++n) {
+    least[n] = (Block)(minimum[n].s0);
+    if (pixel->is_wiped[n]) wipe(pixel->wiped_at[n], pixel->wiped[n]);
+  }
+
+  ushort totals[MAX_BLOCKS * BLOCK + 2 * MAX_STEPS];
+  Best best = {(ushort16)(65535), (ushort16)(0)};
+  for (int b = 0; b < blocks; ++b) {
+    const Block absent = absent_in_block(pixel->disparities - BLOCK * b);
+    leave_block(meets, false, pixel, b, absent, &costs, least, totals + MAX_STEPS, &best);
+  }
+  if (has_tail) leave_block(meets, true, pixel, blocks, tail, &costs, least, totals + MAX_STEPS, &best);
+  if (meets) find_winner(pixel, vectors, &costs, totals + MAX_STEPS, &best, candidate);
 }
 
 // Both flags are constants wherever it is called: each direction has code of its own, whose steps need no registers.
@@ -634,18 +716,20 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
           pixel.wiped_at[n] = slot[n] + (start + (uint)origin_of(wiped[n]));
           pixel.is_wiped[n] = !covers(extent, wiped[n]);
           pixel.wiped[n] = wiped[n];
-          pixel.p2[n] = p2[n];
+          pixel.p2[n] = (uchar)(steps >> 8 * n);
         }
-        pixel.p1 = p1;
+        pixel.p1 = (uchar)q.p1;
         pixel.own = own;
         pixel.other = other + origin;
         pixel.row_above = row_above;
         pixel.row_below = row_below;
         pixel.disparities = q.disparities - (int)lane;
         pixel.cells = cells;
-        pixel.band = row_bands + k;
+        pixel.origin = origin;
+        pixel.first = row_bands[k].first - origin;
+        pixel.last = row_bands[k].last - origin;
         pixel.seen = reads_off ? seen + k - origin : 0;
-        match_vectors(meets, chunks_of(extent) / 2, pixel, candidate);
+        match_blocks(meets, chunks_of(extent) / 2, &pixel, candidate);
       }
       // The next one's: what was to the upper right is above it.
       if (meets) ++candidate;
@@ -665,17 +749,16 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
   }
 }
 
-// The tile of a wave in this work-item's row of tiles, or all tiles of its view and direction.
-inline void sweep(const bool meets, const SgmParameters q, const int wave, const int tile_columns,
-                  global const uint* all_codes, global const Band* bands, global const uint* offsets,
-                  global const uchar* penalties, global uchar* slots, global uchar* sums, global ulong* winners,
-                  global uint* ranks) {
-  const int view = get_global_id(1);
-  const bool backward = get_global_id(2) > 0;
+// The tile of a wave in a row of tiles, or all tiles of a view and direction.
+__attribute__((always_inline)) inline void sweep(const bool meets, const SgmParameters q, const int first_row,
+                                                 const int view, const bool backward, const int wave,
+                                                 const int tile_columns, global const uint* all_codes,
+                                                 global const Band* bands, global const uint* offsets,
+                                                 global const uchar* penalties, global uchar* slots, global uchar* sums,
+                                                 global ulong* winners, global uint* ranks) {
   const bool all = wave == EGOSGM_ALL_TILES;
   const int first_y = meets ? own_rows(q.height, backward) : 0;
   const int end_y = meets ? q.height : own_rows(q.height, backward);
-  const int first_row = get_global_id(0);
   const int end_row = all ? (end_y - first_y + TILE_HEIGHT - 1) / TILE_HEIGHT : first_row + 1;
   for (int tile_y = first_row; tile_y < end_row; ++tile_y) {
     const int tile_of_wave = wave - 2 * tile_y;
@@ -693,11 +776,36 @@ inline void sweep(const bool meets, const SgmParameters q, const int wave, const
   }
 }
 
+// Compilers that are made for many CPUs take this one for an older (PoCL as distributions build it). In a function that
+// says so, and is not inlined, they count bits in one instruction. Defined by the host where the CPU has it.
+#ifdef COUNTS_BITS
+#define WITH_BIT_COUNT __attribute__((noinline, target("avx512vpopcntdq")))
+#else
+#define WITH_BIT_COUNT inline
+#endif
+
+WITH_BIT_COUNT void to_middle(const SgmParameters q, const int first_row, const int view, const bool backward,
+                              const int wave, const int tile_columns, global const uint* all_codes,
+                              global const Band* bands, global const uint* offsets, global const uchar* penalties,
+                              global uchar* slots, global uchar* sums) {
+  sweep(false, q, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0,
+        0);
+}
+
+WITH_BIT_COUNT void from_middle(const SgmParameters q, const int first_row, const int view, const bool backward,
+                                const int wave, const int tile_columns, global const uint* all_codes,
+                                global const Band* bands, global const uint* offsets, global const uchar* penalties,
+                                global uchar* slots, global uchar* sums, global ulong* winners, global uint* ranks) {
+  sweep(true, q, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums,
+        winners, ranks);
+}
+
 // Both sweeps to the middle of the image, where they leave their sums.
 kernel void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
                             global const Band* bands, global const uint* offsets, global const uchar* penalties,
                             global uchar* slots, global uchar* sums) {
-  sweep(false, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0, 0);
+  to_middle(q, get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands, offsets,
+            penalties, slots, sums);
 }
 
 // Both on from there, over the sums of the other one, to the winners.
@@ -705,7 +813,8 @@ kernel void sweep_from_middle(const SgmParameters q, const int wave, const int t
                               global const uint* all_codes, global const Band* bands, global const uint* offsets,
                               global const uchar* penalties, global uchar* slots, global const uchar* sums,
                               global ulong* winners, global uint* ranks) {
-  sweep(true, q, wave, tile_columns, all_codes, bands, offsets, penalties, slots, (global uchar*)sums, winners, ranks);
+  from_middle(q, get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands,
+              offsets, penalties, slots, (global uchar*)sums, winners, ranks);
 }
 
 #if PIXELS == 1

@@ -41,6 +41,7 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   if (c.tile.width != BandedSgm::Tile().width) {
     text += "_tiles" + std::to_string(c.tile.width) + "x" + std::to_string(c.tile.height);
   }
+  if (c.tile.block_lanes > 0) text += "_blocks" + std::to_string(c.tile.block_lanes);
   if (c.right == RightView::kReadOff) text += "_read_off";
   if (c.group) text += "_lanes" + std::to_string(c.group->lanes) + "_lines" + std::to_string(c.group->lines);
   return text;
@@ -297,6 +298,25 @@ std::vector<Case> in_small_tiles() {
   return cases;
 }
 
+/// Blocks of either width, whatever suits the compiler: ranges of an even and of an odd number of vectors, whole or
+/// not.
+std::vector<Case> in_blocks() {
+  std::vector<Case> cases;
+  for (const int lanes : {16, 32}) {
+    for (const Case& c : {Case{.size = {65, 33}, .range = {0, 128}},
+                          {.size = {65, 33}, .range = {-20, 37}, .right = RightView::kReadOff},
+                          {.size = {65, 33}, .range = {-9, 37}, .banded = false},
+                          {.size = {65, 33}, .range = {0, 64}, .cost = MatchingCost::kSad3x3, .paths = 4},
+                          {.size = {65, 33}, .range = {0, 112}, .cost = MatchingCost::kCensus9x7, .banded = false},
+                          {.size = {65, 33}, .range = {0, 100}, .banded = false, .right = RightView::kReadOff},
+                          {.size = {24, 30}, .range = {0, 1024}}}) {
+      cases.push_back(c);
+      cases.back().tile.block_lanes = lanes;
+    }
+  }
+  return cases;
+}
+
 using ::testing::ValuesIn;
 INSTANTIATE_TEST_SUITE_P(Banded, BandedSgmTest, ValuesIn(kBanded), name);
 INSTANTIATE_TEST_SUITE_P(FullRange, BandedSgmTest, ValuesIn(kFullRange), name);
@@ -304,6 +324,7 @@ INSTANTIATE_TEST_SUITE_P(BandedSweeps, BandedSgmTest, ValuesIn(changed(kBanded, 
 INSTANTIATE_TEST_SUITE_P(FullRangeSweeps, BandedSgmTest, ValuesIn(changed(kFullRange, whole_sweeps)), name);
 INSTANTIATE_TEST_SUITE_P(SmallTiles, BandedSgmTest, ValuesIn(in_small_tiles()), name);
 INSTANTIATE_TEST_SUITE_P(SmallTilesSweeps, BandedSgmTest, ValuesIn(changed(in_small_tiles(), whole_sweeps)), name);
+INSTANTIATE_TEST_SUITE_P(Blocks, BandedSgmTest, ValuesIn(in_blocks()), name);
 INSTANTIATE_TEST_SUITE_P(BandedPaths, BandedSgmTest, ValuesIn(changed(kBanded, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(FullRangePaths, BandedSgmTest, ValuesIn(changed(kFullRange, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOff, BandedSgmTest, ValuesIn(changed(kBanded, read_off)), name);

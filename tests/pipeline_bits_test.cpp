@@ -69,7 +69,12 @@ TEST(Pipeline, GivesTheSameBitsForEveryTuning) {
   const std::vector<OutputMemory> expected = process_all(untuned, setting, video);
   const Tuning tunings[] = {
       {.tile_width = 16, .tile_height = 16, .warp_band_rows = 7, .speckle_strip_rows = 5, .row_group = 8},
-      {.tile_width = 96, .tile_height = 5, .warp_band_rows = 100, .speckle_strip_rows = 1, .row_group = 1},
+      {.tile_width = 96,
+       .tile_height = 5,
+       .block_lanes = 16,
+       .warp_band_rows = 100,
+       .speckle_strip_rows = 1,
+       .row_group = 1},
       {.path_lanes = 2, .path_lines = 3, .row_group = 64}};
   for (const Tuning& tuning : tunings) {
     setting.options.banded_sgm.scheduling = tuning.path_lanes > 0 ? Scheduling::kPaths : Scheduling::kWavefront;

@@ -39,13 +39,15 @@ TEST(Tuning, NamesEverySizeAndRefusesWhatCannotBe) {
   int value = 1;
   for (const NamedOption& size : list_tuning(tuning)) set_tuning(tuning, size.name, std::to_string(16 * value++));
   EXPECT_EQ(tuning.tile_width, 16);
-  EXPECT_EQ(tuning.row_group, 16 * 7);
+  EXPECT_EQ(tuning.row_group, 16 * 8);
   expect_refused([&] { set_tuning(tuning, "tile_with", "1"); }, {"tile_with", "tile_width"});
   expect_refused([&] { set_tuning(tuning, "tile_width", "1.5"); }, {"tile_width", "1.5", "whole number"});
   const Device device = Device::select();
   const std::pair<Tuning, const char*> wrong[] = {{{.tile_width = 32, .tile_height = 33}, "tile_height is 33"},
                                                   {{.tile_width = 32}, "tile_height is 0"},
                                                   {{.tile_width = -1, .tile_height = 1}, "tile_width is -1"},
+                                                  {{.block_lanes = 24}, "block_lanes is 24"},
+                                                  {{.block_lanes = 64}, "block_lanes is 64"},
                                                   {{.path_lanes = 6, .path_lines = 1}, "path_lanes is 6"},
                                                   {{.path_lanes = 64, .path_lines = 8}, "path_lines is 8"},
                                                   {{.row_group = 257}, "row_group is 257"}};

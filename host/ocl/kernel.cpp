@@ -5,8 +5,27 @@
 #include <numeric>
 
 #include "egosgm/error.h"
+#include "host/ocl/strings.h"
 
 namespace egosgm::ocl {
+namespace {
+
+bool this_cpu_counts_bits() {
+#if defined(__x86_64__) && defined(__GNUC__)
+  return __builtin_cpu_supports("avx512vpopcntdq");
+#else
+  return false;
+#endif
+}
+
+}  // namespace
+
+bool counts_bits(const Context& context) {
+  const cl::Device& device = context.device();
+  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
+  return this_cpu_counts_bits() && device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU &&
+         trimmed(platform.getInfo<CL_PLATFORM_NAME>()) == "Portable Computing Language";
+}
 
 void expect_work_group(const Context& context, const char* kernel, const cl::NDRange& local, std::size_t limit) {
   const std::size_t work_items =

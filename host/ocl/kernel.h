@@ -50,6 +50,10 @@ inline int pixels_a_work_item(const Context& context) {
   return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU ? 1 : 16;
 }
 
+/// Whether the device is this machine's CPU, which counts the bits of each lane of a vector in one instruction, and its
+/// compiler is one that may be told so (kernels/banded_sgm.cl).
+bool counts_bits(const Context& context);
+
 /// Throws DeviceError, naming the stage, the kernel and the limit, where `local` has more work-items than `limit`.
 void expect_work_group(const Context& context, const char* kernel, const cl::NDRange& local, std::size_t limit);
 

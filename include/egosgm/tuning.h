@@ -13,6 +13,7 @@ namespace egosgm {
 struct EGOSGM_EXPORT Tuning {
   int tile_width = 0;          // BandedSgm in wavefronts: columns of a tile, 16 to 1024,
   int tile_height = 0;         // and rows, at most as many
+  int block_lanes = 0;         // and disparities matched at once, 16 or 32
   int path_lanes = 0;          // BandedSgm on paths: work-items that share a path, a power of two,
   int path_lines = 0;          // and paths that share a work-group of at most 256
   int warp_band_rows = 0;      // ForwardWarp on CPUs: rows of the target that a work-item fills
