@@ -303,13 +303,13 @@ std::vector<Case> in_small_tiles() {
 std::vector<Case> in_blocks() {
   std::vector<Case> cases;
   for (const int lanes : {16, 32}) {
-    for (const Case& c : {Case{.size = {65, 33}, .range = {0, 128}},
-                          {.size = {65, 33}, .range = {-20, 37}, .right = RightView::kReadOff},
-                          {.size = {65, 33}, .range = {-9, 37}, .banded = false},
-                          {.size = {65, 33}, .range = {0, 64}, .cost = MatchingCost::kSad3x3, .paths = 4},
-                          {.size = {65, 33}, .range = {0, 112}, .cost = MatchingCost::kCensus9x7, .banded = false},
-                          {.size = {65, 33}, .range = {0, 100}, .banded = false, .right = RightView::kReadOff},
-                          {.size = {24, 30}, .range = {0, 1024}}}) {
+    for (const Case& c : {Case{.size = {33, 21}, .range = {0, 128}},
+                          {.size = {33, 21}, .range = {-20, 37}, .right = RightView::kReadOff},
+                          {.size = {33, 21}, .range = {-9, 37}, .banded = false},
+                          {.size = {33, 21}, .range = {0, 64}, .cost = MatchingCost::kSad3x3, .paths = 4},
+                          {.size = {33, 21}, .range = {0, 112}, .cost = MatchingCost::kCensus9x7, .banded = false},
+                          {.size = {33, 21}, .range = {0, 100}, .banded = false, .right = RightView::kReadOff},
+                          {.size = {24, 21}, .range = {0, 1024}}}) {
       cases.push_back(c);
       cases.back().tile.block_lanes = lanes;
     }
