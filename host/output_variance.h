@@ -10,7 +10,7 @@ namespace egosgm {
 /// The variance that is given out, of a disparity that may lie on a wrong surface too, from the filter's, which is that
 /// of a pixel on the right one: scale * (mean of the filter's over 17x17 pixels)^1.5 + roughness_weight * (mean over
 /// 7x7 pixels of how far the disparity is from a plane's)^2 + jump_weight * (largest difference to the disparities two
-/// pixels off)^2.
+/// pixels off)^2; of this sum v, v (1 + 2 v^2 / (v^2 + 1)) / (1 + v)^0.75.
 class OutputVariance {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.

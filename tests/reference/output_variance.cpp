@@ -72,6 +72,11 @@ float jump_beside(const Plane& disparity, int x, int y) {
   return std::min(most, EGOSGM_MAX_JUMP_PX);
 }
 
+float calibrated(float sum) {
+  const float root = std::sqrt(1 + sum);
+  return sum * (1 + 3 * (sum * sum)) / ((1 + sum * sum) * (root * std::sqrt(root)));
+}
+
 }  // namespace
 
 std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
@@ -92,7 +97,7 @@ std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceO
         const float j = jump_beside(disparity, x, y);
         const float sum =
             options.scale * (p * std::sqrt(p)) + options.roughness_weight * (r * r) + options.jump_weight * (j * j);
-        out.push_back(is_valid ? sum : 0);
+        out.push_back(is_valid ? calibrated(sum) : 0);
       }
     }
   }
