@@ -21,10 +21,10 @@ std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range) {
   return 2 * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
 }
 
-/// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind them the rest of a block.
+/// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind a chunk, as two are read at once.
 std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
   const std::size_t pixels = 2 * pixel_count(size) + size.width;
-  return (pixels * SearchBand::max_chunks(range) + 2 * kBlockVectors - 1) * EGOSGM_LANES;
+  return (pixels * SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
 }
 
 const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
