@@ -306,7 +306,7 @@ std::vector<Case> in_blocks() {
     for (const Case& c : {Case{.size = {33, 21}, .range = {0, 128}},
                           {.size = {33, 21}, .range = {-20, 37}, .right = RightView::kReadOff},
                           {.size = {33, 21}, .range = {-9, 37}, .banded = false},
-                          {.size = {33, 21}, .range = {0, 64}, .cost = MatchingCost::kSad3x3, .paths = 4},
+                          {.size = {33, 21}, .range = {0, 48}, .cost = MatchingCost::kSad3x3, .paths = 4},
                           {.size = {33, 21}, .range = {-40, 48}, .cost = MatchingCost::kCensus9x7, .banded = false},
                           {.size = {33, 21}, .range = {0, 100}, .banded = false, .right = RightView::kReadOff},
                           {.size = {24, 21}, .range = {0, 1024}}}) {
