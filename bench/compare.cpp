@@ -25,7 +25,7 @@ namespace {
 constexpr const char* kHelp =
     "egosgm_compare: this library and OpenCV's StereoSGBM modes on the same pair, in random turns, medians.\n"
     "  --size WxH        only this size (else 640x480, 1242x375, 1920x1080)\n"
-    "  --disparities N   only this range (else 64, 128, 256)\n"
+    "  --disparities N   only this range (else 64, 128, 256, which take turns, too, but not at 1920x1080)\n"
     "  --rounds N        turns (11)\n"
     "  --set NAME=VALUE  also a banded frame with this option; repeat it for several\n"
     "  --threads N       of PoCL and of OpenCV (2)\n"
@@ -259,13 +259,19 @@ void take_turn(benchmark::State& state, const Contender& contender) {
   }
 }
 
-void compare(const Clip& clip, int disparities, const Device& device, const Arguments& arguments,
+/// All contenders at all `ranges` take turns.
+void compare(const Clip& clip, const std::vector<int>& ranges, const Device& device, const Arguments& arguments,
              std::vector<Row>& rows) {
   const shared::ImageSize size{clip.frames.front().left.cols, clip.frames.front().left.rows};
-  const std::vector<Contender> list = contenders(clip, disparities, arguments.settings, device);
-  for (const Contender& contender : list) {
+  std::vector<std::pair<int, Contender>> list;
+  for (const int disparities : ranges) {
+    for (Contender& contender : contenders(clip, disparities, arguments.settings, device))
+      list.emplace_back(disparities, std::move(contender));
+  }
+  for (const auto& entry : list) {
+    const Contender& contender = entry.second;
     contender.turn();  // pays for what only a first turn costs
-    benchmark::RegisterBenchmark(benchmark_name(contender.name, size, disparities).c_str(),
+    benchmark::RegisterBenchmark(benchmark_name(contender.name, size, entry.first).c_str(),
                                  [&contender](benchmark::State& state) { take_turn(state, contender); })
         ->UseManualTime()
         ->Iterations(1)
@@ -273,11 +279,20 @@ void compare(const Clip& clip, int disparities, const Device& device, const Argu
   }
   std::vector<Row> found;
   run_registered(found);
-  for (const Contender& contender : list) {  // turns were random, the table is not
+  for (const auto& [disparities, contender] : list) {  // turns were random, the table is not
     for (const Row& row : found) {
-      if (row.name == contender.name) rows.push_back(row);
+      if (row.name == contender.name && row.disparities == disparities) rows.push_back(row);
     }
   }
+}
+
+/// The ranges that take turns: all, but one after the other where all at once would need some 17 GB (1920x1080).
+std::vector<std::vector<int>> turns_of(const std::vector<int>& ranges, shared::ImageSize size) {
+  constexpr std::size_t kMostPixels = std::size_t{1} << 20;
+  if (pixel_count(size) <= kMostPixels) return {ranges};
+  std::vector<std::vector<int>> each;
+  for (const int disparities : ranges) each.push_back({disparities});
+  return each;
 }
 
 const Row* find(const std::vector<Row>& rows, const char* name, shared::ImageSize size, int disparities) {
@@ -317,9 +332,8 @@ int run(int argc, char** argv) {
       print_machine(machine);
       std::printf("OpenCV %s, %d threads each\n", CV_VERSION, arguments.threads);
     }
-    for (const int disparities : arguments.disparities ? std::vector{*arguments.disparities} : all_ranges) {
-      compare(clip, disparities, device, arguments, rows);
-    }
+    const std::vector<int> ranges = arguments.disparities ? std::vector{*arguments.disparities} : all_ranges;
+    for (const std::vector<int>& together : turns_of(ranges, size)) compare(clip, together, device, arguments, rows);
   }
   print_ratios(rows);
   if (!arguments.json.empty()) write_json(arguments.json, machine, rows);
