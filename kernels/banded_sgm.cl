@@ -266,7 +266,7 @@ inline uchar16 path_cost_of_chunks(const uchar16 before, const uchar16 cost, con
   return path_cost(cost, before, below, above, p1, p2);
 }
 
-// As block.h has it of blocks.
+// As `mean_of` has it of blocks.
 inline uchar16 mean(const uchar16 a, const uchar16 b) {
   return convert_uchar16((convert_ushort16(a) + convert_ushort16(b) + (ushort16)(1)) >> (ushort16)(1));
 }
