@@ -136,7 +136,7 @@ class Chain {
         {"KalmanUpdate", [this] { kalman_update_(before_, updated_, predicted_, matched_, updated_); }, 3 * maps},
         {"PredictionCheck", [this] { prediction_check_(&before_, predicted_, predicted_, matched_, after_); }, map / 4},
         {"DynamicMap", [this] { dynamic_map_(&predicted_, matched_, warped_); }, 4 * map + grey / 2},
-        {"OutputVariance", [this] { output_variance_(updated_, 2, warped_, variance_); }, 9 * map},
+        {"OutputVariance", [this] { output_variance_(updated_, measured_, 2, warped_, variance_); }, 11 * map},
         {"SadCheck", [this] { sad_check_(images_.pixels, updated_, checked_); }, grey + 2 * maps},
         {"RightMap", [this] { right_map_(matched_, 1.0f, checked_); }, 5 * map / 2},
     };

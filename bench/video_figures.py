@@ -217,12 +217,12 @@ def of_thin_things(video, first, **options):
 
 
 def errors_and_variances(video, frames, **options):
-    """Absolute errors and variances of all pixels with truth and a disparity, of each of the frames numbered `frames`."""
+    """Errors (disparity - truth) and variances of all pixels with truth and a disparity, of each of the frames numbered `frames`."""
     pairs = []
     for k, frame in play(video, **options):
         if k in frames:
             known = is_valid(video.truth(k)) & is_valid(frame.disparity)
-            pairs.append((np.abs(frame.disparity - video.truth(k))[known].astype(float), frame.variance[known].astype(float)))
+            pairs.append(((frame.disparity - video.truth(k))[known].astype(float), frame.variance[known].astype(float)))
     return pairs
 
 
@@ -236,10 +236,20 @@ def interpolated(video, number, max_variances, **options):
     return figures
 
 
+def median_error(pairs):
+    return float(np.median(np.concatenate([errors for errors, _ in pairs])))
+
+
+def without_offset(pairs):
+    """The errors less each frame's median one: a step between cameras and truth that all matchers share is no pixel's uncertainty."""
+    return [(errors - np.median(errors), variances) for errors, variances in pairs]
+
+
 def calibration_of_variance(pairs, bins=10):
     """What the variances are worth. `ratio`: mean of error^2 / variance, errors cut at 3 px, since a few mismatches would decide it.
     `flatness`: the largest such ratio of the `bins` parts of the pixels in order of their variance, by the smallest. `removed`: percent
     of the bad pixels among the tenth of each frame with the largest variances. `bins`: predicted and actual deviation of those parts."""
+    pairs = [(np.abs(errors), variances) for errors, variances in pairs]
     errors, variances = (np.concatenate(values) for values in zip(*pairs))
     cut = np.minimum(errors, BAD_PX)**2
     removed = []

@@ -7,18 +7,20 @@
 
 namespace egosgm {
 
-/// The variance that is given out, of a disparity that may lie on a wrong surface too, from the filter's, which is that
-/// of a pixel on the right one: scale * (mean of the filter's over 17x17 pixels)^1.5 + roughness_weight * (mean over
-/// 7x7 pixels of how far the disparity is from a plane's)^2 + jump_weight * (largest difference to the disparities two
-/// pixels off)^2; of this sum v, v (1 + 2 v^2 / (v^2 + 1)) / (1 + v)^0.75.
+/// The variance that is given out, of a disparity that may lie on a wrong surface too, from the filter's p and the
+/// measurement's r, which are of a pixel on the right one: s = scale * (mean of (p r^3)^(1/4) over 17x17 pixels)^1.5 +
+/// roughness_weight * (mean over 7x7 pixels of how far the disparity is from a plane's)^2 + jump_weight * (largest
+/// difference to the disparities two pixels off)^2; and of this sum
+/// 0.16 s^2 / (s^2 + 0.06) + 1.2 sqrt(s) s^4 / (s^4 + 1).
 class OutputVariance {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   OutputVariance(ocl::Context& context, shared::ImageSize size, const OutputVarianceOptions& options, int pixels = 0);
 
   /// Writes `variance` [px^2], 0 where there is no disparity, of the left view or of both. The disparities of `scratch`
-  /// and its variances are overwritten.
-  void operator()(const StereoMaps& maps, int views, StereoMaps& scratch, ocl::Buffer<float>& variance);
+  /// and its variances are overwritten. `measured`: what the frame of `maps` measured; may be `maps`.
+  void operator()(const StereoMaps& maps, const StereoMaps& measured, int views, StereoMaps& scratch,
+                  ocl::Buffer<float>& variance);
 
  private:
   ocl::Context& context_;
@@ -26,7 +28,9 @@ class OutputVariance {
   const OutputVarianceOptions options_;
   const int pixels_;
   ocl::Buffer<float> mean_roughness_;
-  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, ocl::Buffer<float>> second_differences_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
+      of_each_pixel_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>,
               ocl::Buffer<float>>
       row_means_;

@@ -249,7 +249,7 @@ struct Pipeline::Impl {
     const StereoMaps* result = reason ? measured : updated;
     const StereoMaps* prediction = reason ? nullptr : &predicted;
     const bool is_output_variance = options.output_variance.enabled && wanted.variance_views > 0;
-    if (is_output_variance) output_variance(*result, wanted.variance_views, scratch, *wanted.variance);
+    if (is_output_variance) output_variance(*result, *measured, wanted.variance_views, scratch, *wanted.variance);
     const auto* dynamic = wanted.dynamic ? &dynamic_map(prediction, *measured, scratch) : nullptr;
     return {.result = result,
             .variance = is_output_variance ? wanted.variance : &result->variance,

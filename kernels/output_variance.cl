@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The variance that is given out: the filter's, averaged over the surroundings of a pixel, to the power 1.5, how rough
-// the disparities around it are, and how far they jump beside it. Most surfaces are planes, whose disparities have no
+// The variance that is given out: what measurement and filter say of the surroundings of a pixel, how rough the
+// disparities around it are, and how far they jump beside it. Most surfaces are planes, whose disparities have no
 // second difference; where those around a pixel have, or where there are holes, it is likely to be wrong. Beside a jump
 // it may lie on the wrong side.
 #include "pixels.h"
@@ -20,8 +20,20 @@ static inline Floats second_difference(const Floats before, const Floats at, con
   return valid ? cut(fabs((before + after) - 2.0f * at), EGOSGM_MAX_ROUGHNESS_PX) : (Floats)(EGOSGM_MAX_ROUGHNESS_PX);
 }
 
-// Sum of the horizontal and the vertical one. A pixel at the image's edge is its own neighbour.
-kernel void second_differences(const ImageSize size, global const float* disparity, global float* roughness) {
+// (p r^3)^(1/4), each cut; with nothing measured r is all that it may be. The filter takes the errors of its
+// measurements for independent; those of one surface are not, so that p falls from frame to frame and the errors
+// hardly.
+static inline Floats blend(const Floats p, const Floats measured, const Floats r) {
+  const Floats most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
+  const Floats cut_r = measured > INVALID ? cut(r, EGOSGM_MAX_MEAN_VARIANCE_PX2) : most;
+  return sqrt(cut_r * sqrt(cut_r * cut(p, EGOSGM_MAX_MEAN_VARIANCE_PX2)));
+}
+
+// Of each pixel: the variances' blend, and the sum of the horizontal and the vertical second difference. A pixel at the
+// image's edge is its own neighbour.
+kernel void of_each_pixel(const ImageSize size, global const float* disparity, global const float* variance,
+                          global const float* measured, global const float* measured_variance, global float* blended,
+                          global float* roughness) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
@@ -35,10 +47,13 @@ kernel void second_differences(const ImageSize size, global const float* dispari
     const Floats across = second_difference(left, d, right);
     const Floats down = second_difference(load_pixels(above, x, width), d, load_pixels(below, x, width));
     store_pixels(across + down, roughness + row, x, width);
+    const Floats p = load_pixels(variance + row, x, width);
+    const Floats r = load_pixels(measured_variance + row, x, width);
+    store_pixels(blend(p, load_pixels(measured + row, x, width), r), blended + row, x, width);
   }
 }
 
-// Means along the row: of the variances, each cut, at every fourth pixel; of the roughness at every pixel.
+// Means along the row: of the variances at every fourth pixel; of the roughness at every pixel.
 kernel void row_means(const ImageSize size, global const float* variance, global const float* roughness,
                       global float* mean_variance, global float* mean_roughness) {
   const int width = size.width;
@@ -48,7 +63,7 @@ kernel void row_means(const ImageSize size, global const float* variance, global
     Floats count = 0.0f;
     for (int u = -EGOSGM_VARIANCE_RADIUS; u <= EGOSGM_VARIANCE_RADIUS; u += EGOSGM_VARIANCE_STEP) {
       const Floats p = load_pixels(variance + row, x + u, width);
-      sum += cut(if_inside(p), EGOSGM_MAX_MEAN_VARIANCE_PX2);
+      sum += if_inside(p);
       count += counted(p);
     }
     store_pixels(sum / count, mean_variance + row, x, width);
@@ -92,10 +107,11 @@ static inline Floats jump_beside(global const float* view, const ImageSize size,
   return cut(most, EGOSGM_MAX_JUMP_PX);
 }
 
-// Measured on KITTI: sums around 1 px^2 say too little of a disparity's error, large ones too much. Keeps their order.
+// The error^2 of a disparity on the right surface, which levels off, and the chance of a wrong one times its error^2:
+// as measured on KITTI and synthetic streets. Keeps the order of the sums; none is too small or too large for it.
 static inline Floats calibrated(const Floats sum) {
-  const Floats square = sum * sum, root = sqrt(1.0f + sum);
-  return sum * (1.0f + 3.0f * square) / ((1.0f + square) * (root * sqrt(root)));
+  const Floats square = sum * sum;
+  return 0.16f / (1.0f + 0.06f / square) + 1.2f * sqrt(sum) / (1.0f + 1.0f / (square * square));
 }
 
 kernel void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,

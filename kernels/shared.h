@@ -61,7 +61,7 @@ typedef float f32;
 // next frame searches wide around it.
 #define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
 
-// OutputVariance: the filter's variance, each value cut, at every fourth pixel of the surroundings; the sum of two
+// OutputVariance: the filter's and the measurement's variance, each cut, at every fourth pixel around; the sum of two
 // second differences of disparities, each cut, at every pixel nearer by; and how far the disparities this far off to
 // eight sides are from a pixel's own, each cut.
 #define EGOSGM_VARIANCE_RADIUS 8

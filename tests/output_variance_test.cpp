@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "tests/reference/output_variance.h"
 #include "tests/support/compare.h"
@@ -17,18 +18,25 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 constexpr float kUntouched = -77;
 
 std::vector<float> output_variance(shared::ImageSize size, const testing::HostMaps& in,
-                                   const OutputVarianceOptions& options, int pixels = 0, int views = 2) {
+                                   const testing::HostMaps& measured_in, const OutputVarianceOptions& options,
+                                   int pixels = 0, int views = 2) {
   ocl::Context context(testing::any_device());
   OutputVariance stage(context, size, options, pixels);
-  const StereoMaps maps = testing::upload(context, size, in);
+  const StereoMaps maps = testing::upload(context, size, in), measured = testing::upload(context, size, measured_in);
   StereoMaps scratch = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));
   ocl::Buffer<float> variance(context, in.variance.size());
   variance.write(context, std::vector<float>(in.variance.size(), kUntouched));
-  stage(maps, views, scratch, variance);
+  stage(maps, measured, views, scratch, variance);
   const testing::HostMaps after = testing::download(context, maps);
   EXPECT_EQ(after.disparity, in.disparity);
   EXPECT_EQ(after.variance, in.variance);
   return variance.read(context);
+}
+
+/// Of what was just measured, as in the first frame.
+std::vector<float> output_variance(shared::ImageSize size, const testing::HostMaps& measured,
+                                   const OutputVarianceOptions& options, int pixels = 0, int views = 2) {
+  return output_variance(size, measured, measured, options, pixels, views);
 }
 
 class OutputVarianceTest : public ::testing::TestWithParam<shared::ImageSize> {};
@@ -37,9 +45,10 @@ TEST_P(OutputVarianceTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const double holes : {0.0, 0.3, 0.98}) {
     const testing::HostMaps maps = testing::random_maps(size, -40, 90, holes, 7);
-    const std::vector<float> expected = reference::output_variance(size, {}, maps);
+    const testing::HostMaps measured = testing::random_maps(size, -40, 90, 0.3, 8);
+    const std::vector<float> expected = reference::output_variance(size, {}, maps, measured);
     for (const int pixels : {1, 16}) {
-      EXPECT_TRUE(testing::same_bits(output_variance(size, maps, {}, pixels), expected, size))
+      EXPECT_TRUE(testing::same_bits(output_variance(size, maps, measured, {}, pixels), expected, size))
           << holes << " holes, by " << pixels;
     }
   }
@@ -48,7 +57,9 @@ TEST_P(OutputVarianceTest, EqualsReference) {
 INSTANTIATE_TEST_SUITE_P(Sizes, OutputVarianceTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
 
 /// What is given out for a sum of squares.
-float given_for(float sum) { return sum * (1 + 2 * sum * sum / (sum * sum + 1)) / std::pow(1 + sum, 0.75f); }
+float given_for(float sum) {
+  return 0.16f * sum * sum / (sum * sum + 0.06f) + 1.2f * std::pow(sum, 4.5f) / (std::pow(sum, 4.0f) + 1);
+}
 
 void expect_given_for(const std::vector<float>& sums, const std::vector<float>& variances, const char* what = "") {
   ASSERT_EQ(variances.size(), sums.size());
@@ -139,6 +150,30 @@ TEST(OutputVariance, CutsAVarianceThatSaysOnlyThatItIsLarge) {
       {1, 1}, [](int, int) { return 5.0f; }, [](int, int) { return EGOSGM_ESCAPED_VARIANCE_PX2; });
   const float most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
   EXPECT_FLOAT_EQ(output_variance({1, 1}, maps, {.scale = 1})[0], given_for(most * std::sqrt(most)));
+}
+
+TEST(OutputVariance, RestsOnTheMeasurementMoreThanOnTheFilter) {
+  const auto row_of = [](float disparity, float variance) {
+    return maps_of(
+        {9, 1}, [=](int, int) { return disparity; }, [=](int, int) { return variance; });
+  };
+  const auto expect_mean = [&](float mean, const testing::HostMaps& measured, const char* what) {
+    const std::vector<float> out = output_variance({9, 1}, row_of(5, 1.0f / 16), measured, {.scale = 1});
+    EXPECT_FLOAT_EQ(out[0], given_for(std::pow(mean, 1.5f))) << what;
+  };
+  expect_mean(0.5f, row_of(7, 1), "(1/16 * 1^3)^(1/4)");
+  const float most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
+  const float of_the_most = std::pow(most * most * most / 16, 0.25f);
+  expect_mean(of_the_most, row_of(7, EGOSGM_ESCAPED_VARIANCE_PX2), "cut");
+  expect_mean(of_the_most, row_of(kNone, 0), "nothing measured");
+}
+
+TEST(OutputVariance, KnowsNoSumThatIsTooSmallOrTooLarge) {
+  const testing::HostMaps maps = maps_of(
+      {1, 1}, [](int, int) { return 5.0f; }, [](int, int) { return 1.0f; });
+  const float all = std::numeric_limits<float>::max();
+  EXPECT_FLOAT_EQ(output_variance({1, 1}, maps, {.scale = all})[0], 0.16f + 1.2f * std::sqrt(all));
+  EXPECT_EQ(output_variance({1, 1}, maps, {.scale = 0})[0], 0);
 }
 
 TEST(OutputVariance, DoesNotMixTheViews) {

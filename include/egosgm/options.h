@@ -90,7 +90,7 @@ struct PredictionCheckOptions {
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
   // Of the averaged variance to the power 1.5; of the squares of the distance from a plane and of jumps beside [px^2].
-  float scale = 1.7f, roughness_weight = 1.6f, jump_weight = 0.02f;
+  float scale = 1.3f, roughness_weight = 1.2f, jump_weight = 0.02f;
 };
 struct DynamicMapOptions {
   bool enabled = false;            // of every frame, for DeviceMaps::dynamic; FrameOutputs::dynamic needs no option

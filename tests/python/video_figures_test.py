@@ -94,7 +94,7 @@ def test_bad_or_missing_counts_what_has_truth():
 def test_a_calibrated_variance_gives_one():
     random = np.random.default_rng(5)
     variance = random.uniform(0.05, 0.3, 20000)
-    errors = np.abs(random.normal(size=20000)) * np.sqrt(variance)
+    errors = random.normal(size=20000) * np.sqrt(variance)
     worth = figures.calibration_of_variance([(errors, variance)])
     assert worth["ratio"] == pytest.approx(1, abs=0.05)
     assert worth["flatness"] == pytest.approx(1, abs=0.2)
@@ -109,9 +109,18 @@ def test_a_variance_that_is_too_small_where_it_is_large():
     assert worth["flatness"] == pytest.approx(2)
 
 
+def test_an_offset_that_all_pixels_share_can_be_left_out():
+    random = np.random.default_rng(6)
+    variance = random.uniform(0.02, 0.5, 20000)
+    pairs = [(random.normal(size=20000) * np.sqrt(variance) + offset, variance) for offset in (0.5, -0.5)]
+    assert figures.median_error(pairs[:1]) == pytest.approx(0.5, abs=0.02)
+    assert figures.calibration_of_variance(pairs)["flatness"] > 2.5, "it weighs where the variance is small"
+    assert figures.calibration_of_variance(figures.without_offset(pairs))["flatness"] == pytest.approx(1, abs=0.2)
+
+
 def test_the_worst_tenth_by_variance():
     errors, variance = np.zeros(100), np.ones(100)
-    errors[:4] = 10
+    errors[:4] = 10, -10, 10, -10
     variance[[0, 1, 2]] = 9
     worth = figures.calibration_of_variance([(errors, variance)])
     assert worth["removed"] == 75

@@ -52,10 +52,9 @@ float mean(int i, int radius, int step, int end, At&& at) {
 }
 
 /// Of the means of the rows.
-float window_mean(const Plane& plane, int x, int y, int radius, int step, float most) {
-  return mean(y, radius, step, plane.size.height, [&](int v) {
-    return mean(x, radius, step, plane.size.width, [&](int u) { return std::min(plane(u, v), most); });
-  });
+float window_mean(const Plane& plane, int x, int y, int radius, int step) {
+  return mean(y, radius, step, plane.size.height,
+              [&](int v) { return mean(x, radius, step, plane.size.width, [&](int u) { return plane(u, v); }); });
 }
 
 /// The largest of the differences to the valid disparities EGOSGM_JUMP_DISTANCE pixels off, to eight sides.
@@ -72,27 +71,38 @@ float jump_beside(const Plane& disparity, int x, int y) {
   return std::min(most, EGOSGM_MAX_JUMP_PX);
 }
 
+/// (p r^3)^(1/4) of every pixel of both views, each cut.
+std::vector<float> blends(const testing::HostMaps& maps, const testing::HostMaps& measured) {
+  std::vector<float> out;
+  for (std::size_t i = 0; i < maps.variance.size(); ++i) {
+    const float most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
+    const bool is_measured = measured.disparity[i] != EGOSGM_INVALID_DISPARITY;
+    const float r = is_measured ? std::min(measured.variance[i], most) : most;
+    out.push_back(std::sqrt(r * std::sqrt(r * std::min(maps.variance[i], most))));
+  }
+  return out;
+}
+
 float calibrated(float sum) {
-  const float root = std::sqrt(1 + sum);
-  return sum * (1 + 3 * (sum * sum)) / ((1 + sum * sum) * (root * std::sqrt(root)));
+  const float square = sum * sum;
+  return 0.16f / (1 + 0.06f / square) + 1.2f * std::sqrt(sum) / (1 + 1 / (square * square));
 }
 
 }  // namespace
 
 std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
-                                   const testing::HostMaps& maps) {
+                                   const testing::HostMaps& maps, const testing::HostMaps& measured) {
   std::vector<float> out;
+  const std::vector<float> variances = blends(maps, measured);
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   for (std::size_t view = 0; view < 2; ++view) {
     const Plane disparity{size, maps.disparity.data() + view * pixels};
-    const Plane variance{size, maps.variance.data() + view * pixels};
+    const Plane variance{size, variances.data() + view * pixels};
     const std::vector<float> rough = roughness(disparity);
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) {
-        const float p =
-            window_mean(variance, x, y, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP, EGOSGM_MAX_MEAN_VARIANCE_PX2);
-        const float r =
-            window_mean({size, rough.data()}, x, y, EGOSGM_ROUGHNESS_RADIUS, 1, 2 * EGOSGM_MAX_ROUGHNESS_PX);
+        const float p = window_mean(variance, x, y, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP);
+        const float r = window_mean({size, rough.data()}, x, y, EGOSGM_ROUGHNESS_RADIUS, 1);
         const bool is_valid = disparity(x, y) != EGOSGM_INVALID_DISPARITY;
         const float j = jump_beside(disparity, x, y);
         const float sum =

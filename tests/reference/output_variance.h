@@ -10,6 +10,6 @@
 namespace egosgm::reference {
 
 std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
-                                   const testing::HostMaps& maps);
+                                   const testing::HostMaps& maps, const testing::HostMaps& measured);
 
 }  // namespace egosgm::reference

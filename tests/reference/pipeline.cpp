@@ -59,9 +59,9 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
         dynamic_map(size_, options_.dynamic_map.min_difference_px, frame.predicted, frame.passes.back().measured);
   }
   frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
-  frame.output_variance = options_.output_variance.enabled
-                              ? output_variance(size_, options_.output_variance, frame.result)
-                              : frame.result.variance;
+  frame.output_variance = options_.output_variance.enabled ? output_variance(size_, options_.output_variance,
+                                                                             frame.result, frame.passes.back().measured)
+                                                           : frame.result.variance;
   if (has_prediction && options_.search == SearchMode::kFull) frame.full_range_reason = "search is full";
   offset_ = frame.passes.back().offset;
   has_offset_ = true;

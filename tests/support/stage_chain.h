@@ -78,7 +78,7 @@ class StageChain {
     StereoMaps& result = has_prediction ? updated_ : measured_;
     frame.result = download(context_, result);
     frame.dynamic = dynamic_map_(has_prediction ? &predicted_ : nullptr, measured_, scratch_).read(context_);
-    output_variance_(result, 2, scratch_, transfer_.output_variance());
+    output_variance_(result, measured_, 2, scratch_, transfer_.output_variance());
     frame.output_variance =
         options_.output_variance.enabled ? transfer_.output_variance().read(context_) : frame.result.variance;
     std::swap(belief_, result);
