@@ -217,12 +217,14 @@ def of_thin_things(video, first, **options):
 
 
 def errors_and_variances(video, frames, **options):
-    """Errors (disparity - truth) and variances of all pixels with truth and a disparity, of each of the frames numbered `frames`."""
+    """Errors (disparity - truth) and variances of all pixels with truth and a disparity, and the block of 32x32 pixels that each lies
+    in, of each of the frames numbered `frames`."""
     pairs = []
     for k, frame in play(video, **options):
         if k in frames:
             known = is_valid(video.truth(k)) & is_valid(frame.disparity)
-            pairs.append(((frame.disparity - video.truth(k))[known].astype(float), frame.variance[known].astype(float)))
+            y, x = np.nonzero(known)
+            pairs.append(((frame.disparity - video.truth(k))[known].astype(float), frame.variance[known].astype(float), y // 32 * 1000 + x // 32))
     return pairs
 
 
@@ -237,19 +239,19 @@ def interpolated(video, number, max_variances, **options):
 
 
 def median_error(pairs):
-    return float(np.median(np.concatenate([errors for errors, _ in pairs])))
+    return float(np.median(np.concatenate([errors for errors, *_ in pairs])))
 
 
 def without_offset(pairs):
     """The errors less each frame's median one: a step between cameras and truth that all matchers share is no pixel's uncertainty."""
-    return [(errors - np.median(errors), variances) for errors, variances in pairs]
+    return [(errors - np.median(errors), *others) for errors, *others in pairs]
 
 
 def calibration_of_variance(pairs, bins=10):
     """What the variances are worth. `ratio`: mean of error^2 / variance, errors cut at 3 px, since a few mismatches would decide it.
     `flatness`: the largest such ratio of the `bins` parts of the pixels in order of their variance, by the smallest. `removed`: percent
     of the bad pixels among the tenth of each frame with the largest variances. `bins`: predicted and actual deviation of those parts."""
-    pairs = [(np.abs(errors), variances) for errors, variances in pairs]
+    pairs = [(np.abs(errors), variances) for errors, variances, *_ in pairs]
     errors, variances = (np.concatenate(values) for values in zip(*pairs))
     cut = np.minimum(errors, BAD_PX)**2
     removed = []
@@ -261,6 +263,21 @@ def calibration_of_variance(pairs, bins=10):
     return {"ratio": float(np.mean(cut / variances)), "ratio_not_bad": float(np.mean((errors**2 / variances)[errors <= BAD_PX])),
             "flatness": float(max(ratios) / min(ratios)), "removed": share(removed),
             "bins": [{"predicted_px": float(np.sqrt(variances[part].mean())), "actual_px": float(np.sqrt(cut[part].mean()))} for part in parts]}
+
+
+def flatness_by_chance(pairs, bins=10, rounds=1000, percentile=95):
+    """What `flatness` would stay below 95 of 100 times if the variances were flat: of frames whose blocks are drawn anew, as errors of
+    neighbours are alike, with each part's ratio divided by that of all blocks."""
+    errors, variances = (np.concatenate(values) for values in list(zip(*pairs))[:2])
+    blocks = np.unique(np.concatenate([block + 10**6 * n for n, (_, _, block) in enumerate(pairs)]), return_inverse=True)[1]
+    part = np.empty(len(variances), int)
+    for n, pixels in enumerate(np.array_split(np.argsort(variances, kind="stable"), bins)):
+        part[pixels] = n
+    cells = blocks * bins + part
+    sums = [np.bincount(cells, values, (blocks.max() + 1) * bins).reshape(-1, bins) for values in (np.minimum(np.abs(errors), BAD_PX)**2, variances)]
+    drawn = np.random.default_rng(1).multinomial(len(sums[0]), np.full(len(sums[0]), 1 / len(sums[0])), rounds)
+    ratios = (drawn @ sums[0]) / (drawn @ sums[1]) / (sums[0].sum(axis=0) / sums[1].sum(axis=0))
+    return float(np.percentile(ratios.max(axis=1) / ratios.min(axis=1), percentile))
 
 
 def dynamic_map(video, first, **options):

@@ -118,6 +118,18 @@ def test_an_offset_that_all_pixels_share_can_be_left_out():
     assert figures.calibration_of_variance(figures.without_offset(pairs))["flatness"] == pytest.approx(1, abs=0.2)
 
 
+def test_chance_alone_makes_tenths_differ():
+    random = np.random.default_rng(7)
+    variance = random.uniform(0.02, 0.5, 20000)
+    fours = np.arange(20000) // 4
+    independent = figures.flatness_by_chance([(random.normal(size=20000) * np.sqrt(variance), variance, fours)])
+    assert 1.05 < independent < 1.25
+    assert figures.flatness_by_chance([(random.normal(size=20000) * variance, variance, fours)]) < 1.25, "how flat it is does not count"
+    alike = np.repeat(random.normal(size=200) * 0.3, 100)
+    of_a_block = np.repeat(random.uniform(0.02, 0.5, 200), 100)
+    assert figures.flatness_by_chance([(alike, of_a_block, np.arange(20000) // 100)]) > 1.5
+
+
 def test_the_worst_tenth_by_variance():
     errors, variance = np.zeros(100), np.ones(100)
     errors[:4] = 10, -10, 10, -10
