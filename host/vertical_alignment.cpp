@@ -2,12 +2,14 @@
 #include "host/vertical_alignment.h"
 
 #include <algorithm>
+#include <vector>
 
 namespace egosgm {
 namespace {
 
 // As kernels/vertical_alignment.cl has them.
-constexpr int kFirstRow = 4, kRowStride = 4;
+constexpr int kFirstRow = 4, kRowStride = 4, kSums = 9;
+constexpr std::size_t kState = EGOSGM_OFFSET_TERMS + 1;
 
 const cl::Program& build(ocl::Context& context, PixelType type, int row_group) {
   context.enter("VerticalAlignment");
@@ -33,9 +35,9 @@ VerticalAlignment::VerticalAlignment(ocl::Context& context, shared::ImageSize si
       sum_rows_u16_(build(context, PixelType::kU16, row_group_), "sum_rows"),
       update_(build(context, PixelType::kU8, row_group_), "update"),
       aligned_{ocl::Buffer<cl_uchar>(context, options.enabled ? 2 * 2 * pixel_count(size) : 0), PixelType::kU8},
-      row_sums_(context, 3 * static_cast<std::size_t>(sampled_rows(size))),
-      states_{{context, 2}, {context, 2}, {context, 2}, {context, 2}, {context, 2}} {
-  states_[kUnknown].write(context, {0.0f, 0.0f});
+      row_sums_(context, kSums * static_cast<std::size_t>(sampled_rows(size))),
+      states_{{context, kState}, {context, kState}, {context, kState}, {context, kState}, {context, kState}} {
+  states_[kUnknown].write(context, std::vector<float>(kState));
 }
 
 const FrameImages& VerticalAlignment::align(const FrameImages& images) {
@@ -61,7 +63,8 @@ void VerticalAlignment::estimate(const FrameImages& aligned, const StereoMaps& m
   sum_rows(context_, ocl::group_a_row({size_.width, rows}, row_group_, 1), size_, aligned.pixels, measured.disparity,
            row_sums_);
   const int next = free_state();
-  update_(context_, {cl::NDRange(1), cl::NDRange(1)}, rows, options_.gain, row_sums_, states_[working_], states_[next]);
+  update_(context_, {cl::NDRange(1), cl::NDRange(1)}, size_, rows, options_.gain, row_sums_, states_[working_],
+          states_[next]);
   working_ = next;
 }
 

@@ -8,8 +8,8 @@
 namespace egosgm {
 
 /// Takes out what rectification left between the rows of the views. A left pixel (x, y) lies at (x - d, y + dy) in the
-/// right image, with one dy for the whole image; dy is estimated from matched pixels (a robust step of Lucas and
-/// Kanade 1981 a frame) and the right image resampled, so that rows correspond.
+/// right image, dy a quadratic of that place; it is estimated from matched pixels (a robust step of Lucas and Kanade
+/// 1981 a frame) and the right image resampled, so that rows correspond.
 ///
 /// A steady frame:  images = align(upload); match; estimate(images, measured); ...; commit.
 /// The first frame: images = align(upload); match; estimate(images, measured); images = realign(upload); match; ...
@@ -20,7 +20,7 @@ class VerticalAlignment {
   VerticalAlignment(ocl::Context& context, shared::ImageSize size, const VerticalAlignmentOptions& options,
                     int row_group = 0);
 
-  /// The images with the right one resampled by the committed offset, in memory of this stage that the next call
+  /// The images with the right one resampled by the committed offsets, in memory of this stage that the next call
   /// overwrites; `images` itself where nothing is known or the option is off.
   const FrameImages& align(const FrameImages& images);
 
@@ -45,7 +45,7 @@ class VerticalAlignment {
   /// Whether no frame has committed an estimate yet: a frame that is worth two passes. False where the option is off.
   bool is_unknown() const { return options_.enabled && committed_ == kUnknown; }
 
-  /// Element 0: the offset dy [px] by which the last `align` or `realign` resampled the right image.
+  /// Element 0: the offset dy [px] by which the last `align` or `realign` resampled the middle of the right image.
   const ocl::Buffer<float>& offset_px() const { return states_[applied_]; }
 
  private:
@@ -63,11 +63,12 @@ class VerticalAlignment {
       ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, const ocl::Buffer<float>, ocl::Buffer<cl_long>>;
   ResampleKernel resample_u8_, resample_u16_;
   SumKernel sum_rows_u8_, sum_rows_u16_;
-  ocl::Kernel<const cl_int, const float, const ocl::Buffer<cl_long>, const ocl::Buffer<float>, ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const ocl::Buffer<cl_long>, const ocl::Buffer<float>,
+              ocl::Buffer<float>>
       update_;
   FrameImages aligned_;
   ocl::Buffer<cl_long> row_sums_;  // of each sampled row: see the kernel
-  ocl::Buffer<float> states_[5];   // offset [px], and the number of estimates that it rests on
+  ocl::Buffer<float> states_[5];   // see `update` in the kernel
   State committed_ = kUnknown, working_ = kUnknown, applied_ = kUnknown, kept_ = kUnknown;
 };
 

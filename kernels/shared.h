@@ -61,6 +61,9 @@ typedef float f32;
 // next frame searches wide around it.
 #define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
 
+// VerticalAlignment's quadratic: 1, u, v, u v, u^2, v^2.
+#define EGOSGM_OFFSET_TERMS 6
+
 // OutputVariance: the filter's and the measurement's variance, each cut, at every fourth pixel around; the sum of two
 // second differences of disparities, each cut, at every pixel nearer by; and how far the disparities this far off to
 // eight sides are from a pixel's own, each cut.

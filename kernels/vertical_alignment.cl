@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// The vertical offset dy between the rows of the views: I(x, y) = J(x - d, y + dy), left image I, right image J.
+// The vertical offset dy between the rows of the views: I(x, y) = J(x - d, y + dy), left image I, right image J; a
+// quadratic of the place in the right image, since what is left of a rotation or of the lenses grows to the corners.
 //
-// With the right image resampled by the offset known so far, what is left of it minimises the sum of Huber's function
-// of r = I(x, y) - J(x - d, y + step) over the pixels; a Newton step is sum(g clamp(r)) / sum(g_I g_J), the latter
-// where r is not clamped, with g the mean of the vertical gradients g_I and g_J (after Lucas and Kanade 1981). Smoothed
-// rows for r, g of both images, and the product of the two gradients instead of g g: so the noise of a pixel biases
-// neither sum. All sums are of integers, so their order does not matter.
+// With the right image resampled by the offsets known so far, what is left of them minimises the sum of Huber's
+// function of r = I(x, y) - J(x - d, y + step) over the pixels; a Newton step solves sum(g_I g_J b b^T) step = sum(g
+// clamp(r) b), the former where r is not clamped, with b the quadratic's terms, and g the mean of the vertical
+// gradients g_I and g_J (after Lucas and Kanade 1981). Smoothed rows for r, g of both images, and the product of the
+// two gradients instead of g g: so the noise of a pixel biases neither sum. All sums of a row are of integers, so their
+// order does not matter.
 #include "grey.h"
 
 // lint: PIXEL_BYTES=1 ROW_GROUP=1
@@ -32,34 +34,53 @@ typedef uint Weight;
 // Rows are resampled in 256ths of a pixel, columns read in 16ths.
 #define ROW_STEPS 256
 #define COLUMN_STEPS 16
+#define BLOCK 16
+#define PLACES 256  // from the middle of the image to its end
+
+#define MAX_OFFSET 2.0f  // [px]
 
 inline int clamp_row(const int y, const int height) { return clamp(y, 0, height - 1); }
 
-// Copies the left image, and resamples the right one by state[0] pixels. A work-group of ROW_GROUP a row and view.
+// Where among `count` rows or columns, in `steps` from the middle to either end.
+inline int place(const int at, const int count, const int steps) {
+  return convert_int_rte((float)(2 * at + 1 - count) * ((float)steps / (float)count));
+}
+
+// Copies the left image, and resamples the right one by the quadratic state[0] + state[1] u + state[2] v + state[3] u v
+// + state[4] u^2 + state[5] v^2 pixels; u, v: -1 to 1 over the image. A work-group of ROW_GROUP a row and view.
 kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(const ImageSize size,
                                                                             global const float* state,
                                                                             global const uchar* images,
                                                                             global uchar* aligned) {
-  const int lane = get_local_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  const int offset = view == EGOSGM_RIGHT ? convert_int_rte(state[0] * ROW_STEPS) : 0;
-  const int above = y + (offset >> 8);
-  const Weight weight = offset & (ROW_STEPS - 1);
+  const int is_moved = view == EGOSGM_RIGHT;
+  const float v = (float)place(y, size.height, PLACES) / PLACES;
+  const float constant_term = (state[0] + state[2] * v) + state[5] * (v * v);
+  const float linear_term = state[1] + state[3] * v;
+  const float square_term = state[4];
   const size_t first = (size_t)view * size.height * size.width;
-  global const Pixel* upper = (global const Pixel*)images + first + (size_t)clamp_row(above, size.height) * size.width;
-  global const Pixel* lower =
-      (global const Pixel*)images + first + (size_t)clamp_row(above + 1, size.height) * size.width;
+  global const Pixel* from = (global const Pixel*)images + first;
   global Pixel* to = (global Pixel*)aligned + first + (size_t)y * size.width;
 
-  const int whole = size.width & ~15;
-  for (int x = lane * 16; x < whole; x += ROW_GROUP * 16) {
-    const Wide sum =
-        vload_pixels(0, upper + x) * (Wide)(ROW_STEPS - weight) + vload_pixels(0, lower + x) * (Wide)(weight);
-    vstore16(convert_pixels((sum + (Wide)(ROW_STEPS / 2)) >> (Wide)(8)), 0, to + x);
-  }
-  for (int x = whole + lane; x < size.width; x += ROW_GROUP) {
-    to[x] = ((uint)upper[x] * (ROW_STEPS - weight) + (uint)lower[x] * weight + ROW_STEPS / 2) >> 8;
+  // One offset for BLOCK columns: it changes by less than a 20th of a pixel over them.
+  for (int x = get_local_id(0) * BLOCK; x < size.width; x += ROW_GROUP * BLOCK) {
+    const float u = (float)place(x + BLOCK / 2, size.width, PLACES) / PLACES;
+    const float dy = clamp(constant_term + (linear_term + square_term * u) * u, -MAX_OFFSET, MAX_OFFSET);
+    const int offset = is_moved ? convert_int_rte(dy * ROW_STEPS) : 0;
+    const int above = y + (offset >> 8);
+    const Weight weight = offset & (ROW_STEPS - 1);
+    global const Pixel* upper = from + (size_t)clamp_row(above, size.height) * size.width;
+    global const Pixel* lower = from + (size_t)clamp_row(above + 1, size.height) * size.width;
+    if (x + BLOCK <= size.width) {
+      const Wide sum =
+          vload_pixels(0, upper + x) * (Wide)(ROW_STEPS - weight) + vload_pixels(0, lower + x) * (Wide)(weight);
+      vstore16(convert_pixels((sum + (Wide)(ROW_STEPS / 2)) >> (Wide)(8)), 0, to + x);
+    } else {
+      for (int i = x; i < size.width; ++i) {
+        to[i] = ((uint)upper[i] * (ROW_STEPS - weight) + (uint)lower[i] * weight + ROW_STEPS / 2) >> 8;
+      }
+    }
   }
 }
 
@@ -74,7 +95,15 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
 #define MAX_RESIDUAL (12 * GREY)  // beyond, it is rather a wrong match or an occlusion than an offset
 #define MIN_GRADIENT (2 * GREY)   // below, it is noise
 
-// Sums of g clamp(r), g_I g_J and 1 over a row. A work-group of ROW_GROUP a sampled row.
+// Of a row: sums of g clamp(r) u^n for n = 0 to 2, of g_I g_J u^n for n = 0 to 4, and of 1; u: the column in the right
+// image, -COARSE_PLACES to COARSE_PLACES, so that no sum is too large for 63 bits. A work-group of ROW_GROUP a sampled
+// row.
+#define COARSE_PLACES 32
+#define GR_SUMS 3
+#define GG_SUMS 5
+#define COUNT (GR_SUMS + GG_SUMS)
+#define SUMS (COUNT + 1)
+
 kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
                                                                             global const uchar* images,
                                                                             global const float* disparity,
@@ -84,9 +113,7 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
   const int y = FIRST_ROW + sampled_row * ROW_STRIDE;
   const size_t width = size.width;
   const float last = (float)(COLUMN_STEPS * (size.width - 2));
-  long gr = 0;
-  long gg = 0;
-  int count = 0;
+  long sums[SUMS] = {0};
   if (y + FIRST_ROW < size.height) {
     const size_t row = (size_t)y * width;
     global const Pixel* left = (global const Pixel*)images + row;
@@ -112,53 +139,97 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
       const int g = g_left + g_right;
       const int is_textured = abs(g) >= MIN_GRADIENT;
       const int is_inlier = is_textured & (abs(r) < MAX_RESIDUAL);
-      gr += is_textured ? g * clamp(r, -MAX_RESIDUAL, MAX_RESIDUAL) : 0;
-      gg += is_inlier ? 4 * g_left * g_right : 0;  // each is half of what g is
-      count += is_inlier;
+      const int place_u = place((int)u, size.width, COARSE_PLACES);
+      long gr = is_textured ? g * clamp(r, -MAX_RESIDUAL, MAX_RESIDUAL) : 0;
+      long gg = is_inlier ? 4 * g_left * g_right : 0;  // each is half of what g is
+      for (int n = 0; n < GR_SUMS; ++n, gr *= place_u) sums[n] += gr;
+      for (int n = 0; n < GG_SUMS; ++n, gg *= place_u) sums[GR_SUMS + n] += gg;
+      sums[COUNT] += is_inlier;
     }
   }
 #if ROW_GROUP > 1
-  local long totals[3][ROW_GROUP];
-  totals[0][lane] = gr;
-  totals[1][lane] = gg;
-  totals[2][lane] = count;
+  local long totals[SUMS][ROW_GROUP];
+  for (int n = 0; n < SUMS; ++n) totals[n][lane] = sums[n];
   barrier(CLK_LOCAL_MEM_FENCE);
   for (int i = 1; lane == 0 && i < ROW_GROUP; ++i) {
-    gr += totals[0][i];
-    gg += totals[1][i];
-    count += totals[2][i];
+    for (int n = 0; n < SUMS; ++n) sums[n] += totals[n][i];
   }
 #endif
   if (lane == 0) {
-    row_sums[3 * sampled_row] = gr;
-    row_sums[3 * sampled_row + 1] = gg;
-    row_sums[3 * sampled_row + 2] = count;
+    for (int n = 0; n < SUMS; ++n) row_sums[SUMS * sampled_row + n] = sums[n];
   }
 }
 
+#define TERMS EGOSGM_OFFSET_TERMS
 #define MIN_SAMPLES 256     // fewer tell nothing
-#define MAX_STEP 1.0f       // of a frame [px]: beyond, the linearisation does not hold
-#define MAX_OFFSET 2.0f     // [px]
+#define MAX_STEP 1.0f       // of a term in a frame [px]: beyond, the linearisation does not hold
 #define MAX_ESTIMATES 1e6f  // counted no further
+// Pulls all terms but the first to 0, as if this share of the samples said so: where they lie in a corner of the image,
+// they tell nothing of the others.
+#define PRIOR 0.003f
 
-// The step of a frame, by the running mean of the frames so far at first and then at a fixed gain. state: offset [px],
-// and the number of estimates that it rests on. A single work-item; `state` and `next` may be the same.
-kernel void update(const int sampled_rows, const float gain, global const long* row_sums, global const float* state,
-                   global float* next) {
+constant const int POWER_OF_U[TERMS] = {0, 1, 0, 1, 2, 0};
+constant const int POWER_OF_V[TERMS] = {0, 0, 1, 1, 0, 2};
+
+// Solves matrix * x = x in place, by Cholesky's square-root-free form; the matrix's lower half is lost. Returns 0 where
+// a pivot is below `least`.
+inline int solve(float matrix[TERMS][TERMS], float x[TERMS], const float least) {
+  for (int i = 0; i < TERMS; ++i) {
+    for (int j = 0; j < i; ++j) {
+      const float factor = matrix[i][j] / matrix[j][j];
+      for (int k = j + 1; k <= i; ++k) matrix[i][k] -= factor * matrix[k][j];
+      x[i] -= factor * x[j];
+    }
+    if (!(matrix[i][i] > least)) return 0;
+  }
+  for (int i = TERMS - 1; i >= 0; --i) {
+    for (int k = i + 1; k < TERMS; ++k) x[i] -= matrix[k][i] * x[k];
+    x[i] /= matrix[i][i];
+  }
+  return 1;
+}
+
+// The step of a frame, by the running mean of the frames so far at first and then at a fixed gain. state: the terms of
+// the offset [px], and the number of estimates that they rest on. A single work-item; `state` and `next` may be the
+// same.
+kernel void update(const ImageSize size, const int sampled_rows, const float gain, global const long* row_sums,
+                   global const float* state, global float* next) {
   if (get_global_id(0) > 0) return;
-  long gr = 0;
-  long gg = 0;
+  float matrix[TERMS][TERMS] = {{0.0f}};
+  float step[TERMS] = {0.0f};
   long count = 0;
   for (int row = 0; row < sampled_rows; ++row) {
-    gr += row_sums[3 * row];
-    gg += row_sums[3 * row + 1];
-    count += row_sums[3 * row + 2];
+    global const long* sums = row_sums + SUMS * row;
+    const float v = (float)place(FIRST_ROW + row * ROW_STRIDE, size.height, PLACES) / PLACES;
+    const float powers_of_v[GG_SUMS] = {1.0f, v, v * v, v * v * v, v * v * v * v};
+    float gr[GR_SUMS];
+    float gg[GG_SUMS];
+    float unit = 1.0f;
+    for (int n = 0; n < GG_SUMS; ++n, unit /= COARSE_PLACES) {
+      if (n < GR_SUMS) gr[n] = (float)sums[n] * unit;
+      gg[n] = (float)sums[GR_SUMS + n] * unit;
+    }
+    count += sums[COUNT];
+    for (int i = 0; i < TERMS; ++i) {
+      step[i] += gr[POWER_OF_U[i]] * powers_of_v[POWER_OF_V[i]];
+      for (int j = 0; j <= i; ++j) {
+        matrix[i][j] += gg[POWER_OF_U[i] + POWER_OF_U[j]] * powers_of_v[POWER_OF_V[i] + POWER_OF_V[j]];
+      }
+    }
   }
-  const float offset = state[0];
-  const float estimates = state[1];
-  const int enough = (count >= MIN_SAMPLES) & (gg > 0);
-  const float step = enough ? clamp((float)gr / (float)gg, -MAX_STEP, MAX_STEP) : 0.0f;
+  const float all = matrix[0][0];
+  const float mean_step = step[0] / all;
+  for (int i = 1; i < TERMS; ++i) {
+    matrix[i][i] += PRIOR * all;
+    step[i] -= PRIOR * all * state[i];
+  }
+  const int enough = (count >= MIN_SAMPLES) & (all > 0.0f);
+  const int has_terms = enough && solve(matrix, step, 0.5f * PRIOR * all);
+  const float estimates = state[TERMS];
   const float share = fmax(gain, 1.0f / fmax(estimates, 1.0f));
-  next[0] = clamp(offset + share * step, -MAX_OFFSET, MAX_OFFSET);
-  next[1] = enough ? fmin(estimates + 1.0f, MAX_ESTIMATES) : estimates;
+  for (int i = 0; i < TERMS; ++i) {
+    const float change = has_terms ? step[i] : enough && i == 0 ? mean_step : 0.0f;
+    next[i] = clamp(state[i] + share * clamp(change, -MAX_STEP, MAX_STEP), -MAX_OFFSET, MAX_OFFSET);
+  }
+  next[TERMS] = enough ? fmin(estimates + 1.0f, MAX_ESTIMATES) : estimates;
 }

@@ -164,7 +164,7 @@ TEST(PipelineScene, ReachesEveryStage) {
   const reference::Frame first = twin.process(video.twin_images(0), {});
   const reference::Frame second = twin.process(video.twin_images(1), video.twin_motions(1));
   ASSERT_EQ(first.passes.size(), 2u);
-  EXPECT_NEAR(first.passes[0].offset.offset_px, setting.vertical_offset_px, 0.3);
+  EXPECT_NEAR(first.passes[0].offset.terms_px[0], setting.vertical_offset_px, 0.3);
   const auto differ = [](const HostMaps& a, const HostMaps& b) { return a.disparity != b.disparity; };
   EXPECT_TRUE(differ(second.warped, second.without_edges));
   EXPECT_TRUE(differ(second.without_edges, second.filled));

@@ -44,7 +44,7 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   const int passes = options_.vertical_alignment.enabled && !has_offset_ ? 2 : 1;
   for (int pass = 0; pass < passes; ++pass) {
     const VerticalOffset known = pass == 0 ? offset_ : frame.passes.back().offset;
-    frame.vertical_offset_px = known.offset_px;
+    frame.vertical_offset_px = known.terms_px[0];
     frame.passes.push_back(match(images, frame, known));
   }
   if (options_.prediction_check.enabled) {
@@ -80,12 +80,12 @@ void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
   frame.predicted = consistency_check(size_, options_.consistency.prediction_px, true, frame.filled);
 }
 
-Pass Pipeline::match(const Images& images, const Frame& frame, VerticalOffset known) const {
+Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOffset& known) const {
   const BandedSgmOptions& sgm = options_.banded_sgm;
   const bool everything = frame.predicted.disparity.empty() || options_.search == SearchMode::kFull;
   const bool reads_off = !frame.predicted.disparity.empty() && !options_.track_right;
   Pass pass;
-  pass.images = resample(size_, known.offset_px, images.greys);
+  pass.images = resample(size_, known, images.greys);
   if (!everything && options_.coarse_match.enabled) {
     pass.coarse = coarse_match(size_, options_, pass.images, images.bits);
   }

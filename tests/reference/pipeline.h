@@ -45,7 +45,7 @@ struct Frame {
   testing::HostMaps result;  // on which the next frame rests
   std::vector<std::uint8_t> dynamic;
   std::vector<float> output_variance;  // given out in place of the result's
-  float vertical_offset_px = 0;        // that the last pass was resampled by
+  float vertical_offset_px = 0;        // that the last pass was resampled by in the middle
 };
 
 /// The twins of the stages, in the order of host/pipeline.cpp.
@@ -59,7 +59,7 @@ class Pipeline {
 
  private:
   void predict(const ViewMotions& motions, Frame& frame) const;
-  Pass match(const Images& images, const Frame& frame, VerticalOffset known) const;
+  Pass match(const Images& images, const Frame& frame, const VerticalOffset& known) const;
   void update(const Images& images, Frame& frame) const;
 
   shared::ImageSize size_;

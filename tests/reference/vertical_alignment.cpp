@@ -8,31 +8,71 @@
 namespace egosgm::reference {
 namespace {
 
+constexpr int kTerms = EGOSGM_OFFSET_TERMS;
+
 int floor_divided(int a, int b) { return a / b - (a % b < 0 ? 1 : 0); }
+
+/// From -steps to steps over `count` rows or columns.
+int place(int at, int count, int steps) {
+  const float from_middle = static_cast<float>(2 * at + 1 - count);
+  return static_cast<int>(std::nearbyint(from_middle * (static_cast<float>(steps) / static_cast<float>(count))));
+}
+
+/// Solves matrix * x = right by Gauss's elimination, of which it needs the lower half. False where a pivot is not above
+/// `least`.
+bool solve(std::array<std::array<float, kTerms>, kTerms> matrix, std::array<float, kTerms>& x, float least) {
+  for (int j = 0; j < kTerms; ++j) {
+    if (!(matrix[j][j] > least)) return false;
+    for (int i = j + 1; i < kTerms; ++i) {
+      const float factor = matrix[i][j] / matrix[j][j];
+      for (int k = j + 1; k <= i; ++k) matrix[i][k] -= factor * matrix[k][j];
+      x[i] -= factor * x[j];
+    }
+  }
+  for (int i = kTerms - 1; i >= 0; --i) {
+    for (int k = i + 1; k < kTerms; ++k) x[i] -= matrix[k][i] * x[k];
+    x[i] /= matrix[i][i];
+  }
+  return true;
+}
 
 }  // namespace
 
-std::vector<int> resample(shared::ImageSize size, float offset_px, const std::vector<int>& images) {
+float offset_at(shared::ImageSize size, const VerticalOffset& offset, int x, int y) {
+  const auto& c = offset.terms_px;
+  const float u = static_cast<float>(place(x, size.width, 256)) / 256;
+  const float v = static_cast<float>(place(y, size.height, 256)) / 256;
+  const float along_v = (c[0] + c[2] * v) + c[5] * (v * v), along_u = c[1] + c[3] * v;
+  return std::clamp(along_v + (along_u + c[4] * u) * u, -2.0f, 2.0f);
+}
+
+std::vector<int> resample(shared::ImageSize size, const VerticalOffset& offset, const std::vector<int>& images) {
   std::vector<int> aligned = images;
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
-  const int offset = static_cast<int>(std::nearbyint(offset_px * 256.0f));
-  const int rows = floor_divided(offset, 256), part = offset - 256 * rows;
   for (int y = 0; y < size.height; ++y) {
-    const int above = std::clamp(y + rows, 0, size.height - 1), below = std::clamp(y + rows + 1, 0, size.height - 1);
     for (int x = 0; x < size.width; ++x) {
-      const auto value = [&](int row) { return images[pixels + static_cast<std::size_t>(row) * size.width + x]; };
+      const float offset_px = offset_at(size, offset, x / 16 * 16 + 8, y);
+      const int steps = static_cast<int>(std::nearbyint(offset_px * 256.0f));
+      const int rows = floor_divided(steps, 256), part = steps - 256 * rows;
+      const auto value = [&](int row) {
+        return images[pixels + static_cast<std::size_t>(std::clamp(row, 0, size.height - 1)) * size.width + x];
+      };
       aligned[pixels + static_cast<std::size_t>(y) * size.width + x] =
-          (value(above) * (256 - part) + value(below) * part + 128) / 256;
+          (value(y + rows) * (256 - part) + value(y + rows + 1) * part + 128) / 256;
     }
   }
   return aligned;
 }
 
 VerticalOffset estimate_offset(shared::ImageSize size, float gain, const std::vector<int>& aligned, int grey,
-                               const std::vector<float>& left_disparity, VerticalOffset known) {
+                               const std::vector<float>& left_disparity, const VerticalOffset& known) {
+  constexpr int kPowerOfU[] = {0, 1, 0, 1, 2, 0}, kPowerOfV[] = {0, 0, 1, 1, 0, 2};
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
-  std::int64_t gr = 0, gg = 0, count = 0;
+  std::array<std::array<float, kTerms>, kTerms> matrix{};
+  std::array<float, kTerms> step{};
+  std::int64_t count = 0;
   for (int y = 4; y < size.height - 4; y += 4) {
+    std::int64_t row_gr[3] = {}, row_gg[5] = {};  // times powers of u
     for (int x = 0; x < size.width; x += 2) {
       const float d = left_disparity[static_cast<std::size_t>(y) * size.width + x];
       if (d == EGOSGM_INVALID_DISPARITY) continue;
@@ -52,16 +92,38 @@ VerticalOffset estimate_offset(shared::ImageSize size, float gain, const std::ve
       const std::int64_t g_left = to_8_bit(left(y + 1) - left(y - 1)), g_right = to_8_bit(right(y + 1) - right(y - 1));
       const std::int64_t g = g_left + g_right, max_r = 12 * 64;
       if (std::abs(g) < 2 * 64) continue;
-      gr += g * std::clamp(r, -max_r, max_r);
-      if (std::abs(r) >= max_r) continue;
-      gg += 4 * g_left * g_right;
-      ++count;
+      const std::int64_t right_place = place(u, size.width, 32);
+      std::int64_t gr = g * std::clamp(r, -max_r, max_r), gg = std::abs(r) < max_r ? 4 * g_left * g_right : 0;
+      for (std::int64_t& sum : row_gr) sum += gr, gr *= right_place;
+      for (std::int64_t& sum : row_gg) sum += gg, gg *= right_place;
+      count += std::abs(r) < max_r ? 1 : 0;
+    }
+    const float v = static_cast<float>(place(y, size.height, 256)) / 256;
+    const float of_v[] = {1, v, v * v, v * v * v, v * v * v * v},
+                of_u[] = {1, 1.0f / 32, 1.0f / 1024, 0x1p-15f, 0x1p-20f};
+    for (int i = 0; i < kTerms; ++i) {
+      const int u_i = kPowerOfU[i], v_i = kPowerOfV[i];
+      step[i] += static_cast<float>(row_gr[u_i]) * of_u[u_i] * of_v[v_i];
+      for (int j = 0; j <= i; ++j) {
+        const int u_ij = u_i + kPowerOfU[j], v_ij = v_i + kPowerOfV[j];
+        matrix[i][j] += static_cast<float>(row_gg[u_ij]) * of_u[u_ij] * of_v[v_ij];
+      }
     }
   }
-  if (count < 256 || gg <= 0) return known;
-  const float step = std::clamp(static_cast<float>(gr) / static_cast<float>(gg), -1.0f, 1.0f);
+  const float all = matrix[0][0];
+  if (count < 256 || all <= 0) return known;
+  const float mean_step = step[0] / all;
+  for (int i = 1; i < kTerms; ++i) {
+    matrix[i][i] += 0.003f * all;
+    step[i] -= 0.003f * all * known.terms_px[i];
+  }
+  if (!solve(matrix, step, 0.5f * 0.003f * all)) step = {mean_step};
   const float share = std::max(gain, 1.0f / std::max(known.estimates, 1.0f));
-  return {std::clamp(known.offset_px + share * step, -2.0f, 2.0f), std::min(known.estimates + 1, 1e6f)};
+  VerticalOffset next{known.terms_px, std::min(known.estimates + 1, 1e6f)};
+  for (int i = 0; i < kTerms; ++i) {
+    next.terms_px[i] = std::clamp(known.terms_px[i] + share * std::clamp(step[i], -1.0f, 1.0f), -2.0f, 2.0f);
+  }
+  return next;
 }
 
 }  // namespace egosgm::reference
