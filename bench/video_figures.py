@@ -280,6 +280,34 @@ def flatness_by_chance(pairs, bins=10, rounds=1000, percentile=95):
     return float(np.percentile(ratios.max(axis=1) / ratios.min(axis=1), percentile))
 
 
+def least_flatness(scenes, bins=10, levels=200):
+    """The least that the largest `flatness` of the scenes (lists as `errors_and_variances` gives them) can become by a function of the
+    variance that keeps its order: no scale, floor or curve does better. The function has `levels` steps; for a flatness F, whether there is
+    one is a linear programme: part i of scene s holds f(variances)_si <= h_s errors^2_si <= F f(variances)_si on average."""
+    from scipy.optimize import linprog
+    scenes = [[np.concatenate(values) for values in list(zip(*pairs))[:2]] for pairs in scenes]
+    edges = np.quantile(np.concatenate([variances for _, variances in scenes]), np.linspace(0, 1, levels + 1)[1:-1])
+    parts = [(n, part, errors, variances) for n, (errors, variances) in enumerate(scenes)
+             for part in np.array_split(np.argsort(variances, kind="stable"), bins)]
+    means = np.array([np.bincount(np.searchsorted(edges, variances[part]), minlength=levels) / len(part) for _, part, _, variances in parts])
+    actual = np.zeros((len(parts), len(scenes)))
+    for row, (n, part, errors, _) in enumerate(parts):
+        actual[row, n] = np.mean(np.minimum(np.abs(errors[part]), BAD_PX)**2)
+    falls = np.hstack([np.eye(levels - 1, levels) - np.eye(levels - 1, levels, 1), np.zeros((levels - 1, len(scenes)))])
+    bounds = [(1e-6, None)] * levels + [(1, 1)] + [(1e-6, None)] * (len(scenes) - 1)  # the scale is free
+
+    def is_possible(flatness):
+        rows = np.vstack([np.hstack([means, -actual]), np.hstack([-flatness * means, actual]), falls])
+        return linprog(np.zeros(rows.shape[1]), rows, np.zeros(len(rows)), bounds=bounds, method="highs").status == 0
+    low, high = 1.0, 1.0
+    while not is_possible(high):
+        low, high = high, 2 * high
+    while high - low > 0.005:
+        middle = (low + high) / 2
+        low, high = (low, middle) if is_possible(middle) else (middle, high)
+    return high
+
+
 def dynamic_map(video, first, **options):
     """(percent of the moving objects' pixels that are marked, percent of the marked pixels that lie on or near one)."""
     found, right = [], []

@@ -166,7 +166,7 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
 #define MAX_ESTIMATES 1e6f  // counted no further
 // Pulls all terms but the first to 0, as if this share of the samples said so: where they lie in a corner of the image,
 // they tell nothing of the others.
-#define PRIOR 0.003f
+#define PRIOR 0.01f
 
 constant const int POWER_OF_U[TERMS] = {0, 1, 0, 1, 2, 0};
 constant const int POWER_OF_V[TERMS] = {0, 0, 1, 1, 0, 2};

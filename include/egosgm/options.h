@@ -27,7 +27,7 @@ struct HoleFillOptions {
 };
 struct ConsistencyCheckOptions {
   float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
-  float read_off_px = 1.6f;  // of the measurement, where the right view is read off, unless predictions were wrong
+  float read_off_px = 1.45f;  // of the measurement, where the right view is read off, unless predictions were wrong
 };
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
@@ -41,7 +41,7 @@ struct SearchBandOptions {
   int neighbour_min_count = 8;     // with fewer predictions than this around, the whole range
   float neighbour_margin_px = 4.0f;
   // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
-  float coarse_tolerance_px = 2.0f, coarse_margin_px = 2.0f;
+  float coarse_tolerance_px = 2.5f, coarse_margin_px = 2.0f;
   float ridge_step_px = 3.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
 };
 struct BandedSgmOptions {
@@ -64,7 +64,7 @@ struct BandedSgmOptions {
 };
 
 struct VerticalAlignmentOptions {
-  bool enabled = true;  // estimate one vertical offset between the views, and resample the right image by it
+  bool enabled = true;  // estimate vertical offsets between the views (a quadratic), and resample the right image
   float gain = 0.25f;   // part of what a frame finds that is added to the offset, once it is known; 0 to 1
 };
 struct MedianFilterOptions {
@@ -78,7 +78,7 @@ struct SpeckleRemovalOptions {
   float max_difference_px = 2.0f;  // neighbours within this belong to one region
 };
 struct KalmanUpdateOptions {
-  float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
+  float gate_px = 3.5f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   bool ask_neighbours = true;  // which of the two they speak for, instead; and whether all of them move
   float innovation_sigmas = 4.0f;  // where the two differ by more deviations, p' is raised until they do not; 0: never
