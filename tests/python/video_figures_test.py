@@ -130,6 +130,23 @@ def test_chance_alone_makes_tenths_differ():
     assert figures.flatness_by_chance([(alike, of_a_block, np.arange(20000) // 100)]) > 1.5
 
 
+def test_the_least_that_a_curve_leaves():
+    pytest.importorskip("scipy.optimize")
+    variance = np.random.default_rng(8).uniform(0.02, 0.5, 20000)
+
+    def scene(errors_squared):
+        return [(np.sqrt(errors_squared), variance)]
+    assert figures.least_flatness([scene(variance)]) < 1.02
+    assert figures.least_flatness([scene(1 / (1 + 1 / variance**2))]) < 1.05, "a curve takes out what is one"
+    assert figures.least_flatness([scene(variance), scene(7 * variance)]) < 1.02, "each may have a scale of its own"
+    assert figures.least_flatness([scene(1 - variance)]) > 1.5, "none turns the order round"
+    # Both rise from the first tenth to the last, one more than the other: one of them keeps the root of that.
+    with_offset = figures.least_flatness([scene(variance), scene(variance + 0.3)])
+    tenths = [part.mean() for part in np.array_split(np.sort(variance), 10)]
+    apart = (tenths[9] / tenths[0]) / ((tenths[9] + 0.3) / (tenths[0] + 0.3))
+    assert with_offset == pytest.approx(np.sqrt(apart), rel=0.03)
+
+
 def test_the_worst_tenth_by_variance():
     errors, variance = np.zeros(100), np.ones(100)
     errors[:4] = 10, -10, 10, -10
