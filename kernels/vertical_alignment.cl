@@ -171,8 +171,8 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
 constant const int POWER_OF_U[TERMS] = {0, 1, 0, 1, 2, 0};
 constant const int POWER_OF_V[TERMS] = {0, 0, 1, 1, 0, 2};
 
-// Solves matrix * x = x in place, by Cholesky's square-root-free form; the matrix's lower half is lost. Returns 0 where
-// a pivot is below `least`.
+// Solves a system of equations by Cholesky's form without square roots: x is its right side and becomes its solution;
+// of the symmetric matrix the lower half is given, and lost. Returns 0 where a pivot is not above `least`.
 inline int solve(float matrix[TERMS][TERMS], float x[TERMS], const float least) {
   for (int i = 0; i < TERMS; ++i) {
     for (int j = 0; j < i; ++j) {

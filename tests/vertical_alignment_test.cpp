@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -173,6 +174,28 @@ TEST(VerticalAlignment, RecoversTheOffset) {
     video.frame(scene);
     EXPECT_NEAR(video.next_offset(scene), offset_px, 0.02) << "after the second";
   }
+}
+
+// Of gradients that point against each other the sums are no matrix to step by; then the mean step is left.
+TEST(VerticalAlignment, EqualsReferenceWhereTheViewsHaveNothingInCommon) {
+  int mean_steps = 0;
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    Scene scene(kSize, 0);
+    std::mt19937 random(seed);
+    for (int& grey : scene.images) grey = static_cast<int>(random() % 64);
+    Video video(kSize);
+    const FrameImages images = upload(video.context, scene);
+    video.alignment.estimate(images, testing::upload(video.context, kSize, scene.measured));
+    video.alignment.commit();
+    const reference::VerticalOffset found = video.next(scene);
+    const reference::VerticalOffset expected =
+        reference::estimate_offset(kSize, 0.25f, scene.images, 1, scene.measured.disparity, {});
+    EXPECT_EQ(found.terms_px, expected.terms_px) << "seed " << seed;
+    EXPECT_EQ(found.estimates, expected.estimates) << "seed " << seed;
+    const auto is_zero = [](float term_px) { return term_px == 0; };
+    mean_steps += found.terms_px[0] != 0 && std::all_of(found.terms_px.begin() + 1, found.terms_px.end(), is_zero);
+  }
+  EXPECT_GT(mean_steps, 0) << "the case that this is about";
 }
 
 // What a pair of KITTI has is like the first of these. The prior takes up to a tenth off them.

@@ -9,6 +9,7 @@ namespace egosgm::reference {
 namespace {
 
 constexpr int kTerms = EGOSGM_OFFSET_TERMS;
+constexpr float kPrior = 0.01f;
 
 int floor_divided(int a, int b) { return a / b - (a % b < 0 ? 1 : 0); }
 
@@ -114,10 +115,10 @@ VerticalOffset estimate_offset(shared::ImageSize size, float gain, const std::ve
   if (count < 256 || all <= 0) return known;
   const float mean_step = step[0] / all;
   for (int i = 1; i < kTerms; ++i) {
-    matrix[i][i] += 0.003f * all;
-    step[i] -= 0.003f * all * known.terms_px[i];
+    matrix[i][i] += kPrior * all;
+    step[i] -= kPrior * all * known.terms_px[i];
   }
-  if (!solve(matrix, step, 0.5f * 0.003f * all)) step = {mean_step};
+  if (!solve(matrix, step, 0.5f * kPrior * all)) step = {mean_step};
   const float share = std::max(gain, 1.0f / std::max(known.estimates, 1.0f));
   VerticalOffset next{known.terms_px, std::min(known.estimates + 1, 1e6f)};
   for (int i = 0; i < kTerms; ++i) {
