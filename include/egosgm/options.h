@@ -65,7 +65,7 @@ struct BandedSgmOptions {
 
 struct VerticalAlignmentOptions {
   bool enabled = true;  // estimate vertical offsets between the views (a quadratic), and resample the right image
-  float gain = 0.25f;   // part of what a frame finds that is added to the offset, once it is known; 0 to 1
+  float gain = 0.1f;    // part of what a frame finds that is added to the offsets, once they are known; 0 to 1
 };
 struct MedianFilterOptions {
   bool enabled = true;  // 3x3 median of the disparities, before the left-right check

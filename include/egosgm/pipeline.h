@@ -57,7 +57,7 @@ struct FrameReport {
   double computed_fraction = 0;         // with the lanes that were computed and cannot win
   double predicted_fraction = 0;        // left pixels with a prediction
   double density = 0;                   // left pixels with a disparity
-  double vertical_offset_px = 0;        // by which the right image was resampled (vertical_alignment)
+  double vertical_offset_px = 0;        // by which the middle of the right image was resampled
   int launches = 0;                     // kernels enqueued
   int stripes = 1;                      // in which the image was matched; more than 1 where memory is too small
   std::vector<StageTime> stages;        // in the order in which they ran
