@@ -36,12 +36,12 @@ struct CoarseMatchOptions {
 };
 struct SearchBandOptions {
   float sigmas = 2.0f;             // half-width of a predicted pixel's band, in standard deviations
-  float min_half_width_px = 2.0f;  // and at least this
+  float min_half_width_px = 2.5f;  // and at least this
   bool from_neighbours = true;     // unpredicted pixels search the range of the predictions around them
   int neighbour_min_count = 8;     // with fewer predictions than this around, the whole range
   float neighbour_margin_px = 4.0f;
   // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
-  float coarse_tolerance_px = 2.5f, coarse_margin_px = 2.0f;
+  float coarse_tolerance_px = 2.0f, coarse_margin_px = 2.0f;
   float ridge_step_px = 3.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
 };
 struct BandedSgmOptions {
@@ -78,7 +78,7 @@ struct SpeckleRemovalOptions {
   float max_difference_px = 2.0f;  // neighbours within this belong to one region
 };
 struct KalmanUpdateOptions {
-  float gate_px = 3.5f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
+  float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   bool ask_neighbours = true;  // which of the two they speak for, instead; and whether all of them move
   float innovation_sigmas = 4.0f;  // where the two differ by more deviations, p' is raised until they do not; 0: never
