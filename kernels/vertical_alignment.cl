@@ -63,7 +63,7 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
   global const Pixel* from = (global const Pixel*)images + first;
   global Pixel* to = (global Pixel*)aligned + first + (size_t)y * size.width;
 
-  // One offset for BLOCK columns: it changes by less than a 20th of a pixel over them.
+  // One offset for BLOCK columns: on KITTI it changes by less than a 20th of a pixel over them.
   for (int x = get_local_id(0) * BLOCK; x < size.width; x += ROW_GROUP * BLOCK) {
     const float u = (float)place(x + BLOCK / 2, size.width, PLACES) / PLACES;
     const float dy = clamp(constant_term + (linear_term + square_term * u) * u, -MAX_OFFSET, MAX_OFFSET);

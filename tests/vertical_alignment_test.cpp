@@ -170,7 +170,7 @@ TEST(VerticalAlignment, RecoversTheOffset) {
     const Scene scene(kSize, offset_px, type, 1.0f);
     Video video(kSize);
     video.frame(scene);
-    EXPECT_NEAR(video.next_offset(scene), offset_px, 0.04) << "after the first frame";
+    EXPECT_NEAR(video.next_offset(scene), offset_px, 0.03) << "after the first frame";
     video.frame(scene);
     EXPECT_NEAR(video.next_offset(scene), offset_px, 0.02) << "after the second";
   }
