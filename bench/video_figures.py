@@ -216,15 +216,19 @@ def of_thin_things(video, first, **options):
     return share(counts), sum(pixels for _, pixels in counts)
 
 
+def errors_of(disparity, truth):
+    """disparity - truth of the pixels that have both, and their rows and columns."""
+    y, x = np.nonzero(is_valid(truth) & is_valid(disparity))
+    return (disparity - truth)[y, x].astype(float), y, x
+
+
 def errors_and_variances(video, frames, **options):
-    """Errors (disparity - truth) and variances of all pixels with truth and a disparity, and the block of 32x32 pixels that each lies
-    in, of each of the frames numbered `frames`."""
+    """Of each of the frames numbered `frames`: errors, variances, rows and columns of all pixels with truth and a disparity."""
     pairs = []
     for k, frame in play(video, **options):
         if k in frames:
-            known = is_valid(video.truth(k)) & is_valid(frame.disparity)
-            y, x = np.nonzero(known)
-            pairs.append(((frame.disparity - video.truth(k))[known].astype(float), frame.variance[known].astype(float), y // 32 * 1000 + x // 32))
+            errors, y, x = errors_of(frame.disparity, video.truth(k))
+            pairs.append((errors, frame.variance[y, x].astype(float), y, x))
     return pairs
 
 
@@ -247,6 +251,38 @@ def without_offset(pairs):
     return [(errors - np.median(errors), *others) for errors, *others in pairs]
 
 
+def blocks_of(y, x, side):
+    return y // side * 1000 + x // side
+
+
+def medians_by_block(errors, y, x, side=64, least=500):
+    """The median error of each block of side x side pixels that has `least` of them, by the block's number."""
+    blocks = blocks_of(y, x, side)
+    return {block: float(np.median(errors[blocks == block])) for block, pixels in zip(*np.unique(blocks, return_counts=True)) if pixels >= least}
+
+
+def median_size(values):
+    return float(np.median(np.abs(values)))
+
+
+def field(errors, y, x):
+    """What lies under a matcher's errors as a quadratic of the place, a function of (y, x): where matchers that share nothing but the images
+    have the same, it is what cameras and truth are off by. Least squares in which what is further from it than half a pixel weighs little
+    (Geman and McClure 1985)."""
+    def terms(y, x):
+        v, u = y / 1000, x / 1000
+        return np.stack([np.ones_like(u), u, v, u * v, u * u, v * v], axis=-1)
+    a, weights = terms(y, x), np.ones(len(errors))
+    for _ in range(20):
+        fitted = np.linalg.lstsq(a * weights[:, None], errors * weights, rcond=None)[0]
+        weights = 1 / (1 + ((errors - a @ fitted) / 0.5)**2)
+    return lambda y, x: terms(y, x) @ fitted
+
+
+def without_field(pairs, fields):
+    return [(errors - off(y, x), variances, y, x) for (errors, variances, y, x), off in zip(pairs, fields)]
+
+
 def calibration_of_variance(pairs, bins=10):
     """What the variances are worth. `ratio`: mean of error^2 / variance, errors cut at 3 px, since a few mismatches would decide it.
     `flatness`: the largest such ratio of the `bins` parts of the pixels in order of their variance, by the smallest. `removed`: percent
@@ -265,15 +301,33 @@ def calibration_of_variance(pairs, bins=10):
             "bins": [{"predicted_px": float(np.sqrt(variances[part].mean())), "actual_px": float(np.sqrt(cut[part].mean()))} for part in parts]}
 
 
-def flatness_by_chance(pairs, bins=10, rounds=1000, percentile=95):
-    """What `flatness` would stay below 95 of 100 times if the variances were flat: of frames whose blocks are drawn anew, as errors of
-    neighbours are alike, with each part's ratio divided by that of all blocks."""
-    errors, variances = (np.concatenate(values) for values in list(zip(*pairs))[:2])
-    blocks = np.unique(np.concatenate([block + 10**6 * n for n, (_, _, block) in enumerate(pairs)]), return_inverse=True)[1]
+def parts_in_order(variances, bins):
+    """For each pixel, which of the `bins` parts in order of the variance it belongs to."""
     part = np.empty(len(variances), int)
     for n, pixels in enumerate(np.array_split(np.argsort(variances, kind="stable"), bins)):
         part[pixels] = n
-    cells = blocks * bins + part
+    return part
+
+
+def likeness(pairs, lag, bins=10):
+    """Correlation of pixels `lag` columns apart, in what their error^2 is off by from the mean of their part in order of the variance."""
+    products, squares = [], []
+    for errors, variances, y, x in pairs:
+        part, cut = parts_in_order(variances, bins), np.minimum(np.abs(errors), BAD_PX)**2
+        residual = np.full((y.max() + 1, x.max() + lag + 1), np.nan)
+        residual[y, x] = cut / (np.bincount(part, cut) / np.bincount(part))[part] - 1
+        both = residual[y, x] * residual[y, x + lag]
+        products.append(both[np.isfinite(both)])
+        squares.append(residual[y, x]**2)
+    return float(np.mean(np.concatenate(products)) / np.mean(np.concatenate(squares)))
+
+
+def flatness_by_chance(pairs, bins=10, rounds=1000, percentile=95, side=64):
+    """What `flatness` would stay below 95 of 100 times if the variances were flat: of frames whose blocks of side x side pixels are drawn
+    anew, as errors of neighbours are alike, with each part's ratio divided by that of all blocks."""
+    errors, variances = (np.concatenate(values) for values in list(zip(*pairs))[:2])
+    blocks = np.unique(np.concatenate([blocks_of(y, x, side) + 10**6 * n for n, (_, _, y, x) in enumerate(pairs)]), return_inverse=True)[1]
+    cells = blocks * bins + parts_in_order(variances, bins)
     sums = [np.bincount(cells, values, (blocks.max() + 1) * bins).reshape(-1, bins) for values in (np.minimum(np.abs(errors), BAD_PX)**2, variances)]
     drawn = np.random.default_rng(1).multinomial(len(sums[0]), np.full(len(sums[0]), 1 / len(sums[0])), rounds)
     ratios = (drawn @ sums[0]) / (drawn @ sums[1]) / (sums[0].sum(axis=0) / sums[1].sum(axis=0))
