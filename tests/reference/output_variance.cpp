@@ -85,7 +85,7 @@ std::vector<float> blends(const testing::HostMaps& maps, const testing::HostMaps
 
 float calibrated(float sum) {
   const float square = sum * sum;
-  return 0.12f / (1 + 0.005f / (square * sum)) + 1.3f * std::sqrt(sum) / (1 + 1.04f / (square * square));
+  return 0.21f / (1 + 0.09f / square) + 1.3f * std::sqrt(sum) / (1 + 1.05f / (square * square * sum));
 }
 
 }  // namespace
