@@ -111,7 +111,7 @@ static inline Floats jump_beside(global const float* view, const ImageSize size,
 // as measured on KITTI and synthetic streets. Keeps the order of the sums; none is too small or too large for it.
 static inline Floats calibrated(const Floats sum) {
   const Floats square = sum * sum;
-  return 0.21f / (1.0f + 0.09f / square) + 1.3f * sqrt(sum) / (1.0f + 1.05f / (square * square * sum));
+  return 0.18f / (1.0f + 0.07f / square) + 1.26f * sqrt(sum) / (1.0f + 0.8f / (square * square * sum));
 }
 
 kernel void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,

@@ -85,7 +85,7 @@ std::vector<float> blends(const testing::HostMaps& maps, const testing::HostMaps
 
 float calibrated(float sum) {
   const float square = sum * sum;
-  return 0.21f / (1 + 0.09f / square) + 1.3f * std::sqrt(sum) / (1 + 1.05f / (square * square * sum));
+  return 0.18f / (1 + 0.07f / square) + 1.26f * std::sqrt(sum) / (1 + 0.8f / (square * square * sum));
 }
 
 }  // namespace
