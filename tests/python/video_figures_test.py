@@ -141,6 +141,8 @@ def test_blocks_are_of_rows_and_columns():
     alike, variance = ((random.normal(size=(16, 32)) * 0.3)[y // 8, x // 8], random.uniform(0.02, 0.5, (16, 32))[y // 8, x // 8])
     by_side = [figures.flatness_by_chance([(alike, variance, y, x)], side=side) for side in (2, 8)]
     assert by_side[1] - 1 > 2 * (by_side[0] - 1)
+    two_frames = figures.flatness_by_chance(2 * [(alike, variance, y, x)], side=8)
+    assert two_frames - 1 < 0.85 * (by_side[1] - 1), "a block is of one frame"
     assert set(figures.medians_by_block(alike, y, x, side=8, least=1).values()) == set(alike)
     assert len(figures.medians_by_block(alike[64:], y[64:], x[64:], side=64, least=64 * 64)) == 7, "the first block lacks pixels"
 
@@ -167,7 +169,7 @@ def test_what_matchers_share_is_a_quadratic_of_the_place():
     random = np.random.default_rng(12)
 
     def smooth(y, x):
-        return -0.4 + 0.5 * x / 1000 - 0.3 * (y / 1000) ** 2 + 0.8 * (x / 1000) ** 2 + 0.2 * x * y / 1e6
+        return -0.4 + 0.5 * x / 1000 - 3 * (y / 1000) ** 2 + 0.8 * (x / 1000) ** 2 + 2 * x * y / 1e6
     errors = smooth(y, x) + random.normal(size=len(y)) * 0.2
     wrong = random.uniform(size=len(y)) < 0.1
     errors[wrong] += 40
