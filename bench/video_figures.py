@@ -266,9 +266,9 @@ def median_size(values):
 
 
 def field(errors, y, x):
-    """What lies under a matcher's errors as a quadratic of the place, a function of (y, x): where matchers that share nothing but the images
-    have the same, it is what cameras and truth are off by. Least squares in which what is further from it than half a pixel weighs little
-    (Geman and McClure 1985)."""
+    """What lies under a matcher's errors as a quadratic of the place, a function of (y, x): where different matchers have the same, it is
+    what cameras and truth are off by. Least squares in which what is further from it than half a pixel weighs little (Geman and McClure
+    1985)."""
     def terms(y, x):
         v, u = y / 1000, x / 1000
         return np.stack([np.ones_like(u), u, v, u * v, u * u, v * v], axis=-1)
