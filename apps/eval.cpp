@@ -7,6 +7,7 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/metrics_json.h"
+#include "apps/truth_pairs.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
@@ -86,7 +87,7 @@ void print_row(const std::string& name, const DisparityMetrics& m) {
 }
 
 int evaluate(const EvalArguments& arguments) {
-  const vision::EvaluationPairs found = vision::pair_with_truth(arguments.estimate, arguments.truth);
+  const vision::EvaluationPairs found = find_truth_pairs(arguments.estimate, arguments.truth);
   std::vector<Row> rows;
   std::vector<DisparityMetrics> each;
   DisparityCounts pooled;
@@ -106,6 +107,12 @@ int evaluate(const EvalArguments& arguments) {
   if (rows.size() > 1) {
     print_row("pooled", vision::metrics_of(pooled));
     print_row("mean", vision::mean_of(each));
+  }
+  for (const vision::EvaluationPair& pair : found.pairs) {
+    if (!pair.same_name) {
+      fmt::print("{} is compared with {}: only the number is the same\n", pair.estimate.filename().string(),
+                 pair.truth.string());
+    }
   }
   if (!found.without_estimate.empty()) {
     fmt::print("{} without an estimate, the first is {}\n", counted(found.without_estimate.size(), "truth file"),

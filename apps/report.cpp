@@ -12,6 +12,7 @@
 #include "apps/frame_panels.h"
 #include "apps/metrics_json.h"
 #include "apps/templates.h"
+#include "apps/truth_pairs.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "egosgm/vision/disparity_io.h"
@@ -144,9 +145,11 @@ class Page {
       return;
     }
     vision::DisparityCounts pooled;
-    for (const vision::EvaluationPair& pair : vision::pair_with_truth(folder_, arguments_.truth).pairs) {
+    const vision::EvaluationPairs found = find_truth_pairs(folder_, arguments_.truth);
+    notes_.push_back(text_of(found));
+    for (const vision::EvaluationPair& pair : found.pairs) {
       const auto frame = std::find_if(sequence_.frames.begin(), sequence_.frames.end(),
-                                      [&](const auto& f) { return f.name == pair.estimate.stem(); });
+                                      [&](const auto& f) { return f.name == pair.name; });
       if (frame == sequence_.frames.end()) continue;
       frame->truth_noc = pair.truth;
       const vision::DisparityCounts counts =
@@ -248,7 +251,7 @@ Command add_report(CLI::App& program) {
   CLI::App* command = program.add_subcommand("report", "Make one HTML page of a run: pictures, charts, path, options");
   auto arguments = std::make_shared<ReportArguments>();
   command->add_option("OUT", arguments->run, "the folder that `egosgm run` wrote")->type_name("")->required();
-  command->add_option("--truth", arguments->truth, "true disparity, a folder of files with equal names")
+  command->add_option("--truth", arguments->truth, "true disparity: a file, a folder, or a data set's folder")
       ->type_name("FILE|DIR");
   command->add_option("--poses", arguments->poses, "true KITTI poses, drawn beside the estimated path")
       ->type_name("FILE");

@@ -2,20 +2,14 @@
 #include "egosgm/vision/evaluation.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <optional>
-#include <system_error>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 
 namespace egosgm::vision {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr float kBad_px = 3.0f;
 constexpr float kBadRelative = 0.05f;
@@ -60,84 +54,6 @@ void extend_columns(cv::Mat& map) {
     for (int y = 0; y < top; ++y) map.at<float>(y, x) = map.at<float>(top, x);
     for (int y = bottom + 1; y < map.rows; ++y) map.at<float>(y, x) = map.at<float>(bottom, x);
   }
-}
-
-bool is_map_file(const fs::path& file) { return file.extension() == ".png" || file.extension() == ".pfm"; }
-
-bool is_folder(const fs::path& path) {
-  std::error_code error;
-  return fs::is_directory(path, error);
-}
-
-/// Name without extension -> file.
-std::map<std::string, fs::path> list_maps(const fs::path& folder) {
-  std::map<std::string, fs::path> maps;
-  std::error_code error;
-  fs::directory_iterator entry(folder, error);
-  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    if (is_map_file(entry->path()) && !entry->path().filename().string().starts_with('.')) {
-      maps[entry->path().stem().string()] = entry->path();
-    }
-  }
-  if (error)
-    throw InvalidArgument(folder.string() + ": cannot be listed: " + error.message() + "; give a readable folder");
-  if (maps.empty()) throw InvalidArgument(folder.string() + ": holds no .png or .pfm; give a folder of disparity maps");
-  return maps;
-}
-
-/// A file, or the maps of a folder; an output folder stands for its `disparity`.
-std::map<std::string, fs::path> list_estimates(const fs::path& path) {
-  if (!is_folder(path)) return {{path.stem().string(), path}};
-  return list_maps(is_folder(path / "disparity") ? path / "disparity" : path);
-}
-
-/// The digits at the end of a name: 10 for 000010 and for 000151_10.
-std::optional<int> frame_number(const std::string& name) {
-  std::size_t begin = name.size();
-  while (begin > 0 && name[begin - 1] >= '0' && name[begin - 1] <= '9') --begin;
-  int number = 0;
-  const auto [end, error] = std::from_chars(name.data() + begin, name.data() + name.size(), number);
-  if (begin == name.size() || error != std::errc()) return std::nullopt;
-  return number;
-}
-
-EvaluationPairs pair_equal_names(const std::map<std::string, fs::path>& estimates,
-                                 const std::map<std::string, fs::path>& truths) {
-  EvaluationPairs result;
-  for (const auto& [name, truth] : truths) {
-    const auto estimate = estimates.find(name);
-    if (estimate == estimates.end()) {
-      result.without_estimate.push_back(truth);
-    } else {
-      result.pairs.push_back({estimate->second, truth});
-    }
-  }
-  return result;
-}
-
-EvaluationPairs pair_frame_numbers(const std::map<std::string, fs::path>& estimates,
-                                   const std::map<std::string, fs::path>& truths) {
-  std::map<int, fs::path> estimate_of;
-  for (const auto& [name, file] : estimates) {
-    if (const auto number = frame_number(name)) estimate_of[*number] = file;
-  }
-  EvaluationPairs result;
-  std::map<int, fs::path> used;
-  for (const auto& [name, truth] : truths) {
-    const auto number = frame_number(name);
-    const auto estimate = number ? estimate_of.find(*number) : estimate_of.end();
-    if (estimate == estimate_of.end()) {
-      result.without_estimate.push_back(truth);
-      continue;
-    }
-    if (const auto [other, is_new] = used.emplace(*number, truth); !is_new) {
-      throw InvalidArgument(estimate->second.string() + ": belongs to " + other->second.filename().string() +
-                            " or to " + truth.filename().string() + " of " + truth.parent_path().string() +
-                            "; give one truth file instead of the folder");
-    }
-    result.pairs.push_back({estimate->second, truth});
-  }
-  return result;
 }
 
 /// The mean of the values that are not NaN.
@@ -241,29 +157,6 @@ cv::Mat drop_uncertain(const cv::Mat& disparity, const cv::Mat& variance, float 
   cv::Mat certain = disparity.clone();
   certain.setTo(kInvalidDisparity, variance > max_variance_px2);
   return certain;
-}
-
-EvaluationPairs pair_with_truth(const fs::path& estimate, const fs::path& truth) {
-  std::error_code error;
-  for (const fs::path& path : {estimate, truth}) {
-    if (!fs::exists(path, error)) {
-      throw InvalidArgument(path.string() +
-                            ": no such file or folder; give a disparity map (.png, .pfm) or a folder of them");
-    }
-  }
-  const bool one_estimate = !is_folder(estimate), one_truth = !is_folder(truth);
-  if (one_estimate && one_truth) return {.pairs = {{estimate, truth}}, .without_estimate = {}};
-  const std::map<std::string, fs::path> estimates = list_estimates(estimate);
-  const std::map<std::string, fs::path> truths =
-      one_truth ? std::map<std::string, fs::path>{{truth.stem().string(), truth}} : list_maps(truth);
-  EvaluationPairs result = pair_equal_names(estimates, truths);
-  if (result.pairs.empty()) result = pair_frame_numbers(estimates, truths);
-  if (result.pairs.empty()) {
-    throw InvalidArgument(estimate.string() + ": nothing there belongs to " + truth.string() +
-                          " by name or frame number; give FILE and FILE, or folders with equal names");
-  }
-  if (one_estimate) result.without_estimate.clear();
-  return result;
 }
 
 }  // namespace egosgm::vision

@@ -151,6 +151,65 @@ TEST_F(PairWithTruth, FrameNumberWhereNoNamesAreEqual) {
   expect_refused([&] { pair("out", "t"); }, {"000010.png", "000138_10.png", "000151_10.png", "one truth file"});
 }
 
+TEST_F(PairWithTruth, WhatIsPairedByNumberOnlyIsSaid) {
+  add("e/000009.png"), add("e/000010.png"), add("t/000151_10.png");
+  const EvaluationPairs result = pair("e", "t");
+  ASSERT_EQ(result.pairs.size(), 1u);
+  EXPECT_EQ(result.pairs[0].name, "000010");
+  EXPECT_FALSE(result.pairs[0].same_name);
+  EXPECT_EQ(result.without_truth, (std::vector<std::filesystem::path>{folder_ / "e/000009.png"}));
+  EXPECT_TRUE(pair("e", "e").pairs[0].same_name);
+}
+
+TEST_F(PairWithTruth, ImageNamesFindTheTruthOfTheirScene) {
+  add("e/000010.png"), add("t/000138_10.png"), add("t/000151_10.png"), add("other/000151_10.png");
+  PairingOptions options;
+  options.image_names = {{"000010", "000138_10"}};
+  const EvaluationPairs result = pair_with_truth(folder_ / "e", folder_ / "t", options);
+  ASSERT_EQ(result.pairs.size(), 1u);
+  EXPECT_EQ(result.pairs[0].truth, folder_ / "t/000138_10.png");
+  EXPECT_TRUE(result.pairs[0].same_name);
+  EXPECT_EQ(result.without_estimate, (std::vector<std::filesystem::path>{folder_ / "t/000151_10.png"}));
+  for (const char* truth : {"other", "other/000151_10.png"}) {
+    expect_refused([&] { pair_with_truth(folder_ / "e", folder_ / truth, options); },
+                   {"nothing there belongs", "000010.png is of the image 000138_10"});
+  }
+  options.image_names = {{"000010", "left_10"}};
+  EXPECT_FALSE(pair_with_truth(folder_ / "e", folder_ / "other", options).pairs[0].same_name);
+}
+
+TEST_F(PairWithTruth, ADataSetsFolderStandsForItsTruth) {
+  add("e/000000.png"), add("e/000001.png"), add("e/000010.png");
+  add("street/image_0/000001.png"), add("street/truth/left_disp_noc/000001.png"),
+      add("street/truth/left_disp_occ/000001.png");
+  add("kitti/training/disp_occ_0/000002_10.png"), add("scene/im0.png"), add("scene/disp0GT.pfm");
+  for (const char* place : {"street", "street/truth/left_disp_noc"}) {
+    EXPECT_EQ(pair("e", place).pairs.at(0).truth, folder_ / "street/truth/left_disp_noc/000001.png");
+  }
+  for (const char* place : {"kitti", "kitti/training"}) {
+    EXPECT_EQ(pair("e", place).pairs.at(0).truth, folder_ / "kitti/training/disp_occ_0/000002_10.png");
+  }
+  EXPECT_EQ(pair("e", "scene").pairs.at(0).truth, folder_ / "scene/disp0GT.pfm");
+  expect_refused([&] { pair("e", "street/truth"); }, {"holds no .png", "left_disp_noc, left_disp_occ"});
+}
+
+TEST_F(PairWithTruth, OnlyChosenFrames) {
+  for (const char* name : {"e/000008.png", "e/000009.png", "e/000010.png", "e/mean.png"}) add(name);
+  for (const char* name : {"t/000008.png", "t/000010.png", "t/000011.png"}) add(name);
+  PairingOptions options;
+  options.frames = parse_frame_range("9:10");
+  const EvaluationPairs result = pair_with_truth(folder_ / "e", folder_ / "t", options);
+  ASSERT_EQ(result.pairs.size(), 1u);
+  EXPECT_EQ(result.pairs[0].name, "000010");
+  EXPECT_TRUE(result.without_estimate.empty());
+  EXPECT_EQ(result.without_truth, (std::vector<std::filesystem::path>{folder_ / "e/000009.png"}));
+}
+
+TEST_F(PairWithTruth, TwoMapsOfOneName) {
+  add("e/000001.png"), add("e/000001.pfm"), add("t/000001.png");
+  expect_refused([&] { pair("e", "t"); }, {"e/000001.p", "has the name of"});
+}
+
 TEST_F(PairWithTruth, NothingThatFits) {
   add("e/000001.png"), add("t/000002.png");
   make_folder(folder_ / "empty");

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/truth_pairs.h"
+
+#include <fmt/core.h>
+
+#include <nlohmann/json.hpp>
+
+#include "apps/counted.h"
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+
+namespace egosgm::app {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
+
+/// report.json of the run that `estimate` is: OUT, OUT/disparity or OUT/disparity/000010.png. Empty where there is
+/// none.
+fs::path report_of(const fs::path& estimate) {
+  std::error_code error;
+  fs::path folder = fs::weakly_canonical(estimate, error);
+  const int levels = fs::is_directory(folder, error) ? 2 : 3;
+  for (int level = 0; level < levels; ++level, folder = folder.parent_path()) {
+    if (fs::is_regular_file(folder / "report.json", error)) return folder / "report.json";
+  }
+  return {};
+}
+
+std::map<std::string, std::string> image_names_of(const fs::path& report) {
+  std::map<std::string, std::string> names;
+  if (report.empty()) return names;
+  const Json run = Json::parse(vision::read_file(report, kMaxReportBytes), nullptr, /*allow_exceptions=*/false);
+  if (!run.is_object() || !run.contains("frames")) return names;
+  for (const Json& frame : run["frames"]) {
+    if (!frame.is_object() || !frame.contains("frame") || !frame.contains("left")) continue;
+    if (!frame["frame"].is_number_integer() || !frame["left"].is_string()) continue;
+    names[fmt::format("{:06}", frame["frame"].get<int>())] = fs::path(frame["left"].get<std::string>()).stem().string();
+  }
+  return names;
+}
+
+}  // namespace
+
+vision::EvaluationPairs find_truth_pairs(const fs::path& estimate, const fs::path& truth, const std::string& frames) {
+  vision::PairingOptions options;
+  if (!frames.empty()) options.frames = vision::parse_frame_range(frames);
+  options.image_names = image_names_of(report_of(estimate));
+  return vision::pair_with_truth(estimate, truth, options);
+}
+
+std::string text_of(const vision::EvaluationPairs& pairs) {
+  const vision::EvaluationPair& first = pairs.pairs.front();
+  const fs::path named = pairs.pairs.size() == 1 ? first.truth : first.truth.parent_path();
+  std::string text = fmt::format("Compared with {}.", named.filename().string());
+  for (const vision::EvaluationPair& pair : pairs.pairs) {
+    if (pair.same_name) continue;
+    text += fmt::format(" {} and {} belong together by their number only.", pair.estimate.filename().string(),
+                        pair.truth.filename().string());
+    break;
+  }
+  if (!pairs.without_truth.empty()) {
+    text += fmt::format(" {} without truth.", counted(pairs.without_truth.size(), "frame"));
+  }
+  return text;
+}
+
+void ComparisonArguments::add_to(CLI::App& command, const std::string& estimate_help, const std::string& truth_help) {
+  command.add_option("ESTIMATE", positional_, "what --estimate takes, then what --truth takes")
+      ->type_name("[TRUTH]")
+      ->expected(0, 2);
+  command.add_option("--estimate", estimate, estimate_help)->type_name("FILE|DIR");
+  command.add_option("--truth", truth, truth_help)->type_name("FILE|DIR");
+  command.add_option("--frames", frames, "only these frame numbers, both ends included: 7:10, 7:, :10 or 7")
+      ->type_name("FIRST:LAST");
+}
+
+void ComparisonArguments::resolve() {
+  for (const std::string& argument : positional_) {
+    std::string& free = estimate.empty() ? estimate : truth;
+    if (!free.empty()) {
+      throw InvalidArgument(
+          fmt::format("unexpected argument \"{}\": --estimate and --truth are given already", argument));
+    }
+    free = argument;
+  }
+  if (estimate.empty()) throw InvalidArgument("no estimate: give ESTIMATE TRUTH, or --estimate and --truth");
+  if (truth.empty()) throw InvalidArgument("no truth: give ESTIMATE TRUTH, or --estimate and --truth");
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "egosgm/vision/evaluation.h"
+
+namespace egosgm::app {
+
+/// vision::pair_with_truth with the names of the images, where `estimate` is or lies in a folder that `egosgm run`
+/// wrote (its report.json tells them); `frames` as for --frames, empty: all. Throws InvalidArgument.
+vision::EvaluationPairs find_truth_pairs(const std::filesystem::path& estimate, const std::filesystem::path& truth,
+                                         const std::string& frames = {});
+
+/// One sentence: with which files or folder the estimates were compared, and what belongs together by number only.
+std::string text_of(const vision::EvaluationPairs& pairs);
+
+/// What is compared with what: `COMMAND ESTIMATE TRUTH`, or --estimate and --truth, or one of each kind; and --frames.
+struct ComparisonArguments {
+  std::string estimate, truth, frames;
+
+  /// `estimate_help` and `truth_help` say what --estimate and --truth take.
+  void add_to(CLI::App& command, const std::string& estimate_help, const std::string& truth_help);
+  /// Fills `estimate` and `truth` from the positional arguments. Throws InvalidArgument unless both are given once.
+  void resolve();
+
+ private:
+  std::vector<std::string> positional_;
+};
+
+}  // namespace egosgm::app

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <map>
+#include <set>
+#include <system_error>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/evaluation.h"
+
+namespace egosgm::vision {
+namespace {
+
+namespace fs = std::filesystem;
+using Maps = std::map<std::string, fs::path>;  // name without extension -> file
+using Numbers = std::vector<std::string>;      // digits without leading zeros
+
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+bool is_map(const fs::path& file) {
+  return (file.extension() == ".png" || file.extension() == ".pfm") && !file.filename().string().starts_with('.');
+}
+
+/// Where data sets keep their truth.
+constexpr const char* kTruthPlaces[] = {
+    "truth/left_disp_noc", "truth/left_disp_occ", "disp_noc", "disp_noc_0", "disp_occ",
+    "disp_occ_0",          "disp0GT.pfm",         "disp0.pfm"};
+
+fs::path truth_of(const fs::path& path) {
+  std::error_code error;
+  for (const fs::path& folder : {path, path / "training"}) {
+    for (const char* place : kTruthPlaces) {
+      if (is_folder(path) && fs::exists(folder / place, error)) return folder / place;
+    }
+  }
+  return path;
+}
+
+Maps maps_of(const fs::path& path) {
+  if (!is_folder(path)) return {{path.stem().string(), path}};
+  Maps maps;
+  std::set<std::string> folders;
+  std::error_code error;
+  fs::directory_iterator entry(path, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    if (is_folder(entry->path())) folders.insert(entry->path().filename().string());
+    if (!is_map(entry->path())) continue;
+    const auto [other, is_new] = maps.emplace(entry->path().stem().string(), entry->path());
+    if (is_new) continue;
+    throw InvalidArgument(entry->path().string() + ": has the name of " + other->second.string() +
+                          "; give a folder with one map of each name, or one file");
+  }
+  if (error)
+    throw InvalidArgument(path.string() + ": cannot be listed: " + error.message() + "; give a readable folder");
+  if (!maps.empty()) return maps;
+  std::string inside;
+  for (const std::string& folder : folders) inside += (inside.empty() ? "; inside are the folders " : ", ") + folder;
+  throw InvalidArgument(path.string() + ": holds no .png or .pfm; give a folder of disparity maps" + inside);
+}
+
+/// The numbers in a name: 151 and 10 of 000151_10.
+Numbers numbers_in(const std::string& name) {
+  constexpr const char* kDigits = "0123456789";
+  Numbers numbers;
+  for (std::size_t at = name.find_first_of(kDigits); at != std::string::npos;) {
+    const std::size_t end = std::min(name.find_first_not_of(kDigits, at), name.size());
+    const std::size_t first = std::min(name.find_first_not_of('0', at), end - 1);
+    numbers.push_back(name.substr(first, end - first));
+    at = name.find_first_of(kDigits, end);
+  }
+  return numbers;
+}
+
+/// Whether the longer one ends with the shorter one.
+bool fit(const Numbers& a, const Numbers& b) {
+  const auto common = static_cast<std::ptrdiff_t>(std::min(a.size(), b.size()));
+  return std::equal(a.end() - common, a.end(), b.end() - common);
+}
+
+bool is_below(const std::string& number, int bound) {
+  const std::string other = std::to_string(bound);
+  return number.size() != other.size() ? number.size() < other.size() : number < other;
+}
+
+void keep_frames(Maps& maps, const FrameRange& frames) {
+  if (!frames.first && !frames.last) return;
+  std::erase_if(maps, [&](const auto& map) {
+    const Numbers numbers = numbers_in(map.first);
+    return numbers.empty() || (frames.first && is_below(numbers.back(), *frames.first)) ||
+           (frames.last && !is_below(numbers.back(), *frames.last) && numbers.back() != std::to_string(*frames.last));
+  });
+}
+
+class Pairing {
+ public:
+  Pairing(Maps estimates, Maps truths, const std::map<std::string, std::string>& image_names)
+      : estimates_(std::move(estimates)), truths_(std::move(truths)), image_names_(image_names) {
+    for (auto truth = truths_.cbegin(); truth != truths_.cend(); ++truth) {
+      const Numbers numbers = numbers_in(truth->first);
+      if (!numbers.empty()) by_last_number_.emplace(numbers.back(), truth);
+    }
+  }
+
+  EvaluationPairs operator()() {
+    for (const auto& [name, estimate] : estimates_) {
+      const auto own = truths_.find(name), image = truths_.find(image_name(name));
+      if (own != truths_.end() || image != truths_.end()) add(name, image != truths_.end() ? image : own, true);
+    }
+    if (result_.pairs.empty()) {
+      for (const auto& [name, estimate] : estimates_) pair_by_numbers(name);
+    }
+    for (const auto& [name, estimate] : estimates_) {
+      if (!paired_.contains(estimate)) result_.without_truth.push_back(estimate);
+    }
+    for (const auto& [name, truth] : truths_) {
+      if (!paired_.contains(truth)) result_.without_estimate.push_back(truth);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  const std::string& image_name(const std::string& name) const {
+    const auto known = image_names_.find(name);
+    return known == image_names_.end() ? name : known->second;
+  }
+
+  void add(const std::string& name, Maps::const_iterator truth, bool same_name) {
+    const fs::path& estimate = estimates_.at(name);
+    if (const auto [other, is_new] = paired_.emplace(truth->second, estimate); !is_new) {
+      throw InvalidArgument(truth->second.string() + ": belongs to " + other->second.filename().string() + " or to " +
+                            estimate.filename().string() + " of " + estimate.parent_path().string() +
+                            "; give one estimate instead of the folder");
+    }
+    paired_.emplace(estimate, truth->second);
+    result_.pairs.push_back({estimate, truth->second, name, same_name});
+  }
+
+  void pair_by_numbers(const std::string& name) {
+    const Numbers numbers = numbers_in(image_name(name));
+    if (numbers.empty()) return;
+    auto found = truths_.cend();
+    const auto [begin, end] = by_last_number_.equal_range(numbers.back());
+    for (auto entry = begin; entry != end; ++entry) {
+      const auto truth = entry->second;
+      if (!fit(numbers, numbers_in(truth->first))) continue;
+      if (found != truths_.cend()) {
+        throw InvalidArgument(estimates_.at(name).string() + ": belongs to " + found->second.filename().string() +
+                              " or to " + truth->second.filename().string() + " of " +
+                              truth->second.parent_path().string() + "; give one truth file instead of the folder");
+      }
+      found = truth;
+    }
+    if (found != truths_.cend()) add(name, found, false);
+  }
+
+  const Maps estimates_, truths_;
+  std::multimap<std::string, Maps::const_iterator> by_last_number_;
+  const std::map<std::string, std::string>& image_names_;
+  std::map<fs::path, fs::path> paired_;  // both ways
+  EvaluationPairs result_;
+};
+
+/// What kept estimates and truth apart, with an example.
+std::string why_nothing(const Maps& estimates, const std::map<std::string, std::string>& image_names) {
+  for (const auto& [name, estimate] : estimates) {
+    const auto image = image_names.find(name);
+    if (image == image_names.end() || image->second == name) continue;
+    return estimate.filename().string() + " is of the image " + image->second +
+           ", say; give its truth, or FILE and FILE";
+  }
+  return "give FILE and FILE, or folders with equal names";
+}
+
+}  // namespace
+
+EvaluationPairs pair_with_truth(const fs::path& estimate, const fs::path& truth, const PairingOptions& options) {
+  std::error_code error;
+  for (const fs::path& path : {estimate, truth}) {
+    if (!fs::exists(path, error)) {
+      throw InvalidArgument(path.string() +
+                            ": no such file or folder; give a disparity map (.png, .pfm) or a folder of them");
+    }
+  }
+  if (!is_folder(estimate) && !is_folder(truth)) {
+    return {.pairs = {{estimate, truth, estimate.stem().string(), true}}, .without_estimate = {}, .without_truth = {}};
+  }
+  Maps estimates = maps_of(is_folder(estimate / "disparity") ? estimate / "disparity" : estimate);
+  Maps truths = maps_of(truth_of(truth));
+  keep_frames(estimates, options.frames);
+  keep_frames(truths, options.frames);
+  EvaluationPairs result = Pairing(estimates, truths, options.image_names)();
+  if (result.pairs.empty()) {
+    throw InvalidArgument(estimate.string() + ": nothing there belongs to " + truth.string() +
+                          " by name or frame number; " + why_nothing(estimates, options.image_names));
+  }
+  if (!is_folder(estimate)) result.without_estimate.clear();
+  if (!is_folder(truth)) result.without_truth.clear();
+  return result;
+}
+
+}  // namespace egosgm::vision
