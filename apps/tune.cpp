@@ -147,7 +147,13 @@ int tune(const TuneArguments& arguments) {
     for (const std::vector<NamedOption>& sizes : trial.candidates) {
       Tuning candidate = best;
       for (const auto& [name, value] : sizes) set_tuning(candidate, name, value);
-      const double ms = ms_of(course.run(candidate), trial.stages);
+      double ms = 0;
+      try {
+        ms = ms_of(course.run(candidate), trial.stages);
+      } catch (const BuildError&) {  // blocks of 32 lanes, of which its compiler has no vectors
+        fmt::print("  {:<36} not on this device\n", text_of(sizes));
+        continue;
+      }
       const bool is_better = ms < kGain * least;
       fmt::print("  {:<36} {:8.3f} ms{}\n", text_of(sizes), ms, is_better ? "  the best so far" : "");
       std::fflush(stdout);

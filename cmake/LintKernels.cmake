@@ -11,6 +11,12 @@ endif()
 set(preamble ${CMAKE_CURRENT_BINARY_DIR}/kernel_preamble.h)
 file(WRITE ${preamble} "#pragma OPENCL FP_CONTRACT OFF\n")
 
+# A block that SPIR-V has no vector for is refused by name, before a translator ends the process for it.
+add_test(NAME kernels.block.refuses_32_lanes_in_spirv
+         COMMAND ${EGOSGM_CLANG} -x cl -cl-std=CL1.2 -target spir64-unknown-unknown -Xclang -finclude-default-header -DBLOCK=32
+                 -fsyntax-only ${PROJECT_SOURCE_DIR}/kernels/block.h)
+set_tests_properties(kernels.block.refuses_32_lanes_in_spirv PROPERTIES TIMEOUT 60 PASS_REGULAR_EXPRESSION "BLOCK: 16")
+
 file(GLOB kernels CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/kernels/*.cl)
 foreach(kernel IN LISTS kernels)
   cmake_path(GET kernel STEM name)

@@ -63,8 +63,8 @@ void VerticalAlignment::estimate(const FrameImages& aligned, const StereoMaps& m
   sum_rows(context_, ocl::group_a_row({size_.width, rows}, row_group_, 1), size_, aligned.pixels, measured.disparity,
            row_sums_);
   const int next = free_state();
-  update_(context_, {cl::NDRange(1), cl::NDRange(1)}, size_, rows, options_.gain, row_sums_, states_[working_],
-          states_[next]);
+  update_(context_, ocl::group_a_row({size_.width, 1}, row_group_, 1), size_, rows, options_.gain, row_sums_,
+          states_[working_], states_[next]);
   working_ = next;
 }
 

@@ -801,7 +801,7 @@ WITH_BIT_COUNT void from_middle(const SgmParameters q, const int first_row, cons
 }
 
 // Both sweeps to the middle of the image, where they leave their sums.
-kernel void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
+KERNEL void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
                             global const Band* bands, global const uint* offsets, global const uchar* penalties,
                             global uchar* slots, global uchar* sums) {
   to_middle(q, get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands, offsets,
@@ -809,7 +809,7 @@ kernel void sweep_to_middle(const SgmParameters q, const int wave, const int til
 }
 
 // Both on from there, over the sums of the other one, to the winners.
-kernel void sweep_from_middle(const SgmParameters q, const int wave, const int tile_columns,
+KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int tile_columns,
                               global const uint* all_codes, global const Band* bands, global const uint* offsets,
                               global const uchar* penalties, global uchar* slots, global const uchar* sums,
                               global ulong* winners, global uint* ranks) {
@@ -838,7 +838,7 @@ inline Winners load_winners(global const ulong* row, const int x, const int widt
 
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, and the matching variance
 // (options.h).
-kernel void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
+KERNEL void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
                    global float* variances) {
   const int width = q.width;
   const size_t row = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width;

@@ -246,7 +246,7 @@ inline void add_path(const int stage, const bool vertical, const uchar4 costs, c
 }
 
 // Group ids 1 and 2: the lines, LINES at a time; views, and after them the same views backward.
-kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_paths(
+KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_paths(
     const SgmParameters q, const int stage, const int views, global const uint* codes, global const uchar* penalties,
     global const Band* bands, global const uint* offsets, global uchar* forward_first, global uchar* forward_second,
     global uchar* backward_first, global uchar* backward_second) {
@@ -375,7 +375,7 @@ inline void offer(const SgmParameters q, const int x, const int y, const int lan
 
 // LANES work-items look at a pixel's cells, one of them at the winner's neighbours. Group ids: LINES pixels of a row,
 // row, view.
-kernel __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winners(
+KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winners(
     const SgmParameters q, global const uint* codes, global const Band* bands, global const uint* offsets,
     global const uchar* forward_first, global const uchar* forward_second, global const uchar* backward_first,
     global const uchar* backward_second, global float* disparities, global float* variances, global uint* ranks) {

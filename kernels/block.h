@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A vector as wide as a CPU's registers: 32 lanes of 8 bits are no type of OpenCL C, but one of the compilers that are
-// built on clang. Others take 16. OpenCL C only.
+// built on clang. Others take 16, and so do those that go by SPIR-V, whose vectors end there: it has no name for a
+// wider one, and its translator ends the process. OpenCL C only.
 #ifndef EGOSGM_KERNELS_BLOCK_H
 #define EGOSGM_KERNELS_BLOCK_H
 
@@ -14,7 +15,7 @@
 #endif
 
 #if BLOCK == 32
-#ifndef __clang__
+#if !defined(__clang__) || defined(__SPIR__) || defined(__SPIRV__)
 #error "BLOCK: 16, as this compiler has no vectors of 32 lanes"
 #endif
 

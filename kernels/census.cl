@@ -117,7 +117,7 @@ inline Codes codes_at(const ImageSize size, global const Pixel* image, const int
 }
 
 // A work-item a row and view.
-kernel void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
+KERNEL void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
   const int y = get_global_id(0);
   const int view = get_global_id(1);
   if (y >= size.height) return;

@@ -19,7 +19,7 @@ typedef uint4 Means;
 #endif
 
 // A work-item four neighbouring coarse pixels and view.
-kernel void shrink(const ImageSize size, global const uchar* images, global uchar* coarse_images) {
+KERNEL void shrink(const ImageSize size, global const uchar* images, global uchar* coarse_images) {
   const int coarse_width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int coarse_height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int x = 4 * get_global_id(0);

@@ -6,7 +6,7 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-kernel void check(const ImageSize size, const float max_difference, const float max_difference_in_doubt,
+KERNEL void check(const ImageSize size, const float max_difference, const float max_difference_in_doubt,
                   global const PredictionState* last, const int keep_outside, global const float* disparity,
                   global float* kept_disparity, global float* variance) {
   const int y = get_global_id(1);

@@ -10,7 +10,7 @@ static inline Ints has_both(const Floats predicted, const Floats measured) {
 }
 
 // Of 2 EGOSGM_DYNAMIC_RADIUS + 1 pixels of the row: how many have both, and how many of those differ.
-kernel void count_rows(const ImageSize size, const float min_difference, global const float* predicted,
+KERNEL void count_rows(const ImageSize size, const float min_difference, global const float* predicted,
                        global const float* measured, global float* both, global float* different) {
   const int width = size.width;
   const size_t row = (size_t)get_global_id(1) * width;
@@ -30,7 +30,7 @@ kernel void count_rows(const ImageSize size, const float min_difference, global 
 }
 
 // 255 where at least half of the window's pixels that have both differ, if enough have.
-kernel void mark(const ImageSize size, global const float* predicted, global const float* measured,
+KERNEL void mark(const ImageSize size, global const float* predicted, global const float* measured,
                  global const float* both, global const float* different, global uchar* marks) {
   const int y = get_global_id(1);
   const int width = size.width;

@@ -12,7 +12,7 @@ static inline Ints is_jump(const Floats d, const Floats near, const Floats far, 
   return (neighbour > INVALID) & (fabs(neighbour - d) > max_jump);
 }
 
-kernel void reject(const ImageSize size, const float max_jump, global const float* disparity,
+KERNEL void reject(const ImageSize size, const float max_jump, global const float* disparity,
                    global float* kept_disparity, global float* variance) {
   const int y = get_global_id(1);
   const int width = size.width;

@@ -69,7 +69,7 @@ static inline float disparity_of(const uint key) { return as_float(key >> 31 ? k
 
 // Moves both views' disparity space. landed: the index of a source's target in the view, -1: nowhere. Also clears what
 // the splats bid on.
-kernel void move(const ImageSize size, const DisparityRange range, const DisparityMotion left,
+KERNEL void move(const ImageSize size, const DisparityRange range, const DisparityMotion left,
                  const DisparityMotion right, const float process_noise, global const float* disparity,
                  global const float* variance, global int* landed, global uint* moved_key, global float* moved_variance,
                  global uint* zbuffer, global float* predicted_variance) {
@@ -87,7 +87,7 @@ kernel void move(const ImageSize size, const DisparityRange range, const Dispari
   predicted_variance[i] = 0.0f;
 }
 
-kernel void splat_disparity(const ImageSize size, global const int* landed, global const uint* moved_key,
+KERNEL void splat_disparity(const ImageSize size, global const int* landed, global const uint* moved_key,
                             global uint* zbuffer) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
@@ -98,7 +98,7 @@ kernel void splat_disparity(const ImageSize size, global const int* landed, glob
 }
 
 // Positive floats are ordered as their bits are.
-kernel void splat_variance(const ImageSize size, global const int* landed, global const uint* moved_key,
+KERNEL void splat_variance(const ImageSize size, global const int* landed, global const uint* moved_key,
                            global const float* moved_variance, global const uint* zbuffer,
                            global float* predicted_variance) {
   const int x = get_global_id(0);
@@ -110,7 +110,7 @@ kernel void splat_variance(const ImageSize size, global const int* landed, globa
   atomic_max((global uint*)predicted_variance + first + target, as_uint(moved_variance[i]));
 }
 
-kernel void decode(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
+KERNEL void decode(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
                    global float* disparity, global float* variance) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
@@ -150,7 +150,7 @@ static inline int2 span_of(const ImageSize size, const DisparityMotion motion, c
 
 // Between which rows each source row lands; the first lies behind the last where it lands on none. A work-item a row
 // and view.
-kernel void find_spans(const ImageSize size, const DisparityMotion left, const DisparityMotion right,
+KERNEL void find_spans(const ImageSize size, const DisparityMotion left, const DisparityMotion right,
                        global const float* disparity, global int* spans) {
   const int y = get_global_id(0);
   const int view = get_global_id(1);
@@ -179,7 +179,7 @@ kernel void find_spans(const ImageSize size, const DisparityMotion left, const D
 }
 
 // Moves and splats what lands on a band of `band_rows` rows. A work-item a band and view; no other touches its rows.
-kernel void splat_bands(const ImageSize size, const DisparityRange range, const DisparityMotion left,
+KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const DisparityMotion left,
                         const DisparityMotion right, const float process_noise, const int band_rows,
                         global const int* spans, global const float* disparity, global const float* variance,
                         global float* predicted, global float* predicted_variance) {

@@ -13,7 +13,7 @@ static inline Ints is_gap(const Floats centre, const Floats before, const Floats
 static inline Floats mean_of(const Floats a, const Floats b) { return 0.5f * (a + b); }
 static inline Floats larger_of(const Floats a, const Floats b) { return a > b ? a : b; }
 
-kernel void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
+KERNEL void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
                       global const float* variance, global float* filled_disparity, global float* filled_variance) {
   const int width = size.width;
   const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
@@ -32,7 +32,7 @@ kernel void fill_rows(const ImageSize size, const float gamma, global const floa
   }
 }
 
-kernel void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
+KERNEL void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
                          global const float* variance, global float* filled_disparity, global float* filled_variance) {
   const int y = get_global_id(1);
   const int width = size.width;

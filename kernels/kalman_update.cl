@@ -72,7 +72,7 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
 // than EGOSGM_SUPPORT_MOST where the prediction was dropped; and whether a measurement is taken that differs as those
 // of EGOSGM_MOVING_COUNT around do. innovation_weight: p' is raised until this times the squared innovation is no more
 // than p' + r; 0: never.
-kernel void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
+KERNEL void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
                    const float innovation_weight, const float min_variance, global const PredictionState* check,
                    global const float* warped, global const float* predicted, global const float* predicted_variance,
                    global const float* measured, global const float* measured_variance, global float* updated,

@@ -82,11 +82,11 @@ static inline void filter_window(const bool fills, const ImageSize size, const i
   }
 }
 
-kernel void filter(const ImageSize size, global const float* disparity, global float* filtered) {
+KERNEL void filter(const ImageSize size, global const float* disparity, global float* filtered) {
   filter_window(false, size, 0, disparity, filtered, 0);
 }
 
-kernel void filter_and_fill(const ImageSize size, const int fill_from, global const float* disparity,
+KERNEL void filter_and_fill(const ImageSize size, const int fill_from, global const float* disparity,
                             global float* filtered, global float* variance) {
   filter_window(true, size, fill_from, disparity, filtered, variance);
 }

@@ -31,7 +31,7 @@ static inline Floats blend(const Floats p, const Floats measured, const Floats r
 
 // Of each pixel: the variances' blend, and the sum of the horizontal and the vertical second difference. A pixel at the
 // image's edge is its own neighbour.
-kernel void of_each_pixel(const ImageSize size, global const float* disparity, global const float* variance,
+KERNEL void of_each_pixel(const ImageSize size, global const float* disparity, global const float* variance,
                           global const float* measured, global const float* measured_variance, global float* blended,
                           global float* roughness) {
   const int y = get_global_id(1);
@@ -54,7 +54,7 @@ kernel void of_each_pixel(const ImageSize size, global const float* disparity, g
 }
 
 // Means along the row: of the variances at every fourth pixel; of the roughness at every pixel.
-kernel void row_means(const ImageSize size, global const float* variance, global const float* roughness,
+KERNEL void row_means(const ImageSize size, global const float* variance, global const float* roughness,
                       global float* mean_variance, global float* mean_roughness) {
   const int width = size.width;
   const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
@@ -114,7 +114,7 @@ static inline Floats calibrated(const Floats sum) {
   return 0.18f / (1.0f + 0.07f / square) + 1.26f * sqrt(sum) / (1.0f + 0.8f / (square * square * sum));
 }
 
-kernel void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,
+KERNEL void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,
                     global const float* disparity, global const float* mean_variance,
                     global const float* mean_roughness, global float* variance) {
   const int y = get_global_id(1);

@@ -11,7 +11,7 @@
 // lint: ROW_GROUP=64
 
 // Counts of every EGOSGM_CHECKED_ROWS-th row. A work-group of ROW_GROUP a row.
-kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_rows(const int width,
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_rows(const int width,
                                                                               global const float* warped,
                                                                               global const float* predicted,
                                                                               global const float* measured,
@@ -56,7 +56,7 @@ static inline int are_wrong(const PredictionCounts now, const PredictionCounts b
          (4 * (ulong)now.predicted < 3 * (ulong)before.predicted || differing > 2 * differed + both / 40);
 }
 
-kernel void judge(const int rows, global const PredictionCounts* row_counts, global const PredictionState* before,
+KERNEL void judge(const int rows, global const PredictionCounts* row_counts, global const PredictionState* before,
                   global PredictionState* after) {
   PredictionCounts sum = {0, 0, 0};
   for (int i = 0; i < rows; ++i) {

@@ -15,7 +15,7 @@ inline Uints load_ranks(global const uint* row, const int x) {
 }
 
 // Writes the right half of both maps.
-kernel void read_off(const SgmParameters q, global const uint* ranks, global float* disparities,
+KERNEL void read_off(const SgmParameters q, global const uint* ranks, global float* disparities,
                      global float* variances) {
   const int y = get_global_id(1);
   const size_t row = ((size_t)q.height + y) * q.width;

@@ -37,7 +37,7 @@ static inline void bid(const Ints keys, const Ints targets, global int* row) {
 }
 
 // REQUIRES: on GPUs, keys of 0.
-kernel void splat(const ImageSize size, const int min_disparity, global const float* disparity, global int* keys) {
+KERNEL void splat(const ImageSize size, const int min_disparity, global const float* disparity, global int* keys) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -63,7 +63,7 @@ kernel void splat(const ImageSize size, const int min_disparity, global const fl
 }
 
 // REQUIRES: unless is_measured, any maps as `measured`.
-kernel void decode(const ImageSize size, const int min_disparity, const float max_difference, const int is_measured,
+KERNEL void decode(const ImageSize size, const int min_disparity, const float max_difference, const int is_measured,
                    global const int* keys, global const float* measured, global const float* measured_variance,
                    global float* disparity, global float* variance) {
   const int y = get_global_id(1);

@@ -11,7 +11,7 @@
 #define STEPS_PER_GREY 257
 #endif
 
-kernel void check(const ImageSize size, const float max_difference, global const uchar* images,
+KERNEL void check(const ImageSize size, const float max_difference, global const uchar* images,
                   global const float* disparity_in, global const float* variance_in, global float* disparity_out,
                   global float* variance_out) {
   const int x = get_global_id(0);

@@ -152,7 +152,7 @@ size_t index_of(const ImageSize size, int view, int x, int y) {
 }
 
 // A work-item a block and view.
-kernel void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
+KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
   const int x = get_global_id(0);
   const int y = get_global_id(1);
@@ -194,7 +194,7 @@ int8 ridges_from(global const float* row, int x, int width, int reach, float ste
 
 // What is a ridge in a block, before EdgeRejection drops it: of every other row, since poles are upright; a single
 // pixel is none. A work-item a block and view.
-kernel void gather_ridges(const ImageSize size, const float step, global const float* disparity,
+KERNEL void gather_ridges(const ImageSize size, const float step, global const float* disparity,
                           global BlockRange* ridges) {
   const ImageSize blocks = blocks_of(size);
   const int x = get_global_id(0);
@@ -232,7 +232,7 @@ void insert_most(float4* most, float4 value) {
 // What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at
 // either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. And the block's
 // ridges, with its own coarse ones. A work-item a block and view.
-kernel void gather_coarse(const ImageSize size, const float step, global const float* coarse,
+KERNEL void gather_coarse(const ImageSize size, const float step, global const float* coarse,
                           global const BlockRange* ridges, global BlockRange* ranges,
                           global BlockRange* ridges_with_coarse) {
   const ImageSize blocks = blocks_of(size);
@@ -293,7 +293,7 @@ kernel void gather_coarse(const ImageSize size, const float step, global const f
 // The band of a block's unpredicted pixels: what the predictions in the 3x3 blocks around it, the coarse match and the
 // ridges near span, up to `ridge_blocks` above and below (-1: none). `found`: what the latter two span, for the
 // predicted ones. A work-item a block and view.
-kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
+KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
                             const float margin, const int min_count, const float coarse_margin,
                             global const BlockRange* ranges, global const BlockRange* coarse_ranges,
                             const int ridge_blocks, global const BlockRange* ridges, global BlockRange* found,
@@ -341,7 +341,7 @@ kernel void bands_of_blocks(const ImageSize size, const DisparityRange range, co
 }
 
 // A work-item a block's row of pixels and view.
-kernel void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
+KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
                             const float coarse_tolerance, const float coarse_margin, global const BlockRange* found,
                             global const Band* block_bands, global Band* bands) {
@@ -407,7 +407,7 @@ uint16 load_eight(global const Band* row, int x, int width) {
 }
 
 // Sums up each row, eight pixels at a time. A work-item a row and view.
-kernel __attribute__((reqd_work_group_size(1, 1, 1))) void sum_rows(const ImageSize size, global const float* disparity,
+KERNEL __attribute__((reqd_work_group_size(1, 1, 1))) void sum_rows(const ImageSize size, global const float* disparity,
                                                                     global const Band* bands, global uint* cell_offsets,
                                                                     global RowSum* row_sums) {
   const size_t row = (size_t)get_global_id(2) * size.height + get_global_id(1);
@@ -443,7 +443,7 @@ kernel __attribute__((reqd_work_group_size(1, 1, 1))) void sum_rows(const ImageS
 
 // Sums up each row: a work-group of ROW_GROUP a row and view goes over it in tiles, with an inclusive scan of a tile at
 // a time.
-kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
                                                                             global const float* disparity,
                                                                             global const Band* bands,
                                                                             global uint* cell_offsets,
@@ -495,14 +495,14 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
 #endif
 
 // Every pixel searches everything after predictions that were wrong. A work-item a row.
-kernel void widen(const ImageSize size, const Band band, global const PredictionState* last, global Band* bands) {
+KERNEL void widen(const ImageSize size, const Band band, global const PredictionState* last, global Band* bands) {
   const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width;
   const int count = last->is_wrong ? size.width : 0;
   for (int x = 0; x < count; ++x) bands[row + x] = band;
 }
 
 // `band`: the one of every pixel.
-kernel void full_range(const ImageSize size, const DisparityRange range, const Band band, global Band* bands,
+KERNEL void full_range(const ImageSize size, const DisparityRange range, const Band band, global Band* bands,
                        global uint* cell_offsets, global RowSum* row_sums) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);

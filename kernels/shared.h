@@ -20,6 +20,14 @@ typedef short i16;
 typedef ushort u16;
 typedef uint u32;
 typedef float f32;
+
+// Before every kernel. Where a work-item's values are vectors, a compiler that makes vectors of work-items too (Intel's
+// for CPUs) takes minutes, and has given other sums than were written.
+#if defined(PIXELS) && PIXELS == 1
+#define KERNEL kernel
+#else
+#define KERNEL kernel __attribute__((vec_type_hint(int16)))
+#endif
 #endif
 
 // A pixel without a disparity; include/egosgm/image.h says the same to users.

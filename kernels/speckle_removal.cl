@@ -84,7 +84,7 @@ int find_runs_by_lanes(const int width, const float max_difference, global const
 #endif
 
 // Where the run of each pixel begins, and the length of each run. A work-group of ROW_GROUP a row and view.
-kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void find_runs(const ImageSize size,
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void find_runs(const ImageSize size,
                                                                              const float max_difference,
                                                                              global const float* disparity,
                                                                              global ushort* runs, global uint* parents,
@@ -154,7 +154,7 @@ void join(global uint* parents, uint a, uint b) {
 
 // Joins each row of a strip with the one above; the strip's own runs are touched by no other work-item. A work-item a
 // strip and view. Sixteen pixels at a time: few of them join what their left neighbour has not joined before them.
-kernel void join_strips(const ImageSize size, const float max_difference, const int strip_rows,
+KERNEL void join_strips(const ImageSize size, const float max_difference, const int strip_rows,
                         global const float* disparity, global const ushort* runs, global uint* parents) {
   const int strip = get_global_id(0);
   const int view = get_global_id(1);
@@ -190,7 +190,7 @@ uint root_now(volatile global uint* parents, uint run) {
 }
 
 // Joins the first row of each strip but the first with the one above. A work-item a pixel of such rows.
-kernel void join_seams(const ImageSize size, const float max_difference, const int strip_rows,
+KERNEL void join_seams(const ImageSize size, const float max_difference, const int strip_rows,
                        global const float* disparity, global const ushort* runs, volatile global uint* parents) {
   const int x = get_global_id(0);
   const int y = (get_global_id(1) + 1) * strip_rows;
@@ -238,7 +238,7 @@ uint beginnings(global const ushort* runs, int x, int width) {
 }
 
 // Adds every run to its root. Only roots are added to, and only others are read.
-kernel void measure(const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
+KERNEL void measure(const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
                     volatile global uint* sizes) {
   const int y = get_global_id(1);
   const int view = get_global_id(2);
@@ -255,7 +255,7 @@ kernel void measure(const ImageSize size, global const ushort* runs, global cons
   }
 }
 
-kernel void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
+KERNEL void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
                  global const uint* sizes, global float* disparity, global float* variance) {
   const int y = get_global_id(1);
   const int view = get_global_id(2);

@@ -29,7 +29,7 @@ static inline Ints penalty(const Ints most, const Ints least, const Ints slope, 
   return max(most - slope * max(p - q, q - p), least);
 }
 
-kernel void penalties(const ImageSize size, const int most, const int least, const int slope,
+KERNEL void penalties(const ImageSize size, const int most, const int least, const int slope,
                       global const uchar* images, global uchar* steps) {
   const int y = get_global_id(1);
   const int width = size.width;

@@ -35,7 +35,8 @@ typedef uint Weight;
 #define ROW_STEPS 256
 #define COLUMN_STEPS 16
 #define BLOCK 16
-#define PLACES 256  // from the middle of the image to its end
+#define PLACES_BITS 8
+#define PLACES (1 << PLACES_BITS)  // from the middle of the image to its end
 
 #define MAX_OFFSET 2.0f  // [px]
 
@@ -48,7 +49,7 @@ inline int place(const int at, const int count, const int steps) {
 
 // Copies the left image, and resamples the right one by the quadratic state[0] + state[1] u + state[2] v + state[3] u v
 // + state[4] u^2 + state[5] v^2 pixels; u, v: -1 to 1 over the image. A work-group of ROW_GROUP a row and view.
-kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(const ImageSize size,
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(const ImageSize size,
                                                                             global const float* state,
                                                                             global const uchar* images,
                                                                             global uchar* aligned) {
@@ -98,13 +99,14 @@ kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
 // Of a row: sums of g clamp(r) u^n for n = 0 to 2, of g_I g_J u^n for n = 0 to 4, and of 1; u: the column in the right
 // image, -COARSE_PLACES to COARSE_PLACES, so that no sum is too large for 63 bits. A work-group of ROW_GROUP a sampled
 // row.
-#define COARSE_PLACES 32
+#define COARSE_BITS 5
+#define COARSE_PLACES (1 << COARSE_BITS)
 #define GR_SUMS 3
 #define GG_SUMS 5
 #define COUNT (GR_SUMS + GG_SUMS)
 #define SUMS (COUNT + 1)
 
-kernel __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
                                                                             global const uchar* images,
                                                                             global const float* disparity,
                                                                             global long* row_sums) {
@@ -189,47 +191,76 @@ inline int solve(float matrix[TERMS][TERMS], float x[TERMS], const float least) 
   return 1;
 }
 
+// Which sums over the image a frame's step needs: of u^n v^m times g clamp(r), n + m up to GR_SUMS - 1, and times g_I
+// g_J, n + m up to GG_SUMS - 1; as squares [n][m], the former first.
+#define GR_MOMENTS (GR_SUMS * GR_SUMS)
+#define MOMENTS (GR_MOMENTS + GG_SUMS * GG_SUMS)
+
+// A row's sum times v^m takes more than 63 bits together with the others, so that what lies above its lowest LOW_BITS
+// is summed apart. An image of up to 16384 x 16384 pixels has 2^13 samples in each of 2^12 rows: of |g_I g_J u^n| <=
+// 2^(26 + 5 n) a row's sum has 39 + 5 n bits, and v^m in PLACES 8 m; v^4 is on average less than a quarter of its most.
+// So both parts stay below 2^62.
+#define LOW_BITS 19
+
+// A sum over the image of u^n v^m, from the rows' sums number `sum`, which hold u^n. The sums are of integers, and the
+// rest is exact but for two conversions and a sum, so that no compiler can make another number of it.
+inline float moment_of(const int height, const int rows, const int n, const int m, const int sum,
+                       global const long* row_sums) {
+  long high = 0, low = 0;
+  for (int row = 0; row < rows; ++row) {
+    const long v = place(FIRST_ROW + row * ROW_STRIDE, height, PLACES);
+    long power = 1;
+    for (int i = 0; i < m; ++i) power *= v;
+    const long u_sum = row_sums[SUMS * row + sum];
+    high += (u_sum >> LOW_BITS) * power;
+    low += (u_sum & ((1 << LOW_BITS) - 1)) * power;
+  }
+  return ldexp((float)high * (1 << LOW_BITS) + (float)low, -(COARSE_BITS * n + PLACES_BITS * m));
+}
+
 // The step of a frame, by the running mean of the frames so far at first and then at a fixed gain. state: the terms of
-// the offset [px], and the number of estimates that they rest on. A single work-item; `state` and `next` may be the
-// same.
-kernel void update(const ImageSize size, const int sampled_rows, const float gain, global const long* row_sums,
-                   global const float* state, global float* next) {
-  if (get_global_id(0) > 0) return;
-  float matrix[TERMS][TERMS] = {{0.0f}};
-  float step[TERMS] = {0.0f};
-  long count = 0;
-  for (int row = 0; row < sampled_rows; ++row) {
-    global const long* sums = row_sums + SUMS * row;
-    const float v = (float)place(FIRST_ROW + row * ROW_STRIDE, size.height, PLACES) / PLACES;
-    const float powers_of_v[GG_SUMS] = {1.0f, v, v * v, v * v * v, v * v * v * v};
-    float gr[GR_SUMS];
-    float gg[GG_SUMS];
-    float unit = 1.0f;
-    for (int n = 0; n < GG_SUMS; ++n, unit /= COARSE_PLACES) {
-      if (n < GR_SUMS) gr[n] = (float)sums[n] * unit;
-      gg[n] = (float)sums[GR_SUMS + n] * unit;
+// the offset [px], and the number of estimates that they rest on. A single work-group of ROW_GROUP, whose work-items
+// share the sums; `state` and `next` may be the same.
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update(const ImageSize size, const int sampled_rows,
+                                                                          const float gain, global const long* row_sums,
+                                                                          global const float* state,
+                                                                          global float* next) {
+  local float moments[MOMENTS];
+  for (int i = get_local_id(0); i < MOMENTS; i += ROW_GROUP) {
+    const int is_gr = i < GR_MOMENTS, side = is_gr ? GR_SUMS : GG_SUMS;
+    const int n = (is_gr ? i : i - GR_MOMENTS) / side, m = (is_gr ? i : i - GR_MOMENTS) % side;
+    if (n + m < side) {
+      moments[i] = moment_of(size.height, sampled_rows, n, m, is_gr ? n : GR_SUMS + n, row_sums);
     }
-    count += sums[COUNT];
+  }
+  barrier(CLK_LOCAL_MEM_FENCE);
+  if (get_local_id(0) == 0) {
+    local const float* gr = moments;
+    local const float* gg = moments + GR_MOMENTS;
+    float matrix[TERMS][TERMS];
+    float step[TERMS];
+    long count = 0;
+    for (int row = 0; row < sampled_rows; ++row) count += row_sums[SUMS * row + COUNT];
     for (int i = 0; i < TERMS; ++i) {
-      step[i] += gr[POWER_OF_U[i]] * powers_of_v[POWER_OF_V[i]];
+      step[i] = gr[GR_SUMS * POWER_OF_U[i] + POWER_OF_V[i]];
       for (int j = 0; j <= i; ++j) {
-        matrix[i][j] += gg[POWER_OF_U[i] + POWER_OF_U[j]] * powers_of_v[POWER_OF_V[i] + POWER_OF_V[j]];
+        matrix[i][j] = gg[GG_SUMS * (POWER_OF_U[i] + POWER_OF_U[j]) + POWER_OF_V[i] + POWER_OF_V[j]];
       }
     }
+    const float all = matrix[0][0];
+    const float mean_step = step[0] / all;
+    for (int i = 1; i < TERMS; ++i) {
+      matrix[i][i] += PRIOR * all;
+      step[i] -= PRIOR * all * state[i];
+    }
+    const int enough = (count >= MIN_SAMPLES) & (all > 0.0f);
+    const int has_terms = enough && solve(matrix, step, 0.5f * PRIOR * all);
+    const float estimates = state[TERMS];
+    const float share = fmax(gain, 1.0f / fmax(estimates, 1.0f));
+    for (int i = 0; i < TERMS; ++i) {
+      const float change = has_terms ? step[i] : enough && i == 0 ? mean_step : 0.0f;
+      next[i] = clamp(state[i] + share * clamp(change, -MAX_STEP, MAX_STEP), -MAX_OFFSET, MAX_OFFSET);
+    }
+    next[TERMS] = enough ? fmin(estimates + 1.0f, MAX_ESTIMATES) : estimates;
   }
-  const float all = matrix[0][0];
-  const float mean_step = step[0] / all;
-  for (int i = 1; i < TERMS; ++i) {
-    matrix[i][i] += PRIOR * all;
-    step[i] -= PRIOR * all * state[i];
-  }
-  const int enough = (count >= MIN_SAMPLES) & (all > 0.0f);
-  const int has_terms = enough && solve(matrix, step, 0.5f * PRIOR * all);
-  const float estimates = state[TERMS];
-  const float share = fmax(gain, 1.0f / fmax(estimates, 1.0f));
-  for (int i = 0; i < TERMS; ++i) {
-    const float change = has_terms ? step[i] : enough && i == 0 ? mean_step : 0.0f;
-    next[i] = clamp(state[i] + share * clamp(change, -MAX_STEP, MAX_STEP), -MAX_OFFSET, MAX_OFFSET);
-  }
-  next[TERMS] = enough ? fmin(estimates + 1.0f, MAX_ESTIMATES) : estimates;
 }

@@ -169,6 +169,15 @@ TEST(Kernels, DoNotReturnBeforeABarrier) {
   }
 }
 
+// KERNEL (shared.h) tells compilers what not to make of them.
+TEST(Kernels, BeginWithTheMacroThatSaysTheyAreVectors) {
+  for (const fs::path& kernel : kernels()) {
+    const std::string text = without_comments(text_of(kernel));
+    EXPECT_FALSE(std::regex_search(text, std::regex(R"(\b(__)?kernel\b)"))) << kernel << ": KERNEL in place of kernel";
+    EXPECT_TRUE(std::regex_search(text, std::regex(R"(\nKERNEL\b)"))) << kernel;
+  }
+}
+
 TEST(Kernels, DoNotRecur) {
   for (const fs::path& kernel : kernels()) {
     for (const auto& [name, body] : functions(without_comments(text_of(kernel)))) {

@@ -53,6 +53,49 @@ TEST_F(Signatures, RefusesAnotherCount) {
   EXPECT_THROW((ocl::Kernel<Size, const cl_uint, In>(program_, "add")), std::logic_error);
 }
 
+// A kernel's own limit may lie below the device's: every launch that only guards its bounds takes what there is.
+TEST(WorkGroups, AreHalvedToWhatAKernelAllows) {
+  const auto halved = [](const cl::NDRange& local, std::size_t limit) {
+    const cl::NDRange sides = ocl::halved_to(local, limit);
+    return std::vector<std::size_t>(sides.get(), sides.get() + sides.dimensions());
+  };
+  EXPECT_EQ(halved({64, 1, 1}, 1024), (std::vector<std::size_t>{64, 1, 1}));
+  EXPECT_EQ(halved({64, 1, 1}, 32), (std::vector<std::size_t>{32, 1, 1}));
+  EXPECT_EQ(halved({64, 1, 1}, 1), (std::vector<std::size_t>{1, 1, 1}));
+  EXPECT_EQ(halved({64, 2}, 100), (std::vector<std::size_t>{32, 2}));
+  EXPECT_EQ(halved({3, 1, 1}, 2), (std::vector<std::size_t>{3, 1, 1})) << "refused by name then";
+  EXPECT_EQ(halved(cl::NullRange, 1), (std::vector<std::size_t>{})) << "left to the driver";
+}
+
+TEST_F(Signatures, AKernelWithAWorkGroupOfItsOwnKeepsIt) {
+  const std::size_t limit = context_.max_work_group_size();
+  cl::Program program(context_.get(),
+                      "kernel __attribute__((reqd_work_group_size(SIZE, 1, 1))) void fixed(global int* "
+                      "out) { out[get_global_id(0)] = 1; }\n"
+                      "kernel void free_to_choose(global int* out) { out[get_global_id(0)] = 1; }");
+  program.build({context_.device()}, "-cl-std=CL1.2 -cl-kernel-arg-info -DSIZE=1");
+  ocl::Buffer<cl_int> out(context_, 2 * limit);
+  const ocl::Range too_large{cl::NDRange(2 * limit), cl::NDRange(2 * limit)};
+  ocl::Kernel<ocl::Buffer<cl_int>> fixed(program, "fixed"), free_to_choose(program, "free_to_choose");
+  EXPECT_THROW(fixed(context_, too_large, out), DeviceError);
+  out.fill(context_, 0);
+  free_to_choose(context_, too_large, out);
+  context_.wait();
+  EXPECT_EQ(out.read(context_), std::vector<cl_int>(2 * limit, 1));
+}
+
+TEST(Times, ThatADriverLeavesOutAreThoseOfTheNextStep) {
+  using Times = ocl::Context::Times;
+  const auto completed = [](Times answered) {
+    const Times t = ocl::Context::completed(answered);
+    return std::array{t.queued, t.submitted, t.started, t.ended};
+  };
+  EXPECT_EQ(completed({10, 20, 30, 40}), (std::array<std::int64_t, 4>{10, 20, 30, 40}));
+  EXPECT_EQ(completed({0, 20, 30, 40}), (std::array<std::int64_t, 4>{20, 20, 30, 40}));
+  EXPECT_EQ(completed({0, 0, 30, 40}), (std::array<std::int64_t, 4>{30, 30, 30, 40}));
+  EXPECT_EQ(completed({25, 20, 30, 40}), (std::array<std::int64_t, 4>{20, 20, 30, 40}));
+}
+
 TEST(AllKernels, HaveTheSignatureThatTheirStagesDeclare) {
   for (const MatchingCost cost : {MatchingCost::kCensus9x7, MatchingCost::kSad3x3}) {
     PipelineOptions options;

@@ -138,14 +138,21 @@ std::vector<Context::Times> Context::times_of(const std::vector<Command>& comman
       command.event.getProfilingInfo(what, &ns);
       return static_cast<std::int64_t>(ns);
     };
-    times.push_back({asked(CL_PROFILING_COMMAND_QUEUED), asked(CL_PROFILING_COMMAND_SUBMIT),
-                     asked(CL_PROFILING_COMMAND_START), asked(CL_PROFILING_COMMAND_END)});
+    times.push_back(completed({asked(CL_PROFILING_COMMAND_QUEUED), asked(CL_PROFILING_COMMAND_SUBMIT),
+                               asked(CL_PROFILING_COMMAND_START), asked(CL_PROFILING_COMMAND_END)}));
     clock_offset_ns_ = std::min(clock_offset_ns_, command.enqueued_ns - times.back().queued);
   }
   for (Times& t : times) {
     for (std::int64_t* ns : {&t.queued, &t.submitted, &t.started, &t.ended}) *ns += clock_offset_ns_;
   }
   return times;
+}
+
+Context::Times Context::completed(Times answered) {
+  auto& [queued, submitted, started, ended] = answered;
+  if (submitted <= 0 || submitted > started) submitted = started;
+  if (queued <= 0 || queued > submitted) queued = submitted;
+  return answered;
 }
 
 void Context::expect_none_failed(const std::vector<Command>& commands) {

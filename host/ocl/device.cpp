@@ -75,11 +75,21 @@ std::optional<UnitRange> unit_range(const std::string& wanted) {
   return UnitRange{wanted.substr(0, slash), *first, *last};
 }
 
+/// Whether the driver says so; one that does not may have no such call at all (rusticl of Mesa 22.3).
+bool divides_by_counts(const cl::Device& device) {
+  const auto kinds = device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
+  return device.getInfo<CL_DEVICE_PARTITION_MAX_SUB_DEVICES>() > 0 &&
+         std::find(kinds.begin(), kinds.end(), CL_DEVICE_PARTITION_BY_COUNTS) != kinds.end();
+}
+
 /// The compute units `first` to `last` of `device` as a device of their own.
 cl::Device sub_device(const cl::Device& device, const DeviceInfo& info, int first, int last) {
   const std::string asked = info.name + ": compute units " + std::to_string(first) + " to " + std::to_string(last);
   if (first < 0 || first > last || last >= info.compute_units) {
     throw InvalidArgument(asked + ": it has " + std::to_string(info.compute_units) + ", numbered from 0");
+  }
+  if (!divides_by_counts(device)) {
+    throw InvalidArgument(asked + ": its driver does not divide it: choose the whole device");
   }
   std::vector<cl_device_partition_property> counts{CL_DEVICE_PARTITION_BY_COUNTS};
   if (first > 0) counts.push_back(first);

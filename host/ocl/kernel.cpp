@@ -18,6 +18,10 @@ bool this_cpu_counts_bits() {
 #endif
 }
 
+std::size_t work_items(const cl::NDRange& local) {
+  return std::accumulate(local.get(), local.get() + local.dimensions(), std::size_t{1}, std::multiplies<>());
+}
+
 }  // namespace
 
 bool counts_bits(const Context& context) {
@@ -27,12 +31,16 @@ bool counts_bits(const Context& context) {
          trimmed(platform.getInfo<CL_PLATFORM_NAME>()) == "Portable Computing Language";
 }
 
+cl::NDRange halved_to(const cl::NDRange& local, std::size_t limit) {
+  cl::NDRange fitting = local;
+  while (work_items(fitting) > limit && fitting.get()[0] % 2 == 0) fitting.get()[0] /= 2;
+  return fitting;
+}
+
 void expect_work_group(const Context& context, const char* kernel, const cl::NDRange& local, std::size_t limit) {
-  const std::size_t work_items =
-      std::accumulate(local.get(), local.get() + local.dimensions(), std::size_t{1}, std::multiplies<>());
-  if (work_items <= limit) return;
+  if (work_items(local) <= limit) return;
   throw DeviceError(CL_INVALID_WORK_GROUP_SIZE, std::string(context.stage()) + ": kernel " + kernel +
-                                                    " needs work-groups of " + std::to_string(work_items) +
+                                                    " needs work-groups of " + std::to_string(work_items(local)) +
                                                     " work-items, the device allows " + std::to_string(limit) +
                                                     " for it: choose fewer disparities or another device");
 }

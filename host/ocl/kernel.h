@@ -57,6 +57,10 @@ bool counts_bits(const Context& context);
 /// Throws DeviceError, naming the stage, the kernel and the limit, where `local` has more work-items than `limit`.
 void expect_work_group(const Context& context, const char* kernel, const cl::NDRange& local, std::size_t limit);
 
+/// `local` with its first side halved until it has no more work-items than `limit`: what launches that only guard their
+/// bounds can do with. The global size, a multiple of the former, is one of it too.
+cl::NDRange halved_to(const cl::NDRange& local, std::size_t limit);
+
 /// A kernel with its C++ signature: `Buffer<T>` for `global T*`, `const Buffer<T>` for
 /// `global const T*`, anything else by value.
 template <typename... Params>
@@ -65,17 +69,20 @@ class Kernel {
   /// `name`: a string literal. Throws std::logic_error where the .cl does not fit the signature.
   Kernel(const cl::Program& program, const char* name) : kernel_(program, name), name_(name) {
     expect_signature(kernel_, {KernelParameter<Params>::text()...});
-    max_work_group_size_ =
-        kernel_.template getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(program.getInfo<CL_PROGRAM_DEVICES>().front());
+    const cl::Device device = program.getInfo<CL_PROGRAM_DEVICES>().front();
+    max_work_group_size_ = kernel_.template getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(device);
+    has_fixed_group_ = kernel_.template getWorkGroupInfo<CL_KERNEL_COMPILE_WORK_GROUP_SIZE>(device)[0] > 0;
   }
 
-  /// Throws DeviceError where the device, for what this kernel takes of it, cannot hold the range's work-groups.
+  /// Throws DeviceError where the device, for what this kernel takes of it, cannot hold the range's work-groups and the
+  /// kernel needs them so large.
   void operator()(Context& context, const Range& range, Params&... args) {
-    expect_work_group(context, name_, range.local, max_work_group_size_);
+    const cl::NDRange local = has_fixed_group_ ? range.local : halved_to(range.local, max_work_group_size_);
+    expect_work_group(context, name_, local, max_work_group_size_);
     cl_uint index = 0;
     (set(index++, args), ...);
     cl::Event done;
-    context.queue().enqueueNDRangeKernel(kernel_, cl::NullRange, range.global, range.local, nullptr, &done);
+    context.queue().enqueueNDRangeKernel(kernel_, cl::NullRange, range.global, local, nullptr, &done);
     context.record(done, name_, Queue::kKernels, /*is_launch=*/true);
   }
 
@@ -95,6 +102,7 @@ class Kernel {
   cl::Kernel kernel_;
   const char* name_;
   std::size_t max_work_group_size_ = 0;
+  bool has_fixed_group_ = false;  // by reqd_work_group_size
 };
 
 }  // namespace egosgm::ocl

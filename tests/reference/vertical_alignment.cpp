@@ -37,6 +37,19 @@ bool solve(std::array<std::array<float, kTerms>, kTerms> matrix, std::array<floa
   return true;
 }
 
+/// A sum of products without loss: their parts above and below 2^19 apart, which 64 bits hold.
+struct Sum {
+  std::int64_t high = 0, low = 0;
+
+  void add(std::int64_t value, std::int64_t factor) {
+    constexpr std::int64_t kUnit = 1 << 19;
+    const std::int64_t below = (value % kUnit + kUnit) % kUnit;
+    high += (value - below) / kUnit * factor;
+    low += below * factor;
+  }
+  float rounded() const { return static_cast<float>(high) * (1 << 19) + static_cast<float>(low); }
+};
+
 }  // namespace
 
 float offset_at(shared::ImageSize size, const VerticalOffset& offset, int x, int y) {
@@ -69,8 +82,8 @@ VerticalOffset estimate_offset(shared::ImageSize size, float gain, const std::ve
                                const std::vector<float>& left_disparity, const VerticalOffset& known) {
   constexpr int kPowerOfU[] = {0, 1, 0, 1, 2, 0}, kPowerOfV[] = {0, 0, 1, 1, 0, 2};
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
-  std::array<std::array<float, kTerms>, kTerms> matrix{};
-  std::array<float, kTerms> step{};
+  std::array<std::array<Sum, kTerms>, kTerms> matrix_sums;
+  std::array<Sum, kTerms> step_sums;
   std::int64_t count = 0;
   for (int y = 4; y < size.height - 4; y += 4) {
     std::int64_t row_gr[3] = {}, row_gg[5] = {};  // times powers of u
@@ -99,17 +112,21 @@ VerticalOffset estimate_offset(shared::ImageSize size, float gain, const std::ve
       for (std::int64_t& sum : row_gg) sum += gg, gg *= right_place;
       count += std::abs(r) < max_r ? 1 : 0;
     }
-    const float v = static_cast<float>(place(y, size.height, 256)) / 256;
-    const float of_v[] = {1, v, v * v, v * v * v, v * v * v * v},
-                of_u[] = {1, 1.0f / 32, 1.0f / 1024, 0x1p-15f, 0x1p-20f};
+    const std::int64_t v = place(y, size.height, 256), of_v[] = {1, v, v * v, v * v * v, v * v * v * v};
     for (int i = 0; i < kTerms; ++i) {
-      const int u_i = kPowerOfU[i], v_i = kPowerOfV[i];
-      step[i] += static_cast<float>(row_gr[u_i]) * of_u[u_i] * of_v[v_i];
+      step_sums[i].add(row_gr[kPowerOfU[i]], of_v[kPowerOfV[i]]);
       for (int j = 0; j <= i; ++j) {
-        const int u_ij = u_i + kPowerOfU[j], v_ij = v_i + kPowerOfV[j];
-        matrix[i][j] += static_cast<float>(row_gg[u_ij]) * of_u[u_ij] * of_v[v_ij];
+        matrix_sums[i][j].add(row_gg[kPowerOfU[i] + kPowerOfU[j]], of_v[kPowerOfV[i] + kPowerOfV[j]]);
       }
     }
+  }
+  // Places as parts of half the image.
+  const auto unit = [&](int i) { return std::ldexp(1.0f, -5 * kPowerOfU[i] - 8 * kPowerOfV[i]); };
+  std::array<std::array<float, kTerms>, kTerms> matrix{};
+  std::array<float, kTerms> step{};
+  for (int i = 0; i < kTerms; ++i) {
+    step[i] = step_sums[i].rounded() * unit(i);
+    for (int j = 0; j <= i; ++j) matrix[i][j] = matrix_sums[i][j].rounded() * unit(i) * unit(j);
   }
   const float all = matrix[0][0];
   if (count < 256 || all <= 0) return known;
