@@ -41,10 +41,11 @@ struct BatchArguments {
   bool merge = false, quiet = false;
 };
 
+/// The parts between commas, without the blanks around them.
 std::vector<std::string> split(const std::string& list) {
   std::vector<std::string> parts;
-  std::istringstream stream(list);
-  for (std::string part; std::getline(stream, part, ',');) parts.push_back(part);
+  std::istringstream stream(list + ',');
+  for (std::string part; std::getline(stream, part, ',');) parts.push_back(CLI::detail::trim_copy(part));
   return parts;
 }
 
@@ -54,7 +55,7 @@ std::vector<Device> devices_of(const std::string& list) {
   const std::string each = "/each";
   std::vector<Device> devices;
   const std::vector<std::string> names = split(list);
-  if (names.empty() || std::find(names.begin(), names.end(), "") != names.end()) {
+  if (std::find(names.begin(), names.end(), "") != names.end()) {
     throw InvalidArgument("--devices \"" + list + "\": give all, or names between commas");
   }
   for (const std::string& name : names) {
@@ -70,6 +71,14 @@ std::vector<Device> devices_of(const std::string& list) {
 
 std::vector<Device> select_devices(const BatchArguments& arguments) {
   std::vector<Device> devices = devices_of(arguments.devices);
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      if (!devices[i].shares_units(devices[k])) continue;
+      throw InvalidArgument(
+          fmt::format("--devices {}: {} and {} are the same device or share compute units: name each one once",
+                      arguments.devices, devices[k].info().name, devices[i].info().name));
+    }
+  }
   if (arguments.programs.empty()) return devices;
   for (Device& device : devices) device = device.with_programs(arguments.programs);
   return devices;

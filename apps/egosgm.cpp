@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <new>
 
 #include "apps/command.h"
@@ -66,6 +67,16 @@ std::string meant_path(int argc, char** argv, const std::string& error) {
   return {};
 }
 
+/// Whether main() is left by its own way. A driver may end the whole program: PoCL's compiler does on a full disk.
+bool is_over = false;
+
+void tell_of_an_end_from_within() {
+  if (is_over) return;
+  fail(kFailed,
+       "the OpenCL driver ended the program, for what it says above: where that is its cache, make room or set "
+       "POCL_CACHE_DIR to another folder");
+}
+
 /// A result that the standard output did not take, for example for a full disk, is no result.
 int flushed(int code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
@@ -101,13 +112,7 @@ int run_program(int argc, char** argv) {
   return flushed(chosen->run());
 }
 
-}  // namespace
-}  // namespace egosgm::app
-
-int main(int argc, char** argv) {
-  using namespace egosgm;
-  using namespace egosgm::app;
-  std::signal(SIGXFSZ, SIG_IGN);  // a file beyond `ulimit -f` is to be an error of its write, as a full disk is
+int exit_code_of(int argc, char** argv) {
   try {
     return run_program(argc, argv);
   } catch (const InvalidArgument& error) {
@@ -121,4 +126,17 @@ int main(int argc, char** argv) {
   } catch (const std::exception& error) {
     return fail(kFailed, fmt::format("{} (this is a defect of the program: please report it)", error.what()));
   }
+}
+
+}  // namespace
+}  // namespace egosgm::app
+
+int main(int argc, char** argv) {
+  using namespace egosgm;
+  using namespace egosgm::app;
+  std::signal(SIGXFSZ, SIG_IGN);  // a file beyond `ulimit -f` is to be an error of its write, as a full disk is
+  std::atexit(tell_of_an_end_from_within);
+  const int code = exit_code_of(argc, argv);
+  is_over = true;
+  return code;
 }

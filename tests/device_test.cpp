@@ -92,7 +92,7 @@ TEST_F(DeviceTest, IsSelectedByType) {
     for (const std::string& wanted : {type, changed_case(type)}) {
       if (first != devices.end()) {
         EXPECT_TRUE(is_same(Device::select(wanted), *first)) << wanted;
-      } else if (type == "accelerator") {  // "gpu" may be a part of a name
+      } else {
         expect_refused([&] { Device::select(wanted); }, {"no OpenCL device fits"});
       }
     }
@@ -107,6 +107,54 @@ TEST_F(DeviceTest, IsSelectedByAPartOfItsNameVendorOrPlatform) {
     EXPECT_TRUE(is_same(Device::select(changed_case(text)), devices.front())) << text;
     const std::string part = text.substr(text.size() / 4, std::max<std::size_t>(3, text.size() / 2));
     EXPECT_NO_THROW(Device::select(part)) << part;
+  }
+}
+
+TEST_F(DeviceTest, ANumberIsAnIndexAndNeverAPartOfAName) {
+  const std::vector<Device> devices = Device::list();
+  const std::string there =
+      (devices.size() == 1 ? "is 1" : "are " + std::to_string(devices.size())) + std::string(", numbered from 0");
+  std::vector<std::string> numbers{std::to_string(devices.size()), "4711", "99999999999999999999"};
+  for (const Device& device : devices) {  // the digits in their names
+    const std::string text = device.info().name + " " + device.info().vendor + " " + device.info().platform;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+      for (std::size_t length = 1; length <= 3 && i + length <= text.size(); ++length) {
+        const std::string part = text.substr(i, length);
+        const bool is_number = part.find_first_not_of("0123456789") == std::string::npos;
+        if (is_number && std::stoul(part) >= devices.size()) numbers.push_back(part);
+      }
+    }
+  }
+  for (const std::string& number : numbers) {
+    expect_refused([&] { Device::select(number); },
+                   {"no OpenCL device " + number + ": there " + there, devices.front().info().name});
+    expect_refused([&] { Device::select(number + "/0"); }, {"no OpenCL device " + number + ": there " + there});
+    set_wanted(number);
+    expect_refused([] { Device::select(); }, {"no OpenCL device " + number + " (EGOSGM_DEVICE): there " + there});
+  }
+}
+
+TEST_F(DeviceTest, APartOfANameHasThreeCharactersAndALetter) {
+  for (const Device& device : Device::list()) {
+    const std::string& name = device.info().name;
+    for (std::size_t i = 0; i + 2 <= name.size(); ++i) {
+      for (const std::string& part : {name.substr(i, 1), name.substr(i, 2)}) {
+        if (part.find_first_not_of("0123456789") == std::string::npos) continue;
+        expect_refused([&] { Device::select(part); }, {"no OpenCL device fits", "three letters or more"});
+        expect_refused([&] { Device::select(":" + part); }, {"no OpenCL device fits", "three letters or more"});
+      }
+    }
+  }
+  for (const std::string wanted : {":", "/0", " 0", "0 ", "0.", "+0", "0,0", "..."}) {
+    expect_refused([&] { Device::select(wanted); },
+                   {"no OpenCL device fits \"" + wanted + "\"", "three letters or more"});
+  }
+}
+
+TEST_F(DeviceTest, TellsWhetherTwoHaveComputeUnitsInCommon) {
+  const std::vector<Device> devices = Device::list();
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    for (std::size_t k = 0; k < devices.size(); ++k) EXPECT_EQ(devices[i].shares_units(Device::list()[k]), i == k);
   }
 }
 
@@ -163,6 +211,21 @@ TEST_F(DeviceTest, ComputeUnitsAreDevicesOfTheirOwn) {
   EXPECT_EQ(Device::select("0/0").info().name, Device::list().front().info().name + "/0");
 }
 
+TEST_F(DeviceTest, PartsShareUnitsWithTheWholeAndWhereTheyOverlap) {
+  const auto whole = divisible_device();
+  if (!whole) GTEST_SKIP() << "no device here can be divided";
+  const int last = whole->info().compute_units - 1;
+  const Device first_unit = whole->compute_units(0, 0), last_unit = whole->compute_units(last, last);
+  for (const Device& part : {first_unit, last_unit, whole->compute_units(0, last)}) {
+    EXPECT_TRUE(part.shares_units(*whole));
+    EXPECT_TRUE(whole->shares_units(part));
+    EXPECT_TRUE(part.shares_units(whole->compute_units(0, last)));
+  }
+  EXPECT_FALSE(first_unit.shares_units(last_unit));
+  EXPECT_FALSE(last_unit.shares_units(first_unit));
+  EXPECT_TRUE(last_unit.shares_units(whole->compute_units(last, last)));
+}
+
 TEST_F(DeviceTest, RefusesComputeUnitsThatAreNotThere) {
   const auto whole = divisible_device();
   if (!whole) GTEST_SKIP() << "no device here can be divided";
@@ -178,7 +241,7 @@ TEST_F(DeviceTest, RefusesComputeUnitsThatAreNotThere) {
 }
 
 TEST_F(DeviceTest, RefusesUnknownNamesWithTheList) {
-  for (const std::string wanted : {"No Such Device", "4711", "-1", "0x0", ":::"}) {
+  for (const std::string wanted : {"No Such Device", "-1", "0x0", ":::"}) {
     for (const Device& device : Device::list()) {
       expect_refused([&] { Device::select(wanted); }, {"no OpenCL device fits \"" + wanted + "\"", "choose one of 0 = ",
                                                        device.info().name, device.info().platform, device.info().type});

@@ -6,6 +6,7 @@
 #include "egosgm/error.h"
 #include "host/ocl/errors.h"
 #include "host/ocl/sources.h"
+#include "host/ocl/strings.h"
 
 namespace egosgm::ocl {
 namespace {
@@ -51,6 +52,14 @@ std::string build_log(const cl::Program& program, const cl::Device& device) {
 
 cl::CommandQueue make_queue(const cl::Context& context, const cl::Device& device) {
   return {context, device, CL_QUEUE_PROFILING_ENABLE};
+}
+
+/// Where the compiler named no error of the source.
+std::string reason_beside(const std::string& log, const cl::Device& device) {
+  if (log.find("error:") != std::string::npos) return {};
+  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
+  const std::string remedy = cache_remedy(trimmed(platform.getInfo<CL_PLATFORM_NAME>()));
+  return remedy.empty() ? "" : ": " + remedy;
 }
 
 void expect_not_failed(const cl::Event& event) {
@@ -184,8 +193,9 @@ const cl::Program& Context::program(const std::string& file, const Defines& defi
   // cl::Program::build asks for the log whatever went wrong, and reports that there is none instead of why.
   const cl_int status = ::clBuildProgram(program(), 1, &device_(), source.options.c_str(), nullptr, nullptr);
   if (status != CL_SUCCESS) {
+    const std::string log = build_log(program, device_);
     throw BuildError(status, std::string(stage_) + ": building " + file + " failed with OpenCL status " +
-                                 status_name(status) + "\n" + build_log(program, device_));
+                                 status_name(status) + reason_beside(log, device_) + '\n' + log);
   }
   return programs_.emplace(key, std::pair{source, program}).first->second.second;
 }

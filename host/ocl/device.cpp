@@ -44,12 +44,26 @@ DeviceInfo describe(const cl::Device& device) {
 
 bool contains(const std::string& text, const std::string& part) { return lower(text).find(part) != std::string::npos; }
 
+/// Whether the name, vendor or platform holds `wanted`; "PLATFORM:NAME": whether both do.
 bool fits(const DeviceInfo& info, const std::string& wanted) {
-  if (lower(info.type) == wanted) return true;
   if (const auto colon = wanted.find(':'); colon != std::string::npos) {
     return contains(info.platform, wanted.substr(0, colon)) && contains(info.name, wanted.substr(colon + 1));
   }
   return contains(info.name, wanted) || contains(info.vendor, wanted) || contains(info.platform, wanted);
+}
+
+/// A part of a name: three characters with a letter among them. Less is found in names by chance, and a number is an
+/// index.
+bool is_name(std::string_view text) {
+  return text.size() >= 3 && std::any_of(text.begin(), text.end(), [](unsigned char c) { return std::isalpha(c); });
+}
+
+/// "PLATFORM:NAME" may leave one of the two out.
+bool is_name_of_device(std::string_view text) {
+  const auto colon = text.find(':');
+  if (colon == std::string_view::npos) return is_name(text);
+  const std::string_view platform = text.substr(0, colon), name = text.substr(colon + 1);
+  return (platform.empty() || is_name(platform)) && (name.empty() || is_name(name)) && text.size() > 1;
 }
 
 /// "NAME/FIRST-LAST" or "NAME/FIRST", numbers of compute units. None where `wanted` does not end so.
@@ -114,58 +128,107 @@ std::string numbered(const std::vector<Device>& devices) {
   return text;
 }
 
-/// The device that `name` (lower case) fits as a whole; null: none.
-const Device* find(const std::vector<Device>& devices, const std::string& name) {
-  if (name.empty()) return &devices.front();
-  if (const auto index = number_of(name); index && *index < static_cast<int>(devices.size())) return &devices[*index];
-  const auto found =
-      std::find_if(devices.begin(), devices.end(), [&](const Device& device) { return fits(device.info(), name); });
-  return found == devices.end() ? nullptr : &*found;
-}
+/// All devices, those of the kinds that are preferred first, and the names of the platforms that have none.
+struct Found {
+  std::vector<Device> devices;
+  std::vector<std::string> platforms_without;
+};
 
-}  // namespace
-
-Device::Handle Device::Handle::of(const cl::Device& device) { return {device, describe(device)}; }
-
-std::vector<Device> Device::list() {
+Found find_devices() {
   std::vector<cl::Platform> platforms;
   try {
     cl::Platform::get(&platforms);
   } catch (const cl::Error&) {
     return {};  // the loader reports "no platform" as an error
   }
-  std::vector<Device> devices;
+  Found found;
   for (const cl::Platform& platform : platforms) {
-    std::vector<cl::Device> found;
+    std::vector<cl::Device> devices;
     try {
-      platform.getDevices(CL_DEVICE_TYPE_ALL, &found);
-    } catch (const cl::Error&) {
-      continue;  // a platform without a device
+      platform.getDevices(CL_DEVICE_TYPE_ALL, &devices);
+    } catch (const cl::Error&) {  // none is reported as an error
     }
-    for (const cl::Device& device : found) {
-      devices.emplace_back(std::make_shared<const Handle>(Handle::of(device)));
+    if (devices.empty()) found.platforms_without.push_back(ocl::trimmed(platform.getInfo<CL_PLATFORM_NAME>()));
+    for (const cl::Device& device : devices) {
+      found.devices.emplace_back(std::make_shared<const Device::Handle>(Device::Handle::of(device)));
     }
   }
-  std::stable_sort(devices.begin(), devices.end(), [](const Device& a, const Device& b) {
+  std::stable_sort(found.devices.begin(), found.devices.end(), [](const Device& a, const Device& b) {
     return preference(a.info().type) < preference(b.info().type);
   });
-  return devices;
+  return found;
 }
 
+/// What is known of platforms that have no device; empty where there are none of that kind.
+std::string of_platforms_without(const std::vector<std::string>& platforms) {
+  std::string text;
+  for (const std::string& platform : platforms) {
+    const std::string remedy = ocl::cache_remedy(platform);
+    text += (text.empty() ? "the platform \"" : "; the platform \"") + platform +
+            "\" is there, but has no device: " + (remedy.empty() ? "may this user open its device files?" : remedy);
+  }
+  return text;
+}
+
+/// The device that `name` (lower case) means as a whole: an index, a type, a part of a name. Null: none. `origin` is
+/// for messages.
+const Device* find(const std::vector<Device>& devices, const std::string& name, const std::string& origin) {
+  if (name.find_first_not_of("0123456789") == std::string::npos) {
+    const auto index = number_of(name);
+    if (index && *index < static_cast<int>(devices.size())) return &devices[*index];
+    throw InvalidArgument("no OpenCL device " + name + origin + ": there " +
+                          (devices.size() == 1 ? "is 1" : "are " + std::to_string(devices.size())) +
+                          ", numbered from 0: " + numbered(devices));
+  }
+  const auto first_that = [&](const auto& is_meant) {
+    const auto found = std::find_if(devices.begin(), devices.end(), is_meant);
+    return found == devices.end() ? nullptr : &*found;
+  };
+  if (name == "gpu" || name == "cpu" || name == "accelerator") {
+    return first_that([&](const Device& device) { return lower(device.info().type) == name; });
+  }
+  if (const Device* whole = first_that([&](const Device& device) { return lower(device.info().name) == name; })) {
+    return whole;
+  }
+  if (!is_name_of_device(name)) return nullptr;
+  const Device* first = first_that([&](const Device& device) { return fits(device.info(), name); });
+  const Device* another = first_that([&](const Device& device) {
+    return fits(device.info(), name) &&
+           (device.info().name != first->info().name || device.info().platform != first->info().platform);
+  });
+  if (!another) return first;
+  throw InvalidArgument("the OpenCL device \"" + name + "\"" + origin + " may be " + first->info().name + " or " +
+                        another->info().name + ": give its number or more of its name: " + numbered(devices));
+}
+
+}  // namespace
+
+Device::Handle Device::Handle::of(const cl::Device& device) { return {device, describe(device)}; }
+
+std::vector<Device> Device::list() { return find_devices().devices; }
+
 Device Device::select(const std::string& wanted) {
-  const std::vector<Device> devices = list();
-  if (devices.empty()) {
+  const Found found = find_devices();
+  const std::string without = of_platforms_without(found.platforms_without);
+  if (found.devices.empty()) {
     throw InvalidArgument(
-        "no OpenCL device: install one, on Debian and Ubuntu `apt install pocl-opencl-icd` for the CPU");
+        "no OpenCL device: " +
+        (without.empty() ? "install one, on Debian and Ubuntu `apt install pocl-opencl-icd` for the CPU" : without));
   }
   const char* from_environment = std::getenv("EGOSGM_DEVICE");
   const std::string given = !wanted.empty() ? wanted : from_environment ? from_environment : "";
-  if (const Device* device = find(devices, lower(given))) return *device;
-  if (const auto units = unit_range(lower(given))) {
-    if (const Device* device = find(devices, units->device)) return device->compute_units(units->first, units->last);
+  if (given.empty()) return found.devices.front();
+  const std::string origin = wanted.empty() ? " (EGOSGM_DEVICE)" : "";
+  if (const Device* device = find(found.devices, lower(given), origin)) return *device;
+  if (const auto units = unit_range(lower(given)); units && !units->device.empty()) {
+    if (const Device* device = find(found.devices, units->device, origin)) {
+      return device->compute_units(units->first, units->last);
+    }
   }
-  throw InvalidArgument("no OpenCL device fits \"" + given + "\"" + (wanted.empty() ? " (EGOSGM_DEVICE)" : "") +
-                        ": choose one of " + numbered(devices));
+  throw InvalidArgument("no OpenCL device fits \"" + given + "\"" + origin + ": choose one of " +
+                        numbered(found.devices) +
+                        (is_name_of_device(given) ? "" : ": by its number, or three letters or more of its name") +
+                        (without.empty() ? "" : "; " + without));
 }
 
 Device Device::compute_units(int first, int last) const {
@@ -173,7 +236,14 @@ Device Device::compute_units(int first, int last) const {
   part.device = sub_device(handle_->device, handle_->info, first, last);
   part.info.name += "/" + std::to_string(first) + (last > first ? "-" + std::to_string(last) : "");
   part.info.compute_units = last - first + 1;
+  part.first_unit += first;
   return Device(std::make_shared<const Handle>(std::move(part)));
+}
+
+bool Device::shares_units(const Device& other) const {
+  const Handle &a = *handle_, &b = *other.handle_;
+  return a.whole() == b.whole() && a.first_unit < b.first_unit + b.info.compute_units &&
+         b.first_unit < a.first_unit + a.info.compute_units;
 }
 
 Device Device::with_programs(const std::string& folder) const {

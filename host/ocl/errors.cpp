@@ -32,6 +32,12 @@ std::string status_name(int status) {
   }
 }
 
+std::string cache_remedy(const std::string& platform) {
+  if (platform != "Portable Computing Language") return {};
+  return "PoCL needs a cache that it can write: set POCL_CACHE_DIR to such a folder, with some megabytes of room "
+         "(without it, PoCL takes one in XDG_CACHE_HOME or HOME)";
+}
+
 void raise(const std::string& stage, const cl::Error& error) {
   const bool memory = error.err() == CL_MEM_OBJECT_ALLOCATION_FAILURE || error.err() == CL_OUT_OF_RESOURCES ||
                       error.err() == CL_OUT_OF_HOST_MEMORY;

@@ -11,6 +11,9 @@ namespace egosgm::ocl {
 /// "CL_OUT_OF_RESOURCES", or the number of a status that has no name here.
 std::string status_name(int status);
 
+/// What to do where `platform` may have failed for its cache on the disk; empty where it has none.
+std::string cache_remedy(const std::string& platform);
+
 /// Throws the DeviceError for an OpenCL call that failed in `stage`.
 [[noreturn]] void raise(const std::string& stage, const cl::Error& error);
 

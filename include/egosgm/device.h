@@ -33,17 +33,21 @@ class EGOSGM_EXPORT Device {
   /// All devices, in the order in which they are preferred: GPUs, accelerators, CPUs; then as the platforms list them.
   static std::vector<Device> list();
 
-  /// The device that `wanted` names: an index into `list()`, a type ("gpu", "cpu", "accelerator"), or a part of its
-  /// name, vendor or platform (upper and lower case alike; "PLATFORM:NAME" for both). Empty: the environment variable
-  /// EGOSGM_DEVICE, else the first of `list()`. What nothing fits as a whole may end in compute units: "cpu/0" is the
-  /// first one of "cpu", "cpu/0-3" the first four, as a device of their own (see `compute_units`).
-  /// Throws InvalidArgument with the list where nothing fits, and how to install one where there is none.
+  /// The device that `wanted` names: an index into `list()`, a type ("gpu", "cpu", "accelerator": the first of it), or
+  /// a part of its name, vendor or platform (upper and lower case alike; "PLATFORM:NAME" for both) of at least three
+  /// characters, with a letter among them. Empty: the environment variable EGOSGM_DEVICE, else the first of `list()`.
+  /// What nothing fits as a whole may end in compute units: "cpu/0" is the first one of "cpu", "cpu/0-3" the first
+  /// four, as a device of their own (see `compute_units`). Throws InvalidArgument with the list where nothing fits,
+  /// where devices of different names do, and how to install one where there is none.
   static Device select(const std::string& wanted = {});
 
   /// The compute units `first` to `last` (from 0, both included) as a device of their own: one core, some cores. Its
   /// name is this one's with "/FIRST-LAST" after it, so `select` finds it by its name. Same bits as the whole device.
   /// Throws InvalidArgument where there are no such units, or where the driver does not divide the device.
   Device compute_units(int first, int last) const;
+
+  /// Whether the two have a compute unit in common.
+  bool shares_units(const Device& other) const;
 
   /// The same device, on which pipelines take their programs from `folder`, as `compile_programs` made them
   /// (egosgm/programs.h), and compile nothing. Throws InvalidArgument where they were made for another device, platform

@@ -242,6 +242,18 @@ class Batch(BatchTest):
         other.write_text(f"street-0 {self.folder}/s1\n")
         self.assert_refused(["batch", other, "--out", out, *METHOD], "street-0", "choose another name")
 
+    def test_refuses_a_device_that_is_not_there_and_one_that_comes_twice(self):
+        out = self.new_folder() / "out"
+        count = len(json.loads(self.assert_works("devices", "--json")))
+        self.assert_refused(self.batch(out, "--devices", f"0,{count}"), f"no OpenCL device {count}: there ")
+        self.assert_refused(self.batch(out, "--devices", "0,0"), "--devices 0,0", "once")
+        self.assert_refused(self.batch(out, "--devices", "0,"), "--devices")
+        parts = self.two_devices()
+        for twice in ("0/0,0", "0,0/1", "0/each,0/1", "0/0-1,0/0"):
+            self.assert_refused(self.batch(out, "--devices", twice), f"--devices {twice}", "share compute units")
+        self.assertFalse(out.exists())
+        self.assert_works(*self.batch(out, "--devices", parts.replace(",", " , ")))
+
     def test_refuses_wrong_arguments(self):
         out = self.new_folder() / "out"
         for arguments, named in ((["--devices", "no such device"], ["no such device"]), (["--devices", ","], ["--devices"]), (["--devices", "0,,0"], ["--devices"]),

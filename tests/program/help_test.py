@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import unittest
 
-from program_case import SOURCE, ProgramTest, egosgm
+from program_case import PROGRAM, SOURCE, ProgramTest, egosgm
 
 COMMANDS = ("run", "batch", "eval", "devices", "compile", "synth", "odometry", "eval-poses", "tune", "view", "report", "doctor", "rectify",
             "completion")
@@ -96,6 +96,34 @@ class Help(ProgramTest):
         nothing = dict(os.environ, OCL_ICD_VENDORS="/nonexistent")
         self.assert_refused(["devices"], "pocl-opencl-icd", env=nothing)
         self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder()], "pocl-opencl-icd", env=nothing)
+
+    def test_a_platform_without_a_device_is_told_from_none(self):
+        """PoCL has no device where it cannot make its cache."""
+        for name in ("/proc/nowhere", self.street / "calib.txt/below"):
+            done = egosgm("devices", env=dict(os.environ, POCL_CACHE_DIR=str(name)))
+            if done.returncode == 0:
+                self.skipTest("a driver that needs no cache, or another one")
+            self.assertEqual(done.returncode, 2)
+            self.assertRegex(done.stderr, r"^egosgm: error: no OpenCL device: the platform .* is there, but has no device: .*POCL_CACHE_DIR.*HOME.*\n$")
+            self.assertNotIn("apt install", done.stderr)
+
+    def test_a_cache_that_cannot_be_written_is_told_of_where_a_kernel_does_not_build(self):
+        out, cache = self.new_folder() / "out", self.new_folder()
+
+        def run_with(options):
+            mounted = f"mount -t tmpfs -o size=100k{options} tmpfs '{cache}' && exec \"$@\"; exit 77"
+            return subprocess.run(["unshare", "--map-root-user", "--mount", "sh", "-c", mounted, "sh", PROGRAM, "run", "--odometry",
+                                   self.street, "--out", out], capture_output=True, text=True, timeout=600,
+                                  env=dict(os.environ, POCL_CACHE_DIR=str(cache)))
+
+        if shutil.which("unshare") is None or run_with("").returncode in (77, 0):
+            self.skipTest("no small file system can be mounted here, or the driver needs no cache")
+        for options in ("", ",ro"):
+            done = run_with(options)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            last = done.stderr.splitlines()[-1]
+            self.assertTrue(last.startswith("egosgm: error: "), done.stderr)
+            self.assertIn("POCL_CACHE_DIR", last)
 
 
 if __name__ == "__main__":
