@@ -91,7 +91,6 @@ void measure(const Point& point, const Device& device, int rounds, std::vector<R
     }
     state.counters["device_ms"] = benchmark::Counter(device_ms, benchmark::Counter::kAvgIterations);
     state.counters["search_fraction"] = report.search_fraction;
-    state.counters["computed_fraction"] = report.computed_fraction;
     state.counters["device_memory_bytes"] = steady->memory_bytes();
     state.counters["compute_units"] = device.info().compute_units;
     state.counters["half_width_px"] = point.options.search_band.min_half_width_px;

@@ -166,7 +166,7 @@ def there_and_back(frames, last):
 def long_run(video, numbers, restart, **options):
     """bad_or_missing frame by frame: of one run over `numbers`, and of one that starts at place `restart`. And the later resets."""
     def errors(numbers):
-        frames = [(share([bad_or_missing(frame.disparity, video.truth(k))]), frame.report.search_fraction == 1)
+        frames = [(share([bad_or_missing(frame.disparity, video.truth(k))]), frame.report.search_fraction >= 1)
                   for k, frame in play(video, numbers, **options)]
         return [error for error, _ in frames], sum(full for _, full in frames[1:])
     through, resets = errors(numbers)

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <numeric>
 
 #include "egosgm/error.h"
 #include "host/census.h"
@@ -196,6 +197,10 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
 bool BandedSgm::takes_whole_sweeps(int views) const {
   if (launches_ != Launches::kAutomatic) return launches_ == Launches::kSweeps;
   return context_.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(2 * views);
+}
+
+int BandedSgm::matched_rows() const {
+  return std::accumulate(stripes_.begin(), stripes_.end(), 0, [](int sum, const Stripe& s) { return sum + s.rows; });
 }
 
 int BandedSgm::code_padding(shared::DisparityRange range) {

@@ -46,6 +46,8 @@ class BandedSgm {
   static constexpr int kStripeOverlap = 32;
   /// In which the image is matched; one: as a whole.
   const std::vector<Stripe>& stripes() const { return stripes_; }
+  /// Of all stripes: those where they overlap are matched more than once.
+  int matched_rows() const;
 
   /// `codes`: what Census makes with a padding of `code_padding(range)`. `penalties`: what StepPenalties makes. Of
   /// `penalties` and `band` the right view's part is read where it is matched.

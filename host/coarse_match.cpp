@@ -69,4 +69,9 @@ const StereoMaps& CoarseMatch::operator()(const FrameImages& images) {
   return checked_;
 }
 
+std::uint64_t CoarseMatch::matched_cells() const {
+  const std::uint64_t lanes = static_cast<std::uint64_t>(SearchBand::max_chunks(range_)) * EGOSGM_LANES;
+  return 2 * lanes * coarse_.width * banded_sgm_.matched_rows();
+}
+
 }  // namespace egosgm

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+
 #include "egosgm/options.h"
 #include "host/banded_sgm.h"
 #include "host/census.h"
@@ -21,6 +23,9 @@ class CoarseMatch {
 
   /// Left-right consistent disparities of both views, `coarse_size` of the images' each.
   const StereoMaps& operator()(const FrameImages& images);
+
+  /// Cells that a call matches, of both views.
+  std::uint64_t matched_cells() const;
 
   /// What the last call returned.
   const StereoMaps& found() const { return checked_; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <numeric>
 #include <string>
 
 #include "egosgm/error.h"
@@ -173,6 +174,7 @@ void FrameTransfer::download(const FrameResults& results, const FrameOutputs& ou
   context_.enter("download");
   outputs_ = outputs;
   has_prediction_ = results.predicted;
+  matched_ = results.matched;
   context_.let_wait(ocl::Queue::kDownload, context_.last_kernel());
   if (results.predicted) {
     fetch_left(results.predicted->disparity, outputs.predicted.data, predicted_);
@@ -189,6 +191,19 @@ void FrameTransfer::download(const FrameResults& results, const FrameOutputs& ou
   fetch_view(*results.variance, EGOSGM_LEFT, outputs.variance, variance_);
   fetch_view(results.result->disparity, EGOSGM_RIGHT, outputs.right_disparity, right_disparity_);
   fetch_view(*results.variance, EGOSGM_RIGHT, outputs.right_variance, right_variance_);
+}
+
+double FrameTransfer::matched_cells() const {
+  const std::size_t views = row_sums_.size() / size_.height;
+  std::uint64_t cells = matched_.coarse_cells;
+  for (std::size_t view = 0; view < views; ++view) {
+    for (const Stripe& stripe : *matched_.stripes) {
+      const auto first = row_sums_.begin() + static_cast<std::ptrdiff_t>(view * size_.height + stripe.first_row);
+      cells = std::accumulate(first, first + stripe.rows, cells,
+                              [](std::uint64_t sum, const shared::RowSum& row) { return sum + row.cells; });
+    }
+  }
+  return static_cast<double>(matched_.passes) * static_cast<double>(cells);
 }
 
 void FrameTransfer::collect(FrameReport& report) const {
@@ -211,14 +226,9 @@ void FrameTransfer::collect(FrameReport& report) const {
 
   const double pixels = static_cast<double>(pixel_count(size_));
   const double cells = static_cast<double>(row_sums_.size()) * size_.width * range_.count;
-  std::uint64_t searched = 0, computed = 0, predicted_pixels = 0;
-  for (std::size_t row = 0; row < row_sums_.size(); ++row) {
-    searched += row_sums_[row].searched;
-    computed += row_sums_[row].computed;
-    if (has_prediction_ && row < static_cast<std::size_t>(size_.height)) predicted_pixels += row_sums_[row].predicted;
-  }
-  report.search_fraction = static_cast<double>(searched) / cells;
-  report.computed_fraction = static_cast<double>(computed) / cells;
+  std::uint64_t predicted_pixels = 0;
+  for (int y = 0; has_prediction_ && y < size_.height; ++y) predicted_pixels += row_sums_[y].predicted;
+  report.search_fraction = matched_cells() / cells;
   report.predicted_fraction = static_cast<double>(predicted_pixels) / pixels;
   report.density = static_cast<double>(std::count_if(disparity_.data(), disparity_.data() + pixel_count(size_),
                                                      [](float d) { return d > kInvalidDisparity; })) /

@@ -2,14 +2,23 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "egosgm/pipeline.h"
 #include "host/maps.h"
 #include "host/ocl/host_memory.h"
 #include "host/search_band.h"
+#include "host/stripes.h"
 
 namespace egosgm {
+
+/// What was matched of a frame, apart from which bands.
+struct MatchedParts {
+  int passes;                          // each over all bands
+  const std::vector<Stripe>* stripes;  // in which
+  std::uint64_t coarse_cells;          // and in each pass, these of CoarseMatch
+};
 
 /// What the stages of a frame leave on the device.
 struct FrameResults {
@@ -18,6 +27,7 @@ struct FrameResults {
   const StereoMaps* predicted;         // null where there is no prediction. From here on, the next frame writes them:
   const StereoMaps* measured;          // (or they are the result)
   const SearchBand* band;
+  MatchedParts matched;
   const ocl::Buffer<float>* vertical_offset_px;
   const ocl::Buffer<cl_uchar>* dynamic;  // null where it was not asked for
 };
@@ -57,6 +67,8 @@ class FrameTransfer {
   using MapReadback = ocl::Readback<float>;
   using Scratch = std::vector<float>;
 
+  double matched_cells() const;
+
   template <typename T>
   void fetch(const ocl::Buffer<T>& buffer, std::size_t count, std::vector<T>& staged);
   void fetch_left(const ocl::Buffer<float>& maps, bool wanted, Scratch& staged);
@@ -73,6 +85,7 @@ class FrameTransfer {
   std::vector<shared::Band> bands_;
   std::vector<cl_uchar> dynamic_;
   std::vector<shared::RowSum> row_sums_;  // of the views that were searched
+  MatchedParts matched_{};
   cl::Event scratch_fetched_;
   bool has_prediction_ = false;
   FrameOutputs outputs_;

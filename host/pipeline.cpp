@@ -209,11 +209,14 @@ struct Pipeline::Impl {
     }
   }
 
+  /// Of the match: a second one where the first gives the vertical offset.
+  int passes() const { return vertical_alignment.is_unknown() ? 2 : 1; }
+
   /// Returns the images that were matched.
   const FrameImages& match(const FrameImages& uploaded, bool full_range) {
     const FrameImages* images = &vertical_alignment.align(uploaded);
     match_aligned(*images, full_range);
-    if (vertical_alignment.is_unknown()) {
+    if (passes() == 2) {
       vertical_alignment.estimate(*images, *measured);
       images = &vertical_alignment.realign(uploaded);
       match_aligned(*images, full_range);
@@ -256,6 +259,7 @@ struct Pipeline::Impl {
             .predicted = prediction,
             .measured = measured,
             .band = &search_band,
+            .matched = {passes(), &banded_sgm.stripes(), reason || !coarse_match ? 0 : coarse_match->matched_cells()},
             .vertical_offset_px = &vertical_alignment.offset_px(),
             .dynamic = dynamic};
   }

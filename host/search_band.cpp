@@ -89,7 +89,7 @@ void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* warpe
 void SearchBand::full_range(int views) {
   context_.enter("SearchBand");
   searched_views_ = views;
-  full_range_(context_, ocl::every_pixel(context_, size_, views), size_, range_, whole(range_), bands_, cell_offsets_,
+  full_range_(context_, ocl::every_pixel(context_, size_, views), size_, whole(range_), bands_, cell_offsets_,
               row_sums_);
 }
 

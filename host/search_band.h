@@ -81,8 +81,8 @@ class SearchBand {
   ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
               ocl::Buffer<shared::RowSum>>
       sum_rows_;
-  ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const shared::Band, ocl::Buffer<shared::Band>,
-              ocl::Buffer<cl_uint>, ocl::Buffer<shared::RowSum>>
+  ocl::Kernel<const shared::ImageSize, const shared::Band, ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
+              ocl::Buffer<shared::RowSum>>
       full_range_;
 };
 

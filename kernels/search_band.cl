@@ -386,24 +386,17 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
 
 #if ROW_GROUP == 1
 
-int8 low_half(uint8 word) { return as_int8(word << 16) >> 16; }
-int8 high_half(uint8 word) { return as_int8(word) >> 16; }
-
 uint sum_of(uint8 v) {
   const uint4 halves = v.lo + v.hi;
   return halves.x + halves.y + halves.z + halves.w;
 }
 
-// The bands from x on, two words each; what lies beyond the row has no chunks, and searches nothing.
-uint16 load_eight(global const Band* row, int x, int width) {
-  global const uint* from = (global const uint*)(row + x);
-  if (x + EGOSGM_BLOCK <= width) return vload16(0, from);
-  uint words[2 * EGOSGM_BLOCK];
-  for (int i = 0; i < EGOSGM_BLOCK; ++i) {
-    words[2 * i] = x + i < width ? from[2 * i] : 0;
-    words[2 * i + 1] = x + i < width ? from[2 * i + 1] : 1;  // from 1 to 0
-  }
-  return vload16(0, words);
+// The chunks of the pixels from x on; what lies beyond the row has none.
+uint8 load_chunks(global const Band* row, int x, int width) {
+  if (x + EGOSGM_BLOCK <= width) return vload16(0, (global const uint*)(row + x)).even >> 16;
+  uint chunks[EGOSGM_BLOCK];
+  for (int i = 0; i < EGOSGM_BLOCK; ++i) chunks[i] = x + i < width ? row[x + i].chunks : 0;
+  return vload8(0, chunks);
 }
 
 // Sums up each row, eight pixels at a time. A work-item a row and view.
@@ -414,11 +407,9 @@ KERNEL __attribute__((reqd_work_group_size(1, 1, 1))) void sum_rows(const ImageS
   global const float* disparities = disparity + row * size.width;
   global uint* offsets = cell_offsets + row * size.width;
   uint chunks_before = 0;
-  int8 searched = 0, predicted = 0;
+  int8 predicted = 0;
   for (int x = 0; x < size.width; x += EGOSGM_BLOCK) {
-    const uint16 words = load_eight(bands + row * size.width, x, size.width);
-    const uint8 chunks = words.even >> 16;
-    searched += high_half(words.odd) - low_half(words.odd) + 1;
+    const uint8 chunks = load_chunks(bands + row * size.width, x, size.width);
     predicted -= eight(disparities, x, size.width) > EGOSGM_INVALID_DISPARITY;
     uint8 scan = chunks;  // inclusive, in steps of 1, 2 and 4
     scan += (uint8)(0, scan.s0123, scan.s456);
@@ -434,8 +425,7 @@ KERNEL __attribute__((reqd_work_group_size(1, 1, 1))) void sum_rows(const ImageS
       for (int i = 0; i < size.width - x; ++i) offsets[x + i] = values[i];
     }
   }
-  row_sums[row].searched = sum_of(as_uint8(searched));
-  row_sums[row].computed = chunks_before * EGOSGM_LANES;
+  row_sums[row].cells = chunks_before * EGOSGM_LANES;
   row_sums[row].predicted = sum_of(as_uint8(predicted));
 }
 
@@ -453,17 +443,15 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
   const int view = get_global_id(2);
   const size_t row = (size_t)view * size.height + y;
   uint chunks_before = 0;
-  uint searched = 0;
   uint predicted = 0;
   local uint chunks[ROW_GROUP];
-  local uint totals[2][ROW_GROUP];
+  local uint totals[ROW_GROUP];
   for (int tile = 0; tile < size.width; tile += ROW_GROUP) {
     const int x = tile + lane;
     const size_t pixel = row * size.width + x;
     uint own = 0;
     if (x < size.width) {
       own = bands[pixel].chunks;
-      searched += bands[pixel].last - bands[pixel].first + 1;
       predicted += disparity[pixel] > EGOSGM_INVALID_DISPARITY ? 1 : 0;
     }
     chunks[lane] = own;
@@ -478,16 +466,11 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
     chunks_before += chunks[ROW_GROUP - 1];
     barrier(CLK_LOCAL_MEM_FENCE);
   }
-  totals[0][lane] = searched;
-  totals[1][lane] = predicted;
+  totals[lane] = predicted;
   barrier(CLK_LOCAL_MEM_FENCE);
-  for (int i = 1; lane == 0 && i < ROW_GROUP; ++i) {
-    searched += totals[0][i];
-    predicted += totals[1][i];
-  }
+  for (int i = 1; lane == 0 && i < ROW_GROUP; ++i) predicted += totals[i];
   if (lane == 0) {
-    row_sums[row].searched = searched;
-    row_sums[row].computed = chunks_before * EGOSGM_LANES;
+    row_sums[row].cells = chunks_before * EGOSGM_LANES;
     row_sums[row].predicted = predicted;
   }
 }
@@ -502,8 +485,8 @@ KERNEL void widen(const ImageSize size, const Band band, global const Prediction
 }
 
 // `band`: the one of every pixel.
-KERNEL void full_range(const ImageSize size, const DisparityRange range, const Band band, global Band* bands,
-                       global uint* cell_offsets, global RowSum* row_sums) {
+KERNEL void full_range(const ImageSize size, const Band band, global Band* bands, global uint* cell_offsets,
+                       global RowSum* row_sums) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
@@ -513,8 +496,7 @@ KERNEL void full_range(const ImageSize size, const DisparityRange range, const B
   bands[row * size.width + x] = band;
   cell_offsets[row * size.width + x] = (uint)x * band.chunks;
   if (x == 0) {
-    row_sums[row].searched = (uint)size.width * range.count;
-    row_sums[row].computed = (uint)size.width * band.chunks * EGOSGM_LANES;
+    row_sums[row].cells = (uint)size.width * band.chunks * EGOSGM_LANES;
     row_sums[row].predicted = 0;
   }
 }

@@ -141,9 +141,9 @@ typedef struct {
   i16 first, last;
 } Band;
 
-// What a row of a view searches: cells that can win, lanes that are computed, pixels that were predicted.
+// What a row of a view searches: cells, which are lanes of its bands, also those that cannot win; predicted pixels.
 typedef struct {
-  u32 searched, computed, predicted;
+  u32 cells, predicted;
 } RowSum;
 
 // The predictions in a block of EGOSGM_BLOCK x EGOSGM_BLOCK pixels; count 0: none.
@@ -189,7 +189,7 @@ typedef struct {
 } DisparityMotion;
 
 #ifdef __cplusplus
-static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 12 &&
+static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
                   sizeof(BlockRange) == 12 && sizeof(PredictionState) == 20 && sizeof(SgmParameters) == 44 &&
                   sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");

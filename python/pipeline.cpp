@@ -260,8 +260,9 @@ void bind_frame(py::module_& module) {
   py::class_<FrameReport>(module, "FrameReport", "What happened in a frame.")
       .def_readonly("full_range", &FrameReport::full_range, "No prediction was used: everything was searched,")
       .def_readonly("full_range_reason", &FrameReport::full_range_reason, "because of this.")
-      .def_readonly("search_fraction", &FrameReport::search_fraction, "Cells that can win, of all, in the views that are searched.")
-      .def_readonly("computed_fraction", &FrameReport::computed_fraction)
+      .def_readonly("search_fraction", &FrameReport::search_fraction,
+                    "All cells that were matched, over those of one match of the full range. More than 1 in a first "
+                    "frame, which is matched twice.")
       .def_readonly("predicted_fraction", &FrameReport::predicted_fraction, "Left pixels with a prediction.")
       .def_readonly("density", &FrameReport::density, "Left pixels with a disparity.")
       .def_readonly("vertical_offset_px", &FrameReport::vertical_offset_px)

@@ -323,15 +323,14 @@ TEST(SearchBand, CountsCellsAndLanesOfARow) {
   auto maps = nothing(size);
   maps.disparity[0] = 50, maps.disparity[2] = 60;
   const auto result = run(size, {0, 100}, {.sigmas = 0, .min_half_width_px = 2, .from_neighbours = false}, maps);
-  EXPECT_EQ(result.row_sums[0].searched, 5u + 100 + 5);
-  EXPECT_EQ(result.row_sums[0].computed, 8u + 112 + 8);
+  EXPECT_EQ(result.row_sums[0].cells, 8u + 112 + 8);
   EXPECT_EQ(result.row_sums[0].predicted, 2u);
   EXPECT_EQ(result.row_sums[1].predicted, 0u);
   EXPECT_EQ(result.cell_offsets, (std::vector<cl_uint>{0, 1, 15, 0, 14, 28, 0, 14, 28, 0, 14, 28}));
 }
 
 // The left view has a prediction everywhere and searches 5 of 100 disparities, the right one has none and searches all.
-TEST(SearchBand, ReportsTheViewsThatWereSearched) {
+TEST(SearchBand, ReportsAllThatWasMatched) {
   const shared::ImageSize size{32, 8};
   auto maps = nothing(size);
   std::fill_n(maps.disparity.begin(), pixel_count(size), 50.0f);
@@ -341,20 +340,27 @@ TEST(SearchBand, ReportsTheViewsThatWereSearched) {
   const StereoMaps predicted = testing::upload(context, size, maps);
   ocl::Buffer<float> offset_px(context, 1);
   offset_px.write(context, {0});
-  const auto report_of = [&](int views) {
+  const auto report_of = [&](int views, const MatchedParts& matched) {
     stage(predicted, nullptr, nullptr, nullptr, views);
-    transfer.download({&predicted, &predicted.variance, &predicted, &predicted, &stage, &offset_px, nullptr}, {});
+    transfer.download({&predicted, &predicted.variance, &predicted, &predicted, &stage, matched, &offset_px, nullptr},
+                      {});
     context.wait();
     FrameReport report;
     transfer.collect(report);
     transfer.release();
     return report;
   };
+  const std::vector<Stripe> whole = cut_into_stripes(8, 8, 2), stripes = cut_into_stripes(8, 6, 2);
+  ASSERT_EQ(stripes.size(), 4u);  // 24 rows to match
   for (const int views : {2, 1, 2}) {
-    const FrameReport report = report_of(views);
-    EXPECT_DOUBLE_EQ(report.search_fraction, views == 1 ? 0.05 : 0.525);
-    EXPECT_DOUBLE_EQ(report.computed_fraction, views == 1 ? 0.08 : 0.6);
+    // Lanes of a band of 5 and of the whole range, of 100 disparities.
+    const double once = views == 1 ? 0.08 : (0.08 + 1.12) / 2;
+    const FrameReport report = report_of(views, {1, &whole, 0});
+    EXPECT_DOUBLE_EQ(report.search_fraction, once);
     EXPECT_DOUBLE_EQ(report.predicted_fraction, 1);
+    EXPECT_DOUBLE_EQ(report_of(views, {1, &stripes, 0}).search_fraction, 3 * once);
+    EXPECT_DOUBLE_EQ(report_of(views, {2, &whole, 0}).search_fraction, 2 * once);
+    EXPECT_DOUBLE_EQ(report_of(views, {2, &whole, 256}).search_fraction, 2 * (once + 0.01 / views));
   }
 }
 

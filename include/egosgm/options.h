@@ -119,8 +119,8 @@ struct EGOSGM_EXPORT PipelineOptions {
   OutputVarianceOptions output_variance;
   DynamicMapOptions dynamic_map;
 
-  /// Fućek et al. (IFAC 2017): both views tracked, constant q, three sigmas without a least half-width, unpredicted
-  /// pixels search everything, no gate, the filter's variance. The matcher, which the paper leaves open, is as default.
+  /// Prediction, bands and filter of Fućek et al. (IFAC 2017), both views tracked; all else is as default, also where
+  /// the paper says how it matches: docs/how-it-works.md has the differences.
   static PipelineOptions paper();
 
   /// Throws InvalidArgument, naming the option, its value and what is allowed.

@@ -49,12 +49,17 @@ struct DeviceCommand {
 };
 
 /// What happened in a frame.
+///
+/// `search_fraction`: all cells (a pixel and a disparity) that were matched / (width * height * D) of each view that
+/// was searched at full size: the left one alone, or both in a frame of full range or with track_right. All: lanes
+/// beside a band that were computed and cannot win, what CoarseMatch matched of both views, the second match of a frame
+/// that knows no vertical offset, rows that stripes share. 1: as many as one match of the full range has; a first frame
+/// has 2, and a D that fills no whole chunks more.
 struct FrameReport {
   bool full_range = false;  // no prediction was used: everything was searched,
   std::string
       full_range_reason;  // because of this ("first frame", "no motion", "reset", "search is full", "not temporal")
-  double search_fraction = 0;           // cells that can win / (width * height * D), of what was searched [0..1]
-  double computed_fraction = 0;         // with the lanes that were computed and cannot win
+  double search_fraction = 0;           // see below
   double predicted_fraction = 0;        // left pixels with a prediction
   double density = 0;                   // left pixels with a disparity
   double vertical_offset_px = 0;        // by which the middle of the right image was resampled

@@ -95,7 +95,8 @@ void run(std::string_view input) {
   std::optional<Motion> motion;
   if (bytes.below(6) > 0) motion = random_motion(bytes);
   const FrameReport report = pipeline().process(left, right, motion, outputs);
-  for (const double fraction : {report.search_fraction, report.predicted_fraction, report.density}) {
+  if (!(report.search_fraction > 0)) throw std::logic_error("searched " + std::to_string(report.search_fraction));
+  for (const double fraction : {report.predicted_fraction, report.density}) {
     if (!(fraction >= 0 && fraction <= 1)) throw std::logic_error("a fraction of " + std::to_string(fraction));
   }
   if (!left_rows.guards_are_whole() || !right_rows.guards_are_whole() || !disparity.guards_are_whole() ||

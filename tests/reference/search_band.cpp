@@ -161,8 +161,7 @@ void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, Searc
       const shared::Band& band = result.bands[i];
       result.cell_offsets[i] = chunks;
       chunks += band.chunks;
-      sum.searched += static_cast<cl_uint>(band.last - band.first + 1);
-      sum.computed += static_cast<cl_uint>(band.chunks) * EGOSGM_LANES;
+      sum.cells += static_cast<cl_uint>(band.chunks) * EGOSGM_LANES;
       sum.predicted += is_valid(disparity[i]);
     }
     result.row_sums.push_back(sum);
