@@ -14,13 +14,14 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/npy.h"
 #include "host/vision/png.h"
 
 namespace egosgm::vision {
 namespace {
 
 constexpr float kKittiStepsPerPx = 256.0f;
-constexpr std::size_t kMaxMapFileBytes = static_cast<std::size_t>(kMaxImagePixels) * sizeof(float) + 256;
+constexpr std::size_t kMaxMapFileBytes = static_cast<std::size_t>(kMaxImagePixels) * sizeof(double) + 256;
 
 void require_map(const cv::Mat& map, const std::filesystem::path& file) {
   if (map.empty() || map.type() != CV_32FC1) {
@@ -30,7 +31,7 @@ void require_map(const cv::Mat& map, const std::filesystem::path& file) {
 
 bool fits_png(float disparity) { return disparity >= 0 && disparity < 65536.0f / kKittiStepsPerPx; }
 
-cv::Mat parse_disparity_png(std::string_view bytes, const std::filesystem::path& file) {
+cv::Mat parse_disparity_png(std::string_view bytes, const std::filesystem::path& file, float steps_per_px) {
   const cv::Mat stored = decode_png(bytes, file);
   if (stored.type() != CV_16UC1) {
     throw InvalidArgument(file.string() + ": not a disparity map: KITTI's are 16-bit grey PNG, this one has " +
@@ -40,8 +41,8 @@ cv::Mat parse_disparity_png(std::string_view bytes, const std::filesystem::path&
   cv::Mat disparity(stored.size(), CV_32FC1);
   for (int y = 0; y < stored.rows; ++y) {
     const auto* from = stored.ptr<std::uint16_t>(y);
-    std::transform(from, from + stored.cols, disparity.ptr<float>(y), [](std::uint16_t value) {
-      return value == 0 ? kInvalidDisparity : static_cast<float>(value) / kKittiStepsPerPx;
+    std::transform(from, from + stored.cols, disparity.ptr<float>(y), [&](std::uint16_t value) {
+      return value == 0 ? kInvalidDisparity : static_cast<float>(value) / steps_per_px;
     });
   }
   return disparity;
@@ -127,11 +128,34 @@ std::string lower_extension(const std::filesystem::path& file) {
 
 }  // namespace
 
-cv::Mat read_disparity(const std::filesystem::path& file) {
+cv::Mat read_disparity(const std::filesystem::path& file, double png_steps_per_px) {
+  if (!(png_steps_per_px > 0 && std::isfinite(png_steps_per_px))) {
+    throw InvalidArgument("PNG steps a pixel are " + std::to_string(png_steps_per_px) + ": must be positive");
+  }
   const std::string bytes = read_file(file, kMaxMapFileBytes);
-  if (starts_like_png(bytes)) return parse_disparity_png(bytes, file);
+  if (starts_like_png(bytes)) return parse_disparity_png(bytes, file, static_cast<float>(png_steps_per_px));
+  if (starts_like_npy(bytes)) {
+    cv::Mat map = parse_npy(bytes, file);
+    map.forEach<float>([](float& d, const int*) { d = d > 0 && is_valid_disparity(d) ? d : kInvalidDisparity; });
+    return map;
+  }
   if (bytes.starts_with("Pf") || bytes.starts_with("PF")) return parse_pfm(bytes, file);
-  throw InvalidArgument(file.string() + ": not a readable disparity map (truncated?): neither PNG nor PFM");
+  throw InvalidArgument(file.string() + ": not a readable disparity map (truncated?): neither PNG, PFM nor .npy");
+}
+
+cv::Mat read_values(const std::filesystem::path& file) {
+  const std::string bytes = read_file(file, kMaxMapFileBytes);
+  cv::Mat values;
+  if (starts_like_png(bytes)) {
+    const cv::Mat stored = decode_png(bytes, file);
+    if (stored.channels() != 1) throw InvalidArgument(file.string() + ": has three channels; give a grey PNG");
+    stored.convertTo(values, CV_32FC1);
+    return values;
+  }
+  if (starts_like_npy(bytes)) return parse_npy(bytes, file);
+  values = parse_pfm(bytes, file);
+  values.setTo(std::numeric_limits<float>::quiet_NaN(), values == kInvalidDisparity);
+  return values;
 }
 
 std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& disparity) {
@@ -143,7 +167,7 @@ std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& d
 }
 
 cv::Mat read_disparity_png(const std::filesystem::path& file) {
-  return parse_disparity_png(read_file(file, kMaxImageFileBytes), file);
+  return parse_disparity_png(read_file(file, kMaxImageFileBytes), file, kKittiStepsPerPx);
 }
 
 std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity) {

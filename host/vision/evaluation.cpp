@@ -7,29 +7,15 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
+#include "host/vision/disparity_error.h"
 
 namespace egosgm::vision {
 namespace {
-
-constexpr float kBad_px = 3.0f;
-constexpr float kBadRelative = 0.05f;
 
 void require_map(const cv::Mat& map, const char* name) {
   if (map.empty() || map.type() != CV_32FC1) {
     throw InvalidArgument(std::string(name) + ": a disparity map must be CV_32FC1 and not empty");
   }
-}
-
-bool is_bad(float estimate, float truth) { return std::abs(truth - estimate) > kBad_px; }
-
-bool is_d1(float estimate, float truth) {
-  const float error = std::abs(truth - estimate);
-  return error > kBad_px && error > kBadRelative * std::abs(truth);
-}
-
-double percent(std::int64_t part, std::int64_t whole) {
-  return whole > 0 ? 100.0 * static_cast<double>(part) / static_cast<double>(whole)
-                   : std::numeric_limits<double>::quiet_NaN();
 }
 
 void interpolate_row(float* row, int width) {
@@ -98,16 +84,7 @@ DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth)
     for (int x = 0; x < truth.cols; ++x) {
       const float t = truth.at<float>(y, x);
       if (!is_valid_disparity(t)) continue;
-      const float e = estimate.at<float>(y, x);
-      const float filled = interpolated.at<float>(y, x);
-      ++counts.truth;
-      counts.bad_interpolated += !is_valid_disparity(filled) || is_bad(filled, t);
-      counts.d1_interpolated += !is_valid_disparity(filled) || is_d1(filled, t);
-      if (!is_valid_disparity(e)) continue;
-      ++counts.valid;
-      counts.bad += is_bad(e, t);
-      counts.d1 += is_d1(e, t);
-      counts.absolute_error_px += std::abs(static_cast<double>(t) - e);
+      count_pixel(estimate.at<float>(y, x), interpolated.at<float>(y, x), t, counts);
     }
   }
   return counts;
@@ -121,8 +98,7 @@ DisparityMetrics metrics_of(const DisparityCounts& counts) {
           .interpolated = percent(counts.bad_interpolated, counts.truth),
           .d1 = percent(counts.d1 + missing, counts.truth),
           .d1_interpolated = percent(counts.d1_interpolated, counts.truth),
-          .mae_px = counts.valid > 0 ? counts.absolute_error_px / static_cast<double>(counts.valid)
-                                     : std::numeric_limits<double>::quiet_NaN()};
+          .mae_px = ratio(counts.absolute_error_px, static_cast<double>(counts.valid))};
 }
 
 DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images) {

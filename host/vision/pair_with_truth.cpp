@@ -20,7 +20,9 @@ bool is_folder(const fs::path& path) {
 }
 
 bool is_map(const fs::path& file) {
-  return (file.extension() == ".png" || file.extension() == ".pfm") && !file.filename().string().starts_with('.');
+  const fs::path extension = file.extension();
+  return (extension == ".png" || extension == ".pfm" || extension == ".npy" || extension == ".flo") &&
+         !file.filename().string().starts_with('.');
 }
 
 /// Where data sets keep their truth.

@@ -16,8 +16,13 @@ namespace egosgm::vision {
 
 inline bool is_valid_disparity(float d) { return d > kInvalidDisparity && d <= 3.402823466e38f; }
 
-/// Reads KITTI's PNG or a PFM; the file's first bytes tell which.
-EGOSGM_EXPORT cv::Mat read_disparity(const std::filesystem::path& file);
+/// Reads 16-bit grey PNG (KITTI's has 256 steps a pixel), PFM, or NumPy's .npy, in which what is not above 0 or not
+/// finite is invalid; the file's first bytes tell which.
+EGOSGM_EXPORT cv::Mat read_disparity(const std::filesystem::path& file, double png_steps_per_px = 256);
+
+/// Reads any map of numbers as they are stored, a variance or a confidence for instance: grey PNG of 8 or 16 bits, PFM
+/// or .npy. CV_32FC1; infinity in a PFM becomes NaN.
+EGOSGM_EXPORT cv::Mat read_values(const std::filesystem::path& file);
 
 /// Writes KITTI's PNG or a PFM by the extension. Returns how many valid pixels could not be stored (see
 /// write_disparity_png).

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "egosgm/vision/disparity_io.h"
+#include "egosgm/vision/evaluation.h"
+
+namespace egosgm::vision {
+
+inline constexpr float kBad_px = 3.0f;
+inline constexpr float kBadRelative = 0.05f;
+
+inline bool is_bad(float estimate, float truth) { return std::abs(truth - estimate) > kBad_px; }
+
+inline bool is_d1(float estimate, float truth) {
+  const float error = std::abs(truth - estimate);
+  return error > kBad_px && error > kBadRelative * std::abs(truth);
+}
+
+/// One pixel that has truth; `filled` is its estimate after interpolate_background.
+inline void count_pixel(float estimate, float filled, float truth, DisparityCounts& counts) {
+  ++counts.truth;
+  counts.bad_interpolated += !is_valid_disparity(filled) || is_bad(filled, truth);
+  counts.d1_interpolated += !is_valid_disparity(filled) || is_d1(filled, truth);
+  if (!is_valid_disparity(estimate)) return;
+  ++counts.valid;
+  counts.bad += is_bad(estimate, truth);
+  counts.d1 += is_d1(estimate, truth);
+  counts.absolute_error_px += std::abs(static_cast<double>(truth) - estimate);
+}
+
+/// NaN where there is nothing to divide by.
+inline double ratio(double part, double whole) {
+  return whole > 0 ? part / whole : std::numeric_limits<double>::quiet_NaN();
+}
+inline double percent(std::int64_t part, std::int64_t whole) {
+  return ratio(100.0 * static_cast<double>(part), static_cast<double>(whole));
+}
+
+}  // namespace egosgm::vision
