@@ -1,78 +1,145 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/metrics_json.h"
+#include "apps/progress.h"
 #include "apps/truth_pairs.h"
+#include "apps/video_input.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
-#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/video_evaluation.h"
 
 namespace egosgm::app {
 namespace {
 
 using vision::DisparityCounts;
 using vision::DisparityMetrics;
+using vision::VideoCounts;
 using Json = nlohmann::ordered_json;
 
+constexpr std::size_t kLongFolder = 20;  // frames; a progress bar from here on
+
 struct EvalArguments {
-  std::string estimate, truth, mask;
+  ComparisonArguments compared;
+  VideoArguments video;
+  vision::VideoEvaluationOptions options;
   bool json = false;
 };
 
+/// A frame that has truth.
 struct Row {
   std::string name;
-  vision::EvaluationPair pair;
+  FrameFiles files;
   DisparityCounts counts;
 };
 
-/// The truth where the mask, if there is one, is not 0.
-cv::Mat masked_truth(const std::filesystem::path& truth_file, const std::filesystem::path& mask) {
-  cv::Mat truth = vision::read_disparity(truth_file);
-  if (mask.empty()) return truth;
-  const std::filesystem::path file = is_directory(mask) ? mask / truth_file.filename().replace_extension(".png") : mask;
-  const cv::Mat kept = vision::read_grey_png(file);
-  if (kept.size() != truth.size()) {
-    throw InvalidArgument(fmt::format("{}: the mask is {}x{}, the truth {}x{}", file.string(), kept.cols, kept.rows,
-                                      truth.cols, truth.rows));
+struct Result {
+  std::vector<Row> rows;
+  std::vector<DisparityMetrics> each;  // of the rows
+  DisparityMetrics pooled, mean;
+  vision::VideoEvaluation video;
+};
+
+const DisparityCounts& errors_of(const VideoCounts& counts) { return counts.region(vision::Region::kAll).errors; }
+
+Result measure(const VideoInput& input, const EvalArguments& arguments) {
+  Result result;
+  {
+    const bool show = !arguments.json && isatty(STDOUT_FILENO) == 1 && input.frames().size() >= kLongFolder;
+    Progress progress(static_cast<int>(input.frames().size()), !show);
+    result.video =
+        vision::evaluate_video(input.video(), arguments.options, [&](int i) { progress.done(input.frames()[i].name); });
   }
-  truth.setTo(kInvalidDisparity, kept == 0);
-  return truth;
+  DisparityCounts pooled;
+  for (std::size_t i = 0; i < input.frames().size(); ++i) {
+    if (input.frames()[i].truth.empty()) continue;
+    const DisparityCounts& counts = errors_of(result.video.frames[i]);
+    result.rows.push_back({input.frames()[i].name, input.frames()[i], counts});
+    result.each.push_back(vision::metrics_of(counts));
+    pooled += counts;
+  }
+  result.pooled = vision::metrics_of(pooled);
+  result.mean = vision::mean_of(result.each);
+  return result;
 }
 
-Row compare(const vision::EvaluationPair& pair, const std::filesystem::path& mask) {
-  try {
-    return {pair.estimate.stem().string(), pair,
-            vision::compare_disparity(vision::read_disparity(pair.estimate), masked_truth(pair.truth, mask))};
-  } catch (const InvalidArgument& error) {
-    const std::string what = error.what();  // a reader names its file, the comparison cannot
-    for (const std::string& file : {pair.estimate.string(), pair.truth.string(), mask.string()}) {
-      if (!file.empty() && what.find(file) != std::string::npos) throw;
-    }
-    throw InvalidArgument(pair.estimate.string() + " and " + pair.truth.string() + ": " + what);
-  }
+Json json_of(const std::vector<vision::NamedFigure>& figures) {
+  Json json = Json::object();
+  for (const vision::NamedFigure& figure : figures) json[figure.name] = figure.value;
+  return json;
 }
 
-Json json_of(const std::vector<Row>& rows, const DisparityMetrics& pooled, const DisparityMetrics& mean,
-             const std::vector<std::filesystem::path>& without_estimate) {
+Json json_of_regions(const VideoCounts& counts) {
+  Json json = Json::object();
+  for (std::size_t r = 0; r < counts.regions.size(); ++r) {
+    const vision::RegionCounts& region = counts.regions[r];
+    if (region.errors.truth == 0) continue;
+    Json entry{{"truth_pixels", region.errors.truth}};
+    entry.update(json_of(figures_of(region)));
+    json[vision::kRegionNames[r]] = std::move(entry);
+  }
+  return json;
+}
+
+double percent(double part, std::int64_t whole) {
+  return whole > 0 ? 100 * part / static_cast<double>(whole) : std::nan("");
+}
+
+double mean(double sum, std::int64_t count) { return count > 0 ? sum / static_cast<double>(count) : std::nan(""); }
+
+Json json_of(const vision::DensityCounts& counts) {
+  Json kept = Json::array(), of_truth = Json::array();
+  for (int k = 0; k < vision::DensityCounts::kShares; ++k) {
+    kept.push_back({{"kept_percent", 2 * (k + 1)},
+                    {"bad_percent", percent(static_cast<double>(counts.bad[k]), counts.kept[k])},
+                    {"oracle_bad_percent", percent(static_cast<double>(counts.oracle_bad[k]), counts.kept[k])},
+                    {"mae", mean(counts.error_px[k], counts.kept[k])},
+                    {"oracle_mae", mean(counts.oracle_error_px[k], counts.kept[k])}});
+  }
+  for (int k = 0; k < vision::DensityCounts::kDensities; ++k) {
+    of_truth.push_back({{"density_percent", 50 + 5 * k},
+                        {"reached_percent", percent(static_cast<double>(counts.kept_of_truth[k]), counts.truth)},
+                        {"bad_percent", percent(static_cast<double>(counts.bad_of_kept[k]), counts.kept_of_truth[k])}});
+  }
+  return {{"at_density", of_truth}, {"sparsification", kept}};
+}
+
+Json json_of(const VideoInput& input, const vision::VideoEvaluation& video) {
+  Json json{{"frames", input.frames().size()},         {"pairs", input.successors()},
+            {"motion", input.motion_source()},         {"figures", json_of(figures_of(video.total))},
+            {"regions", json_of_regions(video.total)}, {"over_frames", Json::array()}};
+  for (std::size_t i = 0; i < video.frames.size(); ++i) {
+    Json entry{{"name", input.frames()[i].name}};
+    entry.update(json_of(figures_of(video.frames[i])));
+    json["over_frames"].push_back(std::move(entry));
+  }
+  if (video.total.density.truth > 0) json["density"] = json_of(video.total.density);
+  return json;
+}
+
+Json json_of(const VideoInput& input, const Result& result) {
   Json json{{"pairs", Json::array()},
-            {"pooled", app::json_of(pooled)},
-            {"mean", app::json_of(mean)},
+            {"pooled", app::json_of(result.pooled)},
+            {"mean", app::json_of(result.mean)},
             {"without_estimate", Json::array()}};
-  for (const Row& row : rows) {
+  for (std::size_t i = 0; i < result.rows.size(); ++i) {
+    const Row& row = result.rows[i];
     Json entry{{"name", row.name},
-               {"estimate", row.pair.estimate.string()},
-               {"truth", row.pair.truth.string()},
+               {"estimate", row.files.estimate.string()},
+               {"truth", row.files.truth.string()},
                {"truth_pixels", row.counts.truth}};
-    entry.update(app::json_of(vision::metrics_of(row.counts)));
+    entry.update(app::json_of(result.each[i]));
     json["pairs"].push_back(std::move(entry));
   }
-  for (const auto& file : without_estimate) json["without_estimate"].push_back(file.string());
+  for (const auto& file : input.truth_pairs().without_estimate) json["without_estimate"].push_back(file.string());
+  json["video"] = json_of(input, result.video);
   return json;
 }
 
@@ -86,28 +153,55 @@ void print_row(const std::string& name, const DisparityMetrics& m) {
              cell(m.d1_interpolated, 17, " %"), cell(m.mae_px, 11, "px"));
 }
 
-int evaluate(const EvalArguments& arguments) {
-  const vision::EvaluationPairs found = find_truth_pairs(arguments.estimate, arguments.truth);
-  std::vector<Row> rows;
-  std::vector<DisparityMetrics> each;
-  DisparityCounts pooled;
-  for (const vision::EvaluationPair& pair : found.pairs) {
-    rows.push_back(compare(pair, arguments.mask));
-    each.push_back(vision::metrics_of(rows.back().counts));
-    pooled += rows.back().counts;
-  }
-  if (arguments.json) {
-    fmt::print("{}\n",
-               json_of(rows, vision::metrics_of(pooled), vision::mean_of(each), found.without_estimate).dump(2));
-    return kOk;
-  }
+void print_errors(const Result& result) {
+  if (result.rows.empty()) return;
   fmt::print("{:<14}{:>16}{:>14}{:>11}{:>14}{:>11}{:>17}{:>11}\n", "", "bad_or_missing", "bad_of_valid", "density",
              "interpolated", "d1", "d1_interpolated", "mae");
-  for (std::size_t i = 0; i < rows.size(); ++i) print_row(rows[i].name, each[i]);
-  if (rows.size() > 1) {
-    print_row("pooled", vision::metrics_of(pooled));
-    print_row("mean", vision::mean_of(each));
+  for (std::size_t i = 0; i < result.rows.size(); ++i) print_row(result.rows[i].name, result.each[i]);
+  if (result.rows.size() > 1) {
+    print_row("pooled", result.pooled);
+    print_row("mean", result.mean);
   }
+}
+
+void print_over_time(const VideoInput& input, const VideoCounts& total) {
+  bool first = true;
+  for (const vision::NamedFigure& figure : figures_of(total)) {
+    if (std::isnan(figure.value)) continue;
+    if (first) {
+      fmt::print("\nover time, {} of frames{}{}\n", counted(input.successors(), "pair"),
+                 input.motion_source().empty() ? "" : ", ", input.motion_source());
+    }
+    first = false;
+    fmt::print("  {:<46}{:>12.4f}\n", figure.name, figure.value);
+  }
+}
+
+void print_regions(const VideoCounts& total) {
+  fmt::print("\n{:<12}{:>12}{:>16}{:>14}{:>11}{:>14}{:>12}{:>12}\n", "region", "truth", "bad_or_missing",
+             "bad_of_valid", "density", "interpolated", "mae", "tepe");
+  for (std::size_t r = 0; r < total.regions.size(); ++r) {
+    const vision::RegionCounts& region = total.regions[r];
+    if (region.errors.truth == 0) continue;
+    const DisparityMetrics m = vision::metrics_of(region.errors);
+    fmt::print("{:<12}{:>12}{}{}{}{}{}{}\n", vision::kRegionNames[r], region.errors.truth,
+               cell(m.bad_or_missing, 16, " %"), cell(m.bad_of_valid, 14, " %"), cell(m.density, 11, " %"),
+               cell(m.interpolated, 14, " %"), cell(m.mae_px, 12, "px"),
+               cell(mean(region.tepe.sum_px, region.tepe.pixels), 12, "px"));
+  }
+}
+
+void print_density(const vision::DensityCounts& counts) {
+  if (counts.truth == 0) return;
+  fmt::print("\n{:<12}{:>12}{:>12}\n", "density", "reached", "bad");
+  for (int k = 0; k < vision::DensityCounts::kDensities; ++k) {
+    fmt::print("{:<12}{}{}\n", fmt::format("{} %", 50 + 5 * k),
+               cell(percent(static_cast<double>(counts.kept_of_truth[k]), counts.truth), 12, " %"),
+               cell(percent(static_cast<double>(counts.bad_of_kept[k]), counts.kept_of_truth[k]), 12, " %"));
+  }
+}
+
+void print_pairing(const vision::EvaluationPairs& found) {
   for (const vision::EvaluationPair& pair : found.pairs) {
     if (!pair.same_name) {
       fmt::print("{} is compared with {}: only the number is the same\n", pair.estimate.filename().string(),
@@ -118,27 +212,49 @@ int evaluate(const EvalArguments& arguments) {
     fmt::print("{} without an estimate, the first is {}\n", counted(found.without_estimate.size(), "truth file"),
                found.without_estimate.front().string());
   }
+}
+
+/// The sequence's own truth stands for one that is not given, where it has any.
+void complete_truth(EvalArguments& arguments) {
+  arguments.compared.resolve(arguments.video.sequence.empty());
+  if (!arguments.compared.truth.empty()) return;
+  const std::filesystem::path sequence = arguments.video.sequence;
+  if (is_directory(sequence / "truth") || !arguments.video.scene.empty()) arguments.compared.truth = sequence;
+}
+
+int evaluate(EvalArguments arguments) {
+  complete_truth(arguments);
+  const VideoInput input(arguments.compared, arguments.video);
+  const Result result = measure(input, arguments);
+  if (arguments.json) {
+    fmt::print("{}\n", json_of(input, result).dump(2));
+    return kOk;
+  }
+  print_errors(result);
+  if (input.successors() > 0 || !arguments.video.against.empty() || result.video.total.density.truth > 0) {
+    print_over_time(input, result.video.total);
+    if (!result.rows.empty()) print_regions(result.video.total);
+    print_density(result.video.total.density);
+  }
+  print_pairing(input.truth_pairs());
   return kOk;
 }
 
 }  // namespace
 
 Command add_eval(CLI::App& program) {
-  CLI::App* command =
-      program.add_subcommand("eval", "Compare disparity maps with their truth, as KITTI's development kits do");
+  CLI::App* command = program.add_subcommand(
+      "eval", "Compare disparity maps with their truth, as KITTI's development kits do, and with each other over time");
   auto arguments = std::make_shared<EvalArguments>();
+  arguments->compared.add_to(
+      *command, "disparity map (KITTI PNG, 16-bit PNG with --scale, PFM, .npy), a folder of them, or a folder of `run`",
+      "true disparity, or a folder of files with equal names; not needed with --sequence");
+  arguments->video.add_to(*command);
   command
-      ->add_option("--estimate", arguments->estimate,
-                   "disparity map (KITTI PNG or PFM), a folder of them, or a folder of `run`")
-      ->type_name("FILE|DIR")
-      ->required();
-  command->add_option("--truth", arguments->truth, "true disparity, or a folder of files with equal names")
-      ->type_name("FILE|DIR")
-      ->required();
-  command
-      ->add_option("--mask", arguments->mask,
-                   "compare only where this grey PNG, or the one of the truth's name in this folder, is not 0")
-      ->type_name("FILE|DIR");
+      ->add_option("--near", arguments->options.near_px,
+                   "the region `near` begins at this true disparity [px]; the rest is `far`")
+      ->type_name("PX")
+      ->capture_default_str();
   command->add_flag("--json", arguments->json, "print JSON");
   command->footer(
       "In percent of the pixels with truth (bad_of_valid: of those with an estimate too); bad: off by more than 3 px.\n"
@@ -147,7 +263,8 @@ Command add_eval(CLI::App& program) {
       "  d1               off by more than 3 px and 5 %, or without an estimate (KITTI 2015); d1_interpolated "
       "likewise\n"
       "  mae              mean absolute error of the pixels with an estimate [px]\n"
-      "pooled: over all pixels (KITTI 2015); mean: of the images' figures (KITTI 2012).");
+      "pooled: over all pixels (KITTI 2015); mean: of the images' figures (KITTI 2012).\n"
+      "Over time: docs/evaluation.md has the formula, the source and the pixels of every figure.");
   return {command, [arguments] { return evaluate(*arguments); }};
 }
 

@@ -77,7 +77,7 @@ void ComparisonArguments::add_to(CLI::App& command, const std::string& estimate_
       ->type_name("FIRST:LAST");
 }
 
-void ComparisonArguments::resolve() {
+void ComparisonArguments::resolve(bool truth_is_needed) {
   for (const std::string& argument : positional_) {
     std::string& free = estimate.empty() ? estimate : truth;
     if (!free.empty()) {
@@ -87,7 +87,7 @@ void ComparisonArguments::resolve() {
     free = argument;
   }
   if (estimate.empty()) throw InvalidArgument("no estimate: give ESTIMATE TRUTH, or --estimate and --truth");
-  if (truth.empty()) throw InvalidArgument("no truth: give ESTIMATE TRUTH, or --estimate and --truth");
+  if (truth.empty() && truth_is_needed) throw InvalidArgument("no truth: give ESTIMATE TRUTH, or --estimate and --truth");
 }
 
 }  // namespace egosgm::app

@@ -24,8 +24,9 @@ struct ComparisonArguments {
 
   /// `estimate_help` and `truth_help` say what --estimate and --truth take.
   void add_to(CLI::App& command, const std::string& estimate_help, const std::string& truth_help);
-  /// Fills `estimate` and `truth` from the positional arguments. Throws InvalidArgument unless both are given once.
-  void resolve();
+  /// Fills `estimate` and `truth` from the positional arguments. Throws InvalidArgument unless both are given once;
+  /// without `truth_is_needed` the truth may be missing.
+  void resolve(bool truth_is_needed = true);
 
  private:
   std::vector<std::string> positional_;

@@ -140,7 +140,7 @@ cv::Mat read_disparity(const std::filesystem::path& file, double png_steps_per_p
     return map;
   }
   if (bytes.starts_with("Pf") || bytes.starts_with("PF")) return parse_pfm(bytes, file);
-  throw InvalidArgument(file.string() + ": not a readable disparity map (truncated?): neither PNG, PFM nor .npy");
+  throw InvalidArgument(file.string() + ": not a readable disparity map (truncated?): neither PNG nor PFM nor .npy");
 }
 
 cv::Mat read_values(const std::filesystem::path& file) {

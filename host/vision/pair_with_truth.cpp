@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <charconv>
 #include <map>
 #include <set>
 #include <system_error>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/evaluation.h"
+#include "host/vision/name_numbers.h"
 
 namespace egosgm::vision {
 namespace {
 
 namespace fs = std::filesystem;
 using Maps = std::map<std::string, fs::path>;  // name without extension -> file
-using Numbers = std::vector<std::string>;      // digits without leading zeros
 
 bool is_folder(const fs::path& path) {
   std::error_code error;
@@ -59,20 +60,7 @@ Maps maps_of(const fs::path& path) {
   if (!maps.empty()) return maps;
   std::string inside;
   for (const std::string& folder : folders) inside += (inside.empty() ? "; inside are the folders " : ", ") + folder;
-  throw InvalidArgument(path.string() + ": holds no .png or .pfm; give a folder of disparity maps" + inside);
-}
-
-/// The numbers in a name: 151 and 10 of 000151_10.
-Numbers numbers_in(const std::string& name) {
-  constexpr const char* kDigits = "0123456789";
-  Numbers numbers;
-  for (std::size_t at = name.find_first_of(kDigits); at != std::string::npos;) {
-    const std::size_t end = std::min(name.find_first_not_of(kDigits, at), name.size());
-    const std::size_t first = std::min(name.find_first_not_of('0', at), end - 1);
-    numbers.push_back(name.substr(first, end - first));
-    at = name.find_first_of(kDigits, end);
-  }
-  return numbers;
+  throw InvalidArgument(path.string() + ": holds no .png or .pfm or .npy; give a folder of disparity maps" + inside);
 }
 
 /// Whether the longer one ends with the shorter one.
@@ -200,6 +188,29 @@ EvaluationPairs pair_with_truth(const fs::path& estimate, const fs::path& truth,
   if (!is_folder(estimate)) result.without_estimate.clear();
   if (!is_folder(truth)) result.without_truth.clear();
   return result;
+}
+
+std::vector<fs::path> list_maps(const fs::path& estimate, const FrameRange& frames) {
+  std::error_code error;
+  if (!fs::exists(estimate, error)) {
+    throw InvalidArgument(estimate.string() +
+                          ": no such file or folder; give a disparity map (.png, .pfm, .npy) or a folder of them");
+  }
+  Maps maps = maps_of(is_folder(estimate / "disparity") ? estimate / "disparity" : estimate);
+  keep_frames(maps, frames);
+  if (maps.empty()) throw InvalidArgument(estimate.string() + ": holds no map of the chosen frames");
+  std::vector<fs::path> files;
+  for (const auto& [name, file] : maps) files.push_back(file);
+  return files;
+}
+
+std::optional<int> frame_number(const std::string& name) {
+  const Numbers numbers = numbers_in(name);
+  int number = 0;
+  if (numbers.empty()) return std::nullopt;
+  const std::string& last = numbers.back();
+  const bool fits = std::from_chars(last.data(), last.data() + last.size(), number).ec == std::errc();
+  return fits ? std::optional(number) : std::nullopt;
 }
 
 }  // namespace egosgm::vision

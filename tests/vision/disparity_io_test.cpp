@@ -104,6 +104,71 @@ TEST(DisparityIo, WrittenPfmHoldsInfinityAndStartsAtTheBottom) {
   EXPECT_EQ(read_file(folder / "d.pfm", 100), std::string("Pf\n1 2\n-1.0\n\x00\x00\x80\x3f\x00\x00\x80\x7f", 20));
 }
 
+/// NumPy's header, padded as NumPy does, and the values.
+std::string npy(const std::string& type, const std::string& order, const std::string& shape,
+                const std::string& values) {
+  std::string header = "{'descr': '" + type + "', 'fortran_order': " + order + ", 'shape': " + shape + ", }";
+  header.resize((10 + header.size() + 64) / 64 * 64 - 10, ' ');
+  header.back() = '\n';
+  return std::string("\x93NUMPY\x01\x00", 8) + static_cast<char>(header.size() & 0xff) +
+         static_cast<char>(header.size() >> 8) + header + values;
+}
+
+TEST(DisparityIo, NpyOfAnyOrderAndType) {
+  const TemporaryFolder folder;
+  const auto file = folder / "d.npy";
+  const cv::Mat expected = (cv::Mat_<float>(2, 3) << 1, kInvalidDisparity, 3, 4, 5, 6);
+  const std::string rows("\x01\x00\x00\x00\x03\x00\x04\x00\x05\x00\x06\x00", 12);
+  const std::string columns("\x01\x04\x00\x05\x03\x06", 6);
+  const std::string big("\x00\x01\x00\x00\x00\x03\x00\x04\x00\x05\x00\x06", 12);
+  const std::string halves("\x00\x3c\x00\x7e\x00\x42\x00\x44\x00\x45\x00\x46", 12);  // the second is NaN
+  for (const std::string& bytes : {npy("<u2", "False", "(2, 3)", rows), npy("|u1", "True", "(2, 3)", columns),
+                                   npy(">i2", "False", "(2, 3)", big), npy("<f2", "False", "(1, 2, 3, 1)", halves)}) {
+    write_file(file, bytes);
+    expect_equal(read_disparity(file), expected);
+  }
+  std::string doubles(16, '\0');
+  const double values[] = {-2, 7.25};
+  std::memcpy(doubles.data(), values, 16);
+  write_file(file, npy("<f8", "False", "(1, 2)", doubles));
+  expect_equal(read_disparity(file), (cv::Mat_<float>(1, 2) << kInvalidDisparity, 7.25f));
+  expect_equal(read_values(file), (cv::Mat_<float>(1, 2) << -2, 7.25f));
+}
+
+TEST(DisparityIo, BrokenNpyIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "d.npy";
+  const std::string four(4, '\1');
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {std::string("\x93NUMPY\x01\x00", 8), "header"},
+      {npy("<f4", "False", "(1, 1)", four).substr(0, 40), "header"},
+      {npy("<f4", "False", "(1, 1)", ""), "0 bytes of numbers instead of 4"},
+      {npy("<f4", "False", "(1, 2)", four), "4 bytes of numbers instead of 8"},
+      {npy("<c8", "False", "(1, 1)", four), "not floats"},
+      {npy("<f4", "False", "(1,)", four), "1 sides"},
+      {npy("<f4", "False", "(2, 2, 2)", four), "3 sides"},
+      {npy("<f4", "False", "(0, 2)", four), "not positive"},
+      {npy("<f4", "False", "(-1, 2)", four), "not positive"},
+      {npy("<f4", "False", "(99999, 1)", four), "larger than the limit"},
+      {npy("<f4", "False", "[1, 1]", four), "no tuple"},
+      {npy("<f4", "False", "(x, 1)", four), "whole numbers"},
+      {npy("<f4", "False", "(99999999999999999999, 1)", four), "whole numbers"},
+  };
+  for (const auto& [bytes, part] : cases) {
+    write_file(file, bytes);
+    expect_refused([&] { read_disparity(file); }, {"d.npy", part});
+  }
+}
+
+TEST(DisparityIo, PngOfAnotherScale) {
+  const TemporaryFolder folder;
+  const auto file = folder / "d.png";
+  write_png(file, (cv::Mat_<std::uint16_t>(1, 3) << 0, 100, 250));
+  expect_equal(read_disparity(file, 100), (cv::Mat_<float>(1, 3) << kInvalidDisparity, 1, 2.5f));
+  expect_equal(read_values(file), (cv::Mat_<float>(1, 3) << 0, 100, 250));
+  expect_refused([&] { read_disparity(file, 0); }, {"0.000000", "positive"});
+}
+
 TEST(DisparityIo, BrokenPfmIsRefused) {
   const TemporaryFolder folder;
   const auto file = folder / "d.pfm";

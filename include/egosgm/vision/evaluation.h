@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -87,5 +88,13 @@ struct PairingOptions {
 /// Thread-safe.
 EGOSGM_EXPORT EvaluationPairs pair_with_truth(const std::filesystem::path& estimate, const std::filesystem::path& truth,
                                               const PairingOptions& options = {});
+
+/// The maps that `estimate` stands for in pair_with_truth, in the order of their names. Throws InvalidArgument where
+/// there are none. Thread-safe.
+EGOSGM_EXPORT std::vector<std::filesystem::path> list_maps(const std::filesystem::path& estimate,
+                                                           const FrameRange& frames = {});
+
+/// The last number in a file's name: 10 for 000010 and for 000151_10.
+EGOSGM_EXPORT std::optional<int> frame_number(const std::string& name);
 
 }  // namespace egosgm::vision

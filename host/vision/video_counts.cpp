@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/video_counts.h"
+
+#include <limits>
+
+#include "host/vision/disparity_error.h"
+
+namespace egosgm::vision {
+namespace {
+
+template <typename Array>
+void add_to(Array& sums, const Array& others) {
+  for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += others[i];
+}
+
+/// The area between two curves over the kept share, by the trapezoidal rule.
+double area_between(const std::array<std::int64_t, DensityCounts::kShares>& kept, const auto& curve,
+                    const auto& oracle) {
+  if (kept.back() == 0) return std::numeric_limits<double>::quiet_NaN();
+  const auto gap = [&](int k) {
+    return ratio(static_cast<double>(curve[k]) - static_cast<double>(oracle[k]), static_cast<double>(kept[k]));
+  };
+  double area = 0;
+  for (int k = 1; k < DensityCounts::kShares; ++k) {
+    if (kept[k - 1] > 0) area += (gap(k - 1) + gap(k)) / 2 / DensityCounts::kShares;
+  }
+  return area;
+}
+
+double pooled(const TemporalCounts& c) { return ratio(c.sum_px, static_cast<double>(c.pixels)); }
+
+}  // namespace
+
+TemporalCounts& TemporalCounts::operator+=(const TemporalCounts& other) {
+  sum_px += other.sum_px;
+  pixels += other.pixels;
+  above_1px += other.above_1px;
+  above_3px += other.above_3px;
+  relative_sum += other.relative_sum;
+  relative_above_1 += other.relative_above_1;
+  sum_of_pair_means_px += other.sum_of_pair_means_px;
+  pairs += other.pairs;
+  return *this;
+}
+
+PairMean& PairMean::operator+=(const PairMean& other) {
+  sum += other.sum;
+  pairs += other.pairs;
+  return *this;
+}
+
+double PairMean::value() const { return ratio(sum, pairs); }
+
+ChangeCounts& ChangeCounts::operator+=(const ChangeCounts& other) {
+  both += other.both;
+  changed += other.changed;
+  worse += other.worse;
+  better += other.better;
+  return *this;
+}
+
+DensityCounts& DensityCounts::operator+=(const DensityCounts& other) {
+  add_to(kept, other.kept);
+  add_to(bad, other.bad);
+  add_to(oracle_bad, other.oracle_bad);
+  add_to(error_px, other.error_px);
+  add_to(oracle_error_px, other.oracle_error_px);
+  add_to(kept_of_truth, other.kept_of_truth);
+  add_to(bad_of_kept, other.bad_of_kept);
+  truth += other.truth;
+  return *this;
+}
+
+double DensityCounts::ause_px() const { return area_between(kept, error_px, oracle_error_px); }
+double DensityCounts::ause_percent() const { return 100 * area_between(kept, bad, oracle_bad); }
+
+RegionCounts& RegionCounts::operator+=(const RegionCounts& other) {
+  errors += other.errors;
+  tepe += other.tepe;
+  tepe_interpolated += other.tepe_interpolated;
+  against += other.against;
+  return *this;
+}
+
+VideoCounts& VideoCounts::operator+=(const VideoCounts& other) {
+  add_to(regions, other.regions);
+  flicker += other.flicker;
+  tae_percent += other.tae_percent;
+  tepe_along_motion += other.tepe_along_motion;
+  opw_px += other.opw_px;
+  opw_m += other.opw_m;
+  rtc_1_01_percent += other.rtc_1_01_percent;
+  rtc_1_25_percent += other.rtc_1_25_percent;
+  density += other.density;
+  return *this;
+}
+
+std::vector<NamedFigure> figures_of(const VideoCounts& counts) {
+  const RegionCounts& all = counts.region(Region::kAll);
+  const TemporalCounts& along = counts.tepe_along_motion;
+  return {{"flicker_px", pooled(counts.flicker)},
+          {"tae_vda_percent", counts.tae_percent.value()},
+          {"tepe_dynamicstereo_px", pooled(all.tepe)},
+          {"tepe_dynamicstereo_above_1px_percent", percent(all.tepe.above_1px, all.tepe.pixels)},
+          {"tepe_dynamicstereo_above_3px_percent", percent(all.tepe.above_3px, all.tepe.pixels)},
+          {"tepe_dynamicstereo_filled_px", pooled(all.tepe_interpolated)},
+          {"tepe_dynamicstereo_filled_above_1px_percent",
+           percent(all.tepe_interpolated.above_1px, all.tepe_interpolated.pixels)},
+          {"tepe_dynamicstereo_filled_above_3px_percent",
+           percent(all.tepe_interpolated.above_3px, all.tepe_interpolated.pixels)},
+          {"tepe_codd_px", pooled(along)},
+          {"tepe_codd_mean_of_pairs_px", ratio(along.sum_of_pair_means_px, along.pairs)},
+          {"tepe_codd_above_3px_percent", percent(along.above_3px, along.pixels)},
+          {"tepe_codd_relative", ratio(along.relative_sum, static_cast<double>(along.pixels))},
+          {"tepe_codd_relative_above_1_percent", percent(along.relative_above_1, along.pixels)},
+          {"opw_nvds_px", counts.opw_px.value()},
+          {"opw_nvds_m", counts.opw_m.value()},
+          {"rtc_1_01_percent", counts.rtc_1_01_percent.value()},
+          {"rtc_1_25_percent", counts.rtc_1_25_percent.value()},
+          {"changed_percent", percent(all.against.changed, all.against.both)},
+          {"harm_percent", percent(all.against.worse, all.against.changed)},
+          {"help_percent", percent(all.against.better, all.against.changed)},
+          {"ause_px", counts.density.ause_px()},
+          {"ause_bad_percent", counts.density.ause_percent()}};
+}
+
+std::vector<NamedFigure> figures_of(const RegionCounts& counts) {
+  const DisparityMetrics errors = metrics_of(counts.errors);
+  return {{"bad_or_missing", errors.bad_or_missing},
+          {"bad_of_valid", errors.bad_of_valid},
+          {"density", errors.density},
+          {"interpolated", errors.interpolated},
+          {"mae", errors.mae_px},
+          {"tepe_dynamicstereo_px", pooled(counts.tepe)},
+          {"tepe_dynamicstereo_above_1px_percent", percent(counts.tepe.above_1px, counts.tepe.pixels)},
+          {"tepe_dynamicstereo_above_3px_percent", percent(counts.tepe.above_3px, counts.tepe.pixels)},
+          {"tepe_dynamicstereo_filled_px", pooled(counts.tepe_interpolated)},
+          {"changed_percent", percent(counts.against.changed, counts.against.both)},
+          {"harm_percent", percent(counts.against.worse, counts.against.changed)},
+          {"help_percent", percent(counts.against.better, counts.against.changed)}};
+}
+
+}  // namespace egosgm::vision

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm eval over time."""
+import json
+import shutil
+import struct
+import unittest
+
+from program_case import FRAMES, HEIGHT, WIDTH, ProgramTest, grey_png, png
+
+
+def constant_png(value, width=WIDTH, height=HEIGHT):
+    """KITTI's disparity PNG with one value [px] everywhere."""
+    return png(width, height, 16, [struct.pack(">H", round(256 * value)) * width] * height)
+
+
+class EvalOverTime(ProgramTest):
+    def evaluate(self, *arguments):
+        return json.loads(self.assert_works("eval", *arguments, "--json"))
+
+    def maps(self, values, write=constant_png, suffix="png"):
+        folder = self.new_folder()
+        for i, value in enumerate(values):
+            (folder / f"{i:06}.{suffix}").write_bytes(write(value))
+        return folder
+
+    def test_the_truth_itself_is_calm(self):
+        video = self.evaluate("--estimate", self.street / "truth/left_disp_occ", "--sequence", self.street)["video"]
+        self.assertEqual((video["frames"], video["pairs"]), (FRAMES, FRAMES - 1))
+        self.assertEqual(video["motion"], f"poses {self.street / 'poses.txt'}")
+        figures = video["figures"]
+        for name in ("tepe_dynamicstereo_px", "tepe_codd_px", "tepe_dynamicstereo_above_1px_percent"):
+            self.assertEqual(figures[name], 0, name)
+        self.assertLess(figures["flicker_px"], 0.3)
+        self.assertIsNone(figures["harm_percent"])
+        self.assertEqual(len(video["over_frames"]), FRAMES)
+        self.assertIsNone(video["over_frames"][0]["flicker_px"])
+        self.assertIn("uncovered", video["regions"])
+
+    def test_odometry_takes_the_place_of_poses(self):
+        street = self.broken_street()
+        (street / "poses.txt").unlink()
+        arguments = ("--estimate", self.street / "truth/left_disp_occ", "--sequence")
+        found, given = self.evaluate(*arguments, street)["video"], self.evaluate(*arguments, self.street)["video"]
+        self.assertEqual(found["motion"], "odometry")
+        self.assertAlmostEqual(found["figures"]["flicker_px"], given["figures"]["flicker_px"], delta=0.1)
+        again = self.evaluate(*arguments, street, "--poses", self.street / "poses.txt")["video"]
+        self.assertEqual(again["figures"], given["figures"])
+
+    def test_two_folders_are_enough_for_a_jump(self):
+        estimate, truth = self.maps([10, 12, 10.5]), self.maps([10, 10, 10])
+        result = self.evaluate(estimate, truth)
+        figures = result["video"]["figures"]
+        self.assertEqual(figures["tepe_dynamicstereo_px"], 1.75)
+        self.assertEqual(figures["tepe_dynamicstereo_above_1px_percent"], 100)
+        self.assertEqual([frame["tepe_dynamicstereo_px"] for frame in result["video"]["over_frames"]], [None, 2, 1.5])
+        self.assertEqual(self.evaluate(estimate, truth, "--frames", "1:2")["video"]["figures"]["tepe_dynamicstereo_px"], 1.5)
+        table = self.assert_works("eval", estimate, truth)
+        self.assertIn("2 pairs of frames", table)
+        self.assertRegex(table, r"tepe_dynamicstereo_px +1\.7500")
+
+    def test_a_gap_is_no_pair(self):
+        estimate, truth = self.maps([10, 12, 30, 11]), self.maps([10, 10, 10, 10])
+        (estimate / "000002.png").unlink()
+        figures = self.evaluate(estimate, truth)["video"]
+        self.assertEqual((figures["frames"], figures["pairs"]), (3, 1))
+        self.assertEqual(figures["figures"]["tepe_dynamicstereo_px"], 2)
+
+    def test_pictures_that_are_no_video_give_the_old_table(self):
+        folder = self.new_folder()
+        for name in ("000000_10", "000001_10"):
+            (folder / f"{name}.png").write_bytes(constant_png(9))
+        table = self.assert_works("eval", folder, folder)
+        self.assertNotIn("over time", table)
+        self.assertIn("mean", table)
+
+    def test_against_counts_harm_and_help(self):
+        estimate, against, truth = self.maps([10, 13]), self.maps([12, 10]), self.maps([10, 10])
+        figures = self.evaluate(estimate, truth, "--against", against)["video"]["figures"]
+        self.assertEqual((figures["changed_percent"], figures["harm_percent"], figures["help_percent"]), (100, 50, 50))
+
+    def test_formats_of_others(self):
+        def npy(value):
+            header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({HEIGHT}, {WIDTH}), }}".ljust(117) + "\n"
+            return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + struct.pack("<f", value) * (WIDTH * HEIGHT)
+        truth = self.maps([8, 8])
+        for folder, scale in ((self.maps([8.5, 9], npy, "npy"), ()), (self.maps([4.25, 4.5]), ("--scale", 128))):
+            figures = self.evaluate(folder, truth, *scale)["video"]["figures"]
+            self.assertEqual(figures["tepe_dynamicstereo_px"], 0.5)
+
+    def test_variance_and_confidence_are_opposite_orders(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "variance", "--quiet", "--overwrite")
+        truth = self.street / "truth/left_disp_noc"
+        result = self.evaluate(out, truth, "--variance", out)["video"]
+        wrong_way = self.evaluate(out, truth, "--confidence", out / "variance")["video"]
+        self.assertGreater(wrong_way["figures"]["ause_px"], 2 * result["figures"]["ause_px"])
+        at = result["density"]["at_density"]
+        self.assertEqual([entry["density_percent"] for entry in at], list(range(50, 101, 5)))
+        self.assertLessEqual(at[0]["bad_percent"], at[-1]["bad_percent"])
+        self.assertEqual(len(result["density"]["sparsification"]), 50)
+        last = result["density"]["sparsification"][-1]
+        self.assertEqual(last["bad_percent"], last["oracle_bad_percent"])
+
+    def test_wrong_input_gives_one_line_and_no_table(self):
+        truth = self.street / "truth/left_disp_occ"
+
+        def refused(arguments, *named):
+            self.assert_refused(["eval", *arguments], *named)
+        refused(["--estimate", truth], "no truth")
+        refused([truth, truth, "--poses", self.street / "poses.txt"], "--sequence")
+        refused([truth, truth, "--variance", truth, "--confidence", truth], "give one of them")
+        refused([truth, truth, "--against", self.new_folder()], "holds no")
+        refused([truth, truth, "--scale", "0"], "positive")
+        other = self.new_folder()
+        for name in ("000001.png", "000077.png"):
+            shutil.copy(truth / "000001.png", other / name)
+        refused([other, "--sequence", self.street], "000077.png", "no frame of this number")
+        small = self.maps([1, 1])
+        (small / "000001.png").write_bytes(grey_png(20, 10, depth=16))
+        refused([truth, truth, "--against", small], "000001.png", "20x10", "320x96")
+        broken = self.maps([1, 1, 1, 1])
+        (broken / "000003.png").write_bytes(constant_png(1)[:100])
+        refused([broken, truth], "000003.png")
+        refused([truth, truth, "--flow", truth], "000000.png", "optical flow")
+
+
+if __name__ == "__main__":
+    unittest.main()
