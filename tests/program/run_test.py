@@ -200,16 +200,37 @@ class Run(ProgramTest):
 
 
 class Accuracy(ProgramTest):
-    def test_synthetic_sequence_with_true_poses(self):
-        street, out = self.new_folder(), self.new_folder()
-        self.assert_works("synth", "--out", street, "--frames", 20, "--quiet")
-        self.assert_works("run", "--odometry", street, "--poses", street / "poses.txt", "--out", out, "--quiet")
+    def of_later_frames(self, street, temporal, *arguments):
+        """The pooled figures from frame 3 on, and the largest share of the cells that a frame of them searched."""
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", street, "--poses", street / "poses.txt", "--temporal", temporal, "--out", out, "--quiet", *arguments)
         for i in range(3):
             (out / f"disparity/00000{i}.png").unlink()
         result = json.loads(self.assert_works("eval", "--estimate", out, "--truth", street / "truth/left_disp_noc", "--json"))
-        self.assertEqual(len(result["pairs"]), 17)
+        frames = self.report(out)["frames"][3:]
+        self.assertEqual(len(result["pairs"]), len(frames))
         self.assertEqual(len(result["without_estimate"]), 3)
-        self.assertLessEqual(result["pooled"]["bad_or_missing"], 2.0)
+        return result["pooled"], max(frame["search_fraction"] for frame in frames)
+
+    def test_synthetic_sequence_with_true_poses(self):
+        street = self.new_folder()
+        self.assert_works("synth", "--out", street, "--frames", 20, "--quiet")
+        method, search = self.of_later_frames(street, "on")
+        single, _ = self.of_later_frames(street, "off")
+        self.assertLessEqual(method["bad_or_missing"], 2.0)
+        self.assertLessEqual(method["bad_or_missing"], 1.5 * single["bad_or_missing"])  # the matcher alone does well here
+        self.assertLess(search, 0.25)
+
+    def test_beats_the_single_frame_where_images_are_noisy(self):
+        street = self.new_folder()
+        self.assert_works("synth", "--out", street, "--frames", 10, "--width", 320, "--height", 120, "--seed", 4, "--noise", 12, "--quiet")
+        method, search = self.of_later_frames(street, "on", "--disparities", 64)
+        single, _ = self.of_later_frames(street, "off", "--disparities", 64)
+        for figure in ("bad_or_missing", "interpolated", "bad_of_valid"):
+            self.assertLess(method[figure], 0.75 * single[figure], figure)
+        self.assertLess(method["bad_or_missing"], 0.6 * single["bad_or_missing"])
+        self.assertGreater(method["density"], single["density"])
+        self.assertLess(search, 0.6)
 
     def test_odometry_of_a_synthetic_sequence(self):
         street, poses = self.new_folder(), self.new_folder() / "poses.txt"
