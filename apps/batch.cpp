@@ -17,12 +17,14 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/device_arguments.h"
+#include "apps/doubt.h"
 #include "apps/energy_meter.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
 #include "apps/option_arguments.h"
 #include "apps/run_outputs.h"
 #include "apps/shard.h"
+#include "apps/standard_output.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 
@@ -166,7 +168,8 @@ class Batch {
       folder_.begin(entry);
       const SequenceJob job = job_of(entry);
       if (run_sequence(job, devices_[device])) {
-        finish(number, device, folder_.finish(entry, job), seconds_since(start));
+        const Json done = folder_.finish(entry, job);
+        finish(number, device, done, job.input, seconds_since(start));
       } else {
         queue_.stop();
       }
@@ -184,6 +187,7 @@ class Batch {
     SequenceJob job;
     const BatchInput input = parse_input(entry);
     job.sequence = input.sequence.open();
+    job.input = input.sequence.text();
     job.options = options_;
     job.preset = arguments_.method.preset;
     job.poses_file = input.poses_file;
@@ -194,7 +198,9 @@ class Batch {
     return job;
   }
 
-  void finish(int number, int device, int frames, double seconds) {
+  void finish(int number, int device, const Json& done, const std::string& input, double seconds) {
+    const int frames = done.at("frames");
+    const std::string doubt = done.value("doubt", "");
     queue_.succeeded(number);
     energy_.sample();
     const std::lock_guard lock(mutex_);
@@ -203,8 +209,8 @@ class Batch {
     work.frames += frames;
     work.seconds += seconds;
     ++done_;
-    tell(fmt::format("{}: {}, {:.1f} frames/s, {}", entries_[number].name, counted(frames, "frame"), frames / seconds,
-                     devices_[device].info().name));
+    tell(fmt::format("{}: {}, {:.1f} frames/s, {}{}", entries_[number].name, counted(frames, "frame"), frames / seconds,
+                     devices_[device].info().name, doubt.empty() ? "" : "; " + advice_of(doubt, input)));
   }
 
   void hand_over(int number, int device, const std::string& reason) {
@@ -233,8 +239,7 @@ class Batch {
 
   void tell(const std::string& line) const {
     if (arguments_.quiet) return;
-    fmt::print("[{}/{}] {}\n", done_, entries_.size(), line);
-    std::fflush(stdout);
+    print_now(fmt::format("[{}/{}] {}\n", done_, entries_.size(), line));
   }
 
   const BatchArguments& arguments_;
@@ -258,11 +263,12 @@ std::string figure(const Json& value, const char* unit, const char* none = "-") 
 }
 
 void print_timing(const Json& timing) {
-  fmt::print("{} in {:.1f} s: {:.2f} frames/s, {:.2f} a compute unit; energy a frame: CPU {}, GPU {}\n",
-             counted(timing["frames"].get<std::size_t>(), "frame"), timing["wall_seconds"].get<double>(),
-             timing["frames_per_second"].get<double>(), timing["frames_per_second_per_compute_unit"].get<double>(),
-             figure(timing["cpu_joules_per_frame"], "J", "not told"),
-             figure(timing["gpu_joules_per_frame"], "J", "not told"));
+  print_now(fmt::format("{} in {:.1f} s: {:.2f} frames/s, {:.2f} a compute unit; energy a frame: CPU {}, GPU {}\n",
+                        counted(timing["frames"].get<std::size_t>(), "frame"), timing["wall_seconds"].get<double>(),
+                        timing["frames_per_second"].get<double>(),
+                        timing["frames_per_second_per_compute_unit"].get<double>(),
+                        figure(timing["cpu_joules_per_frame"], "J", "not told"),
+                        figure(timing["gpu_joules_per_frame"], "J", "not told")));
 }
 
 void print_report(const Json& report, const std::filesystem::path& file) {

@@ -120,19 +120,21 @@ void BatchFolder::begin(const BatchEntry& entry) const {
   fs::remove(folder_of(entry) / "failed.json", ignored);
 }
 
-int BatchFolder::finish(const BatchEntry& entry, const SequenceJob& job) const {
+Json BatchFolder::finish(const BatchEntry& entry, const SequenceJob& job) const {
   const Json report = read(job.out / "report.json");
   const Json& frames = report.at("frames");
-  write(folder_of(entry) / "done.json", {{"input", entry.arguments},
-                                         {"title", job.sequence.title},
-                                         {"width", report.at("width")},
-                                         {"height", report.at("height")},
-                                         {"frames", frames.size()},
-                                         {"search_fraction", mean(frames, "search_fraction")},
-                                         {"density", mean(frames, "density")},
-                                         {"noc", json_of(compare(job, &vision::StereoFrame::truth_noc))},
-                                         {"occ", json_of(compare(job, &vision::StereoFrame::truth_occ))}});
-  return static_cast<int>(frames.size());
+  Json done{{"input", entry.arguments},
+            {"title", job.sequence.title},
+            {"width", report.at("width")},
+            {"height", report.at("height")},
+            {"frames", frames.size()},
+            {"search_fraction", mean(frames, "search_fraction")},
+            {"density", mean(frames, "density")},
+            {"noc", json_of(compare(job, &vision::StereoFrame::truth_noc))},
+            {"occ", json_of(compare(job, &vision::StereoFrame::truth_occ))}};
+  if (report.contains("doubt")) done["doubt"] = report["doubt"];
+  write(folder_of(entry) / "done.json", done);
+  return done;
 }
 
 void BatchFolder::fail(const BatchEntry& entry, const std::string& reason) const {

@@ -29,9 +29,9 @@ class BatchFolder {
   bool is_done(const BatchEntry& entry) const;
   /// Forgets that it failed, before it is tried (again).
   void begin(const BatchEntry& entry) const;
-  /// REQUIRES: `run_sequence` finished. Compares the disparities with the truth that the sequence has. Returns the
-  /// number of frames. Throws IoError.
-  int finish(const BatchEntry& entry, const SequenceJob& job) const;
+  /// REQUIRES: `run_sequence` finished. Compares the disparities with the truth that the sequence has. Returns what
+  /// done.json holds. Throws IoError.
+  nlohmann::ordered_json finish(const BatchEntry& entry, const SequenceJob& job) const;
   void fail(const BatchEntry& entry, const std::string& reason) const;
 
   /// Writes batch.json, and returns it. Throws IoError.

@@ -11,6 +11,7 @@
 
 #include "apps/command.h"
 #include "apps/counted.h"
+#include "apps/doubt.h"
 #include "apps/frame_times.h"
 #include "apps/pair_matches.h"
 #include "apps/sequence_arguments.h"
@@ -26,7 +27,6 @@ constexpr double kMaxSpread_px = 1.0;    // of the rest, 90 % of the matches
 constexpr double kClippedShare = 0.01;   // of the matches
 constexpr double kBehindShare = 0.02;    // with a disparity that no point before the cameras has
 constexpr double kBehind_px = 1.0;       // by more than this
-constexpr double kMaxBaseline_m = 5.0;   // more is a unit that was mistaken
 constexpr double kMaxGap = 1.6;          // of the usual time between two frames
 constexpr double kMaxBrightness = 1.25;  // of one image by the other's
 
@@ -124,8 +124,8 @@ class Doctor {
     const Calibration& c = sequence_.calibration;
     const std::string text = fmt::format("fx {:.1f}, fy {:.1f}, cx {:.1f}, cy {:.1f} px, baseline {:.4g} m", c.fx, c.fy,
                                          c.cx, c.cy, c.baseline_m);
-    if (c.baseline_m > kMaxBaseline_m) {
-      return problem("calibration", text, "is the baseline in millimetres? baseline_m is in metres");
+    if (is_baseline_mistaken(c)) {
+      return problem("calibration", text, kMistakenBaseline);
     }
     const bool centred = c.cx > 0.25 * size_.width && c.cx < 0.75 * size_.width && c.cy > 0.2 * size_.height &&
                          c.cy < 0.8 * size_.height;

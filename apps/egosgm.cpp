@@ -3,12 +3,15 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <new>
 
 #include "apps/command.h"
+#include "apps/standard_output.h"
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
 
@@ -17,7 +20,7 @@ namespace {
 
 int fail(int code, std::string message) {
   std::replace(message.begin(), message.end(), '\n', ' ');
-  fmt::print(stderr, "egosgm: error: {}\n", message);
+  std::fputs(("egosgm: error: " + message + '\n').c_str(), stderr);
   return code;
 }
 
@@ -79,8 +82,9 @@ void tell_of_an_end_from_within() {
 
 /// A result that the standard output did not take, for example for a full disk, is no result.
 int flushed(int code) {
-  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
-  return fail(kFailed, "the standard output cannot be written: is its disk full or its reader gone?");
+  const int error = standard_output_error();
+  if (error == 0 || error == EPIPE) return code;  // a reader that goes has read enough
+  return fail(kFailed, fmt::format("the standard output cannot be written: {}", std::strerror(error)));
 }
 
 int run_program(int argc, char** argv) {
@@ -96,7 +100,8 @@ int run_program(int argc, char** argv) {
       "  egosgm synth --out street\n"
       "  egosgm run --odometry street --out result --write color\n"
       "  egosgm eval --estimate result --truth street/truth/left_disp_noc\n"
-      "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.");
+      "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.\n"
+      "Who stops reading the output (`| head`) ends the printing, not the work.");
   const Command commands[] = {
       add_run(program),        add_batch(program), add_view(program),     add_report(program),     add_eval(program),
       add_devices(program),    add_synth(program), add_odometry(program), add_eval_poses(program), add_compile(program),
@@ -123,6 +128,8 @@ int exit_code_of(int argc, char** argv) {
     return fail(kFailed, error.what());
   } catch (const std::bad_alloc&) {
     return fail(kFailed, "out of memory: choose smaller images or fewer --disparities");
+  } catch (const std::system_error& error) {  // more was printed than the output's buffer holds
+    return error.code().value() == EPIPE ? kOk : fail(kFailed, error.what());
   } catch (const std::exception& error) {
     return fail(kFailed, fmt::format("{} (this is a defect of the program: please report it)", error.what()));
   }
@@ -135,6 +142,7 @@ int main(int argc, char** argv) {
   using namespace egosgm;
   using namespace egosgm::app;
   std::signal(SIGXFSZ, SIG_IGN);  // a file beyond `ulimit -f` is to be an error of its write, as a full disk is
+  open_standard_output();
   std::atexit(tell_of_an_end_from_within);
   const int code = exit_code_of(argc, argv);
   is_over = true;

@@ -7,7 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "apps/standard_output.h"
 
 namespace egosgm::app {
 namespace {
@@ -31,25 +32,18 @@ Progress::Progress(int frames, bool quiet) : frames_(frames), quiet_(quiet), ter
 
 Progress::~Progress() {
   if (quiet_ || !terminal_ || done_ == 0) return;
-  std::fputc('\n', stdout);
-  std::fflush(stdout);
+  print_now("\n");
 }
 
 void Progress::done(const std::string& line) {
   ++done_;
   if (quiet_) return;
-  if (terminal_) {
-    draw(line);
-  } else {
-    fmt::print("{}\n", line);
-  }
-  std::fflush(stdout);
+  print_now(terminal_ ? bar(line) : line + '\n');
 }
 
 void Progress::note(const std::string& line) {
   if (quiet_) return;
-  fmt::print("{}{}\n", terminal_ ? kEraseLine : "", line);
-  std::fflush(stdout);
+  print_now(fmt::format("{}{}\n", terminal_ ? kEraseLine : "", line));
 }
 
 double Progress::frames_per_second() const {
@@ -57,14 +51,14 @@ double Progress::frames_per_second() const {
   return seconds.count() > 0 ? done_ / seconds.count() : 0;
 }
 
-void Progress::draw(const std::string& line) {
+std::string Progress::bar(const std::string& line) const {
   const int filled = kBarWidth * done_ / std::max(frames_, 1);
   const double rate = frames_per_second();
   std::string text =
       fmt::format("[{:#<{}}{:.<{}}] {}/{}  {:.1f} frames/s  {} left  {}", "", filled, "", kBarWidth - filled, done_,
                   frames_, rate, clock_text(rate > 0 ? (frames_ - done_) / rate : 0), line);
   text.resize(std::min(text.size(), terminal_columns() - 1));
-  fmt::print("{}{}", kEraseLine, text);
+  return kEraseLine + text;
 }
 
 }  // namespace egosgm::app

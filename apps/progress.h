@@ -24,7 +24,7 @@ class Progress {
   double frames_per_second() const;
 
  private:
-  void draw(const std::string& line);
+  std::string bar(const std::string& line) const;
 
   const int frames_;
   const bool quiet_;

@@ -13,6 +13,7 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/device_arguments.h"
+#include "apps/doubt.h"
 #include "apps/earlier_run.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
@@ -61,11 +62,13 @@ class Run {
       : quiet_(job.quiet),
         folder_(job.out),
         sequence_(job.sequence),
+        input_(job.input),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
         report_(sequence_, pipeline_, job.preset, motion_of(job), size_.width, size_.height),
-        earlier_(job.earlier) {
+        earlier_(job.earlier),
+        doubt_(sequence_.calibration) {
     expect_free(folder_, earlier_, report_.identity());
     outputs_.emplace(folder_, job.kinds, size_, job.options.disparities, sequence_.calibration);
     if (job.trace.empty()) return;
@@ -155,6 +158,7 @@ class Run {
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
     report_.add(frame, result, prepared.motion, times, unstorable);
+    doubt_.add(result.density, prepared.motion.motion.has_value());
     poses_.push_back(prepared.motion.first_from_camera);
     tell(frame, result, prepared.motion, times, unstorable, progress);
   }
@@ -188,6 +192,7 @@ class Run {
 
   void finish(bool finished, const std::string& why_not) {
     if (!poses_.empty()) vision::write_poses(folder_ / "poses.txt", poses_);
+    report_.set_doubt(doubt_.text());
     report_.write(folder_ / "report.json", finished, why_not);
     if (trace_) trace_->write();
     if (!finished || quiet_) return;
@@ -195,6 +200,7 @@ class Run {
                pipeline_.device().info().name);
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
                100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.string());
+    if (const std::string advice = advice_of(doubt_.text(), input_); !advice.empty()) fmt::print("{}\n", advice);
   }
 
   /// The first error counts; that the report cannot be written either adds nothing.
@@ -208,12 +214,14 @@ class Run {
   const bool quiet_;
   const std::filesystem::path& folder_;
   const vision::StereoSequence& sequence_;
+  const std::string& input_;
   const cv::Size size_;
   MotionSource motions_;
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
   Pipeline pipeline_;
   RunReport report_;
   const EarlierRun earlier_;
+  Doubt doubt_;
   std::optional<Trace> trace_;
   std::deque<PreparedFrame> under_way_;
   Clock::time_point last_written_ = Clock::now();
@@ -233,6 +241,7 @@ SequenceJob job_of(const RunArguments& arguments) {
   SequenceJob job;
   job.earlier = earlier_run_of(arguments);
   job.sequence = arguments.input.open();
+  job.input = arguments.input.text();
   job.options = arguments.method.options();
   job.preset = arguments.method.preset;
   job.poses_file = arguments.poses;

@@ -16,6 +16,7 @@ namespace egosgm::app {
 /// A sequence, how to match it, and where its results go.
 struct SequenceJob {
   vision::StereoSequence sequence;
+  std::string input;  // the arguments that named it, for messages
   PipelineOptions options;
   std::string preset = "default";          // what the report calls the options
   std::string poses_file;                  // empty: stereo odometry,

@@ -122,8 +122,13 @@ void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report,
                              {"ms", times_json(report, motion, times)}});
 }
 
+void RunReport::set_doubt(const std::string& doubt) {
+  if (!doubt.empty()) json_["doubt"] = doubt;
+}
+
 void RunReport::write(const std::filesystem::path& file, bool finished, const std::string& why_not) {
   json_["finished"] = finished;
+  json_.erase("stopped_by");
   if (!finished) json_["stopped_by"] = why_not;
   vision::write_file(file, json_.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
 }

@@ -30,6 +30,9 @@ class RunReport {
   void add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
            const HostTimes& times, std::int64_t unstorable);
 
+  /// What speaks against the input, see Doubt; empty: nothing.
+  void set_doubt(const std::string& doubt);
+
   /// `finished`: whether all frames ran; else `why_not` says what stopped them. Throws IoError.
   void write(const std::filesystem::path& file, bool finished, const std::string& why_not = {});
 

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/sequence_arguments.h"
 
+#include <algorithm>
+#include <cctype>
+#include <string_view>
+
 #include "egosgm/error.h"
 
 namespace egosgm::app {
@@ -68,6 +72,28 @@ vision::StereoSequence SequenceArguments::open() const {
   if (!odometry.empty()) return vision::open_kitti_odometry(odometry, range);
   if (!folder.empty()) return vision::open_folder(folder, range);
   return vision::open_patterns(left, right, calib, range);
+}
+
+std::string SequenceArguments::text() const {
+  std::string text;
+  const auto append = [&](const char* name, const std::string& value) {
+    if (value.empty()) return;
+    const bool is_plain = std::all_of(value.begin(), value.end(), [](unsigned char c) {
+      return std::isalnum(c) || std::string_view("/._-+=:,@%").find(static_cast<char>(c)) != std::string_view::npos;
+    });
+    std::string quoted = "'";
+    for (const char c : value) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+    text += (text.empty() ? "" : " ") + std::string(name) + (is_plain ? value : quoted + "'");
+  };
+  append("", folder);
+  append("--kitti ", kitti);
+  append("--scene ", scene);
+  append("--odometry ", odometry);
+  append("--left ", left);
+  append("--right ", right);
+  append("--calib ", calib);
+  append("--frames ", frames);
+  return text;
 }
 
 }  // namespace egosgm::app

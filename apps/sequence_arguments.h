@@ -17,6 +17,8 @@ struct SequenceArguments {
   void add_to_with_positional(CLI::App& command);
   /// Throws InvalidArgument unless exactly one sequence was named, and as the openers do.
   vision::StereoSequence open() const;
+  /// What was given, as a shell takes it for any command that reads a sequence.
+  std::string text() const;
 
  private:
   void add_sources(CLI::App& command);

@@ -9,6 +9,7 @@
 
 #include "apps/command.h"
 #include "apps/device_arguments.h"
+#include "apps/standard_output.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
@@ -143,7 +144,7 @@ int tune(const TuneArguments& arguments) {
   for (const Trial& trial : trials(device.info().type == "GPU")) {
     if (!arguments.stage.empty() && trial.stages.front() != arguments.stage) continue;
     double least = ms_of(untuned, trial.stages);
-    fmt::print("{}: {:.3f} ms with the defaults\n", fmt::join(trial.stages, " + "), least);
+    print_now(fmt::format("{}: {:.3f} ms with the defaults\n", fmt::join(trial.stages, " + "), least));
     for (const std::vector<NamedOption>& sizes : trial.candidates) {
       Tuning candidate = best;
       for (const auto& [name, value] : sizes) set_tuning(candidate, name, value);
@@ -151,12 +152,11 @@ int tune(const TuneArguments& arguments) {
       try {
         ms = ms_of(course.run(candidate), trial.stages);
       } catch (const BuildError&) {  // blocks of 32 lanes, of which its compiler has no vectors
-        fmt::print("  {:<36} not on this device\n", text_of(sizes));
+        print_now(fmt::format("  {:<36} not on this device\n", text_of(sizes)));
         continue;
       }
       const bool is_better = ms < kGain * least;
-      fmt::print("  {:<36} {:8.3f} ms{}\n", text_of(sizes), ms, is_better ? "  the best so far" : "");
-      std::fflush(stdout);
+      print_now(fmt::format("  {:<36} {:8.3f} ms{}\n", text_of(sizes), ms, is_better ? "  the best so far" : ""));
       if (is_better) best = candidate, least = ms;
     }
   }

@@ -9,6 +9,7 @@
 
 #include "apps/command.h"
 #include "apps/device_arguments.h"
+#include "apps/doubt.h"
 #include "apps/frame_panels.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
@@ -47,7 +48,9 @@ class DrawnSequence {
         disparity_(size_, CV_32FC1),
         variance_(size_, CV_32FC1),
         search_width_(size_, CV_16UC1),
-        panels_(options_.disparities) {}
+        panels_(options_.disparities),
+        input_(arguments.input.text()),
+        doubt_(sequence_.calibration) {}
 
   std::size_t frames() const { return sequence_.frames.size(); }
   const std::string& name(std::size_t i) const { return sequence_.frames[i].name; }
@@ -63,6 +66,7 @@ class DrawnSequence {
     outputs.search_width = {search_width_.ptr<std::uint16_t>(), size_.width, size_.height,
                             static_cast<std::ptrdiff_t>(search_width_.step)};
     report_ = pipeline_.process(vision::image_view(images.left), vision::image_view(images.right), motion, outputs);
+    doubt_.add(report_.density, motion.has_value());
     return panels_.all({frame, images.left, disparity_, variance_, search_width_}, cell_width_);
   }
 
@@ -70,6 +74,9 @@ class DrawnSequence {
     return fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms", name(i),
                        100 * report_.search_fraction, 100 * report_.density, report_.total_ms);
   }
+
+  /// Names egosgm doctor where something speaks against the input; else empty.
+  std::string advice() const { return advice_of(doubt_.text(), input_); }
 
  private:
   static Device device_of(const ViewArguments& arguments) {
@@ -86,6 +93,8 @@ class DrawnSequence {
   cv::Mat disparity_, variance_, search_width_;
   FramePanels panels_;
   FrameReport report_;
+  const std::string input_;
+  Doubt doubt_;
 };
 
 /// A video that appears under its name once it is whole.
@@ -223,7 +232,9 @@ int view(const ViewArguments& arguments) {
   catch_interrupts();
   if (window) require_display();
   DrawnSequence drawn(arguments);
-  return window ? Window(drawn, arguments)() : write_files(drawn, arguments);
+  const int code = window ? Window(drawn, arguments)() : write_files(drawn, arguments);
+  if (!arguments.quiet && !drawn.advice().empty()) fmt::print("{}\n", drawn.advice());
+  return code;
 }
 
 }  // namespace

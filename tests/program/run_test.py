@@ -4,6 +4,8 @@ import json
 import os
 import pathlib
 import pty
+import shlex
+import shutil
 import subprocess
 import unittest
 
@@ -19,6 +21,9 @@ class Run(ProgramTest):
         self.assertIn("frame 000003", text)
         report = self.report(out)
         self.assertTrue(report["finished"])
+        self.assertNotIn("stopped_by", report)
+        self.assertNotIn("doubt", report)
+        self.assertNotIn("egosgm doctor", text)
         for key in ("device", "driver", "version", "options"):
             self.assertTrue(report[key])
         self.assertEqual([frame["frame"] for frame in report["frames"]], list(range(FRAMES)))
@@ -44,6 +49,43 @@ class Run(ProgramTest):
         text = json.loads(self.assert_works("eval", "--estimate", out / "interpolated", "--truth",
                                             self.street / "truth/left_disp_occ", "--json"))
         self.assertEqual(text["pooled"]["density"], 100)
+
+    def assert_doubted(self, arguments, *named):
+        """The last line of run names doctor, which finds a problem with the very arguments."""
+        out = self.new_folder()
+        lines = self.assert_works("run", *arguments, "--out", out).splitlines()
+        for text in named:
+            self.assertIn(text, lines[-1])
+            self.assertIn(text, self.report(out)["doubt"])
+        command = lines[-1][lines[-1].index("`") + 1:lines[-1].rindex("`")]
+        self.assertTrue(command.startswith("egosgm doctor "), command)
+        done = egosgm(*shlex.split(command)[1:])
+        self.assertEqual(done.returncode, 2, done.stdout + done.stderr)
+        self.assertIn("problem", done.stdout)
+        self.assertEqual(self.assert_works("run", *arguments, "--out", self.new_folder(), "--quiet"), "")
+
+    def test_plainly_wrong_input_ends_with_a_line_that_names_doctor(self):
+        swapped = self.new_folder() / "it's swapped"
+        shutil.copytree(self.street, swapped)
+        (swapped / "image_0").rename(swapped / "left")
+        (swapped / "image_1").rename(swapped / "image_0")
+        (swapped / "left").rename(swapped / "image_1")
+        self.assert_doubted(["--odometry", swapped], f"no motion in {FRAMES - 1} of {FRAMES - 1} frames", "density")
+        self.assert_doubted(["--dataset", swapped, "--frames", "1:3"], "no motion in 2 of 2 frames")
+        wide = self.broken_street()
+        rows = [line.split() for line in (wide / "calib.txt").read_text().splitlines()]
+        rows[1][4] = str(1000 * float(rows[1][4]))
+        (wide / "calib.txt").write_text("\n".join(" ".join(row) for row in rows) + "\n")
+        self.assert_doubted(["--odometry", wide], "baseline of", "millimetres")
+        pictures = self.new_folder()
+        self.assertIn("egosgm doctor", self.assert_works("view", "--odometry", swapped, "--pictures", pictures).splitlines()[-1])
+        folder = self.new_folder()
+        (folder / "list").write_text(f"good {self.street}\nswapped --odometry \"{swapped}\"\n")
+        lines = self.assert_works("batch", folder / "list", "--out", folder / "out").splitlines()
+        self.assertEqual([line.split()[1] for line in lines if "egosgm doctor" in line], ["swapped:"])
+        good, bad = json.loads((folder / "out/batch.json").read_text())["sequences"]
+        self.assertNotIn("doubt", good)
+        self.assertIn("no motion", bad["doubt"])
 
     def test_interpolate_fills_a_folder_of_its_own(self):
         out = self.new_folder()

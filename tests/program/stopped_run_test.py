@@ -106,6 +106,54 @@ class Disk(LongRuns):
         self.assert_fails_after(2, lambda street: (street / last).write_bytes(grey_png(WIDTH, HEIGHT + 1)), last)
         self.assert_fails_after(2, lambda street: os.truncate(street / last, 1000), last, "truncated")
 
+    def cut_short(self, *arguments, lines=1):
+        """The program's exit code and standard error where the reader of its standard output goes after some lines."""
+        with subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            for _ in range(lines):
+                process.stdout.readline()
+            process.stdout.close()
+            errors = process.stderr.read()
+        return process.returncode, errors
+
+    def test_a_reader_that_goes_ends_the_printing_not_the_work(self):
+        folder, street = self.new_folder(), self.street
+        out = folder / "run"
+        self.assertEqual(self.cut_short("run", "--odometry", self.long_street(), "--out", out, lines=2), (0, ""))
+        self.assertTrue(self.report(out)["finished"])
+        self.assertEqual(self.assert_whole(out), self.LONG)
+        self.assertEqual(len((out / "poses.txt").read_text().splitlines()), self.LONG)
+        self.assertEqual(self.cut_short("odometry", street, "--out", folder / "poses.txt"), (0, ""))
+        self.assertEqual(len((folder / "poses.txt").read_text().splitlines()), FRAMES)
+        self.assertEqual(self.cut_short("synth", "--out", folder / "synth", "--frames", 3, "--width", 64, "--height", 48), (0, ""))
+        self.assertTrue((folder / "synth/poses.txt").exists())
+        (folder / "list").write_text(f"one {street} --frames 0\ntwo {street} --frames 1\n")
+        self.assertEqual(self.cut_short("batch", folder / "list", "--out", folder / "batch"), (0, ""))
+        self.assertEqual(json.loads((folder / "batch/batch.json").read_text())["sequences_done"], 2)
+        self.assertEqual(self.cut_short("rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib",
+                                        street / "calib.txt", "--out", folder / "rectified"), (0, ""))
+        self.assertEqual(len(list((folder / "rectified/image_0").iterdir())), FRAMES)
+        self.assertTrue((folder / "rectified/calib.txt").exists())
+        for command in (["eval", "--estimate", out, "--truth", self.street / "truth/left_disp_noc"], ["run", "--help"], ["completion", "zsh"], ["devices"]):
+            self.assertEqual(self.cut_short(*command, lines=0), (0, ""))
+
+    def test_an_error_that_no_one_reads_ends_the_program_as_any_other(self):
+        reading, writing = os.pipe()
+        os.close(reading)
+        done = subprocess.run([PROGRAM, "run", "--odometry", "nowhere", "--out", self.new_folder()], stderr=writing, stdout=subprocess.DEVNULL,
+                              timeout=60)
+        os.close(writing)
+        self.assertEqual(done.returncode, 2)
+
+    def test_a_full_disk_under_the_standard_output_ends_the_printing_too(self):
+        out = self.new_folder()
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([PROGRAM, "run", "--odometry", self.long_street(), "--out", out], stdout=full, stderr=subprocess.PIPE,
+                                  text=True, timeout=600)
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"^egosgm: error: the standard output cannot be written: No space left on device\n$")
+        self.assertTrue(self.report(out)["finished"])
+        self.assertEqual(self.assert_whole(out), self.LONG)
+
     def test_a_file_system_without_room(self):
         out = self.new_folder()
         small = ["unshare", "--map-root-user", "--mount", "sh", "-c", f"mount -t tmpfs -o size=96k tmpfs '{out}' && exec \"$@\"; exit 77", "sh"]
