@@ -14,7 +14,6 @@ constexpr int kStraight = 0;
 constexpr int kDiagonals[] = {1, 2};
 
 constexpr int kQuad = 4;
-constexpr int kQuadsALane = 4;
 constexpr int kGroupSize = 32;
 
 int groups_of(int lines, int lines_a_group) { return (lines + lines_a_group - 1) / lines_a_group; }
@@ -35,10 +34,13 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
 }  // namespace
 
 BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range) {
-  const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), 256));
+  // A GPU holds more work-items than an image's paths have with a few quads each.
+  const bool is_gpu = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU;
+  const int quads_a_lane = is_gpu ? 1 : 4;
+  const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), is_gpu ? kGroupSize : 256));
   const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / kQuad;
   int lanes = 1;
-  while (lanes * kQuadsALane < quads && 2 * lanes <= limit) lanes *= 2;
+  while (lanes * quads_a_lane < quads && 2 * lanes <= limit) lanes *= 2;
   return {lanes, std::max(1, std::min(limit, kGroupSize) / lanes)};
 }
 

@@ -23,7 +23,8 @@ class BandedSgmPaths {
   void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
                   ocl::Buffer<cl_uint>& ranks, int views);
 
-  /// A few quads of disparities a lane, and a group that fills a GPU's smallest unit, as far as the device allows it.
+  /// A quad of disparities a lane on GPUs, else a few, and a group that fills a GPU's smallest unit, as far as the
+  /// device allows it.
   static Group default_group(const ocl::Context& context, shared::DisparityRange range);
   /// Of one of the four buffers of partial sums: a byte a cell, and a quad a pixel, whose band may begin within one.
   static std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range);

@@ -22,12 +22,13 @@ Comparisons comparisons(MatchingCost cost) {
   return {};
 }
 
-const cl::Program& build(ocl::Context& context, PixelType type, MatchingCost cost) {
+const cl::Program& build(ocl::Context& context, PixelType type, MatchingCost cost, int pixels) {
   context.enter("Census");
   const Comparisons chosen = comparisons(cost);
   return context.program("census.cl", ocl::Defines()
                                           .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
                                           .set("CODE_BYTES", 4 * Census::words(cost))
+                                          .set("PIXELS", pixels)
                                           .set("COMPARISONS", chosen.kind)
                                           .set("RADIUS_X", chosen.radius_x)
                                           .set("RADIUS_Y", chosen.radius_y));
@@ -35,12 +36,19 @@ const cl::Program& build(ocl::Context& context, PixelType type, MatchingCost cos
 
 }  // namespace
 
-Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding)
-    : context_(context), size_(size), padding_(padding), census_(build(context, type, cost), "census") {}
+Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding,
+               int pixels)
+    : context_(context),
+      size_(size),
+      padding_(padding),
+      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
+      census_(build(context, type, cost, pixels_), "census") {}
 
 void Census::operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
   context_.enter("Census");
-  census_(context_, ocl::every_row(context_, size_), size_, padding_, images, codes);
+  const ocl::Range range = pixels_ == 1 ? ocl::every_pixel(context_, {size_.width + 2 * padding_, size_.height})
+                                        : ocl::every_row(context_, size_);
+  census_(context_, range, size_, padding_, images, codes);
 }
 
 }  // namespace egosgm

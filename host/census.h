@@ -12,8 +12,9 @@ namespace egosgm {
 /// kernels/census.cl).
 class Census {
  public:
-  /// Codes may be read up to `padding` pixels outside the image.
-  Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding);
+  /// Codes may be read up to `padding` pixels outside the image. `pixels`: of a work-item, 1 or 16; 0: what suits the
+  /// device. Same bits.
+  Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding, int pixels = 0);
 
   /// `images`: both views' pixels, the left view first, without gaps.
   void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes);
@@ -31,6 +32,7 @@ class Census {
   ocl::Context& context_;
   const shared::ImageSize size_;
   const cl_int padding_;
+  const int pixels_;
   Kernel census_;
 };
 

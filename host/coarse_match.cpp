@@ -6,13 +6,13 @@
 namespace egosgm {
 namespace {
 
-constexpr int kShrunkAtOnce = 4;  // coarse pixels, by a work-item of `shrink`
-
 int floor_div(int a, int b) { return a / b - (a % b < 0); }
 
 const cl::Program& build(ocl::Context& context, PixelType type) {
   context.enter("CoarseMatch");
-  return context.program("coarse_match.cl", ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2));
+  return context.program("coarse_match.cl", ocl::Defines()
+                                                .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
+                                                .set("PIXELS", ocl::pixels_a_work_item(context)));
 }
 
 }  // namespace
@@ -59,8 +59,9 @@ CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const Pi
 const StereoMaps& CoarseMatch::operator()(const FrameImages& images) {
   const ocl::Context::Within within(context_, "CoarseMatch");
   Shrink& shrink = images.type == PixelType::kU8 ? shrink_u8_ : shrink_u16_;
-  const int at_once = (coarse_.width + kShrunkAtOnce - 1) / kShrunkAtOnce;
-  shrink(context_, ocl::every_pixel(context_, {at_once, coarse_.height}), size_, images.pixels, images_);
+  const int at_once = ocl::pixels_a_work_item(context_) == 1 ? 1 : EGOSGM_COARSE;
+  shrink(context_, ocl::every_pixel(context_, {(coarse_.width + at_once - 1) / at_once, coarse_.height}), size_,
+         images.pixels, images_);
   band_.full_range();
   census_(images_, codes_);
   step_penalties_(images_, penalties_);

@@ -38,7 +38,8 @@ void PredictionCheck::operator()(const State* before, const StereoMaps& warped, 
     count_rows_(context_, ocl::group_a_row({size_.width, rows}, row_group_, /*views=*/1), size_.width, warped.disparity,
                 predicted.disparity, measured.disparity, row_counts_);
   }
-  judge_(context_, {cl::NDRange(1), cl::NDRange(1)}, rows, row_counts_, before ? *before : nothing_, after);
+  judge_(context_, ocl::group_a_row({size_.width, 1}, row_group_, /*views=*/1), rows, row_counts_,
+         before ? *before : nothing_, after);
 }
 
 }  // namespace egosgm

@@ -149,8 +149,9 @@ inline Pixel pixel_at(const SgmParameters q, const Path path, const int i, globa
     const size_t row_start = at - (path.x + i * path.x_step);
     // Where a path begins, any P2 gives the same.
     pixel.p2 = path.penalties[4 * (i > 0 ? at + path.penalty_offset : at)];
-    pixel.first = bands[at].origin - q.min_disparity;
-    pixel.end = min(pixel.first + bands[at].chunks * EGOSGM_LANES, q.disparities);
+    const Band band = band_at(bands, at);
+    pixel.first = band.origin - q.min_disparity;
+    pixel.end = min(pixel.first + band.chunks * EGOSGM_LANES, q.disparities);
     pixel.cells = cells_of(row_start, at, offsets[at]);
   }
   return pixel;
@@ -182,7 +183,7 @@ inline Codes fetch_quad(const SgmParameters q, global const Code* own, global co
   return (Codes)(difference(own, other, above, below), difference(own, other + 1, above, below),
                  difference(own, other + 2, above, below), difference(own, other + 3, above, below));
 #else
-  return (Codes)(other[0], other[1], other[2], other[3]);
+  return vload4(0, other);
 #endif
 }
 
@@ -385,7 +386,7 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winn
   const size_t row_start = ((size_t)get_group_id(2) * q.height + get_group_id(1)) * q.width;
   const bool is_inside = x < q.width;
   const size_t pixel = row_start + (is_inside ? x : 0);
-  const Band band = bands[pixel];
+  const Band band = band_at(bands, pixel);
   const size_t first_cell = cells_of(row_start, pixel, offsets[pixel]);
   const int first_lane = band.origin - q.min_disparity, first_of_quad = first_lane % QUAD;
   const int cells_origin = band.origin - first_of_quad;

@@ -10,17 +10,20 @@
 // border's codes.
 #include "grey.h"
 
-// lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3
-// lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2
-// lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=3
-// lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1
-// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3
-// lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2
-// lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=3
-// lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1
+// lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
+// lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
+// lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
+// lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=1
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
+// lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
+// lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
+// lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=16
 
 #ifndef CODE_BYTES
 #error "CODE_BYTES: 4 or 8, the size of a code"
+#endif
+#ifndef PIXELS
+#error "PIXELS: of a work-item, 1 or 16"
 #endif
 #ifndef COMPARISONS
 #error "COMPARISONS: 0 for the grey value, 1 for a census window, 2 for the sparse census"
@@ -34,17 +37,9 @@
 
 #if CODE_BYTES == 4
 typedef uint Code;
-typedef uint16 Codes;
-#define convert_codes convert_uint16
 #else
 typedef ulong Code;
-typedef ulong16 Codes;
-#define convert_codes convert_ulong16
 #endif
-
-typedef struct __attribute__((packed)) {
-  Codes codes;
-} PackedCodes;
 
 #if COMPARISONS == 2
 constant char kSparse[32][2] = EGOSGM_CENSUS13X11;
@@ -71,6 +66,35 @@ inline Code code_at(const ImageSize size, global const Pixel* image, const int x
   return code;
 #endif
 }
+
+#if PIXELS == 1
+
+// A work-item a code, those of the padding too: they are the border's.
+KERNEL void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
+  const int at = get_global_id(0), y = get_global_id(1), view = get_global_id(2);
+  const int stride = size.width + 2 * padding;
+  if (at >= stride) return;
+
+  const size_t row = (size_t)view * size.height + y;
+  global const Pixel* image = (global const Pixel*)images + (size_t)view * size.height * size.width;
+  const int along = clamp(at - padding, 0, size.width - 1);
+  const int x = view == EGOSGM_LEFT ? along : size.width - 1 - along;
+  ((global Code*)all_codes)[row * stride + at] = code_at(size, image, x, y);
+}
+
+#else
+
+#if CODE_BYTES == 4
+typedef uint16 Codes;
+#define convert_codes convert_uint16
+#else
+typedef ulong16 Codes;
+#define convert_codes convert_ulong16
+#endif
+
+typedef struct __attribute__((packed)) {
+  Codes codes;
+} PackedCodes;
 
 // Appends a bit to codes of 8 bits: compilers keep these in narrow vectors.
 inline uchar16 append(const uchar16 bits, const Pixels first, const Pixels second) {
@@ -151,3 +175,5 @@ KERNEL void census(const ImageSize size, const int padding, global const uchar* 
     row[width - 1 + i] = row[width - 1];
   }
 }
+
+#endif

@@ -3,8 +3,13 @@
 // outside the image being its border's. Of 8-bit grey values the sum (times 16), of 16-bit ones the mean: 16 bits both.
 #include "grey.h"
 
-// lint: PIXEL_BYTES=1
-// lint: PIXEL_BYTES=2
+// lint: PIXEL_BYTES=1 PIXELS=1
+// lint: PIXEL_BYTES=2 PIXELS=16
+
+#ifndef PIXELS
+#error "PIXELS: of a work-item, 1 or 16, and so 1 or 4 coarse ones"
+#endif
+#define AT_ONCE (PIXELS == 1 ? 1 : 4)
 
 #if PIXEL_BYTES == 1
 typedef ushort16 Sums;
@@ -18,18 +23,19 @@ typedef uint4 Means;
 #define to_16_bit(sum) ((sum) >> 4)
 #endif
 
-// A work-item four neighbouring coarse pixels and view.
+// A work-item AT_ONCE neighbouring coarse pixels and view.
 KERNEL void shrink(const ImageSize size, global const uchar* images, global uchar* coarse_images) {
   const int coarse_width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int coarse_height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
-  const int x = 4 * get_global_id(0);
+  const int x = AT_ONCE * get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   if (x >= coarse_width) return;
 
   global const Pixel* image = (global const Pixel*)images + (size_t)view * size.height * size.width;
   global ushort* to = (global ushort*)coarse_images + ((size_t)view * coarse_height + y) * coarse_width;
-  if ((x + 4) * EGOSGM_COARSE <= size.width) {
+#if PIXELS > 1
+  if ((x + AT_ONCE) * EGOSGM_COARSE <= size.width) {
     Sums columns = 0;
     for (int v = 0; v < EGOSGM_COARSE; ++v) {
       const size_t row = min(y * EGOSGM_COARSE + v, size.height - 1);
@@ -39,7 +45,8 @@ KERNEL void shrink(const ImageSize size, global const uchar* images, global ucha
     vstore4(convert_ushort4(to_16_bit(sums)), 0, to + x);
     return;
   }
-  for (int u = x; u < min(x + 4, coarse_width); ++u) {
+#endif
+  for (int u = x; u < min(x + AT_ONCE, coarse_width); ++u) {
     uint sum = 0;
     for (int v = 0; v < EGOSGM_COARSE; ++v) {
       global const Pixel* row = image + (size_t)min(y * EGOSGM_COARSE + v, size.height - 1) * size.width;

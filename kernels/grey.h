@@ -19,7 +19,8 @@ typedef ushort16 Pixels;
 #define to_8_bit(value) ((value) >> 8)
 #endif
 
-// vload16 goes byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on all.
+// vload16 goes byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on CPUs. Not for
+// GPUs, where work-items take a pixel each: LLVM 19 makes an aligned load of either for NVIDIA's, which faults.
 typedef struct __attribute__((packed)) {
   Pixels pixels;
 } PackedPixels;

@@ -10,6 +10,21 @@
 // lint: ROW_GROUP=1
 // lint: ROW_GROUP=64
 
+static inline PredictionCounts sum_of(const PredictionCounts a, const PredictionCounts b) {
+  const PredictionCounts sum = {a.predicted + b.predicted, a.both + b.both, a.differing + b.differing};
+  return sum;
+}
+
+// Of a group's lanes, by a barrier for all of them; right in the first one.
+static inline PredictionCounts sum_of_lanes(local PredictionCounts* lanes, const PredictionCounts own) {
+  const int lane = get_local_id(0);
+  lanes[lane] = own;
+  barrier(CLK_LOCAL_MEM_FENCE);
+  PredictionCounts sum = own;
+  for (int i = 1; lane == 0 && i < ROW_GROUP; ++i) sum = sum_of(sum, lanes[i]);
+  return sum;
+}
+
 // Counts of every EGOSGM_CHECKED_ROWS-th row. A work-group of ROW_GROUP a row.
 KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_rows(const int width,
                                                                               global const float* warped,
@@ -32,19 +47,9 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_rows(co
     with_both += both;
     that_differ += both & (fabs(z - d) > EGOSGM_CHECKED_DIFFERENCE_PX);
   }
-  lanes[lane].predicted = with_prediction;
-  lanes[lane].both = with_both;
-  lanes[lane].differing = that_differ;
-  barrier(CLK_LOCAL_MEM_FENCE);
-  if (lane == 0) {
-    PredictionCounts sum = lanes[0];
-    for (int i = 1; i < ROW_GROUP; ++i) {
-      sum.predicted += lanes[i].predicted;
-      sum.both += lanes[i].both;
-      sum.differing += lanes[i].differing;
-    }
-    row_counts[get_global_id(1)] = sum;
-  }
+  const PredictionCounts own = {with_prediction, with_both, that_differ};
+  const PredictionCounts sum = sum_of_lanes(lanes, own);
+  if (lane == 0) row_counts[get_global_id(1)] = sum;
 }
 
 // Less than three quarters as many predictions as a frame before; or twice its share of contradictions and 2.5 % more.
@@ -56,15 +61,18 @@ static inline int are_wrong(const PredictionCounts now, const PredictionCounts b
          (4 * (ulong)now.predicted < 3 * (ulong)before.predicted || differing > 2 * differed + both / 40);
 }
 
-KERNEL void judge(const int rows, global const PredictionCounts* row_counts, global const PredictionState* before,
-                  global PredictionState* after) {
-  PredictionCounts sum = {0, 0, 0};
-  for (int i = 0; i < rows; ++i) {
-    sum.predicted += row_counts[i].predicted;
-    sum.both += row_counts[i].both;
-    sum.differing += row_counts[i].differing;
+// A single work-group of ROW_GROUP.
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void judge(const int rows,
+                                                                         global const PredictionCounts* row_counts,
+                                                                         global const PredictionState* before,
+                                                                         global PredictionState* after) {
+  local PredictionCounts lanes[ROW_GROUP];
+  PredictionCounts own = {0, 0, 0};
+  for (int i = get_local_id(0); i < rows; i += ROW_GROUP) own = sum_of(own, row_counts[i]);
+  const PredictionCounts sum = sum_of_lanes(lanes, own);
+  if (get_local_id(0) == 0) {
+    after->counts = sum;
+    after->is_wrong = are_wrong(sum, before->counts);
+    after->was_wrong = before->is_wrong;
   }
-  after->counts = sum;
-  after->is_wrong = are_wrong(sum, before->counts);
-  after->was_wrong = before->is_wrong;
 }

@@ -35,6 +35,12 @@ typedef uint Weight;
 #define ROW_STEPS 256
 #define COLUMN_STEPS 16
 #define BLOCK 16
+// Pixels of a work-item: lanes that share a row take neighbours.
+#if ROW_GROUP == 1
+#define AT_ONCE BLOCK
+#else
+#define AT_ONCE 1
+#endif
 #define PLACES_BITS 8
 #define PLACES (1 << PLACES_BITS)  // from the middle of the image to its end
 
@@ -65,22 +71,24 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
   global Pixel* to = (global Pixel*)aligned + first + (size_t)y * size.width;
 
   // One offset for BLOCK columns: on KITTI it changes by less than a 20th of a pixel over them.
-  for (int x = get_local_id(0) * BLOCK; x < size.width; x += ROW_GROUP * BLOCK) {
-    const float u = (float)place(x + BLOCK / 2, size.width, PLACES) / PLACES;
+  for (int x = get_local_id(0) * AT_ONCE; x < size.width; x += ROW_GROUP * AT_ONCE) {
+    const float u = (float)place(x / BLOCK * BLOCK + BLOCK / 2, size.width, PLACES) / PLACES;
     const float dy = clamp(constant_term + (linear_term + square_term * u) * u, -MAX_OFFSET, MAX_OFFSET);
     const int offset = is_moved ? convert_int_rte(dy * ROW_STEPS) : 0;
     const int above = y + (offset >> 8);
     const Weight weight = offset & (ROW_STEPS - 1);
     global const Pixel* upper = from + (size_t)clamp_row(above, size.height) * size.width;
     global const Pixel* lower = from + (size_t)clamp_row(above + 1, size.height) * size.width;
+#if AT_ONCE > 1
     if (x + BLOCK <= size.width) {
       const Wide sum =
           vload_pixels(0, upper + x) * (Wide)(ROW_STEPS - weight) + vload_pixels(0, lower + x) * (Wide)(weight);
       vstore16(convert_pixels((sum + (Wide)(ROW_STEPS / 2)) >> (Wide)(8)), 0, to + x);
-    } else {
-      for (int i = x; i < size.width; ++i) {
-        to[i] = ((uint)upper[i] * (ROW_STEPS - weight) + (uint)lower[i] * weight + ROW_STEPS / 2) >> 8;
-      }
+      continue;
+    }
+#endif
+    for (int i = x; i < min(x + AT_ONCE, size.width); ++i) {
+      to[i] = ((uint)upper[i] * (ROW_STEPS - weight) + (uint)lower[i] * weight + ROW_STEPS / 2) >> 8;
     }
   }
 }

@@ -12,22 +12,23 @@
 namespace egosgm {
 namespace {
 
-using Case = std::tuple<shared::ImageSize, PixelType, MatchingCost>;
+using Case = std::tuple<shared::ImageSize, PixelType, MatchingCost, int>;
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
-  const auto [size, type, cost] = info.param;
+  const auto [size, type, cost, pixels] = info.param;
   return std::to_string(size.width) + "x" + std::to_string(size.height) +
          (type == PixelType::kU8 ? "_8bit" : "_16bit") +
          (cost == MatchingCost::kCensus13x11 ? "_census13x11"
           : cost == MatchingCost::kCensus9x7 ? "_census9x7"
           : cost == MatchingCost::kCensus5x5 ? "_census5x5"
-                                             : "_grey");
+                                             : "_grey") +
+         "_by_" + std::to_string(pixels);
 }
 
 class CensusTest : public ::testing::TestWithParam<Case> {};
 
 TEST_P(CensusTest, EqualsReference) {
-  const auto [size, type, cost] = GetParam();
+  const auto [size, type, cost, pixels] = GetParam();
   const int padding = 19, bytes = type == PixelType::kU8 ? 1 : 2;
   std::mt19937 random(1);
   std::uniform_int_distribution<int> grey(0, type == PixelType::kU8 ? 255 : 65535);
@@ -41,7 +42,7 @@ TEST_P(CensusTest, EqualsReference) {
   }
 
   ocl::Context context(testing::any_device());
-  Census census(context, size, type, cost, padding);
+  Census census(context, size, type, cost, padding, pixels);
   ocl::Buffer<cl_uchar> images(context, raw.size());
   ocl::Buffer<cl_uint> codes(context, Census::words(cost, size, padding));
   images.write(context, raw);
@@ -58,7 +59,8 @@ INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
                          ::testing::Combine(::testing::ValuesIn(testing::kSizes),
                                             ::testing::Values(PixelType::kU8, PixelType::kU16),
                                             ::testing::Values(MatchingCost::kCensus13x11, MatchingCost::kCensus9x7,
-                                                              MatchingCost::kCensus5x5, MatchingCost::kSad3x3)),
+                                                              MatchingCost::kCensus5x5, MatchingCost::kSad3x3),
+                                            ::testing::Values(1, 16)),
                          name);
 
 }  // namespace
