@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // This library and OpenCV's four semi-global matchers on the same images, in one process, in turns.
+#include <time.h>
+
 #include <chrono>
 #include <functional>
 #include <map>
@@ -28,7 +30,8 @@ constexpr const char* kHelp =
     "  --disparities N   only this range (else 64, 128, 256, which take turns, too, but not at 1920x1080)\n"
     "  --rounds N        turns (11)\n"
     "  --set NAME=VALUE  also a banded frame with this option; repeat it for several\n"
-    "  --threads N       of PoCL and of OpenCV (2)\n"
+    "  --threads N       of PoCL and of OpenCV (2); where it is more than one, all take turns with one thread, too: "
+    "NAME_1t\n"
     "  --json FILE       write the rows\n"
     "  --benchmark_filter=REGEX and what else Google Benchmark knows\n"
     "opencv_*: left view, blockSize 5, P1 = 8*25, P2 = 32*25, disp12MaxDiff 1, nothing padded.\n"
@@ -37,7 +40,8 @@ constexpr const char* kHelp =
     "of the method, both\n"
     "views, upload to download, motion given. egosgm_video_frame: the same as a stream, with odometry. The last two "
     "play KITTI 2012\n"
-    "000151, frames 07..11, from the start in each turn and give the mean of the last two frames.\n";
+    "000151, frames 07..11, from the start in each turn and give the mean of the last two frames.\n"
+    "cpus: processor time of all threads by wall time, how many threads were at work in the mean; on a CPU only.\n";
 
 using Clock = std::chrono::steady_clock;
 
@@ -52,12 +56,32 @@ struct Contender {
   std::function<Turn()> turn;
 };
 
-template <typename Body>
-double seconds_of(Body&& body) {
-  const auto start = Clock::now();
-  body();
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
+/// Wall time, and the processor time of all threads in it.
+class Stopwatch {
+ public:
+  Turn turn(std::map<std::string, double> more, double parts = 1) const {
+    const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+    more["cpus"] = (cpu_seconds() - cpu_start_) / seconds;
+    return {seconds / parts, std::move(more)};
+  }
+
+ private:
+  static double cpu_seconds() {
+    timespec time{};
+    ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
+
+  Clock::time_point start_ = Clock::now();
+  double cpu_start_ = cpu_seconds();
+};
+
+/// Where a contender runs: ours on a device, OpenCV on `threads`.
+struct Place {
+  Device device;
+  int threads;
+  std::string suffix;  // of its name
+};
 
 /// A pipeline with the maps that a caller takes from it.
 class Matcher {
@@ -81,15 +105,15 @@ class Matcher {
 
   void reset() { pipeline_.reset(); }
 
-  Turn turn(double seconds, const FrameReport& last) const {
+  Turn turn(const Stopwatch& watch, const FrameReport& last, std::size_t frames = 1) const {
     double device_ms = 0;
     for (const StageTime& stage : last.stages) device_ms += stage.ms;
-    return {seconds,
-            {{"device_ms", device_ms},
-             {"search_fraction", last.search_fraction},
-             {"density", last.density},
-             {"launches", last.launches},
-             {"device_memory_bytes", static_cast<double>(pipeline_.device_memory_bytes())}}};
+    return watch.turn({{"device_ms", device_ms},
+                       {"search_fraction", last.search_fraction},
+                       {"density", last.density},
+                       {"launches", last.launches},
+                       {"device_memory_bytes", static_cast<double>(pipeline_.device_memory_bytes())}},
+                      static_cast<double>(frames));
   }
 
  private:
@@ -97,12 +121,15 @@ class Matcher {
   cv::Mat disparity_, variance_;
 };
 
-Contender opencv(const OpencvMode& mode, const Clip& clip, int disparities) {
+Contender opencv(const OpencvMode& mode, const Clip& clip, int disparities, int threads) {
   const auto matcher = make_opencv_matcher(mode.mode, disparities);
   const auto disparity = std::make_shared<cv::Mat>();
-  return {mode.name, [&clip, matcher, disparity] {
+  return {mode.name, [&clip, matcher, disparity, threads] {
             const ClipFrame& frame = clip.frames.back();
-            return Turn{seconds_of([&] { matcher->compute(frame.left, frame.right, *disparity); }), {}};
+            cv::setNumThreads(threads);
+            const Stopwatch watch;
+            matcher->compute(frame.left, frame.right, *disparity);
+            return watch.turn({});
           }};
 }
 
@@ -110,9 +137,9 @@ Contender full_both(const Clip& clip, PipelineOptions options, const Device& dev
   options.temporal = false;
   const auto matcher = std::make_shared<Matcher>(clip, options, device);
   return {"egosgm_full_both", [&clip, matcher] {
-            FrameReport report;
-            const double seconds = seconds_of([&] { report = (*matcher)(clip.frames.back(), std::nullopt); });
-            return matcher->turn(seconds, report);
+            const Stopwatch watch;
+            const FrameReport report = (*matcher)(clip.frames.back(), std::nullopt);
+            return matcher->turn(watch, report);
           }};
 }
 
@@ -122,13 +149,12 @@ Contender banded_frame(const std::string& name, const Clip& clip, const Pipeline
   return {name, [&clip, matcher] {
             matcher->reset();
             for (std::size_t i = 0; i < Clip::kSteadyFrom; ++i) (*matcher)(clip.frames[i], clip.frames[i].motion);
+            const Stopwatch watch;
             FrameReport report;
-            const double seconds = seconds_of([&] {
-              for (std::size_t i = Clip::kSteadyFrom; i < clip.frames.size(); ++i) {
-                report = (*matcher)(clip.frames[i], clip.frames[i].motion);
-              }
-            });
-            return matcher->turn(seconds / static_cast<double>(clip.frames.size() - Clip::kSteadyFrom), report);
+            for (std::size_t i = Clip::kSteadyFrom; i < clip.frames.size(); ++i) {
+              report = (*matcher)(clip.frames[i], clip.frames[i].motion);
+            }
+            return matcher->turn(watch, report, clip.frames.size() - Clip::kSteadyFrom);
           }};
 }
 
@@ -141,18 +167,17 @@ class Stream {
   Turn operator()() {
     matcher_.reset();
     odometry_.reset();
-    Clock::time_point steady;
+    Stopwatch steady;
     for (std::size_t i = 0; i < clip_.frames.size(); ++i) {
       const std::optional<Motion> motion = estimate(clip_.frames[i]);
       matcher_.submit(clip_.frames[i], motion);
       if (i == 0) continue;
       matcher_.collect();
-      if (i == Clip::kSteadyFrom) steady = Clock::now();  // after the odometry of the first one measured,
+      if (i == Clip::kSteadyFrom) steady = Stopwatch();  // after the odometry of the first one measured,
     }
     estimate(clip_.frames[Clip::kSteadyFrom]);  // and therefore with that of the one after the last
     const FrameReport last = matcher_.collect();
-    const double seconds = std::chrono::duration<double>(Clock::now() - steady).count();
-    return matcher_.turn(seconds / static_cast<double>(clip_.frames.size() - Clip::kSteadyFrom), last);
+    return matcher_.turn(steady, last, clip_.frames.size() - Clip::kSteadyFrom);
   }
 
  private:
@@ -225,7 +250,11 @@ class LeftMatcher {
 
 Contender full_left(const Clip& clip, const PipelineOptions& options, const Device& device) {
   const auto matcher = std::make_shared<LeftMatcher>(clip, options, device);
-  return {"egosgm_full_left", [matcher] { return Turn{seconds_of([&] { (*matcher)(); }), {}}; }};
+  return {"egosgm_full_left", [matcher] {
+            const Stopwatch watch;
+            (*matcher)();
+            return watch.turn({});
+          }};
 }
 
 PipelineOptions with(PipelineOptions options, const std::string& setting) {
@@ -236,11 +265,12 @@ PipelineOptions with(PipelineOptions options, const std::string& setting) {
 }
 
 std::vector<Contender> contenders(const Clip& clip, int disparities, const std::vector<std::string>& settings,
-                                  const Device& device) {
+                                  const Place& place) {
+  const Device& device = place.device;
   PipelineOptions options;
   options.disparities = disparities;
   std::vector<Contender> list;
-  for (const OpencvMode& mode : kOpencvModes) list.push_back(opencv(mode, clip, disparities));
+  for (const OpencvMode& mode : kOpencvModes) list.push_back(opencv(mode, clip, disparities, place.threads));
   list.push_back(full_left(clip, options, device));
   list.push_back(full_both(clip, options, device));
   list.push_back(banded_frame("egosgm_banded_frame", clip, options, device));
@@ -248,6 +278,7 @@ std::vector<Contender> contenders(const Clip& clip, int disparities, const std::
     list.push_back(banded_frame("egosgm_banded_frame " + setting, clip, with(options, setting), device));
   }
   list.push_back(video_frame(clip, options, device));
+  for (Contender& contender : list) contender.name += place.suffix;
   return list;
 }
 
@@ -259,14 +290,30 @@ void take_turn(benchmark::State& state, const Contender& contender) {
   }
 }
 
+/// The device with all threads, and one compute unit of it with one thread, where it can be divided.
+std::vector<Place> places(const Arguments& arguments) {
+  const Device all = Device::select();
+  std::vector<Place> list{{all, arguments.threads, ""}};
+  if (arguments.threads > 1 && all.info().compute_units > 1) {
+    try {
+      list.push_back({all.compute_units(0, 0), 1, "_1t"});
+    } catch (const std::exception& error) {
+      std::printf("no rows of one thread: %s\n", error.what());
+    }
+  }
+  return list;
+}
+
 /// All contenders at all `ranges` take turns.
-void compare(const Clip& clip, const std::vector<int>& ranges, const Device& device, const Arguments& arguments,
-             std::vector<Row>& rows) {
+void compare(const Clip& clip, const std::vector<int>& ranges, const std::vector<Place>& places,
+             const Arguments& arguments, std::vector<Row>& rows) {
   const shared::ImageSize size{clip.frames.front().left.cols, clip.frames.front().left.rows};
   std::vector<std::pair<int, Contender>> list;
   for (const int disparities : ranges) {
-    for (Contender& contender : contenders(clip, disparities, arguments.settings, device))
-      list.emplace_back(disparities, std::move(contender));
+    for (const Place& place : places) {
+      for (Contender& contender : contenders(clip, disparities, arguments.settings, place))
+        list.emplace_back(disparities, std::move(contender));
+    }
   }
   for (const auto& entry : list) {
     const Contender& contender = entry.second;
@@ -296,7 +343,14 @@ std::vector<std::vector<int>> turns_of(const std::vector<int>& ranges, shared::I
   return each;
 }
 
-const Row* find(const std::vector<Row>& rows, const char* name, shared::ImageSize size, int disparities) {
+double counter(const Row& row, const char* name) {
+  for (const auto& [key, value] : row.more) {
+    if (key == name) return value;
+  }
+  return 0;
+}
+
+const Row* find(const std::vector<Row>& rows, const std::string& name, shared::ImageSize size, int disparities) {
   for (const Row& row : rows) {
     if (row.name == name && row.size.width == size.width && row.size.height == size.height &&
         row.disparities == disparities)
@@ -306,13 +360,15 @@ const Row* find(const std::vector<Row>& rows, const char* name, shared::ImageSiz
 }
 
 void print_ratios(const std::vector<Row>& rows) {
-  std::printf("\n%-20s %10s %5s %10s %12s %14s\n", "", "size", "D", "ms", "/ opencv_hh", "/ opencv_3way");
+  std::printf("\n%-23s %10s %5s %10s %6s %14s %14s\n", "", "size", "D", "ms", "cpus", "/ opencv_hh", "/ opencv_3way");
   for (const Row& row : rows) {
-    std::printf("%-20s %5dx%-4d %5d %10.2f", row.name.c_str(), row.size.width, row.size.height, row.disparities,
-                row.median_ms);
-    for (const char* other : {"opencv_hh", "opencv_3way"}) {
-      const Row* reference = find(rows, other, row.size, row.disparities);
-      if (reference) std::printf(" %12.3f", row.median_ms / reference->median_ms);
+    std::printf("%-23s %5dx%-4d %5d %10.2f %6.2f", row.name.c_str(), row.size.width, row.size.height, row.disparities,
+                row.median_ms, counter(row, "cpus"));
+    // Of as many threads.
+    const bool has_one = row.name.size() > 3 && row.name.compare(row.name.size() - 3, 3, "_1t") == 0;
+    for (const std::string other : {"opencv_hh", "opencv_3way"}) {
+      const Row* reference = find(rows, has_one ? other + "_1t" : other, row.size, row.disparities);
+      if (reference) std::printf(" %14.3f", row.median_ms / reference->median_ms);
     }
     std::printf("\n");
   }
@@ -320,21 +376,20 @@ void print_ratios(const std::vector<Row>& rows) {
 
 int run(int argc, char** argv) {
   const Arguments arguments = parse_arguments(argc, argv, kHelp, 11, Turns::kRandom);
-  cv::setNumThreads(arguments.threads);
-  const Device device = Device::select();
+  const std::vector<Place> where = places(arguments);
   const std::vector<shared::ImageSize> all_sizes{{640, 480}, {1242, 375}, {1920, 1080}};
   const std::vector<int> all_ranges{64, 128, 256};
-  Machine machine{device.info(), 0, {}, arguments.threads};
+  Machine machine{where.front().device.info(), 0, {}, arguments.threads};
   std::vector<Row> rows;
   for (const shared::ImageSize size : arguments.size ? std::vector{*arguments.size} : all_sizes) {
     const Clip clip = load_clip({size.width, size.height});
     if (machine.input.empty()) {
       machine.input = clip.title;
       print_machine(machine);
-      std::printf("OpenCV %s, %d threads each\n", CV_VERSION, arguments.threads);
+      std::printf("OpenCV %s, %d threads allowed\n", CV_VERSION, arguments.threads);
     }
     const std::vector<int> ranges = arguments.disparities ? std::vector{*arguments.disparities} : all_ranges;
-    for (const std::vector<int>& together : turns_of(ranges, size)) compare(clip, together, device, arguments, rows);
+    for (const std::vector<int>& together : turns_of(ranges, size)) compare(clip, together, where, arguments, rows);
   }
   print_ratios(rows);
   if (!arguments.json.empty()) write_json(arguments.json, machine, rows);

@@ -44,7 +44,7 @@ constexpr const char* kHelp =
     "takes or gives\n"
     "counted once (no re-reads, no memory of its own but the path sums of BandedSgm: a byte a computed cell written "
     "and read), by wall\n"
-    "clock; of_copy: the same as part of a copy's GB/s; Gcells_s: cells that can win, both views.\n";
+    "clock; of_copy: the same as part of a copy's GB/s; Gcells_s: cells that are matched, both views.\n";
 
 const MatchingCost kCost = BandedSgmOptions().cost;
 
@@ -113,8 +113,7 @@ class Chain {
   std::vector<Stage> stages() {
     const double pixels = 2.0 * static_cast<double>(pixel_count(size_));
     const double map = 4 * pixels, maps = 2 * map, band = 12 * pixels, codes = 8 * pixels, grey = pixels;
-    const auto [searched, computed] = cells(search_band_);
-    const auto [searched_full, computed_full] = cells(full_band_);
+    const double banded = cells(search_band_), full = cells(full_band_);
     const double sgm = 2 * (codes + band) + maps;  // each sweep reads codes and bands
     return {
         {"ForwardWarp", [this] { forward_warp_(belief_, motion_, warped_); }, 2 * maps},
@@ -127,10 +126,9 @@ class Chain {
         {"VerticalAlignment", [this] { align(); }, 2 * grey + (grey + map / 2) / 4},
         {"Census", [this] { census_(images_.pixels, codes_); }, grey + codes},
         {"StepPenalties", [this] { step_penalties_(images_.pixels, penalties_); }, grey + 8 * pixels},
-        {"BandedSgm_full", [this] { banded_sgm_(codes_, penalties_, full_band_, measured_); }, sgm + 2 * computed_full,
-         searched_full},
-        {"BandedSgm_banded", [this] { banded_sgm_(codes_, penalties_, search_band_, matched_); }, sgm + 2 * computed,
-         searched},
+        {"BandedSgm_full", [this] { banded_sgm_(codes_, penalties_, full_band_, measured_); }, sgm + 2 * full, full},
+        {"BandedSgm_banded", [this] { banded_sgm_(codes_, penalties_, search_band_, matched_); }, sgm + 2 * banded,
+         banded},
         {"MedianFilter", [this] { median_filter_(matched_, Holes::kLeave); }, 2 * map},
         {"SpeckleRemoval", [this] { speckle_removal_(matched_); }, map},
         {"KalmanUpdate", [this] { kalman_update_(before_, updated_, predicted_, matched_, updated_); }, 3 * maps},
@@ -154,11 +152,11 @@ class Chain {
 
   void align() { vertical_alignment_.estimate(vertical_alignment_.align(images_), predicted_); }
 
-  /// Cells that can win, and lanes that are computed.
-  std::pair<double, double> cells(const SearchBand& band) {
-    double searched = 0, computed = 0;
-    for (const shared::RowSum& row : band.row_sums().read(context_)) searched += row.searched, computed += row.computed;
-    return {searched, computed};
+  /// That are matched, also those that cannot win.
+  double cells(const SearchBand& band) {
+    double sum = 0;
+    for (const shared::RowSum& row : band.row_sums().read(context_)) sum += row.cells;
+    return sum;
   }
 
   ocl::Context& context_;
