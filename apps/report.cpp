@@ -192,7 +192,7 @@ class Page {
     const cv::Mat disparity = vision::read_disparity(fs::exists(exact) ? exact : file("disparity", ".png"));
     cv::Mat variance, search;
     if (const fs::path path = file("variance", ".pfm"); fs::exists(path)) variance = vision::read_pfm(path);
-    if (const fs::path path = file("search", ".png"); fs::exists(path)) search = vision::read_grey_png(path);
+    if (const fs::path path = file("search", ".png"); fs::exists(path)) search = vision::read_grey_image(path);
     return panels_.layers({frame, {}, disparity, variance, search});
   }
 

@@ -92,7 +92,7 @@ void bind_files(py::module_& module) {
       "Reads KITTI's, Middlebury's or EgoSGM's own format.");
   module.def("write_calibration", &vision::write_calibration, py::arg("file"), py::arg("calibration"));
   module.def(
-      "read_grey", [](const path& file) { return array_of(vision::read_grey_png(file)); }, py::arg("file"),
+      "read_grey", [](const path& file) { return array_of(vision::read_grey_image(file)); }, py::arg("file"),
       "Reads a PNG of any colour type as grey, uint8 or uint16.");
   module.def(
       "read_disparity", [](const path& file) { return array_of(vision::read_disparity(file)); }, py::arg("file"),

@@ -14,6 +14,7 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/image_bounds.h"
 #include "host/vision/npy.h"
 #include "host/vision/png.h"
 

@@ -10,28 +10,46 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/render.h"
+#include "host/vision/image_bounds.h"
+#include "host/vision/jpeg.h"
 #include "host/vision/png.h"
 
 namespace egosgm::vision {
 
-cv::Mat read_grey_png(const std::filesystem::path& file) {
-  cv::Mat pixels = decode_png(read_file(file, kMaxImageFileBytes), file);
+namespace {
+
+/// By what the file holds, not by its name.
+cv::Mat decode_image(const std::filesystem::path& file) {
+  const std::string bytes = read_file(file, kMaxImageFileBytes);
+  return starts_like_jpeg(bytes) ? decode_jpeg(bytes, file) : decode_png(bytes, file);
+}
+
+}  // namespace
+
+cv::Mat read_grey_image(const std::filesystem::path& file) {
+  const cv::Mat pixels = decode_image(file);
   if (pixels.channels() == 1) return pixels;
   cv::Mat grey;
   cv::cvtColor(pixels, grey, cv::COLOR_RGB2GRAY);
   return grey;
 }
 
-cv::Mat read_color_png(const std::filesystem::path& file) {
-  cv::Mat pixels = decode_png(read_file(file, kMaxImageFileBytes), file), picture;
+cv::Mat read_color_image(const std::filesystem::path& file) {
+  cv::Mat pixels = decode_image(file), picture;
   if (pixels.channels() == 1) return color_grey(pixels);
   if (pixels.depth() == CV_16U) pixels.convertTo(pixels, CV_8U, 1.0 / 256.0, -0.5);  // rounds, so half a step down
   cv::cvtColor(pixels, picture, cv::COLOR_RGB2BGR);
   return picture;
 }
 
-cv::Size read_png_size(const std::filesystem::path& file) {
-  return parse_png_size(read_file_start(file, kPngHeaderBytes), file);
+cv::Size read_image_size(const std::filesystem::path& file) {
+  const std::string start = read_file_start(file, kPngHeaderBytes);
+  if (!starts_like_jpeg(start)) return parse_png_size(start, file);
+  try {
+    return parse_jpeg_size(read_file_start(file, kUsualJpegHeaderBytes), file);
+  } catch (const InvalidArgument&) {
+    return parse_jpeg_size(read_file(file, kMaxImageFileBytes), file);
+  }
 }
 
 void write_png(const std::filesystem::path& file, const cv::Mat& image) {

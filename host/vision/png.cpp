@@ -9,19 +9,14 @@
 #include <cstring>
 #include <string>
 
-#include "egosgm/error.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/image_bounds.h"
 
 namespace egosgm::vision {
 namespace {
 
 constexpr std::string_view kSignature("\x89PNG\r\n\x1a\n", 8);
-constexpr std::int64_t kMaxDeflateRatio = 1032;  // zlib's "Maximum Expansion Factor"
 constexpr png_alloc_size_t kMaxAncillaryBytes = 4 << 20;
-
-[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
-  throw InvalidArgument(file.string() + ": not a readable image (truncated?): " + why + "; give an intact PNG file");
-}
 
 std::uint32_t big_endian_at(std::string_view bytes, std::size_t offset) {
   std::uint32_t value = 0;
@@ -65,17 +60,15 @@ struct Layout {
   int channels = 0;
   int bit_depth = 0;
   int passes = 0;
-  std::int64_t packed_bytes = 0;  // of the decompressed file, without filter bytes
 };
 
 bool read_layout(Decoder& decoder, Layout& layout) {
   if (setjmp(decoder.on_error)) return false;
   png_set_user_limits(decoder.png, kMaxImageSide, kMaxImageSide);
   png_set_chunk_malloc_max(decoder.png, kMaxAncillaryBytes);
+  png_set_chunk_cache_max(decoder.png, 1);  // texts and unknown chunks are skipped: each might take as much
   png_set_read_fn(decoder.png, &decoder, read_bytes);
   png_read_info(decoder.png, decoder.info);
-  layout.packed_bytes = static_cast<std::int64_t>(png_get_rowbytes(decoder.png, decoder.info)) *
-                        png_get_image_height(decoder.png, decoder.info);
   png_set_expand(decoder.png);
   png_set_strip_alpha(decoder.png);
   if constexpr (std::endian::native == std::endian::little) {
@@ -102,18 +95,12 @@ bool read_rows(Decoder& decoder, const Layout& layout, std::uint8_t* rows, std::
 bool starts_like_png(std::string_view bytes) { return bytes.starts_with(kSignature); }
 
 cv::Size parse_png_size(std::string_view bytes, const std::filesystem::path& file) {
-  if (!starts_like_png(bytes)) refuse(file, bytes.empty() ? "the file is empty" : "it does not start like a PNG");
-  if (bytes.size() < kPngHeaderBytes) refuse(file, "the file ends in its header");
-  if (bytes.substr(12, 4) != "IHDR") refuse(file, "its header is damaged");
+  if (!starts_like_png(bytes)) refuse_image(file, bytes.empty() ? "the file is empty" : "it does not start like a PNG");
+  if (bytes.size() < kPngHeaderBytes) refuse_image(file, "the file ends in its header");
+  if (bytes.substr(12, 4) != "IHDR") refuse_image(file, "its header is damaged");
   const std::int64_t width = big_endian_at(bytes, 16);
   const std::int64_t height = big_endian_at(bytes, 20);
-  if (width == 0 || height == 0) refuse(file, "its width or height is zero");
-  if (width > kMaxImageSide || height > kMaxImageSide || width * height > kMaxImagePixels) {
-    throw InvalidArgument(file.string() + ": an image of " + std::to_string(width) + "x" + std::to_string(height) +
-                          " is larger than the limit of " + std::to_string(kMaxImageSide) + " a side and " +
-                          std::to_string(kMaxImagePixels) + " pixels; give a smaller one");
-  }
-  return {static_cast<int>(width), static_cast<int>(height)};
+  return checked_image_size(width, height, file);
 }
 
 cv::Mat decode_png(std::string_view bytes, const std::filesystem::path& file) {
@@ -125,12 +112,11 @@ cv::Mat decode_png(std::string_view bytes, const std::filesystem::path& file) {
   if (decoder.png) decoder.info = png_create_info_struct(decoder.png);
   if (!decoder.info) throw std::bad_alloc();
   Layout layout;
-  if (!read_layout(decoder, layout)) refuse(file, decoder.message);
-  if (layout.packed_bytes > kMaxDeflateRatio * static_cast<std::int64_t>(bytes.size())) {
-    refuse(file, "it is too short for " + std::to_string(size.width) + "x" + std::to_string(size.height) + " pixels");
-  }
-  cv::Mat pixels(size, CV_MAKETYPE(layout.bit_depth == 16 ? CV_16U : CV_8U, layout.channels));
-  if (!read_rows(decoder, layout, pixels.data, pixels.step, size.height)) refuse(file, decoder.message);
+  if (!read_layout(decoder, layout)) refuse_image(file, decoder.message);
+  const int type = CV_MAKETYPE(layout.bit_depth == 16 ? CV_16U : CV_8U, layout.channels);
+  check_decoded_bytes(size, type, bytes.size(), file);  // as widened: one bit may become three bytes
+  cv::Mat pixels(size, type);
+  if (!read_rows(decoder, layout, pixels.data, pixels.step, size.height)) refuse_image(file, decoder.message);
   return pixels;
 }
 

@@ -7,7 +7,6 @@
 
 namespace egosgm::vision {
 
-inline constexpr std::size_t kMaxImageFileBytes = std::size_t{1} << 30;
 inline constexpr std::size_t kPngHeaderBytes = 33;  // signature, IHDR with its length and checksum
 
 bool starts_like_png(std::string_view bytes);

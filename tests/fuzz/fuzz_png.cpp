@@ -14,8 +14,8 @@ std::vector<std::string> seeds() {
 
 void run(std::string_view input) {
   read_png_bytes(input, [](const std::filesystem::path& file) {
-    vision::read_png_size(file);
-    vision::read_grey_png(file);
+    vision::read_image_size(file);
+    vision::read_grey_image(file);
   });
 }
 

@@ -5,6 +5,9 @@
 #include <png.h>
 
 #include <cstdio>
+// libjpeg's header needs the line above.
+#include <jpeglib.h>
+
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -61,8 +64,8 @@ TEST(ImageIo, GreyImagesKeepEveryBit) {
     for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {65, 3}, {127, 33}}) {
       const cv::Mat image = random_image(random, width, height, type);
       write_png(folder / "image.png", image);
-      expect_equal(read_grey_png(folder / "image.png"), image);
-      EXPECT_EQ(read_png_size(folder / "image.png"), image.size());
+      expect_equal(read_grey_image(folder / "image.png"), image);
+      EXPECT_EQ(read_image_size(folder / "image.png"), image.size());
     }
   }
 }
@@ -72,13 +75,13 @@ TEST(ImageIo, ColorIsReadAsItIs) {
   const TemporaryFolder folder;
   const cv::Mat image = random_image(random, 33, 7, CV_8UC3);
   write_png(folder / "image.png", image);
-  expect_equal(read_color_png(folder / "image.png"), image);
+  expect_equal(read_color_image(folder / "image.png"), image);
   cv::Mat deep;
   image.convertTo(deep, CV_16U, 256, 255);  // the upper byte counts, the lower one is full
   ASSERT_TRUE(cv::imwrite((folder / "deep.png").string(), deep));
-  expect_equal(read_color_png(folder / "deep.png"), image);
+  expect_equal(read_color_image(folder / "deep.png"), image);
   write_png(folder / "grey.png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(7)));
-  expect_equal(read_color_png(folder / "grey.png"), cv::Mat(3, 4, CV_8UC3, cv::Scalar::all(7)));
+  expect_equal(read_color_image(folder / "grey.png"), cv::Mat(3, 4, CV_8UC3, cv::Scalar::all(7)));
 }
 
 TEST(ImageIo, ColorBecomesGreyAsInOpenCv) {
@@ -90,7 +93,7 @@ TEST(ImageIo, ColorBecomesGreyAsInOpenCv) {
       ASSERT_TRUE(cv::imwrite((folder / "image.png").string(), image));
       cv::Mat expected;
       cv::cvtColor(image, expected, channels == 3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
-      expect_equal(read_grey_png(folder / "image.png"), expected);
+      expect_equal(read_grey_image(folder / "image.png"), expected);
     }
   }
 }
@@ -107,16 +110,16 @@ TEST(ImageIo, InterlacedAndPaletteAndBilevelFilesAreRead) {
   const TemporaryFolder folder;
   const cv::Mat image = random_image(random, 29, 19, CV_8UC1);
   write_with_libpng(folder / "interlaced.png", image, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7);
-  expect_equal(read_grey_png(folder / "interlaced.png"), image);
+  expect_equal(read_grey_image(folder / "interlaced.png"), image);
 
   write_with_libpng(folder / "palette.png", image, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE);
   cv::Mat expected;
   cv::cvtColor(cv::imread((folder / "palette.png").string(), cv::IMREAD_COLOR), expected, cv::COLOR_BGR2GRAY);
-  expect_equal(read_grey_png(folder / "palette.png"), expected);
+  expect_equal(read_grey_image(folder / "palette.png"), expected);
 
   const cv::Mat bilevel = image > 128;
   ASSERT_TRUE(cv::imwrite((folder / "bilevel.png").string(), bilevel, {cv::IMWRITE_PNG_BILEVEL, 1}));
-  expect_equal(read_grey_png(folder / "bilevel.png"), bilevel);
+  expect_equal(read_grey_image(folder / "bilevel.png"), bilevel);
 }
 
 TEST(ImageIo, EveryTruncationIsRefusedInSilence) {
@@ -128,7 +131,7 @@ TEST(ImageIo, EveryTruncationIsRefusedInSilence) {
   ::testing::internal::CaptureStderr();
   for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
     write_file(file, whole.substr(0, bytes));
-    expect_refused([&] { read_grey_png(file); }, {file.string(), "not a readable image (truncated?)"});
+    expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
   }
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
@@ -141,7 +144,7 @@ TEST(ImageIo, DamagedPixelsAreRefused) {
   std::string bytes = read_file(file, 1 << 20);
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
   write_file(file, bytes);
-  expect_refused([&] { read_grey_png(file); }, {file.string(), "not a readable image (truncated?)"});
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
 }
 
 std::string with_header_size(std::string png, std::uint32_t width, std::uint32_t height) {
@@ -168,24 +171,24 @@ TEST(ImageIo, HugeSizesAreRefusedFromTheHeader) {
   ASSERT_LT(small.size(), 100u);
   for (const auto& [width, height] : {std::pair{16385u, 1u}, {1u, 16385u}, {0x7fffffffu, 0x7fffffffu}}) {
     write_file(file, with_header_size(small, width, height));
-    expect_refused([&] { read_grey_png(file); }, {file.string(), "larger than the limit"});
-    expect_refused([&] { read_png_size(file); }, {file.string(), "larger than the limit"});
+    expect_refused([&] { read_grey_image(file); }, {file.string(), "larger than the limit"});
+    expect_refused([&] { read_image_size(file); }, {file.string(), "larger than the limit"});
   }
   // Within the limits, but no 100 bytes hold so many pixels.
   write_file(file, with_header_size(small, 16384, 16384));
-  expect_refused([&] { read_grey_png(file); }, {file.string(), "too short for 16384x16384"});
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
   write_file(file, with_header_size(small, 0, 5));
-  expect_refused([&] { read_grey_png(file); }, {file.string(), "zero"});
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "zero"});
 }
 
 TEST(ImageIo, NonImagesAreRefused) {
   const TemporaryFolder folder;
   const auto file = folder / "image.png";
-  for (const std::string text : {"", "hello", "\xff\xd8\xff\xe0 JFIF"}) {
+  for (const std::string text : {"", "hello", "\xff\xd8\xff\xe0 JFIF", "\xff\xd8\xff"}) {
     write_file(file, text);
-    expect_refused([&] { read_grey_png(file); }, {file.string(), "not a readable image"});
+    expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image"});
   }
-  expect_refused([&] { read_grey_png(folder / "none.png"); }, {"none.png", "No such file"});
+  expect_refused([&] { read_grey_image(folder / "none.png"); }, {"none.png", "No such file"});
   expect_refused([&] { write_png(file, cv::Mat()); }, {file.string()});
   expect_refused([&] { write_png(file, cv::Mat(1, 1, CV_32FC1)); }, {file.string()});
 }
@@ -203,6 +206,165 @@ TEST(ImageIo, ViewsKeepTheStride) {
   EXPECT_EQ(map_view(map).stride_bytes, 20);
   expect_refused([&] { image_view(map); }, {"CV_8UC1"});
   expect_refused([&] { map_view(image); }, {"CV_32FC1"});
+}
+
+std::string jpeg_of(const cv::Mat& image, const std::vector<int>& parameters = {}) {
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".jpg", image, bytes, parameters);
+  return {bytes.begin(), bytes.end()};
+}
+
+/// With enough structure for all coefficients to matter.
+cv::Mat smooth_image(int width, int height, int type) {
+  std::mt19937 random(6);
+  cv::Mat image = random_image(random, width, height, type);
+  cv::GaussianBlur(image, image, {5, 5}, 1.5);
+  return image;
+}
+
+TEST(ImageIo, JpegIsReadAsPngIsWhateverItsName) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.png";
+  for (const auto& [width, height] : {std::pair{1, 1}, {8, 8}, {65, 33}, {127, 40}}) {
+    for (const int type : {CV_8UC1, CV_8UC3}) {
+      for (const int progressive : {0, 1}) {
+        write_file(file, jpeg_of(smooth_image(width, height, type), {cv::IMWRITE_JPEG_PROGRESSIVE, progressive}));
+        cv::Mat expected = cv::imread(file.string(), type == CV_8UC1 ? cv::IMREAD_GRAYSCALE : cv::IMREAD_COLOR), grey;
+        if (type == CV_8UC3) {
+          expect_equal(read_color_image(file), expected);
+          cv::cvtColor(expected, expected, cv::COLOR_BGR2GRAY);
+        }
+        expect_equal(read_grey_image(file), expected);
+        EXPECT_EQ(read_image_size(file), cv::Size(width, height));
+      }
+    }
+  }
+}
+
+TEST(ImageIo, AJpegsSizeMayStandBehindALongComment) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.jpg";
+  std::string bytes = jpeg_of(smooth_image(30, 20, CV_8UC1));
+  const std::string comment = "\xff\xfe\xff\xff" + std::string(65533, 'x');
+  for (int i = 0; i < 3; ++i) bytes.insert(2, comment);
+  write_file(file, bytes);
+  EXPECT_EQ(read_image_size(file), cv::Size(30, 20));
+  EXPECT_EQ(read_grey_image(file).size(), cv::Size(30, 20));
+}
+
+TEST(ImageIo, EveryTruncationOfAJpegIsRefusedInSilence) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.jpg";
+  for (const int progressive : {0, 1}) {
+    const std::string whole = jpeg_of(smooth_image(17, 9, CV_8UC3), {cv::IMWRITE_JPEG_PROGRESSIVE, progressive});
+    ::testing::internal::CaptureStderr();
+    for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
+      write_file(file, whole.substr(0, bytes));
+      expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
+    }
+    EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+  }
+}
+
+TEST(ImageIo, ADamagedJpegIsRefusedInSilence) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.jpg";
+  std::string bytes = jpeg_of(smooth_image(64, 64, CV_8UC1));
+  bytes.replace(bytes.size() - 200, 100, std::string(50, '\xff') + std::string(50, '\x01'));  // markers that are none
+  write_file(file, bytes);
+  ::testing::internal::CaptureStderr();
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(ImageIo, AJpegWithTheSizeOfALargerOneIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.jpg";
+  const std::string bytes = jpeg_of(cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(0)));
+  const std::size_t frame = bytes.find("\xff\xc0");
+  ASSERT_NE(frame, std::string::npos);
+  const auto with_size = [&](const std::string& height, const std::string& width) {
+    return std::string(bytes).replace(frame + 5, 4, height + width);
+  };
+  write_file(file, with_size("\xf0\xf0", "\xf0\xf0"));
+  expect_refused([&] { read_image_size(file); }, {file.string(), "61680x61680", "larger than the limit"});
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "61680x61680", "larger than the limit"});
+  write_file(file, with_size("\x40" + std::string(1, '\0'), "\x40" + std::string(1, '\0')));
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
+}
+
+/// A progressive file whose first `coefficients` coefficients come one by one, each in two scans.
+void write_scans(const std::filesystem::path& file, int coefficients) {
+  std::vector<jpeg_scan_info> scans = {{1, {0, 0, 0, 0}, 0, 0, 0, 0}};
+  for (const int low : {1, 0}) {
+    for (int i = 1; i <= coefficients; ++i) scans.push_back({1, {0, 0, 0, 0}, i, i, low ? 0 : 1, low});
+  }
+  std::FILE* stream = std::fopen(file.c_str(), "wb");
+  ASSERT_NE(stream, nullptr);
+  jpeg_compress_struct jpeg{};
+  jpeg_error_mgr errors{};
+  jpeg.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&jpeg);
+  jpeg_stdio_dest(&jpeg, stream);
+  jpeg.image_width = jpeg.image_height = 16;
+  jpeg.input_components = 1;
+  jpeg.in_color_space = JCS_GRAYSCALE;
+  jpeg_set_defaults(&jpeg);
+  jpeg.scan_info = scans.data();
+  jpeg.num_scans = static_cast<int>(scans.size());
+  jpeg_start_compress(&jpeg, TRUE);
+  cv::Mat image = smooth_image(16, 16, CV_8UC1);
+  for (int y = 0; y < image.rows; ++y) {
+    JSAMPROW row = image.ptr(y);
+    jpeg_write_scanlines(&jpeg, &row, 1);
+  }
+  jpeg_finish_compress(&jpeg);
+  jpeg_destroy_compress(&jpeg);
+  std::fclose(stream);
+}
+
+TEST(ImageIo, AJpegOfManyScansIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.jpg";
+  write_scans(file, 40);
+  EXPECT_EQ(read_grey_image(file).size(), cv::Size(16, 16));
+  write_scans(file, 63);
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "scans"});
+}
+
+/// A file of few bytes and many pixels: one colour, of `bits` bits.
+void write_bomb(const std::filesystem::path& file, int side, int color_type, int bits) {
+  std::FILE* stream = std::fopen(file.c_str(), "wb");
+  ASSERT_NE(stream, nullptr);
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  png_init_io(png, stream);
+  png_set_compression_level(png, 9);
+  const auto pixels = static_cast<png_uint_32>(side);
+  png_set_IHDR(png, info, pixels, pixels, bits, color_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
+  const png_color palette[2] = {{0, 0, 0}, {255, 255, 255}};
+  if (color_type == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette, 2);
+  png_write_info(png, info);
+  const std::vector<png_byte> row(png_get_rowbytes(png, info));
+  for (int y = 0; y < side; ++y) png_write_row(png, row.data());
+  png_write_end(png, nullptr);
+  png_destroy_write_struct(&png, &info);
+  std::fclose(stream);
+}
+
+TEST(ImageIo, TheBoundHoldsForPixelsAsTheyAreWidened) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.png";
+  for (const int color_type : {PNG_COLOR_TYPE_PALETTE, PNG_COLOR_TYPE_GRAY}) {
+    write_bomb(file, 16384, color_type, 1);
+    ASSERT_LT(std::filesystem::file_size(file), 50'000u);
+    expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
+    write_bomb(file, 2000, color_type, 1);  // a mask may be as empty as it likes
+    EXPECT_EQ(read_grey_image(file).size(), cv::Size(2000, 2000));
+  }
+  write_bomb(file, 6000, PNG_COLOR_TYPE_GRAY, 8);  // one grey, as deflate packs it best
+  EXPECT_EQ(read_grey_image(file).size(), cv::Size(6000, 6000));
 }
 
 }  // namespace

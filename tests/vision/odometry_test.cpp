@@ -418,7 +418,7 @@ TEST(StereoOdometry, KittiOdometryExcerpt) {
     char name[32];
     std::snprintf(name, sizeof(name), "%06zu.png", k);
     const OdometryResult result =
-        process(odometry, read_grey_png(folder / "image_0" / name), read_grey_png(folder / "image_1" / name));
+        process(odometry, read_grey_image(folder / "image_0" / name), read_grey_image(folder / "image_1" / name));
     if (k == 0) continue;
     ASSERT_TRUE(result.motion) << name << ": " << result.reason;
     const Eigen::Isometry3d truth = current_from_previous(poses[k - 1], poses[k]);

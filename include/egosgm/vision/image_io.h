@@ -14,18 +14,25 @@ namespace egosgm::vision {
 inline constexpr int kMaxImageSide = 16384;
 inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 28;
 
-/// Reads a PNG of any colour type as grey: CV_8UC1, or CV_16UC1 where the file has 16 bits a channel. Colour is
-/// weighted as cv::COLOR_RGB2GRAY does; alpha and gamma are ignored. A file too short for the size in its header is
-/// refused before its pixels are allocated. Nothing is printed. Throws InvalidArgument, naming the file, where it is
-/// missing, too large, truncated, damaged or no PNG. Thread-safe.
-EGOSGM_EXPORT cv::Mat read_grey_png(const std::filesystem::path& file);
+/// Reads a PNG of any colour type or a JPEG, told apart by what they hold, as grey: CV_8UC1, or CV_16UC1 where a PNG
+/// has 16 bits a channel. Colour is weighted as cv::COLOR_RGB2GRAY does; alpha, gamma and orientation are ignored. A
+/// file whose pixels would take more than 16 MiB and more than 1032 times its length is refused before they are
+/// allocated. Nothing is printed. Throws InvalidArgument, naming the file, where it is missing, too large, truncated,
+/// damaged or neither. Thread-safe.
+EGOSGM_EXPORT cv::Mat read_grey_image(const std::filesystem::path& file);
 
-/// Reads a PNG to be looked at: CV_8UC3, BGR. Colour of 16 bits keeps its upper 8, grey is stretched as color_grey
-/// does. Throws as read_grey_png does. Thread-safe.
-EGOSGM_EXPORT cv::Mat read_color_png(const std::filesystem::path& file);
+/// Reads such a file to be looked at: CV_8UC3, BGR. Colour of 16 bits keeps its upper 8, grey is stretched as
+/// color_grey does. Throws as read_grey_image does. Thread-safe.
+EGOSGM_EXPORT cv::Mat read_color_image(const std::filesystem::path& file);
 
-/// Width and height from a PNG's header; the pixels are not looked at. Throws as read_grey_png does. Thread-safe.
-EGOSGM_EXPORT cv::Size read_png_size(const std::filesystem::path& file);
+/// Width and height from the header of such a file; the pixels are not looked at. Throws as read_grey_image does.
+/// Thread-safe.
+EGOSGM_EXPORT cv::Size read_image_size(const std::filesystem::path& file);
+
+// The names from before JPEG was read.
+inline cv::Mat read_grey_png(const std::filesystem::path& file) { return read_grey_image(file); }
+inline cv::Mat read_color_png(const std::filesystem::path& file) { return read_color_image(file); }
+inline cv::Size read_png_size(const std::filesystem::path& file) { return read_image_size(file); }
 
 /// Writes CV_8UC1, CV_8UC3 (BGR) or CV_16UC1, whole or not at all. Throws IoError, and InvalidArgument for another type
 /// or an empty image. Thread-safe for different files.
