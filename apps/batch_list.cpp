@@ -72,7 +72,7 @@ std::vector<BatchEntry> read_batch_list(const std::filesystem::path& file) {
 BatchInput parse_input(const BatchEntry& entry) {
   BatchInput input;
   CLI::App arguments;
-  input.sequence.add_to_with_positional(arguments);
+  input.sequence.add_to(arguments);
   arguments.add_option("--poses", input.poses_file);
   try {
     arguments.parse(entry.arguments);

@@ -68,7 +68,7 @@ std::string case_of(const CLI::App& command) {
   const char* folders = positional ? " $(compgen -d -- \"$word\")" : "";
   return fmt::format(
       "    {})\n      case $previous in\n{}      esac\n"
-      "      COMPREPLY=($(compgen -W '{}' -- \"$word\"){}) ;;\n",
+      "      COMPREPLY=($(compgen -W '{}' -- \"$word\"){}) || : ;;\n",
       command.get_name(), values, joined(names, " "), folders);
 }
 

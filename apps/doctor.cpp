@@ -68,6 +68,9 @@ class Doctor {
       : sequence_(sequence), options_(options), size_(vision::check_image_sizes(sequence)) {}
 
   std::vector<Finding> examine(int samples) {
+    if (!sequence_.note.empty()) {
+      add(Verdict::kNote, "frames", sequence_.note, "a longer motion is harder: give all frames where there are some");
+    }
     look_at_frames(samples);
     check_images();
     check_calibration();
@@ -213,7 +216,12 @@ class Doctor {
   }
 
   void check_times() {
-    const FrameTimes times = frame_times(sequence_);
+    FrameTimes times;
+    try {
+      times = frame_times(sequence_);
+    } catch (const InvalidArgument& error) {
+      return problem("times", error.what(), "give a row for each frame, or remove the file");
+    }
     if (times.seconds.empty()) {
       return add(Verdict::kNote, "times", "no time stamps (times.txt or timestamps.txt) beside the images",
                  "without them, gaps are not seen");
@@ -231,18 +239,17 @@ class Doctor {
     const std::string text = fmt::format("{:.4g} s between two frames ({})", usual, times.file.string());
     if (gaps == 0) return fine("times", text);
     const std::string& before = sequence_.frames[first].name;
-    const int after = sequence_.frames[first + 1].number;
+    const vision::StereoFrame &last = sequence_.frames[first], &next = sequence_.frames[first + 1];
     if (steps[first] <= 0) {
       return problem("times",
                      text + fmt::format(", but after frame {} the time goes back by {:.4g} s", before, -steps[first]),
                      "sort the frames by time, and drop those that came twice");
     }
-    problem(
-        "times",
-        text +
-            fmt::format(", but {}, the first of {:.4g} s after frame {}", counted(gaps, "gap"), steps[first], before),
-        fmt::format("record without dropping frames, or run the parts alone: --frames :{} and --frames {}:", after - 1,
-                    after));
+    problem("times",
+            text + fmt::format(", but {}, the first of {:.4g} s after frame {}", counted(gaps, "gap"), steps[first],
+                               before),
+            fmt::format("record without dropping frames, or run the parts alone: --frames :{} and --frames {}:",
+                        last.number, next.number));
   }
 
   const vision::StereoSequence& sequence_;
@@ -303,7 +310,7 @@ Command add_doctor(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("doctor", "Check a sequence: rows, swapped sides, calibration, range, time stamps");
   auto arguments = std::make_shared<DoctorArguments>();
-  arguments->input.add_to_with_positional(*command);
+  arguments->input.add_to(*command);
   PipelineOptions& options = arguments->options;
   command->add_option("--disparities", options.disparities, "size of the range that is to be searched [px]")
       ->type_name("D")

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <new>
 
 #include "apps/command.h"
@@ -51,6 +52,11 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
     if (const std::string prefix = "Could not convert: "; what.starts_with(prefix))
       what = what.substr(prefix.size()) + " is not a number";
     return fail(kBadInput, fmt::format("{}: see `{}`", what, help_hint(command)));
+  }
+  if (std::error_code error; is_regular_file(std::filesystem::path(unknown.front()), error)) {
+    return fail(kBadInput, fmt::format("unexpected argument \"{}\", a file: did the shell expand a pattern? quote it: "
+                                       "'*{}'",
+                                       unknown.front(), std::filesystem::path(unknown.front()).extension().string()));
   }
   const std::string typed = unknown.front().substr(0, unknown.front().find('='));
   const std::string nearest = suggestion(typed, names_known_to(command));

@@ -16,19 +16,7 @@
 namespace egosgm::app {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr std::size_t kMaxBytes = std::size_t{1} << 28;
-
-fs::path times_file(const fs::path& left) {
-  fs::path folder = fs::absolute(left).parent_path();
-  for (int level = 0; level < 3; ++level, folder = folder.parent_path()) {
-    for (const char* name : {"times.txt", "timestamps.txt"}) {
-      if (fs::is_regular_file(folder / name)) return folder / name;
-    }
-  }
-  return {};
-}
 
 std::optional<double> seconds_of(const std::string& row) {
   int year = 0, month = 0, day = 0, hour = 0, minute = 0;
@@ -49,7 +37,7 @@ std::optional<double> seconds_of(const std::string& row) {
 }  // namespace
 
 FrameTimes frame_times(const vision::StereoSequence& sequence) {
-  FrameTimes times{times_file(sequence.frames.front().left), {}};
+  FrameTimes times{sequence.times_file, {}};
   if (times.file.empty()) return times;
   std::istringstream text(vision::read_file(times.file, kMaxBytes));
   std::vector<double> rows;
@@ -62,16 +50,8 @@ FrameTimes frame_times(const vision::StereoSequence& sequence) {
     }
     rows.push_back(*seconds);
   }
-  const auto last = static_cast<std::size_t>(sequence.frames.back().number);
-  if (rows.size() > last) {
-    for (const vision::StereoFrame& frame : sequence.frames) {
-      times.seconds.push_back(rows[static_cast<std::size_t>(frame.number)]);
-    }
-  } else if (rows.size() == sequence.frames.size()) {
-    times.seconds = std::move(rows);
-  } else {
-    throw InvalidArgument(fmt::format("{}: holds {} times, but there are {} frames up to number {}: is it complete?",
-                                      times.file.string(), rows.size(), sequence.frames.size(), last));
+  for (const std::size_t row : vision::rows_of_frames(sequence, rows.size(), times.file, "times")) {
+    times.seconds.push_back(rows[row]);
   }
   return times;
 }

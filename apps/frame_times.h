@@ -14,9 +14,8 @@ struct FrameTimes {
   std::vector<double> seconds;
 };
 
-/// Reads times.txt or timestamps.txt from the folder of the left images or the two above it: seconds in each row
-/// (KITTI odometry) or a date and a time (KITTI raw). A row for each frame, or rows from frame 0 on. Throws
-/// InvalidArgument, naming file and row.
+/// Reads the sequence's times_file: seconds in each row (KITTI odometry) or a date and a time (KITTI raw), for the
+/// frames that vision::rows_of_frames tells. Throws InvalidArgument, naming file and row.
 FrameTimes frame_times(const vision::StereoSequence& sequence);
 
 }  // namespace egosgm::app

@@ -40,6 +40,7 @@ int estimate(const OdometryArguments& arguments) {
   catch_interrupts();
   {
     Progress progress(static_cast<int>(sequence.frames.size()), arguments.quiet);
+    if (!sequence.note.empty()) progress.note(sequence.note);
     for (const vision::StereoFrame& frame : sequence.frames) {
       if (interrupted()) break;
       const FrameMotion motion = motions.next(vision::read_images(frame));
@@ -58,7 +59,7 @@ int estimate(const OdometryArguments& arguments) {
 Command add_odometry(CLI::App& program) {
   CLI::App* command = program.add_subcommand("odometry", "Estimate the camera's poses alone, without matching");
   auto arguments = std::make_shared<OdometryArguments>();
-  arguments->input.add_to_with_positional(*command);
+  arguments->input.add_to(*command);
   command
       ->add_option("--out", arguments->out, "file to write: KITTI poses, camera-to-world, relative to the first frame")
       ->type_name("FILE")

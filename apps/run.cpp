@@ -105,6 +105,7 @@ class Run {
     const bool ahead = pipeline_.device().info().type != "CPU";
     const auto policy = ahead ? std::launch::async : std::launch::deferred;
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
+    if (!sequence_.note.empty()) progress.note(sequence_.note);
     const auto prepare_later = [&](std::size_t i) { return std::async(policy, [this, i] { return prepare(i); }); };
     auto next = prepare_later(0);
     try {

@@ -12,24 +12,34 @@ namespace {
 
 constexpr const char* kGroup = "Input (one of)";
 
+bool is_image(const std::filesystem::path& file) {
+  std::error_code error;
+  return !file.extension().empty() && std::filesystem::is_regular_file(file, error);
+}
+
 }  // namespace
 
-void SequenceArguments::add_to(CLI::App& command) {
-  add_sources(command);
+void add_pair_by(CLI::App& command, std::string& pair_by, const std::string& group) {
   command
-      .add_option("--dataset", folder,
+      .add_option("--pair-by", pair_by,
+                  "what tells which --left and --right images belong together: equal texts in their names (what * or "
+                  "%d stands for), or their order")
+      ->type_name("name|order")
+      ->group(group);
+}
+
+vision::PairBy parse_pair_by(const std::string& pair_by) {
+  if (pair_by.empty() || pair_by == "name") return vision::PairBy::kName;
+  if (pair_by == "order") return vision::PairBy::kOrder;
+  throw InvalidArgument("--pair-by " + pair_by + ": choose name or order");
+}
+
+void SequenceArguments::add_to(CLI::App& command) {
+  command
+      .add_option("DATASET,--dataset", folder,
                   "folder in the layout of KITTI odometry, KITTI raw or Middlebury, whichever it is")
       ->type_name("DIR")
       ->group(kGroup);
-}
-
-void SequenceArguments::add_to_with_positional(CLI::App& command) {
-  command.add_option("DATASET", folder, "folder in the layout of KITTI odometry, KITTI raw or Middlebury")
-      ->type_name("");
-  add_sources(command);
-}
-
-void SequenceArguments::add_sources(CLI::App& command) {
   command
       .add_option("--odometry", odometry, "KITTI odometry sequence: image_0, image_1 (or image_2, image_3), calib.txt")
       ->type_name("DIR")
@@ -40,7 +50,9 @@ void SequenceArguments::add_sources(CLI::App& command) {
       ->type_name("DIR")
       ->group(kGroup);
   command.add_option("--scene", scene, "scene of --kitti, for example 000151")->type_name("NUMBER")->group(kGroup);
-  command.add_option("--left", left, "left images: one PNG, or a pattern such as 'left/%06d.png' or 'left/*.png'")
+  command
+      .add_option("--left", left,
+                  "left images: one PNG or JPEG, or a pattern (in quotes) such as 'left/%06d.png' or 'left/*.jpg'")
       ->type_name("PATTERN")
       ->group(kGroup);
   command.add_option("--right", right, "right images, likewise; rectified")->type_name("PATTERN")->group(kGroup);
@@ -49,6 +61,7 @@ void SequenceArguments::add_sources(CLI::App& command) {
                   "calibration of --left and --right: KITTI's, Middlebury's, or fx, fy, cx, cy, baseline_m")
       ->type_name("FILE")
       ->group(kGroup);
+  add_pair_by(command, pair_by, kGroup);
   command.add_option("--frames", frames, "frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all")
       ->type_name("FIRST:LAST")
       ->group(kGroup);
@@ -56,22 +69,34 @@ void SequenceArguments::add_sources(CLI::App& command) {
 
 vision::StereoSequence SequenceArguments::open() const {
   const bool patterns = !left.empty() || !right.empty() || !calib.empty();
-  const int sources = !kitti.empty() + !odometry.empty() + !folder.empty() + patterns;
-  if (sources != 1) {
-    throw InvalidArgument(std::string(sources == 0 ? "no input" : "more than one input") +
-                          ": give one of --odometry DIR, --kitti DIR --scene NUMBER, --left PATTERN --right PATTERN "
-                          "--calib FILE, or a data set's folder");
+  std::vector<std::string> sources;
+  if (!kitti.empty()) sources.push_back("--kitti " + kitti);
+  if (!odometry.empty()) sources.push_back("--odometry " + odometry);
+  if (!folder.empty()) sources.push_back(folder);
+  if (patterns) sources.push_back("--left " + left + " --right " + right);
+  if (sources.empty()) {
+    throw InvalidArgument(
+        "no input: give one of --odometry DIR, --kitti DIR --scene NUMBER, --left PATTERN --right PATTERN --calib "
+        "FILE, or a data set's folder");
+  }
+  if (sources.size() > 1) {
+    const std::string hint = patterns && is_image(folder) ? "; did the shell expand a pattern? quote it: '*.png'" : "";
+    throw InvalidArgument("more than one input: " + sources[0] + " and " + sources[1] + ": give one of them" + hint);
   }
   if (kitti.empty() && !scene.empty()) throw InvalidArgument("--scene " + scene + ": give --kitti DIR with it");
   if (!kitti.empty() && scene.empty()) throw InvalidArgument("--kitti " + kitti + ": give --scene NUMBER with it");
   if (patterns && (left.empty() || right.empty() || calib.empty())) {
     throw InvalidArgument("--left, --right and --calib belong together: give all three");
   }
+  const vision::PairBy pairing = parse_pair_by(pair_by);
+  if (!pair_by.empty() && !patterns) {
+    throw InvalidArgument("--pair-by " + pair_by + ": is for --left and --right; in a folder names tell");
+  }
   const vision::FrameRange range = frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(frames);
   if (!kitti.empty()) return vision::open_kitti_multiview(kitti, scene, range);
   if (!odometry.empty()) return vision::open_kitti_odometry(odometry, range);
   if (!folder.empty()) return vision::open_folder(folder, range);
-  return vision::open_patterns(left, right, calib, range);
+  return vision::open_patterns(left, right, calib, range, pairing);
 }
 
 std::string SequenceArguments::text() const {
@@ -92,6 +117,7 @@ std::string SequenceArguments::text() const {
   append("--left ", left);
   append("--right ", right);
   append("--calib ", calib);
+  append("--pair-by ", pair_by);
   append("--frames ", frames);
   return text;
 }

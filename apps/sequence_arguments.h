@@ -10,18 +10,19 @@ namespace egosgm::app {
 
 /// The arguments that say which stereo sequence to read.
 struct SequenceArguments {
-  std::string kitti, scene, odometry, folder, left, right, calib, frames;
+  std::string kitti, scene, odometry, folder, left, right, calib, pair_by, frames;
 
   void add_to(CLI::App& command);
-  /// Adds a positional DATASET in place of --dataset.
-  void add_to_with_positional(CLI::App& command);
   /// Throws InvalidArgument unless exactly one sequence was named, and as the openers do.
   vision::StereoSequence open() const;
   /// What was given, as a shell takes it for any command that reads a sequence.
   std::string text() const;
-
- private:
-  void add_sources(CLI::App& command);
 };
+
+/// Adds --pair-by.
+void add_pair_by(CLI::App& command, std::string& pair_by, const std::string& group);
+
+/// "name", "order" or empty. Throws InvalidArgument.
+vision::PairBy parse_pair_by(const std::string& pair_by);
 
 }  // namespace egosgm::app

@@ -53,6 +53,7 @@ class DrawnSequence {
         doubt_(sequence_.calibration) {}
 
   std::size_t frames() const { return sequence_.frames.size(); }
+  const std::string& note() const { return sequence_.note; }
   const std::string& name(std::size_t i) const { return sequence_.frames[i].name; }
 
   /// REQUIRES: called for frames 0, 1, 2, ... of the sequence.
@@ -151,6 +152,7 @@ int write_files(DrawnSequence& drawn, const ViewArguments& arguments) {
   std::size_t i = 0;
   {
     Progress progress(static_cast<int>(drawn.frames()), arguments.quiet);
+    if (!drawn.note().empty()) progress.note(drawn.note());
     for (; i < drawn.frames() && !interrupted(); ++i) {
       const cv::Mat picture = drawn.draw(i);
       if (video) video->add(picture);

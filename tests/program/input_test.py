@@ -160,10 +160,11 @@ class Doctor(InputTest):
         (street / "times.txt").write_text("\n".join(rows))
         self.assertIn("0.025 s", self.examine(street)["times"]["text"])
         (street / "times.txt").write_text("0\n0.1\n")
-        self.assert_refused(["doctor", street], "times.txt", "2 times")
+        self.assertIn("times.txt: holds 2 times", self.assert_only_problem("times", street)["text"])
         (street / "times.txt").write_text("0\n0.1\nnoon\n0.3\n")
-        self.assert_refused(["doctor", street], "row 3", "noon")
+        self.assertIn('row 3: "noon"', self.assert_only_problem("times", street)["text"])
         (street / "times.txt").unlink()
+        (street.parent / "times.txt").write_text("0\n0.1\n")  # another one's
         self.assertEqual(self.examine(street)["times"]["verdict"], "note")
 
     def test_images_of_other_moments_or_of_nothing(self):

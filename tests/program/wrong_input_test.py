@@ -40,7 +40,17 @@ class WrongArguments(ProgramTest):
         self.assert_refused(["run", "--left", "a.png", "--out", self.folder / "never"], "--right")
         self.assert_refused(["run", "--kitti", self.street, "--out", self.folder / "never"], "--scene")
         self.assert_refused(self.run_with("--device"), "--device")
-        self.assert_refused(self.run_with("surplus"), "surplus")
+        self.assert_refused(self.run_with("surplus"), "more than one input", "--odometry", "surplus")
+        self.assert_refused(self.run_with("--pair-by", "order"), "--pair-by order", "--left")
+        self.assert_refused(["run", "--left", "a%d.png", "--right", "b%d.png", "--calib", "c", "--pair-by", "luck", "--out", self.folder / "never"], "luck")
+
+    def test_patterns_that_the_shell_expanded(self):
+        left, right = (sorted((self.street / side).iterdir()) for side in ("image_0", "image_1"))
+        for many in (left, left[:2]):
+            for command in (["run", "--out", self.folder / "never"], ["view", "--pictures", self.folder / "never"], ["doctor"]):
+                self.assert_refused([*command, "--left", *many, "--right", right[0], "--calib", self.street / "calib.txt"], "quote", "'*.png'")
+        self.assert_refused(["rectify", "--left", *left, "--right", *right, "--calib", self.street / "calib.txt", "--out", self.folder / "never"],
+                            "quote", "'*.png'")
 
     def test_values_out_of_range(self):
         self.assert_refused(self.run_with("--disparities", 0), "disparities", "0")
@@ -93,7 +103,8 @@ class BrokenInput(ProgramTest):
         street = self.broken_street()
         (street / "image_0/000002.png").unlink()
         (street / "image_1/000002.png").unlink()
-        self.assert_sequence_refused(street, "000002.png", "--frames")
+        self.assert_sequence_refused(street, "000002.png", "--frames", options=["--frames", 2])
+        self.assert_sequence_refused(street, "000004.png", "--frames", options=["--frames", "1:4"])
 
     def test_missing_right_image(self):
         street = self.broken_street()

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
 #include "tests/support/expect_refused.h"
@@ -46,6 +48,11 @@ class DatasetTest : public ::testing::Test {
     }
     add_text("calib.txt", kProjections);
   }
+
+  void add_images(std::initializer_list<std::string> names) {
+    for (const std::string& name : names) add_image(name + ".png");
+  }
+  std::string path(const std::string& name) const { return (root_ / name).string(); }
 
   TemporaryFolder folder_;
   const std::filesystem::path& root_ = folder_.path();
@@ -132,7 +139,9 @@ TEST_F(DatasetTest, FramesThatAreMissingAreNamed) {
   std::filesystem::remove(root_ / "image_1/000004.png");
   expect_refused([&] { open_kitti_odometry(root_); }, {"image_1/000004.png", "right image", "image_0/000004.png"});
   std::filesystem::remove(root_ / "image_0/000004.png");
-  expect_refused([&] { open_kitti_odometry(root_); }, {"image_0/000004.png", "frame 4 is missing"});
+  expect_refused([&] { open_kitti_odometry(root_, parse_frame_range("4")); },
+                 {"image_0/000004.png", "frame 4 is missing"});
+  EXPECT_EQ(numbers_of(open_kitti_odometry(root_)), (std::vector<int>{2, 3, 5, 6}));
   EXPECT_EQ(numbers_of(open_kitti_odometry(root_, parse_frame_range(":3"))), (std::vector<int>{2, 3}));
   std::filesystem::remove(root_ / "image_0/000002.png");
   expect_refused([&] { open_kitti_odometry(root_, parse_frame_range(":3")); }, {"image_0/000002.png", "left image"});
@@ -168,7 +177,6 @@ TEST_F(DatasetTest, PrintfPatterns) {
     add_image(name);
   }
   add_text("c.toml", kOwnCalibration);
-  const auto path = [&](const char* name) { return (root_ / name).string(); };
   const StereoSequence sequence = open_patterns(path("l/left_%d.png"), path("r/right_%04d.png"), root_ / "c.toml");
   EXPECT_EQ(numbers_of(sequence), (std::vector<int>{7, 8}));
   EXPECT_EQ(sequence.frames[1].left, root_ / "l/left_8.png");
@@ -177,7 +185,10 @@ TEST_F(DatasetTest, PrintfPatterns) {
        {"l/%s.png", "l/%d_%d.png", "l/%", "l/%6d.png", "l/%0999d.png", "%d/a.png", "l/", "l/%n%d.png", "l/*%d.png"}) {
     expect_refused([&] { open_patterns(path(bad), path("r/right_%04d.png"), root_ / "c.toml"); }, {"pattern '", bad});
   }
-  expect_refused([&] { open_patterns(path("l/left_%d.png"), path("r/*.png"), root_ / "c.toml"); }, {"both must hold"});
+  expect_refused([&] { open_patterns(path("l/left_%d.png"), path("r/right_0007.png"), root_ / "c.toml"); },
+                 {"both must hold"});
+  EXPECT_EQ(open_patterns(path("l/left_%d.png"), path("r/right_0*.png"), root_ / "c.toml").frames[1].right,
+            root_ / "r/right_0008.png");
   expect_refused([&] { open_patterns(path("x/left_%d.png"), path("r/right_%04d.png"), root_ / "c.toml"); },
                  {"/x", "cannot be listed"});
   expect_refused([&] { open_patterns(path("l/left_%d.png"), path("r/right_%04d.png"), root_ / "d.toml"); }, {"d.toml"});
@@ -189,7 +200,6 @@ TEST_F(DatasetTest, GlobPatterns) {
     add_image(name);
   }
   add_text("c.toml", kOwnCalibration);
-  const auto path = [&](const char* name) { return (root_ / name).string(); };
   const StereoSequence numbered = open_patterns(path("l/a_*.png"), path("r/*_b.png"), root_ / "c.toml");
   EXPECT_EQ(numbers_of(numbered), (std::vector<int>{12, 13}));
   EXPECT_EQ(numbered.frames[1].right, root_ / "r/13_b.png");
@@ -199,6 +209,158 @@ TEST_F(DatasetTest, GlobPatterns) {
   std::filesystem::remove(root_ / "m/y.png");
   expect_refused([&] { open_patterns(path("n/*.png"), path("m/*.png"), root_ / "c.toml"); },
                  {"m/y.png", "right image"});
+}
+
+TEST_F(DatasetTest, StepsAndGapsAreFramesInOrderWithANote) {
+  add_text("c.toml", kOwnCalibration);
+  for (const char* number : {"0", "10", "20", "30"})
+    add_images({"l/" + std::string(number), "r/" + std::string(number)});
+  for (const char* wild : {"*", "%d", "*.png"}) {
+    const StereoSequence steps = open_patterns(path("l/") + wild, path("r/") + wild, root_ / "c.toml");
+    EXPECT_EQ(numbers_of(steps), (std::vector<int>{0, 10, 20, 30})) << wild;
+    EXPECT_EQ(steps.frames[1].name, "000010");
+    EXPECT_EQ(steps.frames[1].right, root_ / "r/10.png");
+    EXPECT_NE(steps.note.find("0..30 go in steps of 10"), std::string::npos) << steps.note;
+  }
+  const StereoSequence part = open_patterns(path("l/*"), path("r/*"), root_ / "c.toml", parse_frame_range("5:20"));
+  EXPECT_EQ(numbers_of(part), (std::vector<int>{10, 20}));
+  EXPECT_EQ(part.numbers, (std::vector<int>{0, 10, 20, 30}));
+  expect_refused([&] { open_patterns(path("l/*"), path("r/*"), root_ / "c.toml", parse_frame_range("5:40")); },
+                 {"l/40.png", "frame 40 is missing", "0..30"});
+  expect_refused([&] { open_patterns(path("l/*"), path("r/*"), root_ / "c.toml", parse_frame_range("11:19")); },
+                 {"frame 11 is missing"});
+  add_images({"l/31", "r/31"});
+  EXPECT_NE(open_patterns(path("l/*"), path("r/*"), root_ / "c.toml").note.find("3 gaps, the first after 0"),
+            std::string::npos);
+  add_odometry(2, 4);
+  EXPECT_EQ(open_folder(root_).note, "");
+}
+
+TEST_F(DatasetTest, NamesThatDifferArePairedByOrderWhereTold) {
+  add_text("c.toml", kOwnCalibration);
+  add_images({"s/left_9", "s/left_10", "s/right_1", "s/right_2"});
+  expect_refused([&] { open_patterns(path("s/l*"), path("s/r*"), root_ / "c.toml"); },
+                 {"no right image has the name of a left one", "s/left_", "s/right_", "--pair-by order"});
+  const StereoSequence sequence = open_patterns(path("s/l*"), path("s/r*"), root_ / "c.toml", {}, PairBy::kOrder);
+  EXPECT_EQ(numbers_of(sequence), (std::vector<int>{0, 1}));
+  EXPECT_EQ(sequence.frames[0].left, root_ / "s/left_9.png");
+  EXPECT_EQ(sequence.frames[1].right, root_ / "s/right_2.png");
+  const StereoSequence own = open_patterns(path("s/left_*"), path("s/right_*"), root_ / "c.toml", {}, PairBy::kOrder);
+  EXPECT_EQ(numbers_of(own), (std::vector<int>{9, 10})) << "the left ones' numbers";
+  add_images({"s/right_3"});
+  expect_refused([&] { open_patterns(path("s/l*"), path("s/r*"), root_ / "c.toml", {}, PairBy::kOrder); },
+                 {"2 left and 3 right images"});
+}
+
+TEST_F(DatasetTest, TimeStampsAreFramesInTheirOrder) {
+  add_text("c.toml", kOwnCalibration);
+  for (const char* stamp : {"1403636579763555584", "1403636579813555456"})
+    add_images({"n/" + std::string(stamp), "m/" + std::string(stamp)});
+  for (const char* wild : {"*", "%d"}) {
+    const StereoSequence nanoseconds = open_patterns(path("n/") + wild, path("m/") + wild, root_ / "c.toml");
+    EXPECT_EQ(numbers_of(nanoseconds), (std::vector<int>{0, 1}));
+    EXPECT_EQ(nanoseconds.frames[1].left, root_ / "n/1403636579813555456.png");
+  }
+  for (const char* stamp : {"9.5", "9.25", "10.125"}) add_images({"a/" + std::string(stamp)});
+  std::vector<std::string> names;
+  for (const auto& file : find_images(path("a/*.png"))) names.push_back(file.stem());
+  EXPECT_EQ(names, (std::vector<std::string>{"9.25", "9.5", "10.125"}));
+}
+
+TEST_F(DatasetTest, NumbersInNamesCountByTheirValue) {
+  for (const char* name : {"a/img_10_x", "a/img_9_x", "a/img_009_b", "a/img_9", "a/img_09"}) add_images({name});
+  std::vector<std::string> names;
+  for (const auto& file : find_images(path("a/*"))) names.push_back(file.stem());
+  EXPECT_EQ(names, (std::vector<std::string>{"img_9", "img_09", "img_009_b", "img_9_x", "img_10_x"}));
+}
+
+TEST_F(DatasetTest, TwoFramesNeverShareAName) {
+  add_text("c.toml", kOwnCalibration);
+  add_images({"l/1", "l/01", "l/2", "r/1", "r/01", "r/2"});
+  const StereoSequence sequence = open_patterns(path("l/*"), path("r/*"), root_ / "c.toml");
+  EXPECT_EQ(numbers_of(sequence), (std::vector<int>{0, 1, 2}));
+  std::set<std::string> names;
+  for (const StereoFrame& frame : sequence.frames) {
+    EXPECT_EQ(frame.left.filename(), frame.right.filename());
+    names.insert(frame.name);
+  }
+  EXPECT_EQ(names.size(), 3u);
+  add_odometry(0, 1);
+  add_image("image_0/1.png");
+  expect_refused([&] { open_folder(root_); }, {"image_0/000001.png", "means the same frame as 1.png"});
+  expect_refused([&] { open_patterns(path("l/*"), path("l/*"), root_ / "c.toml"); }, {"is the left and the right"});
+}
+
+TEST_F(DatasetTest, JpegIsAnImageLikeAnother) {
+  add_text("c.toml", kOwnCalibration), add_text("calib.txt", kProjections);
+  for (const char* name : {"image_0/000000.jpg", "image_1/000000.JPEG", "image_0/000001.png", "image_1/000001.Jpg",
+                           "image_0/notes.txt", "m/im0.jpg", "m/im1.JPG"}) {
+    add_text(name, "x");
+  }
+  add_text("m/calib.txt", kOwnCalibration);
+  const StereoSequence sequence = open_folder(root_);
+  EXPECT_EQ(numbers_of(sequence), (std::vector<int>{0, 1}));
+  EXPECT_EQ(sequence.frames[0].right, root_ / "image_1/000000.JPEG");
+  EXPECT_EQ(open_folder(root_ / "m").frames[0].right, root_ / "m/im1.JPG");
+  for (const char* right : {"image_1/*", "image_1/%06d"}) {
+    EXPECT_EQ(open_patterns(path("image_0/%06d"), path(right), root_ / "c.toml").frames.size(), 2u);
+  }
+  EXPECT_EQ(open_patterns(path("image_0/*.JPG"), path("image_1/*.jpeg"), root_ / "c.toml").frames.size(), 1u);
+  add_text("multi/calib/000003.txt", kProjections);
+  add_text("multi/image_0/000003_10.jpg", "x"), add_text("multi/image_1/000003_10.jpg", "x");
+  EXPECT_EQ(numbers_of(open_kitti_multiview(root_ / "multi", "3")), (std::vector<int>{10}));
+  add_text("image_0/000000.png", "x");
+  expect_refused([&] { open_folder(root_); }, {"means the same frame"});
+}
+
+TEST_F(DatasetTest, AFolderOfAnotherLevelIsNamedWithWhatItHolds) {
+  for (const char* scene : {"000003", "000007"}) {
+    add_images({"kitti/training/image_0/" + std::string(scene) + "_10",
+                "kitti/training/image_1/" + std::string(scene) + "_10"});
+  }
+  for (const char* folder : {"kitti", "kitti/training"}) {
+    expect_refused([&] { open_folder(root_ / folder); },
+                   {"000003..000007", "--kitti", "kitti/training --scene 000003"});
+  }
+  expect_refused([&] { open_kitti_odometry(root_ / "kitti/training"); }, {"holds no images", "--kitti"});
+  for (const char* name : {"odo/sequences/00/image_0/000000", "odo/sequences/00/image_1/000000"}) add_images({name});
+  expect_refused([&] { open_folder(root_ / "odo"); }, {"odo: is no stereo sequence", "it holds sequences/00: give"});
+  expect_refused([&] { open_kitti_odometry(root_ / "odo"); }, {"it holds sequences/00: give"});
+  expect_refused([&] { open_folder(root_ / "odo/sequences"); }, {"it holds 00: give", "odo/sequences/00"});
+  expect_refused([&] { open_folder(root_ / "odo/sequences/00/image_1"); }, {"belongs to the sequence", "sequences/00"});
+  add_images({"own/left/1", "own/right/1"}), add_text("rec/mav0/cam0/data.csv", "x"), add_text("out/report.json", "{}");
+  expect_refused([&] { open_folder(root_ / "own"); }, {"--left '", "own/left/*'", "own/right/*'"});
+  expect_refused([&] { open_folder(root_ / "own/left"); }, {"images of its own"});
+  expect_refused([&] { open_folder(root_ / "rec"); }, {"egosgm rectify --euroc"});
+  expect_refused([&] { open_folder(root_ / "out"); }, {"egosgm run"});
+  expect_refused([&] { open_folder(root_ / "own/left/1.png"); }, {"is no folder", "--left PATTERN", "quotes"});
+  expect_refused([&] { open_kitti_multiview(root_ / "odo", "7"); }, {"it holds sequences/00"});
+}
+
+TEST_F(DatasetTest, TimesAreThoseOfTheSequencesFolder) {
+  add_odometry(0, 1), add_text("c.toml", kOwnCalibration);
+  const auto times = [&](const std::string& folder) {
+    return open_patterns(path("a/b/image_0/*"), path("a/b/image_1/*"), root_ / folder / "c.toml").times_file;
+  };
+  add_images({"a/b/image_0/000000", "a/b/image_1/000000"});
+  add_text("a/b/calib.txt", kProjections), add_text("a/times.txt", "0\n"), add_text("a/c.toml", kOwnCalibration);
+  EXPECT_EQ(open_folder(root_ / "a/b").times_file, "") << "another sequence's, maybe";
+  EXPECT_EQ(times("a"), "");
+  add_text("a/b/times.txt", "0\n"), add_text("a/b/c.toml", kOwnCalibration);
+  EXPECT_EQ(open_folder(root_ / "a/b").times_file, root_ / "a/b/times.txt");
+  EXPECT_EQ(times("a"), "");
+  EXPECT_TRUE(std::filesystem::equivalent(times("a/b"), root_ / "a/b/times.txt"));
+  add_text("a/b/image_0/timestamps.txt", "0\n");
+  EXPECT_EQ(times("a"), root_ / "a/b/image_0/timestamps.txt");
+}
+
+TEST_F(DatasetTest, FilesWithoutAPartnerAreTold) {
+  for (const char* name : {"l/0", "l/2", "r/0", "r/1", "r/2"}) add_images({name});
+  const ImagePairs pairs = find_pairs(path("l/*.png"), path("r/%d.png"));
+  ASSERT_EQ(pairs.pairs.size(), 2u);
+  EXPECT_EQ(pairs.pairs[1].first, root_ / "l/2.png");
+  EXPECT_EQ(pairs.pairs[1].second, root_ / "r/2.png");
+  EXPECT_EQ(pairs.alone, (std::vector<std::filesystem::path>{root_ / "r/1.png"}));
 }
 
 TEST_F(DatasetTest, OnePairAndMiddlebury) {
@@ -236,12 +398,28 @@ TEST_F(DatasetTest, PosesBelongToFrameNumbersOrPositions) {
     for (int k = 0; k < count; ++k) text += "1 0 0 0 0 1 0 0 0 0 1 " + std::to_string(k) + "\n";
     return text;
   };
-  add_text("poses.txt", rows(6));
-  EXPECT_EQ(poses_of_frames(sequence, root_ / "poses.txt").at(0).translation().z(), 2);
-  add_text("poses.txt", rows(3));
-  EXPECT_EQ(poses_of_frames(sequence, root_ / "poses.txt").at(0).translation().z(), 0);
-  add_text("poses.txt", rows(4));
-  expect_refused([&] { poses_of_frames(sequence, root_ / "poses.txt"); }, {"poses.txt", "holds 4 poses", "2..4"});
+  const auto first = [&](const StereoSequence& chosen, int count) {
+    add_text("poses.txt", rows(count));
+    return poses_of_frames(chosen, root_ / "poses.txt").at(0).translation().z();
+  };
+  EXPECT_EQ(first(sequence, 5), 2) << "a row for each number";
+  EXPECT_EQ(first(sequence, 3), 0) << "a row for each frame";
+  for (const int neither : {1, 2, 4, 6}) {
+    expect_refused([&] { first(sequence, neither); }, {"poses.txt", "holds " + std::to_string(neither) + " poses",
+                                                       "5 (each number", "3 (each frame of 2..4"});
+  }
+  add_odometry(2, 9);
+  const StereoSequence part = open_kitti_odometry(root_, parse_frame_range("4:6"));
+  EXPECT_EQ(first(part, 10), 4);
+  EXPECT_EQ(first(part, 8), 2) << "rows of 2..9, though there is a row of each number up to 6";
+  EXPECT_EQ(first(part, 3), 0) << "rows of 4..6";
+  expect_refused([&] { first(part, 7); }, {"holds 7 poses", "10 (each", "8 (each", "3 (each chosen frame, 4..6"});
+  StereoSequence unknown = part;
+  unknown.numbers.clear();
+  EXPECT_EQ(first(unknown, 10), 4);
+  EXPECT_EQ(first(unknown, 3), 0);
+  expect_refused([&] { first(unknown, 6); }, {"holds 6 poses"});
+  EXPECT_EQ(rows_of_frames(part, 8, "times.txt", "times"), (std::vector<std::size_t>{2, 3, 4}));
 }
 
 TEST(DatasetData, RealSequencesOpen) {

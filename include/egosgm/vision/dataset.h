@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "egosgm/calibration.h"
@@ -17,18 +18,25 @@ namespace egosgm::vision {
 struct StereoFrame {
   int number = 0;                              // the frame's own number: 10 for 000151_10.png
   std::string name;                            // the number with six digits: outputs are named NAME.png
-  std::filesystem::path left, right;           // PNG
+  std::filesystem::path left, right;           // PNG or JPEG
   std::filesystem::path truth_noc, truth_occ;  // left disparity: non-occluded pixels, all pixels
 };
 
-/// Consecutive frames of one rectified camera pair. `frames` is not empty and ascends by one in `number`.
+/// Frames of one rectified camera pair, one after the other. `frames` is not empty and ascends in `number`; numbers may
+/// have gaps, of which `note` tells.
 struct StereoSequence {
   std::string title;  // "KITTI 2012 scene 000151"
   std::vector<StereoFrame> frames;
+  std::vector<int> numbers;  // of all frames that are there, chosen or not, ascending
+  std::string note;          // what is unusual about the frames, for the user; empty where nothing is
   Calibration calibration;
   std::filesystem::path calibration_file;
   std::filesystem::path poses_file;  // the true poses, empty where there are none
+  std::filesystem::path times_file;  // when the frames were taken, empty where no file says so
 };
+
+/// What tells which left and right images belong together: equal texts in their names, or their order.
+enum class PairBy { kName, kOrder };
 
 /// Frame numbers first..last, both included. An open end takes what there is.
 struct FrameRange {
@@ -40,7 +48,8 @@ EGOSGM_EXPORT FrameRange parse_frame_range(const std::string& text);
 
 // The openers look at names and read the calibration; images are read one by one later. They throw InvalidArgument,
 // naming the file or folder and the remedy: a folder or calibration missing, no such scene (the nearest ones are
-// listed), a frame missing inside the range, a left image without its right one. Thread-safe.
+// listed), an end of the range beyond the frames, a left image without its right one, two files for one image, a folder
+// of another level or layout (with what was found there). Thread-safe.
 
 /// KITTI 2012 (image_0, image_1, calib) or 2015 (image_2, image_3, calib_cam_to_cam) multi-view: `folder` is
 /// `training`, `testing` or their parent; `scene` is "000151" or "151".
@@ -57,14 +66,29 @@ EGOSGM_EXPORT StereoSequence open_kitti_odometry(const std::filesystem::path& fo
 EGOSGM_EXPORT StereoSequence open_kitti_raw(const std::filesystem::path& folder, FrameRange range = {});
 
 /// Middlebury 2014 scene: im0.png, im1.png, calib.txt, disp0GT.pfm if there. One frame, number 0.
-EGOSGM_EXPORT StereoSequence open_middlebury(const std::filesystem::path& folder);
+EGOSGM_EXPORT StereoSequence open_middlebury(const std::filesystem::path& folder, FrameRange range = {});
 
-/// Any pair of PNG files or patterns. A pattern's file name holds one `%d`, `%06d`, ... (the frame's number) or one `*`
-/// (left and right files with equal text there belong together; the text is the frame's number if all of them are
-/// numbers, else frames are counted from 0 in the order of names). Without either it names one pair, number 0.
-/// A left folder called image_2 or image_02 takes the colour cameras of KITTI's calibration, any other the grey ones.
+/// Any pair of images or patterns. A pattern's file name holds one `%d`, `%06d`, ... (the frame's number) or one `*`;
+/// without an extension it means PNG and JPEG. Left and right files with equal text there belong together, or, with
+/// PairBy::kOrder, the first ones, the second ones, and so on. The (left) text is the frame's number if all of them are
+/// different numbers, else frames are counted from 0 in the order of names, numbers in them by their value. Without
+/// `%d` or `*` it names one pair, number 0. A left folder called image_2 or image_02 takes the colour cameras of
+/// KITTI's calibration, any other the grey ones.
 EGOSGM_EXPORT StereoSequence open_patterns(const std::string& left, const std::string& right,
-                                           const std::filesystem::path& calibration_file, FrameRange range = {});
+                                           const std::filesystem::path& calibration_file, FrameRange range = {},
+                                           PairBy pair_by = PairBy::kName);
+
+struct ImagePairs {
+  std::vector<std::pair<std::filesystem::path, std::filesystem::path>> pairs;  // left and right, in order
+  std::vector<std::filesystem::path> alone;                                    // without one of the other camera
+};
+
+/// The files that belong together by open_patterns' rules, of any kind and size. Throws as it does, but for files
+/// without a partner. Thread-safe.
+EGOSGM_EXPORT ImagePairs find_pairs(const std::string& left, const std::string& right, PairBy pair_by = PairBy::kName);
+
+/// The files that one pattern names, in order. Throws as open_patterns. Thread-safe.
+EGOSGM_EXPORT std::vector<std::filesystem::path> find_images(const std::string& pattern);
 
 /// Opens `folder` as whichever of KITTI odometry, KITTI raw or Middlebury it is.
 EGOSGM_EXPORT StereoSequence open_folder(const std::filesystem::path& folder, FrameRange range = {});
@@ -80,8 +104,14 @@ EGOSGM_EXPORT StereoImages read_images(const StereoFrame& frame);
 /// Reads only the headers: throws InvalidArgument at the first image whose size is not that of the first. Thread-safe.
 EGOSGM_EXPORT cv::Size check_image_sizes(const StereoSequence& sequence);
 
-/// The pose of each frame: row `number` of the file's poses, or, where there are as many rows as frames, row by row.
-/// Throws InvalidArgument, naming `poses_file`, where neither fits.
+/// Which of a file's `rows` belongs to each frame. A file has a row for each number from 0 to the sequence's last one
+/// (as KITTI's have), or for each frame of the sequence, or for each chosen frame; where `numbers` is empty (unknown),
+/// for each frame, or for each number up to the last one at least. Throws InvalidArgument, naming the file and `what`
+/// its rows are, where none fits. Thread-safe.
+EGOSGM_EXPORT std::vector<std::size_t> rows_of_frames(const StereoSequence& sequence, std::size_t rows,
+                                                      const std::filesystem::path& file, const std::string& what);
+
+/// The pose of each frame, by rows_of_frames. Throws as it and read_poses do.
 EGOSGM_EXPORT std::vector<Eigen::Isometry3d> poses_of_frames(const StereoSequence& sequence,
                                                              const std::filesystem::path& poses_file);
 

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "egosgm/vision/dataset.h"
+
+namespace egosgm::vision {
+
+/// Names of one camera's images: a prefix, what tells the frames apart, and a suffix.
+struct NamePattern {
+  enum class Kind { kPlain, kNumber, kAnything };  // nothing, `%06d` or `*` between prefix and suffix
+
+  std::filesystem::path folder;
+  std::string prefix, suffix;  // a suffix without a dot stands for those of all kinds of images
+  Kind kind = Kind::kPlain;
+  int digits = 1;          // least number of them
+  bool any_width = false;  // fewer or more digits will do, too
+
+  /// The file that `text` in the place of `%06d` or `*` means, whether it is there or not.
+  std::filesystem::path file_of(const std::string& text) const;
+};
+
+/// Throws InvalidArgument where `pattern` holds more than one `%d` or `*`, or one in a folder's name.
+NamePattern parse_pattern(const std::string& pattern);
+
+/// Files of one moment; one of the paths is empty where only the other camera has one.
+struct NamedPair {
+  std::string text;  // what stands in the place of `%06d` or `*`
+  int number = 0;    // the text, where all of them are different numbers, else the position
+  std::filesystem::path left, right;
+};
+
+/// Files that match, in order. Throws InvalidArgument where none belongs to the other camera's, and where two files of
+/// one camera mean the same frame.
+std::vector<NamedPair> pair_files(const NamePattern& left, const NamePattern& right, PairBy pair_by);
+
+/// The files that match, in order. Throws as pair_files.
+std::vector<std::filesystem::path> files_in_order(const NamePattern& pattern);
+
+/// The frames in `range`, or an error that names the first file that is missing; fills `frames`, `numbers`, `note`.
+void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left, const NamePattern& right,
+                   FrameRange range, const std::string& what, StereoSequence& sequence);
+
+bool is_image_name(const std::filesystem::path& name);  // .png, .jpg, .jpeg, in any case
+
+/// Names in a folder, sorted. Throws InvalidArgument where it cannot be listed.
+std::vector<std::string> list_folder(const std::filesystem::path& folder);
+
+bool is_digits(std::string_view text);
+bool is_folder(const std::filesystem::path& path);
+bool is_file(const std::filesystem::path& path);
+
+/// A frame's number, if it has room in an int.
+std::optional<int> parse_frame_number(std::string_view text);
+
+/// At least `width` digits.
+std::string padded(const std::string& digits, int width);
+
+}  // namespace egosgm::vision
