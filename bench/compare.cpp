@@ -384,9 +384,9 @@ int run(int argc, char** argv) {
   for (const shared::ImageSize size : arguments.size ? std::vector{*arguments.size} : all_sizes) {
     const Clip clip = load_clip({size.width, size.height});
     if (machine.input.empty()) {
-      machine.input = clip.title;
+      machine.input = clip.title + ", OpenCV " CV_VERSION;
       print_machine(machine);
-      std::printf("OpenCV %s, %d threads allowed\n", CV_VERSION, arguments.threads);
+      std::printf("%d threads allowed\n", arguments.threads);
     }
     const std::vector<int> ranges = arguments.disparities ? std::vector{*arguments.disparities} : all_ranges;
     for (const std::vector<int>& together : turns_of(ranges, size)) compare(clip, together, where, arguments, rows);

@@ -1,0 +1,87 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Measures accuracy, search and drift through the program `egosgm`, and tells which figures keep their limits.
+
+  python3 bench/accuracy                      the table of limits (exit code 1 where one is missed, 3 where rows were skipped)
+  python3 bench/accuracy --ego-motion         the table of stereo odometry alone: drift, error, time, and what it is worth to the disparities
+  python3 bench/accuracy --ablation           and every addition on and off, OpenCV's matchers, and the figures of the plots
+  python3 bench/accuracy --kitti2015 DIR --scenes 84,87,130,146,148 --frames 0:10
+                                      the table of Fucek et al. (IFAC 2017) on KITTI 2015's multi-view data
+Plots and markdown from the JSON: bench/plot.py.
+"""
+import argparse
+import datetime
+import json
+import pathlib
+import subprocess
+import sys
+
+from ablation import ablation, ablation_inputs, curves, paper_table
+from ego_motion import ego_motion_table
+from inputs import PROJECT, Bench
+from rows import main_table
+
+
+def commit():
+    done = subprocess.run(["git", "describe", "--always", "--dirty", "--abbrev=10"], cwd=PROJECT, capture_output=True, text=True)
+    return done.stdout.strip() or "unknown"
+
+
+def write_json(path, content):
+    unfinished = pathlib.Path(str(path) + ".part")
+    unfinished.write_text(json.dumps(content, indent=1) + "\n")
+    unfinished.replace(path)
+
+
+def parse_arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--egosgm", metavar="FILE", help="the program (else the newest build*/apps/egosgm)")
+    parser.add_argument("--data", metavar="DIR", help="real sequences (else $EGOSGM_DATA, else ../shared/data beside the project)")
+    parser.add_argument("--work", metavar="DIR", default=PROJECT / "out/accuracy", help="where runs are written (out/accuracy)")
+    parser.add_argument("--json", metavar="FILE", help="write all figures")
+    parser.add_argument("--only", metavar="REGEX", default="", help="only these groups of rows: 'synthetic', '2012 / 000151', 'poles', ...")
+    parser.add_argument("--no-speed", action="store_true", help="do not run egosgm_compare or egosgm_odometry")
+    parser.add_argument("--compare-json", metavar="FILE", help="take the speed from what egosgm_compare --json wrote")
+    parser.add_argument("--no-maps", action="store_true", help="leave out what needs the maps pixel by pixel: flicker, poles, variances, 500 frames")
+    parser.add_argument("--ego-motion", action="store_true", help="stereo odometry alone, and nothing else")
+    parser.add_argument("--ablation", action="store_true", help="every addition on and off, OpenCV's matchers, figures of the plots")
+    parser.add_argument("--inputs", metavar="REGEX", default="", help="only these inputs of --ablation, by title")
+    parser.add_argument("--kitti2015", metavar="DIR", help="KITTI 2015 multi-view data: the paper's table, and nothing else")
+    parser.add_argument("--scenes", metavar="LIST", default="84,87,130,146,148", help="of --kitti2015")
+    parser.add_argument("--frames", metavar="FIRST:LAST", default="0:10", help="of --kitti2015")
+    return parser.parse_args()
+
+
+def main():
+    arguments = parse_arguments()
+    bench = Bench(arguments)
+    content = {"commit": commit(), "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")}
+    if arguments.kitti2015:
+        content["kitti2015"] = paper_table(bench, arguments)
+        skipped = [row for row in content["kitti2015"] if "skipped" in row]
+        code = 3 if skipped else 0
+    else:
+        table = ego_motion_table(bench, arguments) if arguments.ego_motion else main_table(bench, arguments)
+        table.print()
+        content["rows"], content["curves"] = table.rows, table.curves
+        skipped, code = table.skipped(), table.exit_code()
+        if arguments.ablation:
+            inputs = ablation_inputs(bench, arguments.inputs)
+            content["ablation"] = ablation(bench, inputs)
+            content["curves"].update(curves(bench, inputs))
+    content["device"] = bench.device.get("name", "")
+    content["driver"] = bench.device.get("driver", "")
+    print(f"\n{content['device']}, driver {content['driver']}, commit {content['commit']}, {content['date']}")
+    if arguments.json:
+        write_json(arguments.json, content)
+    if skipped:
+        print(f"accuracy: {len(skipped)} rows skipped, so not all was measured" + ("" if bench.data.is_dir() else f": no data at {bench.data}"),
+              file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except OSError as error:  # a folder or file that cannot be written or read
+        sys.exit(f"accuracy: {error}")

@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Writes docs/measured.md from what the benches left in docs/measured/: the only page with figures that a run could change.
+
+  scripts/write_measured.py           writes the page
+  scripts/write_measured.py --check   exit code 1 where the page is not what would be written, 77 where there is nothing to write it from
+scripts/measure runs the benches. All of one page must come from one commit without changes, or it is refused.
+"""
+import argparse
+import json
+import pathlib
+import sys
+
+DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs"
+FILES = ("accuracy", "compare", "stages")
+CONTENDERS = {
+    "opencv_hh": "OpenCV MODE_HH, 8 paths, left view",
+    "opencv_hh4": "OpenCV MODE_HH4, 4 paths, left view",
+    "opencv_sgbm": "OpenCV MODE_SGBM, 5 paths, left view",
+    "opencv_3way": "OpenCV MODE_SGBM_3WAY, 3 paths, left view",
+    "egosgm_full_left": "EgoSGM, full range, 8 paths, left view",
+    "egosgm_full_both": "EgoSGM, full range, both views, checked",
+    "egosgm_banded_frame": "EgoSGM, steady frame, motion given",
+    "egosgm_video_frame": "EgoSGM, steady frame with odometry",
+}
+NO_FILES, DIFFERS = 77, 1
+
+
+class Refused(Exception):
+    """What the files hold makes no page."""
+
+
+def read(folder):
+    missing = [name for name in FILES if not (folder / f"{name}.json").exists()]
+    if missing:
+        raise FileNotFoundError(", ".join(f"{folder / name}.json" for name in missing))
+    return {name: json.loads((folder / f"{name}.json").read_text()) for name in FILES}
+
+
+def expect_one_commit(found):
+    commits = {name: content["commit"] for name, content in found.items()}
+    if len(set(commits.values())) != 1 or any(commit.endswith("-dirty") or commit == "unknown" for commit in commits.values()):
+        raise Refused(f"not of one commit without changes: {commits}: run scripts/measure on a clean checkout")
+    devices = {(content["device"], content["driver"]) for content in found.values()}
+    if len(devices) != 1:
+        raise Refused(f"not of one device: {sorted(devices)}: run scripts/measure on one machine")
+
+
+def table(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "| " + " | ".join("---" if i == 0 else "---:" for i in range(len(header))) + " |"]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
+
+
+def number(value, unit=""):
+    if value is None:
+        return ""
+    return f"{value:.{2 if abs(value) >= 1 else 3}f}" + (f" {unit}" if unit else "")
+
+
+def limit_of(row):
+    if row.get("at_most") is not None:
+        return f"≤ {row['at_most']:.4g}"
+    return f"≥ {row['at_least']:.4g}" if row.get("at_least") is not None else ""
+
+
+def accuracy(content):
+    rows, skipped = [], []
+    for row in content["rows"]:
+        if "value" not in row:
+            skipped.append(f"- {row['input']}: {row['figure']}")
+            continue
+        verdict = " **missed**" if row["passed"] is False else ""
+        rows.append([row["input"], row["figure"], number(row["value"], row["unit"]), number(row["single_frame"]), limit_of(row) + verdict])
+    text = "## Accuracy\n\n\"Single frame\" is the same matcher without the frames before (`--temporal off`), on the same frames.\n\n"
+    text += table(["input", "figure", "EgoSGM", "single frame", "limit"], rows)
+    return text + ("\nNot measured:\n\n" + "\n".join(skipped) + "\n" if skipped else "")
+
+
+def speed(content):
+    ms = {(row["name"], row["width"], row["height"], row["disparities"]): row["median_ms"] for row in content["rows"]}
+    rows = []
+    for row in content["rows"]:
+        name = row["name"].removesuffix("_1t")
+        one = name != row["name"]
+        reference = ms.get(("opencv_hh_1t" if one else "opencv_hh", row["width"], row["height"], row["disparities"]))
+        rows.append([CONTENDERS.get(name, name), f"{row['width']}×{row['height']}, {row['disparities']}", "1" if one else str(content["threads"]),
+                     number(row["cpus"]), number(row["median_ms"], "ms"), number(row["median_ms"] / reference) if reference else "",
+                     f"{100 * row['search_fraction']:.1f} %" if "search_fraction" in row else ""])
+    text = ("## Speed\n\nMedians of random turns. \"At work\" is processor time by wall time: how many threads a row kept at work in the mean. "
+            "\"/ MODE_HH\" is by MODE_HH's time with as many threads allowed.\n\n")
+    return text + table(["", "size, D", "threads allowed", "at work", "time", "/ MODE_HH", "search"], rows)
+
+
+def stages(content):
+    rows = [[row["name"], f"{row['width']}×{row['height']}, {row['disparities']}", number(row["median_ms"], "ms"), number(row["device_ms"], "ms"),
+             number(row["GB_s"])] for row in content["rows"]]
+    return "## Stages\n\nBoth views, each stage alone.\n\n" + table(["stage", "size, D", "time", "on the device", "GB/s"], rows)
+
+
+def page(found):
+    expect_one_commit(found)
+    machine = found["compare"]
+    head = ("# Measured\n\n<!-- Written by scripts/write_measured.py from docs/measured/: do not edit. -->\n\n"
+            f"{machine['device']}, {machine['compute_units']} compute units, {machine['version']}, driver {machine['driver']}; commit {machine['commit']}; "
+            f"{machine['date'][:10]}. Speed on {machine['input']}.\n`scripts/measure` runs all of it again. \"Search\" counts every cell that is matched "
+            "([how much is searched](how-it-works.md#how-much-is-searched)).\n")
+    return "\n".join([head, accuracy(found["accuracy"]), speed(found["compare"]), stages(found["stages"])])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing")
+    parser.add_argument("--docs", metavar="DIR", type=pathlib.Path, default=DOCS, help="where measured/ and measured.md are (docs)")
+    arguments = parser.parse_args()
+    written = arguments.docs / "measured.md"
+    try:
+        text = page(read(arguments.docs / "measured"))
+    except FileNotFoundError as missing:
+        print(f"write_measured: not there: {missing}: run scripts/measure", file=sys.stderr)
+        # A page without its files is worse than none.
+        return DIFFERS if written.exists() else NO_FILES
+    except Refused as reason:
+        print(f"write_measured: {reason}", file=sys.stderr)
+        return DIFFERS
+    if not arguments.check:
+        written.write_text(text)
+    elif not written.exists() or written.read_text() != text:
+        print(f"write_measured: {written} is not what its files say: run scripts/write_measured.py", file=sys.stderr)
+        return DIFFERS
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

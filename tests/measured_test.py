@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of bench/accuracy, and the page that scripts/write_measured.py makes of the benches' files. EGOSGM_PROGRAM names the program."""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(SOURCE / "bench/accuracy"))
+from tables import Missing, Table  # noqa: E402
+
+MACHINE = {"device": "a CPU", "driver": "1.0", "version": "OpenCL 3.0", "compute_units": 2, "threads": 2, "commit": "0123456789",
+           "date": "2026-01-02T03:04:05Z", "input": "a street"}
+SHAPE = {"width": 320, "height": 96, "disparities": 32}
+COMPARED = [{"name": "opencv_hh", **SHAPE, "median_ms": 20, "cpus": 1.0}, {"name": "opencv_hh_1t", **SHAPE, "median_ms": 22, "cpus": 1.0},
+            {"name": "egosgm_banded_frame_1t", **SHAPE, "median_ms": 11, "cpus": 0.99, "search_fraction": 0.136}]
+STAGES = [{"name": "Census", **SHAPE, "median_ms": 1.5, "device_ms": 1.25, "GB_s": 3.5}]
+
+
+class Tables(unittest.TestCase):
+    def test_a_figure_of_accuracy_has_its_single_frames(self):
+        table = Table()
+        for figure in ("bad_or_missing", "interpolated", "d1_interpolated", "bad after interpolation", "bad_of_valid, frame 10"):
+            with self.assertRaisesRegex(ValueError, "single frame"):
+                table.add("street", figure, 1.0)
+            table.add("street", figure, 1.0, single=2.0)
+        table.add("street", "search", 1.0)
+
+    def test_limits(self):
+        table = Table()
+        for value, passed in ((5, True), (5.01, False), (float("nan"), False), (None, False)):
+            table.add("street", "bad_or_missing", value, single=0, limit="poles")
+            self.assertEqual((table.rows[-1]["at_most"], table.rows[-1]["goal"], table.rows[-1]["passed"]), (5, 1, passed))
+
+    def test_what_was_skipped_is_not_kept(self):
+        def missing():
+            raise Missing("it is not there")
+        table = Table()
+        table.add("street", "search", 1.0, at_most=2)
+        self.assertEqual(table.exit_code(), 0)
+        table.fill("2012", missing)
+        self.assertEqual(table.exit_code(), 3)
+        table.add("street", "search", 3.0, at_most=2)
+        self.assertEqual(table.exit_code(), 1)
+
+    def test_without_data_the_bench_says_so(self):
+        with tempfile.TemporaryDirectory() as folder:
+            done = subprocess.run([sys.executable, "-B", SOURCE / "bench/accuracy", "--egosgm", os.environ["EGOSGM_PROGRAM"], "--no-speed", "--only", "2012",
+                                   "--data", f"{folder}/none", "--work", folder], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertIn("2 rows skipped", done.stderr)
+        self.assertIn(f"no data at {folder}/none", done.stderr)
+
+
+class Page(unittest.TestCase):
+    def setUp(self):
+        holder = tempfile.TemporaryDirectory()
+        self.addCleanup(holder.cleanup)
+        self.docs = pathlib.Path(holder.name)
+
+    def put(self, **changed):
+        table = Table()
+        table.add("street", "bad_or_missing", 1.25, single=2.5, at_most=1)
+        table.rows.append({"input": "2012", "figure": "skipped: not there", "skipped": True, "passed": None})
+        content = {"accuracy": {"rows": table.rows}, "compare": {"rows": COMPARED}, "stages": {"rows": STAGES}}
+        (self.docs / "measured").mkdir(exist_ok=True)
+        for name, rows in content.items():
+            (self.docs / f"measured/{name}.json").write_text(json.dumps({**MACHINE, **rows, **changed.get(name, {})}))
+
+    def write(self, *arguments):
+        return subprocess.run([sys.executable, "-B", SOURCE / "scripts/write_measured.py", "--docs", self.docs, *arguments], capture_output=True,
+                              text=True).returncode
+
+    def test_holds_the_figures(self):
+        self.put()
+        self.assertEqual(self.write(), 0)
+        page = (self.docs / "measured.md").read_text()
+        for text in ("| street | bad_or_missing | 1.25 % | 2.50 | ≤ 1 **missed** |", "- 2012: skipped: not there", "a CPU", "driver 1.0", "0123456789", "2026-01-02",
+                     "| EgoSGM, steady frame, motion given | 320×96, 32 | 1 | 0.990 | 11.00 ms | 0.500 | 13.6 % |",
+                     "| OpenCV MODE_HH, 8 paths, left view | 320×96, 32 | 2 | 1.00 | 20.00 ms | 1.00 |  |", "| Census | 320×96, 32 | 1.50 ms | 1.25 ms | 3.50 |"):
+            self.assertIn(text, page)
+
+    def test_check_tells_a_page_that_was_edited(self):
+        self.assertEqual(self.write("--check"), 77)
+        self.put()
+        self.assertEqual(self.write("--check"), 1)
+        self.write()
+        self.assertEqual(self.write("--check"), 0)
+        page = self.docs / "measured.md"
+        page.write_text(page.read_text().replace("1.25 %", "1.24 %"))
+        self.assertEqual(self.write("--check"), 1)
+
+    def test_one_commit_and_one_device(self):
+        for changed in ({"commit": "9876543210"}, {"device": "a GPU"}):
+            self.put(compare=changed)
+            self.assertEqual(self.write(), 1)
+        dirty = {"commit": "0123456789-dirty"}
+        self.put(accuracy=dirty, compare=dirty, stages=dirty)
+        self.assertEqual(self.write(), 1)
+        self.assertFalse((self.docs / "measured.md").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
