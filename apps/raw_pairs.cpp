@@ -67,28 +67,6 @@ class Video : public ImageSource {
   int number_ = 0;
 };
 
-/// Files that match a name with one `*`, shorter names first, so that 10 comes after 9.
-std::vector<fs::path> matching(const fs::path& pattern) {
-  const std::string name = pattern.filename().string();
-  const std::size_t star = name.find('*');
-  const std::string prefix = name.substr(0, star), suffix = name.substr(star + 1);
-  std::vector<fs::path> files;
-  std::error_code error;
-  const fs::path folder = pattern.has_parent_path() ? pattern.parent_path() : fs::path(".");
-  for (fs::directory_iterator file(folder, error), end; !error && file != end; file.increment(error)) {
-    const std::string text = file->path().filename().string();
-    if (text.size() >= prefix.size() + suffix.size() && text.starts_with(prefix) && text.ends_with(suffix)) {
-      files.push_back(file->path());
-    }
-  }
-  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
-    const std::string x = a.string(), y = b.string();
-    return x.size() != y.size() ? x.size() < y.size() : x < y;
-  });
-  if (files.empty()) throw InvalidArgument(pattern.string() + ": no file matches");
-  return files;
-}
-
 void require_same_size(const RawPair& pair, const std::string& what) {
   if (pair.left.size() == pair.right.size() && pair.left.depth() == pair.right.depth()) return;
   throw InvalidArgument(fmt::format("{}: the left image is {}x{}, the right one {}x{}: both need one size and depth",
@@ -160,6 +138,28 @@ class Listed : public RawPairs {
   std::size_t at_ = 0;
 };
 
+/// Files of equal names; those without a partner are left out, with a note.
+std::unique_ptr<RawPairs> open_file_pairs(const RawPairArguments& arguments) {
+  vision::ImagePairs found = vision::find_pairs(arguments.left, arguments.right, arguments.pair_by);
+  if (found.pairs.empty()) {
+    throw InvalidArgument(fmt::format("--left {} --right {}: no file matches both", arguments.left, arguments.right));
+  }
+  if (found.alone.size() > 2 * found.pairs.size()) {
+    throw InvalidArgument(
+        fmt::format("--left {} --right {}: only {} of equal names, {} without, {} say: give --pair-by "
+                    "order where order tells, or other patterns",
+                    arguments.left, arguments.right, counted(found.pairs.size(), "pair"),
+                    counted(found.alone.size(), "image"), found.alone.front().string()));
+  }
+  std::vector<ListedPair> pairs;
+  for (auto& [left, right] : found.pairs) pairs.push_back({std::move(left), std::move(right), std::nullopt});
+  return std::make_unique<Listed>(
+      std::move(pairs), found.alone.empty()
+                            ? ""
+                            : fmt::format("{} without the other camera's left out, the first is {}",
+                                          counted(found.alone.size(), "image"), found.alone.front().string()));
+}
+
 /// Rows LEFT RIGHT [SECONDS]; paths from the list's folder on.
 std::unique_ptr<RawPairs> open_list(const fs::path& file) {
   std::istringstream text(vision::read_file(file, kMaxListBytes));
@@ -220,26 +220,24 @@ std::unique_ptr<RawPairs> open_euroc(const fs::path& mav0) {
       std::move(pairs), alone > 0 ? fmt::format("{} without the other one left out", counted(alone, "image")) : "");
 }
 
-}  // namespace
-
-std::unique_ptr<ImageSource> open_images(const std::string& pattern) {
+/// Whether it names images, by a pattern or an image's extension; else it is a video.
+bool names_files(const std::string& pattern) {
   static const std::array<const char*, 9> extensions{".png",  ".jpg", ".jpeg", ".bmp", ".tif",
                                                      ".tiff", ".pgm", ".ppm",  ".webp"};
-  std::string wild = pattern;
-  const std::size_t name = wild.find_last_of('/') + 1;
-  if (const std::size_t percent = wild.find('%', name); percent != std::string::npos) {
-    const std::size_t end = wild.find('d', percent);
-    if (end == std::string::npos) throw InvalidArgument(pattern + ": its name must hold one * or one %d, %06d, ...");
-    wild.replace(percent, end + 1 - percent, "*");
-  }
-  if (wild.find('*', name) != std::string::npos) return std::make_unique<Files>(matching(wild));
+  if (fs::path(pattern).filename().string().find_first_of("*%") != std::string::npos) return true;
   std::string extension = fs::path(pattern).extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return std::tolower(c); });
-  if (std::find(extensions.begin(), extensions.end(), extension) != extensions.end()) {
-    return std::make_unique<Files>(std::vector<fs::path>{pattern});
-  }
-  return std::make_unique<Video>(pattern);
+  return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
+}
+
+}  // namespace
+
+std::unique_ptr<ImageSource> open_images(const std::string& pattern) {
+  if (!names_files(pattern)) return std::make_unique<Video>(pattern);
+  std::vector<fs::path> files = vision::find_images(pattern);
+  if (files.empty()) throw InvalidArgument(pattern + ": no file matches");
+  return std::make_unique<Files>(std::move(files));
 }
 
 std::unique_ptr<RawPairs> open_pairs(const RawPairArguments& arguments) {
@@ -251,6 +249,7 @@ std::unique_ptr<RawPairs> open_pairs(const RawPairArguments& arguments) {
                                                     : "half a pair") +
                           ": give --left and --right, or --side-by-side, or --list, or --euroc");
   }
+  if (two && names_files(arguments.left) && names_files(arguments.right)) return open_file_pairs(arguments);
   if (two) return std::make_unique<TwoSources>(arguments.left, arguments.right);
   if (!arguments.side_by_side.empty()) return std::make_unique<SideBySide>(arguments.side_by_side);
   if (!arguments.list.empty()) return open_list(arguments.list);

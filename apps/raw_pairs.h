@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "egosgm/vision/dataset.h"
+
 namespace egosgm::app {
 
 /// Images one after the other: of a video, of one file, or of all files that a pattern names (`*`, or `%06d`).
@@ -34,6 +36,7 @@ struct RawPair {
 /// Pairs from one of: two sources, one source with both images side by side, a list, an EuRoC folder.
 struct RawPairArguments {
   std::string left, right, side_by_side, list, euroc;
+  vision::PairBy pair_by = vision::PairBy::kName;  // of left and right files
 };
 
 class RawPairs {

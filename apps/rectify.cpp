@@ -11,6 +11,7 @@
 #include "apps/interrupt.h"
 #include "apps/progress.h"
 #include "apps/raw_pairs.h"
+#include "apps/sequence_arguments.h"
 #include "apps/stereo_rig.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 
 struct RectifyArguments {
   RawPairArguments input;
-  std::string calib, out, unit = "m";
+  std::string calib, out, unit = "m", pair_by;
   double alpha = 0;
   bool is_fisheye = false;
   bool quiet = false;
@@ -149,6 +150,7 @@ int rectify(const RectifyArguments& arguments) {
     throw InvalidArgument(fmt::format("--alpha {}: choose from 0 to 1", arguments.alpha));
   }
   RawPairArguments input = arguments.input;
+  input.pair_by = parse_pair_by(arguments.pair_by);
   if (!input.euroc.empty()) input.euroc = mav0_of(input.euroc);
   const std::unique_ptr<RawPairs> pairs = open_pairs(input);
   Rectifier rectifier(arguments);
@@ -191,6 +193,7 @@ Command add_rectify(CLI::App& program) {
       ->type_name("PATTERN")
       ->group(group);
   command->add_option("--right", input.right, "right images, likewise")->type_name("PATTERN")->group(group);
+  add_pair_by(*command, arguments->pair_by, group);
   command
       ->add_option("--side-by-side", input.side_by_side,
                    "images or a video with the left view in the left half and the right one in the right half")

@@ -11,6 +11,7 @@
 #include "apps/command.h"
 #include "apps/frame_panels.h"
 #include "apps/metrics_json.h"
+#include "apps/run_folder.h"
 #include "apps/templates.h"
 #include "apps/truth_pairs.h"
 #include "egosgm/error.h"
@@ -49,18 +50,15 @@ Json read_run(const fs::path& folder) {
   return run;
 }
 
-/// The sequence as far as the run's report tells: numbers, names, left images that are still there.
-vision::StereoSequence sequence_of(const Json& run) {
-  vision::StereoSequence sequence;
-  for (const Json& entry : run["frames"]) {
-    vision::StereoFrame frame;
-    frame.number = entry.at("frame").get<int>();
-    frame.name = fmt::format("{:06}", frame.number);
-    const fs::path left = entry.value("left", "");
-    if (fs::exists(left)) frame.left = left;
-    sequence.frames.push_back(frame);
+/// The sequence as far as the run's report tells, with the left images that are still there.
+vision::StereoSequence sequence_of(const fs::path& folder) {
+  std::optional<vision::StereoSequence> sequence = frames_of_run(folder);
+  if (!sequence)
+    throw InvalidArgument((folder / "report.json").string() + ": not the report of a run: its frames have no numbers");
+  for (vision::StereoFrame& frame : sequence->frames) {
+    if (!fs::exists(frame.left)) frame.left.clear();
   }
-  return sequence;
+  return std::move(*sequence);
 }
 
 /// Indices of the frames that are shown.
@@ -118,7 +116,7 @@ class Page {
       : arguments_(arguments),
         folder_(arguments.run),
         run_(read_run(folder_)),
-        sequence_(sequence_of(run_)),
+        sequence_(sequence_of(folder_)),
         panels_(run_["options"].value("disparities", 128)) {}
 
   std::string html() {

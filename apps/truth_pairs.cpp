@@ -3,41 +3,21 @@
 
 #include <fmt/core.h>
 
-#include <nlohmann/json.hpp>
-
 #include "apps/counted.h"
+#include "apps/run_folder.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
-
-/// report.json of the run that `estimate` is: OUT, OUT/disparity or OUT/disparity/000010.png. Empty where there is
-/// none.
-fs::path report_of(const fs::path& estimate) {
-  std::error_code error;
-  fs::path folder = fs::weakly_canonical(estimate, error);
-  const int levels = fs::is_directory(folder, error) ? 2 : 3;
-  for (int level = 0; level < levels; ++level, folder = folder.parent_path()) {
-    if (fs::is_regular_file(folder / "report.json", error)) return folder / "report.json";
-  }
-  return {};
-}
-
-std::map<std::string, std::string> image_names_of(const fs::path& report) {
+std::map<std::string, std::string> image_names_of_run(const fs::path& estimate) {
   std::map<std::string, std::string> names;
-  if (report.empty()) return names;
-  const Json run = Json::parse(vision::read_file(report, kMaxReportBytes), nullptr, /*allow_exceptions=*/false);
-  if (!run.is_object() || !run.contains("frames")) return names;
-  for (const Json& frame : run["frames"]) {
-    if (!frame.is_object() || !frame.contains("frame") || !frame.contains("left")) continue;
-    if (!frame["frame"].is_number_integer() || !frame["left"].is_string()) continue;
-    names[fmt::format("{:06}", frame["frame"].get<int>())] = fs::path(frame["left"].get<std::string>()).stem().string();
+  const std::optional<vision::StereoSequence> run = frames_of_run(estimate);
+  if (!run) return names;
+  for (const vision::StereoFrame& frame : run->frames) {
+    if (!frame.left.empty()) names[frame.name] = frame.left.stem().string();
   }
   return names;
 }
@@ -47,7 +27,7 @@ std::map<std::string, std::string> image_names_of(const fs::path& report) {
 vision::EvaluationPairs find_truth_pairs(const fs::path& estimate, const fs::path& truth, const std::string& frames) {
   vision::PairingOptions options;
   if (!frames.empty()) options.frames = vision::parse_frame_range(frames);
-  options.image_names = image_names_of(report_of(estimate));
+  options.image_names = image_names_of_run(estimate);
   return vision::pair_with_truth(estimate, truth, options);
 }
 
@@ -87,7 +67,8 @@ void ComparisonArguments::resolve(bool truth_is_needed) {
     free = argument;
   }
   if (estimate.empty()) throw InvalidArgument("no estimate: give ESTIMATE TRUTH, or --estimate and --truth");
-  if (truth.empty() && truth_is_needed) throw InvalidArgument("no truth: give ESTIMATE TRUTH, or --estimate and --truth");
+  if (truth.empty() && truth_is_needed)
+    throw InvalidArgument("no truth: give ESTIMATE TRUTH, or --estimate and --truth");
 }
 
 }  // namespace egosgm::app

@@ -69,5 +69,30 @@ class Eval(ProgramTest):
         self.assertIn("standard output", done.stderr)
 
 
+class EvalPoses(ProgramTest):
+    def drift(self, *arguments):
+        result = json.loads(self.assert_works("eval-poses", *arguments, "--json"))
+        return result["frames"], result["end_drift_m"]
+
+    def test_a_part_of_the_sequence_against_the_whole_truth(self):
+        truth, out = self.street / "poses.txt", self.new_folder() / "out"
+        self.assert_works("run", self.street, "--frames", "1:3", "--poses", truth, "--disparities", 48, "--out", out, "--quiet")
+        alone = self.new_folder() / "alone.txt"
+        alone.write_text((out / "poses.txt").read_text())
+        for arguments in ((out, truth), (out, self.street), ("--estimate", out / "poses.txt", "--truth", truth), ("--estimate", out, self.street),
+                          (alone, truth, "--frames", "1:3"), (alone, self.street, "--frames", "1:")):
+            frames, drift = self.drift(*arguments)
+            self.assertEqual(frames, 3)
+            self.assertLess(drift, 1e-5, arguments)
+        self.assertEqual(self.drift(out, truth, "--frames", "2:3")[0], 2)
+        self.assert_refused(["eval-poses", alone, truth], alone, "3 poses", f"{truth} {FRAMES}", "--frames FIRST:LAST")
+        self.assert_refused(["eval-poses", out, truth, "--frames", 2], out / "poses.txt", truth, "--frames 2")
+        self.assert_refused(["eval-poses", out], "no truth")
+        self.assert_refused(["eval-poses", "--estimate", out, "--truth", truth, "more"], "more")
+        two = self.new_folder() / "two.txt"
+        two.write_text("".join(truth.read_text().splitlines(True)[:2]))
+        self.assert_refused(["eval-poses", out, two], two, "holds 2 poses", out / "poses.txt")
+
+
 if __name__ == "__main__":
     unittest.main()

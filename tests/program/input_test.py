@@ -331,6 +331,23 @@ class Rectify(RectifyTest):
                 self.assertEqual((folder / file.relative_to(expected)).read_bytes(), file.read_bytes())
         self.assertEqual((listed / "times.txt").read_text(), "1.125000000\n1.250000000\n")
 
+    def test_pairs_are_those_of_equal_names(self):
+        raw = self.new_folder()
+        for side, missing in ((0, 2), (1, 4)):
+            (raw / f"cam{side}").mkdir()
+            for i in range(6):
+                if i != missing:
+                    write_grey(raw / f"cam{side}/{i:06}.png", numpy.full((40, 60), 10 * i + side))
+        for pattern in ("%06d.png", "*.png", "*"):
+            out, text = self.rectify("--left", raw / "cam0" / pattern, "--right", raw / "cam1" / pattern, calib=(self.street / "calib.txt").read_text())
+            self.assertIn("2 images without the other camera's left out", text)
+            pairs = [tuple(int(read_grey(out / f"image_{side}/00000{i}.png")[0, 0]) for side in (0, 1)) for i in range(4)]
+            self.assertEqual(pairs, [(0, 1), (10, 11), (30, 31), (50, 51)])
+            self.assertEqual(len(list((out / "image_0").iterdir())), 4)
+        out, text = self.rectify("--left", raw / "cam0/*.png", "--right", raw / "cam1/*.png", "--pair-by", "order",
+                                 calib=(self.street / "calib.txt").read_text())
+        self.assertEqual([int(read_grey(out / f"image_1/00000{i}.png")[0, 0]) for i in range(5)], [1, 11, 21, 31, 51])
+
     def test_what_is_rectified_already_is_only_split(self):
         both = self.new_folder() / "both.png"
         images = [read_grey(self.street / f"image_{side}/000000.png") for side in (0, 1)]
@@ -368,7 +385,9 @@ class Rectify(RectifyTest):
         refused(self.opencv_yaml(unit_m=-1, given=False), "exchange left and right")
         refused(self.opencv_yaml(unit_m=1e-3, given=False), "--unit mm")
         refused(good + "image_width: 640\nimage_height: 480\n", "640x480 were calibrated")
-        refused(good, "2 images", "1", arguments=[*self.PAIRS[:2], "--right", self.raw_folder / "cam1/9.png"])
+        refused(good, "both must hold", arguments=[*self.PAIRS[:2], "--right", self.raw_folder / "cam1/9.png"])
+        refused(good, "no right image has the name", "--pair-by order", arguments=[*self.PAIRS[:2], "--right", self.raw_folder / "cam1/9*.png"][:2] +
+                ["--right", self.street / "image_1/*.png"])
         refused(good, "no file matches", arguments=["--side-by-side", self.raw_folder / "*.jpg"])
         refused(good, "half a pair", arguments=self.PAIRS[:2])
         refused(good, "more than one input", arguments=[*self.PAIRS, "--list", file])
