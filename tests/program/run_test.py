@@ -13,6 +13,28 @@ from program_case import DATA, FRAMES, PROGRAM, ProgramTest, egosgm, grey_png
 
 
 class Run(ProgramTest):
+    def test_steps_names_by_order_and_a_folder_as_it_is(self):
+        skip, other = self.new_folder(), self.new_folder()
+        for i in range(FRAMES):
+            for side, name in ((0, "left"), (1, "right")):
+                image = self.street / f"image_{side}/00000{i}.png"
+                for folder, copy in ((skip / name, f"{10 * i}.png"), (other, f"{name}_{i + 7}.png")):
+                    folder.mkdir(exist_ok=True)
+                    shutil.copy(image, folder / copy)
+        calib, maps = self.street / "calib.txt", self.new_folder()
+        rest = ("--calib", calib, "--poses", self.street / "poses.txt", "--disparities", 48)
+        plain = self.assert_works("run", self.street, "--out", maps / "plain", *rest[2:])
+        self.assertNotIn("frame numbers", plain)
+        stepped = self.assert_works("run", "--left", skip / "left/*.png", "--right", skip / "right/*.png", "--out", maps / "steps", *rest)
+        self.assertIn(f"frame numbers 0..{10 * (FRAMES - 1)} go in steps of 10", stepped)
+        either = ("run", "--left", other / "l*.png", "--right", other / "r*.png", *rest)
+        self.assert_refused([*either, "--out", maps / "never"], "--pair-by order")
+        self.assert_works(*either, "--out", maps / "ordered", "--pair-by", "order")
+        for i in range(FRAMES):
+            expected = (maps / f"plain/disparity/00000{i}.png").read_bytes()
+            self.assertEqual((maps / f"steps/disparity/{10 * i:06}.png").read_bytes(), expected)
+            self.assertEqual((maps / f"ordered/disparity/00000{i}.png").read_bytes(), expected)
+
     def test_writes_maps_poses_and_report(self):
         out = self.new_folder()
         text = self.assert_works("run", "--odometry", self.street, "--out", out)
