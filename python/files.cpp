@@ -39,9 +39,11 @@ void bind_sequences(py::module_& module) {
       .def_readonly("truth_noc", &StereoFrame::truth_noc, "Left disparity of non-occluded pixels; empty: none.")
       .def_readonly("truth_occ", &StereoFrame::truth_occ, "Left disparity of all pixels; empty: none.")
       .def("read", &read_images, "Both images as grey: (left, right).");
-  py::class_<StereoSequence>(module, "StereoSequence", "Consecutive frames of one rectified camera pair.")
+  py::class_<StereoSequence>(module, "StereoSequence", "Frames of one rectified camera pair, one after the other.")
       .def_readonly("title", &StereoSequence::title)
       .def_readonly("frames", &StereoSequence::frames)
+      .def_readonly("numbers", &StereoSequence::numbers, "Of all frames that are there, chosen or not.")
+      .def_readonly("note", &StereoSequence::note, "What is unusual, such as gaps in the numbers; empty: nothing.")
       .def_readonly("calibration", &StereoSequence::calibration)
       .def_readonly("poses_file", &StereoSequence::poses_file, "The true poses; empty where there are none.")
       .def_property_readonly(
@@ -66,11 +68,15 @@ void bind_sequences(py::module_& module) {
       py::arg("folder"), py::arg("scene"), py::arg("frames") = "", "KITTI 2012 or 2015 multi-view.");
   module.def(
       "open_patterns",
-      [](const std::string& left, const std::string& right, const path& calibration, const std::string& frames) {
-        return vision::open_patterns(left, right, calibration, range_of(frames));
+      [](const std::string& left, const std::string& right, const path& calibration, const std::string& frames,
+         bool by_order) {
+        return vision::open_patterns(left, right, calibration, range_of(frames),
+                                     by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
       },
-      py::arg("left"), py::arg("right"), py::arg("calibration"), py::arg("frames") = "",
-      "PNG files or patterns such as 'left/%06d.png' or 'left/*.png'.");
+      py::arg("left"), py::arg("right"), py::arg("calibration"), py::arg("frames") = "", py::arg("by_order") = false,
+      "PNG or JPEG files or patterns such as 'left/%06d.png' or 'left/*.jpg'. by_order: the first left image belongs "
+      "to\n"
+      "the first right one, and so on; else those of equal names belong together.");
 }
 
 std::int64_t write_disparity(const path& file, const py::object& map) {

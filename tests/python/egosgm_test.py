@@ -286,6 +286,14 @@ def test_sequences_are_read(tmp_path, frames, street):
     egosgm.write_calibration(tmp_path / "c.toml", street.calibration)
     sequence = egosgm.open_patterns(str(tmp_path / "left_%d.png"), str(tmp_path / "right_%d.png"), tmp_path / "c.toml")
     assert len(sequence) == 2 and sequence.size == (WIDTH, HEIGHT) and sequence.frames[1].name == "000001"
+    assert sequence.numbers == [0, 1] and sequence.note == ""
+    names = str(tmp_path / "l*_*.png"), str(tmp_path / "r*.png"), tmp_path / "c.toml"
+    with pytest.raises(egosgm.InvalidArgument, match="one \\*"):
+        egosgm.open_patterns(*names)
+    names = str(tmp_path / "l*.png"), *names[1:]
+    with pytest.raises(egosgm.InvalidArgument, match="no right image has the name"):
+        egosgm.open_patterns(*names)
+    assert egosgm.open_patterns(*names, by_order=True).frames[1].right == sequence.frames[1].right
     left, right = sequence.frames[1].read()
     assert left.dtype == np.uint16
     np.testing.assert_array_equal(left // 256, frames[1].left)
