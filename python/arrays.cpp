@@ -2,6 +2,7 @@
 #include "python/arrays.h"
 
 #include <cmath>
+#include <limits>
 
 #include "egosgm/error.h"
 
@@ -30,7 +31,25 @@ bool rows_are_contiguous(const py::array& array) {
   return array.shape(1) < 2 || array.strides(1) == element_bytes(array);
 }
 
-py::array contiguous(const py::array& array) { return py::module_::import("numpy").attr("ascontiguousarray")(array); }
+bool is_aligned(const py::array& array) { return array.attr("flags").attr("aligned").cast<bool>(); }
+
+/// Rows that overlap, as broadcast ones do.
+bool rows_overlap(const py::array& array) {
+  return array.shape(0) > 1 && std::abs(array.strides(0)) < array.shape(1) * element_bytes(array);
+}
+
+/// A copy whose elements lie side by side and where their type wants them.
+py::array contiguous(const py::array& array) {
+  return py::module_::import("numpy").attr("require")(array, py::none(), "CA");
+}
+
+void expect_indexable(const py::array& array, const std::string& name) {
+  for (py::ssize_t i = 0; i < array.ndim(); ++i) {
+    if (array.shape(i) > std::numeric_limits<int>::max()) {
+      throw InvalidArgument(name + " is " + shape_of(array) + ": give a smaller one");
+    }
+  }
+}
 
 py::array_t<double> doubles_of(const py::object& object, const char* name) {
   auto array = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(object);
@@ -66,7 +85,8 @@ ImageArray image_of(const py::object& image, const char* name) {
   if (array.ndim() != 2 || (!bytes && !array.dtype().equal(py::dtype::of<std::uint16_t>()))) {
     throw InvalidArgument(std::string(name) + " is " + shape_of(array) + ": give " + kWanted);
   }
-  if (!rows_are_contiguous(array)) array = contiguous(array);
+  expect_indexable(array, name);
+  if (!rows_are_contiguous(array) || rows_overlap(array) || !is_aligned(array)) array = contiguous(array);
   const ImageView view{.data = array.data(),
                        .width = static_cast<int>(array.shape(1)),
                        .height = static_cast<int>(array.shape(0)),
@@ -80,11 +100,13 @@ cv::Mat map_of(const py::object& map, const char* name, py::array& keep) {
   if (keep.ndim() != 2 || keep.size() == 0) {
     throw InvalidArgument(std::string(name) + " is " + shape_of(keep) + ": give an H x W map of float32");
   }
+  expect_indexable(keep, name);
   if (!keep.dtype().equal(py::dtype::of<float>())) {
     py::object floats = py::module_::import("numpy").attr("asarray")(keep, py::dtype::of<float>());
     keep = floats;
   }
-  if (!rows_are_contiguous(keep) || keep.strides(0) < keep.shape(1) * element_bytes(keep)) keep = contiguous(keep);
+  if (!rows_are_contiguous(keep) || !is_aligned(keep) || keep.strides(0) < keep.shape(1) * element_bytes(keep))
+    keep = contiguous(keep);
   return cv::Mat(static_cast<int>(keep.shape(0)), static_cast<int>(keep.shape(1)), CV_32FC1,
                  const_cast<void*>(keep.data()), static_cast<std::size_t>(keep.strides(0)));
 }
@@ -96,10 +118,11 @@ MapView<T> output_of(const py::object& object, const std::string& name) {
   if (!py::isinstance<py::array>(object)) throw InvalidArgument("output " + name + " is no NumPy array: " + wanted);
   auto array = py::reinterpret_borrow<py::array>(object);
   if (array.ndim() != 2 || !array.dtype().equal(py::dtype::of<T>()) || !array.writeable() ||
-      !rows_are_contiguous(array)) {
+      !rows_are_contiguous(array) || rows_overlap(array) || !is_aligned(array)) {
     throw InvalidArgument("output " + name + " is " + shape_of(array) + (array.writeable() ? "" : ", read-only") +
                           ": " + wanted);
   }
+  expect_indexable(array, "output " + name);
   return {static_cast<T*>(array.mutable_data()), static_cast<int>(array.shape(1)), static_cast<int>(array.shape(0)),
           array.strides(0)};
 }
@@ -108,6 +131,7 @@ template MapView<std::uint16_t> output_of<std::uint16_t>(const py::object&, cons
 template MapView<std::uint8_t> output_of<std::uint8_t>(const py::object&, const std::string&);
 
 py::array array_of(const cv::Mat& mat) {
+  if (!mat.u) return array_of(mat.clone());  // memory of somebody else's
   const py::dtype type = mat.depth() == CV_8U    ? py::dtype::of<std::uint8_t>()
                          : mat.depth() == CV_16U ? py::dtype::of<std::uint16_t>()
                                                  : py::dtype::of<float>();

@@ -22,7 +22,7 @@ struct ImageArray {
 };
 
 /// A grey image, H x W of uint8 or uint16, rows at any stride. Copied only where a row's pixels do not lie side by
-/// side. Throws InvalidArgument, naming the image.
+/// side, rows overlap (broadcast ones) or pixels are not aligned. Throws InvalidArgument, naming the image.
 ImageArray image_of(const py::object& image, const char* name);
 
 /// An H x W map of float32; other numbers, and rows that are not contiguous, are converted into a copy, which `keep`

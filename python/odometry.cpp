@@ -3,6 +3,8 @@
 
 #include <pybind11/stl.h>
 
+#include <mutex>
+
 #include "egosgm/vision/synthetic.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
@@ -61,14 +63,31 @@ Options options_of(const py::kwargs& values) {
   return options;
 }
 
-OdometryResult process(StereoOdometry& odometry, const py::object& left, const py::object& right,
-                       const py::object& prior) {
-  const ImageArray left_image = image_of(left, "left"), right_image = image_of(right, "right");
-  std::optional<Eigen::Isometry3d> guess;
-  if (!prior.is_none()) guess = transform_of(prior, "prior");
-  const py::gil_scoped_release other_threads_run;
-  return odometry.process(left_image.view, right_image.view, guess);
-}
+/// One frame after the other, also where several Python threads call.
+class LockedOdometry {
+ public:
+  LockedOdometry(const Calibration& calibration, const vision::StereoOdometryOptions& options)
+      : odometry_(calibration, options) {}
+
+  OdometryResult process(const py::object& left, const py::object& right, const py::object& prior) {
+    const ImageArray left_image = image_of(left, "left"), right_image = image_of(right, "right");
+    std::optional<Eigen::Isometry3d> guess;
+    if (!prior.is_none()) guess = transform_of(prior, "prior");
+    const py::gil_scoped_release other_threads_run;
+    const std::lock_guard one_at_a_time(mutex_);
+    return odometry_.process(left_image.view, right_image.view, guess);
+  }
+
+  void reset() {
+    const py::gil_scoped_release other_threads_run;
+    const std::lock_guard one_at_a_time(mutex_);
+    odometry_.reset();
+  }
+
+ private:
+  std::mutex mutex_;
+  StereoOdometry odometry_;
+};
 
 void bind_synthetic(py::module_& module) {
   auto frame = py::class_<SyntheticFrame>(module, "SyntheticFrame", "Images, exact disparities [px] and masks.");
@@ -115,17 +134,17 @@ void bind_odometry(py::module_& module) {
       .def_readonly("standstill", &OdometryResult::standstill, "The motion is the identity: nothing but noise.")
       .def_readonly("reason", &OdometryResult::reason, "Why there is no motion; empty where there is one.");
 
-  py::class_<StereoOdometry>(module, "StereoOdometry",
+  py::class_<LockedOdometry>(module, "StereoOdometry",
                              "Ego-motion from rectified stereo video. Options as keyword arguments: see "
-                             "odometry_options(). One object per thread.")
+                             "odometry_options(). Threads that share one take turns.")
       .def(py::init([](const Calibration& calibration, const py::kwargs& values) {
-             return std::make_unique<StereoOdometry>(calibration, options_of<vision::StereoOdometryOptions>(values));
+             return std::make_unique<LockedOdometry>(calibration, options_of<vision::StereoOdometryOptions>(values));
            }),
            py::arg("calibration"))
-      .def("process", &process, py::arg("left"), py::arg("right"), py::arg("prior") = py::none(),
+      .def("process", &LockedOdometry::process, py::arg("left"), py::arg("right"), py::arg("prior") = py::none(),
            "The next frame; images as Pipeline.process takes them. `prior`, a 4x4 matrix current_from_previous, only "
            "guides the search. The first frame has no motion.")
-      .def("reset", &StereoOdometry::reset, "Forgets all frames: the next one is a first frame.");
+      .def("reset", &LockedOdometry::reset, "Forgets all frames: the next one is a first frame.");
   module.def(
       "odometry_options", [] { return dict_of_fields(vision::StereoOdometryOptions{}); },
       "All options of StereoOdometry with their defaults.");

@@ -7,7 +7,7 @@ namespace egosgm::python {
 namespace {
 
 std::string text_of(const py::handle& value) {
-  const auto text = py::str(value).cast<std::string>();
+  const auto text = py::str(whole(value)).cast<std::string>();
   return text == "True" ? "true" : text == "False" ? "false" : text;
 }
 
@@ -29,6 +29,12 @@ py::object typed(const NamedOption& option) {
 }
 
 }  // namespace
+
+py::object whole(const py::handle& value) {
+  const bool is_number = !py::isinstance<py::bool_>(value) && py::hasattr(value, "is_integer");
+  if (is_number && value.attr("is_integer")().cast<bool>()) return py::int_(py::reinterpret_borrow<py::object>(value));
+  return py::reinterpret_borrow<py::object>(value);
+}
 
 void set_options(PipelineOptions& options, const py::dict& values) {
   for (const auto& [key, value] : values) {

@@ -12,6 +12,9 @@ namespace egosgm::python {
 
 namespace py = pybind11;
 
+/// 150.0 as 150: a number that is whole may be given for a count, whatever its type. Others as they are.
+py::object whole(const py::handle& value);
+
 /// Options by name with Python's values: `banded_sgm__p2=150`, `banded_sgm={"p2": 150}` or `**{"banded_sgm.p2": 150}`.
 /// Throws InvalidArgument, as set_option does.
 void set_options(PipelineOptions& options, const py::dict& values);
@@ -32,7 +35,7 @@ void set_fields(Options& options, const py::kwargs& values) {
       if (wanted != name) return;
       found = true;
       try {
-        member = py::cast<std::decay_t<decltype(member)>>(value);
+        member = py::cast<std::decay_t<decltype(member)>>(whole(value));
       } catch (const py::cast_error&) {
         throw InvalidArgument("option " + wanted + ": " + py::cast<std::string>(py::repr(value)) +
                               " has the wrong type");

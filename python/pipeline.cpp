@@ -45,8 +45,12 @@ PipelineOptions preset_named(const std::string& name) {
 
 /// A dict of arrays to fill, or names of arrays to make.
 py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
-  if (py::isinstance<py::dict>(wanted)) return py::reinterpret_borrow<py::dict>(wanted);
-  py::dict arrays;
+  py::dict
+      arrays;  // never the caller's, which may change while the frame is under way: these references keep the arrays
+  if (py::isinstance<py::dict>(wanted)) {
+    arrays.attr("update")(wanted);
+    return arrays;
+  }
   for (const py::handle& item : py::isinstance<py::str>(wanted) ? py::make_tuple(wanted) : py::tuple(wanted)) {
     const auto name = item.cast<std::string>();
     if (name == "search_width") {
@@ -80,6 +84,26 @@ FrameOutputs views_of(const py::dict& arrays) {
     throw InvalidArgument("output \"" + name + "\": choose from " + all);
   }
   return outputs;
+}
+
+/// Throws InvalidArgument where a map to fill shares memory with another one of its frame or of one under way.
+void expect_apart(const py::dict& arrays, const std::deque<Frame>& under_way) {
+  const py::object share = py::module_::import("numpy").attr("may_share_memory");
+  std::vector<py::handle> taken;
+  for (const Frame& frame : under_way) {
+    for (const auto& [name, array] : frame.maps) taken.push_back(array);
+  }
+  const std::size_t of_others = taken.size();
+  for (const auto& [name, array] : arrays) {
+    for (std::size_t i = 0; i < taken.size(); ++i) {
+      if (!share(array, taken[i]).cast<bool>()) continue;
+      throw InvalidArgument(
+          "output " + py::str(name).cast<std::string>() + " shares memory with another map that is " +
+          (i < of_others ? "written until its frame is collected: collect it first, or give" : "to be filled: give") +
+          " an array of its own");
+    }
+    taken.push_back(array);
+  }
 }
 
 std::optional<Motion> motion_of(const py::object& motion) {
@@ -120,6 +144,7 @@ class LockedPipeline {
     const std::optional<Motion> moved = motion_of(motion);
     Frame frame{.maps = arrays_to_fill(wanted, width_, height_), .report = {}};
     const FrameOutputs outputs = views_of(frame.maps);
+    expect_apart(frame.maps, {});
     {
       const py::gil_scoped_release other_threads_run;
       const std::lock_guard one_at_a_time(mutex_);
@@ -136,13 +161,22 @@ class LockedPipeline {
     std::deque<Frame> dropped;  // goes when this thread may touch Python's objects again
     const py::gil_scoped_release other_threads_run;
     const std::lock_guard one_at_a_time(mutex_);
+    {
+      const py::gil_scoped_acquire python;
+      expect_apart(frame.maps, under_way_);
+    }
+    under_way_.push_back(std::move(frame));  // before anything writes to its arrays
     try {
       pipeline_.submit(left_image.view, right_image.view, moved, outputs);
     } catch (...) {
-      if (pipeline_.under_way() == 0) dropped.swap(under_way_);
+      if (pipeline_.under_way() == 0) {
+        dropped.swap(under_way_);
+      } else {
+        dropped.push_back(std::move(under_way_.back()));
+        under_way_.pop_back();
+      }
       throw;
     }
-    under_way_.push_back(std::move(frame));
   }
 
   Frame collect() {
@@ -165,7 +199,11 @@ class LockedPipeline {
     return std::move(*frame);
   }
 
-  int under_way() const { return pipeline_.under_way(); }
+  int under_way() {
+    const py::gil_scoped_release other_threads_run;
+    const std::lock_guard one_at_a_time(mutex_);
+    return pipeline_.under_way();
+  }
 
   void reset() {
     const py::gil_scoped_release other_threads_run;
@@ -302,8 +340,8 @@ void bind_pipeline(py::module_& module) {
       .def("submit", &LockedPipeline::submit, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
            py::arg("outputs") = py::make_tuple("disparity", "variance"),
            "The first half of process: copies the images, starts the frame and returns, so that Python may read and "
-           "estimate the next one meanwhile. At most two frames may be under way; arrays to fill are written until "
-           "their frame is collected.")
+           "estimate the next one meanwhile. At most two frames may be under way. Arrays to fill are kept and "
+           "written until their frame is collected; the dict may be used again at once, with other arrays in it.")
       .def("collect", &LockedPipeline::collect,
            "The second half: waits for the oldest frame under way and returns it. The bits are those of process. "
            "Raises InvalidArgument where none is under way, and DeviceError where one has failed: all are dropped "
