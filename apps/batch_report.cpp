@@ -11,6 +11,7 @@
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
 #include "egosgm/vision/file_io.h"
+#include "host/json_text.h"
 
 namespace egosgm::app {
 namespace {
@@ -48,7 +49,7 @@ void write(const fs::path& file, const Json& json) {
 }
 
 Json read(const fs::path& file) {
-  Json json = Json::parse(vision::read_file(file, kMaxReportBytes), nullptr, /*allow_exceptions=*/false);
+  Json json = parse_json(vision::read_file(file, kMaxReportBytes), file);
   if (json.is_object()) return json;
   throw InvalidArgument(file.string() + ": is not what egosgm batch wrote: remove it to do its sequence again");
 }

@@ -10,6 +10,7 @@
 #include "apps/run_outputs.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
+#include "host/json_text.h"
 
 namespace egosgm::app {
 namespace {
@@ -46,7 +47,7 @@ void remove_file(const fs::path& file) {
 
 /// Throws InvalidArgument, naming the first figure in which the run that is recorded in `file` differs.
 void expect_same(const fs::path& file, const Json& identity) {
-  const Json earlier = Json::parse(vision::read_file(file, kMaxReportBytes), nullptr, /*allow_exceptions=*/false);
+  const Json earlier = parse_json(vision::read_file(file, kMaxReportBytes), file);
   if (!earlier.is_object()) {
     throw InvalidArgument(file.string() + ": not the report of a run: give --overwrite to start anew");
   }

@@ -21,6 +21,7 @@
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/json_text.h"
 
 namespace egosgm::app {
 namespace {
@@ -41,7 +42,7 @@ Json read_run(const fs::path& folder) {
   if (!fs::exists(file)) {
     throw InvalidArgument(file.string() + ": no such file: give the folder that `egosgm run --out` wrote");
   }
-  Json run = Json::parse(vision::read_file(file, kMaxReportBytes), nullptr, /*allow_exceptions=*/false);
+  Json run = parse_json(vision::read_file(file, kMaxReportBytes), file);
   const auto has = [&](const char* key) { return run.is_object() && run.contains(key); };
   for (const char* key : {"input", "version", "device", "calibration", "options", "frames"}) {
     if (!has(key)) throw InvalidArgument(file.string() + ": not the report of a run: it has no \"" + key + "\"");
@@ -109,6 +110,30 @@ cv::Mat narrowed(const cv::Mat& picture, int width) {
   return scaled;
 }
 
+/// The text with the last folder and the name of each path in it: a page that is passed on tells nothing of the
+/// machine.
+std::string without_folders(const std::string& text) {
+  constexpr std::string_view kBetween = " and ";
+  std::string short_text;
+  for (std::size_t from = 0; from <= text.size();) {
+    const std::size_t end = std::min(text.find(kBetween, from), text.size());
+    std::string part = text.substr(from, end - from);
+    if (const std::size_t root = part.starts_with('/') ? 0 : part.find(" /"); root != std::string::npos) {
+      const fs::path path = part.substr(root == 0 ? 0 : root + 1);
+      part = part.substr(0, root == 0 ? 0 : root + 1) + (path.parent_path().filename() / path.filename()).string();
+    }
+    short_text += std::string(from ? kBetween : "") + part;
+    from = end + kBetween.size();
+  }
+  return short_text;
+}
+
+void shorten_paths(Json& json) {
+  if (json.is_string()) json = without_folders(json.get<std::string>());
+  if (!json.is_structured()) return;
+  for (Json& inner : json) shorten_paths(inner);  // as deep as parse_json allows
+}
+
 /// What the page shows; its script reads it from @DATA@.
 class Page {
  public:
@@ -126,6 +151,7 @@ class Page {
     add_paths(data);
     data["changed"] = changed_options();
     data["notes"] = notes_;
+    shorten_paths(run_);
     data["run"] = std::move(run_);
     std::string json = data.dump(-1, ' ', false, Json::error_handler_t::replace);
     // Nothing in a text may end the script element.

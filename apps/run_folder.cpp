@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "egosgm/vision/file_io.h"
+#include "host/json_text.h"
 
 namespace egosgm::app {
 namespace {
@@ -47,7 +48,7 @@ std::vector<int> numbers_of(const Json& run) {
 std::optional<vision::StereoSequence> frames_of_run(const fs::path& path) {
   const fs::path file = report_of(path);
   if (file.empty()) return std::nullopt;
-  const Json run = Json::parse(vision::read_file(file, kMaxReportBytes), nullptr, /*allow_exceptions=*/false);
+  const Json run = parse_json(vision::read_file(file, kMaxReportBytes), file);
   if (!run.is_object() || !run.contains("frames")) return std::nullopt;
   vision::StereoSequence sequence;
   for (const Json& entry : run["frames"]) {

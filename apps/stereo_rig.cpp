@@ -107,6 +107,16 @@ std::optional<cv::Size> find_size(const std::vector<cv::FileStorage>& files) {
   return std::nullopt;
 }
 
+/// Rounded to a few digits, as files have them.
+void check_rotation(const char* name, const cv::Mat& R) {
+  constexpr double kMaxError = 1e-2;
+  const double error = cv::norm(R * R.t() - cv::Mat::eye(3, 3, CV_64F), cv::NORM_INF);
+  if (error <= kMaxError && cv::determinant(R) > 0) return;
+  throw InvalidArgument(fmt::format(
+      "{} is no rotation: its rows are not of length 1 and at right angles; give the calibration as it was computed",
+      name));
+}
+
 void check_stance(const cv::Mat& T) {
   const double x = T.at<double>(0), y = T.at<double>(1), z = T.at<double>(2);
   if (std::abs(x) < std::abs(y) || std::abs(x) < std::abs(z)) {
@@ -236,6 +246,9 @@ Rectification rectification_of(const StereoRig& rig, cv::Size size, double alpha
         fmt::format("the images are {}x{}, but {}x{} were calibrated: give the calibration of this size", size.width,
                     size.height, rig.size->width, rig.size->height));
   }
+  check_rotation("R", rig.R);
+  if (rig.given[0]) check_rotation("R1", *rig.given[0]);
+  if (rig.given[1]) check_rotation("R2", *rig.given[1]);
   check_stance(rig.T);
   cv::Mat R1, R2, P1, P2, Q;
   if (rig.given[0]) {

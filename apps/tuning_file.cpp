@@ -8,6 +8,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
+#include "host/json_text.h"
 
 namespace egosgm::app {
 namespace {
@@ -24,7 +25,7 @@ std::string key_of(const DeviceInfo& device) { return device.name + ", driver " 
 }
 
 Json read(const std::filesystem::path& file) {
-  Json json = Json::parse(vision::read_file(file, kMaxBytes), nullptr, /*allow_exceptions=*/false);
+  Json json = parse_json(vision::read_file(file, kMaxBytes), file);
   if (!json.is_object()) refuse(file, "not a tuning file");
   return json;
 }

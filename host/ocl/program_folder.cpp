@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "egosgm/error.h"
+#include "host/json_text.h"
 #include "host/ocl/strings.h"
 
 namespace egosgm::ocl {
@@ -42,13 +43,17 @@ std::vector<std::pair<std::string, std::string>> identity(const cl::Device& devi
 
 std::string read(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  std::string bytes((std::istreambuf_iterator<char>(stream)), {});
+  std::string bytes;
+  for (std::istreambuf_iterator<char> next(stream), end; next != end; ++next) {
+    if (bytes.size() == kMaxJsonBytes) throw InvalidArgument(file.string() + ": is longer than 256 MiB" + kRemedy);
+    bytes += *next;
+  }
   if (!stream.good() && !stream.eof()) throw InvalidArgument(file.string() + ": cannot be read" + kRemedy);
   return bytes;
 }
 
 Json read_manifest(const std::filesystem::path& file) {
-  Json manifest = Json::parse(read(file), nullptr, /*allow_exceptions=*/false);
+  Json manifest = parse_json(read(file), file);
   if (manifest.is_discarded() || !manifest.is_object()) {
     throw InvalidArgument(file.string() + ": is no manifest of programs" + kRemedy);
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// PNG: images of all kinds and their sizes.
+// PNG and JPEG: images of all kinds and their sizes.
 #include <opencv2/imgcodecs.hpp>
 
 #include "egosgm/vision/image_io.h"
@@ -8,8 +8,25 @@
 
 namespace egosgm::fuzz {
 
+namespace {
+
+std::string encoded(const char* extension, const cv::Mat& image, const std::vector<int>& parameters) {
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(extension, image, bytes, parameters);
+  return {bytes.begin(), bytes.end()};
+}
+
+}  // namespace
+
 std::vector<std::string> seeds() {
-  return {png_seed(CV_8UC1), png_seed(CV_8UC3), png_seed(CV_8UC4), png_seed(CV_16UC1)};
+  const cv::Mat mask(1000, 2000, CV_8UC1, cv::Scalar(0)), color(11, 19, CV_8UC3, cv::Scalar(200, 30, 90));
+  return {png_seed(CV_8UC1),
+          png_seed(CV_8UC3),
+          png_seed(CV_8UC4),
+          png_seed(CV_16UC1),
+          encoded(".png", mask, {cv::IMWRITE_PNG_BILEVEL, 1}),  // few bytes, many pixels
+          encoded(".jpg", color, {}),
+          encoded(".jpg", color, {cv::IMWRITE_JPEG_PROGRESSIVE, 1})};
 }
 
 void run(std::string_view input) {

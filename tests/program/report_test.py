@@ -56,6 +56,30 @@ class ReportTest(ProgramTest):
 
 
 class Report(ReportTest):
+    def test_the_page_names_no_folder_of_this_machine(self):
+        self.assertNotIn(str(self.folder), self.page.read_text())
+        self.assertEqual(self.data(self.page)["run"]["frames"][0]["left"], "image_0/000000.png")
+        out = self.new_folder() / "out"
+        self.works("run", "--left", self.street / "image_0/%06d.png", "--right", self.street / "image_1/%06d.png", "--calib",
+                   self.street / "calib.txt", "--out", out, "--quiet", "--disparities", 64, "--poses", self.street / "poses.txt")
+        self.works("report", out)
+        self.assertNotIn(str(self.folder), (out / "report.html").read_text())
+
+    def test_json_that_is_nested_too_deep_or_has_too_many_keys_is_one_line(self):
+        out = self.new_folder() / "out"
+        shutil.copytree(self.out, out)
+        report = out / "report.json"
+        text = report.read_text().rstrip().removesuffix("}")
+        resume = ["run", "--odometry", self.street, "--out", out, "--resume", "--quiet", "--set", "banded_sgm.p2=150", "--disparities", 64]
+        for extra, named in (('"x": ' + "[" * 200_000 + "]" * 200_000, "nested deeper than 64"),
+                             ('"x": ' + '{"a":' * 200_000 + "1" + "}" * 200_000, "nested deeper than 64"),
+                             ('"x": {' + ",".join(f'"k{i}": 0' for i in range(200_000)) + "}", "more than 2000 keys")):
+            report.write_text(text + ", " + extra + "}")
+            self.assert_refused(["report", out], "report.json", named)
+            self.assert_refused(resume, "report.json", named)
+        report.write_text(text + ', "x": ' + "[" * 60 + "]" * 60 + "}")
+        self.works("report", out)
+
     def test_the_page_holds_what_it_shows_and_asks_for_nothing_else(self):
         elements = Elements(self.page.read_text()).elements
         for tag, attributes in elements:
