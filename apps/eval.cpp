@@ -9,12 +9,14 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/metrics_json.h"
+#include "apps/plot_file.h"
 #include "apps/progress.h"
 #include "apps/truth_pairs.h"
 #include "apps/video_input.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/evaluation.h"
 #include "egosgm/vision/video_evaluation.h"
+#include "egosgm/vision/video_plot.h"
 
 namespace egosgm::app {
 namespace {
@@ -30,6 +32,7 @@ struct EvalArguments {
   ComparisonArguments compared;
   VideoArguments video;
   vision::VideoEvaluationOptions options;
+  std::string plot_frames, plot_density;
   bool json = false;
 };
 
@@ -88,27 +91,23 @@ Json json_of_regions(const VideoCounts& counts) {
   return json;
 }
 
-double percent(double part, std::int64_t whole) {
-  return whole > 0 ? 100 * part / static_cast<double>(whole) : std::nan("");
-}
-
 double mean(double sum, std::int64_t count) { return count > 0 ? sum / static_cast<double>(count) : std::nan(""); }
 
 Json json_of(const vision::DensityCounts& counts) {
-  Json kept = Json::array(), of_truth = Json::array();
-  for (int k = 0; k < vision::DensityCounts::kShares; ++k) {
-    kept.push_back({{"kept_percent", 2 * (k + 1)},
-                    {"bad_percent", percent(static_cast<double>(counts.bad[k]), counts.kept[k])},
-                    {"oracle_bad_percent", percent(static_cast<double>(counts.oracle_bad[k]), counts.kept[k])},
-                    {"mae", mean(counts.error_px[k], counts.kept[k])},
-                    {"oracle_mae", mean(counts.oracle_error_px[k], counts.kept[k])}});
+  Json at_density = Json::array(), kept = Json::array();
+  for (const vision::DensityPoint& point : densities_of(counts)) {
+    at_density.push_back({{"density_percent", point.density_percent},
+                          {"reached_percent", point.reached_percent},
+                          {"bad_percent", point.bad_percent}});
   }
-  for (int k = 0; k < vision::DensityCounts::kDensities; ++k) {
-    of_truth.push_back({{"density_percent", 50 + 5 * k},
-                        {"reached_percent", percent(static_cast<double>(counts.kept_of_truth[k]), counts.truth)},
-                        {"bad_percent", percent(static_cast<double>(counts.bad_of_kept[k]), counts.kept_of_truth[k])}});
+  for (const vision::SparsificationPoint& point : sparsification_of(counts)) {
+    kept.push_back({{"kept_percent", point.kept_percent},
+                    {"bad_percent", point.bad_percent},
+                    {"oracle_bad_percent", point.oracle_bad_percent},
+                    {"mae", point.mae_px},
+                    {"oracle_mae", point.oracle_mae_px}});
   }
-  return {{"at_density", of_truth}, {"sparsification", kept}};
+  return {{"at_density", at_density}, {"sparsification", kept}};
 }
 
 Json json_of(const VideoInput& input, const vision::VideoEvaluation& video) {
@@ -194,10 +193,9 @@ void print_regions(const VideoCounts& total) {
 void print_density(const vision::DensityCounts& counts) {
   if (counts.truth == 0) return;
   fmt::print("\n{:<12}{:>12}{:>12}\n", "density", "reached", "bad");
-  for (int k = 0; k < vision::DensityCounts::kDensities; ++k) {
-    fmt::print("{:<12}{}{}\n", fmt::format("{} %", 50 + 5 * k),
-               cell(percent(static_cast<double>(counts.kept_of_truth[k]), counts.truth), 12, " %"),
-               cell(percent(static_cast<double>(counts.bad_of_kept[k]), counts.kept_of_truth[k]), 12, " %"));
+  for (const vision::DensityPoint& point : densities_of(counts)) {
+    fmt::print("{:<12}{}{}\n", fmt::format("{:.0f} %", point.density_percent), cell(point.reached_percent, 12, " %"),
+               cell(point.bad_percent, 12, " %"));
   }
 }
 
@@ -222,10 +220,26 @@ void complete_truth(EvalArguments& arguments) {
   if (is_directory(sequence / "truth") || !arguments.video.scene.empty()) arguments.compared.truth = sequence;
 }
 
+void write_plots(const EvalArguments& arguments, const vision::VideoEvaluation& video) {
+  if (!arguments.plot_frames.empty()) {
+    write_plot(
+        arguments.plot_frames, [&] { return vision::over_frames_svg(video.frames); },
+        [&] { return vision::draw_over_frames(video.frames); });
+  }
+  if (!arguments.plot_density.empty()) {
+    write_plot(
+        arguments.plot_density, [&] { return vision::density_svg(video.total.density); },
+        [&] { return vision::draw_density(video.total.density); });
+  }
+}
+
 int evaluate(EvalArguments arguments) {
+  if (!arguments.plot_frames.empty()) require_plot_name("--plot-frames", arguments.plot_frames);
+  if (!arguments.plot_density.empty()) require_plot_name("--plot-density", arguments.plot_density);
   complete_truth(arguments);
   const VideoInput input(arguments.compared, arguments.video);
   const Result result = measure(input, arguments);
+  write_plots(arguments, result.video);
   if (arguments.json) {
     fmt::print("{}\n", json_of(input, result).dump(2));
     return kOk;
@@ -255,6 +269,13 @@ Command add_eval(CLI::App& program) {
                    "the region `near` begins at this true disparity [px]; the rest is `far`")
       ->type_name("PX")
       ->capture_default_str();
+  command->add_option("--plot-frames", arguments->plot_frames, "draw the figures over the frames: a .png or .svg file")
+      ->type_name("FILE");
+  command
+      ->add_option("--plot-density", arguments->plot_density,
+                   "draw the bad pixels against the share of pixels kept: a .png or .svg file; with --variance or "
+                   "--confidence")
+      ->type_name("FILE");
   command->add_flag("--json", arguments->json, "print JSON");
   command->footer(
       "In percent of the pixels with truth (bad_of_valid: of those with an estimate too); bad: off by more than 3 px.\n"

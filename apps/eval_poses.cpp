@@ -13,11 +13,10 @@
 
 #include "apps/command.h"
 #include "apps/counted.h"
+#include "apps/plot_file.h"
 #include "apps/run_folder.h"
 #include "apps/truth_pairs.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
-#include "egosgm/vision/image_io.h"
 #include "egosgm/vision/pose_evaluation.h"
 #include "egosgm/vision/pose_plot.h"
 #include "egosgm/vision/poses_io.h"
@@ -77,14 +76,6 @@ void print(const vision::PoseEvaluation& e) {
     fmt::print("{:8.0f} m {:6d}  {:.3f} %  {:.5f} deg/m\n", segment.length_m, segment.segments,
                segment.translation_percent, segment.rotation_deg_per_m);
   }
-}
-
-bool is_svg(const std::string& file) {
-  const std::string extension = std::filesystem::path(file).extension();
-  if (extension != ".svg" && extension != ".png") {
-    throw InvalidArgument("--plot " + file + ": the name must end in .png or .svg");
-  }
-  return extension == ".svg";
 }
 
 using Poses = std::vector<Eigen::Isometry3d>;
@@ -161,15 +152,12 @@ PosePairs read_pairs(const ComparisonArguments& compared) {
 
 int evaluate(EvalPosesArguments& arguments) {
   arguments.compared.resolve();
-  for (const std::string& file : arguments.plots) is_svg(file);
+  for (const std::string& file : arguments.plots) require_plot_name("--plot", file);
   const auto [estimate, truth] = read_pairs(arguments.compared);
   const vision::PoseEvaluation evaluation = vision::evaluate_poses(estimate, truth);
   for (const std::string& file : arguments.plots) {
-    if (is_svg(file)) {
-      vision::write_file(file, vision::path_svg(estimate, truth));
-    } else {
-      vision::write_png(file, vision::draw_path(estimate, truth));
-    }
+    write_plot(
+        file, [&] { return vision::path_svg(estimate, truth); }, [&] { return vision::draw_path(estimate, truth); });
   }
   if (arguments.json) {
     fmt::print("{}\n", json_of(evaluation).dump(2));

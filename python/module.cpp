@@ -31,4 +31,5 @@ PYBIND11_MODULE(_egosgm, module) {
   bind_odometry(module);
   bind_files(module);
   bind_evaluation(module);
+  bind_video_evaluation(module);
 }

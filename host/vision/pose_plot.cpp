@@ -2,45 +2,20 @@
 #include "egosgm/vision/pose_plot.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
-#include <opencv2/imgproc.hpp>
 
 #include "egosgm/vision/pose_evaluation.h"
+#include "host/vision/plot.h"
 
 namespace egosgm::vision {
 namespace {
 
 using Poses = std::vector<Eigen::Isometry3d>;
-using Rgb = std::array<int, 3>;
 
-constexpr Rgb kInk{40, 40, 40}, kGrid{222, 222, 222}, kTruth{31, 119, 180}, kEstimate{214, 39, 40};
+constexpr Rgb kTruth{31, 119, 180}, kEstimate{214, 39, 40};
 constexpr double kLongSide_px = 620, kLeft_px = 76, kRight_px = 24, kTop_px = 64, kBottom_px = 56;
 constexpr double kNarrowest = 0.45;  // of the long side: room for the legend beside a straight path
 constexpr int kTicks = 10;           // about, on the long side
-
-struct Line {
-  std::vector<cv::Point2d> points;
-  Rgb color;
-  double width_px;
-};
-
-enum class Anchor { kStart, kMiddle, kEnd };
-
-struct Label {
-  cv::Point2d at;  // on the baseline
-  std::string text;
-  Anchor anchor = Anchor::kStart;
-  bool upwards = false;  // turned by 90 degrees
-};
-
-/// What both formats draw, in pixels.
-struct Plot {
-  cv::Size2d size;
-  std::vector<Line> lines;
-  std::vector<Label> labels;
-};
 
 struct Range {
   double low, high;
@@ -68,21 +43,6 @@ Range range_of(const std::vector<Eigen::Vector3d>& a, const std::vector<Eigen::V
   }
   range.widen_to(1.06 * range.length());
   return range;
-}
-
-/// 1, 2 or 5 times a power of ten.
-double tick_step(double length, int ticks) {
-  const double raw = length / ticks, power = std::pow(10.0, std::floor(std::log10(raw)));
-  for (const double step : {1.0, 2.0, 5.0}) {
-    if (raw <= step * power) return step * power;
-  }
-  return 10 * power;
-}
-
-std::string format(const char* pattern, double a, double b = 0) {
-  char text[96];
-  std::snprintf(text, sizeof text, pattern, a, b);
-  return text;
 }
 
 /// From metres to pixels.
@@ -158,73 +118,10 @@ Plot make_plot(const Poses& estimate, const Poses& truth) {
   return plot;
 }
 
-void draw(const Line& line, cv::Mat& picture) {
-  constexpr int kShift = 4;  // of the fixed-point coordinates
-  std::vector<cv::Point> points;
-  for (const auto& p : line.points) points.emplace_back(cvRound(p.x * (1 << kShift)), cvRound(p.y * (1 << kShift)));
-  const cv::Scalar bgr(line.color[2], line.color[1], line.color[0]);
-  cv::polylines(picture, points, false, bgr, std::max(1, cvRound(line.width_px)), cv::LINE_AA, kShift);
-}
-
-void draw(const Label& label, cv::Mat& picture) {
-  constexpr double kScale = 0.42;
-  int below = 0;
-  const cv::Size size = cv::getTextSize(label.text, cv::FONT_HERSHEY_SIMPLEX, kScale, 1, &below);
-  cv::Mat text(size.height + below + 2, size.width + 2, CV_8UC3, cv::Scalar::all(255));
-  cv::putText(text, label.text, {1, size.height}, cv::FONT_HERSHEY_SIMPLEX, kScale,
-              cv::Scalar(kInk[2], kInk[1], kInk[0]), 1, cv::LINE_AA);
-  const double before = label.anchor == Anchor::kStart    ? 0
-                        : label.anchor == Anchor::kMiddle ? size.width / 2.0
-                                                          : size.width;
-  cv::Point corner(cvRound(label.at.x - before), cvRound(label.at.y) - size.height);
-  if (label.upwards) {
-    cv::rotate(text, text, cv::ROTATE_90_COUNTERCLOCKWISE);
-    corner = {cvRound(label.at.x) - size.height, cvRound(label.at.y - before)};
-  }
-  const cv::Rect inside = cv::Rect(corner, text.size()) & cv::Rect({0, 0}, picture.size());
-  cv::Mat target = picture(inside);
-  cv::min(target, text(inside - corner), target);
-}
-
-std::string svg_color(Rgb color) {
-  char text[8];
-  std::snprintf(text, sizeof text, "#%02x%02x%02x", color[0], color[1], color[2]);
-  return text;
-}
-
-std::string svg(const Line& line) {
-  std::string points;
-  for (const auto& p : line.points) points += format(points.empty() ? "%.2f,%.2f" : " %.2f,%.2f", p.x, p.y);
-  return "<polyline fill=\"none\" stroke=\"" + svg_color(line.color) +
-         format("\" stroke-width=\"%g\" points=\"", line.width_px) + points + "\"/>\n";
-}
-
-std::string svg(const Label& label) {
-  const char* anchor = label.anchor == Anchor::kStart ? "start" : label.anchor == Anchor::kMiddle ? "middle" : "end";
-  const std::string turn = label.upwards ? format(" transform=\"rotate(-90 %.2f %.2f)\"", label.at.x, label.at.y) : "";
-  return format("<text x=\"%.2f\" y=\"%.2f\"", label.at.x, label.at.y) + turn + " text-anchor=\"" + anchor + "\">" +
-         label.text + "</text>\n";
-}
-
 }  // namespace
 
-cv::Mat draw_path(const Poses& estimate, const Poses& truth) {
-  const Plot plot = make_plot(estimate, truth);
-  cv::Mat picture(cvRound(plot.size.height), cvRound(plot.size.width), CV_8UC3, cv::Scalar::all(255));
-  for (const Line& line : plot.lines) draw(line, picture);
-  for (const Label& label : plot.labels) draw(label, picture);
-  return picture;
-}
+cv::Mat draw_path(const Poses& estimate, const Poses& truth) { return draw_plot(make_plot(estimate, truth)); }
 
-std::string path_svg(const Poses& estimate, const Poses& truth) {
-  const Plot plot = make_plot(estimate, truth);
-  std::string text = format("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.0f\" height=\"%.0f\" ",
-                            plot.size.width, plot.size.height) +
-                     "font-family=\"sans-serif\" font-size=\"13\" fill=\"" + svg_color(kInk) + "\">\n" +
-                     "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n";
-  for (const Line& line : plot.lines) text += svg(line);
-  for (const Label& label : plot.labels) text += svg(label);
-  return text + "</svg>\n";
-}
+std::string path_svg(const Poses& estimate, const Poses& truth) { return plot_svg(make_plot(estimate, truth)); }
 
 }  // namespace egosgm::vision

@@ -13,16 +13,16 @@ void add_to(Array& sums, const Array& others) {
   for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += others[i];
 }
 
-/// The area between two curves over the kept share, by the trapezoidal rule.
-double area_between(const std::array<std::int64_t, DensityCounts::kShares>& kept, const auto& curve,
-                    const auto& oracle) {
-  if (kept.back() == 0) return std::numeric_limits<double>::quiet_NaN();
-  const auto gap = [&](int k) {
-    return ratio(static_cast<double>(curve[k]) - static_cast<double>(oracle[k]), static_cast<double>(kept[k]));
-  };
+/// The area between two curves over the share that is kept (0 to 1), by the trapezoidal rule.
+double area_between(const DensityCounts& counts, double SparsificationPoint::*curve,
+                    double SparsificationPoint::*oracle) {
+  if (counts.kept.back() == 0) return std::numeric_limits<double>::quiet_NaN();
+  const std::vector<SparsificationPoint> points = sparsification_of(counts);
   double area = 0;
-  for (int k = 1; k < DensityCounts::kShares; ++k) {
-    if (kept[k - 1] > 0) area += (gap(k - 1) + gap(k)) / 2 / DensityCounts::kShares;
+  for (std::size_t k = 1; k < points.size(); ++k) {
+    if (counts.kept[k - 1] == 0) continue;
+    const double gaps = points[k - 1].*curve - points[k - 1].*oracle + points[k].*curve - points[k].*oracle;
+    area += gaps / 2 * (points[k].kept_percent - points[k - 1].kept_percent) / 100;
   }
   return area;
 }
@@ -71,8 +71,33 @@ DensityCounts& DensityCounts::operator+=(const DensityCounts& other) {
   return *this;
 }
 
-double DensityCounts::ause_px() const { return area_between(kept, error_px, oracle_error_px); }
-double DensityCounts::ause_percent() const { return 100 * area_between(kept, bad, oracle_bad); }
+double DensityCounts::ause_px() const {
+  return area_between(*this, &SparsificationPoint::mae_px, &SparsificationPoint::oracle_mae_px);
+}
+
+double DensityCounts::ause_percent() const {
+  return area_between(*this, &SparsificationPoint::bad_percent, &SparsificationPoint::oracle_bad_percent);
+}
+
+std::vector<SparsificationPoint> sparsification_of(const DensityCounts& counts) {
+  std::vector<SparsificationPoint> points;
+  for (std::size_t k = 0; k < counts.kept.size(); ++k) {
+    const auto kept = static_cast<double>(counts.kept[k]);
+    points.push_back({2.0 * static_cast<double>(k + 1), percent(counts.bad[k], counts.kept[k]),
+                      percent(counts.oracle_bad[k], counts.kept[k]), ratio(counts.error_px[k], kept),
+                      ratio(counts.oracle_error_px[k], kept)});
+  }
+  return points;
+}
+
+std::vector<DensityPoint> densities_of(const DensityCounts& counts) {
+  std::vector<DensityPoint> points;
+  for (std::size_t k = 0; k < counts.kept_of_truth.size(); ++k) {
+    points.push_back({50.0 + 5.0 * static_cast<double>(k), percent(counts.kept_of_truth[k], counts.truth),
+                      percent(counts.bad_of_kept[k], counts.kept_of_truth[k])});
+  }
+  return points;
+}
 
 RegionCounts& RegionCounts::operator+=(const RegionCounts& other) {
   errors += other.errors;

@@ -16,8 +16,10 @@ import inspect as _inspect
 from . import _egosgm
 from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
+from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video
 
-__all__ = ["__version__", *(name for name in dir(_egosgm) if not name.startswith("_"))]
+__all__ = ["__version__", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video",
+           *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 
 def _signature(leading, options):

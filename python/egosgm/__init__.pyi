@@ -7,6 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Unpack
 
 from ._options import PipelineOptions, StereoOdometryOptions, SyntheticOptions
+from .video_evaluation import DensityFigures as DensityFigures
+from .video_evaluation import RegionFigures as RegionFigures
+from .video_evaluation import VideoEvaluation as VideoEvaluation
+from .video_evaluation import VideoFigures as VideoFigures
+from .video_evaluation import evaluate_video as evaluate_video
 
 __version__: str
 INVALID_DISPARITY: float

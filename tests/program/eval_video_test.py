@@ -101,6 +101,16 @@ class EvalOverTime(ProgramTest):
         last = result["density"]["sparsification"][-1]
         self.assertEqual(last["bad_percent"], last["oracle_bad_percent"])
 
+    def test_plots(self):
+        estimate, truth = self.maps([10, 12, 10.5]), self.maps([10, 10, 10])
+        out = self.new_folder()
+        self.assert_works("eval", estimate, truth, "--plot-frames", out / "frames.svg", "--variance", estimate, "--plot-density", out / "density.png")
+        self.assertIn("TEPE same pixel", (out / "frames.svg").read_text())
+        self.assertTrue((out / "density.png").read_bytes().startswith(b"\x89PNG"))
+        self.assert_refused(["eval", estimate, truth, "--plot-frames", out / "frames.gif"], "--plot-frames", ".svg")
+        self.assert_refused(["eval", estimate, truth, "--plot-density", out / "none.svg"], "variance")
+        self.assertFalse((out / "none.svg").exists())
+
     def test_wrong_input_gives_one_line_and_no_table(self):
         truth = self.street / "truth/left_disp_occ"
 

@@ -53,7 +53,7 @@ struct EGOSGM_EXPORT DensityCounts {
 
   DensityCounts& operator+=(const DensityCounts& other);
   double ause_px() const;       // of the mean |error| [px]; NaN without pixels
-  double ause_percent() const;  // of the share of bad pixels [percent]
+  double ause_percent() const;  // of the bad pixels [percent]
 };
 
 /// Parts of the image that are looked at apart, told by truth, masks and motion of the later frame.
@@ -81,6 +81,19 @@ struct EGOSGM_EXPORT VideoCounts {
   VideoCounts& operator+=(const VideoCounts& other);
   const RegionCounts& region(Region which) const { return regions[static_cast<std::size_t>(which)]; }
 };
+
+/// Percent of each frame's pixels with truth, estimate and uncertainty that are kept, in the order of the uncertainty
+/// and in the oracle's, that of the errors. NaN where there is nothing to divide by.
+struct SparsificationPoint {
+  double kept_percent, bad_percent, oracle_bad_percent, mae_px, oracle_mae_px;
+};
+EGOSGM_EXPORT std::vector<SparsificationPoint> sparsification_of(const DensityCounts& counts);
+
+/// Percent of the pixels with truth: wanted, and reached where the method has fewer; of these, bad.
+struct DensityPoint {
+  double density_percent, reached_percent, bad_percent;
+};
+EGOSGM_EXPORT std::vector<DensityPoint> densities_of(const DensityCounts& counts);
 
 /// A figure by the name that the program and the Python module give it. NaN where there is nothing to divide by.
 struct NamedFigure {

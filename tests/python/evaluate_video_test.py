@@ -1,0 +1,361 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm.evaluate_video against each formula in a few lines of NumPy, on maps whose answers are known and on random ones."""
+import dataclasses
+import math
+import os
+import pathlib
+
+import numpy as np
+import pytest
+
+import egosgm
+
+NO = egosgm.INVALID_DISPARITY
+HEIGHT, WIDTH = 20, 40
+CAMERA = egosgm.Calibration(fx=50, fy=50, cx=19.5, cy=9.5, baseline_m=0.3)
+
+
+def maps(*values):
+    return [np.full((HEIGHT, WIDTH), value, np.float32) for value in values]
+
+
+def poses(*forward_m):
+    """Camera-to-world, along the view."""
+    result = np.stack([np.eye(4)] * len(forward_m))
+    result[:, 2, 3] = forward_m
+    return result
+
+
+def is_known(d):
+    return np.isfinite(d) & (d > NO)
+
+
+def noisy_video(frames=4, seed=5):
+    """A slanted wall with a square before it that moves right; estimates are noisy, with holes. The camera goes forward, turns and sways."""
+    rng = np.random.default_rng(seed)
+    truths, estimates, moving, world_from_camera = [], [], [], []
+    for k in range(frames):
+        truth = np.tile(np.linspace(6, 9, WIDTH, dtype=np.float32), (HEIGHT, 1)) + 0.2 * k
+        mask = np.zeros((HEIGHT, WIDTH), bool)
+        mask[6:12, 5 + 4 * k:12 + 4 * k] = True
+        truth[mask] = 18 + k
+        estimate = (truth + rng.normal(0, 1.5, truth.shape)).astype(np.float32)
+        estimate[rng.random(truth.shape) < 0.1] = NO
+        truth[rng.random(truth.shape) < 0.2] = NO
+        pose = np.eye(4)
+        turn = np.radians(1.5 * k)
+        pose[[0, 0, 2, 2], [0, 2, 0, 2]] = np.cos(turn), np.sin(turn), -np.sin(turn), np.cos(turn)
+        pose[:3, 3] = 0.03 * k, 0.01 * k, 0.05 * k
+        truths.append(truth), estimates.append(estimate), moving.append(mask), world_from_camera.append(pose)
+    return estimates, truths, moving, np.stack(world_from_camera)
+
+
+def move(d, motion):
+    """Every known pixel of d moved: its target's row and column, its new disparity, and which pixels those are."""
+    y, x = np.nonzero(is_known(d) & (d > 0))
+    z = CAMERA.fx * CAMERA.baseline_m / d[y, x].astype(float)
+    points = np.stack([(x - CAMERA.cx) / CAMERA.fx * z, (y - CAMERA.cy) / CAMERA.fy * z, z])
+    points = motion[:3, :3] @ points + motion[:3, 3:]
+    to_x, to_y = (np.rint(f * p / points[2] + c).astype(int) for f, p, c in ((CAMERA.fx, points[0], CAMERA.cx), (CAMERA.fy, points[1], CAMERA.cy)))
+    inside = (points[2] > 0) & (to_x >= 0) & (to_x < WIDTH) & (to_y >= 0) & (to_y < HEIGHT)
+    return to_y[inside], to_x[inside], (CAMERA.fx * CAMERA.baseline_m / points[2])[inside], y[inside], x[inside]
+
+
+def moved_map(d, motion):
+    to_y, to_x, moved, _, _ = move(d, motion)
+    result = np.full(d.shape, NO)
+    np.maximum.at(result, (to_y, to_x), moved)
+    return result
+
+
+def pairs(world_from_camera):
+    for k in range(1, len(world_from_camera)):
+        yield k, np.linalg.inv(world_from_camera[k]) @ world_from_camera[k - 1]
+
+
+def test_flicker_is_the_mean_over_the_pixels_that_have_both():
+    estimates, _, _, world_from_camera = noisy_video()
+    differences = []
+    for k, motion in pairs(world_from_camera):
+        moved, now = moved_map(estimates[k - 1], motion), estimates[k]
+        both = is_known(moved) & is_known(now)
+        differences.append(np.abs(now - moved)[both])
+    figures = egosgm.evaluate_video(estimates, calibration=CAMERA, world_from_camera=world_from_camera).figures
+    assert figures.flicker_px == pytest.approx(np.concatenate(differences).mean(), rel=1e-5)
+    assert math.isnan(figures.tepe_dynamicstereo_px), "no truth"
+
+
+def test_tae_is_relative_depth_in_both_directions():
+    estimates, _, _, world_from_camera = noisy_video()
+    errors = []
+    for k, motion in pairs(world_from_camera):
+        for source, target, how in ((k - 1, k, motion), (k, k - 1, np.linalg.inv(motion))):
+            moved = moved_map(estimates[source], how)
+            both = is_known(moved) & is_known(estimates[target])
+            depth, depth_moved = (CAMERA.fx * CAMERA.baseline_m / d[both].astype(float) for d in (estimates[target], moved))
+            errors.append(np.mean(np.abs(depth - depth_moved) / depth))
+    figures = egosgm.evaluate_video(estimates, calibration=CAMERA, world_from_camera=world_from_camera).figures
+    assert figures.tae_vda_percent == pytest.approx(100 * np.mean(errors), rel=1e-5)
+
+
+def test_tepe_at_the_same_pixel():
+    estimates, truths, _, _ = noisy_video()
+    errors = []
+    for k in range(1, len(estimates)):
+        e, d = ([values[k - 1].astype(float), values[k].astype(float)] for values in (estimates, truths))
+        known = is_known(e[0]) & is_known(e[1]) & is_known(d[0]) & is_known(d[1])
+        errors.append(np.abs((e[0] - e[1]) - (d[0] - d[1]))[known])
+    pooled = np.concatenate(errors)
+    figures = egosgm.evaluate_video(estimates, truths).figures
+    assert figures.tepe_dynamicstereo_px == pytest.approx(pooled.mean(), rel=1e-6)
+    assert figures.tepe_dynamicstereo_above_1px_percent == pytest.approx(100 * np.mean(pooled > 1))
+    assert figures.tepe_dynamicstereo_above_3px_percent == pytest.approx(100 * np.mean(pooled > 3))
+
+
+def test_tepe_of_filled_maps():
+    estimates, truths, _, _ = noisy_video()
+    dense = [egosgm.interpolate_background(e) for e in estimates]
+    filled, own = egosgm.evaluate_video(estimates, truths).figures, egosgm.evaluate_video(dense, truths).figures
+    assert filled.tepe_dynamicstereo_filled_px == own.tepe_dynamicstereo_px != filled.tepe_dynamicstereo_px
+    assert filled.tepe_dynamicstereo_filled_above_3px_percent == own.tepe_dynamicstereo_above_3px_percent
+
+
+def test_tepe_by_dynamicstereos_own_formula():
+    """Theirs: maps of a mask's size times the mask, sqrt of the sum of squares over the one channel, over the whole sequence. It divides by
+    the pixels whose error is not zero; noise leaves none that are."""
+    rng = np.random.default_rng(3)
+    y = rng.uniform(5, 50, (6, 1, HEIGHT, WIDTH)).astype(np.float32)
+    x = (y + rng.normal(0, 2, y.shape)).astype(np.float32)
+    mask = (rng.random(y.shape) < 0.7).astype(np.float32)
+    both = mask[:-1] * mask[1:]
+    error = np.sqrt((both * ((x[:-1] - x[1:]) - (y[:-1] - y[1:]))**2).sum(axis=1))
+    nonzero = np.count_nonzero(error)
+    assert nonzero == both.sum()
+    truths = [np.where(mask[k, 0] > 0, y[k, 0], NO) for k in range(len(y))]
+    figures = egosgm.evaluate_video(list(x[:, 0]), truths).figures
+    assert figures.tepe_dynamicstereo_px == pytest.approx(error.sum() / nonzero, rel=1e-5)
+    assert figures.tepe_dynamicstereo_above_1px_percent == pytest.approx(100 * (error > 1).sum() / nonzero)
+    assert figures.tepe_dynamicstereo_above_3px_percent == pytest.approx(100 * (error > 3).sum() / nonzero)
+
+
+def test_tepe_along_the_motion_of_what_stands():
+    estimates, truths, moving, world_from_camera = noisy_video()
+    errors, changes = [], []
+    for k, motion in pairs(world_from_camera):
+        to_y, to_x, expected, y, x = move(np.where(moving[k - 1], NO, truths[k - 1]), motion)
+        there = truths[k][to_y, to_x].astype(float)
+        seen = is_known(there) & (np.abs(there - expected) <= 1) & ~moving[k][to_y, to_x]
+        e = estimates[k - 1][y, x].astype(float), estimates[k][to_y, to_x].astype(float)
+        good = seen & is_known(e[0]) & is_known(e[1])
+        change = (there - truths[k - 1][y, x])[good]
+        errors.append(np.abs((e[1] - e[0])[good] - change)), changes.append(change)
+    error, change = np.concatenate(errors), np.concatenate(changes)
+    assert len(error) > 500
+    figures = egosgm.evaluate_video(estimates, truths, moving=moving, calibration=CAMERA, world_from_camera=world_from_camera).figures
+    assert figures.tepe_codd_px == pytest.approx(error.mean(), rel=1e-5)
+    assert figures.tepe_codd_mean_of_pairs_px == pytest.approx(np.mean([e.mean() for e in errors]), rel=1e-5)
+    assert figures.tepe_codd_relative == pytest.approx(np.mean(error / (np.abs(change) + 1e-3)), rel=1e-4)
+    assert figures.tepe_codd_relative_above_1_percent == pytest.approx(100 * np.mean(error / (np.abs(change) + 1e-3) > 1))
+    assert figures.tepe_codd_above_3px_percent == pytest.approx(100 * np.mean(error > 3))
+
+
+def random_flow(seed):
+    flow = np.random.default_rng(seed).uniform(-6, 6, (HEIGHT, WIDTH, 2)).astype(np.float32)
+    flow[::5, ::3] = np.nan
+    return flow
+
+
+def test_tepe_along_a_given_flow():
+    estimates, truths, _, _ = noisy_video(2)
+    flow = random_flow(1)
+    errors = []
+    for y in range(HEIGHT):
+        for x in range(WIDTH):
+            to_x, to_y = (np.rint(at + f) for at, f in ((x, flow[y, x, 0].astype(float)), (y, flow[y, x, 1].astype(float))))
+            if not (0 <= to_x < WIDTH and 0 <= to_y < HEIGHT):
+                continue
+            values = [m[0][y, x] for m in (truths, estimates)] + [m[1][int(to_y), int(to_x)] for m in (truths, estimates)]
+            if all(map(is_known, values)):
+                d0, e0, d1, e1 = map(float, values)
+                errors.append(abs((e1 - e0) - (d1 - d0)))
+    figures = egosgm.evaluate_video(estimates, truths, flows=[flow, None]).figures
+    assert figures.tepe_codd_px == pytest.approx(np.mean(errors), rel=1e-6)
+
+
+def test_opw_and_rtc_of_depths():
+    estimates, _, _, _ = noisy_video(2)
+    flow, depths = random_flow(2), []
+    rng = np.random.default_rng(9)
+    images = [rng.integers(100, 130, (HEIGHT, WIDTH)).astype(np.uint8) for _ in range(2)]
+    depth = [CAMERA.fx * CAMERA.baseline_m / np.where(is_known(e), e, np.nan).astype(float) for e in estimates]
+
+    def bilinear(image, y, x):
+        top, left = int(np.floor(y)), int(np.floor(x))
+        dy, dx = y - top, x - left
+        return sum(w * image[top + j, left + i] for j, i, w in ((0, 0, (1 - dy) * (1 - dx)), (0, 1, (1 - dy) * dx), (1, 0, dy * (1 - dx)),
+                                                                (1, 1, dy * dx)) if w)
+    for y in range(HEIGHT):
+        for x in range(WIDTH):
+            to_x, to_y = x + float(flow[y, x, 0]), y + float(flow[y, x, 1])
+            if 0 <= to_x <= WIDTH - 1 and 0 <= to_y <= HEIGHT - 1:
+                difference = np.sqrt(3) * abs(bilinear(images[1].astype(float), to_y, to_x) - images[0][y, x]) / 255
+                if np.exp(-50 * difference) > 0.01:
+                    depths.append((depth[0][y, x], bilinear(depth[1], to_y, to_x)))
+    a, b = np.array([pair for pair in depths if np.isfinite(pair).all()]).T
+    figures = egosgm.evaluate_video(estimates, calibration=CAMERA, flows=[flow, None], images=images).figures
+    assert 100 < len(a) < HEIGHT * WIDTH
+    assert figures.opw_nvds_m == pytest.approx(np.mean(np.abs(a - b)), rel=1e-5)
+    ratio = np.maximum(a / b, b / a)
+    assert figures.rtc_1_01_percent == pytest.approx(100 * np.mean(ratio < 1.01))
+    assert figures.rtc_1_25_percent == pytest.approx(100 * np.mean(ratio < 1.25))
+
+
+def test_harm_and_help():
+    estimates, truths, _, _ = noisy_video()
+    others = [np.where(is_known(e), e + np.random.default_rng(k).normal(0, 2, e.shape), NO).astype(np.float32) for k, e in enumerate(estimates)]
+    a, b, t = (np.concatenate([m.ravel() for m in values]).astype(float) for values in (estimates, others, truths))
+    known = is_known(a) & is_known(b) & is_known(t)
+    changed = known & (np.abs(a - b) > 1)
+    figures = egosgm.evaluate_video(estimates, truths, against=others).figures
+    assert figures.changed_percent == pytest.approx(100 * changed.sum() / known.sum())
+    assert figures.harm_percent == pytest.approx(100 * np.mean((np.abs(a - t) > np.abs(b - t))[changed]))
+    assert figures.help_percent == pytest.approx(100 * np.mean((np.abs(a - t) < np.abs(b - t))[changed]))
+
+
+def half_up(value):
+    return int(np.floor(value + 0.5))
+
+
+def test_equal_density_and_ause():
+    estimates, truths, _, _ = noisy_video()
+    rng = np.random.default_rng(4)
+    variances = [np.abs(e - t).astype(np.float32) * rng.uniform(0.5, 2, e.shape).astype(np.float32) for e, t in zip(estimates, truths)]
+    shares = np.arange(2, 101, 2)
+    sums = {"order": np.zeros((50, 3)), "oracle": np.zeros((50, 3))}
+    at = np.zeros((11, 2))
+    for e, t, v in zip(estimates, truths, variances):
+        known = is_known(e) & is_known(t)
+        error, variance = np.abs(t - e)[known], v[known]
+        by_variance = error[np.argsort(variance, kind="stable")]
+        for name, ordered in (("order", by_variance), ("oracle", np.sort(error))):
+            for i, share in enumerate(shares):
+                kept = ordered[:half_up(len(error) * share / 100)]
+                sums[name][i] += len(kept), kept.astype(float).sum(), (kept > 3).sum()
+        for i, density in enumerate(range(50, 101, 5)):
+            kept = by_variance[:half_up(is_known(t).sum() * density / 100)]
+            at[i] += len(kept), (kept > 3).sum()
+    evaluation = egosgm.evaluate_video(estimates, truths, uncertainties=variances)
+    density = evaluation.density
+    np.testing.assert_allclose(density.kept_bad_percent, 100 * sums["order"][:, 2] / sums["order"][:, 0])
+    np.testing.assert_allclose(density.oracle_bad_percent, 100 * sums["oracle"][:, 2] / sums["oracle"][:, 0])
+    np.testing.assert_allclose(density.bad_percent, 100 * at[:, 1] / at[:, 0])
+    np.testing.assert_allclose(density.reached_percent, 100 * at[:, 0] / sum(is_known(t).sum() for t in truths))
+    gap = sums["order"][:, 1] / sums["order"][:, 0] - sums["oracle"][:, 1] / sums["oracle"][:, 0]
+    assert evaluation.figures.ause_px == pytest.approx(np.trapezoid(gap, shares / 100) if hasattr(np, "trapezoid") else np.trapz(gap, shares / 100))
+
+
+def test_regions():
+    estimates, truths, moving, world_from_camera = noisy_video(2)
+    regions = egosgm.evaluate_video(estimates, truths, moving=moving, calibration=CAMERA, world_from_camera=world_from_camera,
+                                    near_px=10).regions
+    known = [is_known(t) for t in truths]
+    assert regions["all"].truth_pixels == sum(k.sum() for k in known)
+    assert regions["moving"].truth_pixels == sum((k & m).sum() for k, m in zip(known, moving))
+    assert regions["still"].truth_pixels == regions["all"].truth_pixels - regions["moving"].truth_pixels
+    near = [k & (t >= 10) for k, t in zip(known, truths)]
+    assert regions["near"].truth_pixels == sum(n.sum() for n in near)
+    bad = [n & is_known(e) & (np.abs(e - t) > 3) for n, e, t in zip(near, estimates, truths)]
+    valid = [n & is_known(e) for n, e in zip(near, estimates)]
+    assert regions["near"].bad_of_valid == pytest.approx(100 * sum(b.sum() for b in bad) / sum(v.sum() for v in valid))
+    # Uncovered: seen from the frame before, outside of the image or behind a surface that is nearer by more than 1 px.
+    motion = np.linalg.inv(world_from_camera[1]) @ world_from_camera[0]
+    still = np.where(moving[1], NO, truths[1])
+    to_y, to_x, then, y, x = move(still, np.linalg.inv(motion))
+    hidden = is_known(truths[0][to_y, to_x]) & (truths[0][to_y, to_x] > then + 1)
+    assert regions["uncovered"].truth_pixels == is_known(still).sum() - len(y) + hidden.sum() > 0
+    # Edges: within 3 rows and columns of two neighbours with truth that differ by more than 3 px.
+    count = 0
+    for t in truths:
+        beside = np.zeros(t.shape, bool)
+        for axis in (0, 1):
+            a, b = [slice(None)] * 2, [slice(None)] * 2
+            a[axis], b[axis] = slice(None, -1), slice(1, None)
+            a, b = tuple(a), tuple(b)
+            jump = is_known(t[a]) & is_known(t[b]) & (np.abs(t[a] - t[b]) > 3)
+            beside[a] |= jump
+            beside[b] |= jump
+        y, x = np.nonzero(beside)
+        around = np.zeros(t.shape, bool)
+        for dy in range(-3, 4):
+            for dx in range(-3, 4):
+                rows, columns = y + dy, x + dx
+                inside = (rows >= 0) & (rows < HEIGHT) & (columns >= 0) & (columns < WIDTH)
+                around[rows[inside], columns[inside]] = True
+        count += (around & is_known(t)).sum()
+    assert regions["edges"].truth_pixels == count
+
+
+def test_known_answers():
+    """A constant shift is calm, a jump in time is not, a hole is no pixel, a square that moves is no flicker of the rest."""
+    shifted = egosgm.evaluate_video(maps(14, 15), maps(10, 11)).figures
+    assert shifted.tepe_dynamicstereo_px == 0
+    jump = egosgm.evaluate_video(maps(10, 12, 10), maps(10, 10, 10))
+    assert jump.figures.tepe_dynamicstereo_px == 2
+    assert [frame.tepe_dynamicstereo_px for frame in jump.frames[1:]] == [2, 2] and math.isnan(jump.frames[0].tepe_dynamicstereo_px)
+    holes = maps(10, 12)
+    holes[1][:, :30] = np.nan
+    holes[1][:, 30:] = 10
+    assert egosgm.evaluate_video(holes, maps(10, 10)).figures.tepe_dynamicstereo_px == 0
+    assert egosgm.evaluate_video(maps(7.5, 15), calibration=CAMERA, world_from_camera=poses(0, 1)).figures.flicker_px == pytest.approx(0, abs=1e-5)
+    square = maps(5, 5)
+    square[0][5:10, 5:10] = square[1][5:10, 9:14] = 20
+    still = egosgm.evaluate_video(square, square, calibration=CAMERA, world_from_camera=poses(0, 0)).figures
+    assert still.flicker_px == pytest.approx(2 * 20 * 15 / (HEIGHT * WIDTH)), "flicker knows nothing of what moves"
+    assert still.tepe_dynamicstereo_px == 0 and still.tepe_codd_px == 0
+
+
+def test_maps_may_be_read_when_they_are_needed():
+    class Lazy:
+        def __len__(self):
+            return 64
+
+        def __getitem__(self, i):
+            if i >= 64:
+                raise IndexError
+            return maps(10 + i % 2)[0]
+    result = egosgm.evaluate_video(Lazy(), [maps(10)[0]] * 64)
+    assert result.figures.tepe_dynamicstereo_px == 1 and len(result.frames) == 64
+    assert dataclasses.asdict(result)["figures"]["tepe_dynamicstereo_above_1px_percent"] == 0
+
+
+@pytest.mark.parametrize("arguments, named", [
+    (dict(estimates=[]), "no frames"), (dict(estimates=maps(1), truths=[np.zeros((3, 4))]), "4x3"),
+    (dict(estimates=maps(1, 1), flows=[np.zeros((HEIGHT, WIDTH)), None]), "H x W x 2"),
+    (dict(estimates=maps(1, 1), world_from_camera=poses(0, 1)), "no calibration"),
+    (dict(estimates=maps(1, 1), world_from_camera=poses(0), calibration=CAMERA), "1 poses of 2 frames"),
+    (dict(estimates=[np.zeros(3)]), "estimates")])
+def test_wrong_input_is_refused(arguments, named):
+    with pytest.raises(egosgm.InvalidArgument, match=named):
+        egosgm.evaluate_video(**arguments)
+
+
+def test_an_error_of_the_callers_own_comes_through():
+    class Broken(list):
+        def __getitem__(self, i):
+            raise KeyError("the disk is gone")
+    with pytest.raises(KeyError, match="the disk is gone"):
+        egosgm.evaluate_video(Broken(maps(1, 1, 1)))
+
+
+def data_folder():
+    folder = pathlib.Path(os.environ.get("EGOSGM_DATA") or pathlib.Path(__file__).resolve().parents[3] / "shared/data")
+    return folder if (folder / "devkit2012").is_dir() else None
+
+
+@pytest.mark.skipif(data_folder() is None, reason="no real data: neither $EGOSGM_DATA nor ../shared/data is there")
+def test_the_development_kits_own_figures():
+    """KITTI's kit gives these for its own example: percent bad interpolated, bad of valid, missing or bad, and the density."""
+    folder = data_folder() / "devkit2012"
+    estimate, truth = (egosgm.read_disparity(folder / f"disp_{kind}.png") for kind in ("est", "gt"))
+    every = egosgm.evaluate_video([estimate], [truth]).regions["all"]
+    assert (every.interpolated, every.bad_of_valid, every.bad_or_missing, every.density) == pytest.approx((5.186, 4.393, 7.894, 96.337), abs=5e-4)
