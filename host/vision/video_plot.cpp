@@ -12,7 +12,7 @@ namespace egosgm::vision {
 namespace {
 
 constexpr double kWidth_px = 620, kHeight_px = 300, kLeft_px = 62, kRight_px = 20, kTop_px = 56, kBottom_px = 52;
-constexpr double kLegend_px = 140;  // a name's room
+constexpr double kLegend_px = 160;  // a name's room
 constexpr Rgb kColors[] = {{214, 39, 40}, {31, 119, 180}, {44, 160, 44}, {148, 103, 189}};
 
 struct Curve {
@@ -98,7 +98,7 @@ double mean_px(const TemporalCounts& counts) { return ratio(counts.sum_px, stati
 
 Plot plot_over_frames(const std::vector<VideoCounts>& frames) {
   if (frames.size() < 2) throw InvalidArgument("a plot over frames needs at least two of them");
-  Chart chart{"frame", "px", 0, static_cast<double>(frames.size() - 1), {}};
+  Chart chart{"frame, counted from the first one", "px", 0, static_cast<double>(frames.size() - 1), {}};
   const auto add = [&](const char* name, auto&& figure) {
     Curve curve{name, {}};
     for (std::size_t i = 0; i < frames.size(); ++i)
