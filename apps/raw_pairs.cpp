@@ -76,22 +76,35 @@ void require_same_size(const RawPair& pair, const std::string& what) {
 class TwoSources : public RawPairs {
  public:
   TwoSources(const std::string& left, const std::string& right)
-      : name_(left), left_(open_images(left)), right_(open_images(right)) {
+      : name_(left), right_name_(right), left_(open_images(left)), right_(open_images(right)) {
     if (left_->count() < 0 || right_->count() < 0 || left_->count() == right_->count()) return;
     throw InvalidArgument(fmt::format("--left {} has {} images, --right {} has {}: give as many of both", left,
                                       left_->count(), right, right_->count()));
   }
   std::optional<RawPair> next() override {
     RawPair pair{left_->next(), right_->next(), left_->time_s()};
-    if (pair.left.empty() || pair.right.empty()) return std::nullopt;
+    if (pair.left.empty() || pair.right.empty()) {
+      if (!pair.left.empty()) note_ = text_of_early_end("--right " + right_name_, "--left " + name_);
+      if (!pair.right.empty()) note_ = text_of_early_end("--left " + name_, "--right " + right_name_);
+      return std::nullopt;
+    }
     require_same_size(pair, name_);
+    ++pairs_;
     return pair;
   }
   int count() const override { return left_->count(); }
+  std::string note() const override { return note_; }
 
  private:
-  const std::string name_;
+  std::string text_of_early_end(const std::string& ended, const std::string& longer) const {
+    return fmt::format("{} ends after {}, before {}: the rest of that one is left out", ended, counted(pairs_, "image"),
+                       longer);
+  }
+
+  const std::string name_, right_name_;
   const std::unique_ptr<ImageSource> left_, right_;
+  std::size_t pairs_ = 0;
+  std::string note_;
 };
 
 class SideBySide : public RawPairs {

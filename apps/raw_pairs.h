@@ -45,6 +45,7 @@ class RawPairs {
   /// Nothing at the end. Throws InvalidArgument, naming the file.
   virtual std::optional<RawPair> next() = 0;
   virtual int count() const = 0;
+  /// What was left out, for the user; empty where nothing was. Known in full once next() gave nothing.
   virtual std::string note() const { return {}; }
 };
 

@@ -158,12 +158,14 @@ int rectify(const RectifyArguments& arguments) {
   catch_interrupts();
   {
     Progress progress(pairs->count(), arguments.quiet);
-    if (!pairs->note().empty()) progress.note(pairs->note());
+    const std::string note = pairs->note();
+    if (!note.empty()) progress.note(note);
     for (std::optional<RawPair> pair; !interrupted() && (pair = pairs->next());) {
       rectifier(*pair);
       folder.add(*pair);
       progress.done(fmt::format("pair {}", folder.frames()));
     }
+    if (pairs->note() != note) progress.note(pairs->note());
   }
   folder.finish(rectifier);
   if (!arguments.quiet) {

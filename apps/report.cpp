@@ -33,7 +33,7 @@ constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
 constexpr std::size_t kPictures = 6;
 
 struct ReportArguments {
-  std::string run, truth, poses, pictures, out;
+  std::string run, truth, poses, frames, pictures, out;
   int picture_width = 1242;
 };
 
@@ -142,7 +142,9 @@ class Page {
         folder_(arguments.run),
         run_(read_run(folder_)),
         sequence_(sequence_of(folder_)),
-        panels_(run_["options"].value("disparities", 128)) {}
+        panels_(run_["options"].value("disparities", 128)) {
+    choose_frames();
+  }
 
   std::string html() {
     Json data;
@@ -162,14 +164,36 @@ class Page {
   }
 
  private:
+  /// Leaves the frames of --frames in the run's report and in the sequence.
+  void choose_frames() {
+    const vision::FrameRange range =
+        arguments_.frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(arguments_.frames);
+    Json entries = Json::array();
+    std::vector<vision::StereoFrame> frames;
+    for (std::size_t i = 0; i < sequence_.frames.size(); ++i) {
+      const int number = sequence_.frames[i].number;
+      if (number < range.first.value_or(number) || number > range.last.value_or(number)) continue;
+      in_run_.push_back(i);
+      entries.push_back(std::move(run_["frames"][i]));
+      frames.push_back(std::move(sequence_.frames[i]));
+    }
+    if (frames.empty()) {
+      throw InvalidArgument(fmt::format("--frames {}: the run has none of them: choose from {} to {}",
+                                        arguments_.frames, sequence_.frames.front().number,
+                                        sequence_.frames.back().number));
+    }
+    run_["frames"] = std::move(entries);
+    sequence_.frames = std::move(frames);
+  }
+
   void add_truth(Json& data) {
     data["metrics"] = Json::object();
     if (arguments_.truth.empty()) {
-      notes_.emplace_back("Without truth there are no errors: egosgm report OUT --truth DIR compares.");
+      notes_.emplace_back("Without truth there are no errors: egosgm report OUT TRUTH compares.");
       return;
     }
     vision::DisparityCounts pooled;
-    const vision::EvaluationPairs found = find_truth_pairs(folder_, arguments_.truth);
+    const vision::EvaluationPairs found = find_truth_pairs(folder_, arguments_.truth, arguments_.frames);
     notes_.push_back(text_of(found));
     for (const vision::EvaluationPair& pair : found.pairs) {
       const auto frame = std::find_if(sequence_.frames.begin(), sequence_.frames.end(),
@@ -229,8 +253,14 @@ class Page {
       }
       return path;
     };
-    const fs::path estimated = folder_ / "poses.txt";
-    data["path"] = fs::exists(estimated) ? from_above(vision::read_poses(estimated)) : Json::array();
+    std::vector<Eigen::Isometry3d> estimated;
+    if (const fs::path file = folder_ / "poses.txt"; fs::exists(file)) {
+      const std::vector<Eigen::Isometry3d> poses = vision::read_poses(file);
+      for (const std::size_t row : in_run_) {
+        if (row < poses.size()) estimated.push_back(poses[row]);
+      }
+    }
+    data["path"] = from_above(estimated);
     data["true_path"] =
         arguments_.poses.empty() ? Json::array() : from_above(vision::poses_of_frames(sequence_, arguments_.poses));
   }
@@ -249,6 +279,7 @@ class Page {
   const fs::path folder_;
   Json run_;
   vision::StereoSequence sequence_;
+  std::vector<std::size_t> in_run_;  // place of each frame that is shown among all of the run
   FramePanels panels_;
   std::vector<std::string> notes_;
 };
@@ -275,10 +306,14 @@ Command add_report(CLI::App& program) {
   CLI::App* command = program.add_subcommand("report", "Make one HTML page of a run: pictures, charts, path, options");
   auto arguments = std::make_shared<ReportArguments>();
   command->add_option("OUT", arguments->run, "the folder that `egosgm run` wrote")->type_name("")->required();
-  command->add_option("--truth", arguments->truth, "true disparity: a file, a folder, or a data set's folder")
+  command->add_option("TRUTH,--truth", arguments->truth, "true disparity: a file, a folder, or a data set's folder")
       ->type_name("FILE|DIR");
   command->add_option("--poses", arguments->poses, "true KITTI poses, drawn beside the estimated path")
       ->type_name("FILE");
+  command
+      ->add_option("--frames", arguments->frames,
+                   "only these frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all")
+      ->type_name("FIRST:LAST");
   command
       ->add_option("--pictures", arguments->pictures,
                    "numbers of the frames to show, separated by commas; without: six, from the first to the last")

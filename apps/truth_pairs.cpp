@@ -48,9 +48,8 @@ std::string text_of(const vision::EvaluationPairs& pairs) {
 }
 
 void ComparisonArguments::add_to(CLI::App& command, const std::string& estimate_help, const std::string& truth_help) {
-  command.add_option("ESTIMATE", positional_, "what --estimate takes, then what --truth takes")
-      ->type_name("[TRUTH]")
-      ->expected(0, 2);
+  command.add_option("ESTIMATE", positional_[0], "what --estimate takes")->type_name("");
+  command.add_option("TRUTH", positional_[1], "what --truth takes")->type_name("");
   command.add_option("--estimate", estimate, estimate_help)->type_name("FILE|DIR");
   command.add_option("--truth", truth, truth_help)->type_name("FILE|DIR");
   command.add_option("--frames", frames, "only these frame numbers, both ends included: 7:10, 7:, :10 or 7")
@@ -59,6 +58,7 @@ void ComparisonArguments::add_to(CLI::App& command, const std::string& estimate_
 
 void ComparisonArguments::resolve(bool truth_is_needed) {
   for (const std::string& argument : positional_) {
+    if (argument.empty()) continue;
     std::string& free = estimate.empty() ? estimate : truth;
     if (!free.empty()) {
       throw InvalidArgument(

@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <string>
-#include <vector>
 
 #include "egosgm/vision/evaluation.h"
 
@@ -29,7 +28,7 @@ struct ComparisonArguments {
   void resolve(bool truth_is_needed = true);
 
  private:
-  std::vector<std::string> positional_;
+  std::string positional_[2];
 };
 
 }  // namespace egosgm::app

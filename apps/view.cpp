@@ -16,6 +16,7 @@
 #include "apps/option_arguments.h"
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
+#include "apps/standard_output.h"
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/file_io.h"
@@ -152,7 +153,6 @@ int write_files(DrawnSequence& drawn, const ViewArguments& arguments) {
   std::size_t i = 0;
   {
     Progress progress(static_cast<int>(drawn.frames()), arguments.quiet);
-    if (!drawn.note().empty()) progress.note(drawn.note());
     for (; i < drawn.frames() && !interrupted(); ++i) {
       const cv::Mat picture = drawn.draw(i);
       if (video) video->add(picture);
@@ -234,6 +234,7 @@ int view(const ViewArguments& arguments) {
   catch_interrupts();
   if (window) require_display();
   DrawnSequence drawn(arguments);
+  if (!arguments.quiet && !drawn.note().empty()) print_now(drawn.note() + '\n');
   const int code = window ? Window(drawn, arguments)() : write_files(drawn, arguments);
   if (!arguments.quiet && !drawn.advice().empty()) fmt::print("{}\n", drawn.advice());
   return code;

@@ -20,6 +20,13 @@ class Help(ProgramTest):
             self.assertIn("--help", self.assert_works(command, "--help"))
             self.assertIn(command, self.assert_works("--help"))
 
+    def test_usage_lines_read_well(self):
+        for command in COMMANDS:
+            text = self.assert_works(command, "--help")
+            self.assertNotRegex(text, r"\(\d+x\)|\[\w+\.\.\.\]|\[\[")
+        for command in ("eval", "eval-poses"):
+            self.assertIn(f"egosgm {command} [OPTIONS] [ESTIMATE] [TRUTH]\n", self.assert_works(command, "--help"))
+
     def test_the_readme_names_every_subcommand_and_exit_code(self):
         text = (SOURCE / "README.md").read_text()
         for name in COMMANDS:

@@ -326,6 +326,19 @@ class Rectify(RectifyTest):
         wide, _ = self.rectify(*self.PAIRS, "--alpha", 1, calib=self.opencv_yaml(given=False))
         self.assertLess((read_grey(wide / "valid.png") == 255).mean(), 0.95)
 
+    def test_a_video_that_ends_before_the_other_one_is_told_of(self):
+        folder = self.new_folder()
+        whole, cut = folder / "whole.avi", folder / "cut.avi"
+        self.assert_works("view", self.street, "--video", whole, "--cell-width", 100, "--quiet")
+        content = whole.read_bytes()
+        cut.write_bytes(content[:content.index(b"00dc", len(content) // 2)])  # its header still counts all frames
+        for left, right, ended, longer in ((whole, cut, f"--right {cut}", f"--left {whole}"), (cut, whole, f"--left {cut}", f"--right {whole}")):
+            out = self.new_folder() / "out"
+            text = self.assert_works("rectify", "--left", left, "--right", right, "--calib", self.street / "calib.txt", "--out", out)
+            pairs = len(list((out / "image_3").iterdir()))
+            self.assertIn(pairs, range(1, FRAMES))
+            self.assertIn(f"{ended} ends after {pairs} image{'s' * (pairs > 1)}, before {longer}: ", text)
+
     def test_side_by_side_images_and_lists(self):
         both = self.new_folder()
         for i in range(2):

@@ -88,6 +88,23 @@ class Report(ReportTest):
         policy = next(attributes["content"] for tag, attributes in elements if attributes.get("http-equiv") == "Content-Security-Policy")
         self.assertTrue(policy.startswith("default-src 'none'; img-src data:;"))
 
+    def test_frames_chooses_and_the_truth_stands_behind_the_run(self):
+        page = self.new_folder() / "some.html"
+        self.works("report", self.out, self.street, "--frames", "1:2", "--poses", self.street / "poses.txt", "--out", page)
+        some, whole = self.data(page), self.data(self.page)
+        self.assertEqual(some["run"]["frames"], whole["run"]["frames"][1:3])
+        self.assertEqual([picture["frame"] for picture in some["pictures"]], [1, 2])
+        self.assertEqual(some["metrics"], {number: whole["metrics"][number] for number in ("1", "2")})
+        own = json.loads(self.assert_works("eval", self.out, self.street / "truth/left_disp_noc", "--frames", "1:2", "--json"))
+        self.assertEqual(some["pooled"], own["pooled"])
+        self.assertEqual((len(some["path"]), len(some["true_path"])), (2, 2))
+        step = [[b - a for a, b in zip(*data["path"][first:first + 2])] for data, first in ((some, 0), (whole, 1))]
+        for mine, own in zip(*step):  # each is seen from its first camera, which turns little
+            self.assertAlmostEqual(mine, own, delta=0.05)
+        self.assert_refused(["report", self.out, "--frames", f"{FRAMES}:"], f"--frames {FRAMES}:", f"from 0 to {FRAMES - 1}")
+        self.assert_refused(["report", self.out, "--frames", "some"], "FIRST:LAST")
+        self.assert_refused(["report", self.out, "--frames", "1:2", "--pictures", "3"], "--pictures", "from 1 to 2")
+
     def test_pictures_of_all_layers(self):
         data = self.data(self.page)
         self.assertEqual([picture["frame"] for picture in data["pictures"]], list(range(FRAMES)))  # fewer than six
@@ -119,7 +136,7 @@ class Report(ReportTest):
         data = self.data(page)
         self.assertEqual([picture["frame"] for picture in data["pictures"]], [1, 3])
         self.assertEqual([layer["name"] for layer in data["pictures"][0]["layers"]], LAYERS[:-1])
-        self.assertIn("--truth DIR", data["notes"][0])
+        self.assertIn("report OUT TRUTH", data["notes"][0])
         self.assertLess(page.stat().st_size, self.page.stat().st_size / 2)
 
     def test_truth_in_the_folders_that_eval_takes(self):

@@ -35,6 +35,22 @@ class View(ProgramTest):
         self.assertEqual((content[:4], content[8:12]), (b"RIFF", b"AVI "))
         self.assertEqual(content.count(b"00dc") // 2, FRAMES)  # each frame stands in the stream and in the index
 
+    def street_with_a_gap(self):
+        street = self.broken_street()
+        for side in ("image_0", "image_1"):
+            (street / side / "000001.png").unlink()
+        return street
+
+    NOTE = "frame numbers 0..3"
+
+    def test_a_gap_is_told_of_once_before_the_frames(self):
+        street = self.street_with_a_gap()
+        view = ["view", street, "--pictures", street / "pictures", "--cell-width", 100]
+        text = self.assert_works(*view)
+        self.assertEqual(text.count(self.NOTE), 1, text)
+        self.assertLess(text.index(self.NOTE), text.index("frame 000000"))
+        self.assertEqual(self.assert_works(*view, "--quiet"), "")
+
     def test_without_truth_there_is_no_error_panel(self):
         street, heights = self.broken_street(), []
         for name in ("with", "without"):
@@ -61,14 +77,15 @@ class View(ProgramTest):
         with subprocess.Popen(["Xvfb", display, "-nolisten", "tcp"], stderr=subprocess.DEVNULL) as screen:
             try:
                 self.wait_until(pathlib.Path(f"/tmp/.X11-unix/X{display[1:]}").exists)
-                process = subprocess.Popen([PROGRAM, "view", "--odometry", self.street], stderr=subprocess.PIPE, text=True,
+                process = subprocess.Popen([PROGRAM, "view", self.street_with_a_gap()], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                            env=dict(os.environ, DISPLAY=display))
                 with self.assertRaises(subprocess.TimeoutExpired):  # it stays open after the last frame
                     process.wait(timeout=8)
                 process.send_signal(signal.SIGINT)
-                _, errors = process.communicate(timeout=60)
+                text, errors = process.communicate(timeout=60)
                 self.assertEqual(process.returncode, 130, errors)
                 self.assertNotIn("error", errors)
+                self.assertEqual(text.count(self.NOTE), 1, text)
             finally:
                 screen.terminate()
 
