@@ -35,6 +35,12 @@ namespace {
 constexpr const char* kKilled = "a kill, or it is still running";
 
 using Clock = std::chrono::steady_clock;
+std::string note_of(const FrameReport& report) {
+  if (report.unpredicted != Unpredicted::kNo)
+    return fmt::format("  (no prediction: {})", to_string(report.unpredicted));
+  return report.searched_everything ? "  (searched everything)" : "";
+}
+
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
@@ -187,8 +193,7 @@ class Run {
           frame.name, unstorable));
     }
     progress.done(fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms{}", frame.name,
-                              100 * result.search_fraction, 100 * result.density, times.wall_ms,
-                              result.full_range ? "  (full range: " + result.full_range_reason + ")" : ""));
+                              100 * result.search_fraction, 100 * result.density, times.wall_ms, note_of(result)));
   }
 
   void finish(bool finished, const std::string& why_not) {

@@ -16,10 +16,8 @@
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/odometry.h"
-#include "host/banded_sgm.h"
-#include "host/census.h"
+#include "host/match/matcher.h"
 #include "host/ocl/device_handle.h"
-#include "host/step_penalties.h"
 
 namespace egosgm::bench {
 namespace {
@@ -203,27 +201,20 @@ class LeftMatcher {
       : size_{clip.frames.back().left.cols, clip.frames.back().left.rows},
         range_{options.min_disparity, options.disparities},
         context_(device.handle().device),
-        census_(context_, size_, PixelType::kU8, options.banded_sgm.cost, BandedSgm::code_padding(range_)),
-        step_penalties_(context_, size_, PixelType::kU8, options.banded_sgm),
-        search_band_(context_, size_, range_, options.search_band),
-        banded_sgm_(context_, size_, range_, options.banded_sgm),
-        images_(context_, 2 * pixel_count(size_)),
-        codes_(context_, Census::words(options.banded_sgm.cost, size_, BandedSgm::code_padding(range_))),
-        penalties_(context_, StepPenalties::count(size_)),
+        matcher_(context_, size_, range_, options.banded_sgm),
+        everything_(context_, size_, range_),
+        images_{ocl::Buffer<cl_uchar>(context_, 2 * pixel_count(size_)), PixelType::kU8},
         measured_(context_, size_),
         disparity_(pixel_count(size_)) {
     for (const cv::Mat* view : {&clip.frames.back().left, &clip.frames.back().right}) {
       for (int y = 0; y < view->rows; ++y) pixels_.insert(pixels_.end(), view->ptr(y), view->ptr(y) + view->cols);
     }
-    search_band_.full_range();  // the same in every frame
-    context_.wait();
+    matcher_.prepare(images_.type);
   }
 
   void operator()() {
-    images_.write(context_, pixels_);
-    census_(images_, codes_);
-    step_penalties_(images_, penalties_);
-    banded_sgm_(codes_, penalties_, search_band_, measured_, RightView::kNone);
+    images_.pixels.write(context_, pixels_);
+    matcher_(images_, everything_, measured_, Views::kLeft);
     const ocl::Drain drain{context_};
     cl::Event done;
     context_.queue().enqueueReadBuffer(measured_.disparity.get(), CL_FALSE, 0, disparity_.size() * sizeof(float),
@@ -236,13 +227,9 @@ class LeftMatcher {
   const shared::ImageSize size_;
   const shared::DisparityRange range_;
   ocl::Context context_;
-  Census census_;
-  StepPenalties step_penalties_;
-  SearchBand search_band_;
-  BandedSgm banded_sgm_;
-  ocl::Buffer<cl_uchar> images_;
-  ocl::Buffer<cl_uint> codes_;
-  ocl::Buffer<cl_uchar> penalties_;
+  egosgm::Matcher matcher_;
+  const SearchBands everything_;
+  FrameImages images_;
   StereoMaps measured_;
   std::vector<cl_uchar> pixels_;
   std::vector<float> disparity_;

@@ -67,13 +67,19 @@ def compare_table(content):
     return "### Speed\n\n" + markdown(header, rows)
 
 
+def stage_rows(content):
+    """Without the rooms; of the typical size, or of all."""
+    rows = [row for row in content["rows"] if "of_copy" in row]
+    return [row for row in rows if shape(row) == TYPICAL] or rows
+
+
 def stages_table(content):
-    rows = [row for row in content["rows"] if shape(row) == TYPICAL] or content["rows"]
+    rows = stage_rows(content)
     width, height, disparities = shape(rows[0])
     rows = [row for row in rows if shape(row) == (width, height, disparities)]
     cells = [[row["name"], number(row["median_ms"]), number(row["device_ms"]), number(row["GB_s"], 1), f"{100 * row['of_copy']:.0f} %",
               number(row.get("Gcells_s"))] for row in rows]
-    return (f"### Stages, {width}×{height}, D {disparities}, both views\n\n"
+    return (f"### Stages, {width}×{height}, D {disparities}, a steady frame\n\n"
             + markdown(["stage", "ms", "ms on the device", "GB/s", "of a copy", "Gcells/s"], cells))
 
 
@@ -163,13 +169,13 @@ def draw_compare(plt, content):
 
 
 def draw_stages(plt, content):
-    rows = [row for row in content["rows"] if shape(row) == TYPICAL] or content["rows"]
+    rows = stage_rows(content)
     rows = [row for row in reversed(rows) if shape(row) == shape(rows[0])]
     figure, (time, share) = plt.subplots(1, 2, figsize=(9, 4), sharey=True)
     names = [row["name"] for row in rows]
     time.bar_label(time.barh(names, [row["median_ms"] for row in rows], color=OURS), fmt="%.2f", padding=2, fontsize=8)
     time.set_xscale("log")
-    time.set_xlabel("ms, both views")
+    time.set_xlabel("ms of a steady frame")
     share.barh(names, [100 * row["of_copy"] for row in rows], color=THEIRS)
     share.set_xlabel("% of this device's copy bandwidth")
     for axes in (time, share):

@@ -75,19 +75,10 @@ class RowReporter : public benchmark::BenchmarkReporter {
     }
     row.median_ms = median(ms);
     for (auto& [counter, values] : counters) row.more.emplace_back(counter, median(values));
-    print(row);
-    rows_.push_back(std::move(row));
+    add_row(std::move(row), rows_);
   }
 
  private:
-  static void print(const Row& row) {
-    std::printf("%-20s %5dx%-5d D %4d %10.3f ms", row.name.c_str(), row.size.width, row.size.height, row.disparities,
-                row.median_ms);
-    for (const auto& [counter, value] : row.more) std::printf("  %s %.4g", counter.c_str(), value);
-    std::printf("\n");
-    std::fflush(stdout);
-  }
-
   std::vector<Row>& rows_;
 };
 
@@ -173,6 +164,15 @@ void run_registered(std::vector<Row>& rows) {
   RowReporter reporter(rows);
   benchmark::RunSpecifiedBenchmarks(&reporter);
   benchmark::ClearRegisteredBenchmarks();
+}
+
+void add_row(Row row, std::vector<Row>& rows) {
+  std::printf("%-20s %5dx%-5d D %4d %10.3f ms", row.name.c_str(), row.size.width, row.size.height, row.disparities,
+              row.median_ms);
+  for (const auto& [counter, value] : row.more) std::printf("  %s %.4g", counter.c_str(), value);
+  std::printf("\n");
+  std::fflush(stdout);
+  rows.push_back(std::move(row));
 }
 
 double median(std::vector<double> values) {

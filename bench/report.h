@@ -48,6 +48,9 @@ std::string benchmark_name(const std::string& name, shared::ImageSize size, int 
 /// Runs what is registered under such names, forgets it, and appends a row each.
 void run_registered(std::vector<Row>& rows);
 
+/// Prints a row and appends it.
+void add_row(Row row, std::vector<Row>& rows);
+
 /// The middle one; the mean of the two in the middle. REQUIRES: not empty.
 double median(std::vector<double> values);
 

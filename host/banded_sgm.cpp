@@ -141,62 +141,64 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
   }
 }
 
-void BandedSgm::operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties,
-                           const SearchBand& band, StereoMaps& measured, RightView right) {
-  (*this)({codes, penalties, band.bands(), band.cell_offsets()}, measured, right);
+void BandedSgm::operator()(const MatchInputs& image, StereoMaps& measured, Views views) {
+  match_stripes(image, measured, views, /*reads_off=*/false);
 }
 
-void BandedSgm::operator()(const MatchInputs& image, StereoMaps& measured, RightView right) {
+void BandedSgm::reading_off(const MatchInputs& image, StereoMaps& measured) {
+  match_stripes(image, measured, Views::kLeft, /*reads_off=*/true);
+}
+
+void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off) {
   context_.enter("BandedSgm");
-  if (!stripe_memory_) return match(image, measured, right);
+  if (!stripe_memory_) return match(image, measured, views, reads_off);
   for (const Stripe& stripe : stripes_) {
     stripe_memory_->load(image, stripe);
-    match(stripe_memory_->inputs(), stripe_memory_->measured(), right);
+    match(stripe_memory_->inputs(), stripe_memory_->measured(), views, reads_off);
     stripe_memory_->store(stripe, measured);
   }
 }
 
-void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, RightView right) {
-  const int views = right == RightView::kMatched ? 2 : 1;
+void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off) {
   shared::SgmParameters parameters = parameters_;
-  parameters.reads_off = right == RightView::kReadOff;
-  if (parameters.reads_off) read_off_.clear();
+  parameters.reads_off = reads_off;
+  if (reads_off) read_off_.clear();
   if (paths_) {
     (*paths_)(parameters, inputs, measured, read_off_.ranks(), views);
   } else {
     sweep(parameters, inputs, measured, views);
   }
-  if (parameters.reads_off) read_off_(parameters, measured);
+  if (reads_off) read_off_(parameters, measured);
 }
 
 void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
-                      int views) {
+                      Views views) {
   Wavefront& wavefront = *wavefront_;
   const Tile tile = wavefront.tile;
   const int tile_rows = ceil_div(ceil_div(size_.height, 2), tile.height);
   const int tile_columns = ceil_div(size_.width + tile.height, tile.width) + 1;
   const bool is_whole = takes_whole_sweeps(views);
-  const ocl::Range tiles{cl::NDRange(is_whole ? 1 : tile_rows, views, 2), cl::NDRange(1, 1, 1)};
+  const ocl::Range tiles{cl::NDRange(is_whole ? 1 : tile_rows, count(views), 2), cl::NDRange(1, 1, 1)};
   const int first_wave = is_whole ? EGOSGM_ALL_TILES : 0;
   const int end_wave = is_whole ? EGOSGM_ALL_TILES + 1 : tile_columns + 2 * (tile_rows - 1);
 
   wavefront.slots.fill(context_, 255);
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
-    wavefront.to_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands,
-                        inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums);
+    wavefront.to_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
+                        inputs.bands.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums);
   }
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
-    wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands,
-                          inputs.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums, wavefront.winners,
-                          read_off_.ranks());
+    wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
+                          inputs.bands.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums,
+                          wavefront.winners, read_off_.ranks());
   }
-  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters,
-                   wavefront.winners, measured.disparity, measured.variance);
+  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), count(views)),
+                   parameters, wavefront.winners, measured.disparity, measured.variance);
 }
 
-bool BandedSgm::takes_whole_sweeps(int views) const {
+bool BandedSgm::takes_whole_sweeps(Views views) const {
   if (launches_ != Launches::kAutomatic) return launches_ == Launches::kSweeps;
-  return context_.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(2 * views);
+  return context_.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(2 * count(views));
 }
 
 int BandedSgm::matched_rows() const {

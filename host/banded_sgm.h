@@ -49,12 +49,11 @@ class BandedSgm {
   /// Of all stripes: those where they overlap are matched more than once.
   int matched_rows() const;
 
-  /// `codes`: what Census makes with a padding of `code_padding(range)`. `penalties`: what StepPenalties makes. Of
-  /// `penalties` and `band` the right view's part is read where it is matched.
-  void operator()(const ocl::Buffer<cl_uint>& codes, const ocl::Buffer<cl_uchar>& penalties, const SearchBand& band,
-                  StereoMaps& measured, RightView right = RightView::kMatched);
-
-  void operator()(const MatchInputs& image, StereoMaps& measured, RightView right = RightView::kMatched);
+  /// Matches `views`. Of the inputs' codes, which Census makes with a padding of `code_padding(range)`, both views' are
+  /// read; of penalties and bands, theirs.
+  void operator()(const MatchInputs& image, StereoMaps& measured, Views views);
+  /// Matches the left view, and reads the right one's disparities off its sums: half of the work, whole disparities.
+  void reading_off(const MatchInputs& image, StereoMaps& measured);
 
   static int code_padding(shared::DisparityRange range);
 
@@ -82,9 +81,10 @@ class BandedSgm {
     Refine refine;
   };
 
-  void match(const MatchInputs& inputs, StereoMaps& measured, RightView right);
-  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured, int views);
-  bool takes_whole_sweeps(int views) const;
+  void match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off);
+  void match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off);
+  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured, Views views);
+  bool takes_whole_sweeps(Views views) const;
 
   ocl::Context& context_;
   const shared::ImageSize size_;  // of what is matched at once: the image, or a stripe

@@ -61,27 +61,30 @@ BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, sh
       follow_paths_(build(context, range, options, group), "follow_paths"),
       find_winners_(build(context, range, options, group), "find_winners") {}
 
-void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs, int views) {
+void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs,
+                            Views views) {
   const int groups = stage == kStraight ? groups_of(size_.height, group_.lines) + groups_of(size_.width, group_.lines)
                                         : groups_of(size_.width + size_.height - 1, group_.lines);
   const int work_items = group_.lanes * group_.lines;
-  const ocl::Range lines{cl::NDRange(work_items, groups, 2 * views), cl::NDRange(work_items, 1, 1)};
-  follow_paths_(context_, lines, parameters, stage, views, inputs.codes, inputs.penalties, inputs.bands,
-                inputs.cell_offsets, forward_first_, forward_second_, backward_first_, backward_second_);
+  const ocl::Range lines{cl::NDRange(work_items, groups, 2 * count(views)), cl::NDRange(work_items, 1, 1)};
+  const cl_int view_count = count(views);
+  follow_paths_(context_, lines, parameters, stage, view_count, inputs.codes, inputs.penalties, inputs.bands.bands,
+                inputs.bands.cell_offsets, forward_first_, forward_second_, backward_first_, backward_second_);
 }
 
 void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs,
-                                StereoMaps& measured, ocl::Buffer<cl_uint>& ranks, int views) {
+                                StereoMaps& measured, ocl::Buffer<cl_uint>& ranks, Views views) {
   follow(kStraight, parameters, inputs, views);
   if (paths_ == 8) {
     for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);
   }
   const int work_items = group_.lanes * group_.lines;
-  const ocl::Range pixels{
-      cl::NDRange(static_cast<std::size_t>(groups_of(size_.width, group_.lines)) * work_items, size_.height, views),
-      cl::NDRange(work_items, 1, 1)};
-  find_winners_(context_, pixels, parameters, inputs.codes, inputs.bands, inputs.cell_offsets, forward_first_,
-                forward_second_, backward_first_, backward_second_, measured.disparity, measured.variance, ranks);
+  const ocl::Range pixels{cl::NDRange(static_cast<std::size_t>(groups_of(size_.width, group_.lines)) * work_items,
+                                      size_.height, count(views)),
+                          cl::NDRange(work_items, 1, 1)};
+  find_winners_(context_, pixels, parameters, inputs.codes, inputs.bands.bands, inputs.bands.cell_offsets,
+                forward_first_, forward_second_, backward_first_, backward_second_, measured.disparity,
+                measured.variance, ranks);
 }
 
 }  // namespace egosgm

@@ -21,7 +21,7 @@ class BandedSgmPaths {
 
   /// As BandedSgm.
   void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
-                  ocl::Buffer<cl_uint>& ranks, int views);
+                  ocl::Buffer<cl_uint>& ranks, Views views);
 
   /// A quad of disparities a lane on GPUs, else a few, and a group that fills a GPU's smallest unit, as far as the
   /// device allows it.
@@ -38,7 +38,7 @@ class BandedSgmPaths {
   using Sums = ocl::Buffer<cl_uchar>;
   using Maps = ocl::Buffer<float>;
 
-  void follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs, int views);
+  void follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs, Views views);
 
   ocl::Context& context_;
   const shared::ImageSize size_;

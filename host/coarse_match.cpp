@@ -36,43 +36,42 @@ BandedSgmOptions CoarseMatch::matcher(const PipelineOptions& options) {
   return coarse;
 }
 
+Shrink::Shrink(ocl::Context& context, shared::ImageSize size, PixelType type)
+    : context_(context), size_(size), shrink_(build(context, type), "shrink") {}
+
+void Shrink::operator()(const FrameImages& images, FrameImages& coarse) {
+  context_.enter("CoarseMatch");
+  const shared::ImageSize coarse_size = CoarseMatch::coarse_size(size_);
+  const int at_once = ocl::pixels_a_work_item(context_) == 1 ? 1 : EGOSGM_COARSE;
+  shrink_(context_, ocl::every_pixel(context_, {(coarse_size.width + at_once - 1) / at_once, coarse_size.height}),
+          size_, images.pixels, coarse.pixels);
+}
+
 CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options)
     : context_((context.enter("CoarseMatch"), context)),
-      size_(size),
       coarse_(coarse_size(size)),
       range_(coarse_range({options.min_disparity, options.disparities})),
-      matcher_(matcher(options)),
       max_difference_px_(options.coarse_match.max_difference_px),
-      shrink_u8_(build(context, PixelType::kU8), "shrink"),
-      shrink_u16_(build(context, PixelType::kU16), "shrink"),
-      band_(context, coarse_, range_, {}),
-      census_(context, coarse_, PixelType::kU16, matcher_.cost, BandedSgm::code_padding(range_)),
-      step_penalties_(context, coarse_, PixelType::kU16, matcher_),
-      banded_sgm_(context, coarse_, range_, matcher_),
+      shrink_([=, &context](PixelType type) { return Shrink(context, size, type); }),
+      matcher_(context, coarse_, range_, matcher(options)),
       consistency_(context, coarse_),
-      images_(context, 2 * 2 * pixel_count(coarse_)),
-      codes_(context, Census::words(matcher_.cost, coarse_, BandedSgm::code_padding(range_))),
-      penalties_(context, StepPenalties::count(coarse_)),
-      matched_(context, coarse_),
-      checked_(context, coarse_) {}
+      everything_(context, coarse_, range_),
+      images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(coarse_)), PixelType::kU16},
+      matched_(context, 2 * pixel_count(coarse_)) {
+  matcher_.prepare(PixelType::kU16);
+}
 
-const StereoMaps& CoarseMatch::operator()(const FrameImages& images) {
+void CoarseMatch::operator()(const FrameImages& images, StereoMaps& found) {
   const ocl::Context::Within within(context_, "CoarseMatch");
-  Shrink& shrink = images.type == PixelType::kU8 ? shrink_u8_ : shrink_u16_;
-  const int at_once = ocl::pixels_a_work_item(context_) == 1 ? 1 : EGOSGM_COARSE;
-  shrink(context_, ocl::every_pixel(context_, {(coarse_.width + at_once - 1) / at_once, coarse_.height}), size_,
-         images.pixels, images_);
-  band_.full_range();
-  census_(images_, codes_);
-  step_penalties_(images_, penalties_);
-  banded_sgm_(codes_, penalties_, band_, matched_);
-  consistency_(matched_, max_difference_px_, OutsideView::kDrop, checked_);
-  return checked_;
+  shrink_[images.type](images, images_);
+  StereoMaps matched{matched_, found.variance};
+  matcher_(images_, everything_, matched, Views::kBoth);
+  consistency_(matched_, max_difference_px_, OutsideView::kDrop, found.disparity, found.variance);
 }
 
 std::uint64_t CoarseMatch::matched_cells() const {
   const std::uint64_t lanes = static_cast<std::uint64_t>(SearchBand::max_chunks(range_)) * EGOSGM_LANES;
-  return 2 * lanes * coarse_.width * banded_sgm_.matched_rows();
+  return 2 * lanes * coarse_.width * matcher_.banded_sgm().matched_rows();
 }
 
 }  // namespace egosgm

@@ -4,15 +4,23 @@
 #include <cstdint>
 
 #include "egosgm/options.h"
-#include "host/banded_sgm.h"
-#include "host/census.h"
 #include "host/consistency_check.h"
-#include "host/maps.h"
-#include "host/ocl/kernel.h"
-#include "host/search_band.h"
-#include "host/step_penalties.h"
+#include "host/match/matcher.h"
 
 namespace egosgm {
+
+/// Shrinks both images to a quarter: coarse pixels of 16 bits.
+class Shrink {
+ public:
+  Shrink(ocl::Context& context, shared::ImageSize size, PixelType type);
+
+  void operator()(const FrameImages& images, FrameImages& coarse);
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>> shrink_;
+};
 
 /// Matches both views over the full range at a quarter of the resolution, without a prediction: what is far from what
 /// the prediction says shows here first. A pixel of the result stands for EGOSGM_COARSE x EGOSGM_COARSE pixels, and its
@@ -21,14 +29,15 @@ class CoarseMatch {
  public:
   CoarseMatch(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options);
 
-  /// Left-right consistent disparities of both views, `coarse_size` of the images' each.
-  const StereoMaps& operator()(const FrameImages& images);
+  /// Builds what images of `type` need.
+  void prepare(PixelType type) { shrink_.prepare(type); }
+
+  /// Writes the left-right consistent disparities of both views, `coarse_size` of the images' each. REQUIRES: the
+  /// images' type was prepared.
+  void operator()(const FrameImages& images, StereoMaps& found);
 
   /// Cells that a call matches, of both views.
   std::uint64_t matched_cells() const;
-
-  /// What the last call returned.
-  const StereoMaps& found() const { return checked_; }
 
   static shared::ImageSize coarse_size(shared::ImageSize size);
   static shared::DisparityRange coarse_range(shared::DisparityRange range);
@@ -36,23 +45,16 @@ class CoarseMatch {
   static BandedSgmOptions matcher(const PipelineOptions& options);
 
  private:
-  using Shrink = ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
-
   ocl::Context& context_;
-  const shared::ImageSize size_, coarse_;
+  const shared::ImageSize coarse_;
   const shared::DisparityRange range_;
-  const BandedSgmOptions matcher_;
   const float max_difference_px_;
-  Shrink shrink_u8_, shrink_u16_;
-  SearchBand band_;
-  Census census_;
-  StepPenalties step_penalties_;
-  BandedSgm banded_sgm_;
+  OfEachType<Shrink> shrink_;
+  Matcher matcher_;
   ConsistencyCheck consistency_;
-  ocl::Buffer<cl_uchar> images_;
-  ocl::Buffer<cl_uint> codes_;
-  ocl::Buffer<cl_uchar> penalties_;
-  StereoMaps matched_, checked_;
+  const SearchBands everything_;
+  FrameImages images_;
+  Map matched_;
 };
 
 }  // namespace egosgm

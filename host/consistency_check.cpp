@@ -22,18 +22,18 @@ ConsistencyCheck::ConsistencyCheck(ocl::Context& context, shared::ImageSize size
   no_doubt_.write(context, {shared::PredictionState{}});
 }
 
-void ConsistencyCheck::operator()(StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out) {
-  (*this)(in, max_difference_px, max_difference_px, no_doubt_, outside, out);
+void ConsistencyCheck::operator()(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept,
+                                  Map& variance) {
+  (*this)(disparity, max_difference_px, max_difference_px, no_doubt_, outside, kept, variance);
 }
 
-void ConsistencyCheck::operator()(StereoMaps& in, float max_difference_px, float in_doubt_px,
-                                  const ocl::Buffer<shared::PredictionState>& last, OutsideView outside,
-                                  StereoMaps& out) {
+void ConsistencyCheck::operator()(const Map& disparity, float max_difference_px, float in_doubt_px,
+                                  const ocl::Buffer<shared::PredictionState>& last, OutsideView outside, Map& kept,
+                                  Map& variance) {
   context_.enter("ConsistencyCheck");
   const cl_int keep_outside = outside == OutsideView::kKeep;
-  std::swap(in.variance, out.variance);
   check_(context_, ocl::every_pixels(context_, size_, pixels_), size_, max_difference_px, in_doubt_px, last,
-         keep_outside, in.disparity, out.disparity, out.variance);
+         keep_outside, disparity, kept, variance);
 }
 
 }  // namespace egosgm

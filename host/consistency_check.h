@@ -16,11 +16,11 @@ class ConsistencyCheck {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   ConsistencyCheck(ocl::Context& context, shared::ImageSize size, int pixels = 0);
 
-  /// `out` takes over the variances of `in`, which keeps its disparities only. REQUIRES: `out` is not `in`.
-  void operator()(StereoMaps& in, float max_difference_px, OutsideView outside, StereoMaps& out);
+  /// Writes what is kept of `disparity` to `kept`, which is another map; what is dropped loses its `variance`.
+  void operator()(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept, Map& variance);
   /// With another tolerance where the predictions of the `last` frame were wrong.
-  void operator()(StereoMaps& in, float max_difference_px, float in_doubt_px,
-                  const ocl::Buffer<shared::PredictionState>& last, OutsideView outside, StereoMaps& out);
+  void operator()(const Map& disparity, float max_difference_px, float in_doubt_px,
+                  const ocl::Buffer<shared::PredictionState>& last, OutsideView outside, Map& kept, Map& variance);
 
  private:
   ocl::Context& context_;

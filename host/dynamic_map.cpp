@@ -16,23 +16,16 @@ DynamicMap::DynamicMap(ocl::Context& context, shared::ImageSize size, const Dyna
       size_(size),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       min_difference_px_(options.min_difference_px),
-      marks_(context, pixel_count(size)),
+      both_(context, pixel_count(size)),
+      differing_(context, pixel_count(size)),
       count_rows_(build(context, pixels_), "count_rows"),
       mark_(build(context, pixels_), "mark") {}
 
-const ocl::Buffer<cl_uchar>& DynamicMap::operator()(const StereoMaps* predicted, const StereoMaps& measured,
-                                                    StereoMaps& scratch) {
+void DynamicMap::operator()(const Map& predicted, const Map& measured, ocl::Buffer<cl_uchar>& marks) {
   context_.enter("DynamicMap");
-  if (predicted) {
-    const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, /*views=*/1);
-    count_rows_(context_, pixels, size_, min_difference_px_, predicted->disparity, measured.disparity,
-                scratch.disparity, scratch.variance);
-    mark_(context_, pixels, size_, predicted->disparity, measured.disparity, scratch.disparity, scratch.variance,
-          marks_);
-  } else {
-    marks_.fill(context_, 0);
-  }
-  return marks_;
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, /*views=*/1);
+  count_rows_(context_, pixels, size_, min_difference_px_, predicted, measured, both_, differing_);
+  mark_(context_, pixels, size_, predicted, measured, both_, differing_, marks);
 }
 
 }  // namespace egosgm

@@ -15,15 +15,15 @@ class DynamicMap {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   DynamicMap(ocl::Context& context, shared::ImageSize size, const DynamicMapOptions& options, int pixels = 0);
 
-  /// Without a prediction (null) nothing contradicts it. `scratch` is overwritten.
-  const ocl::Buffer<cl_uchar>& operator()(const StereoMaps* predicted, const StereoMaps& measured, StereoMaps& scratch);
+  /// By the disparities `predicted` and `measured`. `marks`: a byte a pixel.
+  void operator()(const Map& predicted, const Map& measured, ocl::Buffer<cl_uchar>& marks);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
   const float min_difference_px_;
-  ocl::Buffer<cl_uchar> marks_;
+  Map both_, differing_;  // of each pixel, in its row
   ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
               ocl::Buffer<float>, ocl::Buffer<float>>
       count_rows_;

@@ -22,11 +22,9 @@ EdgeRejection::EdgeRejection(ocl::Context& context, shared::ImageSize size, cons
       max_jump_px_(options.max_jump_px > 0 ? options.max_jump_px : std::numeric_limits<float>::max()),
       reject_(build(context, pixels_), "reject") {}
 
-void EdgeRejection::operator()(StereoMaps& in, StereoMaps& out) {
+void EdgeRejection::operator()(const Map& disparity, Map& kept, Map& variance) {
   context_.enter("EdgeRejection");
-  std::swap(in.variance, out.variance);
-  reject_(context_, ocl::every_pixels(context_, size_, pixels_), size_, max_jump_px_, in.disparity, out.disparity,
-          out.variance);
+  reject_(context_, ocl::every_pixels(context_, size_, pixels_), size_, max_jump_px_, disparity, kept, variance);
 }
 
 }  // namespace egosgm

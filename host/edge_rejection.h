@@ -15,8 +15,8 @@ class EdgeRejection {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   EdgeRejection(ocl::Context& context, shared::ImageSize size, const EdgeRejectionOptions& options, int pixels = 0);
 
-  /// `out` takes over the variances of `in`, which keeps its disparities only. REQUIRES: `out` is not `in`.
-  void operator()(StereoMaps& in, StereoMaps& out);
+  /// Writes what is kept of `disparity` to `kept`; what is dropped loses its `variance`.
+  void operator()(const Map& disparity, Map& kept, Map& variance);
 
  private:
   ocl::Context& context_;

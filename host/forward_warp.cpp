@@ -101,7 +101,7 @@ ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Ca
 }
 
 void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted,
-                             int views) {
+                             Views views) {
   context_.enter("ForwardWarp");
   Motion motion = current_from_previous;
   motion.covariance *= static_cast<double>(options_.motion_noise);
@@ -110,13 +110,13 @@ void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_fro
   if (bands_) {
     auto& [find_spans, splat_bands, spans] = *bands_;
     const int bands = (size_.height + band_rows_ - 1) / band_rows_;
-    find_spans(context_, ocl::every_row(context_, size_, views), size_, left, right, belief.disparity, spans);
-    splat_bands(context_, ocl::every_row(context_, {1, bands}, views), size_, range_, left, right,
+    find_spans(context_, ocl::every_row(context_, size_, count(views)), size_, left, right, belief.disparity, spans);
+    splat_bands(context_, ocl::every_row(context_, {1, bands}, count(views)), size_, range_, left, right,
                 options_.process_noise_px2, band_rows_, spans, belief.disparity, belief.variance, predicted.disparity,
                 predicted.variance);
     return;
   }
-  const ocl::Range pixels = ocl::every_pixel(context_, size_, views);
+  const ocl::Range pixels = ocl::every_pixel(context_, size_, count(views));
   auto& [move, splat_disparity, splat_variance, decode, landed, moved_key, moved_variance, zbuffer] = *atomics_;
   move(context_, pixels, size_, range_, left, right, options_.process_noise_px2, belief.disparity, belief.variance,
        landed, moved_key, moved_variance, zbuffer, predicted.variance);

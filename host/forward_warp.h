@@ -28,8 +28,8 @@ class ForwardWarp {
               const ForwardWarpOptions& options, shared::DisparityRange range, int pixels = 0,
               int band_rows = kCpuTuning.warp_band_rows);
 
-  /// `views`: 1 predicts the left view only. REQUIRES: `motion` is valid; `predicted` is not `belief`.
-  void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted, int views = 2);
+  /// REQUIRES: `motion` is valid; `predicted` is not `belief`.
+  void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted, Views views);
 
  private:
   using Size = const shared::ImageSize;

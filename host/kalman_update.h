@@ -16,10 +16,10 @@ class KalmanUpdate {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
 
-  /// `check`: what PredictionCheck says of this frame. `warped`: predictions before any was dropped. `views`: 1
-  /// updates the left view only. REQUIRES: `updated` is neither `predicted` nor `measured`; it may be `warped`.
-  void operator()(const ocl::Buffer<shared::PredictionState>& check, const StereoMaps& warped,
-                  const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated, int views = 2);
+  /// `check`: what PredictionCheck says of this frame. `warped`: predicted disparities before any was dropped.
+  /// REQUIRES: `updated` is neither `predicted` nor `measured`.
+  void operator()(const ocl::Buffer<shared::PredictionState>& check, const Map& warped, const StereoMaps& predicted,
+                  const StereoMaps& measured, StereoMaps& updated, Views views);
 
  private:
   ocl::Context& context_;

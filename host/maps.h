@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
+#include <optional>
+#include <utility>
+
 #include "egosgm/image.h"
+#include "egosgm/options.h"
 #include "host/ocl/buffer.h"
 #include "kernels/shared.h"
 
@@ -9,22 +14,51 @@ namespace egosgm {
 
 inline std::size_t pixel_count(shared::ImageSize size) { return static_cast<std::size_t>(size.width) * size.height; }
 
+inline shared::DisparityRange range_of(const PipelineOptions& options) {
+  return {options.min_disparity, options.disparities};
+}
+
 /// Both views' pixels on the device, the left view first, without gaps; 1 or 2 bytes each.
 struct FrameImages {
   ocl::Buffer<cl_uchar> pixels;
   PixelType type = PixelType::kU8;
 };
 
-/// Disparity [px] and variance [px^2] of both views, the left one first. Variance is 0 where the disparity is invalid.
-struct StereoMaps {
-  ocl::Buffer<float> disparity, variance;
+/// A stage that is built for images of one type: one of each type that was prepared.
+template <typename Stage>
+class OfEachType {
+ public:
+  explicit OfEachType(std::function<Stage(PixelType)> build) : build_(std::move(build)) {}
 
+  /// Builds the one for `type`, where that was not done. Enqueues nothing.
+  void prepare(PixelType type) {
+    if (!stages_[index(type)]) stages_[index(type)].emplace(build_(type));
+  }
+  /// REQUIRES: it was prepared.
+  Stage& operator[](PixelType type) { return stages_[index(type)].value(); }
+
+ private:
+  static int index(PixelType type) { return type == PixelType::kU8 ? 0 : 1; }
+
+  std::function<Stage(PixelType)> build_;
+  std::optional<Stage> stages_[2];
+};
+
+/// A map of both views, the left one first.
+using Map = ocl::Buffer<float>;
+
+/// Disparity [px] and variance [px^2] of both views. Variance is 0 where the disparity is invalid. A copy shares the
+/// device's memory.
+struct StereoMaps {
+  Map disparity, variance;
+
+  StereoMaps(Map disparities, Map variances) : disparity(std::move(disparities)), variance(std::move(variances)) {}
   StereoMaps(ocl::Context& context, shared::ImageSize size)
       : disparity(context, 2 * pixel_count(size)), variance(context, 2 * pixel_count(size)) {}
 };
 
-/// How the right view's disparities come about: matched in bands of their own; read off the sums of the left view's
-/// match, which is half of the work, whole ones; or not at all, and what was there stays.
-enum class RightView { kMatched, kReadOff, kNone };
+/// Of which views something is made. The values are their number.
+enum class Views { kLeft = 1, kBoth = 2 };
+inline int count(Views views) { return static_cast<int>(views); }
 
 }  // namespace egosgm

@@ -15,26 +15,22 @@ const cl::Program& build(ocl::Context& context, int pixels) {
 
 }  // namespace
 
-MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, const MedianFilterOptions& options,
-                           int pixels)
+MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, int pixels)
     : context_((context.enter("MedianFilter"), context)),
       size_(size),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
-      enabled_(options.enabled),
       filter_(build(context, pixels_), "filter"),
-      filter_and_fill_(build(context, pixels_), "filter_and_fill"),
-      filtered_(context, enabled_ ? 2 * pixel_count(size) : 0) {}
+      filter_and_fill_(build(context, pixels_), "filter_and_fill") {}
 
-void MedianFilter::operator()(StereoMaps& maps, Holes holes, int views) {
-  if (!enabled_) return;
+void MedianFilter::operator()(const Map& disparity, Map& filtered, Views views) {
   context_.enter("MedianFilter");
-  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, views);
-  if (holes == Holes::kFill) {
-    filter_and_fill_(context_, pixels, size_, kFillFrom, maps.disparity, filtered_, maps.variance);
-  } else {
-    filter_(context_, pixels, size_, maps.disparity, filtered_);
-  }
-  std::swap(maps.disparity, filtered_);
+  filter_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, disparity, filtered);
+}
+
+void MedianFilter::fill(const Map& disparity, Map& filtered, Map& variance, Views views) {
+  context_.enter("MedianFilter");
+  filter_and_fill_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, kFillFrom, disparity,
+                   filtered, variance);
 }
 
 }  // namespace egosgm

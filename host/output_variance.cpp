@@ -17,20 +17,21 @@ OutputVariance::OutputVariance(ocl::Context& context, shared::ImageSize size, co
       size_(size),
       options_(options),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
+      roughness_(context, 2 * pixel_count(size)),
+      mean_variance_(context, 2 * pixel_count(size)),
       mean_roughness_(context, 2 * pixel_count(size)),
       of_each_pixel_(build(context, pixels_), "of_each_pixel"),
       row_means_(build(context, pixels_), "row_means"),
       combine_(build(context, pixels_), "combine") {}
 
-void OutputVariance::operator()(const StereoMaps& maps, const StereoMaps& measured, int views, StereoMaps& scratch,
-                                ocl::Buffer<float>& variance) {
+void OutputVariance::operator()(const StereoMaps& maps, const StereoMaps& measured, Map& variance, Views views) {
   context_.enter("OutputVariance");
-  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, views);
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, count(views));
   of_each_pixel_(context_, pixels, size_, maps.disparity, maps.variance, measured.disparity, measured.variance,
-                 variance, scratch.disparity);
-  row_means_(context_, pixels, size_, variance, scratch.disparity, scratch.variance, mean_roughness_);
+                 variance, roughness_);
+  row_means_(context_, pixels, size_, variance, roughness_, mean_variance_, mean_roughness_);
   combine_(context_, pixels, size_, options_.scale, options_.roughness_weight, options_.jump_weight, maps.disparity,
-           scratch.variance, mean_roughness_, variance);
+           mean_variance_, mean_roughness_, variance);
 }
 
 }  // namespace egosgm

@@ -17,17 +17,16 @@ class OutputVariance {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   OutputVariance(ocl::Context& context, shared::ImageSize size, const OutputVarianceOptions& options, int pixels = 0);
 
-  /// Writes `variance` [px^2], 0 where there is no disparity, of the left view or of both. The disparities of `scratch`
-  /// and its variances are overwritten. `measured`: what the frame of `maps` measured; may be `maps`.
-  void operator()(const StereoMaps& maps, const StereoMaps& measured, int views, StereoMaps& scratch,
-                  ocl::Buffer<float>& variance);
+  /// Writes `variance` [px^2], 0 where there is no disparity. `measured`: what the frame of `maps` measured; may be
+  /// `maps`.
+  void operator()(const StereoMaps& maps, const StereoMaps& measured, Map& variance, Views views);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const OutputVarianceOptions options_;
   const int pixels_;
-  ocl::Buffer<float> mean_roughness_;
+  Map roughness_, mean_variance_, mean_roughness_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>,
               const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       of_each_pixel_;

@@ -30,16 +30,21 @@ PredictionCheck::PredictionCheck(ocl::Context& context, shared::ImageSize size, 
       count_rows_(build(context, row_group_), "count_rows"),
       judge_(build(context, row_group_), "judge") {}
 
-void PredictionCheck::operator()(const State* before, const StereoMaps& warped, const StereoMaps& predicted,
-                                 const StereoMaps& measured, State& after) {
+void PredictionCheck::operator()(const State& before, const Map& warped, const Map& predicted, const Map& measured,
+                                 State& after) {
   context_.enter("PredictionCheck");
-  const cl_int rows = is_enabled_ && before ? checked_rows(size_) : 0;
+  const cl_int rows = is_enabled_ ? checked_rows(size_) : 0;
   if (rows > 0) {
-    count_rows_(context_, ocl::group_a_row({size_.width, rows}, row_group_, /*views=*/1), size_.width, warped.disparity,
-                predicted.disparity, measured.disparity, row_counts_);
+    count_rows_(context_, ocl::group_a_row({size_.width, rows}, row_group_, /*views=*/1), size_.width, warped,
+                predicted, measured, row_counts_);
   }
-  judge_(context_, ocl::group_a_row({size_.width, 1}, row_group_, /*views=*/1), rows, row_counts_,
-         before ? *before : nothing_, after);
+  judge_(context_, ocl::group_a_row({size_.width, 1}, row_group_, /*views=*/1), rows, row_counts_, before, after);
+}
+
+void PredictionCheck::begin(State& after) {
+  context_.enter("PredictionCheck");
+  const cl_int no_rows = 0;
+  judge_(context_, ocl::group_a_row({size_.width, 1}, row_group_, /*views=*/1), no_rows, row_counts_, nothing_, after);
 }
 
 }  // namespace egosgm

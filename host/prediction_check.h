@@ -21,9 +21,10 @@ class PredictionCheck {
   PredictionCheck(ocl::Context& context, shared::ImageSize size, const PredictionCheckOptions& options,
                   int row_group = 0);
 
-  /// `before`: of the frame before; null: this one has no predictions, and any maps do.
-  void operator()(const State* before, const StereoMaps& warped, const StereoMaps& predicted,
-                  const StereoMaps& measured, State& after);
+  /// `before`: of the frame before. The disparities `warped`, before any was dropped, `predicted` and `measured`.
+  void operator()(const State& before, const Map& warped, const Map& predicted, const Map& measured, State& after);
+  /// For a frame without predictions: nothing speaks against the next one's.
+  void begin(State& after);
 
  private:
   ocl::Context& context_;

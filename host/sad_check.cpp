@@ -14,16 +14,11 @@ const cl::Program& build(ocl::Context& context, PixelType type) {
 }  // namespace
 
 SadCheck::SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type, const SadCheckOptions& options)
-    : context_(context), size_(size), options_(options), check_(build(context, type), "check") {}
+    : context_(context), size_(size), max_difference_(options.max_difference), check_(build(context, type), "check") {}
 
-void SadCheck::operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& in, StereoMaps& out) {
+void SadCheck::operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps) {
   context_.enter("SadCheck");
-  if (options_.max_difference > 0) {
-    check_(context_, ocl::every_pixel(context_, size_), size_, options_.max_difference, images, in.disparity,
-           in.variance, out.disparity, out.variance);
-  } else {
-    std::swap(in, out);
-  }
+  check_(context_, ocl::every_pixel(context_, size_), size_, max_difference_, images, maps.disparity, maps.variance);
 }
 
 }  // namespace egosgm

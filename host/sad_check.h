@@ -13,17 +13,14 @@ class SadCheck {
  public:
   SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type, const SadCheckOptions& options);
 
-  /// `images`: the pixels of both views without padding, the left view first, one or two bytes each.
-  /// `in` and `out` may be the same maps. With the check off, nothing is launched: `in` and `out` change places.
-  void operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& in, StereoMaps& out);
+  /// In place. `images`: the pixels of both views without padding, the left view first, one or two bytes each.
+  void operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
-  const SadCheckOptions options_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<cl_uchar>, const ocl::Buffer<float>,
-              const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
-      check_;
+  const float max_difference_;
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<cl_uchar>, Map, Map> check_;
 };
 
 }  // namespace egosgm

@@ -22,6 +22,19 @@ const cl::Program& build(ocl::Context& context, int row_group) {
 
 }  // namespace
 
+SearchBands::SearchBands(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range)
+    : bands(context, 2 * pixel_count(size)),
+      cell_offsets(context, 2 * pixel_count(size)),
+      row_sums(context, 2 * static_cast<std::size_t>(size.height)) {
+  const shared::Band band = whole(range);
+  bands.write(context, std::vector(bands.size(), band));
+  std::vector<cl_uint> offsets(cell_offsets.size());
+  for (std::size_t i = 0; i < offsets.size(); ++i) {
+    offsets[i] = static_cast<cl_uint>(i % static_cast<std::size_t>(size.width)) * band.chunks;
+  }
+  cell_offsets.write(context, offsets);
+}
+
 SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                        const SearchBandOptions& options, int row_group)
     : context_((context.enter("SearchBand"), context)),
@@ -37,9 +50,6 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       none_(context, 2 * pixel_count(blocks_)),
       found_(context, 2 * pixel_count(blocks_)),
       block_bands_(context, 2 * pixel_count(blocks_)),
-      bands_(context, 2 * pixel_count(size)),
-      cell_offsets_(context, 2 * pixel_count(size)),
-      row_sums_(context, 2 * static_cast<std::size_t>(size.height)),
       gather_blocks_(build(context, row_group_), "gather_blocks"),
       gather_ridges_(build(context, row_group_), "gather_ridges"),
       gather_coarse_(build(context, row_group_), "gather_coarse"),
@@ -51,56 +61,46 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
   for (ocl::Buffer<shared::BlockRange>* ranges : {&block_ranges_, &none_}) {
     ranges->write(context, std::vector(ranges->size(), shared::BlockRange{}));
   }
-  clear(context, range, bands_, cell_offsets_);
 }
 
-void SearchBand::clear(ocl::Context& context, shared::DisparityRange range, ocl::Buffer<shared::Band>& bands,
-                       ocl::Buffer<cl_uint>& cell_offsets) {
-  const ocl::Drain drain{context};
-  bands.fill(context, whole(range));
-  cell_offsets.fill(context, 0);
-  context.wait();
-}
-
-void SearchBand::operator()(const StereoMaps& predicted, const StereoMaps* warped, const StereoMaps* coarse,
-                            const ocl::Buffer<shared::PredictionState>* last, int views) {
+void SearchBand::operator()(const StereoMaps& predicted, const Hints& hints, SearchBands& bands, Views views) {
   context_.enter("SearchBand");
-  searched_views_ = views;
-  const ocl::Range blocks = ocl::every_pixel(context_, blocks_, views);
-  const bool has_ridges = warped && options_.ridge_step_px > 0;
-  if (has_ridges) gather_ridges_(context_, blocks, size_, options_.ridge_step_px, warped->disparity, ridges_);
+  const ocl::Range blocks = ocl::every_pixel(context_, blocks_, count(views));
+  const bool has_ridges = hints.warped && options_.ridge_step_px > 0;
+  if (has_ridges) gather_ridges_(context_, blocks, size_, options_.ridge_step_px, *hints.warped, ridges_);
   const Ranges& ridges = has_ridges ? ridges_ : none_;
-  if (coarse) {
-    gather_coarse_(context_, blocks, size_, options_.ridge_step_px, coarse->disparity, ridges, coarse_ranges_,
+  if (hints.coarse) {
+    gather_coarse_(context_, blocks, size_, options_.ridge_step_px, *hints.coarse, ridges, coarse_ranges_,
                    ridges_with_coarse_);
   }
   if (options_.from_neighbours) gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
   bands_of_blocks_(context_, blocks, size_, range_, options_.from_neighbours, options_.neighbour_margin_px,
                    options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_,
-                   coarse ? coarse_ranges_ : none_, options_.ridge_step_px > 0 ? EGOSGM_RIDGE_BLOCKS : -1,
-                   coarse ? ridges_with_coarse_ : ridges, found_, block_bands_);
-  bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}, views), size_, range_,
+                   hints.coarse ? coarse_ranges_ : none_, options_.ridge_step_px > 0 ? EGOSGM_RIDGE_BLOCKS : -1,
+                   hints.coarse ? ridges_with_coarse_ : ridges, found_, block_bands_);
+  bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}, count(views)), size_, range_,
                    options_.sigmas, options_.min_half_width_px, predicted.disparity, predicted.variance,
-                   options_.coarse_tolerance_px, options_.coarse_margin_px, found_, block_bands_, bands_);
-  if (last) widen_(context_, ocl::group_a_row(size_, 1, views), size_, whole(range_), *last, bands_);
-  sum_rows(predicted);
+                   options_.coarse_tolerance_px, options_.coarse_margin_px, found_, block_bands_, bands.bands);
+  if (hints.last) {
+    widen_(context_, ocl::group_a_row(size_, 1, count(views)), size_, whole(range_), *hints.last, bands.bands);
+  }
+  sum_rows(predicted.disparity, bands, views);
 }
 
-void SearchBand::full_range(int views) {
+void SearchBand::full_range(SearchBands& bands, Views views) {
   context_.enter("SearchBand");
-  searched_views_ = views;
-  full_range_(context_, ocl::every_pixel(context_, size_, views), size_, whole(range_), bands_, cell_offsets_,
-              row_sums_);
+  full_range_(context_, ocl::every_pixel(context_, size_, count(views)), size_, whole(range_), bands.bands,
+              bands.cell_offsets, bands.row_sums);
 }
 
-void SearchBand::full_range(const StereoMaps& predicted, int views) {
-  full_range(views);
-  sum_rows(predicted);
+void SearchBand::full_range(const Map& predicted, SearchBands& bands, Views views) {
+  full_range(bands, views);
+  sum_rows(predicted, bands, views);
 }
 
-void SearchBand::sum_rows(const StereoMaps& predicted) {
-  sum_rows_(context_, ocl::group_a_row(size_, row_group_, searched_views_), size_, predicted.disparity, bands_,
-            cell_offsets_, row_sums_);
+void SearchBand::sum_rows(const Map& predicted, SearchBands& bands, Views views) {
+  sum_rows_(context_, ocl::group_a_row(size_, row_group_, count(views)), size_, predicted, bands.bands,
+            bands.cell_offsets, bands.row_sums);
 }
 
 }  // namespace egosgm

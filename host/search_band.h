@@ -7,6 +7,16 @@
 
 namespace egosgm {
 
+/// Which disparities are searched, and where their cells lie, of both views.
+struct SearchBands {
+  ocl::Buffer<shared::Band> bands;       // one a pixel and view
+  ocl::Buffer<cl_uint> cell_offsets;     // one a pixel and view: the chunks of the pixels to the left of it in its row
+  ocl::Buffer<shared::RowSum> row_sums;  // one a row and view: index view * height + y
+
+  /// Each pixel searches the whole range, until SearchBand says otherwise.
+  SearchBands(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
+};
+
 /// Says for every pixel of both views which disparities are searched, and where their cells lie.
 ///
 /// A predicted pixel searches d +- max(min_half_width_px, sigmas * sqrt(p)), another one the range that the predictions
@@ -21,36 +31,27 @@ class SearchBand {
   SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
              const SearchBandOptions& options, int row_group = 0);
 
-  /// Bands from the prediction, from ridges of it before anything was dropped (`warped`), and from what CoarseMatch
-  /// found, where there are these; the whole range where `last`, what PredictionCheck said of the frame before, says
-  /// that its predictions were wrong. `views`: 1 searches the left view only, here and below.
-  void operator()(const StereoMaps& predicted, const StereoMaps* warped = nullptr, const StereoMaps* coarse = nullptr,
-                  const ocl::Buffer<shared::PredictionState>* last = nullptr, int views = 2);
-  /// Every pixel searches everything.
-  void full_range(int views = 2);
-  /// The same where there is a prediction that is not searched by: `row_sums` counts its pixels.
-  void full_range(const StereoMaps& predicted, int views = 2);
+  /// What bands rest on beside the prediction, where there is such a thing.
+  struct Hints {
+    const Map* warped = nullptr;  // predicted disparities before any was dropped: their ridges
+    const Map* coarse = nullptr;  // the disparities that CoarseMatch found
+    const ocl::Buffer<shared::PredictionState>* last = nullptr;  // of the frame before: were its predictions wrong?
+  };
 
-  /// One a pixel and view.
-  const ocl::Buffer<shared::Band>& bands() const { return bands_; }
-  /// One a pixel and view: the chunks of the pixels to the left of it in its row.
-  const ocl::Buffer<cl_uint>& cell_offsets() const { return cell_offsets_; }
-  /// One a row and view: index view * height + y. Those of `searched_views()` count.
-  const ocl::Buffer<shared::RowSum>& row_sums() const { return row_sums_; }
-  /// By the last call: 1 or 2.
-  int searched_views() const { return searched_views_; }
+  /// Bands from the prediction and the hints; the whole range where the last predictions were wrong.
+  void operator()(const StereoMaps& predicted, const Hints& hints, SearchBands& bands, Views views);
+  /// Every pixel searches everything.
+  void full_range(SearchBands& bands, Views views);
+  /// The same where there are predicted disparities that are not searched by: `row_sums` counts them.
+  void full_range(const Map& predicted, SearchBands& bands, Views views);
 
   /// No pixel has more chunks than this.
   static int max_chunks(shared::DisparityRange range) {
     return range.count <= EGOSGM_LANES ? 1 : (range.count + 2 * EGOSGM_LANES - 1) / (2 * EGOSGM_LANES) * 2;
   }
-  /// What a device that goes on after a kernel that failed must find: bands that fit the range, and offsets below a
-  /// row's end. Waits.
-  static void clear(ocl::Context& context, shared::DisparityRange range, ocl::Buffer<shared::Band>& bands,
-                    ocl::Buffer<cl_uint>& cell_offsets);
 
  private:
-  void sum_rows(const StereoMaps& predicted);
+  void sum_rows(const Map& predicted, SearchBands& bands, Views views);
 
   using Disparities = const ocl::Buffer<float>;
   using Ranges = ocl::Buffer<shared::BlockRange>;
@@ -60,12 +61,8 @@ class SearchBand {
   const shared::DisparityRange range_;
   const SearchBandOptions options_;
   const int row_group_;
-  int searched_views_ = 2;
   Ranges block_ranges_, coarse_ranges_, ridges_, ridges_with_coarse_, none_, found_;
   ocl::Buffer<shared::Band> block_bands_;
-  ocl::Buffer<shared::Band> bands_;
-  ocl::Buffer<cl_uint> cell_offsets_;
-  ocl::Buffer<shared::RowSum> row_sums_;
   ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_blocks_;
   ocl::Kernel<const shared::ImageSize, const float, Disparities, Ranges> gather_ridges_;
   ocl::Kernel<const shared::ImageSize, const float, Disparities, const Ranges, Ranges, Ranges> gather_coarse_;

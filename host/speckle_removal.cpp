@@ -31,19 +31,19 @@ SpeckleRemoval::SpeckleRemoval(ocl::Context& context, shared::ImageSize size, co
       measure_(build(context, row_group_), "measure"),
       drop_(build(context, row_group_), "drop") {}
 
-void SpeckleRemoval::operator()(StereoMaps& maps, int views) {
+void SpeckleRemoval::operator()(StereoMaps& maps, Views views) {
   if (options_.max_size_px <= 0) return;
   context_.enter("SpeckleRemoval");
   const int strips = (size_.height + strip_rows_ - 1) / strip_rows_;
-  const ocl::Range pixels = ocl::every_pixels(context_, size_, row_group_ == 1 ? 16 : 1, views);
-  find_runs_(context_, ocl::group_a_row(size_, row_group_, views), size_, options_.max_difference_px, maps.disparity,
-             runs_, parents_, sizes_);
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, row_group_ == 1 ? 16 : 1, count(views));
+  find_runs_(context_, ocl::group_a_row(size_, row_group_, count(views)), size_, options_.max_difference_px,
+             maps.disparity, runs_, parents_, sizes_);
   if (strip_rows_ > 1) {
-    join_strips_(context_, ocl::every_row(context_, {1, strips}, views), size_, options_.max_difference_px, strip_rows_,
-                 maps.disparity, runs_, parents_);
+    join_strips_(context_, ocl::every_row(context_, {1, strips}, count(views)), size_, options_.max_difference_px,
+                 strip_rows_, maps.disparity, runs_, parents_);
   }
   if (strips > 1) {
-    join_seams_(context_, ocl::every_pixel(context_, {size_.width, strips - 1}, views), size_,
+    join_seams_(context_, ocl::every_pixel(context_, {size_.width, strips - 1}, count(views)), size_,
                 options_.max_difference_px, strip_rows_, maps.disparity, runs_, parents_);
   }
   measure_(context_, pixels, size_, runs_, parents_, roots_, sizes_);

@@ -21,7 +21,7 @@ class SpeckleRemoval {
                  int strip_rows = 0, int row_group = 0);
 
   /// In place. With `max_size_px` 0 nothing is launched. `views`: 1 looks at the left view only.
-  void operator()(StereoMaps& maps, int views = 2);
+  void operator()(StereoMaps& maps, Views views);
 
  private:
   using Disparities = const ocl::Buffer<float>;

@@ -14,11 +14,12 @@ class StepPenalties {
   StepPenalties(ocl::Context& context, shared::ImageSize size, PixelType type, const BandedSgmOptions& options,
                 int pixels = 0);
 
-  /// `images`: both views' pixels. `steps`: `count(size)` penalties. `views`: 1 writes those of the left view only.
-  void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& steps, int views = 2);
+  /// `images`: both views' pixels. `steps`: `bytes(size)` penalties, a byte each. `views`: 1 writes those of the left
+  /// view only.
+  void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& steps, Views views);
 
   static constexpr int kStepsAPixel = 4;
-  static std::size_t count(shared::ImageSize size) { return kStepsAPixel * 2 * pixel_count(size); }
+  static std::size_t bytes(shared::ImageSize size) { return kStepsAPixel * 2 * pixel_count(size); }
 
  private:
   ocl::Context& context_;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 
-#include "host/search_band.h"
 #include "host/step_penalties.h"
 
 namespace egosgm {
@@ -33,12 +32,9 @@ StripeMemory::StripeMemory(ocl::Context& context, shared::ImageSize size, shared
       stripe_size_{size.width, rows},
       words_a_row_(words_a_row),
       codes_(context, kViews * words_a_row * rows),
-      penalties_(context, StepPenalties::count(stripe_size_)),
-      bands_(context, kViews * pixel_count(stripe_size_)),
-      cell_offsets_(context, kViews * pixel_count(stripe_size_)),
-      measured_(context, stripe_size_) {
-  SearchBand::clear(context, range, bands_, cell_offsets_);
-}
+      penalties_(context, StepPenalties::bytes(stripe_size_)),
+      bands_(context, stripe_size_, range),
+      measured_(context, stripe_size_) {}
 
 std::uint64_t StripeMemory::bytes(int width, int rows, std::size_t words_a_row) {
   const std::uint64_t a_pixel =
@@ -60,8 +56,8 @@ void StripeMemory::load(const MatchInputs& image, const Stripe& stripe) {
   const std::size_t width = size_.width;
   load_rows(image.codes, codes_, kViews, words_a_row_, stripe.first_row);
   load_rows(image.penalties, penalties_, kViews, StepPenalties::kStepsAPixel * width, stripe.first_row);
-  load_rows(image.bands, bands_, kViews, width, stripe.first_row);
-  load_rows(image.cell_offsets, cell_offsets_, kViews, width, stripe.first_row);
+  load_rows(image.bands.bands, bands_.bands, kViews, width, stripe.first_row);
+  load_rows(image.bands.cell_offsets, bands_.cell_offsets, kViews, width, stripe.first_row);
 }
 
 void StripeMemory::store(const Stripe& stripe, StereoMaps& image) {

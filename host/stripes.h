@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "host/maps.h"
+#include "host/search_band.h"
 
 namespace egosgm {
 
@@ -11,8 +12,7 @@ namespace egosgm {
 struct MatchInputs {
   const ocl::Buffer<cl_uint>& codes;
   const ocl::Buffer<cl_uchar>& penalties;
-  const ocl::Buffer<shared::Band>& bands;
-  const ocl::Buffer<cl_uint>& cell_offsets;
+  const SearchBands& bands;
 };
 
 /// A horizontal stripe of an image: `rows` rows from `first_row` on are matched, those of [kept_begin, kept_end) kept.
@@ -36,7 +36,7 @@ class StripeMemory {
   /// Brings what is kept of the stripe's `measured` maps to the image's.
   void store(const Stripe& stripe, StereoMaps& image);
 
-  MatchInputs inputs() const { return {codes_, penalties_, bands_, cell_offsets_}; }
+  MatchInputs inputs() const { return {codes_, penalties_, bands_}; }
   StereoMaps& measured() { return measured_; }
 
   /// What this takes on the device.
@@ -52,8 +52,7 @@ class StripeMemory {
   const std::size_t words_a_row_;
   ocl::Buffer<cl_uint> codes_;
   ocl::Buffer<cl_uchar> penalties_;
-  ocl::Buffer<shared::Band> bands_;
-  ocl::Buffer<cl_uint> cell_offsets_;
+  SearchBands bands_;
   StereoMaps measured_;
 };
 

@@ -12,8 +12,7 @@
 #endif
 
 KERNEL void check(const ImageSize size, const float max_difference, global const uchar* images,
-                  global const float* disparity_in, global const float* variance_in, global float* disparity_out,
-                  global float* variance_out) {
+                  global float* disparity, global float* variance) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
@@ -21,7 +20,7 @@ KERNEL void check(const ImageSize size, const float max_difference, global const
 
   const size_t pixels = (size_t)size.width * size.height;
   const size_t pixel = view * pixels + (size_t)y * size.width + x;
-  const float d = disparity_in[pixel];
+  const float d = disparity[pixel];
   // A disparity that leads out of the image has no window; clamped, it converts safely.
   const float shift = fmin(fmax(view == EGOSGM_LEFT ? -d : d, -2.0f * size.width), 2.0f * size.width);
   const int match = x + convert_int_rte(shift);
@@ -42,7 +41,7 @@ KERNEL void check(const ImageSize size, const float max_difference, global const
   }
   const int count = (right - left + 1) * (bottom - top + 1) * STEPS_PER_GREY;
   const bool keeps = inside && sum <= max_difference * count;
-  const float variance = variance_in[pixel];
-  disparity_out[pixel] = keeps ? d : EGOSGM_INVALID_DISPARITY;
-  variance_out[pixel] = keeps ? variance : 0.0f;
+  if (keeps) return;
+  disparity[pixel] = EGOSGM_INVALID_DISPARITY;
+  variance[pixel] = 0.0f;
 }

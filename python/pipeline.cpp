@@ -296,8 +296,11 @@ void bind_values(py::module_& module) {
 
 void bind_frame(py::module_& module) {
   py::class_<FrameReport>(module, "FrameReport", "What happened in a frame.")
-      .def_readonly("full_range", &FrameReport::full_range, "No prediction was used: everything was searched,")
-      .def_readonly("full_range_reason", &FrameReport::full_range_reason, "because of this.")
+      .def_property_readonly(
+          "unpredicted", [](const FrameReport& report) { return to_string(report.unpredicted); },
+          "Why nothing was predicted: 'first frame', 'reset', 'no motion' or 'not temporal'; '' where something was.")
+      .def_readonly("searched_everything", &FrameReport::searched_everything,
+                    "The whole range at every pixel: without a prediction, or not trusting it.")
       .def_readonly("search_fraction", &FrameReport::search_fraction,
                     "All cells that were matched, over those of one match of the full range. More than 1 in a first "
                     "frame, which is matched twice.")

@@ -27,7 +27,7 @@ struct Case {
   std::optional<BandedSgmPaths::Group> group = {};
   BandedSgm::Launches launches = BandedSgm::Launches::kWaves;
   BandedSgm::Tile tile = {};
-  RightView right = RightView::kMatched;
+  bool reads_off = false;
 };
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
@@ -42,7 +42,7 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
     text += "_tiles" + std::to_string(c.tile.width) + "x" + std::to_string(c.tile.height);
   }
   if (c.tile.block_lanes > 0) text += "_blocks" + std::to_string(c.tile.block_lanes);
-  if (c.right == RightView::kReadOff) text += "_read_off";
+  if (c.reads_off) text += "_read_off";
   if (c.group) text += "_lanes" + std::to_string(c.group->lanes) + "_lines" + std::to_string(c.group->lines);
   return text;
 }
@@ -91,7 +91,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
   ocl::Context context(testing::any_device());
   const int padding = BandedSgm::code_padding(c.range);
   m.options = {.cost = c.cost, .paths = c.paths, .scheduling = c.scheduling, .max_memory_mib = max_memory_mib};
-  SearchBand band(context, c.size, c.range, {.min_half_width_px = 1});
+  SearchBands bands(context, c.size, c.range);
   BandedSgm sgm(context, c.size, c.range, m.options, c.group, c.tile, c.launches);
   const auto padded = reference::padded_codes(c.size, m.codes[0], m.codes[1], padding, c.cost);
   ocl::Buffer<cl_uint> device_codes(context, padded.size());
@@ -101,14 +101,13 @@ Match match(const Case& c, int max_memory_mib = 0) {
     const testing::HostMaps maps = predictions(c);
     predicted.disparity.write(context, maps.disparity);
     predicted.variance.write(context, maps.variance);
-    band(predicted);
-  } else {
-    band.full_range();
+    SearchBand(context, c.size, c.range, {.min_half_width_px = 1})(predicted, {}, bands, Views::kBoth);
   }
   const auto steps = reference::step_penalties(c.size, m.grey, 8, m.options);
   ocl::Buffer<cl_uchar> penalties(context, steps.size());
   penalties.write(context, {steps.begin(), steps.end()});
-  sgm(device_codes, penalties, band, measured, c.right);
+  const MatchInputs inputs{device_codes, penalties, bands};
+  c.reads_off ? sgm.reading_off(inputs, measured) : sgm(inputs, measured, Views::kBoth);
 
   m.parameters = {c.size.width,
                   c.size.height,
@@ -120,8 +119,8 @@ Match match(const Case& c, int max_memory_mib = 0) {
                   m.options.variance_floor_px2,
                   m.options.variance_per_step_px2,
                   m.options.variance_per_square_px2,
-                  c.right == RightView::kReadOff};
-  m.bands = band.bands().read(context);
+                  c.reads_off};
+  m.bands = bands.bands.read(context);
   m.measured = {measured.disparity.read(context), measured.variance.read(context)};
   m.stripes = sgm.stripes();
   return m;
@@ -175,8 +174,11 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
 TEST(BandedSgmStripes, EqualTheTwinOfEach) {
   for (const Scheduling scheduling : {Scheduling::kWavefront, Scheduling::kPaths}) {
     for (const MatchingCost cost : {MatchingCost::kCensus13x11, MatchingCost::kSad3x3}) {
-      const RightView right = cost == MatchingCost::kSad3x3 ? RightView::kReadOff : RightView::kMatched;
-      const Case c{.size = {61, 301}, .range = {-5, 37}, .cost = cost, .scheduling = scheduling, .right = right};
+      const Case c{.size = {61, 301},
+                   .range = {-5, 37},
+                   .cost = cost,
+                   .scheduling = scheduling,
+                   .reads_off = cost == MatchingCost::kSad3x3};
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
       const auto expected = stripe_by_stripe(m, c.size);
@@ -270,7 +272,7 @@ std::vector<Case> changed(std::vector<Case> cases, Change change) {
 }
 
 void along_paths(Case& c) { c.scheduling = Scheduling::kPaths; }
-void read_off(Case& c) { c.right = RightView::kReadOff; }
+void read_off(Case& c) { c.reads_off = true; }
 void whole_sweeps(Case& c) { c.launches = BandedSgm::Launches::kSweeps; }
 
 /// Groups of other shapes than the default: single work-items, paths that do not share out evenly, more lanes than
@@ -304,11 +306,11 @@ std::vector<Case> in_blocks() {
   std::vector<Case> cases;
   for (const int lanes : {16, 32}) {
     for (const Case& c : {Case{.size = {33, 21}, .range = {0, 128}},
-                          {.size = {33, 21}, .range = {-20, 37}, .right = RightView::kReadOff},
+                          {.size = {33, 21}, .range = {-20, 37}, .reads_off = true},
                           {.size = {33, 21}, .range = {-9, 37}, .banded = false},
                           {.size = {33, 21}, .range = {0, 48}, .cost = MatchingCost::kSad3x3, .paths = 4},
                           {.size = {33, 21}, .range = {-40, 48}, .cost = MatchingCost::kCensus9x7, .banded = false},
-                          {.size = {33, 21}, .range = {0, 100}, .banded = false, .right = RightView::kReadOff},
+                          {.size = {33, 21}, .range = {0, 100}, .banded = false, .reads_off = true},
                           {.size = {24, 21}, .range = {0, 1024}}}) {
       cases.push_back(c);
       cases.back().tile.block_lanes = lanes;

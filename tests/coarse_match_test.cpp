@@ -40,7 +40,9 @@ std::vector<float> run(shared::ImageSize size, const PipelineOptions& options, c
   }
   FrameImages on_device{ocl::Buffer<cl_uchar>(context, bytes.size()), type};
   on_device.pixels.write(context, bytes);
-  const StereoMaps& found = stage(on_device);
+  StereoMaps found(context, CoarseMatch::coarse_size(size));
+  stage.prepare(type);
+  stage(on_device, found);
   return found.disparity.read(context);
 }
 

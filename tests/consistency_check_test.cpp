@@ -21,8 +21,8 @@ testing::HostMaps check(shared::ImageSize size, float max_difference_px, const t
   ConsistencyCheck check(context, size, pixels);
   StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  check(in, max_difference_px, outside, out);
-  return testing::download(context, out);
+  check(in.disparity, max_difference_px, outside, out.disparity, in.variance);
+  return {out.disparity.read(context), in.variance.read(context)};
 }
 
 // A row of both views.
@@ -91,7 +91,7 @@ TEST(ConsistencyCheck, HasAnotherToleranceWhereTheLastPredictionsWereWrong) {
     for (const auto& [usual_px, in_doubt_px] : {std::pair{0.4375f, 0.5f}, {0.5f, 0.4375f}}) {
       last.write(context, {{.counts = {}, .is_wrong = is_wrong, .was_wrong = 0}});
       StereoMaps in = testing::upload(context, size, maps);
-      check(in, usual_px, in_doubt_px, last, OutsideView::kDrop, out);
+      check(in.disparity, usual_px, in_doubt_px, last, OutsideView::kDrop, out.disparity, in.variance);
       EXPECT_EQ(out.disparity.read(context)[1], (is_wrong ? in_doubt_px : usual_px) == 0.5f ? 1.25f : kNone);
     }
   }

@@ -129,8 +129,7 @@ TEST_F(DevicePipelineTest, GivesTheBitsOfTheHostsWay) {
         ASSERT_NE(done, nullptr);
         EXPECT_EQ(clWaitForEvents(1, &done), CL_SUCCESS);
         clReleaseEvent(done);
-        EXPECT_EQ(maps.full_range, index == 0);
-        EXPECT_EQ(maps.full_range_reason, index == 0 ? "first frame" : "");
+        EXPECT_EQ(maps.unpredicted, index == 0 ? Unpredicted::kFirstFrame : Unpredicted::kNo);
         frames.expect_same(maps, index);
       }
     }
@@ -208,7 +207,7 @@ TEST_F(DevicePipelineTest, GoesOnAfterAFrameThatFailed) {
   }
   for (int index = 0; index < ShortVideo::kFrames; ++index) {
     const DeviceMaps maps = frames.enqueue(index);
-    EXPECT_EQ(maps.full_range_reason, index == 0 ? "reset" : "");
+    EXPECT_EQ(maps.unpredicted, index == 0 ? Unpredicted::kReset : Unpredicted::kNo);
     frames.expect_same(maps, index);
   }
 }
@@ -341,7 +340,7 @@ TEST_F(DevicePipelineTest, RefusesWhatIsNoSharedVirtualMemory) {
   cl_mem pixels = queue.upload(ShortVideo(), 0);
   expect_not_enqueued({.pixels = pixels, .svm_pixels = enough.get()}, {"give one of them"});
   clReleaseMemObject(pixels);
-  EXPECT_TRUE(device.enqueue({.svm_pixels = enough.get()}, std::nullopt).full_range);
+  EXPECT_NE(device.enqueue({.svm_pixels = enough.get()}, std::nullopt).unpredicted, Unpredicted::kNo);
 }
 
 }  // namespace

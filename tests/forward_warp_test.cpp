@@ -25,7 +25,7 @@ testing::HostMaps before(shared::ImageSize size) { return testing::random_maps(s
 
 testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, shared::DisparityRange range,
                        float process_noise_px2, const testing::HostMaps& belief, const Motion& motion, int pixels = 0,
-                       int views = 2) {
+                       Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   ForwardWarp warp(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
@@ -111,7 +111,7 @@ TEST_P(ForwardWarpTest, PredictsTheLeftViewAlone) {
   const Motion motion = random_motion(random, 0.3, 0.02);
   const testing::HostMaps both = warp(size, kCalibration, kRange, 0.25f, belief, motion);
   for (const int pixels : {1, 16}) {
-    const testing::HostMaps one = warp(size, kCalibration, kRange, 0.25f, belief, motion, pixels, 1);
+    const testing::HostMaps one = warp(size, kCalibration, kRange, 0.25f, belief, motion, pixels, Views::kLeft);
     EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
     EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
   }

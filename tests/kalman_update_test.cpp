@@ -16,19 +16,18 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 /// What lies in the output must not shine through.
 testing::HostMaps before_update(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
 
-/// `in_place`: the warped map lies where the updated one will.
 testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& warped,
                          const testing::HostMaps& predicted, const testing::HostMaps& measured, int pixels = 0,
-                         bool in_place = false, const shared::PredictionState& check = {}, int views = 2) {
+                         const shared::PredictionState& check = {}, Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   KalmanUpdate update(context, size, options, pixels);
   const StereoMaps before = testing::upload(context, size, warped);
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const StereoMaps measurement = testing::upload(context, size, measured);
-  StereoMaps out = testing::upload(context, size, in_place ? warped : before_update(size));
+  StereoMaps out = testing::upload(context, size, before_update(size));
   ocl::Buffer<shared::PredictionState> checked(context, 1);
   checked.write(context, {check});
-  update(checked, in_place ? out : before, prediction, measurement, out, views);
+  update(checked, before.disparity, prediction, measurement, out, views);
   return testing::download(context, out);
 }
 
@@ -71,7 +70,7 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
         KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
     const testing::HostMaps expected = reference::kalman_update(size, options, warped.disparity, predicted, measured);
     for (const int pixels : {1, 16}) {
-      const testing::HostMaps actual = update(size, options, warped, predicted, measured, pixels, pixels == 1);
+      const testing::HostMaps actual = update(size, options, warped, predicted, measured, pixels);
       EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
           << "gate " << options.gate_px << ", by " << pixels;
       EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
@@ -87,9 +86,8 @@ TEST_P(KalmanUpdateTest, UpdatesTheLeftViewAlone) {
   const testing::HostMaps warped = testing::random_maps(size, -8, 8, 0.3, 11);
   const testing::HostMaps both = update(size, {}, warped, predicted, measured);
   for (const int pixels : {1, 16}) {
-    const bool in_place = pixels == 1;
-    const testing::HostMaps was = in_place ? warped : before_update(size);
-    const testing::HostMaps one = update(size, {}, warped, predicted, measured, pixels, in_place, {}, 1);
+    const testing::HostMaps was = before_update(size);
+    const testing::HostMaps one = update(size, {}, warped, predicted, measured, pixels, {}, Views::kLeft);
     EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
     EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
   }
@@ -158,7 +156,7 @@ struct Surroundings {
   }
   Estimate updated_in_the_middle(const KalmanUpdateOptions& options = {},
                                  const shared::PredictionState& check = {}) const {
-    const testing::HostMaps updated = update(kSize, options, warped, predicted, measured, 0, false, check);
+    const testing::HostMaps updated = update(kSize, options, warped, predicted, measured, 0, check);
     return {updated.disparity[kMiddle], updated.variance[kMiddle]};
   }
   void drop_prediction() {

@@ -11,36 +11,39 @@
 namespace egosgm::testing {
 namespace {
 
-TEST(Pipeline, SaysWhyAFrameWasSearchedInFull) {
+// What is predicted and what is searched are two things: see `search=full` and SearchesEverythingAfterAWrongPrediction.
+TEST(Pipeline, SaysWhyNothingWasPredictedAndWhatWasSearched) {
   Setting setting = standard();
   const Video video(setting, 3);
   Pipeline pipeline = make_pipeline(setting);
-  const auto reason = [&](int index, bool has_motion) {
+  const auto unpredicted = [&](int index, bool has_motion) {
     const FrameReport report =
         process(pipeline, setting, video, index, has_motion ? std::optional(video.motion(index)) : std::nullopt).report;
-    EXPECT_EQ(report.full_range, !report.full_range_reason.empty());
-    EXPECT_EQ(report.full_range, report.search_fraction >= 1) << report.search_fraction;
-    return report.full_range_reason;
+    EXPECT_EQ(report.searched_everything,
+              report.unpredicted != Unpredicted::kNo || setting.options.search == SearchMode::kFull);
+    EXPECT_EQ(report.searched_everything, report.search_fraction >= 1) << report.search_fraction;
+    EXPECT_EQ(report.predicted_fraction > 0, report.unpredicted == Unpredicted::kNo);
+    return report.unpredicted;
   };
-  EXPECT_EQ(reason(0, true), "first frame");
-  EXPECT_EQ(reason(1, true), "");
-  EXPECT_EQ(reason(2, false), "no motion");
-  EXPECT_EQ(reason(0, true), "");
+  EXPECT_EQ(unpredicted(0, true), Unpredicted::kFirstFrame);
+  EXPECT_EQ(unpredicted(1, true), Unpredicted::kNo);
+  EXPECT_EQ(unpredicted(2, false), Unpredicted::kNoMotion);
+  EXPECT_EQ(unpredicted(0, true), Unpredicted::kNo);
   pipeline.reset();
-  EXPECT_EQ(reason(1, true), "reset");
-  EXPECT_EQ(reason(2, true), "");
+  EXPECT_EQ(unpredicted(1, true), Unpredicted::kReset);
+  EXPECT_EQ(unpredicted(2, true), Unpredicted::kNo);
   pipeline.reset();
   pipeline.reset();
-  EXPECT_EQ(reason(0, false), "reset");
+  EXPECT_EQ(unpredicted(0, false), Unpredicted::kReset);
 
   setting.options.search = SearchMode::kFull;
   pipeline = make_pipeline(setting);
-  EXPECT_EQ(reason(0, true), "first frame");
-  EXPECT_EQ(reason(1, true), "search is full");
+  EXPECT_EQ(unpredicted(0, true), Unpredicted::kFirstFrame);
+  EXPECT_EQ(unpredicted(1, true), Unpredicted::kNo);
   setting.options.temporal = false;
   pipeline = make_pipeline(setting);
-  EXPECT_EQ(reason(0, true), "not temporal");
-  EXPECT_EQ(reason(1, true), "not temporal");
+  EXPECT_EQ(unpredicted(0, true), Unpredicted::kNotTemporal);
+  EXPECT_EQ(unpredicted(1, true), Unpredicted::kNotTemporal);
 }
 
 // The belief of the frame without a motion is what the next one predicts from.
@@ -54,7 +57,7 @@ TEST(Pipeline, PredictsAgainAfterAFrameWithoutMotion) {
   EXPECT_EQ(valid_part(gap.outputs.predicted.values()), 0);
   EXPECT_TRUE(same_bits(gap.outputs.disparity.values(), gap.outputs.measured.values(), setting.size));
   const Result after = process(broken, setting, video, 2);
-  EXPECT_FALSE(after.report.full_range);
+  EXPECT_EQ(after.report.unpredicted, Unpredicted::kNo);
   EXPECT_GT(after.report.predicted_fraction, 0.5);
   EXPECT_LT(after.report.search_fraction, 0.4);
 }

@@ -34,8 +34,12 @@ shared::PredictionState check(shared::ImageSize size, const shared::PredictionSt
   PredictionCheck::State last(context, 1), next(context, 1);
   if (before) last.write(context, {*before});
   next.write(context, {{{9, 9, 9}, 9, 9}});  // must not shine through
-  prediction_check(before ? &last : nullptr, testing::upload(context, size, warped),
-                   testing::upload(context, size, predicted), testing::upload(context, size, measured), next);
+  if (before) {
+    const StereoMaps moved = testing::upload(context, size, warped), kept = testing::upload(context, size, predicted);
+    prediction_check(last, moved.disparity, kept.disparity, testing::upload(context, size, measured).disparity, next);
+  } else {
+    prediction_check.begin(next);
+  }
   return next.read(context).front();
 }
 

@@ -7,7 +7,7 @@
 #include <functional>
 #include <limits>
 
-#include "host/frame_transfer.h"
+#include "host/frame/frame_transfer.h"
 #include "tests/reference/search_band.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
@@ -21,8 +21,8 @@ using testing::same_bits;
 
 constexpr shared::DisparityRange kRanges[] = {{0, 1}, {0, 16}, {-20, 37}, {0, 128}, {3, 1027}};
 
-reference::SearchBands read(ocl::Context& context, const SearchBand& stage) {
-  return {stage.bands().read(context), stage.cell_offsets().read(context), stage.row_sums().read(context)};
+reference::SearchBands read(ocl::Context& context, const SearchBands& bands) {
+  return {bands.bands.read(context), bands.cell_offsets.read(context), bands.row_sums.read(context)};
 }
 
 reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
@@ -37,8 +37,10 @@ reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range,
   if (!coarse.empty()) found.disparity.write(context, coarse);
   StereoMaps before(context, size);
   if (!warped.empty()) before.disparity.write(context, warped);
-  stage(predicted, warped.empty() ? nullptr : &before, coarse.empty() ? nullptr : &found);
-  return read(context, stage);
+  SearchBands bands(context, size, range);
+  stage(predicted, {warped.empty() ? nullptr : &before.disparity, coarse.empty() ? nullptr : &found.disparity}, bands,
+        Views::kBoth);
+  return read(context, bands);
 }
 
 void expect_same(const reference::SearchBands& actual, const reference::SearchBands& expected, shared::ImageSize size) {
@@ -110,9 +112,12 @@ TEST_P(SearchBandTest, FullRangeEqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const shared::DisparityRange range : kRanges) {
     ocl::Context context(testing::any_device());
-    SearchBand stage(context, size, range, {});
-    stage.full_range();
-    expect_same(read(context, stage), reference::full_range(size, range), size);
+    SearchBands bands(context, size, range);
+    EXPECT_TRUE(same_bits(bands.bands.read(context), reference::full_range(size, range).bands, size));
+    EXPECT_TRUE(same_bits(bands.cell_offsets.read(context), reference::full_range(size, range).cell_offsets, size));
+    bands.bands.fill(context, {0, 1, 0, 0});
+    SearchBand(context, size, range, {}).full_range(bands, Views::kBoth);
+    expect_same(read(context, bands), reference::full_range(size, range), size);
   }
 }
 
@@ -127,19 +132,22 @@ TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
   wrong.write(context, {{.counts = {}, .is_wrong = 1, .was_wrong = 0}});
   for (const int row_group : {1, 64}) {
     SearchBand stage(context, size, {-5, 128}, {}, row_group);
-    const std::function<void(int)> ways[] = {
-        [&](int views) { stage(predicted, &warped, &coarse, nullptr, views); },
-        [&](int views) { stage(predicted, nullptr, nullptr, &wrong, views); },
-        [&](int views) { stage.full_range(views); },
-        [&](int views) { stage.full_range(predicted, views); },
+    SearchBands bands(context, size, {-5, 128});
+    const std::function<void(Views)> ways[] = {
+        [&](Views views) {
+          stage(predicted, {&warped.disparity, &coarse.disparity}, bands, views);
+        },
+        [&](Views views) { stage(predicted, {.last = &wrong}, bands, views); },
+        [&](Views views) { stage.full_range(bands, views); },
+        [&](Views views) { stage.full_range(predicted.disparity, bands, views); },
     };
     for (const auto& search : ways) {
-      search(2);
-      const reference::SearchBands both = read(context, stage);
-      stage(earlier);
-      const reference::SearchBands before = read(context, stage);
-      search(1);
-      expect_same(read(context, stage),
+      search(Views::kBoth);
+      const reference::SearchBands both = read(context, bands);
+      stage(earlier, {}, bands, Views::kBoth);
+      const reference::SearchBands before = read(context, bands);
+      search(Views::kLeft);
+      expect_same(read(context, bands),
                   {testing::left_and_right(both.bands, before.bands),
                    testing::left_and_right(both.cell_offsets, before.cell_offsets),
                    testing::left_and_right(both.row_sums, before.row_sums)},
@@ -338,12 +346,12 @@ TEST(SearchBand, ReportsAllThatWasMatched) {
   SearchBand stage(context, size, {0, 100}, {.sigmas = 0, .min_half_width_px = 2});
   FrameTransfer transfer(context, size, {0, 100});
   const StereoMaps predicted = testing::upload(context, size, maps);
-  ocl::Buffer<float> offset_px(context, 1);
-  offset_px.write(context, {0});
-  const auto report_of = [&](int views, const MatchedParts& matched) {
-    stage(predicted, nullptr, nullptr, nullptr, views);
-    transfer.download({&predicted, &predicted.variance, &predicted, &predicted, &stage, matched, &offset_px, nullptr},
-                      {});
+  const VerticalOffset offset(context);
+  SearchBands bands(context, size, {0, 100});
+  const auto report_of = [&](Views views, const MatchedParts& parts) {
+    stage(predicted, {}, bands, views);
+    transfer.download(
+        {predicted, predicted.variance, &predicted, predicted, bands, views, parts, offset, /*dynamic=*/nullptr}, {});
     context.wait();
     FrameReport report;
     transfer.collect(report);
@@ -352,15 +360,15 @@ TEST(SearchBand, ReportsAllThatWasMatched) {
   };
   const std::vector<Stripe> whole = cut_into_stripes(8, 8, 2), stripes = cut_into_stripes(8, 6, 2);
   ASSERT_EQ(stripes.size(), 4u);  // 24 rows to match
-  for (const int views : {2, 1, 2}) {
+  for (const Views views : {Views::kBoth, Views::kLeft, Views::kBoth}) {
     // Lanes of a band of 5 and of the whole range, of 100 disparities.
-    const double once = views == 1 ? 0.08 : (0.08 + 1.12) / 2;
+    const double once = views == Views::kLeft ? 0.08 : (0.08 + 1.12) / 2;
     const FrameReport report = report_of(views, {1, &whole, 0});
     EXPECT_DOUBLE_EQ(report.search_fraction, once);
     EXPECT_DOUBLE_EQ(report.predicted_fraction, 1);
     EXPECT_DOUBLE_EQ(report_of(views, {1, &stripes, 0}).search_fraction, 3 * once);
     EXPECT_DOUBLE_EQ(report_of(views, {2, &whole, 0}).search_fraction, 2 * once);
-    EXPECT_DOUBLE_EQ(report_of(views, {2, &whole, 256}).search_fraction, 2 * (once + 0.01 / views));
+    EXPECT_DOUBLE_EQ(report_of(views, {2, &whole, 256}).search_fraction, 2 * (once + 0.01 / count(views)));
   }
 }
 

@@ -15,7 +15,7 @@ using testing::HostMaps;
 using testing::same_bits;
 
 HostMaps run(shared::ImageSize size, const SpeckleRemovalOptions& options, const HostMaps& maps, int strip_rows = 0,
-             int row_group = 0, int views = 2) {
+             int row_group = 0, Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   SpeckleRemoval stage(context, size, options, strip_rows, row_group);
   StereoMaps on_device(context, size);
@@ -65,7 +65,7 @@ TEST_P(SpeckleRemovalTest, LooksAtTheLeftViewAlone) {
   const shared::ImageSize size = GetParam();
   const HostMaps maps = regions(size, 2.5f, 53), both = run(size, {}, maps);
   for (const auto& [strip_rows, row_group] : {std::pair{1, 64}, {2, 1}}) {
-    const HostMaps one = run(size, {}, maps, strip_rows, row_group, 1);
+    const HostMaps one = run(size, {}, maps, strip_rows, row_group, Views::kLeft);
     EXPECT_TRUE(same_bits(one.disparity, testing::left_and_right(both.disparity, maps.disparity), size));
     EXPECT_TRUE(same_bits(one.variance, testing::left_and_right(both.variance, maps.variance), size));
   }

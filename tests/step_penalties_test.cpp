@@ -15,7 +15,7 @@ namespace {
 constexpr cl_uchar kUntouched = 7;
 
 std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<std::uint16_t>& grey, PixelType type,
-                                    const BandedSgmOptions& options, int pixels = 0, int views = 2) {
+                                    const BandedSgmOptions& options, int pixels = 0, Views views = Views::kBoth) {
   std::vector<cl_uchar> raw;
   for (const std::uint16_t value : grey) {
     raw.push_back(static_cast<cl_uchar>(value));
@@ -23,7 +23,7 @@ std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<st
   }
   ocl::Context context(testing::any_device());
   StepPenalties penalties(context, size, type, options, pixels);
-  ocl::Buffer<cl_uchar> images(context, raw.size()), steps(context, StepPenalties::count(size));
+  ocl::Buffer<cl_uchar> images(context, raw.size()), steps(context, StepPenalties::bytes(size));
   images.write(context, raw);
   steps.write(context, std::vector<cl_uchar>(steps.size(), kUntouched));
   penalties(images, steps, views);
@@ -59,10 +59,10 @@ TEST_P(StepPenaltiesTest, EqualsReference) {
 TEST_P(StepPenaltiesTest, AreWrittenOfTheLeftViewAlone) {
   const shared::ImageSize size = GetParam();
   const std::vector<std::uint16_t> grey = random_grey(size, 8);
-  const std::vector<std::uint8_t> before(StepPenalties::count(size), kUntouched);
+  const std::vector<std::uint8_t> before(StepPenalties::bytes(size), kUntouched);
   const auto expected = testing::left_and_right(penalties(size, grey, PixelType::kU8, kOptions), before);
   for (const int pixels : {1, 16}) {
-    EXPECT_TRUE(testing::same_bits(penalties(size, grey, PixelType::kU8, kOptions, pixels, 1), expected,
+    EXPECT_TRUE(testing::same_bits(penalties(size, grey, PixelType::kU8, kOptions, pixels, Views::kLeft), expected,
                                    {4 * size.width, size.height}));
   }
 }

@@ -31,8 +31,7 @@ struct DeviceImages {
 struct DeviceMaps {
   cl_mem disparity = nullptr;
   cl_mem variance = nullptr;
-  bool full_range = false;  // as in FrameReport
-  std::string full_range_reason;
+  Unpredicted unpredicted = Unpredicted::kNo;  // as in FrameReport
   cl_mem dynamic = nullptr;  // bytes, the left view's, as in FrameOutputs; null unless options.dynamic_map.enabled
 };
 

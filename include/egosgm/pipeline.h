@@ -33,14 +33,17 @@ struct FrameOutputs {
   MapView<std::uint8_t> dynamic;
 };
 
+/// Why a frame has no prediction; kNo: it has one. By name: "", "first frame", "reset", "no motion", "not temporal".
+enum class Unpredicted { kNo, kFirstFrame, kReset, kNoMotion, kNotTemporal };
+EGOSGM_EXPORT const char* to_string(Unpredicted reason);
+
 /// Device time of a stage in one frame.
 struct StageTime {
   std::string stage;
   double ms = 0;
 };
 
-/// A command of a frame on the device. Times by the driver, brought to std::chrono::steady_clock [ns] (to within what
-/// enqueueing takes).
+/// A command of a frame on the device. Times by the driver, as std::chrono::steady_clock would say, or nearly so.
 struct DeviceCommand {
   std::string stage;
   std::string name;  // of the kernel, or "map", "unmap", "read", "write", "fill", "wait" (for another queue)
@@ -56,9 +59,8 @@ struct DeviceCommand {
 /// that knows no vertical offset, rows that stripes share. 1: as many as one match of the full range has; a first frame
 /// has 2, and a D that fills no whole chunks more.
 struct FrameReport {
-  bool full_range = false;  // no prediction was used: everything was searched,
-  std::string
-      full_range_reason;  // because of this ("first frame", "no motion", "reset", "search is full", "not temporal")
+  Unpredicted unpredicted = Unpredicted::kNo;  // why nothing was predicted
+  bool searched_everything = false;     // the whole range at every pixel: without a prediction, or not trusting it
   double search_fraction = 0;           // see below
   double predicted_fraction = 0;        // left pixels with a prediction
   double density = 0;                   // left pixels with a disparity

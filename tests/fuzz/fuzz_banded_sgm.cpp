@@ -24,8 +24,7 @@ struct Matcher {
   BandedSgm sgm{context, size, range, options};
   ocl::Buffer<cl_uint> codes{context, code_words()};
   ocl::Buffer<cl_uchar> penalties{context, 8 * pixel_count(size)};
-  ocl::Buffer<shared::Band> bands{context, 2 * pixel_count(size)};
-  ocl::Buffer<cl_uint> cell_offsets{context, 2 * pixel_count(size)};
+  SearchBands bands{context, size, range};
   StereoMaps measured{context, size};
 
   std::size_t code_words() const {
@@ -99,11 +98,11 @@ void run(std::string_view input) {
   m.codes.write(m.context, {padded.begin(), padded.end()});
   const auto steps = reference::step_penalties(m.size, grey, 8, m.options);
   m.penalties.write(m.context, {steps.begin(), steps.end()});
-  m.bands.write(m.context, bands);
-  m.cell_offsets.write(m.context, offsets);
+  m.bands.bands.write(m.context, bands);
+  m.bands.cell_offsets.write(m.context, offsets);
   const int reads_off = random() & 1;
-  m.sgm({m.codes, m.penalties, m.bands, m.cell_offsets}, m.measured,
-        reads_off ? RightView::kReadOff : RightView::kMatched);
+  const MatchInputs inputs{m.codes, m.penalties, m.bands};
+  reads_off ? m.sgm.reading_off(inputs, m.measured) : m.sgm(inputs, m.measured, Views::kBoth);
 
   const BandedSgmOptions& o = m.options;
   const shared::SgmParameters parameters{

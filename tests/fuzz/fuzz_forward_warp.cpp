@@ -63,7 +63,7 @@ void run(std::string_view input) {
   for (const int pixels : {1, 16}) {
     ForwardWarp warp(context, kSize, calibration, {.process_noise_px2 = kProcessNoisePx2}, range, pixels);
     StereoMaps predicted(context, kSize);
-    warp(on_device, motion, predicted);
+    warp(on_device, motion, predicted, Views::kBoth);
     const testing::HostMaps actual = testing::download(context, predicted);
     for (const auto& same : {testing::same_bits(actual.disparity, expected.disparity, kSize),
                              testing::same_bits(actual.variance, expected.variance, kSize)}) {

@@ -55,7 +55,7 @@ class Run(ProgramTest):
             self.assertGreater(frame["ms"]["total"], 0)
             self.assertIn("BandedSgm", frame["ms"])
         first, later = report["frames"][0], report["frames"][-1]
-        self.assertEqual((first["search_fraction"], first["full_range"], first["full_range_reason"]), (2, True, "first frame"))
+        self.assertEqual((first["search_fraction"], first["searched_everything"], first["unpredicted"]), (2, True, "first frame"))
         self.assertIsNone(first["odometry"]["motion"])
         self.assertLess(later["search_fraction"], 0.5)
         self.assertGreater(later["odometry"]["inliers"], 10)
@@ -206,7 +206,7 @@ class Run(ProgramTest):
         self.assert_works("run", "--odometry", self.street, "--out", out, "--temporal", "off")
         for frame in self.report(out)["frames"]:
             matches = 2 if frame["frame"] == 0 else 1
-            self.assertEqual((frame["search_fraction"], frame["full_range"], frame["predicted_fraction"]), (matches, True, 0))
+            self.assertEqual((frame["search_fraction"], frame["searched_everything"], frame["predicted_fraction"]), (matches, True, 0))
 
     def test_search_full_still_predicts(self):
         out = self.new_folder()

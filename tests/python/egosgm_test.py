@@ -52,8 +52,8 @@ def padded(image):
 
 def test_a_sequence_is_matched_and_predicted(pipeline, street, frames):
     results = [pipeline.process(f.left, f.right, street.motion(i) if i else None, "disparity") for i, f in enumerate(frames)]
-    assert [r.report.full_range for r in results] == [True, False, False]
-    assert results[0].report.full_range_reason in ("first frame", "reset")
+    assert [r.report.searched_everything for r in results] == [True, False, False]
+    assert results[0].report.unpredicted in ("first frame", "reset")
     assert results[-1].report.search_fraction < 0.5
     assert results[-1].variance is None
     assert "BandedSgm" in dict(results[-1].report.stages)
@@ -77,7 +77,7 @@ def test_submit_and_collect_give_the_bits_of_process(pipeline, street, frames):
     with pytest.raises(egosgm.InvalidArgument):
         pipeline.submit(frames[0].left, frames[0].right)
     results.append(pipeline.collect())
-    assert pipeline.collect().report.full_range  # without a motion
+    assert pipeline.collect().report.unpredicted == "no motion"  # without a motion
     assert pipeline.under_way == 0
     assert results[0].disparity is own
     for result, disparity in zip(results, expected, strict=True):

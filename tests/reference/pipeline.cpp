@@ -34,11 +34,8 @@ void Pipeline::reset() {
 
 Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& motions) {
   Frame frame;
-  frame.full_range_reason = !options_.temporal ? "not temporal"
-                            : !belief_         ? no_belief_reason_
-                            : !motions         ? "no motion"
-                                               : "";
-  const bool has_prediction = frame.full_range_reason.empty();
+  frame.unpredicted = !options_.temporal ? "not temporal" : !belief_ ? no_belief_reason_ : !motions ? "no motion" : "";
+  const bool has_prediction = frame.unpredicted.empty();
   if (has_prediction) predict(*motions, frame);
 
   const int passes = options_.vertical_alignment.enabled && !has_offset_ ? 2 : 1;
@@ -62,7 +59,6 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   frame.output_variance = options_.output_variance.enabled ? output_variance(size_, options_.output_variance,
                                                                              frame.result, frame.passes.back().measured)
                                                            : frame.result.variance;
-  if (has_prediction && options_.search == SearchMode::kFull) frame.full_range_reason = "search is full";
   offset_ = frame.passes.back().offset;
   has_offset_ = true;
   if (options_.temporal) belief_ = frame.result;

@@ -38,7 +38,7 @@ struct Pass {
 
 /// What every stage of a frame gave. Maps of stages that did not run are empty.
 struct Frame {
-  std::string full_range_reason;
+  std::string unpredicted;
   testing::HostMaps warped, without_edges, filled, predicted;
   std::vector<Pass> passes;  // two where nothing was known of the vertical offset
   testing::HostMaps fused, fused_smoothed, fused_consistent, updated;

@@ -10,6 +10,7 @@
 #include "host/ocl/host_memory.h"
 #include "host/search_band.h"
 #include "host/stripes.h"
+#include "host/vertical_alignment.h"
 
 namespace egosgm {
 
@@ -20,15 +21,16 @@ struct MatchedParts {
   std::uint64_t coarse_cells;          // and in each pass, these of CoarseMatch
 };
 
-/// What the stages of a frame leave on the device.
-struct FrameResults {
-  const StereoMaps* result;            // no later frame writes it before this one is collected,
-  const ocl::Buffer<float>* variance;  // nor this, which is given out in place of the result's
-  const StereoMaps* predicted;         // null where there is no prediction. From here on, the next frame writes them:
-  const StereoMaps* measured;          // (or they are the result)
-  const SearchBand* band;
-  MatchedParts matched;
-  const ocl::Buffer<float>* vertical_offset_px;
+/// What a frame leaves on the device.
+struct FrameOnDevice {
+  const StereoMaps& result;     // no later frame writes it before this one is collected,
+  const Map& variance;          // nor this, which is given out in place of the result's
+  const StereoMaps* predicted;  // null where there is no prediction. From here on, the next frame writes them:
+  const StereoMaps& measured;   // (or they are the result)
+  const SearchBands& bands;
+  Views matched;  // they are of these
+  MatchedParts parts;
+  const VerticalOffset& offset;
   const ocl::Buffer<cl_uchar>* dynamic;  // null where it was not asked for
 };
 
@@ -51,7 +53,7 @@ class FrameTransfer {
   ocl::Buffer<float>& output_variance() { return output_variance_; }
 
   /// Enqueues the way back, behind all that was enqueued for the device.
-  void download(const FrameResults& results, const FrameOutputs& outputs);
+  void download(const FrameOnDevice& frame, const FrameOutputs& outputs);
 
   /// When all but the result was fetched, so that the next frame may write it.
   const cl::Event& scratch_fetched() const { return scratch_fetched_; }
@@ -85,7 +87,7 @@ class FrameTransfer {
   std::vector<shared::Band> bands_;
   std::vector<cl_uchar> dynamic_;
   std::vector<shared::RowSum> row_sums_;  // of the views that were searched
-  MatchedParts matched_{};
+  MatchedParts parts_{};
   cl::Event scratch_fetched_;
   bool has_prediction_ = false;
   FrameOutputs outputs_;

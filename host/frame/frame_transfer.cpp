@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/frame_transfer.h"
+#include "host/frame/frame_transfer.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -170,40 +170,40 @@ void FrameTransfer::fetch_view(const ocl::Buffer<float>& maps, int view, const M
   if (wanted.data) readback.fetch(maps, view * pixel_count(size_), pixel_count(size_));
 }
 
-void FrameTransfer::download(const FrameResults& results, const FrameOutputs& outputs) {
+void FrameTransfer::download(const FrameOnDevice& frame, const FrameOutputs& outputs) {
   context_.enter("download");
   outputs_ = outputs;
-  has_prediction_ = results.predicted;
-  matched_ = results.matched;
+  has_prediction_ = frame.predicted;
+  parts_ = frame.parts;
   context_.let_wait(ocl::Queue::kDownload, context_.last_kernel());
-  if (results.predicted) {
-    fetch_left(results.predicted->disparity, outputs.predicted.data, predicted_);
-    fetch_left(results.predicted->variance, outputs.predicted_variance.data, predicted_variance_);
+  if (frame.predicted) {
+    fetch_left(frame.predicted->disparity, outputs.predicted.data, predicted_);
+    fetch_left(frame.predicted->variance, outputs.predicted_variance.data, predicted_variance_);
   }
-  fetch_left(results.measured->disparity, outputs.measured.data, measured_);
-  fetch_left(results.measured->variance, outputs.measured_variance.data, measured_variance_);
-  if (results.dynamic) fetch(*results.dynamic, pixel_count(size_), dynamic_);
-  if (outputs.search_width.data) fetch(results.band->bands(), pixel_count(size_), bands_);
-  fetch(results.band->row_sums(), static_cast<std::size_t>(results.band->searched_views()) * size_.height, row_sums_);
-  fetch(*results.vertical_offset_px, 1, vertical_offset_px_);
+  fetch_left(frame.measured.disparity, outputs.measured.data, measured_);
+  fetch_left(frame.measured.variance, outputs.measured_variance.data, measured_variance_);
+  if (frame.dynamic) fetch(*frame.dynamic, pixel_count(size_), dynamic_);
+  if (outputs.search_width.data) fetch(frame.bands.bands, pixel_count(size_), bands_);
+  fetch(frame.bands.row_sums, static_cast<std::size_t>(count(frame.matched)) * size_.height, row_sums_);
+  fetch(frame.offset.terms, 1, vertical_offset_px_);
 
-  disparity_.fetch(results.result->disparity, 0, pixel_count(size_));  // always: the report counts its valid pixels
-  fetch_view(*results.variance, EGOSGM_LEFT, outputs.variance, variance_);
-  fetch_view(results.result->disparity, EGOSGM_RIGHT, outputs.right_disparity, right_disparity_);
-  fetch_view(*results.variance, EGOSGM_RIGHT, outputs.right_variance, right_variance_);
+  disparity_.fetch(frame.result.disparity, 0, pixel_count(size_));  // always: the report counts its valid pixels
+  fetch_view(frame.variance, EGOSGM_LEFT, outputs.variance, variance_);
+  fetch_view(frame.result.disparity, EGOSGM_RIGHT, outputs.right_disparity, right_disparity_);
+  fetch_view(frame.variance, EGOSGM_RIGHT, outputs.right_variance, right_variance_);
 }
 
 double FrameTransfer::matched_cells() const {
   const std::size_t views = row_sums_.size() / size_.height;
-  std::uint64_t cells = matched_.coarse_cells;
+  std::uint64_t cells = parts_.coarse_cells;
   for (std::size_t view = 0; view < views; ++view) {
-    for (const Stripe& stripe : *matched_.stripes) {
+    for (const Stripe& stripe : *parts_.stripes) {
       const auto first = row_sums_.begin() + static_cast<std::ptrdiff_t>(view * size_.height + stripe.first_row);
       cells = std::accumulate(first, first + stripe.rows, cells,
                               [](std::uint64_t sum, const shared::RowSum& row) { return sum + row.cells; });
     }
   }
-  return static_cast<double>(matched_.passes) * static_cast<double>(cells);
+  return static_cast<double>(parts_.passes) * static_cast<double>(cells);
 }
 
 void FrameTransfer::collect(FrameReport& report) const {
@@ -228,6 +228,10 @@ void FrameTransfer::collect(FrameReport& report) const {
   const double cells = static_cast<double>(row_sums_.size()) * size_.width * range_.count;
   std::uint64_t predicted_pixels = 0;
   for (int y = 0; has_prediction_ && y < size_.height; ++y) predicted_pixels += row_sums_[y].predicted;
+  const std::uint32_t whole_row =
+      static_cast<std::uint32_t>(size_.width * SearchBand::max_chunks(range_)) * EGOSGM_LANES;
+  report.searched_everything = std::all_of(row_sums_.begin(), row_sums_.end(),
+                                           [&](const shared::RowSum& row) { return row.cells == whole_row; });
   report.search_fraction = matched_cells() / cells;
   report.predicted_fraction = static_cast<double>(predicted_pixels) / pixels;
   report.density = static_cast<double>(std::count_if(disparity_.data(), disparity_.data() + pixel_count(size_),

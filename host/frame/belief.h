@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/pipeline.h"
+#include "host/prediction_check.h"
+#include "host/vertical_alignment.h"
+
+namespace egosgm {
+
+/// All that survives a frame. A value: copies share the device's memory, so that going back to one is an assignment.
+struct Belief {
+  StereoMaps maps;
+  VerticalOffset offset;
+  PredictionCheck::State agreement;                // of the frame's predictions with its measurement
+  Unpredicted missing = Unpredicted::kFirstFrame;  // why there are no maps and no agreement; kNo: there are
+
+  /// Of nothing.
+  Belief(ocl::Context& context, shared::ImageSize size) : maps(context, size), offset(context), agreement(context, 1) {}
+
+  /// Forgets all.
+  void forget(Unpredicted why) {
+    missing = why;
+    offset.is_known = false;
+  }
+
+  bool shares_memory_with(const Belief& other) const { return maps.disparity.get()() == other.maps.disparity.get()(); }
+};
+
+}  // namespace egosgm

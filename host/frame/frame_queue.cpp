@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/frame/frame_queue.h"
+
+#include <algorithm>
+
+#include "host/tuning_defaults.h"
+
+namespace egosgm {
+namespace {
+
+ocl::Context context_on(const Device::Handle& device) {
+  return device.queue() ? ocl::Context(device.queue, device.programs) : ocl::Context(device.device, device.programs);
+}
+
+}  // namespace
+
+FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options,
+                       const Device& device)
+    : options_(options),
+      device_(device),
+      size_(size),
+      context_(context_on(device.handle())),
+      method_(context_, size, calibration, options, with_defaults(device.handle().tuning, device.info())),
+      transfers_{{{context_, size, range_of(options)}, {context_, size, range_of(options)}}},
+      memory_{{{context_, size}, {context_, size}, {context_, size}}},
+      belief_(memory_.front()) {
+  method_.prepare(PixelType::kU8);
+  method_.prepare(PixelType::kU16);
+}
+
+void FrameQueue::submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
+                        const FrameOutputs& outputs) {
+  expect_device_frame_not_failed();
+  expect_none_failed();
+  FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
+  ocl::Drain drain{context_};
+  release_results();
+  Wanted wanted{{}, outputs.dynamic.data != nullptr};
+  if (outputs.variance.data) wanted.variance = Views::kLeft;
+  if (outputs.right_variance.data) wanted.variance = Views::kBoth;
+  const Plan plan = plan_of(options_, belief_.missing, belief_.offset.is_known, motion, wanted);
+  const FrameImages& images = frame.transfer->upload(left, right);
+  if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
+  Map& variance = frame.transfer->output_variance();
+  const FrameResults results = method_.frame(plan, images, belief_, frame.after, variance);
+  const Workspace& workspace = method_.workspace();
+  frame.transfer->download({.result = frame.after.maps,
+                            .variance = plan.wanted.variance ? variance : frame.after.maps.variance,
+                            .predicted = plan.predicts() ? &workspace.prediction.maps : nullptr,
+                            .measured = results.measured,
+                            .bands = workspace.bands,
+                            .matched = plan.matched,
+                            .parts = {plan.matches, &method_.matcher().banded_sgm().stripes(),
+                                      plan.has_coarse_match ? method_.search().coarse_cells() : 0},
+                            .offset = results.offset,
+                            .dynamic = plan.wanted.dynamic ? &workspace.dynamic : nullptr},
+                           outputs);
+
+  drain.is_dismissed = true;
+  frame.report.stripes = static_cast<int>(method_.matcher().banded_sgm().stripes().size());
+  frame.report.unpredicted = plan.unpredicted;
+  frame.commands = context_.take_commands();
+  belief_ = frame.after;
+  under_way_.push_back(std::move(frame));
+}
+
+DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done) {
+  expect_device_frame_not_failed();
+  FrameTransfer& transfer = free_transfer();
+  Belief after = free_memory();
+  ocl::Drain drain{context_};
+  release_results();
+  const Plan plan =
+      plan_of(options_, belief_.missing, belief_.offset.is_known, motion, {Views::kBoth, options_.dynamic_map.enabled});
+  method_.frame(plan, images, belief_, after, transfer.output_variance());
+  const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
+
+  drain.is_dismissed = true;
+  device_frame_ = context_.take_commands();
+  if (done) {
+    *done = end();
+    ::clRetainEvent(*done);
+  }
+  belief_ = after;
+  return {.disparity = after.maps.disparity.get()(),
+          .variance = plan.wanted.variance ? transfer.output_variance().get()() : after.maps.variance.get()(),
+          .unpredicted = plan.unpredicted,
+          .dynamic = plan.wanted.dynamic ? method_.workspace().dynamic.get()() : nullptr};
+}
+
+FrameReport FrameQueue::collect() {
+  FrameUnderWay& frame = under_way_.front();
+  or_go_back([&] {
+    report_stages(context_.wait(frame.commands), frame.report);
+    if (records_commands_) report_commands(context_, frame.commands, frame.report);
+  });
+  expect_none_failed();
+  frame.transfer->collect(frame.report);
+  const Clock::time_point now = Clock::now();
+  frame.report.total_ms = std::chrono::duration<double, std::milli>(now - std::max(frame.start, collected_)).count();
+  collected_ = now;
+  FrameReport report = std::move(frame.report);
+  under_way_.erase(under_way_.begin());
+  return report;
+}
+
+void FrameQueue::reset() {
+  belief_.forget(Unpredicted::kReset);
+  for (FrameUnderWay& frame : under_way_) frame.before.forget(Unpredicted::kReset);
+}
+
+FrameTransfer& FrameQueue::free_transfer() {
+  const bool is_first_taken = under_way() > 0 && under_way_.front().transfer == &transfers_[0];
+  return is_first_taken ? transfers_[1] : transfers_[0];
+}
+
+/// Memory that neither the belief has nor a frame under way, which may have to be gone back from.
+Belief& FrameQueue::free_memory() {
+  return *std::find_if(memory_.begin(), memory_.end(), [&](const Belief& memory) {
+    return !memory.shares_memory_with(belief_) &&
+           std::none_of(under_way_.begin(), under_way_.end(), [&](const FrameUnderWay& frame) {
+             return memory.shares_memory_with(frame.before) || memory.shares_memory_with(frame.after);
+           });
+  });
+}
+
+/// Gives the results of frames that were collected back to the device.
+void FrameQueue::release_results() {
+  for (FrameTransfer& transfer : transfers_) {
+    if (under_way_.empty() || under_way_.front().transfer != &transfer) transfer.release();
+  }
+}
+
+void FrameQueue::expect_device_frame_not_failed() {
+  const std::vector<ocl::Command> commands = std::exchange(device_frame_, {});
+  try {
+    context_.expect_none_failed(commands);
+  } catch (...) {
+    context_.drain();
+    reset();
+    throw;
+  }
+}
+
+/// Also one behind the oldest: commands after a failed one may have overtaken those before it.
+void FrameQueue::expect_none_failed() {
+  or_go_back([&] {
+    for (const FrameUnderWay& frame : under_way_) context_.expect_none_failed(frame.commands);
+  });
+}
+
+/// Where `f` throws, a frame failed: it and those submitted after it, which rest on it, never were.
+template <typename F>
+void FrameQueue::or_go_back(F&& f) {
+  try {
+    f();
+  } catch (...) {
+    context_.drain();
+    belief_ = under_way_.front().before;
+    under_way_.clear();
+    throw;
+  }
+}
+
+}  // namespace egosgm

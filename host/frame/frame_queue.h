@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <vector>
+
+#include "egosgm/opencl.h"
+#include "host/frame/frame_transfer.h"
+#include "host/method.h"
+#include "host/ocl/device_handle.h"
+
+namespace egosgm {
+
+/// Frames on their way: up to two at once, each on the belief that the one before leaves. One that fails takes those
+/// that rest on it along, and the belief goes back to what was before it.
+class FrameQueue {
+ public:
+  FrameQueue(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options,
+             const Device& device);
+  ~FrameQueue() { context_.drain(); }
+  FrameQueue(const FrameQueue&) = delete;
+  FrameQueue& operator=(const FrameQueue&) = delete;
+
+  /// As Pipeline. REQUIRES: arguments that were validated, and a frame under way or room for one.
+  void submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
+              const FrameOutputs& outputs);
+  FrameReport collect();
+  int under_way() const { return static_cast<int>(under_way_.size()); }
+  void reset();
+  void record_commands(bool wanted) { records_commands_ = wanted; }
+
+  /// As DevicePipeline. REQUIRES: no frame is under way.
+  DeviceMaps enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done);
+
+  void validate(const ImageView& left, const ImageView& right, const FrameOutputs& outputs) const {
+    transfers_[0].validate(left, right, outputs);
+  }
+
+  ocl::Context& context() { return context_; }
+  const ocl::Context& context() const { return context_; }
+  const PipelineOptions& options() const { return options_; }
+  const Device& device() const { return device_; }
+  shared::ImageSize size() const { return size_; }
+  Method& method() { return method_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  struct FrameUnderWay {
+    FrameTransfer* transfer;
+    Belief before, after;
+    FrameReport report;
+    std::vector<ocl::Command> commands;
+    Clock::time_point start;
+  };
+
+  FrameTransfer& free_transfer();
+  Belief& free_memory();
+  void release_results();
+  void expect_device_frame_not_failed();
+  void expect_none_failed();
+  template <typename F>
+  void or_go_back(F&& f);
+
+  const PipelineOptions options_;
+  const Device device_;
+  const shared::ImageSize size_;
+  ocl::Context context_;
+  Method method_;
+  std::array<FrameTransfer, Pipeline::kMaxUnderWay> transfers_;
+  std::array<Belief, Pipeline::kMaxUnderWay + 1> memory_;  // of the belief, the one to go back to, and the next one
+  Belief belief_;                                          // of the last frame submitted; in one of them
+  std::vector<FrameUnderWay> under_way_;                   // the oldest first
+  Clock::time_point collected_;                            // the last one before them
+  std::vector<ocl::Command> device_frame_;                 // of the last `enqueue`
+  bool records_commands_ = false;
+};
+
+/// Frames are all that a pipeline has.
+struct Pipeline::Impl : FrameQueue {
+  using FrameQueue::FrameQueue;
+};
+
+}  // namespace egosgm

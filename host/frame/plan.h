@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "egosgm/motion.h"
+#include "egosgm/pipeline.h"
+#include "host/maps.h"
+
+namespace egosgm {
+
+/// Where a frame is searched.
+enum class Search { kBands, kEverything };
+
+/// What is wanted of a frame that no later one rests on.
+struct Wanted {
+  std::optional<Views> variance;  // the one that is given out
+  bool dynamic = false;
+};
+
+/// All that is decided before a frame.
+struct Plan {
+  Unpredicted unpredicted;       // why there is no prediction; kNo: there is one
+  std::optional<Motion> motion;  // by which it is made
+  Search search;
+  Views tracked;  // predicted and fused
+  Views matched;  // where it is the left one, the right one is read off its match
+  int matches;    // 2 where the first one gives the vertical offset
+  bool has_coarse_match;
+  Wanted wanted;
+
+  bool predicts() const { return unpredicted == Unpredicted::kNo; }
+};
+
+/// `missing`: why the belief has no maps; kNo: it has. `knows_offset`: whether it has a vertical offset.
+Plan plan_of(const PipelineOptions& options, Unpredicted missing, bool knows_offset,
+             const std::optional<Motion>& motion, const Wanted& wanted);
+
+}  // namespace egosgm

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/fuse/fuse_room.h"
+
+namespace egosgm {
+
+FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options, const Tuning& tuning)
+    : left_right_px_(options.consistency.update_px),
+      prediction_check_(context, size, options.prediction_check, tuning.row_group),
+      kalman_update_(context, size, options.kalman_update),
+      right_map_(context, size, range_of(options)),
+      consistency_(context, size) {
+  if (options.median_filter.enabled) median_filter_.emplace(context, size);
+  if (options.sad_check.max_difference > 0) {
+    sad_check_.emplace(
+        [&context, size, check = options.sad_check](PixelType type) { return SadCheck(context, size, type, check); });
+  }
+}
+
+void FuseRoom::prepare(PixelType type) {
+  if (sad_check_) sad_check_->prepare(type);
+}
+
+void FuseRoom::compare(const Plan& plan, const Prediction& prediction, const StereoMaps& measured,
+                       const PredictionCheck::State& before, PredictionCheck::State& agreement) {
+  if (plan.predicts()) {
+    prediction_check_(before, prediction.warped.disparity, prediction.maps.disparity, measured.disparity, agreement);
+  } else {
+    prediction_check_.begin(agreement);
+  }
+}
+
+void FuseRoom::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction,
+                    const StereoMaps& measured, const PredictionCheck::State& agreement, Fusion& fusion,
+                    StereoMaps& belief) {
+  StereoMaps fused{fusion.fused, belief.variance};
+  kalman_update_(agreement, prediction.warped.disparity, prediction.maps, measured, fused, plan.tracked);
+  if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
+  StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
+  if (plan.tracked == Views::kLeft) right_map_(measured, left_right_px_, smoothed);
+  consistency_(smoothed.disparity, left_right_px_, OutsideView::kKeep, belief.disparity, belief.variance);
+  if (sad_check_) (*sad_check_)[images.type](images.pixels, belief);
+}
+
+}  // namespace egosgm

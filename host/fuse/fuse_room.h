@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/consistency_check.h"
+#include "host/frame/plan.h"
+#include "host/kalman_update.h"
+#include "host/median_filter.h"
+#include "host/predict/predict_room.h"
+#include "host/prediction_check.h"
+#include "host/right_map.h"
+#include "host/sad_check.h"
+
+namespace egosgm {
+
+/// What fusion leaves, beside the belief.
+struct Fusion {
+  Map fused, smoothed;  // disparities; the latter where the median filter is on
+
+  Fusion(ocl::Context& context, shared::ImageSize size)
+      : fused(context, 2 * pixel_count(size)), smoothed(context, 2 * pixel_count(size)) {}
+};
+
+/// Compares prediction and measurement, and makes one map of the two.
+class FuseRoom {
+ public:
+  FuseRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options, const Tuning& tuning);
+
+  /// Builds what images of `type` need.
+  void prepare(PixelType type);
+
+  /// What prediction and measurement say of each other, by what the frame before them said.
+  void compare(const Plan& plan, const Prediction& prediction, const StereoMaps& measured,
+               const PredictionCheck::State& before, PredictionCheck::State& agreement);
+
+  /// REQUIRES: the plan predicts.
+  void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
+            const PredictionCheck::State& agreement, Fusion& fusion, StereoMaps& belief);
+
+ private:
+  const float left_right_px_;
+  PredictionCheck prediction_check_;
+  KalmanUpdate kalman_update_;
+  std::optional<MedianFilter> median_filter_;
+  RightMap right_map_;
+  ConsistencyCheck consistency_;
+  std::optional<OfEachType<SadCheck>> sad_check_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/match/match_room.h"
+
+namespace egosgm {
+namespace {
+
+std::optional<BandedSgmPaths::Group> path_group(const Tuning& tuning) {
+  if (tuning.path_lanes == 0) return {};
+  return BandedSgmPaths::Group{tuning.path_lanes, tuning.path_lines};
+}
+
+}  // namespace
+
+MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options,
+                     const Tuning& tuning)
+    : left_right_(options.consistency),
+      matcher_(context, size, range_of(options), options.banded_sgm,
+               {path_group(tuning), {tuning.tile_width, tuning.tile_height, tuning.block_lanes}}),
+      consistency_(context, size),
+      speckle_removal_(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group) {
+  if (options.median_filter.enabled) median_filter_.emplace(context, size);
+}
+
+void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands,
+                           const PredictionCheck::State& agreement, Matching& matching, StereoMaps& measured) {
+  const bool reads_off = plan.matched == Views::kLeft;
+  StereoMaps matched{matching.matched, measured.variance};
+  if (reads_off) {
+    matcher_.reading_off(images, bands, matched);
+  } else {
+    matcher_(images, bands, matched, Views::kBoth);
+  }
+  if (median_filter_) (*median_filter_)(matching.matched, matching.smoothed, Views::kBoth);
+  const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;
+  if (reads_off) {
+    consistency_(smoothed, left_right_.read_off_px, left_right_.measurement_px, agreement, OutsideView::kDrop,
+                 measured.disparity, measured.variance);
+  } else {
+    consistency_(smoothed, left_right_.measurement_px, OutsideView::kDrop, measured.disparity, measured.variance);
+  }
+  speckle_removal_(measured, plan.matched);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/consistency_check.h"
+#include "host/frame/plan.h"
+#include "host/match/matcher.h"
+#include "host/median_filter.h"
+#include "host/prediction_check.h"
+#include "host/speckle_removal.h"
+
+namespace egosgm {
+
+/// What matching leaves, beside what it measured.
+struct Matching {
+  Map matched, smoothed;  // disparities before any was dropped; the latter where the median filter is on
+
+  Matching(ocl::Context& context, shared::ImageSize size)
+      : matched(context, 2 * pixel_count(size)), smoothed(context, 2 * pixel_count(size)) {}
+};
+
+/// Measures disparities and variances within bands, and drops what is doubtful.
+class MatchRoom {
+ public:
+  MatchRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options, const Tuning& tuning);
+
+  /// Builds what images of `type` need.
+  void prepare(PixelType type) { matcher_.prepare(type); }
+
+  /// `agreement`: of the frame before, read where the right view is read off.
+  void operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands,
+                  const PredictionCheck::State& agreement, Matching& matching, StereoMaps& measured);
+
+  const Matcher& matcher() const { return matcher_; }
+
+ private:
+  const ConsistencyCheckOptions left_right_;
+  Matcher matcher_;
+  std::optional<MedianFilter> median_filter_;
+  ConsistencyCheck consistency_;
+  SpeckleRemoval speckle_removal_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of contents: a frame, a line a room.
+#include "host/method.h"
+
+namespace egosgm {
+
+FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
+                           Map& variance) {
+  Workspace& w = work_;
+  StereoMaps measured = plan.predicts() ? w.measured : after.maps;
+  VerticalOffset offset = before.offset.is_known ? before.offset : unknown_;
+  FrameImages images = uploaded;
+
+  in(Room::kPredict, [&] { predict(plan, before.maps, w.prediction); });
+  for (int match = 1; match <= plan.matches; ++match) {
+    if (match > 1) offset = w.first_offset;
+    VerticalOffset& refined = match < plan.matches ? w.first_offset : after.offset;
+    in(Room::kAlign, [&] { images = align(uploaded, offset, w.aligned); });
+    in(Room::kSearch, [&] { search_(plan, images, w.prediction, before.agreement, w.coarse, w.bands); });
+    in(Room::kMatch, [&] { match_(plan, images, w.bands, before.agreement, w.matching, measured); });
+    in(Room::kRefineAlignment, [&] { refine(images, measured, offset, refined); });
+  }
+  in(Room::kCompare, [&] { compare(plan, w.prediction, measured, before.agreement, after.agreement); });
+  in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, after.agreement, w.fusion, after); });
+  in(Room::kPublish, [&] { publish_(plan, w.prediction, measured, after.maps, variance, w.dynamic); });
+  return {measured, offset, images};
+}
+
+void Method::predict(const Plan& plan, const StereoMaps& belief, Prediction& prediction) {
+  if (plan.predicts()) (*predict_)(plan, belief, prediction);
+}
+
+FrameImages Method::align(const FrameImages& uploaded, const VerticalOffset& offset, FrameImages& aligned) {
+  if (!offset.is_known) return uploaded;
+  alignment_[uploaded.type].resample(uploaded, offset, aligned);
+  return aligned;
+}
+
+void Method::refine(const FrameImages& images, const StereoMaps& measured, const VerticalOffset& offset,
+                    VerticalOffset& refined) {
+  if (options_.vertical_alignment.enabled) {
+    alignment_[images.type].estimate(images, measured.disparity, offset, refined);
+  }
+}
+
+void Method::compare(const Plan& plan, const Prediction& prediction, const StereoMaps& measured,
+                     const PredictionCheck::State& before, PredictionCheck::State& agreement) {
+  if (fuse_) fuse_->compare(plan, prediction, measured, before, agreement);
+}
+
+void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
+                  const PredictionCheck::State& agreement, Fusion& fusion, Belief& belief) {
+  if (plan.predicts()) fuse_->fuse(plan, images, prediction, measured, agreement, fusion, belief.maps);
+  belief.missing = fuse_ ? Unpredicted::kNo : Unpredicted::kNotTemporal;
+}
+
+Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options)
+    : prediction(context, size),
+      aligned{ocl::Buffer<cl_uchar>(context, options.vertical_alignment.enabled ? 2 * 2 * pixel_count(size) : 0)},
+      first_offset(context),
+      coarse(context, CoarseMatch::coarse_size(size)),
+      bands(context, size, range_of(options)),
+      matching(context, size),
+      measured(context, size),
+      fusion(context, size),
+      dynamic(context, pixel_count(size)) {}
+
+Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
+               const PipelineOptions& options, const Tuning& tuning)
+    : options_(options),
+      work_(context, size, options),
+      unknown_(context),
+      alignment_([&context, size, alignment = options.vertical_alignment, group = tuning.row_group](PixelType type) {
+        return VerticalAlignment(context, size, type, alignment, group);
+      }),
+      search_(context, size, options, tuning),
+      match_(context, size, options, tuning),
+      publish_(context, size, options) {
+  if (!options.temporal) return;
+  predict_.emplace(context, size, calibration, options, tuning);
+  fuse_.emplace(context, size, options, tuning);
+}
+
+void Method::prepare(PixelType type) {
+  if (options_.vertical_alignment.enabled) alignment_.prepare(type);
+  search_.prepare(type);
+  match_.prepare(type);
+  if (fuse_) fuse_->prepare(type);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+
+#include "host/frame/belief.h"
+#include "host/fuse/fuse_room.h"
+#include "host/match/match_room.h"
+#include "host/predict/predict_room.h"
+#include "host/publish/publish_room.h"
+#include "host/search/search_room.h"
+
+namespace egosgm {
+
+/// The rooms of a frame, in its order.
+enum class Room { kPredict, kAlign, kSearch, kMatch, kRefineAlignment, kCompare, kFuse, kPublish };
+
+/// What a frame makes on its way. The next one overwrites it.
+struct Workspace {
+  Prediction prediction;
+  FrameImages aligned;
+  VerticalOffset first_offset;  // found by the first of two matches
+  StereoMaps coarse;            // what CoarseMatch found
+  SearchBands bands;
+  Matching matching;
+  StereoMaps measured;  // where there is a prediction to fuse it with; else the belief's memory
+  Fusion fusion;
+  ocl::Buffer<cl_uchar> dynamic;
+
+  Workspace(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options);
+};
+
+/// What a frame left on the device. Handles: it is there until a later frame overwrites it.
+struct FrameResults {
+  StereoMaps measured;
+  VerticalOffset offset;  // by which the right image was resampled for the last match
+  FrameImages images;     // that were matched
+};
+
+/// The method: from a pair of images and the belief of the frame before to the belief of this one.
+class Method {
+ public:
+  Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration, const PipelineOptions& options,
+         const Tuning& tuning);
+
+  /// Builds what images of `type` need. Enqueues nothing.
+  void prepare(PixelType type);
+
+  /// Enqueues a frame. Writes `after` and `variance` (see PublishRoom), which share no memory with `before`.
+  /// REQUIRES: the images' type was prepared.
+  FrameResults frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after, Map& variance);
+
+  /// Called after each room of each frame; null: nobody looks on.
+  std::function<void(Room)> observer;
+
+  const Workspace& workspace() const { return work_; }
+  const Matcher& matcher() const { return match_.matcher(); }
+  const SearchRoom& search() const { return search_; }
+
+ private:
+  template <typename F>
+  void in(Room room, F&& enqueue) {
+    enqueue();
+    if (observer) observer(room);
+  }
+  void predict(const Plan& plan, const StereoMaps& belief, Prediction& prediction);
+  FrameImages align(const FrameImages& uploaded, const VerticalOffset& offset, FrameImages& aligned);
+  void refine(const FrameImages& images, const StereoMaps& measured, const VerticalOffset& offset,
+              VerticalOffset& refined);
+  void compare(const Plan& plan, const Prediction& prediction, const StereoMaps& measured,
+               const PredictionCheck::State& before, PredictionCheck::State& agreement);
+  void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
+            const PredictionCheck::State& agreement, Fusion& fusion, Belief& belief);
+
+  const PipelineOptions options_;
+  Workspace work_;
+  const VerticalOffset unknown_;
+  std::optional<PredictRoom> predict_;
+  OfEachType<VerticalAlignment> alignment_;
+  SearchRoom search_;
+  MatchRoom match_;
+  std::optional<FuseRoom> fuse_;
+  PublishRoom publish_;
+};
+
+}  // namespace egosgm

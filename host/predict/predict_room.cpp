@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/predict/predict_room.h"
+
+namespace egosgm {
+
+PredictRoom::PredictRoom(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
+                         const PipelineOptions& options, const Tuning& tuning)
+    : left_right_px_(options.consistency.prediction_px),
+      forward_warp_(context, size, calibration, options.forward_warp, range_of(options), 0, tuning.warp_band_rows),
+      right_map_(context, size, range_of(options)),
+      edge_rejection_(context, size, options.edge_rejection),
+      hole_fill_(context, size, options.hole_fill),
+      consistency_(context, size) {}
+
+void PredictRoom::operator()(const Plan& plan, const StereoMaps& belief, Prediction& prediction) {
+  auto& [warped, rejected, filled, maps] = prediction;
+  forward_warp_(belief, *plan.motion, warped, plan.tracked);
+  if (plan.tracked == Views::kLeft) right_map_(left_right_px_, warped);
+  edge_rejection_(warped.disparity, rejected, warped.variance);
+  StereoMaps holes_filled{filled, maps.variance};
+  hole_fill_({rejected, warped.variance}, holes_filled);
+  consistency_(filled, left_right_px_, OutsideView::kKeep, maps.disparity, maps.variance);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/consistency_check.h"
+#include "host/edge_rejection.h"
+#include "host/forward_warp.h"
+#include "host/frame/plan.h"
+#include "host/hole_fill.h"
+#include "host/right_map.h"
+
+namespace egosgm {
+
+/// What the last frame's maps say of this one: of both views, also where the left one alone is tracked.
+struct Prediction {
+  StereoMaps warped;     // before anything was dropped; of what EdgeRejection dropped, the variances are gone
+  Map rejected, filled;  // disparities after those stages
+  StereoMaps maps;
+
+  Prediction(ocl::Context& context, shared::ImageSize size)
+      : warped(context, size),
+        rejected(context, 2 * pixel_count(size)),
+        filled(context, 2 * pixel_count(size)),
+        maps(context, size) {}
+};
+
+/// Moves the maps of the last frame into this one, and drops what is doubtful.
+class PredictRoom {
+ public:
+  PredictRoom(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
+              const PipelineOptions& options, const Tuning& tuning);
+
+  /// REQUIRES: the plan has a motion.
+  void operator()(const Plan& plan, const StereoMaps& belief, Prediction& prediction);
+
+ private:
+  const float left_right_px_;
+  ForwardWarp forward_warp_;
+  RightMap right_map_;
+  EdgeRejection edge_rejection_;
+  HoleFill hole_fill_;
+  ConsistencyCheck consistency_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/search/search_room.h"
+
+namespace egosgm {
+
+SearchRoom::SearchRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options,
+                       const Tuning& tuning)
+    : search_band_(context, size, range_of(options), options.search_band, tuning.row_group) {
+  if (options.coarse_match.enabled && options.temporal && options.search == SearchMode::kBand) {
+    coarse_match_.emplace(context, size, options);
+  }
+}
+
+void SearchRoom::prepare(PixelType type) {
+  if (coarse_match_) coarse_match_->prepare(type);
+}
+
+void SearchRoom::operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
+                            const PredictionCheck::State& agreement, StereoMaps& coarse, SearchBands& bands) {
+  if (plan.search == Search::kBands) {
+    if (plan.has_coarse_match) (*coarse_match_)(images, coarse);
+    const Map* found = plan.has_coarse_match ? &coarse.disparity : nullptr;
+    search_band_(prediction.maps, {&prediction.warped.disparity, found, &agreement}, bands, plan.matched);
+  } else if (plan.predicts()) {
+    search_band_.full_range(prediction.maps.disparity, bands, plan.matched);
+  } else {
+    search_band_.full_range(bands, plan.matched);
+  }
+}
+
+}  // namespace egosgm

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/coarse_match.h"
+#include "host/predict/predict_room.h"
+#include "host/prediction_check.h"
+#include "host/search_band.h"
+
+namespace egosgm {
+
+/// Says where each pixel is searched.
+class SearchRoom {
+ public:
+  SearchRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options, const Tuning& tuning);
+
+  /// Builds what images of `type` need.
+  void prepare(PixelType type);
+
+  /// `agreement`: of the frame before. Writes `coarse`, what CoarseMatch finds in the images, where the plan has one.
+  /// Prediction and agreement are read where the plan predicts.
+  void operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
+                  const PredictionCheck::State& agreement, StereoMaps& coarse, SearchBands& bands);
+
+  /// Cells that a coarse match matches, of both views.
+  std::uint64_t coarse_cells() const { return coarse_match_ ? coarse_match_->matched_cells() : 0; }
+
+ private:
+  std::optional<CoarseMatch> coarse_match_;
+  SearchBand search_band_;
+};
+
+}  // namespace egosgm
