@@ -72,6 +72,7 @@ std::vector<BatchEntry> read_batch_list(const std::filesystem::path& file) {
 BatchInput parse_input(const BatchEntry& entry) {
   BatchInput input;
   CLI::App arguments;
+  arguments.set_help_flag();  // none: a list has no one to read it
   input.sequence.add_to(arguments);
   arguments.add_option("--poses", input.poses_file);
   try {

@@ -65,15 +65,19 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
                           typed, nearest.empty() ? "" : "did you mean " + nearest + "? ", help_hint(command)));
 }
 
-/// A question that names the path that an argument was meant to be, where the error is of one that is not there.
-std::string meant_path(int argc, char** argv, const std::string& error) {
-  for (int i = 2; i < argc; ++i) {
-    const std::string text = argv[i];
-    const std::string value = text.starts_with("--") ? text.substr(text.find('=') + 1) : text;
-    if (value.empty() || value.starts_with("-") || error.find(value) == std::string::npos) continue;
-    if (const std::string path = path_suggestion(value); !path.empty()) return "; did you mean " + path + "?";
+/// A question that names the path that one which is not there was meant to be.
+std::string meant_path(const MissingPath& error) {
+  const std::string path = path_suggestion(error.path());
+  return path.empty() ? "" : "; did you mean " + path + "?";
+}
+
+/// An empty value is a variable of the shell that was not set.
+void refuse_empty_values(const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& value : option->results()) {
+      if (value.empty()) throw InvalidArgument(option->get_name() + " \"\": is empty: give a value, or leave it out");
+    }
   }
-  return {};
 }
 
 /// Whether main() is left by its own way. A driver may end the whole program: PoCL's compiler does on a full disk.
@@ -120,14 +124,17 @@ int run_program(int argc, char** argv) {
   }
   const auto chosen =
       std::find_if(std::begin(commands), std::end(commands), [](const Command& c) { return c.arguments->parsed(); });
+  refuse_empty_values(*chosen->arguments);
   return flushed(chosen->run());
 }
 
 int exit_code_of(int argc, char** argv) {
   try {
     return run_program(argc, argv);
+  } catch (const MissingPath& error) {
+    return fail(kBadInput, error.what() + meant_path(error));
   } catch (const InvalidArgument& error) {
-    return fail(kBadInput, error.what() + meant_path(argc, argv, error.what()));
+    return fail(kBadInput, error.what());
   } catch (const IoError& error) {
     return fail(kFailed, error.what());
   } catch (const DeviceError& error) {

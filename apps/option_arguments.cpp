@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "apps/suggestion.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "egosgm/vision/file_io.h"
@@ -18,7 +19,9 @@ constexpr std::size_t kMaxConfigBytes = 1 << 20;
 PipelineOptions preset_named(const std::string& name) {
   if (name == "default") return {};
   if (name == "paper") return PipelineOptions::paper();
-  throw InvalidArgument("--preset \"" + name + "\": choose default or paper");
+  const std::string nearest = suggestion(name, {"default", "paper"});
+  throw InvalidArgument("--preset \"" + name + "\": " + (nearest.empty() ? "" : "did you mean " + nearest + "? ") +
+                        "choose default or paper");
 }
 
 /// An option's value as TOML writes it: names are quoted, numbers and truth values are not.
@@ -34,8 +37,24 @@ std::string toml_of(const PipelineOptions& options) {
   return text;
 }
 
+/// The line, from 1, that sets `option`; 0: none that is written as usual.
+int line_of(const std::string& text, const std::string& option) {
+  std::istringstream lines(text);
+  std::string section;
+  int number = 0;
+  for (std::string raw; std::getline(lines, raw);) {
+    ++number;
+    const std::string line = CLI::detail::trim_copy(raw);
+    if (line.starts_with('[')) section = CLI::detail::trim_copy(line.substr(1, line.find(']') - 1)) + '.';
+    const std::string name = CLI::detail::trim_copy(line.substr(0, line.find('=')));
+    if (section + name == option) return number;
+  }
+  return 0;
+}
+
 void apply_config(PipelineOptions& options, const std::string& file) {
-  std::istringstream text(vision::read_file(file, kMaxConfigBytes));
+  const std::string read = vision::read_file(file, kMaxConfigBytes);
+  std::istringstream text(read);
   std::vector<CLI::ConfigItem> items;
   try {
     items = CLI::ConfigTOML().from_config(text);
@@ -48,7 +67,8 @@ void apply_config(PipelineOptions& options, const std::string& file) {
     try {
       set_option(options, item.fullname(), item.inputs.front());
     } catch (const InvalidArgument& error) {
-      throw InvalidArgument(file + ": " + error.what());
+      const int line = line_of(read, item.fullname());
+      throw InvalidArgument(fmt::format("{}{}: {}", file, line > 0 ? fmt::format(":{}", line) : "", error.what()));
     }
   }
 }

@@ -46,7 +46,7 @@ class Video : public ImageSource {
  public:
   explicit Video(const std::string& file) : file_(file) {
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said once, below
-    if (!fs::exists(file)) throw InvalidArgument(file + ": no such file");
+    if (!fs::exists(file)) throw MissingPath(file, "no such file");
     if (!video_.open(file)) throw InvalidArgument(file + ": neither an image nor a video that OpenCV can read");
   }
   cv::Mat next() override {

@@ -40,7 +40,7 @@ struct ReportArguments {
 Json read_run(const fs::path& folder) {
   const fs::path file = folder / "report.json";
   if (!fs::exists(file)) {
-    throw InvalidArgument(file.string() + ": no such file: give the folder that `egosgm run --out` wrote");
+    throw MissingPath(file.string(), "no such file: give the folder that `egosgm run --out` wrote");
   }
   Json run = parse_json(vision::read_file(file, kMaxReportBytes), file);
   const auto has = [&](const char* key) { return run.is_object() && run.contains(key); };

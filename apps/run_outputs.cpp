@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <functional>
 #include <sstream>
@@ -59,7 +60,8 @@ const std::vector<std::string>& write_kinds() { return kKinds; }
 std::set<std::string> parse_write_list(const std::string& list) {
   std::set<std::string> kinds;
   std::istringstream stream(list);
-  for (std::string kind; std::getline(stream, kind, ',');) {
+  for (std::string part; std::getline(stream, part, ',');) {
+    const std::string kind = CLI::detail::trim_copy(part);
     if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end()) {
       const std::string nearest = suggestion(kind, kKinds);
       std::string all;

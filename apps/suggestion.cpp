@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/suggestion.h"
 
+#include <algorithm>
+
 #include "host/edit_distance.h"
 
 namespace egosgm::app {
 std::string suggestion(const std::string& typed, const std::vector<std::string>& known) {
   std::string nearest;
-  int least = 1 + static_cast<int>(typed.size()) / 3;  // farther is not a typing error
+  // Farther is not a typing error; nor is what shares no letter.
+  const int letters = static_cast<int>(typed.size() - std::min(typed.find_first_not_of('-'), typed.size()));
+  int least = std::min(1 + letters / 3, letters - 1);
   for (const std::string& name : known) {
     const bool begins = typed.size() >= 4 && name.starts_with(typed);
     const int distance = begins ? 1 : edit_distance(typed, name);

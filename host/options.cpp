@@ -125,12 +125,12 @@ void parse(std::string_view name, std::string_view text, int& value) {
 }
 void parse(std::string_view name, std::string_view text, float& value) { parse_number(name, text, value, "a number"); }
 void parse(std::string_view name, std::string_view text, bool& value) {
-  if (text == "true" || text == "on" || text == "1") {
+  if (text == "true" || text == "on" || text == "yes" || text == "1") {
     value = true;
-  } else if (text == "false" || text == "off" || text == "0") {
+  } else if (text == "false" || text == "off" || text == "no" || text == "0") {
     value = false;
   } else {
-    refuse(name, text, "true or false");
+    refuse(name, text, "on or off (nor true, false, yes, no, 1, 0)");
   }
 }
 template <typename Enum>
@@ -215,17 +215,28 @@ std::vector<NamedOption> list_options(const PipelineOptions& options) {
 }
 
 void set_option(PipelineOptions& options, std::string_view name, std::string_view value) {
+  const auto behind_dot = [](std::string_view text) { return text.substr(text.rfind('.') + 1); };
+  const std::string_view last = behind_dot(name);
   bool found = false;
   std::string nearest;
-  int distance = 1 << 20;
+  int least = 1 << 20;
   for_each(options, [&](const char* known, auto& member) {
     if (name == known) {
       found = true;
       parse(name, value, member);
     }
-    if (const int d = edit_distance(name, known); d < distance) distance = d, nearest = known;
+    // Of the whole, or of the part behind the dot, with another stage before it. Farther is not a typing error.
+    const int of_whole = edit_distance(name, known);
+    const int of_last = edit_distance(last, behind_dot(known));
+    int distance = of_last * 3 < static_cast<int>(last.size()) + 3 ? of_last + (last.size() < name.size()) : 1 << 20;
+    if (of_whole * 3 < static_cast<int>(name.size()) + 3) distance = std::min(distance, of_whole);
+    if (distance > least || distance == 1 << 20) return;
+    nearest = (distance < least ? "" : nearest + " or ") + known;
+    least = distance;
   });
-  if (!found) throw InvalidArgument("no option named \"" + std::string(name) + "\": did you mean " + nearest + "?");
+  if (found) return;
+  throw InvalidArgument("no option named \"" + std::string(name) + "\": " +
+                        (nearest.empty() ? "`egosgm run --help` lists them" : "did you mean " + nearest + "?"));
 }
 
 }  // namespace egosgm

@@ -149,12 +149,12 @@ TEST(Options, TakeEveryNameOfAChoice) {
   EXPECT_EQ(options.search, SearchMode::kFull);
   set_option(options, "search", "band");
   EXPECT_EQ(options.search, SearchMode::kBand);
-  for (const std::string yes : {"true", "on", "1"}) {
+  for (const std::string yes : {"true", "on", "yes", "1"}) {
     options.temporal = false;
     set_option(options, "temporal", yes);
     EXPECT_TRUE(options.temporal) << yes;
   }
-  for (const std::string no : {"false", "off", "0"}) {
+  for (const std::string no : {"false", "off", "no", "0"}) {
     options.temporal = true;
     set_option(options, "temporal", no);
     EXPECT_FALSE(options.temporal) << no;
@@ -162,13 +162,15 @@ TEST(Options, TakeEveryNameOfAChoice) {
 }
 
 TEST(Options, UnknownNamesGetTheNearestOne) {
-  const std::pair<const char*, const char*> cases[] = {{"banded_sgm.p3", "banded_sgm.p1"},
+  const std::pair<const char*, const char*> cases[] = {{"banded_sgm.p3", "banded_sgm.p1 or banded_sgm.p2"},
+                                                       {"p2", "coarse_match.p2 or banded_sgm.p2"},
+                                                       {"matcher.p2_slope", "banded_sgm.p2_slope"},
+                                                       {"gate_px", "kalman_update.gate_px"},
                                                        {"banded_sgm.path", "banded_sgm.paths"},
                                                        {"disparity", "disparities"},
                                                        {"min-disparity", "min_disparity"},
                                                        {"search_band.sigma", "search_band.sigmas"},
                                                        {"kalman.gate_px", "kalman_update.gate_px"},
-                                                       {"", "search"},
                                                        {"Temporal", "temporal"},
                                                        {"speckle_removal.max_sizepx", "speckle_removal.max_size_px"}};
   for (const auto& [name, nearest] : cases) {
@@ -176,6 +178,18 @@ TEST(Options, UnknownNamesGetTheNearestOne) {
     expect_refused([&] { set_option(options, name, "1"); },
                    {"no option named \"" + std::string(name) + "\"", "did you mean " + std::string(nearest) + "?"});
     EXPECT_EQ(texts(options), texts({})) << name;
+  }
+}
+
+TEST(Options, UnknownNamesThatAreNearNoneGetNone) {
+  for (const std::string name : {"", "x", "hello", "p2 = 3, and more of that"}) {
+    PipelineOptions options;
+    try {
+      set_option(options, name, "1");
+      ADD_FAILURE() << name;
+    } catch (const InvalidArgument& error) {
+      EXPECT_EQ(error.what(), "no option named \"" + name + "\": `egosgm run --help` lists them");
+    }
   }
 }
 
@@ -193,7 +207,7 @@ TEST(Options, RefusesTextsThatAreNoValue) {
   expect_refused([&] { set_option(options, "disparities", "12.5"); }, {"a whole number"});
   expect_refused([&] { set_option(options, "disparities", "99999999999"); }, {"a whole number"});
   expect_refused([&] { set_option(options, "search_band.sigmas", "many"); }, {"a number"});
-  expect_refused([&] { set_option(options, "temporal", "yes"); }, {"true or false"});
+  expect_refused([&] { set_option(options, "temporal", "maybe"); }, {"on or off"});
   expect_refused([&] { set_option(options, "search", "Band"); }, {"one of band, full"});
   expect_refused([&] { set_option(options, "banded_sgm.cost", "census"); },
                  {"one of census13x11, census9x7, census5x5, sad3x3"});

@@ -33,9 +33,9 @@ std::string name_of(const fs::path& folder) {
 void require_folder(const fs::path& folder, const std::string& remedy) {
   if (is_folder(folder)) return;
   std::error_code error;
-  const bool is_there = fs::exists(folder, error);
-  throw InvalidArgument(folder.string() + (is_there ? ": is no folder; " : ": no such folder; ") +
-                        (is_there && is_image_name(folder)
+  if (!fs::exists(folder, error)) throw MissingPath(folder.string(), "no such folder; " + remedy);
+  throw InvalidArgument(folder.string() + ": is no folder; " +
+                        (is_image_name(folder)
                              ? "give --left PATTERN --right PATTERN --calib FILE, patterns in quotes, or " + remedy
                              : remedy));
 }
@@ -130,7 +130,7 @@ fs::path find_file(const std::vector<fs::path>& candidates, const std::string& r
   for (const fs::path& candidate : candidates) {
     if (is_file(candidate)) return candidate;
   }
-  throw InvalidArgument(candidates.front().string() + ": no such calibration file; " + remedy);
+  throw MissingPath(candidates.front().string(), "no such calibration file; " + remedy);
 }
 
 /// KITTI's name for the folder of a colour camera chooses the colour pair of a calibration that holds both.
@@ -158,7 +158,7 @@ bool is_parent(const fs::path& file, const fs::path& folder) {
 }
 
 void require_image(const fs::path& file) {
-  if (!is_file(file)) throw InvalidArgument(file.string() + ": no such image; give an existing PNG or JPEG file");
+  if (!is_file(file)) throw MissingPath(file.string(), "no such image; give an existing PNG or JPEG file");
 }
 
 /// pair_files, where both name one image or both many.

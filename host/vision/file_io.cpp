@@ -40,7 +40,9 @@ class Descriptor {
 };
 
 [[noreturn]] void fail_reading(const std::filesystem::path& file, int error) {
-  throw InvalidArgument(file.string() + ": cannot be read: " + reason(error) + "; give an existing, readable file");
+  const std::string what = "cannot be read: " + reason(error) + "; give an existing, readable file";
+  if (error == ENOENT || error == ENOTDIR) throw MissingPath(file.string(), what);
+  throw InvalidArgument(file.string() + ": " + what);
 }
 
 [[noreturn]] void fail_writing(const std::filesystem::path& file, int error) {

@@ -169,8 +169,7 @@ EvaluationPairs pair_with_truth(const fs::path& estimate, const fs::path& truth,
   std::error_code error;
   for (const fs::path& path : {estimate, truth}) {
     if (!fs::exists(path, error)) {
-      throw InvalidArgument(path.string() +
-                            ": no such file or folder; give a disparity map (.png, .pfm) or a folder of them");
+      throw MissingPath(path.string(), "no such file or folder; give a disparity map (.png, .pfm) or a folder of them");
     }
   }
   if (!is_folder(estimate) && !is_folder(truth)) {
@@ -193,8 +192,8 @@ EvaluationPairs pair_with_truth(const fs::path& estimate, const fs::path& truth,
 std::vector<fs::path> list_maps(const fs::path& estimate, const FrameRange& frames) {
   std::error_code error;
   if (!fs::exists(estimate, error)) {
-    throw InvalidArgument(estimate.string() +
-                          ": no such file or folder; give a disparity map (.png, .pfm, .npy) or a folder of them");
+    throw MissingPath(estimate.string(),
+                      "no such file or folder; give a disparity map (.png, .pfm, .npy) or a folder of them");
   }
   Maps maps = maps_of(is_folder(estimate / "disparity") ? estimate / "disparity" : estimate);
   keep_frames(maps, frames);

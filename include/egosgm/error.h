@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "egosgm/export.h"
 
@@ -13,6 +14,18 @@ namespace egosgm {
 class EGOSGM_EXPORT InvalidArgument : public std::invalid_argument {
  public:
   using std::invalid_argument::invalid_argument;
+};
+
+/// A file or folder that was named is not there.
+class EGOSGM_EXPORT MissingPath : public InvalidArgument {
+ public:
+  /// `what()` is `path`, a colon and `reason`.
+  MissingPath(std::string path, const std::string& reason)
+      : InvalidArgument(path + ": " + reason), path_(std::move(path)) {}
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
 };
 
 /// The file system refused to take a result: a full disk, a folder that cannot be written. `what()` names the file and

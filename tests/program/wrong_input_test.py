@@ -31,6 +31,42 @@ class WrongArguments(ProgramTest):
         done = egosgm("run", "--odometry", self.street.parent / "another", "--out", self.folder / "never")
         self.assertNotIn("did you mean", done.stderr)
 
+    def test_suggestions_come_from_what_was_wrong_and_its_own_kind(self):
+        folder = self.new_folder()
+        for name in ("r0", "o1", "sw", "fifo", "frames", "overview", "p2=151"):
+            (folder / name).touch()
+        (folder / "list").write_text("a --help\n")
+        for arguments in (["--disparities", 0], ["--frames", "3:1"], ["--disparities", "64px"], ["--set", "hello=3"], ["--device", 1000],
+                          ["--temporal", "maybe"], ["--paths", 5]):
+            done = egosgm(*self.run_with(*arguments), cwd=folder)
+            self.assertEqual(done.returncode, 2, arguments)
+            self.assertNotIn("did you mean", done.stderr)
+        for arguments in (["synth", "--out", "never", "--frames", 0], ["completion", "fish"], ["batch", "list", "--out", "never"]):
+            done = egosgm(*arguments, cwd=folder)
+            self.assertEqual(done.returncode, 2, arguments)
+            self.assertNotIn("did you mean", done.stderr)
+            self.assertNotIn("main function", done.stderr)
+        self.assert_refused(self.run_with("--set", "p2=150"), "did you mean coarse_match.p2 or banded_sgm.p2?", cwd=folder)
+        self.assert_refused(self.run_with("--preset", "papr"), "did you mean paper?", cwd=folder)
+        config = folder / "config.toml"
+        config.write_text("# options\n\n[banded_sgm]\np2 = 150\np9 = 1\n")
+        self.assert_refused(self.run_with("--config", config), f"{config}:5: ", "banded_sgm.p9", "did you mean banded_sgm.p1 or")
+        (folder / "list").write_text(f"a {str(self.street)[:-1]}\n")
+        self.assertFalse((folder / "never").exists())
+
+    def test_empty_values_are_refused(self):
+        for option in ("--temporal", "--device", "--config", "--set"):
+            self.assert_refused(["run", "--odometry", self.street, "--out", self.folder / "never", option, ""], option, "is empty")
+        self.assert_refused(["run", "--odometry", self.street, "--out", ""], "--out", "is empty", cwd=self.new_folder())
+
+    def test_no_is_off_and_blanks_in_a_list_are_none(self):
+        out = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0:1", "--temporal", "no", "--write", "color, overview ",
+                          "--quiet")
+        self.assertFalse(self.report(out)["options"]["temporal"])
+        self.assertEqual(len(list((out / "color").iterdir())), 2)
+        self.assertEqual(len(list((out / "overview").iterdir())), 2)
+
     def test_missing_and_contradicting_arguments(self):
         self.assert_refused([], "subcommand")
         self.assert_refused(["run"], "--out")
