@@ -22,11 +22,11 @@
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
 #include "apps/option_arguments.h"
+#include "apps/output_folder.h"
 #include "apps/run_outputs.h"
 #include "apps/shard.h"
 #include "apps/standard_output.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -40,7 +40,7 @@ struct BatchArguments {
   std::string list, out, devices = "all", programs, write, shard, shards;
   OptionArguments method;
   vision::StereoOdometryOptions odometry;
-  bool merge = false, quiet = false;
+  bool merge = false, quiet = false, overwrite = false;
 };
 
 /// The parts between commas, without the blanks around them.
@@ -92,6 +92,29 @@ struct DeviceWork {
   double seconds = 0;
 };
 
+/// Opens the input, and looks whether its folder is free. Throws InvalidArgument.
+SequenceJob job_of(const BatchArguments& arguments, const PipelineOptions& options, const BatchFolder& folder,
+                   const BatchEntry& entry) {
+  SequenceJob job;
+  const BatchInput input = parse_input(entry);
+  job.sequence = input.sequence.open();
+  job.input = input.sequence.text();
+  job.options = options;
+  job.preset = arguments.method.preset;
+  job.poses_file = input.poses_file;
+  job.odometry = arguments.odometry;
+  job.kinds = parse_write_list(arguments.write);
+  Inputs inputs(input.sequence, job.sequence);
+  for (const std::string& file : {arguments.list, input.poses_file, arguments.method.config}) inputs.add_file(file);
+  inputs.add_folder(arguments.programs);
+  inputs.expect_apart(arguments.out);
+  job.out = OutputFolder(folder.folder_of(entry).string(), inputs, folder.treatment_of(entry),
+                         output_files(job.kinds, job.sequence));
+  job.batch_input = entry.arguments;
+  job.quiet = true;
+  return job;
+}
+
 class Batch {
  public:
   Batch(const BatchArguments& arguments, std::vector<BatchEntry> entries, const BatchFolder& folder,
@@ -100,7 +123,6 @@ class Batch {
         entries_(std::move(entries)),
         folder_(folder),
         options_(options),
-        kinds_(parse_write_list(arguments.write)),
         devices_(std::move(devices)),
         work_(devices_.size()),
         queue_(static_cast<int>(entries_.size()), static_cast<int>(devices_.size())) {}
@@ -166,7 +188,7 @@ class Batch {
     const auto start = Clock::now();
     try {
       folder_.begin(entry);
-      const SequenceJob job = job_of(entry);
+      const SequenceJob job = job_of(arguments_, options_, folder_, entry);
       if (run_sequence(job, devices_[device])) {
         const Json done = folder_.finish(entry, job);
         finish(number, device, done, job.input, seconds_since(start));
@@ -181,21 +203,6 @@ class Batch {
       queue_.failed();
       fail(entry, error.what());
     }
-  }
-
-  SequenceJob job_of(const BatchEntry& entry) const {
-    SequenceJob job;
-    const BatchInput input = parse_input(entry);
-    job.sequence = input.sequence.open();
-    job.input = input.sequence.text();
-    job.options = options_;
-    job.preset = arguments_.method.preset;
-    job.poses_file = input.poses_file;
-    job.odometry = arguments_.odometry;
-    job.out = folder_.folder_of(entry);
-    job.kinds = kinds_;
-    job.quiet = true;
-    return job;
   }
 
   void finish(int number, int device, const Json& done, const std::string& input, double seconds) {
@@ -246,7 +253,6 @@ class Batch {
   const std::vector<BatchEntry> entries_;
   const BatchFolder& folder_;
   const PipelineOptions& options_;
-  const std::set<std::string> kinds_;
   const std::vector<Device> devices_;
   const Clock::time_point start_ = Clock::now();
 
@@ -309,8 +315,15 @@ std::vector<BatchEntry> part_of(const std::vector<BatchEntry>& entries, const Sh
 std::vector<BatchEntry> not_done(const std::vector<BatchEntry>& entries, const BatchFolder& folder) {
   std::vector<BatchEntry> left;
   std::copy_if(entries.begin(), entries.end(), std::back_inserter(left),
-               [&](const BatchEntry& entry) { return !folder.is_done(entry); });
+               [&](const BatchEntry& entry) { return folder.is_to_do(entry); });
   return left;
+}
+
+std::vector<BatchEntry> failed_of(const std::vector<BatchEntry>& entries, const BatchFolder& folder) {
+  std::vector<BatchEntry> failed;
+  std::copy_if(entries.begin(), entries.end(), std::back_inserter(failed),
+               [&](const BatchEntry& entry) { return !folder.is_done(entry); });
+  return failed;
 }
 
 /// Where a shard's own figures go.
@@ -330,26 +343,29 @@ int batch(const BatchArguments& arguments) {
   const std::vector<BatchEntry> entries = read_batch_list(arguments.list);
   const PipelineOptions options = arguments.method.options();
   const Json settings = batch_settings(options, arguments.odometry, parse_write_list(arguments.write));
-  if (arguments.merge) return report_all(arguments, entries, BatchFolder(arguments.out, settings));
+  const BatchFolder folder(arguments.out, settings, arguments.overwrite && !arguments.merge);
+  if (arguments.merge) return report_all(arguments, entries, folder);
 
   // All mistakes in the arguments now, before anything is written.
   const Shard shard = shard_of(arguments.shard, arguments.shards);
   const std::vector<BatchEntry> part = part_of(entries, shard);
   for (const BatchEntry& entry : part) parse_input(entry);
+  expect_own_json(timing_file(arguments, shard));
+  const std::vector<BatchEntry> left = not_done(part, folder);
+  for (const BatchEntry& entry : left) job_of(arguments, options, folder, entry);
   const std::vector<Device> devices = select_devices(arguments);
 
-  const BatchFolder folder(arguments.out, settings);
-  const std::vector<BatchEntry> left = not_done(part, folder);
+  arguments.method.save(options);
+  folder.begin();
   if (!left.empty()) {
     catch_interrupts();
     Batch batch(arguments, left, folder, options, devices);
     if (!batch()) return kInterrupted;
     const Json timing = batch.timing();
-    vision::write_file(timing_file(arguments, shard),
-                       timing.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
+    write_own_json(timing_file(arguments, shard), timing);
     if (!arguments.quiet) print_timing(timing);
   }
-  return shard.count == 1 ? report_all(arguments, entries, folder) : report_shard(shard, not_done(part, folder));
+  return shard.count == 1 ? report_all(arguments, entries, folder) : report_shard(shard, failed_of(part, folder));
 }
 
 }  // namespace
@@ -385,6 +401,8 @@ Command add_batch(CLI::App& program) {
       ->type_name("N");
   command->add_flag("--merge", arguments->merge, "run nothing: make batch.json of what all shards have done");
   command->add_option("--write", arguments->write, kWriteListHelp)->type_name("LIST");
+  command->add_flag("--overwrite", arguments->overwrite,
+                    "do all again, and replace earlier runs in OUT/NAME: what their report.json says they wrote");
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors");
   arguments->method.add_to(*command);
   add_programs(*command, arguments->programs);

@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "apps/run_outputs.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 
@@ -34,6 +35,23 @@ bool is_folder_name(const std::string& name) {
          framed.find("//") == std::string::npos;
 }
 
+/// Letters of either case name one file on some file systems.
+std::string lowered(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+/// The part of a name that a batch or a run writes files to; empty where there is none.
+std::string reserved_part(const std::string& name) {
+  const std::vector<std::string> folders = output_folders();
+  std::istringstream parts(lowered(name));
+  for (std::string part; std::getline(parts, part, '/');) {
+    const bool is_file = part.ends_with(".json") || part == "report.html" || part == "poses.txt";
+    if (is_file || std::find(folders.begin(), folders.end(), part) != folders.end()) return part;
+  }
+  return {};
+}
+
 BatchEntry split(const std::string& line, const std::string& place) {
   const auto end = std::min(line.find_first_of(kBlanks), line.size());
   const std::string name = line.substr(0, end);
@@ -42,6 +60,10 @@ BatchEntry split(const std::string& line, const std::string& place) {
         fmt::format("{}: name \"{}\": choose letters, digits and . _ + - /, not beginning with a dot; "
                     "then the input",
                     place, name));
+  }
+  if (const std::string part = reserved_part(name); !part.empty()) {
+    throw InvalidArgument(fmt::format("{}: name \"{}\": results have files or folders of the name {}: choose another",
+                                      place, name, part));
   }
   return {name, stripped(line.substr(end)), place};
 }
@@ -58,9 +80,17 @@ std::vector<BatchEntry> read_batch_list(const std::filesystem::path& file) {
     const std::string line = stripped(raw);
     if (line.empty()) continue;
     entries.push_back(split(line, fmt::format("{}, line {}", file.string(), number)));
-    if (!names.insert(entries.back().name).second) {
+    if (!names.insert(lowered(entries.back().name)).second) {
       throw InvalidArgument(fmt::format("{}: the name {} comes twice: results would overwrite each other",
                                         entries.back().place, entries.back().name));
+    }
+  }
+  for (const BatchEntry& entry : entries) {
+    const std::string name = lowered(entry.name);
+    for (std::size_t end = name.find('/'); end != std::string::npos; end = name.find('/', end + 1)) {
+      if (!names.contains(name.substr(0, end))) continue;
+      throw InvalidArgument(fmt::format("{}: the name {} lies in {}, which is a name, too: choose another", entry.place,
+                                        entry.name, entry.name.substr(0, end)));
     }
   }
   if (entries.empty()) {

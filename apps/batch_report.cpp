@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "apps/metrics_json.h"
+#include "apps/output_folder.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "egosgm/vision/disparity_io.h"
@@ -44,14 +45,13 @@ DisparityCounts counts_of(const Json& json) {
   return counts;
 }
 
-void write(const fs::path& file, const Json& json) {
-  vision::write_file(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
-}
-
 Json read(const fs::path& file) {
   Json json = parse_json(vision::read_file(file, kMaxReportBytes), file);
-  if (json.is_object()) return json;
-  throw InvalidArgument(file.string() + ": is not what egosgm batch wrote: remove it to do its sequence again");
+  if (!json.is_object()) {
+    throw InvalidArgument(file.string() + ": is not what egosgm batch wrote: move it away, or choose another --out");
+  }
+  json.erase("digest");
+  return json;
 }
 
 /// Of the frames that have truth of that kind.
@@ -59,7 +59,7 @@ DisparityCounts compare(const SequenceJob& job, fs::path vision::StereoFrame::*t
   DisparityCounts counts;
   for (const vision::StereoFrame& frame : job.sequence.frames) {
     if ((frame.*truth).empty()) continue;
-    counts += vision::compare_disparity(vision::read_disparity(job.out / "disparity" / (frame.name + ".png")),
+    counts += vision::compare_disparity(vision::read_disparity(job.out.path() / "disparity" / (frame.name + ".png")),
                                         vision::read_disparity(frame.*truth));
   }
   return counts;
@@ -96,19 +96,38 @@ Json batch_settings(const PipelineOptions& options, const vision::StereoOdometry
   return json;
 }
 
-BatchFolder::BatchFolder(fs::path folder, const Json& settings) : folder_(std::move(folder)) {
-  vision::make_folder(folder_);
+BatchFolder::BatchFolder(const std::string& folder, Json settings, bool overwrite)
+    : folder_(folder), settings_(std::move(settings)), overwrite_(overwrite) {
+  if (folder.empty()) throw InvalidArgument("--out \"\": give a name");
+  for (const char* name : {"settings.json", "batch.json"}) expect_own_json(folder_ / name);
   const fs::path file = folder_ / "settings.json";
-  if (!fs::exists(file)) write(file, settings);
+  if (overwrite_ || !fs::exists(file)) return;
   const Json there = read(file);
-  if (there == settings) return;
-  throw InvalidArgument(fmt::format("{}: this batch was begun {}: give the same options, or another --out",
-                                    folder_.string(), difference(there, settings)));
+  if (there == settings_) return;
+  throw InvalidArgument(fmt::format("{}: this batch was begun {}: give the same options, or another --out", folder,
+                                    difference(there, settings_)));
+}
+
+void BatchFolder::begin() const {
+  vision::make_folder(folder_);
+  write_own_json(folder_ / "settings.json", settings_);
+}
+
+EarlierRun BatchFolder::treatment_of(const BatchEntry& entry) const {
+  for (const char* name : {"done.json", "failed.json"}) expect_own_json(folder_of(entry) / name);
+  const fs::path report = folder_of(entry) / "report.json";
+  std::error_code none;
+  if (overwrite_ || !fs::exists(report, none)) return overwrite_ ? EarlierRun::kOverwrite : EarlierRun::kRefuse;
+  expect_own_json(report);
+  const Json earlier = read(report);
+  const bool is_ours = earlier.value("batch_input", Json()) == Json(entry.arguments);
+  return is_ours ? EarlierRun::kOverwrite : EarlierRun::kRefuse;
 }
 
 bool BatchFolder::is_done(const BatchEntry& entry) const {
   const fs::path file = folder_of(entry) / "done.json";
   if (!fs::exists(file)) return false;
+  expect_own_json(file);
   const std::string before = read(file).value("input", "");
   if (before == entry.arguments) return true;
   throw InvalidArgument(fmt::format(R"({} holds the results of "{}", the list now says "{}": choose another name)",
@@ -118,11 +137,11 @@ bool BatchFolder::is_done(const BatchEntry& entry) const {
 void BatchFolder::begin(const BatchEntry& entry) const {
   vision::make_folder(folder_of(entry));
   std::error_code ignored;
-  fs::remove(folder_of(entry) / "failed.json", ignored);
+  for (const char* name : {"done.json", "failed.json"}) fs::remove(folder_of(entry) / name, ignored);
 }
 
 Json BatchFolder::finish(const BatchEntry& entry, const SequenceJob& job) const {
-  const Json report = read(job.out / "report.json");
+  const Json report = read(job.out.path() / "report.json");
   const Json& frames = report.at("frames");
   Json done{{"input", entry.arguments},
             {"title", job.sequence.title},
@@ -134,12 +153,12 @@ Json BatchFolder::finish(const BatchEntry& entry, const SequenceJob& job) const 
             {"noc", json_of(compare(job, &vision::StereoFrame::truth_noc))},
             {"occ", json_of(compare(job, &vision::StereoFrame::truth_occ))}};
   if (report.contains("doubt")) done["doubt"] = report["doubt"];
-  write(folder_of(entry) / "done.json", done);
+  write_own_json(folder_of(entry) / "done.json", done);
   return done;
 }
 
 void BatchFolder::fail(const BatchEntry& entry, const std::string& reason) const {
-  write(folder_of(entry) / "failed.json", {{"input", entry.arguments}, {"reason", reason}});
+  write_own_json(folder_of(entry) / "failed.json", {{"input", entry.arguments}, {"reason", reason}});
 }
 
 Json BatchFolder::result_of(const BatchEntry& entry) const {
@@ -174,7 +193,7 @@ Json BatchFolder::write_report(const std::vector<BatchEntry>& entries) const {
   report["frames"] = frames;
   report["pooled"] = {{"noc", app::json_of(vision::metrics_of(noc))}, {"occ", app::json_of(vision::metrics_of(occ))}};
   report["sequences"] = std::move(sequences);
-  write(folder_ / "batch.json", report);
+  write_own_json(folder_ / "batch.json", report);
   return report;
 }
 

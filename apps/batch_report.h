@@ -20,14 +20,21 @@ namespace egosgm::app {
 /// None of it names a device or a time. Thread-safe for different sequences.
 class BatchFolder {
  public:
-  /// Makes the folder, or continues in it. Throws IoError, or InvalidArgument where it was made with other settings.
-  BatchFolder(std::filesystem::path folder, const nlohmann::ordered_json& settings);
+  /// Looks at the folder, and changes nothing. `overwrite`: what was done there is done again. Throws InvalidArgument
+  /// where it was made with other settings, and is not to be overwritten, or holds files of others in a batch's names.
+  BatchFolder(const std::string& folder, nlohmann::ordered_json settings, bool overwrite);
+  /// Makes the folder and settings.json. Throws IoError.
+  void begin() const;
 
   std::filesystem::path folder_of(const BatchEntry& entry) const { return folder_ / entry.name; }
 
   /// Whether its results are complete. Throws InvalidArgument where they are those of another input of the same name.
   bool is_done(const BatchEntry& entry) const;
-  /// Forgets that it failed, before it is tried (again).
+  bool is_to_do(const BatchEntry& entry) const { return overwrite_ || !is_done(entry); }
+  /// What becomes of a run in its folder: what this batch began, it does again; another one is in the way, unless it is
+  /// to be overwritten.
+  EarlierRun treatment_of(const BatchEntry& entry) const;
+  /// Forgets what came of it, before it is tried (again). REQUIRES: `treatment_of` looked at it.
   void begin(const BatchEntry& entry) const;
   /// REQUIRES: `run_sequence` finished. Compares the disparities with the truth that the sequence has. Returns what
   /// done.json holds. Throws IoError.
@@ -41,6 +48,8 @@ class BatchFolder {
   nlohmann::ordered_json result_of(const BatchEntry& entry) const;
 
   const std::filesystem::path folder_;
+  const nlohmann::ordered_json settings_;
+  const bool overwrite_;
 };
 
 /// What all sequences of a batch share.

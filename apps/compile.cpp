@@ -8,6 +8,7 @@
 #include "apps/counted.h"
 #include "apps/device_arguments.h"
 #include "apps/option_arguments.h"
+#include "apps/output_folder.h"
 #include "egosgm/programs.h"
 #include "egosgm/vision/file_io.h"
 
@@ -21,9 +22,12 @@ struct CompileArguments {
 
 int compile(const CompileArguments& arguments) {
   const PipelineOptions options = arguments.method.options();
+  Inputs inputs;
+  inputs.add_file(arguments.method.config);
+  const std::filesystem::path folder = new_folder("--out", arguments.out, inputs);
   const Device device = Device::select(arguments.device);
   const std::vector<ProgramFile> files = compile_programs(device, options);
-  const std::filesystem::path folder = arguments.out;
+  arguments.method.save(options);
   vision::make_folder(folder);
   for (const ProgramFile& file : files) vision::write_file(folder / file.name, file.bytes);  // the manifest last
   fmt::print("{} for {}: {}\n", counted(files.size() - 1, "program"), device.info().name, folder.string());
@@ -36,8 +40,7 @@ Command add_compile(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("compile", "Compile the kernels ahead, for machines without an OpenCL compiler");
   auto arguments = std::make_shared<CompileArguments>();
-  command
-      ->add_option("--out", arguments->out, "folder to write: program binaries, and manifest.json, which says of what")
+  command->add_option("--out", arguments->out, "new folder: program binaries, and manifest.json, which says of what")
       ->type_name("DIR")
       ->group("Output")
       ->required();

@@ -13,6 +13,7 @@
 
 #include "apps/command.h"
 #include "apps/counted.h"
+#include "apps/output_folder.h"
 #include "apps/plot_file.h"
 #include "apps/run_folder.h"
 #include "apps/truth_pairs.h"
@@ -152,7 +153,10 @@ PosePairs read_pairs(const ComparisonArguments& compared) {
 
 int evaluate(EvalPosesArguments& arguments) {
   arguments.compared.resolve();
-  for (const std::string& file : arguments.plots) require_plot_name("--plot", file);
+  for (const std::string& file : arguments.plots) {
+    require_plot_name("--plot", file);
+    expect_new_file("--plot", file);
+  }
   const auto [estimate, truth] = read_pairs(arguments.compared);
   const vision::PoseEvaluation evaluation = vision::evaluate_poses(estimate, truth);
   for (const std::string& file : arguments.plots) {
@@ -177,7 +181,7 @@ Command add_eval_poses(CLI::App& program) {
                              "the true ones, of the same frames or of the whole sequence, or the sequence's folder");
   command
       ->add_option("--plot", arguments->plots,
-                   "draw both paths from above, in metres: a .png or .svg file; may be repeated")
+                   "draw both paths from above, in metres: a new .png or .svg file; may be repeated")
       ->allow_extra_args(false)
       ->type_name("FILE");
   command->add_flag("--json", arguments->json, "print JSON");

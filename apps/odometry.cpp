@@ -7,6 +7,7 @@
 #include "apps/command.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
+#include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
 #include "egosgm/vision/file_io.h"
@@ -35,7 +36,8 @@ int estimate(const OdometryArguments& arguments) {
   const vision::StereoSequence sequence = arguments.input.open();
   vision::check_image_sizes(sequence);
   MotionSource motions(sequence, {}, arguments.options);
-  vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
+  if (!arguments.out.empty()) vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
+  expect_new_file("--out", arguments.out);
   std::vector<Eigen::Isometry3d> poses;
   catch_interrupts();
   {
@@ -60,8 +62,7 @@ Command add_odometry(CLI::App& program) {
   CLI::App* command = program.add_subcommand("odometry", "Estimate the camera's poses alone, without matching");
   auto arguments = std::make_shared<OdometryArguments>();
   arguments->input.add_to(*command);
-  command
-      ->add_option("--out", arguments->out, "file to write: KITTI poses, camera-to-world, relative to the first frame")
+  command->add_option("--out", arguments->out, "new file: KITTI poses, camera-to-world, relative to the first frame")
       ->type_name("FILE")
       ->required();
   add_motion_bounds(*command, arguments->options, "Options");

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "apps/output_folder.h"
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
@@ -126,7 +127,7 @@ void OptionArguments::add_to(CLI::App& command) {
   command.add_option("--config", config, "read options from a file, `stage.option = value` a line (TOML)")
       ->type_name("FILE")
       ->group(group);
-  command.add_option("--save-config", save_config, "write the options in use to such a file")
+  command.add_option("--save-config", save_config, "write the options in use to such a new file")
       ->type_name("FILE")
       ->group(group);
   command.footer([] { return stage_options_help(); });
@@ -145,8 +146,12 @@ PipelineOptions OptionArguments::options() const {
     if (!value.empty()) set_option(options, name, value);
   }
   options.validate();
-  if (!save_config.empty()) vision::write_file(save_config, toml_of(options));
+  if (!save_config.empty()) expect_new_file("--save-config", save_config);
   return options;
+}
+
+void OptionArguments::save(const PipelineOptions& options) const {
+  if (!save_config.empty()) vision::write_file(save_config, toml_of(options));
 }
 
 }  // namespace egosgm::app

@@ -17,8 +17,11 @@ struct OptionArguments {
   std::string search, temporal, paths, disparities, min_disparity;
 
   void add_to(CLI::App& command);
-  /// Reads --config, writes --save-config. Throws InvalidArgument, naming the option (and the file), or IoError.
+  /// Reads --config, and looks whether --save-config can be written. Throws InvalidArgument, naming the option (and the
+  /// file), or IoError.
   PipelineOptions options() const;
+  /// Writes --save-config. Throws IoError.
+  void save(const PipelineOptions& options) const;
 };
 
 }  // namespace egosgm::app

@@ -9,6 +9,7 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/interrupt.h"
+#include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/raw_pairs.h"
 #include "apps/sequence_arguments.h"
@@ -92,11 +93,8 @@ class Rectifier {
 /// KITTI odometry's layout; colour goes to image_2 and image_3.
 class SequenceFolder {
  public:
-  explicit SequenceFolder(const fs::path& folder) : folder_(folder) {
-    if (fs::exists(folder) && !fs::is_empty(folder)) {
-      throw InvalidArgument("--out " + folder.string() + ": is not empty: give a new folder");
-    }
-  }
+  /// REQUIRES: a new or empty folder.
+  explicit SequenceFolder(const fs::path& folder) : folder_(folder) {}
 
   void add(const RawPair& pair) {
     if (frames_ == 0) {
@@ -145,6 +143,18 @@ std::string rectangle_text(const cv::Rect& r) {
   return fmt::format("{}x{} from ({}, {})", r.width, r.height, r.x, r.y);
 }
 
+Inputs inputs_of(const RectifyArguments& arguments) {
+  Inputs inputs;
+  for (const std::string& pattern : {arguments.input.left, arguments.input.right, arguments.input.side_by_side}) {
+    if (pattern.empty()) continue;
+    inputs.add_folder(fs::is_directory(pattern) ? fs::path(pattern) : fs::absolute(pattern).parent_path());
+  }
+  inputs.add_file(arguments.input.list);
+  inputs.add_folder(arguments.input.euroc);
+  inputs.add_file(arguments.calib);
+  return inputs;
+}
+
 int rectify(const RectifyArguments& arguments) {
   if (!(arguments.alpha >= 0 && arguments.alpha <= 1)) {
     throw InvalidArgument(fmt::format("--alpha {}: choose from 0 to 1", arguments.alpha));
@@ -154,7 +164,7 @@ int rectify(const RectifyArguments& arguments) {
   if (!input.euroc.empty()) input.euroc = mav0_of(input.euroc);
   const std::unique_ptr<RawPairs> pairs = open_pairs(input);
   Rectifier rectifier(arguments);
-  SequenceFolder folder(arguments.out);
+  SequenceFolder folder(new_folder("--out", arguments.out, inputs_of(arguments)));
   catch_interrupts();
   {
     Progress progress(pairs->count(), arguments.quiet);

@@ -11,6 +11,7 @@
 #include "apps/command.h"
 #include "apps/frame_panels.h"
 #include "apps/metrics_json.h"
+#include "apps/output_folder.h"
 #include "apps/run_folder.h"
 #include "apps/templates.h"
 #include "apps/truth_pairs.h"
@@ -290,9 +291,10 @@ int report(const ReportArguments& arguments) {
         fmt::format("--picture-width {}: choose from 16 to {}", arguments.picture_width, vision::kMaxImageSide));
   }
   const fs::path file = arguments.out.empty() ? fs::path(arguments.run) / "report.html" : fs::path(arguments.out);
+  if (!is_own_page(file)) expect_new_file("--out", file.string());
   try {
     const std::string page = Page(arguments).html();
-    vision::write_file(file, page);
+    vision::write_file(file, signed_text(page, kPageDigestBegin, kPageDigestEnd));
     fmt::print("{}: {:.1f} MB, opens in any browser\n", file.string(), static_cast<double>(page.size()) / 1e6);
   } catch (const Json::exception& error) {
     throw InvalidArgument(fmt::format("{}/report.json: not the report of a run: {}", arguments.run, error.what()));
@@ -321,7 +323,10 @@ Command add_report(CLI::App& program) {
   command->add_option("--picture-width", arguments->picture_width, "wider pictures are scaled down to this [px]")
       ->type_name("N")
       ->capture_default_str();
-  command->add_option("--out", arguments->out, "the page; without: OUT/report.html")->type_name("FILE.html");
+  command
+      ->add_option("--out", arguments->out,
+                   "the page: a new file, or one that egosgm report made; without: OUT/report.html")
+      ->type_name("FILE.html");
   command->footer(
       "The page holds everything that it shows: it needs no network and no other file. Variance and the width of the\n"
       "search are shown where the run wrote them: egosgm run --write variance,search");

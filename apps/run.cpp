@@ -14,10 +14,10 @@
 #include "apps/counted.h"
 #include "apps/device_arguments.h"
 #include "apps/doubt.h"
-#include "apps/earlier_run.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
 #include "apps/option_arguments.h"
+#include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/run_outputs.h"
 #include "apps/run_report.h"
@@ -67,29 +67,29 @@ class Run {
   Run(const SequenceJob& job, const Device& device)
       : quiet_(job.quiet),
         folder_(job.out),
+        kinds_(job.kinds),
         sequence_(job.sequence),
         input_(job.input),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
-        report_(sequence_, pipeline_, job.preset, motion_of(job), size_.width, size_.height),
-        earlier_(job.earlier),
+        report_(sequence_, pipeline_, job.preset, motion_of(job), size_.width, size_.height, job.batch_input),
         doubt_(sequence_.calibration) {
-    expect_free(folder_, earlier_, report_.identity());
-    outputs_.emplace(folder_, job.kinds, size_, job.options.disparities, sequence_.calibration);
+    folder_.begin(report_.identity());
+    outputs_.emplace(folder_.path(), job.kinds, size_, job.options.disparities, sequence_.calibration);
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
     pipeline_.record_commands(true);
   }
 
   bool operator()() {
-    report_.write(folder_ / "report.json", false, kKilled);
+    write_report(false, kKilled);
     try {
       const bool finished = process_all();
       finish(finished, finished ? "" : "an interrupt");
       if (!finished) {
         fmt::print(stderr, "egosgm: interrupted after {} of {} frames: what is in {} is whole\n", poses_.size(),
-                   sequence_.frames.size(), folder_.string());
+                   sequence_.frames.size(), folder_.path().string());
       }
       return finished;
     } catch (const std::exception& error) {
@@ -160,7 +160,8 @@ class Run {
     under_way_.pop_front();
     const vision::StereoFrame& frame = sequence_.frames[prepared.index];
     const auto before_write = Clock::now();
-    const std::int64_t unstorable = outputs_->write(frame, prepared.images.left, earlier_ == EarlierRun::kResume);
+    const std::int64_t unstorable = outputs_->write(frame, prepared.images.left, folder_.resumes());
+    for (const std::string& file : output_files(kinds_, frame.name)) folder_.wrote(file);
     const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
@@ -197,16 +198,26 @@ class Run {
   }
 
   void finish(bool finished, const std::string& why_not) {
-    if (!poses_.empty()) vision::write_poses(folder_ / "poses.txt", poses_);
     report_.set_doubt(doubt_.text());
-    report_.write(folder_ / "report.json", finished, why_not);
+    folder_.close();
+    if (!poses_.empty()) {
+      folder_.announce("poses.txt");
+      write_report(false, kKilled);
+      vision::write_poses(folder_.path() / "poses.txt", poses_);
+      folder_.wrote("poses.txt");
+    }
+    write_report(finished, why_not);
     if (trace_) trace_->write();
     if (!finished || quiet_) return;
     fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
                pipeline_.device().info().name);
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
-               100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.string());
+               100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.path().string());
     if (const std::string advice = advice_of(doubt_.text(), input_); !advice.empty()) fmt::print("{}\n", advice);
+  }
+
+  void write_report(bool finished, const std::string& why_not) {
+    report_.write(folder_.path() / "report.json", folder_.files(), finished, why_not);
   }
 
   /// The first error counts; that the report cannot be written either adds nothing.
@@ -218,7 +229,8 @@ class Run {
   }
 
   const bool quiet_;
-  const std::filesystem::path& folder_;
+  OutputFolder folder_;
+  const std::set<std::string> kinds_;
   const vision::StereoSequence& sequence_;
   const std::string& input_;
   const cv::Size size_;
@@ -226,7 +238,6 @@ class Run {
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
   Pipeline pipeline_;
   RunReport report_;
-  const EarlierRun earlier_;
   Doubt doubt_;
   std::optional<Trace> trace_;
   std::deque<PreparedFrame> under_way_;
@@ -245,16 +256,20 @@ EarlierRun earlier_run_of(const RunArguments& arguments) {
 
 SequenceJob job_of(const RunArguments& arguments) {
   SequenceJob job;
-  job.earlier = earlier_run_of(arguments);
+  const EarlierRun earlier = earlier_run_of(arguments);
   job.sequence = arguments.input.open();
   job.input = arguments.input.text();
   job.options = arguments.method.options();
   job.preset = arguments.method.preset;
   job.poses_file = arguments.poses;
   job.odometry = arguments.odometry;
-  job.out = arguments.out;
   job.kinds = parse_write_list(arguments.write);
   if (arguments.interpolate) job.kinds.insert("interpolated");
+  Inputs inputs(arguments.input, job.sequence);
+  for (const std::string& file : {arguments.poses, arguments.method.config, arguments.tuning}) inputs.add_file(file);
+  inputs.add_folder(arguments.programs);
+  job.out = OutputFolder(arguments.out, inputs, earlier, output_files(job.kinds, job.sequence));
+  if (!arguments.trace.empty()) expect_new_file("--trace", arguments.trace);
   job.trace = arguments.trace;
   job.quiet = arguments.quiet;
   return job;
@@ -265,6 +280,7 @@ int run(const RunArguments& arguments) {
   Device device = Device::select(arguments.device);
   if (arguments.programs.empty() || !arguments.tuning.empty()) device = tuned_by_argument(device, arguments.tuning);
   if (!arguments.programs.empty()) device = device.with_programs(arguments.programs);
+  arguments.method.save(job.options);
   catch_interrupts();
   return run_sequence(job, device) ? kOk : kInterrupted;
 }
@@ -298,7 +314,10 @@ Command add_run(CLI::App& program) {
                  "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
                  "before are computed again, for the filter's state")
       ->group(group);
-  command->add_flag("--overwrite", arguments->overwrite, "replace an earlier run's maps in OUT")->group(group);
+  command
+      ->add_flag("--overwrite", arguments->overwrite,
+                 "replace an earlier run: what OUT/report.json says it wrote, and nothing more")
+      ->group(group);
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
   arguments->method.add_to(*command);
   add_motion(*command, arguments->poses, arguments->odometry);

@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "apps/earlier_run.h"
+#include "apps/output_folder.h"
 #include "egosgm/device.h"
 #include "egosgm/options.h"
 #include "egosgm/vision/dataset.h"
@@ -21,10 +21,10 @@ struct SequenceJob {
   std::string preset = "default";          // what the report calls the options
   std::string poses_file;                  // empty: stereo odometry,
   vision::StereoOdometryOptions odometry;  // with these options
-  std::filesystem::path out;
-  std::set<std::string> kinds;                  // what is written beside the disparity, see parse_write_list
-  std::filesystem::path trace;                  // file for a trace of all commands; empty: none
-  EarlierRun earlier = EarlierRun::kOverwrite;  // what becomes of a run that `out` holds
+  OutputFolder out;
+  std::set<std::string> kinds;  // what is written beside the disparity, see parse_write_list
+  std::filesystem::path trace;  // file for a trace of all commands; empty: none
+  std::string batch_input;      // of a batch: the line of its list that asks for this; else empty
   bool quiet = false;
 };
 

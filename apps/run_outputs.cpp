@@ -80,6 +80,21 @@ std::vector<std::string> output_folders() {
   return folders;
 }
 
+std::vector<std::string> output_files(const std::set<std::string>& kinds, const std::string& frame) {
+  std::vector<std::string> files;
+  for (const std::string& kind : kinds) files.push_back(kind + '/' + frame + extension_of(kind));
+  files.push_back("disparity/" + frame + extension_of("disparity"));
+  return files;
+}
+
+std::vector<std::string> output_files(const std::set<std::string>& kinds, const vision::StereoSequence& sequence) {
+  std::vector<std::string> files;
+  for (const vision::StereoFrame& frame : sequence.frames) {
+    for (std::string& file : output_files(kinds, frame.name)) files.push_back(std::move(file));
+  }
+  return files;
+}
+
 RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities,
                        const Calibration& calibration)
     : folder_(std::move(folder)),

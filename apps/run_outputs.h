@@ -18,6 +18,9 @@ namespace egosgm::app {
 std::set<std::string> parse_write_list(const std::string& list);
 /// The folders that a run may write its maps to.
 std::vector<std::string> output_folders();
+/// The files of one frame, relative to OUT, and those of all frames.
+std::vector<std::string> output_files(const std::set<std::string>& kinds, const std::string& frame);
+std::vector<std::string> output_files(const std::set<std::string>& kinds, const vision::StereoSequence& sequence);
 const std::vector<std::string>& write_kinds();
 /// The same, as --help and the README describe it.
 extern const char* const kWriteListHelp;

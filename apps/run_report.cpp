@@ -3,8 +3,8 @@
 
 #include <fmt/core.h>
 
+#include "apps/output_folder.h"
 #include "egosgm/named_options.h"
-#include "egosgm/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -77,7 +77,7 @@ nlohmann::ordered_json json_of(const Eigen::Isometry3d& motion) {
 }
 
 RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& preset,
-                     const std::string& motion, int width, int height) {
+                     const std::string& motion, int width, int height, const std::string& batch_input) {
   const DeviceInfo& device = pipeline.device().info();
   json_ = {{"program", "egosgm"},
            {"version", EGOSGM_VERSION},
@@ -98,6 +98,7 @@ RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pip
            {"options", json_of(pipeline.options())},
            {"finished", false},
            {"frames", Json::array()}};
+  if (!batch_input.empty()) json_["batch_input"] = batch_input;
 }
 
 Json RunReport::identity() const {
@@ -130,11 +131,12 @@ void RunReport::set_doubt(const std::string& doubt) {
   if (!doubt.empty()) json_["doubt"] = doubt;
 }
 
-void RunReport::write(const std::filesystem::path& file, bool finished, const std::string& why_not) {
+void RunReport::write(const std::filesystem::path& file, Json files, bool finished, const std::string& why_not) {
+  json_["files"] = std::move(files);
   json_["finished"] = finished;
   json_.erase("stopped_by");
   if (!finished) json_["stopped_by"] = why_not;
-  vision::write_file(file, json_.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
+  write_own_json(file, json_);
 }
 
 double RunReport::mean(const char* figure) const {

@@ -20,9 +20,9 @@ struct HostTimes {
 /// OUT/report.json: what ran, on what, and what every frame gave.
 class RunReport {
  public:
-  /// `motion`: where the motions come from.
+  /// `motion`: where the motions come from. `batch_input`: as in SequenceJob.
   RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& preset,
-            const std::string& motion, int width, int height);
+            const std::string& motion, int width, int height, const std::string& batch_input);
 
   /// All that the maps depend on. Two runs with equal identities give the same maps.
   nlohmann::ordered_json identity() const;
@@ -33,8 +33,10 @@ class RunReport {
   /// What speaks against the input, see Doubt; empty: nothing.
   void set_doubt(const std::string& doubt);
 
-  /// `finished`: whether all frames ran; else `why_not` says what stopped them. Throws IoError.
-  void write(const std::filesystem::path& file, bool finished, const std::string& why_not = {});
+  /// `files`: what OUT holds of the run (OutputFolder::files). `finished`: whether all frames ran; else `why_not` says
+  /// what stopped them. Throws IoError.
+  void write(const std::filesystem::path& file, nlohmann::ordered_json files, bool finished,
+             const std::string& why_not = {});
 
   double mean(const char* figure) const;
 

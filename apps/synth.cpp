@@ -3,6 +3,7 @@
 
 #include "apps/command.h"
 #include "apps/counted.h"
+#include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "egosgm/vision/synthetic.h"
 
@@ -17,9 +18,10 @@ struct SynthArguments {
 
 int render(const SynthArguments& arguments) {
   arguments.options.validate();
+  const std::filesystem::path folder = new_folder("--out", arguments.out, {});
   {
     Progress progress(arguments.options.frames, arguments.quiet);
-    vision::write_sequence(arguments.options, arguments.out, [&](int done, int frames) {
+    vision::write_sequence(arguments.options, folder, [&](int done, int frames) {
       progress.done(fmt::format("rendered {} of {}", done, frames));
     });
   }
@@ -37,7 +39,7 @@ Command add_synth(CLI::App& program) {
       program.add_subcommand("synth", "Render a synthetic stereo sequence with exact disparity, masks and poses");
   auto arguments = std::make_shared<SynthArguments>();
   vision::SyntheticOptions& options = arguments->options;
-  command->add_option("--out", arguments->out, "folder to write, in the layout of KITTI odometry, with truth/ beside")
+  command->add_option("--out", arguments->out, "new folder, in the layout of KITTI odometry, with truth/ beside")
       ->type_name("DIR")
       ->required();
   command->add_option("--frames", options.frames, "number of frames")->type_name("N")->capture_default_str();

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "apps/output_folder.h"
 #include "egosgm/vision/file_io.h"
 
 namespace egosgm::app {
@@ -34,7 +35,6 @@ Trace::Trace(std::filesystem::path file) : file_(std::move(file)), events_(Json:
                                               {Row::kDownload, "device: download"}};
   events_.push_back(named("process_name", Row::kPrepare, "egosgm run"));
   for (const auto& [row, name] : rows) events_.push_back(named("thread_name", row, name));
-  write();
 }
 
 double Trace::us_since_start(std::int64_t steady_clock_ns) const {
@@ -70,6 +70,7 @@ void Trace::add_device(const std::vector<DeviceCommand>& commands, const std::st
 }
 
 void Trace::write() const {
+  expect_new_file("--trace", file_.string());
   vision::write_file(file_, Json{{"displayTimeUnit", "ms"}, {"traceEvents", events_}}.dump(
                                 -1, ' ', false, Json::error_handler_t::replace) +
                                 '\n');

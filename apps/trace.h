@@ -17,7 +17,6 @@ class Trace {
   using Time = std::chrono::steady_clock::time_point;
   enum class Row { kPrepare = 1, kWrite, kUpload, kKernels, kDownload };
 
-  /// Writes a trace of nothing, so that a file that cannot be written ends the run at once. Throws IoError.
   explicit Trace(std::filesystem::path file);
 
   void add_host(const std::string& name, const std::string& frame, Row row, Time start, double ms);

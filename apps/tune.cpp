@@ -9,6 +9,7 @@
 
 #include "apps/command.h"
 #include "apps/device_arguments.h"
+#include "apps/interrupt.h"
 #include "apps/standard_output.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
@@ -136,7 +137,8 @@ int tune(const TuneArguments& arguments) {
   const std::filesystem::path file =
       arguments.file.empty() ? user_tuning_file() : std::filesystem::path(arguments.file);
   if (file.empty()) throw InvalidArgument("tune: neither XDG_CONFIG_HOME nor HOME is set: give --file FILE");
-  store_tuning(file, device.info(), {});  // so that a file that cannot be written ends it at once
+  expect_tuning_file(file);
+  catch_interrupts();
   Course course(arguments, device);
   Tuning best;
   const std::vector<StageTime> untuned = course.run(best);
@@ -146,6 +148,10 @@ int tune(const TuneArguments& arguments) {
     double least = ms_of(untuned, trial.stages);
     print_now(fmt::format("{}: {:.3f} ms with the defaults\n", fmt::join(trial.stages, " + "), least));
     for (const std::vector<NamedOption>& sizes : trial.candidates) {
+      if (interrupted()) {
+        fmt::print(stderr, "egosgm: interrupted: nothing is kept, {} is as it was\n", file.string());
+        return kInterrupted;
+      }
       Tuning candidate = best;
       for (const auto& [name, value] : sizes) set_tuning(candidate, name, value);
       double ms = 0;

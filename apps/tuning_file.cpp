@@ -21,7 +21,11 @@ std::string key_of(const DeviceInfo& device) { return device.name + ", driver " 
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {
   throw InvalidArgument(
-      fmt::format("{}: {}: delete it and run egosgm tune again, or give --tuning none", file.string(), what));
+      fmt::format("{}: {}: move it away and run egosgm tune again, or give --tuning none", file.string(), what));
+}
+
+[[noreturn]] void refuse_to_store(const std::filesystem::path& file) {
+  throw InvalidArgument(file.string() + ": not a tuning file, and stays as it is: give another --file");
 }
 
 Json read(const std::filesystem::path& file) {
@@ -64,12 +68,26 @@ Device tuned_by_argument(const Device& device, const std::string& argument) {
   return std::filesystem::exists(file) ? tuned(device, file) : device;
 }
 
+void expect_tuning_file(const std::filesystem::path& file) {
+  if (file.has_parent_path()) vision::make_folder(file.parent_path());
+  vision::expect_writable(file);
+  if (!std::filesystem::is_regular_file(file)) return;
+  const Json json = read(file);
+  const auto is_tuning = [](const auto& entry) {
+    return entry.key().find(", driver ") != std::string::npos && entry.value().is_object();
+  };
+  for (const auto& entry : json.items()) {
+    if (!is_tuning(entry)) refuse_to_store(file);
+  }
+  if (json.empty()) refuse_to_store(file);
+}
+
 void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, const Tuning& tuning) {
-  Json json = std::filesystem::exists(file) ? read(file) : Json::object();
+  expect_tuning_file(file);
+  Json json = std::filesystem::is_regular_file(file) ? read(file) : Json::object();
   Json sizes = Json::object();
   for (const auto& [name, value] : list_tuning(tuning)) sizes[name] = std::stoi(value);
   json[key_of(device)] = sizes;
-  if (file.has_parent_path()) vision::make_folder(file.parent_path());
   vision::write_file(file, json.dump(2) + '\n');
 }
 

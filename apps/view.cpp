@@ -12,8 +12,10 @@
 #include "apps/doubt.h"
 #include "apps/frame_panels.h"
 #include "apps/interrupt.h"
+#include "apps/last_ones.h"
 #include "apps/motion_source.h"
 #include "apps/option_arguments.h"
+#include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
 #include "apps/standard_output.h"
@@ -39,17 +41,16 @@ struct ViewArguments {
 /// Matches one frame after the other and draws what came out.
 class DrawnSequence {
  public:
-  explicit DrawnSequence(const ViewArguments& arguments)
+  DrawnSequence(const ViewArguments& arguments, vision::StereoSequence sequence, const PipelineOptions& options)
       : cell_width_(arguments.cell_width),
-        sequence_(arguments.input.open()),
+        sequence_(std::move(sequence)),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, arguments.poses, arguments.odometry),
-        options_(arguments.method.options()),
-        pipeline_(sequence_.calibration, size_.width, size_.height, options_, device_of(arguments)),
+        pipeline_(sequence_.calibration, size_.width, size_.height, options, device_of(arguments)),
         disparity_(size_, CV_32FC1),
         variance_(size_, CV_32FC1),
         search_width_(size_, CV_16UC1),
-        panels_(options_.disparities),
+        panels_(options.disparities),
         input_(arguments.input.text()),
         doubt_(sequence_.calibration) {}
 
@@ -90,7 +91,6 @@ class DrawnSequence {
   const vision::StereoSequence sequence_;
   const cv::Size size_;
   MotionSource motions_;
-  const PipelineOptions options_;
   Pipeline pipeline_;
   cv::Mat disparity_, variance_, search_width_;
   FramePanels panels_;
@@ -99,20 +99,29 @@ class DrawnSequence {
   Doubt doubt_;
 };
 
+/// Throws InvalidArgument where a video cannot get this name.
+void expect_video(const std::filesystem::path& file) {
+  if (file.extension() != ".mp4" && file.extension() != ".avi")
+    throw InvalidArgument("--video " + file.string() + ": the name must end in .mp4 or .avi");
+  vision::make_folder(std::filesystem::absolute(file).parent_path());
+  expect_new_file("--video", file.string());
+}
+
 /// A video that appears under its name once it is whole.
 class VideoFile {
  public:
   VideoFile(std::filesystem::path file, double frames_per_second)
       : file_(std::move(file)), frames_per_second_(frames_per_second) {
-    if (file_.extension() != ".mp4" && file_.extension() != ".avi")
-      throw InvalidArgument("--video " + file_.string() + ": the name must end in .mp4 or .avi");
-    vision::make_folder(std::filesystem::absolute(file_).parent_path());
-    unfinished_ = file_;
-    unfinished_.replace_filename(fmt::format(".{}.{}{}", file_.stem().string(), getpid(), file_.extension().string()));
+    std::string folder = (std::filesystem::absolute(file_).parent_path() / ".egosgm-XXXXXX").string();
+    if (!::mkdtemp(folder.data())) {
+      throw IoError(file_.string() + ": cannot be written: " + std::generic_category().message(errno));
+    }
+    unfinished_ = std::filesystem::path(folder) / ("video" + file_.extension().string());
   }
   ~VideoFile() {
     std::error_code ignored;
     std::filesystem::remove(unfinished_, ignored);
+    std::filesystem::remove(unfinished_.parent_path(), ignored);
   }
   VideoFile(const VideoFile&) = delete;
   VideoFile& operator=(const VideoFile&) = delete;
@@ -134,9 +143,7 @@ class VideoFile {
   void finish() {
     if (!writer_.isOpened()) return;
     writer_.release();
-    std::error_code error;
-    std::filesystem::rename(unfinished_, file_, error);
-    if (error) throw IoError(file_.string() + ": cannot be written: " + error.message());
+    vision::move_file(unfinished_, file_);
   }
 
  private:
@@ -167,7 +174,7 @@ int write_files(DrawnSequence& drawn, const ViewArguments& arguments) {
   return kInterrupted;
 }
 
-/// The window: plays, pauses, and steps through what has been drawn.
+/// The window: plays, pauses, and steps through what was drawn last.
 class Window {
  public:
   Window(DrawnSequence& drawn, const ViewArguments& arguments)
@@ -185,7 +192,7 @@ class Window {
       const int key = cv::waitKeyEx(playing_ ? delay_ms_ : 50);
       if (is_quit(key) || !is_open()) break;
       if (key == ' ') playing_ = !playing_;
-      if (is_step_back(key) && at_ > 0) playing_ = false, show(at_ - 1);
+      if (is_step_back(key) && at_ > pictures_.first()) playing_ = false, show(at_ - 1);
       if (is_step(key)) playing_ = false;
       if ((playing_ || is_step(key)) && at_ + 1 < drawn_.frames()) show(at_ + 1);
     }
@@ -201,7 +208,7 @@ class Window {
   static bool is_open() { return cv::getWindowProperty(kName, cv::WND_PROP_VISIBLE) >= 1; }
 
   void show(std::size_t i) {
-    while (pictures_.size() <= i) pictures_.push_back(drawn_.draw(pictures_.size()));
+    while (pictures_.end() <= i) pictures_.push_back(drawn_.draw(pictures_.end()));
     at_ = i;
     cv::imshow(kName, pictures_[i]);
   }
@@ -209,7 +216,7 @@ class Window {
   DrawnSequence& drawn_;
   bool playing_;
   const int delay_ms_;
-  std::vector<cv::Mat> pictures_;
+  LastOnes<cv::Mat> pictures_{100};  // some 150 MB of KITTI's size
   std::size_t at_ = 0;
 };
 
@@ -233,7 +240,12 @@ int view(const ViewArguments& arguments) {
   const bool window = arguments.video.empty() && arguments.pictures.empty();
   catch_interrupts();
   if (window) require_display();
-  DrawnSequence drawn(arguments);
+  vision::StereoSequence sequence = arguments.input.open();
+  const PipelineOptions options = arguments.method.options();
+  if (!arguments.pictures.empty()) new_folder("--pictures", arguments.pictures, Inputs(arguments.input, sequence));
+  if (!arguments.video.empty()) expect_video(arguments.video);
+  DrawnSequence drawn(arguments, std::move(sequence), options);
+  arguments.method.save(options);
   if (!arguments.quiet && !drawn.note().empty()) print_now(drawn.note() + '\n');
   const int code = window ? Window(drawn, arguments)() : write_files(drawn, arguments);
   if (!arguments.quiet && !drawn.advice().empty()) fmt::print("{}\n", drawn.advice());
@@ -248,10 +260,11 @@ Command add_view(CLI::App& program) {
   auto arguments = std::make_shared<ViewArguments>();
   arguments->input.add_to(*command);
   const char* group = "Output (default: a window)";
-  command->add_option("--video", arguments->video, "write a video in place of the window")
+  command->add_option("--video", arguments->video, "write a new video in place of the window")
       ->type_name("FILE.mp4")
       ->group(group);
-  command->add_option("--pictures", arguments->pictures, "write DIR/NNNNNN.png in place of the window")
+  command
+      ->add_option("--pictures", arguments->pictures, "write DIR/NNNNNN.png, DIR a new folder, in place of the window")
       ->type_name("DIR")
       ->group(group);
   command->add_option("--fps", arguments->frames_per_second, "frames per second, at most")

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -98,56 +99,137 @@ int write_all(const Descriptor& descriptor, std::string_view bytes) {
   return 0;
 }
 
-std::filesystem::path folder_of(const std::filesystem::path& file) {
-  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
-}
+namespace fs = std::filesystem;
 
-std::filesystem::path hidden_name(const std::filesystem::path& file) {
+fs::path folder_of(const fs::path& file) { return file.has_parent_path() ? file.parent_path() : fs::path("."); }
+
+fs::path hidden_name(const fs::path& file) {
   static std::atomic<unsigned> counter{0};
   return folder_of(file) / (".egosgm-" + std::to_string(::getpid()) + "-" + std::to_string(counter++) + ".part");
 }
 
-/// A file without a name: nothing of it remains when the process dies. Not open where the file system has no such
-/// thing.
-Descriptor open_unnamed([[maybe_unused]] const std::filesystem::path& file) {
-#ifdef O_TMPFILE
-  return Descriptor(::open(folder_of(file).c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666));
-#else
-  return Descriptor(-1);
-#endif
+/// N where `path` is /dev/fd/N or the like; -1 elsewhere.
+int descriptor_named(const fs::path& path) {
+  const std::string name = path.filename().string();
+  if (name.empty() || name.size() > 9 || name.find_first_not_of("0123456789") != std::string::npos) return -1;
+  std::error_code none;  // no /proc, no such folder
+  const fs::path open_ones = fs::canonical("/proc/self/fd", none);
+  return !none && fs::canonical(folder_of(path), none) == open_ones && !none ? std::stoi(name) : -1;
 }
 
-int give_name(const Descriptor& unnamed, const std::filesystem::path& name) {
-  const std::string link = "/proc/self/fd/" + std::to_string(unnamed.get());
-  return ::linkat(AT_FDCWD, link.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
-}
+/// What a write to a file reaches.
+struct Target {
+  fs::path file;  // links are followed, those to nothing too
+  bool exists = false;
+  struct stat status {};
+  int descriptor = -1;  // of this process, where it names one
 
-int rename_or_remove(const std::filesystem::path& from, const std::filesystem::path& to) {
-  if (::rename(from.c_str(), to.c_str()) == 0) return 0;
-  const int error = errno;
-  ::unlink(from.c_str());
-  return error;
-}
+  bool is_stream() const { return descriptor >= 0 || (exists && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode)); }
+};
 
-void write_named(const std::filesystem::path& file, std::string_view bytes) {
-  // A killed process with this one's number may have left a file behind.
-  constexpr int kMostTries = 1000;
-  std::filesystem::path hidden;
-  Descriptor descriptor(-1);
-  for (int i = 0; i < kMostTries && !descriptor.is_open(); ++i) {
-    hidden = hidden_name(file);
-    descriptor = Descriptor(::open(hidden.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-    if (!descriptor.is_open() && errno != EEXIST) break;
+Target target_of(const fs::path& file) {
+  constexpr int kMostLinks = 40;
+  if (!file.has_filename()) fail_writing(file, EISDIR);
+  Target target;
+  target.file = file;
+  target.exists = ::stat(file.c_str(), &target.status) == 0;
+  if (!target.exists && errno != ENOENT) fail_writing(file, errno);
+  for (int links = 0; (target.descriptor = descriptor_named(target.file)) < 0; ++links) {
+    struct stat status {};
+    if (::lstat(target.file.c_str(), &status) != 0 || !S_ISLNK(status.st_mode)) break;
+    if (links == kMostLinks) fail_writing(file, ELOOP);
+    std::error_code error;
+    target.file = folder_of(target.file) / fs::read_symlink(target.file, error);
+    if (error) fail_writing(file, error.value());
   }
+  if (target.is_stream() || !target.exists) return target;
+  if (S_ISDIR(target.status.st_mode)) fail_writing(file, EISDIR);
+  // A new file in its place needs no right to write to it: what is protected stays.
+  if (::access(target.file.c_str(), W_OK) != 0) fail_writing(file, errno);
+  return target;
+}
+
+void write_through(const Target& target, const fs::path& file, std::string_view bytes) {
+  if (target.exists && S_ISBLK(target.status.st_mode)) {
+    throw IoError(file.string() + ": is a disk: choose the name of a file");
+  }
+  Descriptor descriptor(target.descriptor >= 0 ? ::fcntl(target.descriptor, F_DUPFD_CLOEXEC, 0)
+                                               : ::open(file.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY));
   if (!descriptor.is_open()) fail_writing(file, errno);
   int error = write_all(descriptor, bytes);
   if (descriptor.close() != 0 && error == 0) error = errno;
-  if (error != 0) {
-    ::unlink(hidden.c_str());
-    fail_writing(file, error);
-  }
-  if ((error = rename_or_remove(hidden, file)) != 0) fail_writing(file, error);
+  if (error != 0) fail_writing(file, error);
 }
+
+/// The bytes of a file before it has its name. Without a name (where the file system can do that) nothing of it remains
+/// when the process dies.
+class Unfinished {
+ public:
+  explicit Unfinished(const Target& target) : target_(target) {
+#ifdef O_TMPFILE
+    descriptor_ = Descriptor(::open(folder_of(target.file).c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666));
+    // Without /proc an unnamed file cannot get a name.
+    if (descriptor_.is_open() && ::access(link_of(descriptor_).c_str(), F_OK) == 0) return;
+#endif
+    open_hidden();
+  }
+  ~Unfinished() {
+    if (!hidden_.empty()) ::unlink(hidden_.c_str());
+  }
+  Unfinished(const Unfinished&) = delete;
+  Unfinished& operator=(const Unfinished&) = delete;
+
+  void write(std::string_view bytes) {
+    if (const int error = write_all(descriptor_, bytes); error != 0) fail_writing(target_.file, error);
+  }
+
+  /// Takes the target's place in one step, with the mode of what was there.
+  void take_name() {
+    take_mode(target_, descriptor_.get());
+    for (int tries = 0; hidden_.empty(); ++tries) {
+      const fs::path name = hidden_name(target_.file);
+      if (::linkat(AT_FDCWD, link_of(descriptor_).c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0) {
+        hidden_ = name;
+      } else if (errno != EEXIST || tries == kMostTries) {
+        fail_writing(target_.file, errno);
+      }
+    }
+    if (descriptor_.close() != 0) fail_writing(target_.file, errno);
+    if (::rename(hidden_.c_str(), target_.file.c_str()) != 0) fail_writing(target_.file, errno);
+    hidden_.clear();
+  }
+
+  static void take_mode(const Target& target, int descriptor) {
+    if (!target.exists) return;
+    const struct stat& old = target.status;
+    const bool same_owner = ::fchown(descriptor, old.st_uid, old.st_gid) == 0;
+    ::fchmod(descriptor, old.st_mode & (same_owner ? 07777 : 0777));
+  }
+
+ private:
+  static constexpr int kMostTries = 1000;  // a killed process with this one's number may have left files behind
+
+  static std::string link_of(const Descriptor& descriptor) {
+    return "/proc/self/fd/" + std::to_string(descriptor.get());
+  }
+
+  void open_hidden() {
+    for (int i = 0; i < kMostTries; ++i) {
+      const fs::path name = hidden_name(target_.file);
+      descriptor_ = Descriptor(::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+      if (descriptor_.is_open()) {
+        hidden_ = name;
+        return;
+      }
+      if (errno != EEXIST) break;
+    }
+    fail_writing(target_.file, errno);
+  }
+
+  const Target& target_;
+  Descriptor descriptor_{-1};
+  fs::path hidden_;  // its name until it is whole, where it has one
+};
 
 }  // namespace
 
@@ -164,20 +246,34 @@ std::string read_file_start(const std::filesystem::path& file, std::size_t bytes
   return read_up_to(open_for_reading(file), file, bytes);
 }
 
+bool is_stream(const std::filesystem::path& file) { return target_of(file).is_stream(); }
+
 void write_file(const std::filesystem::path& file, std::string_view bytes) {
-  if (!file.has_filename()) fail_writing(file, EISDIR);
-  Descriptor unnamed = open_unnamed(file);
-  if (!unnamed.is_open()) return write_named(file, bytes);
-  if (const int error = write_all(unnamed, bytes); error != 0) fail_writing(file, error);
-  const std::filesystem::path hidden = hidden_name(file);
-  // Without /proc an unnamed file cannot get a name.
-  if (give_name(unnamed, hidden) != 0) return write_named(file, bytes);
-  if (unnamed.close() != 0) {
-    const int error = errno;
-    ::unlink(hidden.c_str());
-    fail_writing(file, error);
+  const Target target = target_of(file);
+  if (target.is_stream()) return write_through(target, file, bytes);
+  Unfinished unfinished(target);
+  unfinished.write(bytes);
+  unfinished.take_name();
+}
+
+void expect_writable(const std::filesystem::path& file) {
+  const Target target = target_of(file);
+  if (!target.is_stream()) {
+    const Unfinished unfinished(target);
+  } else if (target.descriptor < 0 && ::access(file.c_str(), W_OK) != 0) {
+    fail_writing(file, errno);
   }
-  if (const int error = rename_or_remove(hidden, file); error != 0) fail_writing(file, error);
+}
+
+void move_file(const std::filesystem::path& from, const std::filesystem::path& to) {
+  const Target target = target_of(to);
+  if (const Descriptor descriptor(::open(from.c_str(), O_WRONLY | O_CLOEXEC)); descriptor.is_open()) {
+    Unfinished::take_mode(target, descriptor.get());
+  }
+  if (!target.is_stream() && ::rename(from.c_str(), target.file.c_str()) == 0) return;
+  if (!target.is_stream() && errno != EXDEV) fail_writing(to, errno);
+  write_file(to, read_file(from, std::numeric_limits<std::size_t>::max() - 1));  // a pipe, or another file system
+  ::unlink(from.c_str());
 }
 
 void make_folder(const std::filesystem::path& folder) {

@@ -54,8 +54,9 @@ class View(ProgramTest):
     def test_without_truth_there_is_no_error_panel(self):
         street, heights = self.broken_street(), []
         for name in ("with", "without"):
-            self.assert_works("view", "--odometry", street, "--pictures", street / name, "--frames", "0", "--quiet")
-            heights.append(self.png_size(street / name / "000000.png")[1])
+            pictures = street.parent / name
+            self.assert_works("view", "--odometry", street, "--pictures", pictures, "--frames", "0", "--quiet")
+            heights.append(self.png_size(pictures / "000000.png")[1])
             shutil.rmtree(street / "truth", ignore_errors=True)
         self.assertGreater(heights[0], heights[1])
 
@@ -68,7 +69,9 @@ class View(ProgramTest):
         self.assert_refused([*view, "--video", self.folder / "street.mkv"], ".mp4 or .avi")
         self.assert_refused([*view, "--pictures", self.folder / "p", "--fps", 0], "--fps 0")
         self.assert_refused([*view, "--pictures", self.folder / "p", "--cell-width", 0], "1..32768")
-        self.assert_refused([*view, "--pictures", self.street / "calib.txt/p"], "calib.txt", code=1)
+        file = self.new_folder() / "file"
+        file.touch()
+        self.assert_refused([*view, "--pictures", file / "p"], file, code=1)
 
     @unittest.skipUnless(shutil.which("Xvfb"), "no Xvfb")
     def test_the_window_plays_until_it_is_told_to_stop(self):

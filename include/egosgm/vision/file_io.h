@@ -19,8 +19,19 @@ EGOSGM_EXPORT std::string read_file_start(const std::filesystem::path& file, std
 
 /// Writes a whole file or none: the bytes go into an unnamed (or, where the file system has none, hidden) file in the
 /// same folder, which then takes the name in one step. A crash, a kill or a full disk leaves the old file as it was.
-/// Not flushed to the medium: a power cut may lose it. Throws IoError. Thread-safe for different files.
+/// Links are followed, the mode of an old file is kept, and one that may not be written to is not replaced. What is no
+/// regular file (a pipe, a terminal, /dev/stdout) is written through; a disk is refused. Not flushed to the medium: a
+/// power cut may lose it. Throws IoError. Thread-safe for different files.
 EGOSGM_EXPORT void write_file(const std::filesystem::path& file, std::string_view bytes);
+
+/// Whether write_file writes through to what stands there, and replaces nothing. Throws IoError. Thread-safe.
+EGOSGM_EXPORT bool is_stream(const std::filesystem::path& file);
+
+/// Throws IoError where write_file could not write; changes nothing. Thread-safe.
+EGOSGM_EXPORT void expect_writable(const std::filesystem::path& file);
+
+/// Gives a finished file another name, as write_file does. Throws IoError. Thread-safe for different files.
+EGOSGM_EXPORT void move_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// Makes a folder with its parents. Throws IoError.
 EGOSGM_EXPORT void make_folder(const std::filesystem::path& folder);

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/output_folder.h"
+
+#include <fmt/core.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/file_io.h"
+#include "host/json_text.h"
+
+namespace egosgm::app {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
+constexpr std::size_t kAnySize = std::numeric_limits<std::size_t>::max() - 1;
+constexpr const char *kJsonDigestBegin = ",\n  \"digest\": \"", *kJsonDigestEnd = "\"\n}\n";
+
+/// FNV-1a.
+std::string digest_of(std::string_view bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3u;
+  return fmt::format("{:016x}", hash);
+}
+
+/// Where a path leads, also one that is not there yet.
+fs::path place_of(const fs::path& path) {
+  std::error_code error;
+  fs::path result = fs::weakly_canonical(fs::absolute(path), error);
+  if (error) throw InvalidArgument(fmt::format("{}: {}: give another path", path.string(), error.message()));
+  return result.has_filename() ? result : result.parent_path();
+}
+
+bool is_within(fs::path path, const fs::path& folder) {
+  std::error_code none;  // what is not there is nobody's folder
+  for (;; path = path.parent_path()) {
+    if (path == folder || (fs::exists(path, none) && fs::equivalent(path, folder, none))) return true;
+    if (path == path.parent_path()) return false;
+  }
+}
+
+bool is_there(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::symlink_status(path, error);
+  if (status.type() == fs::file_type::none) {
+    throw IoError(fmt::format("{}: cannot be looked at: {}; choose another folder", path.string(), error.message()));
+  }
+  return fs::exists(status);
+}
+
+bool is_regular(const fs::path& path) {
+  std::error_code none;
+  return fs::is_regular_file(fs::symlink_status(path, none));
+}
+
+/// "disparity/000001.png": below the folder, without a detour.
+bool is_plain_name(const std::string& name) {
+  const fs::path path(name);
+  return !name.empty() && path.is_relative() && path.lexically_normal() == path && path.has_filename() &&
+         std::none_of(path.begin(), path.end(), [](const fs::path& part) { return part == ".." || part == "."; });
+}
+
+bool is_map(const fs::path& file) {
+  const std::string stem = file.stem().string();
+  return !stem.empty() && file.has_extension() && stem.find_first_not_of("0123456789") == std::string::npos;
+}
+
+bool is_own_json(const fs::path& file) {
+  return is_regular(file) && is_signed(vision::read_file(file, kMaxReportBytes), kJsonDigestBegin, kJsonDigestEnd);
+}
+
+void remove_file(const fs::path& file) {
+  std::error_code error;
+  if (!fs::remove(file, error) && error) {
+    throw IoError(file.string() + ": cannot be removed: " + error.message() + "; choose another --out");
+  }
+}
+
+std::set<std::string> folders_of(const std::vector<std::string>& files) {
+  std::set<std::string> folders;
+  for (const std::string& file : files) {
+    for (fs::path folder = fs::path(file).parent_path(); !folder.empty(); folder = folder.parent_path()) {
+      folders.insert(folder.string());
+    }
+  }
+  return folders;
+}
+
+void expect_named(const std::string& option, const std::string& path) {
+  if (path.empty()) throw InvalidArgument(option + " \"\": give a name");
+}
+
+/// Throws InvalidArgument, naming the first figure in which the run that is recorded in `file` differs.
+void expect_same(const std::string& folder, const Json& earlier, const Json& identity) {
+  const Json flat = identity.flatten(), flat_earlier = earlier.flatten();
+  for (const auto& [name, value] : flat.items()) {
+    const auto found = flat_earlier.find(name);
+    const Json before = found == flat_earlier.end() ? Json() : *found;
+    if (before == value) continue;
+    throw InvalidArgument(fmt::format(
+        "--resume: the run in {} had {} = {}, this one has {}: give what it was given, or --overwrite to start anew",
+        folder, name.substr(1), before.dump(), value.dump()));
+  }
+}
+
+}  // namespace
+
+Inputs::Inputs(const SequenceArguments& arguments, const vision::StereoSequence& sequence) {
+  for (const std::string& folder : {arguments.kitti, arguments.odometry, arguments.folder}) add_folder(folder);
+  std::set<fs::path> folders;
+  for (const vision::StereoFrame& frame : sequence.frames) {
+    for (const fs::path& file : {frame.left, frame.right, frame.truth_noc, frame.truth_occ}) {
+      if (file.empty()) continue;
+      folders.insert(fs::absolute(file).parent_path());
+      std::error_code none;
+      if (fs::is_symlink(file, none)) folders.insert(place_of(file).parent_path());
+    }
+  }
+  for (const fs::path& folder : folders) add_folder(folder);
+  add_file(sequence.calibration_file);
+  add_file(sequence.poses_file);
+}
+
+void Inputs::add_file(const fs::path& file) {
+  if (file.empty()) return;
+  files_.insert(place_of(file));
+  files_.insert(place_of(fs::absolute(file).parent_path()) / file.filename());  // a link is an input, too
+}
+
+void Inputs::add_folder(const fs::path& folder) {
+  if (!folder.empty()) folders_.insert(place_of(folder));
+}
+
+void Inputs::expect_apart(const fs::path& folder) const {
+  const fs::path out = place_of(folder);
+  const auto refuse = [&](const char* how, const fs::path& input) {
+    throw InvalidArgument(
+        fmt::format("{}: {} {}: what is written must lie apart from what is read: give another folder", folder.string(),
+                    how, input.string()));
+  };
+  for (const fs::path& input : folders_) {
+    if (is_within(out, input)) refuse("is, or lies in, the input's folder", input);
+    if (is_within(input, out)) refuse("holds the input's folder", input);
+  }
+  for (const fs::path& input : files_) {
+    if (is_within(input.parent_path(), out)) refuse("holds the input", input);
+  }
+}
+
+fs::path new_folder(const std::string& option, const std::string& folder, const Inputs& inputs) {
+  expect_named(option, folder);
+  inputs.expect_apart(folder);
+  fs::path path = place_of(folder);
+  std::error_code error;
+  if (is_there(path) && !(fs::is_directory(path, error) && fs::is_empty(path, error))) {
+    if (error) throw IoError(fmt::format("{} {}: {}; choose another folder", option, folder, error.message()));
+    throw InvalidArgument(fmt::format("{} {}: is {}: give a new folder", option, folder,
+                                      fs::is_directory(path, error) ? "not empty" : "no folder"));
+  }
+  return path;
+}
+
+void expect_new_file(const std::string& option, const std::string& file) {
+  expect_named(option, file);
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (fs::is_directory(status)) throw InvalidArgument(option + " " + file + ": is a folder: give the name of a file");
+  if (fs::is_regular_file(status) && !vision::is_stream(file)) {
+    throw InvalidArgument(option + " " + file + ": is there already: give another name, or remove it first");
+  }
+  vision::expect_writable(file);
+}
+
+std::string signed_text(const std::string& text, const std::string& begin, const std::string& end) {
+  return text + begin + digest_of(text) + end;
+}
+
+bool is_signed(const std::string& text, const std::string& begin, const std::string& end) {
+  const std::size_t at = text.rfind(begin);
+  if (at == std::string::npos) return false;
+  return text.compare(at, std::string::npos, begin + digest_of(std::string_view(text).substr(0, at)) + end) == 0;
+}
+
+bool is_own_page(const fs::path& file) {
+  return is_regular(file) && is_signed(vision::read_file(file, kMaxReportBytes), kPageDigestBegin, kPageDigestEnd);
+}
+
+void write_own_json(const fs::path& file, const Json& json) {
+  std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace);
+  text.resize(text.size() - 2);  // "\n}"
+  vision::write_file(file, signed_text(text, kJsonDigestBegin, kJsonDigestEnd));
+}
+
+void expect_own_json(const fs::path& file) {
+  if (!is_there(file) || is_own_json(file)) return;
+  throw InvalidArgument(file.string() +
+                        ": is not as egosgm wrote it, or not its file at all, and stays: choose another --out");
+}
+
+OutputFolder::OutputFolder(const std::string& folder, const Inputs& inputs, EarlierRun treatment,
+                           const std::vector<std::string>& planned)
+    : shown_(folder), treatment_(treatment), planned_(planned) {
+  planned_.emplace_back("poses.txt");
+  expect_named("--out", folder);
+  inputs.expect_apart(folder);
+  path_ = place_of(folder);
+  std::error_code none;
+  if (is_there(path_) && !fs::is_directory(path_, none)) vision::make_folder(path_);  // says what is wrong
+  read_report();
+  if (!earlier_.is_null() && treatment == EarlierRun::kRefuse) {
+    throw InvalidArgument(fmt::format(
+        "--out {}: holds an earlier run: give --resume to go on with it, --overwrite to replace it, or another folder",
+        shown_));
+  }
+  expect_unchanged();
+  expect_room_for(planned_);
+}
+
+void OutputFolder::read_report() {
+  const fs::path file = path_ / "report.json";
+  if (!is_there(file)) return;
+  expect_own_json(file);
+  earlier_ = parse_json(vision::read_file(file, kMaxReportBytes), file);
+  const auto refuse = [&](const std::string& why) {
+    throw InvalidArgument(fmt::format("{}: {}: nothing there is replaced; choose another --out", file.string(), why));
+  };
+  if (!earlier_.is_object() || !earlier_.contains("files") || !earlier_["files"].is_object()) {
+    refuse("does not list what the run wrote");
+  }
+  for (const auto& [name, digest] : earlier_["files"].items()) {
+    if (!is_plain_name(name) || name == "report.json") refuse("lists \"" + name + "\", which is no file of a run");
+    if (!digest.is_null() && !digest.is_string()) refuse("has no digest of " + name);
+    files_[name] = digest.is_null() ? "" : digest.get<std::string>();
+  }
+}
+
+void OutputFolder::expect_unchanged() const {
+  for (const auto& [name, digest] : files_) {
+    const fs::path file = path_ / name;
+    if (!is_there(file)) continue;
+    if (is_regular(file) && (digest.empty() || digest == digest_of(vision::read_file(file, kAnySize)))) continue;
+    throw InvalidArgument(
+        fmt::format("{}: was changed after the run wrote it: move it away, or choose another --out", file.string()));
+  }
+}
+
+void OutputFolder::expect_room_for(const std::vector<std::string>& planned) const {
+  const auto refuse = [&](const fs::path& file) {
+    throw InvalidArgument(
+        fmt::format("--out {}: {} is there, and no report.json beside says that a run wrote it: choose another folder",
+                    shown_, file.string()));
+  };
+  std::vector<std::string> all = planned;
+  for (const auto& [name, digest] : files_) all.push_back(name);
+  for (const std::string& folder : folders_of(all)) {
+    const fs::path path = path_ / folder;
+    if (!is_there(path)) continue;
+    std::error_code error;
+    if (!fs::is_directory(fs::symlink_status(path, error))) {
+      throw InvalidArgument(fmt::format("--out {}: {} is {}: choose another folder", shown_, path.string(),
+                                        fs::is_symlink(path, error) ? "a link" : "no folder"));
+    }
+    // Maps of two runs do not mix.
+    for (fs::directory_iterator file(path, error), end; !error && file != end; file.increment(error)) {
+      const std::string name = folder + '/' + file->path().filename().string();
+      if (is_map(file->path()) && !files_.contains(name)) refuse(file->path());
+    }
+    if (error) throw IoError(path.string() + ": cannot be read: " + error.message() + "; choose another --out");
+  }
+  for (const std::string& name : planned) {
+    if (!files_.contains(name) && is_there(path_ / name)) refuse(path_ / name);
+  }
+}
+
+void OutputFolder::begin(const Json& identity) {
+  if (resumes() && !earlier_.is_null()) expect_same(shown_, earlier_, identity);
+  if (treatment_ == EarlierRun::kOverwrite) remove_earlier();
+  earlier_ = Json();
+  vision::make_folder(path_);
+  for (const std::string& file : planned_) {
+    if (file != "poses.txt") files_.try_emplace(file);  // which is announced at the end
+  }
+}
+
+void OutputFolder::remove_earlier() {
+  std::vector<std::string> names;
+  for (const auto& [name, digest] : files_) {
+    remove_file(path_ / name);
+    names.push_back(name);
+  }
+  const std::set<std::string> folders = folders_of(names);
+  std::error_code not_empty;
+  for (auto folder = folders.rbegin(); folder != folders.rend(); ++folder) fs::remove(path_ / *folder, not_empty);
+  // What others made of that run.
+  if (is_own_page(path_ / "report.html")) remove_file(path_ / "report.html");
+  if (is_own_json(path_ / "done.json")) remove_file(path_ / "done.json");
+  files_.clear();
+}
+
+void OutputFolder::wrote(const std::string& file) {
+  files_[file] = digest_of(vision::read_file(path_ / file, kAnySize));
+}
+
+void OutputFolder::close() {
+  std::erase_if(files_, [this](const auto& file) { return file.second.empty() && !is_there(path_ / file.first); });
+  for (const auto& [name, digest] : files_) {
+    if (digest.empty()) wrote(name);  // a stopped run had written it, and this one did not come to it
+  }
+}
+
+Json OutputFolder::files() const {
+  Json json = Json::object();
+  for (const auto& [name, digest] : files_) json[name] = digest.empty() ? Json() : Json(digest);
+  return json;
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,334 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the program may write, replace and remove: only what it can prove to be its own. Environment as for program_case.py."""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import stat
+import subprocess
+import threading
+import time
+import unittest
+
+from program_case import PROGRAM, ProgramTest, egosgm, grey_png
+
+METHOD = ("--disparities", 16, "--quiet")
+CALIBRATION = "fx = 100\nfy = 100\ncx = 32\ncy = 15\nbaseline_m = 0.5\n"
+
+
+def state(folder):
+    """Every file and link below `folder`, with its bytes and mode."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_symlink():
+            found[path] = os.readlink(path)
+        elif path.is_file():
+            found[path] = (path.read_bytes(), stat.S_IMODE(path.stat().st_mode))
+    return found
+
+
+class FilesTest(ProgramTest):
+    def user_folder(self):
+        """left, right, calib.toml, poses.txt, config.toml: what a user has."""
+        folder = self.new_folder() / "user"
+        for side in ("left", "right"):
+            (folder / side).mkdir(parents=True)
+            for i in range(2):
+                (folder / side / f"{i:06d}.png").write_bytes(grey_png(64, 32))
+        (folder / "calib.toml").write_text(CALIBRATION)
+        (folder / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 2)
+        (folder / "config.toml").write_text("disparities = 16\n")
+        return folder
+
+    @staticmethod
+    def pair(folder):
+        return ["--left", folder / "left/%06d.png", "--right", folder / "right/%06d.png", "--calib", folder / "calib.toml", *METHOD]
+
+    def assert_refused_and_untouched(self, folder, arguments, *named, code=2, **options):
+        before = state(folder)
+        self.assert_refused(arguments, *named, code=code, **options)
+        self.assertEqual(state(folder), before, arguments)
+
+    def run_into(self, out, *arguments):
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0:1", *METHOD, *arguments)
+
+
+class InputFiles(FilesTest):
+    """--out never is, lies in or holds what is read, whatever it is called."""
+
+    def test_run_and_overwrite_in_the_folder_of_the_images(self):
+        for overwrite in ([], ["--overwrite"], ["--resume"]):
+            user = self.user_folder()
+            links = self.new_folder()
+            (links / "to_user").symlink_to(user)
+            (links / "to_left").symlink_to(user / "left")
+            for out in (user, user / "left", f"{user}/left/", user / "left/../right", user / "left/sub/deeper", user / "new/../left",
+                        user / ".", user.parent, links / "to_user", links / "to_left", links / "to_left/..", links / "to_user/right/new"):
+                with self.subTest(out=out, overwrite=overwrite):
+                    self.assert_refused_and_untouched(user, ["run", *self.pair(user), "--out", out, *overwrite])
+            self.assert_refused_and_untouched(user, ["run", "--left", "left/%06d.png", "--right", "right/%06d.png", "--calib", "calib.toml",
+                                                     "--out", ".", *overwrite], "input", cwd=user)
+
+    def test_a_sequence_keeps_its_truth(self):
+        street = self.broken_street()
+        for out in (street, street / "truth", street / "image_0", street / "results"):
+            self.assert_refused_and_untouched(street, ["run", "--odometry", street, "--out", out, *METHOD], street)
+        self.assert_refused_and_untouched(street, ["odometry", street, "--out", street / "poses.txt"], "poses.txt", "is there already")
+        self.assert_refused_and_untouched(street, ["odometry", street, "--out", street / "image_0/000000.png"], "is there already")
+
+    def test_links_that_images_are_count_as_what_they_lead_to(self):
+        user, linked = self.user_folder(), self.new_folder()
+        for side in ("left", "right"):
+            (linked / side).mkdir()
+            for image in (user / side).iterdir():
+                (linked / side / image.name).symlink_to(image)
+        shutil.copy(user / "calib.toml", linked)
+        self.assert_refused_and_untouched(user, ["run", *self.pair(linked), "--out", user, "--overwrite"], "input")
+
+    def test_poses_configuration_tuning_and_programs_are_inputs_too(self):
+        user, other = self.user_folder(), self.new_folder()
+        for name in ("poses.txt", "config.toml", "tuning.json"):
+            (other / name).write_text("{}")
+        shutil.copy(user / "poses.txt", other)
+        (other / "config.toml").write_text("disparities = 16\n")
+        for arguments in (["--poses", other / "poses.txt"], ["--config", other / "config.toml"], ["--tuning", other / "tuning.json"], ["--programs", other]):
+            self.assert_refused_and_untouched(other, ["run", *self.pair(user), "--out", other, "--overwrite", *arguments], other)
+
+    def test_other_commands(self):
+        user = self.user_folder()
+        street = self.broken_street()
+        for out in (user, user / "left", user / "left/new", street):
+            self.assert_refused_and_untouched(user, ["rectify", *self.pair(user)[:6], "--out", out])
+            self.assert_refused_and_untouched(user, ["view", *self.pair(user), "--pictures", out])
+            if out.exists():
+                self.assert_refused_and_untouched(user, ["compile", "--out", out], "not empty")
+                self.assert_refused_and_untouched(out, ["synth", "--out", out, "--frames", 1], "not empty")
+        for command in (["run", *self.pair(user)], ["rectify", *self.pair(user)[:6]], ["synth"], ["compile"], ["odometry", self.street],
+                        ["batch", user / "config.toml"]):
+            self.assert_refused_and_untouched(user, [*command, "--out", ""], "--out", cwd=user)
+
+    def test_named_files_replace_none(self):
+        user, folder = self.user_folder(), self.new_folder()
+        self.run_into(folder / "out")
+        image, poses, config = user / "left/000000.png", user / "poses.txt", user / "config.toml"
+        (user / "page.html").write_text("<html></html>")
+        (user / "path.svg").write_text("<svg/>")
+        (user / "film.avi").write_text("film")
+        (user / "json.json").write_text('{"a, driver b": 7}')
+        (user / "link").symlink_to(image)
+        shutil.copy(poses, user / "more.txt")
+        run = ["run", *self.pair(user), "--out", folder / "new"]
+        for arguments in ([*run, "--trace", image], [*run, "--save-config", image], [*run, "--config", config, "--save-config", config],
+                          [*run, "--trace", user / "link"], ["odometry", self.street, "--out", user / "more.txt"],
+                          ["eval-poses", "--estimate", poses, "--truth", poses, "--plot", user / "path.svg"],
+                          ["eval-poses", "--estimate", poses, "--truth", poses, "--plot", image],
+                          ["view", *self.pair(user), "--video", user / "film.avi"], ["report", folder / "out", "--out", image],
+                          ["report", folder / "out", "--out", user / "page.html"], ["tune", "--file", image], ["tune", "--file", user / "json.json"],
+                          ["compile", "--out", folder / "programs", "--save-config", config]):
+            with self.subTest(arguments=arguments):
+                self.assert_refused_and_untouched(user, arguments)
+        self.assertFalse((folder / "new").exists())
+        self.assertFalse((folder / "programs").exists())
+
+
+class OwnFiles(FilesTest):
+    """Of what lies in --out, only what its report.json lists is the program's own."""
+
+    def test_without_a_report_nothing_is_replaced(self):
+        for name in ("poses.txt", "report.json", "disparity/000000.png", "disparity/000007.png", "color/000001.png", "disparity"):
+            for how in ([], ["--overwrite"], ["--resume"]):
+                out = self.new_folder()
+                (out / name).parent.mkdir(exist_ok=True)
+                (out / name).write_text("mine")
+                with self.subTest(name=name, how=how):
+                    self.assert_refused_and_untouched(out, ["run", "--odometry", self.street, "--out", out, "--write", "color", *METHOD, *how])
+
+    def test_overwrite_removes_all_kinds_and_nothing_more(self):
+        out = self.new_folder()
+        self.run_into(out, "--write", "cloud,variance,color")
+        self.assert_works("report", out)
+        (out / "cloud/mine.ply").write_text("mine")
+        (out / "notes.txt").write_text("mine")
+        (out / "depth").mkdir()
+        (out / "depth/000000.png").write_text("mine")
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "1", "--overwrite", *METHOD)
+        files = {str(file.relative_to(out)) for file in out.rglob("*") if file.is_file()}
+        self.assertEqual(files, {"disparity/000001.png", "poses.txt", "report.json", "cloud/mine.ply", "notes.txt", "depth/000000.png"})
+
+    def test_what_was_edited_since_stays(self):
+        for name in ("poses.txt", "disparity/000000.png", "variance/000001.pfm", "report.json"):
+            for how in ("--overwrite", "--resume"):
+                out = self.new_folder()
+                self.run_into(out, "--write", "variance")
+                times = (out / name).stat()
+                (out / name).write_bytes((out / name).read_bytes() + b" ")
+                os.utime(out / name, ns=(times.st_atime_ns, times.st_mtime_ns))
+                with self.subTest(name=name, how=how):
+                    self.assert_refused_and_untouched(out, ["run", "--odometry", self.street, "--frames", "0:1", "--write", "variance", *METHOD,
+                                                            "--out", out, how], name)
+
+    def test_a_crafted_report_leads_nowhere(self):
+        user = self.user_folder()
+        out = user.parent / "out"
+        self.run_into(out)
+        (out / "right").symlink_to(user / "right")
+        whole = (out / "report.json").read_text()
+        for name in ("../user/poses.txt", str(user / "poses.txt"), "right/000000.png", "disparity/../../user/poses.txt", "", ".", "..", "disparity",
+                     "disparity/", "./poses.txt", "report.json"):
+            report = json.loads(whole)
+            del report["digest"]
+            report["files"][name] = None
+            text = json.dumps(report, indent=2)[:-2]
+            digest = 0xcbf29ce484222325
+            for byte in text.encode():
+                digest = (digest ^ byte) * 0x100000001b3 % 2**64
+            (out / "report.json").write_text(f'{text},\n  "digest": "{digest:016x}"\n}}\n')
+            for how in ("--overwrite", "--resume"):
+                with self.subTest(name=name, how=how):
+                    self.assert_refused_and_untouched(user.parent, ["run", "--odometry", self.street, "--frames", "0:1", *METHOD, "--out", out, how])
+        for broken in (whole[:len(whole) // 2], "", "{}", "[]", whole.replace("egosgm", "EGOSGM", 1), "[" * 200000):
+            (out / "report.json").write_text(broken)
+            for how in ("--overwrite", "--resume"):
+                self.assert_refused_and_untouched(user.parent, ["run", "--odometry", self.street, "--frames", "0:1", *METHOD, "--out", out, how],
+                                                  "report.json")
+
+    def test_links_in_out_are_not_followed(self):
+        user, out = self.user_folder(), self.new_folder()
+        self.run_into(out)
+        shutil.rmtree(out / "disparity")
+        (out / "disparity").symlink_to(user / "right")
+        (out / "poses.txt").unlink()
+        (out / "poses.txt").symlink_to(user / "poses.txt")
+        for how in ("--overwrite", "--resume"):
+            self.assert_refused_and_untouched(user, ["run", "--odometry", self.street, "--frames", "0:1", *METHOD, "--out", out, how])
+        fresh = self.new_folder()
+        (fresh / "variance").symlink_to(user / "right")
+        (fresh / "poses.txt").symlink_to(user / "new.txt")
+        self.assert_refused_and_untouched(user, ["run", "--odometry", self.street, *METHOD, "--out", fresh, "--write", "variance"])
+        (fresh / "poses.txt").unlink()
+        self.assert_refused_and_untouched(user, ["run", "--odometry", self.street, *METHOD, "--out", fresh, "--write", "variance"], "a link")
+
+    def test_a_page_is_made_again_unless_it_was_edited(self):
+        out = self.new_folder()
+        self.run_into(out)
+        for _ in range(2):
+            self.assert_works("report", out)
+        with open(out / "report.html", "a") as page:
+            page.write("<!-- mine -->\n")
+        self.assert_refused_and_untouched(out, ["report", out], "report.html")
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0:1", "--overwrite", *METHOD)
+        self.assertIn("mine", (out / "report.html").read_text())
+
+
+class BatchFiles(FilesTest):
+    def batch(self, folder, *lines):
+        (folder / "list.txt").write_text("\n".join(lines) + "\n")
+        return ["batch", folder / "list.txt", *METHOD]
+
+    def test_the_folder_of_an_input_is_no_output(self):
+        folder = self.new_folder()
+        shutil.copytree(self.street, folder / "drive")
+        (folder / "drive/depth").mkdir()
+        shutil.copy(folder / "drive/image_0/000000.png", folder / "drive/depth/000000.png")
+        for out in (".", folder, "drive", "drive/.."):
+            for overwrite in ([], ["--overwrite"]):
+                self.assert_refused_and_untouched(folder / "drive", [*self.batch(folder, "drive drive"), "--out", out, *overwrite], "input", cwd=folder)
+
+    def test_names_that_meet_and_inputs_that_are_not_there(self):
+        folder = self.new_folder()
+        for lines, named in (([f"settings.json {self.street}"], "settings.json"), ([f"a/Report.JSON {self.street}"], "report.json"),
+                             ([f"a {self.street}", f"a/disparity {self.street}"], "disparity"), ([f"a {self.street}", f"a/b {self.street}"], "a/b"),
+                             ([f"a/b {self.street}", f"A {self.street}"], "a/b"), ([f"a {self.street}", f"A {self.street}"], "twice"),
+                             ([f"a {self.street}", f"b {folder}/nowhere"], "nowhere"), ([f"x/cloud {self.street}"], "cloud"),
+                             ([f"a {self.street}", f"b {self.street} --poses {folder}/out/poses.txt"], "poses.txt")):
+            with self.subTest(lines=lines):
+                self.assert_refused([*self.batch(folder, *lines), "--out", folder / "out"], named)
+                self.assertFalse((folder / "out").exists())
+
+    def test_what_others_left_is_replaced_only_when_told(self):
+        folder = self.new_folder()
+        out = folder / "out"
+        batch = [*self.batch(folder, f"a {self.street} --frames 1"), "--out", out]
+        self.run_into(out / "a", "--write", "cloud")
+        self.assert_refused_and_untouched(out, batch, out / "a", "--overwrite")
+        for name in ("settings.json", "batch.json", "timing.json", "a/done.json", "a/failed.json"):
+            (out / name).write_text('{"mine": 1}')
+            for overwrite in ([], ["--overwrite"]):
+                self.assert_refused_and_untouched(out, [*batch, *overwrite], name)
+            (out / name).unlink()
+        (out / "a/notes.txt").write_text("mine")
+        self.assert_works(*batch, "--overwrite")
+        self.assertEqual(sorted(file.name for file in (out / "a").rglob("*") if file.is_file()),
+                         ["000001.png", "done.json", "notes.txt", "poses.txt", "report.json"])
+        self.assert_works(*batch, "--overwrite")
+        (out / "a/done.json").unlink()
+        self.assert_works(*batch)
+        (out / "a/poses.txt").write_text("mine")
+        (out / "a/done.json").unlink()
+        self.assert_refused_and_untouched(out, batch, "poses.txt")
+
+
+class Streams(FilesTest):
+    """Pipes, devices, links, modes."""
+
+    def test_a_pipe_takes_the_bytes_and_stays(self):
+        pipe, read = self.new_folder() / "pipe", []
+        os.mkfifo(pipe)
+        reader = threading.Thread(target=lambda: read.append(pipe.read_text()))
+        reader.start()
+        self.assert_works("run", "--odometry", self.street, "--out", self.new_folder(), "--frames", "0", *METHOD, "--trace", pipe)
+        reader.join()
+        self.assertTrue(stat.S_ISFIFO(pipe.lstat().st_mode))
+        self.assertIn("traceEvents", json.loads(read[0]))
+
+    def test_standard_output_takes_the_bytes(self):
+        out = self.new_folder()
+        for target in ("/dev/stdout", "/dev/fd/1"):
+            text = self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0", *METHOD, "--overwrite", "--save-config", target)
+            self.assertIn("\ndisparities = 16\n", text)
+        with open(out / "saved.toml", "w") as saved:
+            subprocess.run([PROGRAM, "run", "--odometry", self.street, "--out", out / "more", "--frames", "0", *map(str, METHOD), "--save-config", "/dev/stdout"],
+                           stdout=saved, check=True, timeout=600)
+        self.assertIn("\ndisparities = 16\n", (out / "saved.toml").read_text())
+
+    @unittest.skipUnless(os.geteuid() == 0, "devices are made by root alone")
+    def test_a_device_stays_one(self):
+        device = self.new_folder() / "null"
+        try:
+            os.mknod(device, 0o600 | stat.S_IFCHR, os.makedev(1, 3))
+            with open(device, "w"):
+                pass
+        except OSError:
+            self.skipTest("no device can be made or opened here")
+        self.assert_works("odometry", self.street, "--out", device, "--quiet")
+        self.assertTrue(stat.S_ISCHR(device.lstat().st_mode))
+
+    def test_links_to_nothing_are_followed(self):
+        folder = self.new_folder()
+        (folder / "elsewhere").mkdir()
+        (folder / "link").symlink_to("elsewhere/poses.txt")
+        self.assert_works("odometry", self.street, "--out", folder / "link", "--quiet")
+        self.assertTrue((folder / "link").is_symlink())
+        self.assertTrue((folder / "elsewhere/poses.txt").is_file())
+
+
+class TuneFiles(FilesTest):
+    def test_an_interrupt_keeps_the_earlier_tuning(self):
+        file = self.new_folder() / "tuning.json"
+        self.assert_works("tune", "--file", file, "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "ForwardWarp")
+        kept = json.loads(file.read_text())
+        next(iter(kept.values()))["tile_width"] = 96
+        file.write_text(json.dumps(kept))
+        before = file.read_bytes()
+        process = subprocess.Popen([PROGRAM, "tune", "--file", file, "--width", "64", "--height", "24", "--disparities", "16", "--rounds", "1000"],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=600)
+        self.assertNotEqual(process.returncode, 0)
+        self.assertEqual(file.read_bytes(), before)
+
+
+if __name__ == "__main__":
+    unittest.main()
