@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -139,6 +140,8 @@ int exit_code_of(int argc, char** argv) {
     return fail(kFailed, error.what());
   } catch (const DeviceError& error) {
     return fail(kFailed, error.what());
+  } catch (const std::filesystem::filesystem_error& error) {  // a loop of links, a name too long, a folder without rights
+    return fail(kBadInput, error.what() + std::string(": give another path"));
   } catch (const std::bad_alloc&) {
     return fail(kFailed, "out of memory: choose smaller images or fewer --disparities");
   } catch (const std::system_error& error) {  // more was printed than the output's buffer holds

@@ -291,9 +291,10 @@ int report(const ReportArguments& arguments) {
         fmt::format("--picture-width {}: choose from 16 to {}", arguments.picture_width, vision::kMaxImageSide));
   }
   const fs::path file = arguments.out.empty() ? fs::path(arguments.run) / "report.html" : fs::path(arguments.out);
-  if (!is_own_page(file)) expect_new_file("--out", file.string());
   try {
-    const std::string page = Page(arguments).html();
+    Page contents(arguments);
+    if (!is_own_page(file)) expect_new_file("--out", file.string());
+    const std::string page = contents.html();
     vision::write_file(file, signed_text(page, kPageDigestBegin, kPageDigestEnd));
     fmt::print("{}: {:.1f} MB, opens in any browser\n", file.string(), static_cast<double>(page.size()) / 1e6);
   } catch (const Json::exception& error) {

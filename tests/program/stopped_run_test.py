@@ -47,7 +47,9 @@ class LongRuns(ProgramTest):
 
 class Disk(LongRuns):
     def test_output_folders_that_cannot_be_written(self):
-        below_a_file = self.street / "calib.txt/out"
+        file = self.new_folder() / "file"
+        file.touch()
+        below_a_file = file / "out"
         self.assert_refused(["run", "--odometry", self.street, "--out", below_a_file], below_a_file, code=1)
         self.assert_refused(["synth", "--out", below_a_file], below_a_file, code=1)
         self.assert_refused(["odometry", self.street, "--out", below_a_file / "poses.txt"], below_a_file, code=1)

@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random commands over a folder tree: whatever they are told, what is a user's keeps its bytes and its mode.
+
+EGOSGM_FORKING_PROGRAM, where it is set, names the program that is loaded once (forking_program.cpp); else each command starts EGOSGM_PROGRAM.
+"""
+import collections
+import os
+import pathlib
+import random
+import shutil
+import stat
+import subprocess
+import tempfile
+import unittest
+
+from program_case import egosgm, grey_png
+
+FORKING = os.environ.get("EGOSGM_FORKING_PROGRAM", "")
+COMMANDS = int(os.environ.get("EGOSGM_FILES_COMMANDS", 1050))  # of each of the two tests
+RUNS = 24  # that may reach the device
+POSES = "1 0 0 0 0 1 0 0 0 0 1 0\n"
+
+
+class Program:
+    """Runs commands."""
+
+    def __init__(self, folder):
+        self.errors = folder / "errors.txt"
+        self.process = FORKING and subprocess.Popen([FORKING, self.errors], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def __call__(self, cwd, arguments):
+        """The exit code and the standard error."""
+        words = [str(word) for word in arguments]
+        if not self.process:
+            done = egosgm(*words, cwd=cwd, stdin=subprocess.DEVNULL)
+            return done.returncode, done.stderr
+        self.process.stdin.write(b"".join(os.fsencode(word) + b"\0" for word in [str(cwd), str(len(words)), *words]))
+        self.process.stdin.flush()
+        code = int(self.process.stdout.readline())
+        return code, self.errors.read_text(errors="replace")
+
+    def close(self):
+        if self.process:
+            self.process.communicate()
+
+
+class Tree:
+    """Sequences, a user's files, links, and the outputs of earlier runs, some of them edited."""
+
+    def __init__(self, folder, templates, rng):
+        self.rng = rng
+        self.root = folder / f"tree{rng.randrange(10**9)}"
+        self.root.mkdir()
+        for name in ("seq", "drive"):
+            shutil.copytree(templates / "street", self.root / name)
+        user = self.root / "user"
+        for side in ("left", "right", "disparity", "variance"):
+            (user / side).mkdir(parents=True)
+            for i in range(3):
+                (user / side / f"{i:06d}.png").write_bytes(grey_png(32, 16))
+        (user / "calib.toml").write_text("fx = 100\nfy = 100\ncx = 16\ncy = 8\nbaseline_m = 0.5\n")
+        (user / "poses.txt").write_text(POSES * 3)
+        (user / "config.toml").write_text("# Options of egosgm run: read back with --config.\ndisparities = 16\n")
+        (user / "tuning.json").write_text('{"a device": {"tile_width": 32}}')
+        (user / "report.json").write_text('{"program": "egosgm", "files": {"left/000000.png": null, "poses.txt": null}}')
+        for name in ("page.html", "path.svg", "path.png", "film.avi", "film.mp4", "trace.json", ".hidden", "settings.json", "empty"):
+            (user / name).write_text("" if name == "empty" else f"the user's {name}")
+        (user / "poses.txt").chmod(0o600)
+        (user / "page.html").chmod(0o640)
+        os.link(user / "left/000000.png", user / "hard_link.png")
+        links = self.root / "links"
+        links.mkdir()
+        for name, target in (("seq", "../seq"), ("left", "../user/left"), ("poses.txt", "../user/poses.txt"), ("image.png", str(user / "right/000001.png")),
+                             ("out", "../outs/run"), ("user", str(user)), ("loop", "loop")):
+            (links / name).symlink_to(target)
+        outs = self.root / "outs"
+        for name in ("run", "edited", "linked", "crafted"):
+            shutil.copytree(templates / "run", outs / name)
+        (outs / "edited/poses.txt").write_text(POSES)
+        (outs / "edited/disparity/000001.png").write_bytes(grey_png(32, 16))
+        shutil.rmtree(outs / "linked/disparity")
+        (outs / "linked/disparity").symlink_to(user / "disparity")
+        (outs / "linked/variance/000000.pfm").unlink()
+        (outs / "linked/variance/000000.pfm").symlink_to(user / "left/000000.png")
+        text = (outs / "crafted/report.json").read_text()
+        (outs / "crafted/report.json").write_text(text.replace('"poses.txt"', '"../../user/poses.txt"', 1))
+        for name in outs.iterdir():
+            (name / "notes.txt").write_text("mine")
+            (name / "depth").mkdir()
+            (name / "depth/000000.png").write_text("mine")
+            (name / "variance/mine.pfm").write_text("mine")
+        (outs / "empty").mkdir()
+        shutil.copytree(templates / "batch", outs / "batch")
+        (outs / "batch/a/notes.txt").write_text("mine")
+        (self.root / "list.txt").write_text("a seq\nb user/../drive --frames 0\n")
+        (self.root / "bad.txt").write_text("drive drive\nseq seq --poses outs/run/poses.txt\n")
+        (self.root / "names.txt").write_text("a seq\na/disparity drive\nsettings.json seq\n")
+        own = [outs / "run", outs / "batch", outs / "linked", outs / "crafted"]
+        mine = {outs / "crafted/report.json"} | {path for name in own for path in name.rglob("*") if path.is_symlink() or
+                                                  path.is_file() and path.read_bytes() == b"mine"}
+        mine |= {outs / "edited/poses.txt", outs / "edited/disparity/000001.png"}
+        self.sentinels = {}
+        for path in self.root.rglob("*"):
+            if path.is_dir() and not path.is_symlink():
+                continue
+            if outs in path.parents and path not in mine and path.name not in ("notes.txt", "mine.pfm") and path.parent.name != "depth":
+                continue
+            self.keep(path)
+
+    def keep(self, path):
+        self.sentinels[path] = (self.look(path), self.content(path))
+
+    @staticmethod
+    def look(path):
+        found = path.lstat()
+        return (found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns, found.st_mode)
+
+    @staticmethod
+    def content(path):
+        return stat.S_IMODE(path.lstat().st_mode), os.readlink(path) if path.is_symlink() else path.read_bytes()
+
+    def lost(self):
+        """The sentinels that are not as they were."""
+        lost = []
+        for path, (look, content) in self.sentinels.items():
+            try:
+                if self.look(path) != look and self.content(path) != content:
+                    lost.append(path)
+            except OSError:
+                lost.append(path)
+        return lost
+
+    def add_a_users_file(self):
+        """The user edits an output, or puts a file or a link beside it."""
+        folders = [path for path in (self.root / "outs").rglob("*") if path.is_dir() and not path.is_symlink()]
+        folder = self.rng.choice(folders)
+        files = [path for path in folder.iterdir() if path.is_file() and path not in self.sentinels]
+        if files and self.rng.random() < 0.5:
+            path = self.rng.choice(files)
+            path.write_bytes(path.read_bytes() + b"edited")
+        else:
+            path = folder / self.rng.choice(["000000.png", "000002.png", "poses.txt", "mine.txt", "000000.pfm", "report.json", "settings.json", "done.json"])
+            if path.exists() or path.is_symlink():
+                return
+            if self.rng.random() < 0.3:
+                path.symlink_to(self.root / "user/left/000000.png")
+            else:
+                path.write_text("mine")
+        self.keep(path)
+
+
+class Commands:
+    """Draws commands."""
+
+    def __init__(self, tree, rng):
+        self.tree, self.rng, self.runs = tree, rng, 0
+
+    def spelled(self, path, cwd):
+        """One of the many names of a path."""
+        path, kind = str(path), self.rng.randrange(8)
+        if kind == 0:
+            return os.path.relpath(path, cwd)
+        if kind == 1:
+            return path + "/"
+        if kind == 2:
+            return path + "/."
+        if kind == 3:
+            return f"{os.path.dirname(path)}/./{os.path.basename(path)}"
+        if kind == 4:
+            return f"{path}/../{os.path.basename(path)}"
+        if kind == 5 and f"{self.tree.root}/user" in path:
+            return path.replace(f"{self.tree.root}/user", f"{self.tree.root}/links/user")
+        if kind == 6:
+            return "./" + os.path.relpath(path, cwd)
+        return path
+
+    def folder(self, cwd):
+        root = self.tree.root
+        names = ["seq", "seq/image_0", "seq/truth", "seq/new", "drive", "user", "user/left", "user/right", "user/left/new", "links", "links/seq",
+                 "links/left", "links/out", "links/loop", "links/poses.txt", "outs", "outs/run", "outs/edited", "outs/linked", "outs/crafted",
+                 "outs/empty", "outs/batch", "outs/batch/a", "outs/new", "outs/run/disparity", "new/../user", "user/poses.txt", "."]
+        if self.rng.random() < 0.02:
+            return ""
+        return self.spelled(root / self.rng.choice(names), cwd)
+
+    def file(self, cwd, *more):
+        root = self.tree.root
+        names = ["seq/poses.txt", "seq/image_0/000000.png", "drive/calib.txt", "user/poses.txt", "user/left/000000.png", "user/config.toml",
+                 "user/tuning.json", "user/page.html", "user/path.svg", "user/path.png", "user/film.avi", "user/film.mp4", "user/trace.json", "user/hard_link.png",
+                 "user/empty", "links/poses.txt", "links/image.png", "links/loop", "outs/run/poses.txt", "outs/edited/poses.txt", "outs/run/report.json",
+                 "outs/run/notes.txt", "outs/run/report.html", "user", "list.txt", f"outs/new{self.rng.randrange(10**6)}"]
+        path = root / self.rng.choice([*names, *more])
+        return os.path.relpath(path, cwd) if self.rng.random() < 0.3 else path
+
+    def sequence(self, cwd):
+        root = self.tree.root
+        seq = root / self.rng.choice(["seq", "drive", "links/seq"])
+        user = root / self.rng.choice(["user", "links/user"])
+        return self.rng.choice([["--odometry", self.spelled(seq, cwd)], ["--dataset", seq],
+                                ["--left", user / "left/%06d.png", "--right", user / "right/*.png", "--calib", user / "calib.toml"],
+                                ["--left", os.path.relpath(user / "left/*.png", cwd), "--right", user / "right/%06d.png", "--calib", user / "calib.toml"]])
+
+    def maybe(self, probability, *words):
+        return list(words) if self.rng.random() < probability else []
+
+    def method(self):
+        """Most commands end where they ask for a device that is not there: after all looks at files."""
+        self.runs += (reaches := self.runs < RUNS and self.rng.random() < 0.15)
+        return ["--disparities", 16, *([] if reaches else ["--device", "none of them"])]
+
+    def run(self, cwd):
+        root = self.tree.root
+        how = self.rng.choice([[], ["--overwrite"], ["--overwrite"], ["--resume"]])
+        return ["run", *self.sequence(cwd), "--out", self.folder(cwd), *how, *self.maybe(0.4, "--write", self.rng.choice(["variance", "color,cloud", "depth", "right"])),
+                *self.maybe(0.3, "--poses", self.file(cwd)), *self.maybe(0.3, "--frames", "0:1"), *self.maybe(0.2, "--trace", self.file(cwd)),
+                *self.maybe(0.2, "--save-config", self.file(cwd)), *self.maybe(0.2, "--config", root / "user/config.toml"),
+                *self.maybe(0.1, "--tuning", self.file(cwd)), *self.maybe(0.1, "--programs", self.folder(cwd)), *self.method(), "--quiet"]
+
+    def batch(self, cwd):
+        device = self.method()
+        device = ["--disparities", 16, *(["--devices", device[3]] if len(device) > 2 else [])]
+        return ["batch", self.tree.root / self.rng.choice(["list.txt", "bad.txt", "names.txt", "user/poses.txt"]), "--out", self.folder(cwd),
+                *self.maybe(0.5, "--overwrite"), *self.maybe(0.1, "--merge"), *self.maybe(0.2, "--write", "variance"),
+                *self.maybe(0.1, "--save-config", self.file(cwd)), *device, "--quiet"]
+
+    def rectify(self, cwd):
+        root = self.tree.root
+        return ["rectify", *self.rng.choice([["--left", root / "user/left/*.png", "--right", root / "user/right/*.png"], ["--side-by-side", root / "user/left"]]),
+                "--calib", root / "user/calib.toml", "--out", self.folder(cwd), "--quiet"]
+
+    def synth(self, cwd):
+        return ["synth", "--frames", 1, "--width", 16, "--height", 8, "--out", self.folder(cwd), "--quiet"]
+
+    def odometry(self, cwd):
+        return ["odometry", *self.sequence(cwd), "--frames", 0, "--out", self.file(cwd), "--quiet"]
+
+    def eval_poses(self, cwd):
+        poses = self.tree.root / "user/poses.txt"
+        return ["eval-poses", "--estimate", poses, "--truth", poses, "--plot", self.file(cwd, "user/path.svg", "user/path.png", "outs/run/new.svg")]
+
+    def report(self, cwd):
+        return ["report", self.folder(cwd), *self.maybe(0.6, "--out", self.file(cwd)), "--pictures", 0]
+
+    def tune(self, cwd):
+        return ["tune", "--file", self.file(cwd), "--device", "none of them"]
+
+    def compile(self, cwd):
+        return ["compile", "--out", self.folder(cwd), *self.maybe(0.3, "--save-config", self.file(cwd)), "--device", "none of them"]
+
+    def view(self, cwd):
+        return ["view", *self.sequence(cwd), *self.rng.choice([["--pictures", self.folder(cwd)], ["--video", self.file(cwd, "user/film.avi", "user/film.mp4")]]),
+                *self.maybe(0.2, "--save-config", self.file(cwd)), "--device", "none of them", "--quiet"]
+
+    def draw(self):
+        cwd = self.tree.root / self.rng.choice([".", "seq", "user", "user/left", "outs", "links"])
+        kinds = [self.run] * 6 + [self.batch] * 3 + [self.rectify, self.synth, self.odometry, self.eval_poses, self.report, self.tune, self.compile, self.view]
+        return cwd, self.rng.choice(kinds)(cwd)
+
+
+class RandomCommands(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.holder = tempfile.TemporaryDirectory(prefix="egosgm_files_")
+        cls.folder = pathlib.Path(cls.holder.name).resolve()
+        cls.templates = cls.folder / "templates"
+        street = cls.templates / "street"
+        (cls.folder / "list.txt").write_text(f"a {street} --frames 0\n")
+        method = ("--disparities", 16, "--quiet")
+        for arguments in (["synth", "--out", street, "--frames", 3, "--width", 32, "--height", 16, "--quiet"],
+                          ["run", "--odometry", street, "--out", cls.templates / "run", "--write", "variance", *method],
+                          ["batch", cls.folder / "list.txt", "--out", cls.templates / "batch", *method]):
+            done = egosgm(*arguments)
+            assert done.returncode == 0, done.stderr
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.holder.cleanup()
+
+    def drive(self, seed):
+        rng = random.Random(seed)
+        program, codes, history = Program(self.folder), collections.Counter(), []
+        try:
+            tree = Tree(self.folder, self.templates, rng)
+            commands = Commands(tree, rng)
+            for i in range(COMMANDS):
+                if i % 150 == 149:  # a fresh one, since runs use up what may be overwritten
+                    shutil.rmtree(tree.root)
+                    tree = commands.tree = Tree(self.folder, self.templates, rng)
+                if rng.random() < 0.1:
+                    tree.add_a_users_file()
+                cwd, command = commands.draw()
+                history.append(f"cd {cwd.relative_to(tree.root)} && egosgm {' '.join(map(str, command))}")
+                code, errors = program(cwd, command)
+                codes[command[0], code] += 1
+                self.assertIn(code, (0, 1, 2), f"command {i}: {history[-1]}: {errors}")
+                self.assertNotIn("please report it", errors, f"command {i}: {history[-1]}")
+                self.assertEqual(tree.lost(), [], f"command {i}: {history[-1]}: {code} {errors}")
+        finally:
+            program.close()
+        done = {command for command, code in codes if code == 0}
+        self.assertEqual(sum(codes.values()), COMMANDS)
+        if FORKING:
+            self.assertLessEqual({"run", "synth", "rectify", "odometry", "eval-poses", "report"}, done, codes)
+        return codes
+
+
+class RandomCommandsOne(RandomCommands):
+    def test_what_is_the_users_stays(self):
+        print(self.drive(1))
+
+
+class RandomCommandsTwo(RandomCommands):
+    def test_what_is_the_users_stays(self):
+        print(self.drive(2))
+
+
+if __name__ == "__main__":
+    unittest.main()
