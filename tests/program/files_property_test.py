@@ -300,7 +300,7 @@ class RandomCommands(unittest.TestCase):
         done = {command for command, code in codes if code == 0}
         self.assertEqual(sum(codes.values()), COMMANDS)
         if FORKING:
-            self.assertLessEqual({"run", "synth", "rectify", "odometry", "eval-poses", "report"}, done, codes)
+            self.assertLessEqual({"run", "synth", "batch"}, done, codes)
         return codes
 
 
