@@ -230,10 +230,13 @@ void OutputFolder::read_report() {
   const auto refuse = [&](const std::string& why) {
     throw InvalidArgument(fmt::format("{}: {}: nothing there is replaced; choose another --out", file.string(), why));
   };
-  if (!earlier_.is_object() || !earlier_.contains("files") || !earlier_["files"].is_object()) {
+  if (!earlier_.is_object() || !earlier_.contains("files") || !earlier_["files"].is_array()) {
     refuse("does not list what the run wrote");
   }
-  for (const auto& [name, digest] : earlier_["files"].items()) {
+  for (const Json& entry : earlier_["files"]) {
+    if (!entry.is_array() || entry.size() != 2 || !entry[0].is_string()) refuse("does not list what the run wrote");
+    const std::string name = entry[0];
+    const Json& digest = entry[1];
     if (!is_plain_name(name) || name == "report.json") refuse("lists \"" + name + "\", which is no file of a run");
     if (!digest.is_null() && !digest.is_string()) refuse("has no digest of " + name);
     files_[name] = digest.is_null() ? "" : digest.get<std::string>();
@@ -315,8 +318,8 @@ void OutputFolder::close() {
 }
 
 Json OutputFolder::files() const {
-  Json json = Json::object();
-  for (const auto& [name, digest] : files_) json[name] = digest.empty() ? Json() : Json(digest);
+  Json json = Json::array();  // an object of so many keys is refused by readers
+  for (const auto& [name, digest] : files_) json.push_back({name, digest.empty() ? Json() : Json(digest)});
   return json;
 }
 

@@ -84,7 +84,7 @@ class OutputFolder {
   /// Forgets what was announced and not written.
   void close();
 
-  /// For "files" of report.json: names and digests, null until a file is written.
+  /// For "files" of report.json: pairs of a name and a digest, null until the file is written.
   nlohmann::ordered_json files() const;
 
  private:

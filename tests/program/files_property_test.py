@@ -62,7 +62,7 @@ class Tree:
         (user / "poses.txt").write_text(POSES * 3)
         (user / "config.toml").write_text("# Options of egosgm run: read back with --config.\ndisparities = 16\n")
         (user / "tuning.json").write_text('{"a device": {"tile_width": 32}}')
-        (user / "report.json").write_text('{"program": "egosgm", "files": {"left/000000.png": null, "poses.txt": null}}')
+        (user / "report.json").write_text('{"program": "egosgm", "files": [["left/000000.png", null], ["poses.txt", null]]}')
         for name in ("page.html", "path.svg", "path.png", "film.avi", "film.mp4", "trace.json", ".hidden", "settings.json", "empty"):
             (user / name).write_text("" if name == "empty" else f"the user's {name}")
         (user / "poses.txt").chmod(0o600)

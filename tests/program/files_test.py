@@ -178,7 +178,7 @@ class OwnFiles(FilesTest):
                      "disparity/", "./poses.txt", "report.json"):
             report = json.loads(whole)
             del report["digest"]
-            report["files"][name] = None
+            report["files"].append([name, None])
             text = json.dumps(report, indent=2)[:-2]
             digest = 0xcbf29ce484222325
             for byte in text.encode():
