@@ -225,8 +225,8 @@ OutputFolder::OutputFolder(const std::string& folder, const Inputs& inputs, Earl
 void OutputFolder::read_report() {
   const fs::path file = path_ / "report.json";
   if (!is_there(file)) return;
+  if (is_regular(file)) earlier_ = parse_json(vision::read_file(file, kMaxReportBytes), file);
   expect_own_json(file);
-  earlier_ = parse_json(vision::read_file(file, kMaxReportBytes), file);
   const auto refuse = [&](const std::string& why) {
     throw InvalidArgument(fmt::format("{}: {}: nothing there is replaced; choose another --out", file.string(), why));
   };
