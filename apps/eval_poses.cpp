@@ -13,7 +13,6 @@
 
 #include "apps/command.h"
 #include "apps/counted.h"
-#include "apps/output_folder.h"
 #include "apps/plot_file.h"
 #include "apps/run_folder.h"
 #include "apps/truth_pairs.h"
@@ -153,10 +152,7 @@ PosePairs read_pairs(const ComparisonArguments& compared) {
 
 int evaluate(EvalPosesArguments& arguments) {
   arguments.compared.resolve();
-  for (const std::string& file : arguments.plots) {
-    require_plot_name("--plot", file);
-    expect_new_file("--plot", file);
-  }
+  for (const std::string& file : arguments.plots) require_plot_name("--plot", file);
   const auto [estimate, truth] = read_pairs(arguments.compared);
   const vision::PoseEvaluation evaluation = vision::evaluate_poses(estimate, truth);
   for (const std::string& file : arguments.plots) {

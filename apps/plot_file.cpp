@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "apps/output_folder.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
@@ -14,6 +15,7 @@ void require_plot_name(const std::string& option, const std::string& file) {
   if (extension != ".svg" && extension != ".png") {
     throw InvalidArgument(option + " " + file + ": the name must end in .png or .svg");
   }
+  expect_new_file(option, file);
 }
 
 void write_plot(const std::string& file, const std::function<std::string()>& svg,

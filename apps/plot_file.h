@@ -7,7 +7,7 @@
 
 namespace egosgm::app {
 
-/// Throws InvalidArgument, naming the option, unless `file` ends in .png or .svg.
+/// Throws InvalidArgument, naming the option, unless `file` ends in .png or .svg, and as expect_new_file.
 void require_plot_name(const std::string& option, const std::string& file);
 
 /// Writes what the file's name asks for. REQUIRES: require_plot_name.
