@@ -13,10 +13,10 @@
 #include "apps/counted.h"
 #include "apps/doubt.h"
 #include "apps/frame_times.h"
-#include "apps/pair_matches.h"
 #include "apps/sequence_arguments.h"
 #include "egosgm/error.h"
 #include "egosgm/options.h"
+#include "egosgm/vision/rectification.h"
 
 namespace egosgm::app {
 namespace {
@@ -56,7 +56,7 @@ double share(const std::vector<double>& values, const std::function<bool(double)
 
 /// What the sampled frames showed.
 struct Samples {
-  std::vector<PairMatch> matches;
+  std::vector<vision::PairMatch> matches;
   std::vector<double> disparity, row_error;  // of the matches: x_left - x_right, y_right - y_left
   double left_brightness = 0, right_brightness = 0;
   int frames = 0, depth_bits = 8;
@@ -105,7 +105,7 @@ class Doctor {
       samples_.left_brightness += cv::mean(images.left)[0];
       samples_.right_brightness += cv::mean(images.right)[0];
       ++samples_.frames;
-      for (const PairMatch& match : match_pair(images.left, images.right)) {
+      for (const vision::PairMatch& match : vision::match_pair(images.left, images.right)) {
         samples_.matches.push_back(match);
         samples_.disparity.push_back(match.left.x - match.right.x);
         samples_.row_error.push_back(match.right.y - match.left.y);

@@ -13,11 +13,11 @@
 #include "apps/progress.h"
 #include "apps/raw_pairs.h"
 #include "apps/sequence_arguments.h"
-#include "apps/stereo_rig.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/rectification.h"
 
 namespace egosgm::app {
 namespace {
@@ -47,11 +47,11 @@ class Rectifier {
  public:
   explicit Rectifier(const RectifyArguments& arguments) : arguments_(arguments) {
     if (!arguments.input.euroc.empty()) {
-      rig_ = read_euroc_rig(mav0_of(arguments.input.euroc));
+      rig_ = vision::read_euroc_rig(mav0_of(arguments.input.euroc));
       return;
     }
     if (arguments.calib.empty()) throw InvalidArgument("no calibration: give --calib FILE");
-    rig_ = read_opencv_rig(arguments.calib, metres_in(arguments.unit), arguments.is_fisheye);
+    rig_ = vision::read_opencv_rig(arguments.calib, metres_in(arguments.unit), arguments.is_fisheye);
     if (!rig_ && arguments.is_fisheye) {
       throw InvalidArgument("--fisheye: " + arguments.calib + " is no calibration of OpenCV's (K1, D1, K2, D2, R, T)");
     }
@@ -63,30 +63,20 @@ class Rectifier {
   void operator()(RawPair& pair) {
     if (!rig_) return;
     if (!rectification_) {
-      rectification_ = rectification_of(*rig_, pair.left.size(), arguments_.alpha);
+      rectification_ = vision::rectification_of(*rig_, pair.left.size(), arguments_.alpha);
       calibration_ = rectification_->calibration;
     }
-    if (pair.left.size() != rectification_->valid.size()) {
-      throw InvalidArgument(fmt::format("an image is {}x{}, the first one {}x{}: all need one size", pair.left.cols,
-                                        pair.left.rows, rectification_->valid.cols, rectification_->valid.rows));
-    }
-    remap(pair.left, rectification_->left_map);
-    remap(pair.right, rectification_->right_map);
+    pair.left = vision::rectify(pair.left, rectification_->left_map);
+    pair.right = vision::rectify(pair.right, rectification_->right_map);
   }
 
   const Calibration& calibration() const { return calibration_; }
-  const std::optional<Rectification>& rectification() const { return rectification_; }
+  const std::optional<vision::Rectification>& rectification() const { return rectification_; }
 
  private:
-  static void remap(cv::Mat& image, const cv::Mat (&map)[2]) {
-    cv::Mat rectified;
-    cv::remap(image, rectified, map[0], map[1], cv::INTER_LINEAR);
-    image = rectified;
-  }
-
   const RectifyArguments& arguments_;
-  std::optional<StereoRig> rig_;
-  std::optional<Rectification> rectification_;
+  std::optional<vision::StereoRig> rig_;
+  std::optional<vision::Rectification> rectification_;
   Calibration calibration_;
 };
 

@@ -8,6 +8,7 @@ namespace egosgm::python {
 void bind_errors(pybind11::module_& module);
 void bind_pipeline(pybind11::module_& module);
 void bind_odometry(pybind11::module_& module);
+void bind_rectification(pybind11::module_& module);
 void bind_files(pybind11::module_& module);
 void bind_evaluation(pybind11::module_& module);
 void bind_video_evaluation(pybind11::module_& module);

@@ -29,6 +29,7 @@ PYBIND11_MODULE(_egosgm, module) {
   bind_errors(module);
   bind_pipeline(module);
   bind_odometry(module);
+  bind_rectification(module);
   bind_files(module);
   bind_evaluation(module);
   bind_video_evaluation(module);

@@ -1,24 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/stereo_rig.h"
+// Calibrations of two cameras, read from files.
 
-#include <fmt/core.h>
-
-#include <cmath>
 #include <initializer_list>
 #include <opencv2/calib3d.hpp>
-#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
+#include "egosgm/vision/rectification.h"
 
-namespace egosgm::app {
+namespace egosgm::vision {
 namespace {
 
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxBytes = std::size_t{1} << 22;
-constexpr double kMaxBaseline_m = 10;
 
 using Names = std::initializer_list<const char*>;
 
@@ -28,13 +24,13 @@ auto blaming(const fs::path& file, Read&& read) {
   try {
     return read();
   } catch (const cv::Exception& error) {
-    throw InvalidArgument(fmt::format("{}: holds no calibration that can be read: {}", file.string(), error.err));
+    throw InvalidArgument(file.string() + ": holds no calibration that can be read: " + error.err);
   }
 }
 
 /// A file of OpenCV's cv::FileStorage, also without its header, as others write YAML.
 cv::FileStorage open_storage(const fs::path& file) {
-  std::string text = vision::read_file(file, kMaxBytes);
+  std::string text = read_file(file, kMaxBytes);
   if (text.find_first_of("<{") != text.find_first_not_of(" \t\r\n") && !text.starts_with("%YAML")) {
     text = "%YAML:1.0\n---\n" + text;
   }
@@ -75,9 +71,9 @@ cv::Mat find_matrix(const std::vector<cv::FileStorage>& files, Names names) {
 }
 
 cv::Mat require_matrix(const cv::Mat& matrix, const fs::path& file, const char* name, std::size_t elements) {
-  if (matrix.empty()) throw InvalidArgument(fmt::format("{}: has no {}", file.string(), name));
+  if (matrix.empty()) throw InvalidArgument(file.string() + ": has no " + name);
   if (matrix.total() != elements || !cv::checkRange(matrix)) {
-    throw InvalidArgument(fmt::format("{}: {} must hold {} finite numbers", file.string(), name, elements));
+    throw InvalidArgument(file.string() + ": " + name + " must hold " + std::to_string(elements) + " finite numbers");
   }
   return matrix;
 }
@@ -85,14 +81,14 @@ cv::Mat require_matrix(const cv::Mat& matrix, const fs::path& file, const char* 
 cv::Mat require_distortion(const cv::Mat& matrix, const fs::path& file, const char* name, bool is_fisheye) {
   if (matrix.empty()) return cv::Mat::zeros(is_fisheye ? 4 : 5, 1, CV_64F);
   if (is_fisheye && matrix.total() != 4) {
-    throw InvalidArgument(
-        fmt::format("{}: {} has {} numbers; OpenCV's fisheye model has 4", file.string(), name, matrix.total()));
+    throw InvalidArgument(file.string() + ": " + name + " has " + std::to_string(matrix.total()) +
+                          " numbers; OpenCV's fisheye model has 4");
   }
   for (const std::size_t count : {4, 5, 8, 12, 14}) {
     if (matrix.total() == count && cv::checkRange(matrix)) return matrix.reshape(1, static_cast<int>(count));
   }
-  throw InvalidArgument(
-      fmt::format("{}: {} has {} numbers; OpenCV's model has 4, 5, 8, 12 or 14", file.string(), name, matrix.total()));
+  throw InvalidArgument(file.string() + ": " + name + " has " + std::to_string(matrix.total()) +
+                        " numbers; OpenCV's model has 4, 5, 8, 12 or 14");
 }
 
 std::optional<cv::Size> find_size(const std::vector<cv::FileStorage>& files) {
@@ -107,55 +103,6 @@ std::optional<cv::Size> find_size(const std::vector<cv::FileStorage>& files) {
   return std::nullopt;
 }
 
-/// Rounded to a few digits, as files have them.
-void check_rotation(const char* name, const cv::Mat& R) {
-  constexpr double kMaxError = 1e-2;
-  const double error = cv::norm(R * R.t() - cv::Mat::eye(3, 3, CV_64F), cv::NORM_INF);
-  if (error <= kMaxError && cv::determinant(R) > 0) return;
-  throw InvalidArgument(fmt::format(
-      "{} is no rotation: its rows are not of length 1 and at right angles; give the calibration as it was computed",
-      name));
-}
-
-void check_stance(const cv::Mat& T) {
-  const double x = T.at<double>(0), y = T.at<double>(1), z = T.at<double>(2);
-  if (std::abs(x) < std::abs(y) || std::abs(x) < std::abs(z)) {
-    throw InvalidArgument(fmt::format(
-        "T = ({:.4g}, {:.4g}, {:.4g}) m: the cameras do not stand side by side; turn the images by 90 degrees", x, y,
-        z));
-  }
-  if (x > 0) {
-    throw InvalidArgument(fmt::format(
-        "T = ({:.4g}, {:.4g}, {:.4g}) m: the second camera stands left of the first: exchange left and right, images "
-        "and calibration",
-        x, y, z));
-  }
-  if (-x > kMaxBaseline_m) {
-    throw InvalidArgument(fmt::format("the baseline is {:.4g} m: is T in millimetres? give --unit mm", -x));
-  }
-}
-
-/// The largest upright rectangle of valid pixels (one pass over histograms of columns).
-cv::Rect largest_rectangle(const cv::Mat& valid) {
-  cv::Rect best;
-  std::vector<int> heights(static_cast<std::size_t>(valid.cols) + 1, 0);
-  for (int y = 0; y < valid.rows; ++y) {
-    std::vector<int> open;
-    for (int x = 0; x <= valid.cols; ++x) {
-      const auto at = static_cast<std::size_t>(x);
-      heights[at] = x < valid.cols && valid.at<std::uint8_t>(y, x) ? heights[at] + 1 : 0;
-      while (!open.empty() && heights[static_cast<std::size_t>(open.back())] >= heights[at]) {
-        const int height = heights[static_cast<std::size_t>(open.back())];
-        open.pop_back();
-        const int left = open.empty() ? 0 : open.back() + 1;
-        if (height * (x - left) > best.area()) best = {left, y - height + 1, x - left, height};
-      }
-      open.push_back(x);
-    }
-  }
-  return best;
-}
-
 std::optional<StereoRig> opencv_rig(const fs::path& file, double unit_m, bool is_fisheye) {
   std::vector<cv::FileStorage> files;
   if (fs::is_directory(file)) {
@@ -164,7 +111,7 @@ std::optional<StereoRig> opencv_rig(const fs::path& file, double unit_m, bool is
     try {
       files.push_back(open_storage(file));
     } catch (const InvalidArgument&) {
-      if (vision::read_file_start(file, 5) == "%YAML") throw;
+      if (read_file_start(file, 5) == "%YAML") throw;
       return std::nullopt;  // one of the formats that are no YAML
     }
   }
@@ -200,20 +147,17 @@ StereoRig euroc_rig(const fs::path& mav0) {
   StereoRig rig;
   cv::Mat body_from_camera[2];
   for (int i = 0; i < 2; ++i) {
-    const fs::path file = mav0 / fmt::format("cam{}", i) / "sensor.yaml";
+    const fs::path file = mav0 / (i == 0 ? "cam0" : "cam1") / "sensor.yaml";
     const std::vector<cv::FileStorage> files{open_storage(file)};
     const cv::Mat k = require_matrix(find_matrix(files, {"intrinsics"}), file, "intrinsics", 4);
     const std::string model = files[0]["distortion_model"].string();
+    const std::string named = file.string() + ": distortion_model \"" + model + "\": ";
     if (model != "radial-tangential" && model != "equidistant") {
-      throw InvalidArgument(fmt::format("{}: distortion_model \"{}\": only radial-tangential and equidistant are known",
-                                        file.string(), model));
+      throw InvalidArgument(named + "only radial-tangential and equidistant are known");
     }
     const bool is_fisheye = model == "equidistant";
     if (i == 1 && is_fisheye != rig.is_fisheye) {
-      throw InvalidArgument(
-          fmt::format("{}: distortion_model \"{}\": the other camera has another one: calibrate both "
-                      "with one model",
-                      file.string(), model));
+      throw InvalidArgument(named + "the other camera has another one: calibrate both with one model");
     }
     rig.is_fisheye = is_fisheye;
     StereoRig::Camera& camera = i == 0 ? rig.left : rig.right;
@@ -240,48 +184,4 @@ StereoRig read_euroc_rig(const fs::path& mav0) {
   return blaming(mav0, [&] { return euroc_rig(mav0); });
 }
 
-Rectification rectification_of(const StereoRig& rig, cv::Size size, double alpha) {
-  if (rig.size && *rig.size != size) {
-    throw InvalidArgument(
-        fmt::format("the images are {}x{}, but {}x{} were calibrated: give the calibration of this size", size.width,
-                    size.height, rig.size->width, rig.size->height));
-  }
-  check_rotation("R", rig.R);
-  if (rig.given[0]) check_rotation("R1", *rig.given[0]);
-  if (rig.given[1]) check_rotation("R2", *rig.given[1]);
-  check_stance(rig.T);
-  cv::Mat R1, R2, P1, P2, Q;
-  if (rig.given[0]) {
-    R1 = *rig.given[0], R2 = *rig.given[1], P1 = *rig.given[2], P2 = *rig.given[3];
-  } else if (rig.is_fisheye) {
-    cv::fisheye::stereoRectify(rig.left.matrix, rig.left.distortion, rig.right.matrix, rig.right.distortion, size,
-                               rig.R, rig.T, R1, R2, P1, P2, Q, cv::CALIB_ZERO_DISPARITY, size, alpha);
-  } else {
-    cv::stereoRectify(rig.left.matrix, rig.left.distortion, rig.right.matrix, rig.right.distortion, size, rig.R, rig.T,
-                      R1, R2, P1, P2, Q, cv::CALIB_ZERO_DISPARITY, alpha, size);
-  }
-  Rectification result;
-  result.calibration = {.fx = P1.at<double>(0, 0),
-                        .fy = P1.at<double>(1, 1),
-                        .cx = P1.at<double>(0, 2),
-                        .cy = P1.at<double>(1, 2),
-                        .baseline_m = -P2.at<double>(0, 3) / P2.at<double>(0, 0),
-                        .doffs_px = P2.at<double>(0, 2) - P1.at<double>(0, 2)};
-  result.calibration.validate();
-  const auto map = [&](const StereoRig::Camera& camera, const cv::Mat& R, const cv::Mat& P, cv::Mat(&maps)[2]) {
-    if (rig.is_fisheye) {
-      cv::fisheye::initUndistortRectifyMap(camera.matrix, camera.distortion, R, P, size, CV_32FC1, maps[0], maps[1]);
-    } else {
-      cv::initUndistortRectifyMap(camera.matrix, camera.distortion, R, P, size, CV_32FC1, maps[0], maps[1]);
-    }
-    cv::Mat valid;
-    cv::remap(cv::Mat(size, CV_8UC1, cv::Scalar(255)), valid, maps[0], maps[1], cv::INTER_LINEAR);
-    return cv::Mat(valid == 255);
-  };
-  result.valid = map(rig.left, R1, P1, result.left_map);
-  result.valid_left = largest_rectangle(result.valid);
-  result.valid_right = largest_rectangle(map(rig.right, R2, P2, result.right_map));
-  return result;
-}
-
-}  // namespace egosgm::app
+}  // namespace egosgm::vision

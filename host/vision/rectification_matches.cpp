@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/pair_matches.h"
-
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/video/tracking.hpp>
 
-namespace egosgm::app {
+#include "egosgm/error.h"
+#include "egosgm/vision/rectification.h"
+
+namespace egosgm::vision {
 namespace {
 
 constexpr int kFeatures = 3000;
@@ -82,6 +83,10 @@ void refine(const cv::Mat& left, const cv::Mat& right, Points& points) {
 }  // namespace
 
 std::vector<PairMatch> match_pair(const cv::Mat& left, const cv::Mat& right) {
+  if (left.size() != right.size() || left.type() != right.type() ||
+      (left.type() != CV_8UC1 && left.type() != CV_16UC1)) {
+    throw InvalidArgument("the pair: give grey images of 8 or 16 bits, both of one size and depth");
+  }
   const cv::Mat left_bytes = bytes_of(left), right_bytes = bytes_of(right);
   Points points = match_descriptors(left_bytes, right_bytes);
   if (points.left.size() < kFewest) return {};
@@ -93,4 +98,4 @@ std::vector<PairMatch> match_pair(const cv::Mat& left, const cv::Mat& right) {
   return matches;
 }
 
-}  // namespace egosgm::app
+}  // namespace egosgm::vision
