@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cctype>
 #include <set>
-#include <sstream>
 
 #include "apps/run_outputs.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
+#include "host/vision/text_rows.h"
 
 namespace egosgm::app {
 namespace {
@@ -71,15 +71,13 @@ BatchEntry split(const std::string& line, const std::string& place) {
 }  // namespace
 
 std::vector<BatchEntry> read_batch_list(const std::filesystem::path& file) {
-  std::istringstream text(vision::read_file(file, kMaxListBytes));
+  const std::string text = vision::read_file(file, kMaxListBytes);
   std::vector<BatchEntry> entries;
   std::set<std::string> names;
-  int number = 0;
-  for (std::string raw; std::getline(text, raw);) {
-    ++number;
-    const std::string line = stripped(raw);
+  for (const vision::TextRow& row : vision::split_rows(text, file)) {
+    const std::string line = stripped(std::string(row.text));
     if (line.empty()) continue;
-    entries.push_back(split(line, fmt::format("{}, line {}", file.string(), number)));
+    entries.push_back(split(line, fmt::format("{}, line {}", file.string(), row.number)));
     if (!names.insert(lowered(entries.back().name)).second) {
       throw InvalidArgument(fmt::format("{}: the name {} comes twice: results would overwrite each other",
                                         entries.back().place, entries.back().name));

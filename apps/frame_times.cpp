@@ -8,10 +8,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
-#include <sstream>
+#include <string>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
+#include "host/vision/text_rows.h"
 
 namespace egosgm::app {
 namespace {
@@ -39,14 +40,14 @@ std::optional<double> seconds_of(const std::string& row) {
 FrameTimes frame_times(const vision::StereoSequence& sequence) {
   FrameTimes times{sequence.times_file, {}};
   if (times.file.empty()) return times;
-  std::istringstream text(vision::read_file(times.file, kMaxBytes));
+  const std::string text = vision::read_file(times.file, kMaxBytes);
   std::vector<double> rows;
-  for (std::string row; std::getline(text, row);) {
-    if (row.find_first_not_of(" \t\r") == std::string::npos) continue;
-    const std::optional<double> seconds = seconds_of(row);
+  for (const vision::TextRow& row : vision::split_rows(text, times.file)) {
+    if (vision::trim(row.text).empty()) continue;
+    const std::optional<double> seconds = seconds_of(std::string(row.text));
     if (!seconds) {
-      throw InvalidArgument(fmt::format("{}: row {}: \"{}\" is no time: seconds, or YYYY-MM-DD HH:MM:SS",
-                                        times.file.string(), rows.size() + 1, row));
+      vision::refuse_row(times.file, row.number,
+                         vision::quoted(row.text) + " is no time: give seconds, or YYYY-MM-DD HH:MM:SS");
     }
     rows.push_back(*seconds);
   }

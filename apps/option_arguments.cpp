@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <sstream>
 #include <utility>
 
@@ -11,11 +12,13 @@
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "egosgm/vision/file_io.h"
+#include "host/vision/text_rows.h"
 
 namespace egosgm::app {
 namespace {
 
-constexpr std::size_t kMaxConfigBytes = 1 << 20;
+constexpr std::size_t kMaxConfigBytes = 1 << 16;
+constexpr int kMaxDots = 3;  // in a section's name
 
 PipelineOptions preset_named(const std::string& name) {
   if (name == "default") return {};
@@ -53,8 +56,21 @@ int line_of(const std::string& text, const std::string& option) {
   return 0;
 }
 
+/// CLI11 keeps a section of N parts as N names of up to N parts.
+void check_sections(const std::string& text, const std::string& file) {
+  for (const vision::TextRow& row : vision::split_rows(text, file)) {
+    const std::size_t first = std::min(row.text.find_first_not_of(" \t\r\v\f"), row.text.size());
+    if (!row.text.substr(first).starts_with('[') || std::count(row.text.begin(), row.text.end(), '.') <= kMaxDots) {
+      continue;
+    }
+    vision::refuse_row(file, row.number,
+                       vision::quoted(row.text) + " is nested too deep: write one `stage.option = value` a line");
+  }
+}
+
 void apply_config(PipelineOptions& options, const std::string& file) {
   const std::string read = vision::read_file(file, kMaxConfigBytes);
+  check_sections(read, file);
   std::istringstream text(read);
   std::vector<CLI::ConfigItem> items;
   try {

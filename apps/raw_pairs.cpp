@@ -14,6 +14,7 @@
 #include "apps/counted.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
+#include "host/vision/text_rows.h"
 
 namespace egosgm::app {
 namespace {
@@ -21,6 +22,19 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxListBytes = std::size_t{1} << 28;
+
+std::string lower_extension(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  return extension;
+}
+
+/// Whether it is named as what only OpenCV reads.
+bool is_foreign(const fs::path& file) {
+  static const std::array<const char*, 6> extensions{".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"};
+  return std::find(extensions.begin(), extensions.end(), lower_extension(file)) != extensions.end();
+}
 
 cv::Mat read_image(const fs::path& file) {
   cv::Mat image = cv::imread(file.string(), cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
@@ -175,12 +189,10 @@ std::unique_ptr<RawPairs> open_file_pairs(const RawPairArguments& arguments) {
 
 /// Rows LEFT RIGHT [SECONDS]; paths from the list's folder on.
 std::unique_ptr<RawPairs> open_list(const fs::path& file) {
-  std::istringstream text(vision::read_file(file, kMaxListBytes));
+  const std::string text = vision::read_file(file, kMaxListBytes);
   std::vector<ListedPair> pairs;
-  int number = 0;
-  for (std::string row; std::getline(text, row);) {
-    ++number;
-    std::istringstream words(row.substr(0, row.find('#')));
+  for (const vision::TextRow& row : vision::split_rows(text, file)) {
+    std::istringstream words(std::string(row.text.substr(0, row.text.find('#'))));
     std::string left, right, time, more;
     if (!(words >> left)) continue;
     words >> right >> time;
@@ -192,7 +204,7 @@ std::unique_ptr<RawPairs> open_list(const fs::path& file) {
       end = 0;
     }
     if (right.empty() || end != time.size() || words >> more) {
-      throw InvalidArgument(fmt::format("{}: row {}: give LEFT RIGHT or LEFT RIGHT SECONDS", file.string(), number));
+      vision::refuse_row(file, row.number, "give LEFT RIGHT or LEFT RIGHT SECONDS");
     }
     pairs.push_back({file.parent_path() / left, file.parent_path() / right, seconds});
   }
@@ -202,16 +214,16 @@ std::unique_ptr<RawPairs> open_list(const fs::path& file) {
 
 /// Nanoseconds -> file, of a camera's data.csv.
 std::map<std::int64_t, fs::path> euroc_images(const fs::path& camera) {
-  std::istringstream text(vision::read_file(camera / "data.csv", kMaxListBytes));
+  const fs::path file = camera / "data.csv";
+  const std::string text = vision::read_file(file, kMaxListBytes);
   std::map<std::int64_t, fs::path> images;
-  for (std::string row; std::getline(text, row);) {
-    if (row.empty() || row.starts_with('#')) continue;
-    const std::size_t comma = row.find(',');
-    std::string name = comma == std::string::npos ? "" : row.substr(comma + 1);
-    name.erase(name.find_last_not_of(" \t\r") + 1);
+  for (const vision::TextRow& row : vision::split_rows(text, file)) {
+    if (vision::trim(row.text).empty() || row.text.starts_with('#')) continue;
+    const std::size_t comma = std::min(row.text.find(','), row.text.size());
+    const std::string_view name = vision::trim(row.text.substr(std::min(comma + 1, row.text.size())));
     std::int64_t time_ns = 0;
-    if (name.empty() || !(std::istringstream(row.substr(0, comma)) >> time_ns)) {
-      throw InvalidArgument(fmt::format("{}/data.csv: \"{}\" is not TIME,FILE", camera.string(), row));
+    if (name.empty() || !(std::istringstream(std::string(row.text.substr(0, comma))) >> time_ns)) {
+      vision::refuse_row(file, row.number, vision::quoted(row.text) + " is not TIME,FILE");
     }
     images[time_ns] = camera / "data" / name;
   }
@@ -235,13 +247,9 @@ std::unique_ptr<RawPairs> open_euroc(const fs::path& mav0) {
 
 /// Whether it names images, by a pattern or an image's extension; else it is a video.
 bool names_files(const std::string& pattern) {
-  static const std::array<const char*, 9> extensions{".png",  ".jpg", ".jpeg", ".bmp", ".tif",
-                                                     ".tiff", ".pgm", ".ppm",  ".webp"};
   if (fs::path(pattern).filename().string().find_first_of("*%") != std::string::npos) return true;
-  std::string extension = fs::path(pattern).extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
+  const std::string extension = lower_extension(pattern);
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg" || is_foreign(pattern);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -30,7 +31,7 @@ struct Entry {
 class Entries {
  public:
   Entries(const std::filesystem::path& file, std::string_view text) : file_(file) {
-    for (const TextRow& row : split_rows(text)) add(row);
+    for (const TextRow& row : split_rows(text, file)) add(row);
   }
 
   const std::filesystem::path& file() const { return file_; }
@@ -55,21 +56,23 @@ class Entries {
       refuse_row(file_, row.number, quoted(text) + " is not `key: value` or `key = value`; give a calibration file");
     }
     const Entry entry{row.number, trim(text.substr(0, separator)), trim(text.substr(separator + 1))};
-    if (const Entry* first = find(entry.key)) {
-      refuse_row(
-          file_, row.number,
-          quoted(entry.key) + " was given in row " + std::to_string(first->row) + " already; remove one of them");
+    const auto [first, is_new] = places_.emplace(entry.key, entries_.size());
+    if (!is_new) {
+      refuse_row(file_, row.number,
+                 quoted(entry.key) + " was given in row " + std::to_string(entries_[first->second].row) +
+                     " already; remove one of them");
     }
     entries_.push_back(entry);
   }
 
   const Entry* find(std::string_view key) const {
-    const auto found = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.key == key; });
-    return found == entries_.end() ? nullptr : &*found;
+    const auto found = places_.find(key);
+    return found == places_.end() ? nullptr : &entries_[found->second];
   }
 
   std::filesystem::path file_;
   std::vector<Entry> entries_;
+  std::map<std::string_view, std::size_t> places_;  // in entries_, by key
 };
 
 double parse_finite(const Entries& entries, const Entry& entry, std::string_view token) {

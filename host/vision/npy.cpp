@@ -17,6 +17,7 @@ namespace egosgm::vision {
 namespace {
 
 constexpr std::string_view kMagic("\x93NUMPY", 6);
+constexpr std::size_t kMaxSides = 64;  // of NumPy itself
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why) {
   throw InvalidArgument(file.string() + ": not a readable .npy (truncated?): " + why +
@@ -41,6 +42,7 @@ std::vector<std::int64_t> parse_shape(std::string_view text, const std::filesyst
     const auto [after, error] = std::from_chars(next, last, side);
     if (error != std::errc()) refuse(file, "its shape is no tuple of whole numbers");
     shape.push_back(side);
+    if (shape.size() > kMaxSides) refuse(file, "its array has more than " + std::to_string(kMaxSides) + " sides");
     next = std::find_if_not(after, last, [](char c) { return c == ',' || c == ' '; });
   }
   return shape;

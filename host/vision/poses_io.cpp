@@ -54,7 +54,7 @@ Eigen::Isometry3d parse_pose(const std::filesystem::path& file, const TextRow& r
 
 std::vector<Eigen::Isometry3d> read_poses(const std::filesystem::path& file) {
   const std::string text = read_file(file, kMaxPosesBytes);
-  std::vector<TextRow> rows = split_rows(text);
+  std::vector<TextRow> rows = split_rows(text, file);
   while (!rows.empty() && trim(rows.back().text).empty()) rows.pop_back();
   if (rows.empty()) throw InvalidArgument(file.string() + ": holds no poses; give a row of 12 numbers per frame");
   std::vector<Eigen::Isometry3d> poses;

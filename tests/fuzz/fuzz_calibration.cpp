@@ -13,9 +13,14 @@ std::vector<std::string> seeds() {
     odometry += std::string("P") + camera + p + tx + q;
     raw += std::string("P_rect_0") + camera + p + tx + q;
   }
-  return {odometry, raw,
+  std::string many;
+  for (int i = 0; i < 300; ++i) many += "k" + std::to_string(i) + ":\n";
+  return {odometry,
+          raw,
           "cam0=[99.4 0 94.1; 0 99.4 52.9; 0 0 1]\ncam1=[99.4 0 96.9; 0 99.4 52.9; 0 0 1]\ndoffs=2.8\nbaseline=193\n",
-          "fx = 721.5\nfy = 721.5\ncx = 609.6\ncy = 172.9\nbaseline_m = 0.54\ndoffs_px = 0\n"};
+          "fx = 721.5\nfy = 721.5\ncx = 609.6\ncy = 172.9\nbaseline_m = 0.54\ndoffs_px = 0\n",
+          many + odometry,
+          "fx = " + std::string(3000, '7') + "\n"};
 }
 
 void run(std::string_view input) {

@@ -8,12 +8,15 @@
 namespace egosgm::fuzz {
 
 std::vector<std::string> seeds() {
+  std::string deep = "a";
+  for (int i = 0; i < 1500; ++i) deep += ".a";
   std::string all = "# every option\n";
   for (const NamedOption& option : list_options({})) {
     const bool bare = option.value.find_first_not_of("+-.0123456789e") == std::string::npos;
     all += option.name + " = " + (bare ? option.value : '"' + option.value + '"') + '\n';
   }
-  return {all, "disparities = 40\n[banded_sgm]\np1 = 7\np2 = 77\ncost = \"census5x5\"\n[search_band]\nsigmas = 2.5\n"};
+  return {all, "disparities = 40\n[banded_sgm]\np1 = 7\np2 = 77\ncost = \"census5x5\"\n[search_band]\nsigmas = 2.5\n",
+          "[a.b.c.d]\np1 = 7\n[" + deep + "]\n", "[[x.y]]\n[[x.y]]\na.b.c.d.e.f = [1, 2]\n"};
 }
 
 void run(std::string_view input) {

@@ -5,7 +5,10 @@
 
 namespace egosgm::fuzz {
 
-std::vector<std::string> seeds() { return {"1 0 0 0 0 1 0 0 0 0 1 0\n0.8 0 0.6 1.5 0 1 0 -2e-1 -0.6 0 0.8 12\n"}; }
+std::vector<std::string> seeds() {
+  return {"1 0 0 0 0 1 0 0 0 0 1 0\n0.8 0 0.6 1.5 0 1 0 -2e-1 -0.6 0 0.8 12\n",
+          std::string(3000, '\n') + "1 0 0 0 0 1 0 0 0 0 1 0\n"};
+}
 
 void run(std::string_view input) {
   const MemoryFile file(input);

@@ -162,7 +162,7 @@ class Doctor(InputTest):
         (street / "times.txt").write_text("0\n0.1\n")
         self.assertIn("times.txt: holds 2 times", self.assert_only_problem("times", street)["text"])
         (street / "times.txt").write_text("0\n0.1\nnoon\n0.3\n")
-        self.assertIn('row 3: "noon"', self.assert_only_problem("times", street)["text"])
+        self.assertIn(":3: 'noon'", self.assert_only_problem("times", street)["text"])
         (street / "times.txt").unlink()
         (street.parent / "times.txt").write_text("0\n0.1\n")  # another one's
         self.assertEqual(self.examine(street)["times"]["verdict"], "note")
@@ -418,7 +418,7 @@ class Rectify(RectifyTest):
         refused(good, "--unit inch", arguments=[*self.PAIRS, "--unit", "inch"])
         refused(good, "--alpha 2", arguments=[*self.PAIRS, "--alpha", 2])
         (self.raw_folder / "bad.txt").write_text("cam0/9.png\n")
-        refused(good, "row 1", arguments=["--list", self.raw_folder / "bad.txt"])
+        refused(good, "bad.txt:1", arguments=["--list", self.raw_folder / "bad.txt"])
         self.assertFalse(out.exists())
         self.assert_refused(["rectify", *self.PAIRS, "--calib", file, "--out", self.street], "not empty")
         self.assert_refused(["rectify", *self.PAIRS, "--out", out], "--calib FILE")

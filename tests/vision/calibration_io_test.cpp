@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <ctime>
+
 #include "egosgm/vision/file_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
@@ -116,6 +118,16 @@ TEST_F(CalibrationIo, BrokenFilesAreNamedWithTheirRow) {
 TEST_F(CalibrationIo, MissingCamerasAreNamed) {
   expect_refused([&] { read("P0: " + kP0 + "\nP1: " + kP1, KittiCameras::kColor); }, {"has no row P2"});
   expect_refused([&] { read_calibration(folder_ / "none.txt"); }, {"none.txt", "No such file"});
+}
+
+TEST_F(CalibrationIo, AsManyKeysAsFitTakeLittleTime) {
+  std::string text;
+  for (int i = 100000; text.size() + 200 < std::size_t{1} << 20; ++i) text += "k" + std::to_string(i) + ":\n";
+  text += "P0: " + kP0 + "\nP1: " + kP1 + "\n";
+  const std::clock_t start = std::clock();
+  expect_calibration(read(text), 600, 180, 0.5, 0);
+  EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 2.0);
+  expect_text_refused(text + "k100000:\n", {"'k100000' was given in row 1 already"});
 }
 
 TEST(CalibrationData, RealFiles) {

@@ -139,6 +139,8 @@ TEST(DisparityIo, BrokenNpyIsRefused) {
   const TemporaryFolder folder;
   const auto file = folder / "d.npy";
   const std::string four(4, '\1');
+  std::string ones;
+  for (int i = 0; i < 65; ++i) ones += "1,";
   const std::vector<std::pair<std::string, std::string>> cases = {
       {std::string("\x93NUMPY\x01\x00", 8), "header"},
       {npy("<f4", "False", "(1, 1)", four).substr(0, 40), "header"},
@@ -153,6 +155,8 @@ TEST(DisparityIo, BrokenNpyIsRefused) {
       {npy("<f4", "False", "[1, 1]", four), "no tuple"},
       {npy("<f4", "False", "(x, 1)", four), "whole numbers"},
       {npy("<f4", "False", "(99999999999999999999, 1)", four), "whole numbers"},
+      {npy("<f4", "False", "(9223372036854775807, 9223372036854775807)", four), "larger than the limit"},
+      {npy("<f4", "False", '(' + ones + ')', four), "more than 64 sides"},
   };
   for (const auto& [bytes, part] : cases) {
     write_file(file, bytes);

@@ -71,6 +71,10 @@ TEST(PosesIo, BadRowsAreNamed) {
     write_file(file, text);
     for (const std::string& part : parts) expect_refused([&] { read_poses(file); }, {file.string(), part});
   }
+  write_file(file, kIdentity + std::string(70000, ' ') + kIdentity);
+  expect_refused([&] { read_poses(file); }, {"poses.txt:2:", "65536 bytes at most"});
+  write_file(file, std::string(2'000'001, '\n'));
+  expect_refused([&] { read_poses(file); }, {"poses.txt:2000001:", "2000000 rows at most"});
   expect_refused<IoError>([&] { write_poses(folder / "none/poses.txt", {}); }, {"none/poses.txt", "No such file"});
 }
 

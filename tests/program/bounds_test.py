@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a small file may take: the bounds of SECURITY.md, measured at the program's peak."""
+import os
+import resource
+import subprocess
+import unittest
+
+from program_case import PROGRAM, ProgramTest, png
+
+MOST_MIB = 256  # resident at the peak, of any file below 64 KiB: as SECURITY.md says
+CEILING_MIB = 4096  # so that a broken bound ends the program, not the machine
+
+
+class Bounds(ProgramTest):
+    def peak_mib(self, *arguments):
+        """The peak of a command that must refuse its input in one line; the line."""
+        def limit():
+            resource.setrlimit(resource.RLIMIT_AS, (CEILING_MIB << 20, CEILING_MIB << 20))
+
+        with subprocess.Popen([PROGRAM, *map(str, arguments)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, preexec_fn=limit) as program:
+            line = program.stderr.read().decode()
+            _, status, usage = os.wait4(program.pid, 0)
+            program.returncode = os.waitstatus_to_exitcode(status)
+        self.assertEqual(program.returncode, 2, line)
+        self.assertEqual(line.count("\n"), 1, line)
+        return usage.ru_maxrss / 1024, line
+
+    def assert_bounded(self, file, *arguments, says):
+        self.assertLess(file.stat().st_size, 65536)
+        peak_mib, line = self.peak_mib(*arguments)
+        self.assertIn(file.name, line)
+        self.assertIn(says, line)
+        self.assertLess(peak_mib, MOST_MIB)
+
+    def test_images_that_unpack_to_hundreds_of_megabytes(self):
+        file = self.new_folder() / "bomb.png"
+        side = 16384
+        file.write_bytes(png(side, side, 1, [bytes(side // 8)] * side, palette=bytes(6)))
+        self.assert_bounded(file, "eval", "--estimate", file, "--truth", file, says="too short")
+        calib = self.street / "calib.txt"
+        self.assert_bounded(file, "run", "--left", file, "--right", file, "--calib", calib, "--out", self.folder / "never", says="bomb.png")
+
+    def test_the_largest_map_that_a_small_file_may_hold(self):
+        file = self.new_folder() / "flat.png"
+        width, height = 4096, 2048  # 16 MiB of 16 bits
+        file.write_bytes(png(width, height, 16, [b"\1\0" * width] * height))
+        done = self.new_folder() / "bad.pfm"
+        done.write_bytes(b"Pf\n4096 2048\n-1.0\n")
+        self.assert_bounded(done, "eval", "--estimate", file, "--truth", done, says="0 bytes of pixels")
+
+    def test_json_that_is_nested_deep(self):
+        for name, text in {"objects": '{"x":' * 10000, "arrays": "[" * 30000 + "]" * 30000, "frames": '{"frames": ' + "[" * 20000}.items():
+            with self.subTest(name):
+                file = self.new_folder() / "report.json"
+                file.write_text(text)
+                self.assert_bounded(file, "report", file.parent, says="nested deeper than 64 levels")
+
+    def test_configurations_of_deep_sections(self):
+        file = self.new_folder() / "config.toml"
+        file.write_text("[" + "a." * 5000 + "a]\n")
+        self.assert_bounded(file, "run", "--odometry", self.street, "--config", file, "--out", self.folder / "never", says="nested too deep")
+
+
+if __name__ == "__main__":
+    unittest.main()
