@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <set>
+#include <sstream>
 
 #include "apps/run_outputs.h"
 #include "egosgm/error.h"

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -31,6 +32,7 @@ void print_device(std::size_t index, const DeviceInfo& info, bool is_default) {
              counted(info.compute_units, "compute unit"), static_cast<double>(info.memory_bytes) / gibibyte,
              static_cast<double>(info.max_allocation_bytes) / gibibyte);
   fmt::print("     {}; {}; driver {}\n", info.platform, info.version, info.driver);
+  if (!info.lacks.empty()) fmt::print("     does not promise: {}\n", fmt::join(info.lacks, ", "));
 }
 
 nlohmann::ordered_json json_of(const DeviceInfo& info, bool is_default) {
@@ -43,6 +45,7 @@ nlohmann::ordered_json json_of(const DeviceInfo& info, bool is_default) {
           {"compute_units", info.compute_units},
           {"memory_bytes", info.memory_bytes},
           {"max_allocation_bytes", info.max_allocation_bytes},
+          {"lacks", info.lacks},
           {"default", is_default}};
 }
 

@@ -208,6 +208,10 @@ class Run {
     }
     write_report(finished, why_not);
     if (trace_) trace_->write();
+    if (trace_ && !trace_->has_device_times() && !quiet_) {
+      fmt::print("{} gives no times of commands: the trace has those of the host only\n",
+                 pipeline_.device().info().name);
+    }
     if (!finished || quiet_) return;
     fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
                pipeline_.device().info().name);

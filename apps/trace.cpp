@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/trace.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "apps/output_folder.h"
@@ -53,6 +54,9 @@ void Trace::add_host(const std::string& name, const std::string& frame, Row row,
 }
 
 void Trace::add_device(const std::vector<DeviceCommand>& commands, const std::string& frame) {
+  has_device_times_ = std::any_of(commands.begin(), commands.end(), [](const DeviceCommand& command) {
+    return command.ended_ns - command.queued_ns >= 10;
+  });
   for (const DeviceCommand& command : commands) {
     events_.push_back({{"name", command.name},
                        {"cat", command.stage},

@@ -22,6 +22,9 @@ class Trace {
   void add_host(const std::string& name, const std::string& frame, Row row, Time start, double ms);
   void add_device(const std::vector<DeviceCommand>& commands, const std::string& frame);
 
+  /// Whether the driver told when commands ran: one that does not answers some nanoseconds for all of them.
+  bool has_device_times() const { return has_device_times_; }
+
   /// Throws IoError.
   void write() const;
 
@@ -31,6 +34,7 @@ class Trace {
   const std::filesystem::path file_;
   const Time start_ = std::chrono::steady_clock::now();
   nlohmann::ordered_json events_;
+  bool has_device_times_ = true;
 };
 
 }  // namespace egosgm::app

@@ -188,10 +188,11 @@ const cl::Program& Context::program(const std::string& file, const Defines& defi
   const std::pair key{file, defines.text()};
   if (const auto built = programs_.find(key); built != programs_.end()) return built->second.second;
 
-  const ProgramSource source{file, std::string(kPreamble) + expand(file), build_options_ + key.second};
+  const ProgramSource source{file, std::string(kPreamble) + expand(file), build_options_ + key.second, build_options_};
   const cl::Program program = created(source);
   // cl::Program::build asks for the log whatever went wrong, and reports that there is none instead of why.
-  const cl_int status = ::clBuildProgram(program(), 1, &device_(), source.options.c_str(), nullptr, nullptr);
+  const std::string options = folder_ ? folder_->options(source) : source.options;
+  const cl_int status = ::clBuildProgram(program(), 1, &device_(), options.c_str(), nullptr, nullptr);
   if (status != CL_SUCCESS) {
     const std::string log = build_log(program, device_);
     throw BuildError(status, std::string(stage_) + ": building " + file + " failed with OpenCL status " +
@@ -202,7 +203,7 @@ const cl::Program& Context::program(const std::string& file, const Defines& defi
 
 cl::Program Context::created(const ProgramSource& source) const {
   if (!folder_) return {context_, source.text};
-  return {context_, {device_}, {folder_->binary(source)}};
+  return folder_->program(context_, device_, source);
 }
 
 std::vector<std::pair<ProgramSource, cl::Program>> Context::programs() const {

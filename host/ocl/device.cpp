@@ -29,6 +29,30 @@ std::string type_name(cl_device_type type) {
 
 int preference(const std::string& type) { return type == "GPU" ? 0 : type == "accelerator" ? 1 : 2; }
 
+/// Whether the driver says so; one that does not may have no such call at all (rusticl of Mesa 22.3).
+bool divides_by_counts(const cl::Device& device) {
+  const auto kinds = device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
+  return device.getInfo<CL_DEVICE_PARTITION_MAX_SUB_DEVICES>() > 0 &&
+         std::find(kinds.begin(), kinds.end(), CL_DEVICE_PARTITION_BY_COUNTS) != kinds.end();
+}
+
+std::vector<std::string> lacks_of(const cl::Device& device) {
+  const auto floats = device.getInfo<CL_DEVICE_SINGLE_FP_CONFIG>();
+  const std::pair<bool, const char*> wanted[] = {
+      {floats & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT, "correctly rounded division"},
+      {floats & CL_FP_DENORM, "denormals"},
+      {floats & CL_FP_ROUND_TO_NEAREST, "rounding to nearest"},
+      {floats & CL_FP_INF_NAN, "infinity and NaN"},
+      {device.getInfo<CL_DEVICE_ENDIAN_LITTLE>(), "little-endian memory"},
+      {device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>(), "a compiler (take --programs)"},
+      {divides_by_counts(device), "division into compute units"}};
+  std::vector<std::string> lacks;
+  for (const auto& [has, what] : wanted) {
+    if (!has) lacks.push_back(what);
+  }
+  return lacks;
+}
+
 DeviceInfo describe(const cl::Device& device) {
   const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
   return {.name = ocl::trimmed(device.getInfo<CL_DEVICE_NAME>()),
@@ -39,7 +63,8 @@ DeviceInfo describe(const cl::Device& device) {
           .driver = ocl::trimmed(device.getInfo<CL_DRIVER_VERSION>()),
           .compute_units = static_cast<int>(device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>()),
           .memory_bytes = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>(),
-          .max_allocation_bytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()};
+          .max_allocation_bytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>(),
+          .lacks = lacks_of(device)};
 }
 
 bool contains(const std::string& text, const std::string& part) { return lower(text).find(part) != std::string::npos; }
@@ -87,13 +112,6 @@ std::optional<UnitRange> unit_range(const std::string& wanted) {
   const auto last = dash == std::string_view::npos ? first : number_of(units.substr(dash + 1));
   if (!first || !last) return std::nullopt;
   return UnitRange{wanted.substr(0, slash), *first, *last};
-}
-
-/// Whether the driver says so; one that does not may have no such call at all (rusticl of Mesa 22.3).
-bool divides_by_counts(const cl::Device& device) {
-  const auto kinds = device.getInfo<CL_DEVICE_PARTITION_PROPERTIES>();
-  return device.getInfo<CL_DEVICE_PARTITION_MAX_SUB_DEVICES>() > 0 &&
-         std::find(kinds.begin(), kinds.end(), CL_DEVICE_PARTITION_BY_COUNTS) != kinds.end();
 }
 
 /// The compute units `first` to `last` of `device` as a device of their own.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/ocl/program_folder.h"
 
+#include <dlfcn.h>
+
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
@@ -41,6 +43,44 @@ std::vector<std::pair<std::string, std::string>> identity(const cl::Device& devi
           {"platform_version", trimmed(platform.getInfo<CL_PLATFORM_VERSION>())}};
 }
 
+// CL_DEVICE_IL_VERSION and its call, which the headers have from OpenCL 2.1 on only; the extension's name for it.
+constexpr cl_device_info kIlVersion = 0x105b;
+using CreateWithIl = cl_program(CL_API_CALL*)(cl_context, const void*, size_t, cl_int*);
+
+bool takes_spirv(const cl::Device& device) {
+  std::size_t bytes = 0;
+  if (::clGetDeviceInfo(device(), kIlVersion, 0, nullptr, &bytes) != CL_SUCCESS || bytes == 0) return false;
+  std::string versions(bytes, '\0');
+  return ::clGetDeviceInfo(device(), kIlVersion, bytes, versions.data(), nullptr) == CL_SUCCESS &&
+         versions.find("SPIR-V") != std::string::npos;
+}
+
+cl::Program program_of_spirv(const cl::Context& context, const cl::Device& device,
+                             const std::vector<unsigned char>& module) {
+  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
+  void* call = ::clGetExtensionFunctionAddressForPlatform(platform(), "clCreateProgramWithILKHR");
+  if (!call) call = ::clGetExtensionFunctionAddressForPlatform(platform(), "clCreateProgramWithIL");
+  if (!call) call = ::dlsym(RTLD_DEFAULT, "clCreateProgramWithIL");  // of the loader, since OpenCL 2.1
+  if (!call) throw DeviceError(CL_INVALID_OPERATION, "programs: the driver has no clCreateProgramWithIL");
+  cl_int status = CL_SUCCESS;
+  cl_program program = reinterpret_cast<CreateWithIl>(call)(context(), module.data(), module.size(), &status);
+  if (status != CL_SUCCESS) throw cl::Error(status, "clCreateProgramWithIL");
+  return cl::Program(program);
+}
+
+std::string file_name(const std::string& kernel_file, const std::string& options, const char* ending) {
+  return kernel_file.substr(0, kernel_file.rfind('.')) + "-" + hash_of(options) + ending;
+}
+
+Json entry_of(const std::string& kernel_file, const std::string& options, const std::string& text,
+              const ProgramFile& file) {
+  return {{"kernel", kernel_file},
+          {"options", options},
+          {"source_hash", hash_of(text)},
+          {"file", file.name},
+          {"binary_hash", hash_of(file.bytes)}};
+}
+
 std::string read(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::string bytes;
@@ -78,8 +118,13 @@ ProgramFolder::ProgramFolder(const std::filesystem::path& folder, const cl::Devi
   const std::filesystem::path file = folder / kManifest;
   try {
     const Json manifest = read_manifest(file);
+    is_spirv_ = manifest.contains("spirv");
+    if (is_spirv_ && !takes_spirv(device)) {
+      throw InvalidArgument(file.string() + ": holds SPIR-V, which " + trimmed(device.getInfo<CL_DEVICE_NAME>()) +
+                            " does not take" + kRemedy);
+    }
     for (const auto& [name, value] : identity(device)) {
-      if (manifest.at(name) == value) continue;
+      if (is_spirv_ || manifest.at(name) == value) continue;
       throw InvalidArgument(file.string() + ": made for " + name + " \"" + manifest.at(name).get<std::string>() +
                             "\", here it is \"" + value + '"' + kRemedy);
     }
@@ -94,9 +139,10 @@ ProgramFolder::ProgramFolder(const std::filesystem::path& folder, const cl::Devi
 
 std::vector<unsigned char> ProgramFolder::binary(const ProgramSource& source) const {
   const std::string manifest = (folder_ / kManifest).string();
-  const auto found = entries_.find({source.kernel_file, source.options});
+  const std::string options = is_spirv_ ? portable(source).options : source.options;
+  const auto found = entries_.find({source.kernel_file, options});
   if (found == entries_.end()) {
-    throw InvalidArgument(manifest + ": has no " + source.kernel_file + " built with" + source.options + kRemedy);
+    throw InvalidArgument(manifest + ": has no " + source.kernel_file + " built with" + options + kRemedy);
   }
   const Entry& entry = found->second;
   if (entry.source_hash != hash_of(source.text)) {
@@ -111,6 +157,19 @@ std::vector<unsigned char> ProgramFolder::binary(const ProgramSource& source) co
   return {bytes.begin(), bytes.end()};
 }
 
+cl::Program ProgramFolder::program(const cl::Context& context, const cl::Device& device,
+                                   const ProgramSource& source) const {
+  if (is_spirv_) return program_of_spirv(context, device, binary(source));
+  return {context, {device}, {binary(source)}};
+}
+
+ProgramText portable(const ProgramSource& source) {
+  std::string defines = source.options.substr(source.device_options.size());
+  const std::string of_this_machine = " -DCOUNTS_BITS=1";
+  if (const auto at = defines.find(of_this_machine); at != std::string::npos) defines.erase(at, of_this_machine.size());
+  return {source.kernel_file, source.text, defines};
+}
+
 std::vector<ProgramFile> files_of(const cl::Device& device,
                                   const std::vector<std::pair<ProgramSource, cl::Program>>& programs) {
   Json manifest{{"format", kFormat}};
@@ -119,16 +178,32 @@ std::vector<ProgramFile> files_of(const cl::Device& device,
   std::vector<ProgramFile> files;
   for (const auto& [source, program] : programs) {
     const std::vector<unsigned char> binary = binary_of(program);
-    const std::string stem = source.kernel_file.substr(0, source.kernel_file.rfind('.'));
-    files.push_back({stem + "-" + hash_of(source.options) + ".bin", {binary.begin(), binary.end()}});
-    manifest["programs"].push_back({{"kernel", source.kernel_file},
-                                    {"options", source.options},
-                                    {"source_hash", hash_of(source.text)},
-                                    {"file", files.back().name},
-                                    {"binary_hash", hash_of(files.back().bytes)}});
+    files.push_back({file_name(source.kernel_file, source.options, ".bin"), {binary.begin(), binary.end()}});
+    manifest["programs"].push_back(entry_of(source.kernel_file, source.options, source.text, files.back()));
   }
   files.push_back({kManifest, manifest.dump(2) + '\n'});
   return files;
 }
 
 }  // namespace egosgm::ocl
+
+namespace egosgm {
+
+std::vector<ProgramFile> spirv_programs(const std::vector<ProgramText>& programs,
+                                        const std::vector<std::string>& modules) {
+  if (programs.size() != modules.size()) {
+    throw InvalidArgument("spirv_programs: " + std::to_string(programs.size()) + " programs and " +
+                          std::to_string(modules.size()) + " modules: give one for each");
+  }
+  ocl::Json manifest{{"format", ocl::kFormat}, {"spirv", "1.0"}, {"programs", ocl::Json::array()}};
+  std::vector<ProgramFile> files;
+  for (std::size_t i = 0; i < programs.size(); ++i) {
+    const auto& [kernel_file, text, options] = programs[i];
+    files.push_back({ocl::file_name(kernel_file, options, ".spv"), modules[i]});
+    manifest["programs"].push_back(ocl::entry_of(kernel_file, options, text, files.back()));
+  }
+  files.push_back({ocl::kManifest, manifest.dump(2) + '\n'});
+  return files;
+}
+
+}  // namespace egosgm

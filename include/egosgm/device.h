@@ -25,6 +25,8 @@ struct DeviceInfo {
   int compute_units = 0;
   std::uint64_t memory_bytes = 0;
   std::uint64_t max_allocation_bytes = 0;
+  /// What it does not promise of what equal bits and all of this library rest on: "denormals". Empty: nothing.
+  std::vector<std::string> lacks;
 };
 
 /// An OpenCL device. Copies refer to the same one. Thread-safe.

@@ -24,4 +24,17 @@ struct ProgramFile {
 /// Throws InvalidArgument (option), DeviceError or BuildError. Thread-safe.
 EGOSGM_EXPORT std::vector<ProgramFile> compile_programs(const Device& device, const PipelineOptions& options = {});
 
+/// A program as a compiler gets it: OpenCL C 1.2, with options like -DNAME=VALUE.
+struct ProgramText {
+  std::string kernel_file, text, options;
+};
+
+/// What `compile_programs` would build, for a compiler to SPIR-V. The same for all devices of a type.
+EGOSGM_EXPORT std::vector<ProgramText> list_programs(const Device& device, const PipelineOptions& options = {});
+
+/// The files of a folder of programs that any device of that type loads if it takes SPIR-V. `modules`: of each of
+/// `programs`, in their order.
+EGOSGM_EXPORT std::vector<ProgramFile> spirv_programs(const std::vector<ProgramText>& programs,
+                                                      const std::vector<std::string>& modules);
+
 }  // namespace egosgm

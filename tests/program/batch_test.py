@@ -79,6 +79,30 @@ class Compile(ProgramTest):
         self.assert_refused([*run, self.new_folder(), "--programs", programs], "driver", "0.0", manifest["driver"], "egosgm compile")
 
 
+    def test_spirv_for_every_device_of_the_type_is_refused_where_it_is_not_taken(self):
+        version = subprocess.run(["clang", "-dumpversion"], capture_output=True, text=True).stdout.split(".")[0] if shutil.which("clang") else ""
+        translator = next(filter(shutil.which, (f"llvm-spirv-{version}", "llvm-spirv")), None)
+        if not translator:
+            self.skipTest("no clang, or no llvm-spirv of its version")
+        programs = self.new_folder() / "programs"
+        self.assert_refused(["compile", "--il", "--clang", "no-such-clang", "--out", programs], "no-such-clang", "--clang")
+        self.assert_refused(["compile", "--il", "--llvm-spirv", "false", "--out", programs], "false failed")
+        self.assertFalse(programs.exists())
+        self.assertIn("that takes SPIR-V", self.assert_works("compile", "--il", "--llvm-spirv", translator, "--out", programs, *METHOD))
+        manifest = json.loads((programs / "manifest.json").read_text())
+        self.assertNotIn("driver", manifest)
+        for program in manifest["programs"]:
+            self.assertEqual((programs / program["file"]).read_bytes()[:4], b"\x03\x02\x23\x07", program["file"])
+            self.assertNotIn("COUNTS_BITS", program["options"])
+        run = ["run", "--odometry", self.street, "--out", self.new_folder(), "--programs", programs, *METHOD]
+        done = egosgm(*run)
+        if done.returncode != 0:  # the system's PoCL takes none; scripts/drivers runs them where they are taken
+            self.assertIn("holds SPIR-V, which", done.stderr)
+            return
+        (programs / manifest["programs"][0]["file"]).write_bytes(b"\x03\x02\x23\x07")
+        self.assert_refused([*run, "--overwrite"], "is not the file that its manifest speaks of")
+
+
 class DeviceBuffers(ProgramTest):
     """examples/device_buffers.cpp: kernels of its own before and after the pipeline's."""
 
