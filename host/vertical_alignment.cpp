@@ -27,8 +27,11 @@ VerticalOffset::VerticalOffset(ocl::Context& context) : terms(context, kTerms) {
   terms.write(context, std::vector<float>(kTerms));
 }
 
+VerticalAlignment::Sums::Sums(ocl::Context& context, shared::ImageSize size)
+    : of_rows(context, kSums * static_cast<std::size_t>(sampled_rows(size))) {}
+
 VerticalAlignment::VerticalAlignment(ocl::Context& context, shared::ImageSize size, PixelType type,
-                                     const VerticalAlignmentOptions& options, int row_group)
+                                     const VerticalAlignmentOptions& options, Sums sums, int row_group)
     : context_((context.enter("VerticalAlignment"), context)),
       size_(size),
       gain_(options.gain),
@@ -36,7 +39,7 @@ VerticalAlignment::VerticalAlignment(ocl::Context& context, shared::ImageSize si
       resample_(build(context, type, row_group_), "resample"),
       sum_rows_(build(context, type, row_group_), "sum_rows"),
       update_(build(context, type, row_group_), "update"),
-      row_sums_(context, kSums * static_cast<std::size_t>(sampled_rows(size))) {}
+      sums_(std::move(sums)) {}
 
 void VerticalAlignment::resample(const FrameImages& images, const VerticalOffset& offset, FrameImages& aligned) {
   context_.enter("VerticalAlignment");
@@ -49,8 +52,8 @@ void VerticalAlignment::estimate(const FrameImages& aligned, const Map& disparit
   context_.enter("VerticalAlignment");
   const cl_int rows = sampled_rows(size_);
   sum_rows_(context_, ocl::group_a_row({size_.width, rows}, row_group_, 1), size_, aligned.pixels, disparity,
-            row_sums_);
-  update_(context_, ocl::group_a_row({size_.width, 1}, row_group_, 1), size_, rows, gain_, row_sums_, offset.terms,
+            sums_.of_rows);
+  update_(context_, ocl::group_a_row({size_.width, 1}, row_group_, 1), size_, rows, gain_, sums_.of_rows, offset.terms,
           improved.terms);
   improved.is_known = true;
 }

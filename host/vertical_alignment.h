@@ -22,9 +22,17 @@ struct VerticalOffset {
 /// 1981 a frame) and the right image resampled, so that rows correspond.
 class VerticalAlignment {
  public:
-  /// For images of `type`. `row_group`: how many work-items share a row; 0: what suits the device.
+  /// Of each row that is looked at: see the kernel.
+  struct Sums {
+    ocl::Buffer<cl_long> of_rows;
+
+    Sums(ocl::Context& context, shared::ImageSize size);
+  };
+
+  /// For images of `type`. `sums` are overwritten. `row_group`: how many work-items share a row; 0: what suits the
+  /// device.
   VerticalAlignment(ocl::Context& context, shared::ImageSize size, PixelType type,
-                    const VerticalAlignmentOptions& options, int row_group = 0);
+                    const VerticalAlignmentOptions& options, Sums sums, int row_group = 0);
 
   /// Copies the left image of `images` to `aligned` and resamples the right one by `offset`.
   void resample(const FrameImages& images, const VerticalOffset& offset, FrameImages& aligned);
@@ -45,7 +53,7 @@ class VerticalAlignment {
   ocl::Kernel<const shared::ImageSize, const cl_int, const float, const ocl::Buffer<cl_long>, const ocl::Buffer<float>,
               ocl::Buffer<float>>
       update_;
-  ocl::Buffer<cl_long> row_sums_;  // of each sampled row: see the kernel
+  Sums sums_;
 };
 
 }  // namespace egosgm

@@ -96,7 +96,7 @@ struct Video {
   VerticalOffset offset{context};
 
   explicit Video(const Scene& scene, const VerticalAlignmentOptions& options = {})
-      : size(scene.size), alignment(context, scene.size, scene.type, options) {}
+      : size(scene.size), alignment(context, scene.size, scene.type, options, {context, scene.size}) {}
 
   FrameImages aligned(const Scene& scene) {
     const FrameImages images = upload(context, scene);
@@ -137,7 +137,7 @@ TEST_P(VerticalAlignmentTest, EqualsReference) {
   for (std::size_t i = 0; i < scene.measured.disparity.size(); i += 3) scene.measured.disparity[i] = holes.disparity[i];
 
   ocl::Context context(testing::any_device());
-  VerticalAlignment alignment(context, size, type, {.gain = 0.3f}, row_group);
+  VerticalAlignment alignment(context, size, type, {.gain = 0.3f}, {context, size}, row_group);
   const FrameImages images = upload(context, scene);
   const StereoMaps measured = testing::upload(context, size, scene.measured);
   FrameImages aligned = upload(context, scene);
