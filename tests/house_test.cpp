@@ -94,14 +94,33 @@ TEST(House, KernelsAndTheirHostKnowNothingOfOpenCv) {
   }
 }
 
+constexpr const char* kRooms[] = {"align", "predict", "search", "match", "fuse", "publish"};
+
+TEST(House, EveryRoomSaysWhatComesInAndWhatGoesOut) {
+  for (const std::string room : kRooms) {
+    const std::string text = text_of(kSource / "host" / room / "README.md");
+    for (const char* part : {"**In:**", "**Out:**"}) EXPECT_NE(text.find(part), std::string::npos) << room;
+    for (const char* folder : {"kernels", "tests", "tests/reference"}) {
+      EXPECT_TRUE(fs::is_directory(kSource / folder / room)) << folder << ": " << room;
+    }
+    for (const char* page : {"kernels/README.md", "tests/README.md"}) {
+      EXPECT_NE(text_of(kSource / page).find("| `" + room + "` |"), std::string::npos) << page << ": " << room;
+    }
+  }
+}
+
 TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
   ASSERT_GE(kernels().size(), 10u);
+  std::set<std::string> names;
   for (const fs::path& kernel : kernels()) {
-    const std::string name = kernel.stem();
+    const std::string name = kernel.stem(), room = kernel.parent_path().filename();
+    EXPECT_TRUE(std::count(std::begin(kRooms), std::end(kRooms), room)) << kernel << " is in no room";
+    EXPECT_TRUE(names.insert(name).second) << kernel << ": programs go by the names of their files";
     // A second way to a stage's bits, or its last part, shares its twin and its test, which runs all of them.
     const std::string stage = name == "banded_sgm_paths" || name == "read_off" ? "banded_sgm" : name;
-    for (const std::string& file : {"host/" + name + ".h", "host/" + name + ".cpp", "tests/reference/" + stage + ".h",
-                                    "tests/reference/" + stage + ".cpp", "tests/" + stage + "_test.cpp"}) {
+    const std::string host = "host/" + room + "/" + name, twin = "tests/reference/" + room + "/" + stage;
+    for (const std::string& file :
+         {host + ".h", host + ".cpp", twin + ".h", twin + ".cpp", "tests/" + room + "/" + stage + "_test.cpp"}) {
       EXPECT_TRUE(fs::exists(kSource / file)) << file;
     }
   }

@@ -26,7 +26,7 @@ struct Built {
   bool has(const std::string& file, const std::string& define = "") const {
     const auto programs = context.programs();
     return std::any_of(programs.begin(), programs.end(), [&](const auto& program) {
-      return program.first.file == file && program.first.options.find(define) != std::string::npos;
+      return program.first.kernel_file == file && program.first.options.find(define) != std::string::npos;
     });
   }
 
