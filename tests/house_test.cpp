@@ -42,6 +42,8 @@ std::vector<fs::path> files(const std::set<std::string>& endings,
 }
 
 std::vector<fs::path> kernels() { return files({".cl"}, {"kernels"}); }
+/// With the headers that they are made of.
+std::vector<fs::path> kernel_texts() { return files({".cl", ".h"}, {"kernels"}); }
 
 /// Bodies of the functions in a kernel file, by name.
 std::vector<std::pair<std::string, std::string>> functions(const std::string& text) {
@@ -127,7 +129,7 @@ TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
 }
 
 TEST(House, TwinsShareNothingWithTheKernelsButTheirLayouts) {
-  const std::regex foreign(R"(#\s*include\s*"(host/|CL/))");
+  const std::regex foreign(R"(#\s*include\s*"(host/|CL/|kernels/method))");
   for (const fs::path& file : files({".h", ".cpp"}, {"tests/reference"})) {
     EXPECT_FALSE(std::regex_search(text_of(file), foreign)) << file;
   }
@@ -169,7 +171,7 @@ TEST(Kernels, UseOnlyWhatEveryDeviceHasAndRoundsAlike) {
            R"(\b(native_\w+|half_(sqrt|recip|divide|exp|log)\w*|fma|mad|exp\d*|exp10|log\d*|pow\w?|sin|cos|tan|rsqrt|cbrt)\s*\()")},
       {"output", std::regex(R"(\bprintf\s*\()")},
   };
-  for (const fs::path& kernel : kernels()) {
+  for (const fs::path& kernel : kernel_texts()) {
     const std::string text = without_comments(text_of(kernel));
     for (const auto& [what, rule] : rules) {
       std::smatch match;
@@ -179,7 +181,7 @@ TEST(Kernels, UseOnlyWhatEveryDeviceHasAndRoundsAlike) {
 }
 
 TEST(Kernels, DoNotReturnBeforeABarrier) {
-  for (const fs::path& kernel : kernels()) {
+  for (const fs::path& kernel : kernel_texts()) {
     for (const auto& [name, body] : functions(without_comments(text_of(kernel)))) {
       const std::size_t last = body.rfind("barrier(");
       if (last == std::string::npos) continue;
@@ -197,8 +199,18 @@ TEST(Kernels, BeginWithTheMacroThatSaysTheyAreVectors) {
   }
 }
 
+TEST(Kernels, FitAScreenOrFive) {
+  for (const fs::path& kernel : kernel_texts()) {
+    const std::string text = text_of(kernel);
+    EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 350) << kernel;
+    for (const auto& [name, body] : functions(without_comments(text))) {
+      EXPECT_LE(std::count(body.begin(), body.end(), '\n'), 62) << kernel << ": " << name;
+    }
+  }
+}
+
 TEST(Kernels, DoNotRecur) {
-  for (const fs::path& kernel : kernels()) {
+  for (const fs::path& kernel : kernel_texts()) {
     for (const auto& [name, body] : functions(without_comments(text_of(kernel)))) {
       EXPECT_FALSE(std::regex_search(body, std::regex("\\b" + name + R"(\s*\()"))) << kernel << ": " << name;
     }

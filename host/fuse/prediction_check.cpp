@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/fuse/prediction_check.h"
 
+#include "kernels/method.h"
+
 namespace egosgm {
 namespace {
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/match/census.h"
 
+#include "kernels/method.h"
+
 namespace egosgm {
 namespace {
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "kernels/method.h"
+
 namespace egosgm {
 namespace {
 

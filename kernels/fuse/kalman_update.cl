@@ -5,6 +5,7 @@
 // as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide;
 // unless the pixels around speak against it. What is hidden by a surface nearer than the range (ForwardWarp) has no
 // disparity: whatever is measured there is a mismatch.
+#include "method.h"
 #include "pixels.h"
 
 // lint: PIXELS=1

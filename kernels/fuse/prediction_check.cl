@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether a frame's predictions were right. A gap leaves many pixels without one, a wrong motion contradicts what is
 // measured, each far more than a frame before.
+#include "method.h"
 #include "shared.h"
 
 #ifndef ROW_GROUP

@@ -8,6 +8,7 @@
 // A view's codes lie in rows of `stride` = padding + width + padding, the right view's from right to left, so that the
 // codes a pixel is compared with at growing disparities lie at growing addresses in both views. The padding repeats the
 // border's codes.
+#include "method.h"
 #include "grey.h"
 
 // lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16

@@ -2,6 +2,7 @@
 // The median of 3x3 disparities, in both views. A neighbour outside the image or without a value votes for the centre;
 // a centre without a value gets the median (the upper of two middle ones) of its neighbours if at least `fill_from` of
 // the eight have one.
+#include "method.h"
 #include "pixels.h"
 
 // lint: PIXELS=1

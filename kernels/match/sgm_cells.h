@@ -3,6 +3,7 @@
 #ifndef EGOSGM_KERNELS_SGM_CELLS_H
 #define EGOSGM_KERNELS_SGM_CELLS_H
 
+#include "method.h"
 #include "pixels.h"
 
 // Where the right view is read off the left one's sums, a right pixel takes of the left pixels that it may be the one

@@ -7,6 +7,7 @@
 // atomic maxima of keys that are ordered as they are, then variances do among the sources that reached the winner.
 // CPUs, where atomics are slow: a work-item owns a band of target rows and looks through the source rows that reach
 // into it.
+#include "method.h"
 #include "pixels.h"
 
 // lint: PIXELS=1

@@ -6,6 +6,7 @@
 // Several may land on one pixel. Each bids a key, of which the largest wins, so the result does not depend on the order
 // in which they come: d in steps of 2^-16 px, counted from one pixel below the range, so that 0 is nobody's. GPUs, a
 // pixel a work-item: atomic maxima. CPUs, where atomics are slow: a work-item owns a row.
+#include "method.h"
 #include "pixels.h"
 
 // lint: PIXELS=1

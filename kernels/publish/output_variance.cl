@@ -3,6 +3,7 @@
 // disparities around it are, and how far they jump beside it. Most surfaces are planes, whose disparities have no
 // second difference; where those around a pixel have, or where there are holes, it is likely to be wrong. Beside a jump
 // it may lie on the wrong side.
+#include "method.h"
 #include "pixels.h"
 
 // lint: PIXELS=1

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span; and
 // what CoarseMatch found there and what thin things stand above or below, where these lie elsewhere.
-#include "shared.h"
+#include "bands.h"
+#include "ridges.h"
+#include "spans.h"
 
 // lint: ROW_GROUP=1
 // lint: ROW_GROUP=64
@@ -13,143 +15,6 @@
 #ifndef __ENDIAN_LITTLE__
 #error "bands are written as words: a little-endian device"
 #endif
-
-// Eight bands at a time: PoCL's compiler does not vectorise this over work-items by itself.
-typedef struct {
-  int8 origin, chunks, first, last;
-} Bands;
-
-int8 floor_to(int8 step, int8 lane) { return lane & ~(step - 1); }
-int8 ceil_to(int8 step, int8 lane) { return floor_to(step, lane + (step - 1)); }
-
-// convert_int8_rtn for what fits, in instructions that every device has.
-int8 floor_int(float8 value) {
-  const int8 towards_zero = convert_int8(value);
-  return towards_zero + (value < convert_float8(towards_zero));
-}
-
-// The bands that search [from, to], cut to the range. A band has as few chunks as cover that, one or an even number:
-// with begin and end counted from range.min, its origin is a multiple of the step (of 1 with one chunk) in [end -
-// lanes, begin], and not above ceil_to(step, count) - lanes, so that hardly a lane lies beyond the range. If there is
-// none, the next number of chunks has one. Slack is shared out to both sides, as far as this allows. Chunks never
-// exceed SearchBand::max_chunks, because from the origin range.min that many cover everything.
-Bands bands_of(const DisparityRange range, float8 from, float8 to) {
-  const float8 lowest = range.min;
-  const float8 highest = range.min + range.count - 1;
-  from = from < lowest ? lowest : from > highest ? highest : from;
-  to = to < lowest ? lowest : to > highest ? highest : to;
-
-  const int8 begin = floor_int(from) - range.min;
-  const int8 end = 1 - floor_int(-to) - range.min;
-  const int8 has_one = end - begin <= EGOSGM_LANES;
-  int8 pairs = (end - begin + (2 * EGOSGM_LANES - 1)) / (2 * EGOSGM_LANES);
-  pairs -= ceil_to(EGOSGM_BAND_STEP, end - pairs * (2 * EGOSGM_LANES)) > floor_to(EGOSGM_BAND_STEP, begin);
-  const int8 chunks = has_one ? 1 : 2 * pairs;
-  const int8 step = has_one ? 1 : EGOSGM_BAND_STEP;
-
-  const int8 last_origin = floor_to(step, begin);
-  const int8 lanes = chunks * EGOSGM_LANES;
-  const int8 centred = floor_to(step, begin - (lanes - (end - begin)) / 2);
-  const int8 first_origin = max(ceil_to(step, end - lanes), (int8)(0));
-  const int8 limit = max(ceil_to(step, range.count) - lanes, (int8)(0));
-  const int8 origin = max(min(centred, min(last_origin, limit)), first_origin);
-
-  Bands bands;
-  bands.origin = range.min + origin;
-  bands.chunks = chunks;
-  bands.first = range.min + begin;
-  bands.last = range.min + end - 1;
-  return bands;
-}
-
-Band first_of(const Bands bands) {
-  Band band;
-  band.origin = bands.origin.s0;
-  band.chunks = bands.chunks.s0;
-  band.first = bands.first.s0;
-  band.last = bands.last.s0;
-  return band;
-}
-
-// Eight disparities of a row from x on; what lies before or beyond the row is invalid.
-float8 eight(global const float* row, int x, int width) {
-  if (x >= 0 && x + EGOSGM_BLOCK <= width) return vload8(0, row + x);
-  float values[EGOSGM_BLOCK];
-  for (int i = 0; i < EGOSGM_BLOCK; ++i) {
-    values[i] = x + i >= 0 && x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
-  }
-  return vload8(0, values);
-}
-
-// Four disparities of a row from x on; what lies before or beyond the row is invalid.
-float4 four(global const float* row, int x, int width) {
-  if (x >= 0 && x + 4 <= width) return vload4(0, row + x);
-  float values[4];
-  for (int i = 0; i < 4; ++i) values[i] = x + i >= 0 && x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
-  return vload4(0, values);
-}
-
-// Writes eight bands of two words each, as far as the row goes.
-void store_eight(global Band* row, int x, int width, uint16 words) {
-  global uint* to = (global uint*)(row + x);
-  if (x + EGOSGM_BLOCK <= width) {
-    vstore16(words, 0, to);
-    return;
-  }
-  uint values[2 * EGOSGM_BLOCK];
-  vstore16(words, 0, values);
-  for (int i = 0; i < 2 * (width - x); ++i) to[i] = values[i];
-}
-
-// What pixels that are looked through one after another span, lane by lane.
-typedef struct {
-  float8 least, most;
-  int8 count;
-} Spans;
-
-Spans no_spans() {
-  Spans spans;
-  spans.least = INFINITY;
-  spans.most = -INFINITY;
-  spans.count = 0;
-  return spans;
-}
-
-Spans with(Spans spans, const float8 d, const int8 counts) {
-  spans.least = select(spans.least, d, counts & (d < spans.least));
-  spans.most = select(spans.most, d, counts & (d > spans.most));
-  spans.count -= counts;
-  return spans;
-}
-
-BlockRange range_of(const Spans spans) {
-  BlockRange range;
-  const float4 least4 = fmin(spans.least.lo, spans.least.hi);
-  const float4 most4 = fmax(spans.most.lo, spans.most.hi);
-  const int4 count4 = spans.count.lo + spans.count.hi;
-  range.min = fmin(fmin(least4.x, least4.y), fmin(least4.z, least4.w));
-  range.max = fmax(fmax(most4.x, most4.y), fmax(most4.z, most4.w));
-  range.count = count4.x + count4.y + count4.z + count4.w;
-  return range;
-}
-
-BlockRange joined(const BlockRange a, const BlockRange b) {
-  BlockRange both;
-  both.min = b.count > 0 && (a.count == 0 || b.min < a.min) ? b.min : a.min;
-  both.max = b.count > 0 && (a.count == 0 || b.max > a.max) ? b.max : a.max;
-  both.count = a.count + b.count;
-  return both;
-}
-
-ImageSize blocks_of(const ImageSize size) {
-  ImageSize blocks;
-  blocks.width = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
-  blocks.height = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
-  return blocks;
-}
-size_t index_of(const ImageSize size, int view, int x, int y) {
-  return ((size_t)view * size.height + y) * size.width + x;
-}
 
 // A work-item a block and view.
 KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
@@ -166,30 +31,6 @@ KERNEL void gather_blocks(const ImageSize size, global const float* disparity, g
     spans = with(spans, d, d > EGOSGM_INVALID_DISPARITY);
   }
   ranges[index_of(blocks, view, x, y)] = range_of(spans);
-}
-
-float8 infinite_where_invalid(const float8 d) { return d > EGOSGM_INVALID_DISPARITY ? d : INFINITY; }
-
-// Which of the eight pixels from x on lie nearer than one of the `reach` pixels to their left by more than `step`, and
-// than one to their right. REQUIRES: reach <= 8.
-int8 ridges_from(global const float* row, int x, int width, int reach, float step) {
-  const float8 d = eight(row, x, width);
-  // Hardly ever does one lie that much nearer than anything here or to the right.
-  const float8 right_of = infinite_where_invalid(eight(row, x + 8, width));
-  const float8 around = fmin(infinite_where_invalid(d), right_of);
-  const float4 least4 = fmin(around.lo, around.hi);
-  const float2 least2 = fmin(least4.lo, least4.hi);
-  if (!any(d - step > fmin(least2.x, least2.y))) return 0;
-
-  float8 left = INFINITY;
-  float8 right = INFINITY;
-  for (int i = 1; i <= reach; ++i) {
-    const float8 before = eight(row, x - i, width);
-    const float8 after = eight(row, x + i, width);
-    left = ((before > EGOSGM_INVALID_DISPARITY) & (before < left)) ? before : left;
-    right = ((after > EGOSGM_INVALID_DISPARITY) & (after < right)) ? after : right;
-  }
-  return d > EGOSGM_INVALID_DISPARITY & left < d - step & right < d - step;
 }
 
 // What is a ridge in a block, before EdgeRejection drops it: of every other row, since poles are upright; a single
@@ -211,22 +52,6 @@ KERNEL void gather_ridges(const ImageSize size, const float step, global const f
   }
   const BlockRange found = range_of(spans);
   ridges[index_of(blocks, view, x, y)] = found.count < EGOSGM_RIDGE_MIN_COUNT ? range_of(no_spans()) : found;
-}
-
-// Keeps the EGOSGM_COARSE_OUTLIERS + 1 least values of each lane, in rising order; the most, in falling order.
-void insert_least(float4* least, float4 value) {
-  for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
-    const float4 before = least[i];
-    least[i] = value < before ? value : before;
-    value = value < before ? before : value;
-  }
-}
-void insert_most(float4* most, float4 value) {
-  for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
-    const float4 before = most[i];
-    most[i] = value > before ? value : before;
-    value = value > before ? before : value;
-  }
 }
 
 // What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "kernels/method.h"
 #include "tests/reference/fuse/kalman_update.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 
+#include "kernels/method.h"
 #include "tests/reference/predict/forward_warp.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/method.h"
 #include "tests/reference/publish/output_variance.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 namespace {
 
@@ -48,8 +50,8 @@ class View {
   /// Those to the left and to the right among them.
   bool is_between_moving(int x, int y, float sign) const {
     const std::size_t i = static_cast<std::size_t>(y) * size_.width + x;
-    return x >= EGOSGM_SUPPORT_STEP && x + EGOSGM_SUPPORT_STEP < size_.width &&
-           is_moving(i - EGOSGM_SUPPORT_STEP, sign) && is_moving(i + EGOSGM_SUPPORT_STEP, sign);
+    return x >= kSupportStep && x + kSupportStep < size_.width && is_moving(i - kSupportStep, sign) &&
+           is_moving(i + kSupportStep, sign);
   }
 
  private:
@@ -57,14 +59,14 @@ class View {
     return predicted_[i] != EGOSGM_INVALID_DISPARITY && measured_[i] != EGOSGM_INVALID_DISPARITY &&
            sign * (measured_[i] - predicted_[i]) > 0.75f;
   }
-  static bool is_near(float a, float b) { return a != EGOSGM_INVALID_DISPARITY && std::abs(a - b) < EGOSGM_SUPPORT_PX; }
+  static bool is_near(float a, float b) { return a != EGOSGM_INVALID_DISPARITY && std::abs(a - b) < kSupportPx; }
 
   template <typename Condition>
   int count(int x, int y, Condition&& condition) const {
     int found = 0;
     for (int v = -2; v <= 2; ++v) {
       for (int u = -2; u <= 2; ++u) {
-        const int column = x + u * EGOSGM_SUPPORT_STEP, row = y + v * EGOSGM_SUPPORT_STEP;
+        const int column = x + u * kSupportStep, row = y + v * kSupportStep;
         if (column < 0 || column >= size_.width || row < 0 || row >= size_.height) continue;
         found += condition(static_cast<std::size_t>(row) * size_.width + column);
       }
@@ -83,7 +85,7 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
   const bool is_hidden = !is_valid(predicted) && predicted.variance > 0;
   if (is_hidden) return kNone;
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
-  const float z = measured.disparity, escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+  const float z = measured.disparity, escaped = kEscapedVariancePx2;
   // Less than half of the 25; less than 18; 15 and more.
   const auto vouch = [&](float disparity) { return view.vouching(x, y, disparity); };
   const auto stays = [&](float other) {

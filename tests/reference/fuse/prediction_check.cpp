@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 
 shared::PredictionState check_prediction(shared::ImageSize size, const shared::PredictionState& before,
@@ -10,14 +12,14 @@ shared::PredictionState check_prediction(shared::ImageSize size, const shared::P
                                          const std::vector<float>& measured) {
   if (predicted.empty()) return {};
   shared::PredictionCounts now{};
-  for (int y = 0; y < size.height; y += EGOSGM_CHECKED_ROWS) {
+  for (int y = 0; y < size.height; y += kCheckedRows) {
     for (int x = 0; x < size.width; ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * size.width + x;
       if (predicted[i] == EGOSGM_INVALID_DISPARITY) continue;
       ++now.predicted;
       if (warped[i] == EGOSGM_INVALID_DISPARITY || measured[i] == EGOSGM_INVALID_DISPARITY) continue;
       ++now.both;
-      now.differing += std::abs(measured[i] - predicted[i]) > EGOSGM_CHECKED_DIFFERENCE_PX;
+      now.differing += std::abs(measured[i] - predicted[i]) > kCheckedDifferencePx;
     }
   }
   const shared::PredictionCounts& last = before.counts;

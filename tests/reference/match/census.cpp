@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 namespace {
 
@@ -21,7 +23,7 @@ std::vector<Offset> window(int radius_x, int radius_y) {
 }
 
 std::vector<Offset> sparse_window() {
-  constexpr int kOffsets[32][2] = EGOSGM_CENSUS13X11;
+  const auto& kOffsets = kSparseWindow;
   std::vector<Offset> offsets;
   for (const auto& offset : kOffsets) offsets.push_back({offset[0], offset[1]});
   return offsets;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 
 testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing::HostMaps& in) {
@@ -25,7 +27,7 @@ testing::HostMaps median_filter(shared::ImageSize size, bool fill, const testing
         std::sort(votes.begin(), votes.end());
         if (is_hole && (!fill || votes.size() < 6)) continue;
         out.disparity[at(x, y)] = votes[votes.size() / 2];
-        if (is_hole) out.variance[at(x, y)] = EGOSGM_FILLED_VARIANCE_PX2;
+        if (is_hole) out.variance[at(x, y)] = kFilledVariancePx2;
       }
     }
   }

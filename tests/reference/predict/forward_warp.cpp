@@ -3,6 +3,8 @@
 
 #include <cmath>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 namespace {
 
@@ -27,7 +29,7 @@ void warp_view(shared::ImageSize size, shared::DisparityRange range, const share
       const float wx = static_cast<float>(x) - m.cx, wy = static_cast<float>(y) - m.cy,
                   wd = disparity[source] + m.doffs;
       const float w = row_times(m.w, wx, wy, wd);
-      if (!(w > EGOSGM_MIN_DEPTH_RATIO)) continue;
+      if (!(w > kMinDepthRatio)) continue;
       const float phi = 1 / w;
       const float u = row_times(m.x, wx, wy, wd) * phi, v = row_times(m.y, wx, wy, wd) * phi, metric = wd * phi;
       const float d = metric - m.doffs + 0.0f;
@@ -36,7 +38,7 @@ void warp_view(shared::ImageSize size, shared::DisparityRange range, const share
       if (!(target_y >= 0 && target_y < static_cast<float>(size.height))) continue;
       if (!(d >= static_cast<float>(range.min))) continue;
       float p = phi * phi * variance[source] + process_noise_px2 + variance_of_motion(m, u, v, metric);
-      if (!(p < EGOSGM_MAX_VARIANCE_PX2)) p = EGOSGM_MAX_VARIANCE_PX2;
+      if (!(p < kMaxVariancePx2)) p = kMaxVariancePx2;
 
       const std::size_t target = static_cast<std::size_t>(target_y) * size.width + static_cast<std::size_t>(target_x);
       if (d > out_disparity[target] || (d == out_disparity[target] && p > out_variance[target])) {
@@ -48,7 +50,7 @@ void warp_view(shared::ImageSize size, shared::DisparityRange range, const share
   for (std::size_t i = 0; i < static_cast<std::size_t>(size.width) * size.height; ++i) {
     if (!(out_disparity[i] > static_cast<float>(range.min + range.count - 1))) continue;
     out_disparity[i] = EGOSGM_INVALID_DISPARITY;
-    out_variance[i] = EGOSGM_MAX_VARIANCE_PX2;
+    out_variance[i] = kMaxVariancePx2;
   }
 }
 

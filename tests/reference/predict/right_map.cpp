@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 namespace {
 
@@ -18,10 +20,10 @@ std::vector<float> landed(shared::ImageSize size, int min_disparity, const testi
   for (std::size_t i = 0; i < nearest.size(); ++i) {
     const float d = maps.disparity[i], right_x = std::nearbyint(static_cast<float>(i % width) - d);
     if (d == kNone || !(right_x >= 0 && right_x < static_cast<float>(width))) continue;
-    const float steps = (d - static_cast<float>(min_disparity) + 1) * EGOSGM_RIGHT_MAP_STEPS_PER_PX;
+    const float steps = (d - static_cast<float>(min_disparity) + 1) * kRightMapStepsPerPx;
     const float whole = static_cast<float>(static_cast<std::uint32_t>(steps));
     float& there = nearest[i / width * width + static_cast<std::size_t>(right_x)];
-    there = std::max(there, whole / EGOSGM_RIGHT_MAP_STEPS_PER_PX - 1 + static_cast<float>(min_disparity));
+    there = std::max(there, whole / kRightMapStepsPerPx - 1 + static_cast<float>(min_disparity));
   }
   return nearest;
 }

@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 
 std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, float min_difference_px,
                                       const testing::HostMaps& predicted, const testing::HostMaps& measured) {
   std::vector<std::uint8_t> marks(static_cast<std::size_t>(size.width) * size.height, 0);
-  const int radius = EGOSGM_DYNAMIC_RADIUS;
+  const int radius = kDynamicRadius;
   const auto index = [&](int x, int y) { return static_cast<std::size_t>(y) * size.width + x; };
   const auto has_both = [&](std::size_t i) {
     return predicted.disparity[i] != EGOSGM_INVALID_DISPARITY && measured.disparity[i] != EGOSGM_INVALID_DISPARITY;
@@ -26,7 +28,7 @@ std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, float min_differen
           different += std::abs(measured.disparity[i] - predicted.disparity[i]) > min_difference_px;
         }
       }
-      if (both >= EGOSGM_DYNAMIC_MIN_COUNT && 2 * different >= both) marks[index(x, y)] = 255;
+      if (both >= kDynamicMinCount && 2 * different >= both) marks[index(x, y)] = 255;
     }
   }
   return marks;

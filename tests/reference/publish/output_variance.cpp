@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 namespace {
 
@@ -21,9 +23,9 @@ struct Plane {
 
 float second_difference(float before, float at, float after) {
   for (const float d : {before, at, after}) {
-    if (d == EGOSGM_INVALID_DISPARITY) return EGOSGM_MAX_ROUGHNESS_PX;
+    if (d == EGOSGM_INVALID_DISPARITY) return kMaxRoughnessPx;
   }
-  return std::min(std::abs(before + after - 2 * at), EGOSGM_MAX_ROUGHNESS_PX);
+  return std::min(std::abs(before + after - 2 * at), kMaxRoughnessPx);
 }
 
 std::vector<float> roughness(const Plane& disparity) {
@@ -57,25 +59,25 @@ float window_mean(const Plane& plane, int x, int y, int radius, int step) {
               [&](int v) { return mean(x, radius, step, plane.size.width, [&](int u) { return plane(u, v); }); });
 }
 
-/// The largest of the differences to the valid disparities EGOSGM_JUMP_DISTANCE pixels off, to eight sides.
+/// The largest of the differences to the valid disparities kJumpDistance pixels off, to eight sides.
 float jump_beside(const Plane& disparity, int x, int y) {
   float most = 0;
-  for (const int dy : {-EGOSGM_JUMP_DISTANCE, 0, EGOSGM_JUMP_DISTANCE}) {
-    for (const int dx : {-EGOSGM_JUMP_DISTANCE, 0, EGOSGM_JUMP_DISTANCE}) {
+  for (const int dy : {-kJumpDistance, 0, kJumpDistance}) {
+    for (const int dx : {-kJumpDistance, 0, kJumpDistance}) {
       const int u = x + dx, v = y + dy;
       if (u < 0 || u >= disparity.size.width || v < 0 || v >= disparity.size.height) continue;
       if (disparity(u, v) == EGOSGM_INVALID_DISPARITY) continue;
       most = std::max(most, std::abs(disparity(u, v) - disparity(x, y)));
     }
   }
-  return std::min(most, EGOSGM_MAX_JUMP_PX);
+  return std::min(most, kMaxJumpPx);
 }
 
 /// (p r^3)^(1/4) of every pixel of both views, each cut.
 std::vector<float> blends(const testing::HostMaps& maps, const testing::HostMaps& measured) {
   std::vector<float> out;
   for (std::size_t i = 0; i < maps.variance.size(); ++i) {
-    const float most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
+    const float most = kMaxMeanVariancePx2;
     const bool is_measured = measured.disparity[i] != EGOSGM_INVALID_DISPARITY;
     const float r = is_measured ? std::min(measured.variance[i], most) : most;
     out.push_back(std::sqrt(r * std::sqrt(r * std::min(maps.variance[i], most))));
@@ -101,8 +103,8 @@ std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceO
     const std::vector<float> rough = roughness(disparity);
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) {
-        const float p = window_mean(variance, x, y, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP);
-        const float r = window_mean({size, rough.data()}, x, y, EGOSGM_ROUGHNESS_RADIUS, 1);
+        const float p = window_mean(variance, x, y, kVarianceRadius, kVarianceStep);
+        const float r = window_mean({size, rough.data()}, x, y, kRoughnessRadius, 1);
         const bool is_valid = disparity(x, y) != EGOSGM_INVALID_DISPARITY;
         const float j = jump_beside(disparity, x, y);
         const float sum =

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "tests/reference/method.h"
+
 namespace egosgm::reference {
 namespace {
 
@@ -48,9 +50,9 @@ std::pair<float, float> found_around(shared::ImageSize size, const std::vector<f
       found.push_back(4 * d);
     }
   }
-  if (found.size() < EGOSGM_COARSE_MIN_COUNT) return {kInfinity, -kInfinity};
+  if (found.size() < kCoarseMinCount) return {kInfinity, -kInfinity};
   std::sort(found.begin(), found.end());
-  return {found[EGOSGM_COARSE_OUTLIERS], found[found.size() - 1 - EGOSGM_COARSE_OUTLIERS]};
+  return {found[kCoarseOutliers], found[found.size() - 1 - kCoarseOutliers]};
 }
 
 /// Is it nearer than something close on its left, and on its right?
@@ -99,14 +101,14 @@ void join(std::pair<float, float>& range, std::pair<float, float> other) {
 /// What the ridges of the warped and of the coarse map span in each block, and in those above and below.
 std::vector<std::pair<float, float>> ridges_around(shared::ImageSize size, shared::ImageSize blocks, float step,
                                                    const std::vector<float>& warped, const std::vector<float>& coarse) {
-  const auto fine = ridges_of(size, blocks, EGOSGM_BLOCK, 2, warped, EGOSGM_RIDGE_REACH, step, EGOSGM_RIDGE_MIN_COUNT);
+  const auto fine = ridges_of(size, blocks, EGOSGM_BLOCK, 2, warped, kRidgeReach, step, kRidgeMinCount);
   const auto found = ridges_of({(size.width + 3) / 4, (size.height + 3) / 4}, blocks, EGOSGM_BLOCK / EGOSGM_COARSE, 1,
-                               coarse, EGOSGM_COARSE_RIDGE_REACH, step / 2, 1);
+                               coarse, kCoarseRidgeReach, step / 2, 1);
   std::vector<std::pair<float, float>> around(fine.size(), {kInfinity, -kInfinity});
   for (int i = 0; i < static_cast<int>(fine.size()); ++i) {
     const int view = i / (blocks.width * blocks.height);
     const int y = i / blocks.width % blocks.height, x = i % blocks.width;
-    for (int v = std::max(0, y - EGOSGM_RIDGE_BLOCKS); v <= std::min(blocks.height - 1, y + EGOSGM_RIDGE_BLOCKS); ++v) {
+    for (int v = std::max(0, y - kRidgeBlocks); v <= std::min(blocks.height - 1, y + kRidgeBlocks); ++v) {
       const int near = (view * blocks.height + v) * blocks.width + x;
       join(around[i], fine[near]);
       join(around[i], {4 * found[near].first, 4 * found[near].second});
