@@ -14,10 +14,10 @@ file(WRITE ${preamble} "#pragma OPENCL FP_CONTRACT OFF\n")
 # A block that SPIR-V has no vector for is refused by name, before a translator ends the process for it.
 add_test(NAME kernels.block.refuses_32_lanes_in_spirv
          COMMAND ${EGOSGM_CLANG} -x cl -cl-std=CL1.2 -target spir64-unknown-unknown -Xclang -finclude-default-header -DBLOCK=32
-                 -fsyntax-only ${PROJECT_SOURCE_DIR}/kernels/block.h)
+                 -I ${PROJECT_SOURCE_DIR}/kernels -fsyntax-only ${PROJECT_SOURCE_DIR}/kernels/match/block.h)
 set_tests_properties(kernels.block.refuses_32_lanes_in_spirv PROPERTIES TIMEOUT 60 PASS_REGULAR_EXPRESSION "BLOCK: 16")
 
-file(GLOB kernels CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/kernels/*.cl)
+file(GLOB kernels CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/kernels/*/*.cl)
 foreach(kernel IN LISTS kernels)
   cmake_path(GET kernel STEM name)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${kernel})
@@ -34,7 +34,7 @@ foreach(kernel IN LISTS kernels)
     list(TRANSFORM defines PREPEND -D)
     add_test(NAME ${test}
              COMMAND ${EGOSGM_CLANG} -x cl -cl-std=CL1.2 -target spir64-unknown-unknown -Xclang -finclude-default-header
-                     -include ${preamble} -Wall -Wextra -Wno-unused-parameter -Werror ${defines} -fsyntax-only ${kernel})
+                     -include ${preamble} -I ${PROJECT_SOURCE_DIR}/kernels -Wall -Wextra -Wno-unused-parameter -Werror ${defines} -fsyntax-only ${kernel})
     set_tests_properties(${test} PROPERTIES TIMEOUT 60)
   endforeach()
 endforeach()

@@ -70,8 +70,9 @@ Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration&
     : options_(options),
       work_(context, size, options),
       unknown_(context),
-      alignment_([&context, size, alignment = options.vertical_alignment, group = tuning.row_group](PixelType type) {
-        return VerticalAlignment(context, size, type, alignment, group);
+      alignment_([=, &context, sums = VerticalAlignment::Sums(context, size),
+                  alignment = options.vertical_alignment](PixelType type) {
+        return VerticalAlignment(context, size, type, alignment, sums, tuning.row_group);
       }),
       search_(context, size, options, tuning),
       match_(context, size, options, tuning),

@@ -26,12 +26,12 @@ const char* to_string(Unpredicted reason) {
 }
 
 Pipeline::Pipeline(const Calibration& calibration, int width, int height, const PipelineOptions& options,
-                   const Device& device) {
+                   const Device& device, PixelType type) {
   calibration.validate();
   options.validate();
   FrameTransfer::validate_size(width, height);
   impl_ = ocl::translated("Pipeline", [&] {
-    return std::make_unique<Impl>(calibration, shared::ImageSize{width, height}, options, device);
+    return std::make_unique<Impl>(calibration, shared::ImageSize{width, height}, options, device, type);
   });
 }
 

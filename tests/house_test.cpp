@@ -42,6 +42,8 @@ std::vector<fs::path> files(const std::set<std::string>& endings,
 }
 
 std::vector<fs::path> kernels() { return files({".cl"}, {"kernels"}); }
+/// With the headers that they are made of.
+std::vector<fs::path> kernel_texts() { return files({".cl", ".h"}, {"kernels"}); }
 
 /// Bodies of the functions in a kernel file, by name.
 std::vector<std::pair<std::string, std::string>> functions(const std::string& text) {
@@ -94,21 +96,40 @@ TEST(House, KernelsAndTheirHostKnowNothingOfOpenCv) {
   }
 }
 
+constexpr const char* kRooms[] = {"align", "predict", "search", "match", "fuse", "publish"};
+
+TEST(House, EveryRoomSaysWhatComesInAndWhatGoesOut) {
+  for (const std::string room : kRooms) {
+    const std::string text = text_of(kSource / "host" / room / "README.md");
+    for (const char* part : {"**In:**", "**Out:**"}) EXPECT_NE(text.find(part), std::string::npos) << room;
+    for (const char* folder : {"kernels", "tests", "tests/reference"}) {
+      EXPECT_TRUE(fs::is_directory(kSource / folder / room)) << folder << ": " << room;
+    }
+    for (const char* page : {"kernels/README.md", "tests/README.md"}) {
+      EXPECT_NE(text_of(kSource / page).find("| `" + room + "` |"), std::string::npos) << page << ": " << room;
+    }
+  }
+}
+
 TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
   ASSERT_GE(kernels().size(), 10u);
+  std::set<std::string> names;
   for (const fs::path& kernel : kernels()) {
-    const std::string name = kernel.stem();
+    const std::string name = kernel.stem(), room = kernel.parent_path().filename();
+    EXPECT_TRUE(std::count(std::begin(kRooms), std::end(kRooms), room)) << kernel << " is in no room";
+    EXPECT_TRUE(names.insert(name).second) << kernel << ": programs go by the names of their files";
     // A second way to a stage's bits, or its last part, shares its twin and its test, which runs all of them.
     const std::string stage = name == "banded_sgm_paths" || name == "read_off" ? "banded_sgm" : name;
-    for (const std::string& file : {"host/" + name + ".h", "host/" + name + ".cpp", "tests/reference/" + stage + ".h",
-                                    "tests/reference/" + stage + ".cpp", "tests/" + stage + "_test.cpp"}) {
+    const std::string host = "host/" + room + "/" + name, twin = "tests/reference/" + room + "/" + stage;
+    for (const std::string& file :
+         {host + ".h", host + ".cpp", twin + ".h", twin + ".cpp", "tests/" + room + "/" + stage + "_test.cpp"}) {
       EXPECT_TRUE(fs::exists(kSource / file)) << file;
     }
   }
 }
 
 TEST(House, TwinsShareNothingWithTheKernelsButTheirLayouts) {
-  const std::regex foreign(R"(#\s*include\s*"(host/|CL/))");
+  const std::regex foreign(R"(#\s*include\s*"(host/|CL/|kernels/method))");
   for (const fs::path& file : files({".h", ".cpp"}, {"tests/reference"})) {
     EXPECT_FALSE(std::regex_search(text_of(file), foreign)) << file;
   }
@@ -150,7 +171,7 @@ TEST(Kernels, UseOnlyWhatEveryDeviceHasAndRoundsAlike) {
            R"(\b(native_\w+|half_(sqrt|recip|divide|exp|log)\w*|fma|mad|exp\d*|exp10|log\d*|pow\w?|sin|cos|tan|rsqrt|cbrt)\s*\()")},
       {"output", std::regex(R"(\bprintf\s*\()")},
   };
-  for (const fs::path& kernel : kernels()) {
+  for (const fs::path& kernel : kernel_texts()) {
     const std::string text = without_comments(text_of(kernel));
     for (const auto& [what, rule] : rules) {
       std::smatch match;
@@ -160,7 +181,7 @@ TEST(Kernels, UseOnlyWhatEveryDeviceHasAndRoundsAlike) {
 }
 
 TEST(Kernels, DoNotReturnBeforeABarrier) {
-  for (const fs::path& kernel : kernels()) {
+  for (const fs::path& kernel : kernel_texts()) {
     for (const auto& [name, body] : functions(without_comments(text_of(kernel)))) {
       const std::size_t last = body.rfind("barrier(");
       if (last == std::string::npos) continue;
@@ -178,8 +199,18 @@ TEST(Kernels, BeginWithTheMacroThatSaysTheyAreVectors) {
   }
 }
 
+TEST(Kernels, FitAScreenOrFive) {
+  for (const fs::path& kernel : kernel_texts()) {
+    const std::string text = text_of(kernel);
+    EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 350) << kernel;
+    for (const auto& [name, body] : functions(without_comments(text))) {
+      EXPECT_LE(std::count(body.begin(), body.end(), '\n'), 62) << kernel << ": " << name;
+    }
+  }
+}
+
 TEST(Kernels, DoNotRecur) {
-  for (const fs::path& kernel : kernels()) {
+  for (const fs::path& kernel : kernel_texts()) {
     for (const auto& [name, body] : functions(without_comments(text_of(kernel)))) {
       EXPECT_FALSE(std::regex_search(body, std::regex("\\b" + name + R"(\s*\()"))) << kernel << ": " << name;
     }

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "egosgm/pipeline.h"
-#include "host/prediction_check.h"
-#include "host/vertical_alignment.h"
+#include "host/fuse/prediction_check.h"
+#include "host/align/vertical_alignment.h"
 
 namespace egosgm {
 

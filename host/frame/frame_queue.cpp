@@ -15,7 +15,7 @@ ocl::Context context_on(const Device::Handle& device) {
 }  // namespace
 
 FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options,
-                       const Device& device)
+                       const Device& device, PixelType type)
     : options_(options),
       device_(device),
       size_(size),
@@ -24,14 +24,14 @@ FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, c
       transfers_{{{context_, size, range_of(options)}, {context_, size, range_of(options)}}},
       memory_{{{context_, size}, {context_, size}, {context_, size}}},
       belief_(memory_.front()) {
-  method_.prepare(PixelType::kU8);
-  method_.prepare(PixelType::kU16);
+  method_.prepare(type);
 }
 
 void FrameQueue::submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
                         const FrameOutputs& outputs) {
   expect_device_frame_not_failed();
   expect_none_failed();
+  method_.prepare(left.type);
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};
   release_results();
@@ -66,6 +66,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
 
 DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done) {
   expect_device_frame_not_failed();
+  method_.prepare(images.type);
   FrameTransfer& transfer = free_transfer();
   Belief after = free_memory();
   ocl::Drain drain{context_};

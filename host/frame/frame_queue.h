@@ -17,7 +17,7 @@ namespace egosgm {
 class FrameQueue {
  public:
   FrameQueue(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options,
-             const Device& device);
+             const Device& device, PixelType type);
   ~FrameQueue() { context_.drain(); }
   FrameQueue(const FrameQueue&) = delete;
   FrameQueue& operator=(const FrameQueue&) = delete;

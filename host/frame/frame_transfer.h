@@ -8,9 +8,9 @@
 #include "egosgm/pipeline.h"
 #include "host/maps.h"
 #include "host/ocl/host_memory.h"
-#include "host/search_band.h"
-#include "host/stripes.h"
-#include "host/vertical_alignment.h"
+#include "host/search/search_band.h"
+#include "host/match/stripes.h"
+#include "host/align/vertical_alignment.h"
 
 namespace egosgm {
 

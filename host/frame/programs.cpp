@@ -9,14 +9,27 @@
 #include "host/tuning_defaults.h"
 
 namespace egosgm {
-
 namespace {
 
-// Of images of the least size: no define depends on it.
+/// With every stage that can be on.
+PipelineOptions all_stages(PipelineOptions options) {
+  options.temporal = true;
+  options.search = SearchMode::kBand;
+  options.coarse_match.enabled = true;
+  options.vertical_alignment.enabled = true;
+  options.median_filter.enabled = true;
+  options.sad_check.max_difference = 1;
+  options.output_variance.enabled = true;
+  return options;
+}
+
+// Of images of the least size, as no define depends on it, and of both types.
 std::vector<std::pair<ocl::ProgramSource, cl::Program>> programs_of(const Device& device,
                                                                     const PipelineOptions& options) {
   const Calibration any{.fx = 1, .fy = 1, .cx = 0, .cy = 0, .baseline_m = 1};
-  return FrameQueue(any, shared::ImageSize{1, 1}, options, device).context().programs();
+  FrameQueue frames(any, shared::ImageSize{1, 1}, all_stages(options), device, PixelType::kU8);
+  frames.method().prepare(PixelType::kU16);
+  return frames.context().programs();
 }
 
 }  // namespace

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/consistency_check.h"
+#include "host/match/consistency_check.h"
 #include "host/frame/plan.h"
-#include "host/kalman_update.h"
-#include "host/median_filter.h"
+#include "host/fuse/kalman_update.h"
+#include "host/match/median_filter.h"
 #include "host/predict/predict_room.h"
-#include "host/prediction_check.h"
-#include "host/right_map.h"
-#include "host/sad_check.h"
+#include "host/fuse/prediction_check.h"
+#include "host/predict/right_map.h"
+#include "host/fuse/sad_check.h"
 
 namespace egosgm {
 

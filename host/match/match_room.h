@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/consistency_check.h"
+#include "host/match/consistency_check.h"
 #include "host/frame/plan.h"
 #include "host/match/matcher.h"
-#include "host/median_filter.h"
-#include "host/prediction_check.h"
-#include "host/speckle_removal.h"
+#include "host/match/median_filter.h"
+#include "host/fuse/prediction_check.h"
+#include "host/match/speckle_removal.h"
 
 namespace egosgm {
 

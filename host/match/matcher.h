@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/banded_sgm.h"
-#include "host/census.h"
-#include "host/step_penalties.h"
+#include "host/match/banded_sgm.h"
+#include "host/match/census.h"
+#include "host/match/step_penalties.h"
 
 namespace egosgm {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/consistency_check.h"
-#include "host/edge_rejection.h"
-#include "host/forward_warp.h"
+#include "host/match/consistency_check.h"
+#include "host/predict/edge_rejection.h"
+#include "host/predict/forward_warp.h"
 #include "host/frame/plan.h"
-#include "host/hole_fill.h"
-#include "host/right_map.h"
+#include "host/predict/hole_fill.h"
+#include "host/predict/right_map.h"
 
 namespace egosgm {
 

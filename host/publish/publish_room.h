@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/dynamic_map.h"
+#include "host/publish/dynamic_map.h"
 #include "host/frame/plan.h"
-#include "host/output_variance.h"
+#include "host/publish/output_variance.h"
 #include "host/predict/predict_room.h"
 
 namespace egosgm {

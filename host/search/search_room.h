@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/coarse_match.h"
+#include "host/search/coarse_match.h"
 #include "host/predict/predict_room.h"
-#include "host/prediction_check.h"
-#include "host/search_band.h"
+#include "host/fuse/prediction_check.h"
+#include "host/search/search_band.h"
 
 namespace egosgm {
 

@@ -78,10 +78,10 @@ struct FrameReport {
 /// Not thread-safe; two pipelines may run in two threads, also on one device.
 class EGOSGM_EXPORT Pipeline {
  public:
-  /// Builds the kernels and allocates all memory for images of exactly `width` x `height`.
-  /// Throws InvalidArgument (size, calibration, option), DeviceError or BuildError.
+  /// Allocates all memory for images of exactly `width` x `height`, and builds the kernels for those of `type`; what
+  /// the other type needs is built before its first frame. Throws InvalidArgument, DeviceError or BuildError.
   Pipeline(const Calibration& calibration, int width, int height, const PipelineOptions& options = {},
-           const Device& device = Device::select());
+           const Device& device = Device::select(), PixelType type = PixelType::kU8);
   ~Pipeline();
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;

@@ -3,22 +3,22 @@
 
 #include <algorithm>
 
-#include "tests/reference/banded_sgm.h"
-#include "tests/reference/census.h"
-#include "tests/reference/coarse_match.h"
-#include "tests/reference/consistency_check.h"
-#include "tests/reference/dynamic_map.h"
-#include "tests/reference/edge_rejection.h"
-#include "tests/reference/forward_warp.h"
-#include "tests/reference/hole_fill.h"
-#include "tests/reference/kalman_update.h"
-#include "tests/reference/median_filter.h"
-#include "tests/reference/output_variance.h"
-#include "tests/reference/prediction_check.h"
-#include "tests/reference/right_map.h"
-#include "tests/reference/sad_check.h"
-#include "tests/reference/speckle_removal.h"
-#include "tests/reference/step_penalties.h"
+#include "tests/reference/match/banded_sgm.h"
+#include "tests/reference/match/census.h"
+#include "tests/reference/search/coarse_match.h"
+#include "tests/reference/match/consistency_check.h"
+#include "tests/reference/publish/dynamic_map.h"
+#include "tests/reference/predict/edge_rejection.h"
+#include "tests/reference/predict/forward_warp.h"
+#include "tests/reference/predict/hole_fill.h"
+#include "tests/reference/fuse/kalman_update.h"
+#include "tests/reference/match/median_filter.h"
+#include "tests/reference/publish/output_variance.h"
+#include "tests/reference/fuse/prediction_check.h"
+#include "tests/reference/predict/right_map.h"
+#include "tests/reference/fuse/sad_check.h"
+#include "tests/reference/match/speckle_removal.h"
+#include "tests/reference/match/step_penalties.h"
 
 namespace egosgm::reference {
 

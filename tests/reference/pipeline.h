@@ -8,8 +8,8 @@
 
 #include "egosgm/options.h"
 #include "kernels/shared.h"
-#include "tests/reference/search_band.h"
-#include "tests/reference/vertical_alignment.h"
+#include "tests/reference/align/vertical_alignment.h"
+#include "tests/reference/search/search_band.h"
 #include "tests/support/random_maps.h"
 
 namespace egosgm::reference {
@@ -30,8 +30,8 @@ struct Pass {
   std::vector<int> images;
   std::vector<float> coarse;  // disparities of both views at a quarter of the resolution
   SearchBands band;
-  std::vector<std::uint32_t> codes;     // as kernels/census.cl lays them out
-  std::vector<std::uint8_t> penalties;  // as kernels/step_penalties.cl does
+  std::vector<std::uint32_t> codes;     // as kernels/match/census.cl lays them out
+  std::vector<std::uint8_t> penalties;  // as kernels/match/step_penalties.cl does
   testing::HostMaps matched, smoothed, consistent, measured;
   VerticalOffset offset;  // after this pass; by it the next one is resampled
 };

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "egosgm/pipeline.h"
-#include "host/forward_warp.h"
+#include "host/predict/forward_warp.h"
 #include "tests/reference/pipeline.h"
 #include "tests/support/frame_memory.h"
 #include "tests/support/scene.h"

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/fuse/kalman_update.h"
+
+#include <limits>
+
+namespace egosgm {
+namespace {
+
+const cl::Program& build(ocl::Context& context, int pixels) {
+  context.enter("KalmanUpdate");
+  return context.program("kalman_update.cl", ocl::Defines().set("PIXELS", pixels));
+}
+
+// 1 / sigmas^2; 0: of none.
+float weight_of(float sigmas) { return sigmas > 0 ? 1 / (sigmas * sigmas) : 0.0f; }
+
+}  // namespace
+
+KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options,
+                           int pixels)
+    : context_((context.enter("KalmanUpdate"), context)),
+      size_(size),
+      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
+      gate_px_(options.gate_px > 0 ? options.gate_px : std::numeric_limits<float>::max()),
+      keep_predicted_(options.keep_predicted),
+      ask_neighbours_(options.ask_neighbours),
+      innovation_weight_(weight_of(options.innovation_sigmas)),
+      min_variance_px2_(options.min_variance_px2),
+      update_(build(context, pixels_), "update") {}
+
+void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check, const Map& warped,
+                              const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated,
+                              Views views) {
+  context_.enter("KalmanUpdate");
+  update_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, gate_px_, keep_predicted_,
+          ask_neighbours_, innovation_weight_, min_variance_px2_, check, warped, predicted.disparity,
+          predicted.variance, measured.disparity, measured.variance, updated.disparity, updated.variance);
+}
+
+}  // namespace egosgm

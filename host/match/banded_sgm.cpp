@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/match/banded_sgm.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <numeric>
+
+#include "egosgm/error.h"
+#include "host/match/census.h"
+
+namespace egosgm {
+namespace {
+
+int ceil_div(int a, int b) { return (a + b - 1) / b; }
+
+/// Vectors of two chunks in the larger of kernels/match/block.h. One is read, and of a slot one is left, where a vector
+/// ends.
+constexpr int kBlockVectors = 2;
+
+std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  const int vectors = (SearchBand::max_chunks(range) + 1) / 2;
+  const std::size_t slot = static_cast<std::size_t>(vectors + kBlockVectors * 2) * 2 * EGOSGM_LANES;
+  return 2 * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
+}
+
+/// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind a chunk, as two are read at once.
+std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  const std::size_t pixels = 2 * pixel_count(size) + size.width;
+  return (pixels * SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
+}
+
+const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+                         BandedSgm::Tile tile) {
+  ocl::Defines defines;
+  defines.set("MAX_CHUNKS", SearchBand::max_chunks(range))
+      .set("PATHS", options.paths)
+      .set("CODE_BYTES", 4 * Census::words(options.cost))
+      .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
+      .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
+      .set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
+      .set("TILE_WIDTH", tile.width)
+      .set("TILE_HEIGHT", tile.height)
+      .set("PIXELS", ocl::pixels_a_work_item(context));
+  if (tile.block_lanes > 0) defines.set("BLOCK", tile.block_lanes);
+  if (ocl::counts_bits(context)) defines.set("COUNTS_BITS", 1);
+  return context.program("banded_sgm.cl", defines);
+}
+
+bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
+  if (scheduling != Scheduling::kAutomatic) return scheduling == Scheduling::kPaths;
+  return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
+}
+
+/// What a match takes on the device.
+struct Demand {
+  std::uint64_t largest_buffer, total;
+};
+
+Demand demand(shared::ImageSize size, shared::DisparityRange range, bool paths) {
+  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(size, range) : sum_bytes(size, range);
+  const std::uint64_t ranks = ReadOff::bytes(size, BandedSgm::code_padding(range));
+  if (paths) return {sums, 4 * sums + ranks};
+  const std::uint64_t slots = slot_bytes(size, range), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
+  return {std::max({sums, slots, winners}), sums + slots + winners + ranks};
+}
+
+std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCost cost) {
+  return Census::words(cost, {width, 1}, BandedSgm::code_padding(range)) / 2;
+}
+
+/// How many rows can be matched at once. A quarter of the memory is left to all else.
+int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                 const BandedSgmOptions& options) {
+  const bool paths = follows_paths(context, options.scheduling);
+  const std::uint64_t memory = context.device().getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>() / 4 * 3;
+  const std::uint64_t device_limit = memory - std::min(memory, context.allocated_bytes());
+  const std::uint64_t chosen = static_cast<std::uint64_t>(options.max_memory_mib) << 20;
+  const std::uint64_t total_limit = chosen > 0 ? std::min(chosen, device_limit) : device_limit;
+  const auto fits = [&](int rows, std::uint64_t copies) {
+    const Demand needs = demand({size.width, rows}, range, paths);
+    return needs.largest_buffer <= context.max_allocation_bytes() && needs.total + copies <= total_limit;
+  };
+  if (fits(size.height, 0)) return size.height;
+  const std::size_t words = code_words_a_row(size.width, range, options.cost);
+  int rows = size.height;
+  while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
+  const int least = 3 * BandedSgm::kStripeOverlap;
+  if (rows >= least) return rows;
+  const std::uint64_t needed = demand({size.width, std::min(size.height, least)}, range, paths).total;
+  throw DeviceError(
+      CL_MEM_OBJECT_ALLOCATION_FAILURE,
+      "BandedSgm: a stripe of " + std::to_string(std::min(size.height, least)) + " rows needs " +
+          std::to_string((needed >> 20) + 1) + " MiB, " +
+          (chosen > 0 && chosen < device_limit ? "banded_sgm.max_memory_mib allows " : "the device has left ") +
+          std::to_string(total_limit >> 20) + " MiB and buffers of at most " +
+          std::to_string(context.max_allocation_bytes() >> 20) +
+          " MiB: choose fewer disparities, a smaller image or another device");
+}
+
+}  // namespace
+
+BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                                const BandedSgmOptions& options, Tile chosen)
+    : tile(chosen),
+      slots(context, slot_bytes(size, range)),
+      sums(context, sum_bytes(size, range)),
+      winners(context, 2 * pixel_count(size)),
+      to_middle(build(context, range, options, tile), "sweep_to_middle"),
+      from_middle(build(context, range, options, tile), "sweep_from_middle"),
+      refine(build(context, range, options, tile), "refine") {}
+
+BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                     const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group)
+    : BandedSgm(context, size, range, options, group, Tile()) {}
+
+BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                     const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile,
+                     Launches launches)
+    : context_((context.enter("BandedSgm"), context)),
+      size_{size.width, rows_at_once(context, size, range, options)},
+      stripes_(cut_into_stripes(size.height, size_.height, kStripeOverlap)),
+      parameters_{size_.width,
+                  size_.height,
+                  range.min,
+                  range.count,
+                  code_padding(range),
+                  options.p1,
+                  options.s_max,
+                  options.variance_floor_px2,
+                  options.variance_per_step_px2,
+                  options.variance_per_square_px2,
+                  /*reads_off=*/0},
+      launches_(launches),
+      read_off_(context, size_, code_padding(range)) {
+  if (follows_paths(context, options.scheduling)) {
+    paths_.emplace(context, size_, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
+  } else {
+    wavefront_.emplace(context, size_, range, options, tile);
+  }
+  if (stripes_.size() > 1) {
+    stripe_memory_.emplace(context, size, range, size_.height, code_words_a_row(size.width, range, options.cost));
+  }
+}
+
+void BandedSgm::operator()(const MatchInputs& image, StereoMaps& measured, Views views) {
+  match_stripes(image, measured, views, /*reads_off=*/false);
+}
+
+void BandedSgm::reading_off(const MatchInputs& image, StereoMaps& measured) {
+  match_stripes(image, measured, Views::kLeft, /*reads_off=*/true);
+}
+
+void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off) {
+  context_.enter("BandedSgm");
+  if (!stripe_memory_) return match(image, measured, views, reads_off);
+  for (const Stripe& stripe : stripes_) {
+    stripe_memory_->load(image, stripe);
+    match(stripe_memory_->inputs(), stripe_memory_->measured(), views, reads_off);
+    stripe_memory_->store(stripe, measured);
+  }
+}
+
+void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off) {
+  shared::SgmParameters parameters = parameters_;
+  parameters.reads_off = reads_off;
+  if (reads_off) read_off_.clear();
+  if (paths_) {
+    (*paths_)(parameters, inputs, measured, read_off_.ranks(), views);
+  } else {
+    sweep(parameters, inputs, measured, views);
+  }
+  if (reads_off) read_off_(parameters, measured);
+}
+
+void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
+                      Views views) {
+  Wavefront& wavefront = *wavefront_;
+  const Tile tile = wavefront.tile;
+  const int tile_rows = ceil_div(ceil_div(size_.height, 2), tile.height);
+  const int tile_columns = ceil_div(size_.width + tile.height, tile.width) + 1;
+  const bool is_whole = takes_whole_sweeps(views);
+  const ocl::Range tiles{cl::NDRange(is_whole ? 1 : tile_rows, count(views), 2), cl::NDRange(1, 1, 1)};
+  const int first_wave = is_whole ? EGOSGM_ALL_TILES : 0;
+  const int end_wave = is_whole ? EGOSGM_ALL_TILES + 1 : tile_columns + 2 * (tile_rows - 1);
+
+  wavefront.slots.fill(context_, 255);
+  for (cl_int wave = first_wave; wave < end_wave; ++wave) {
+    wavefront.to_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
+                        inputs.bands.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums);
+  }
+  for (cl_int wave = first_wave; wave < end_wave; ++wave) {
+    wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
+                          inputs.bands.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums,
+                          wavefront.winners, read_off_.ranks());
+  }
+  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), count(views)),
+                   parameters, wavefront.winners, measured.disparity, measured.variance);
+}
+
+bool BandedSgm::takes_whole_sweeps(Views views) const {
+  if (launches_ != Launches::kAutomatic) return launches_ == Launches::kSweeps;
+  return context_.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(2 * count(views));
+}
+
+int BandedSgm::matched_rows() const {
+  return std::accumulate(stripes_.begin(), stripes_.end(), 0, [](int sum, const Stripe& s) { return sum + s.rows; });
+}
+
+int BandedSgm::code_padding(shared::DisparityRange range) {
+  return std::abs(range.min) + (SearchBand::max_chunks(range) + 2 * kBlockVectors) * EGOSGM_LANES;
+}
+
+}  // namespace egosgm

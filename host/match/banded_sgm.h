@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/match/banded_sgm_paths.h"
+#include "host/match/read_off.h"
+#include "host/match/stripes.h"
+#include "host/ocl/kernel.h"
+#include "host/search/search_band.h"
+#include "host/tuning_defaults.h"
+
+namespace egosgm {
+
+/// Semi-global matching of both views in their bands: disparity and matching variance. Two ways to the same bits:
+/// diagonal wavefronts (see kernels/match/banded_sgm.cl) and a few work-items a path (see
+/// kernels/match/banded_sgm_paths.cl).
+///
+/// Its memory grows with width x height x disparities. Where that is more than the device holds, or than the options
+/// allow, the image is matched in horizontal stripes, one after the other in the same memory. Paths then begin
+/// kStripeOverlap rows above and below a stripe instead of at the image's edge.
+class BandedSgm {
+ public:
+  /// Of a wavefront; at most as high as wide. `block_lanes`: disparities that are matched at once, 16 or 32 (see
+  /// kernels/match/block.h); 0: what suits the compiler.
+  struct Tile {
+    int width = kCpuTuning.tile_width, height = kCpuTuning.tile_height;
+    int block_lanes = 0;
+  };
+
+  /// Of the wavefronts, two sweeps a view, to the middle of the image and from there: one for every wave of tiles, or
+  /// one for each half of the way, whose work-items take a sweep each and wait for nobody. Automatic: the latter where
+  /// the device has no more compute units than there are sweeps.
+  enum class Launches { kAutomatic, kWaves, kSweeps };
+
+  /// `group`: how paths share work-groups, where they do; by default what suits the device. `tile`, `launches`: where
+  /// they do not. Same bits.
+  BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+            const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group = {});
+  BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+            const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile,
+            Launches launches = Launches::kAutomatic);
+
+  /// Rows around a stripe from which paths come into it.
+  static constexpr int kStripeOverlap = 32;
+  /// In which the image is matched; one: as a whole.
+  const std::vector<Stripe>& stripes() const { return stripes_; }
+  /// Of all stripes: those where they overlap are matched more than once.
+  int matched_rows() const;
+
+  /// Matches `views`. Of the inputs' codes, which Census makes with a padding of `code_padding(range)`, both views' are
+  /// read; of penalties and bands, theirs.
+  void operator()(const MatchInputs& image, StereoMaps& measured, Views views);
+  /// Matches the left view, and reads the right one's disparities off its sums: half of the work, whole disparities.
+  void reading_off(const MatchInputs& image, StereoMaps& measured);
+
+  static int code_padding(shared::DisparityRange range);
+
+  using ToMiddle = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
+                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
+                               ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
+  using FromMiddle =
+      ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
+                  const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
+                  ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>, ocl::Buffer<cl_uint>>;
+  using Refine =
+      ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
+
+ private:
+  struct Wavefront {
+    Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+              const BandedSgmOptions& options, Tile tile);
+
+    Tile tile;
+    ocl::Buffer<cl_uchar> slots;  // path costs under way, one row of disparities a path, sweep and view
+    ocl::Buffer<cl_uchar> sums;   // of the sweep that comes first, 8 bits a cell
+    ocl::Buffer<cl_ulong> winners;
+    ToMiddle to_middle;
+    FromMiddle from_middle;
+    Refine refine;
+  };
+
+  void match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off);
+  void match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off);
+  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured, Views views);
+  bool takes_whole_sweeps(Views views) const;
+
+  ocl::Context& context_;
+  const shared::ImageSize size_;  // of what is matched at once: the image, or a stripe
+  const std::vector<Stripe> stripes_;
+  const shared::SgmParameters parameters_;
+  const Launches launches_;
+  ReadOff read_off_;
+  std::optional<StripeMemory> stripe_memory_;  // where there is more than one
+  std::optional<Wavefront> wavefront_;         // one of the two
+  std::optional<BandedSgmPaths> paths_;
+};
+
+}  // namespace egosgm

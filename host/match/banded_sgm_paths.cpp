@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/match/banded_sgm_paths.h"
+
+#include <algorithm>
+
+#include "host/match/census.h"
+#include "host/search/search_band.h"
+
+namespace egosgm {
+namespace {
+
+// Stages of kernels/match/banded_sgm_paths.cl.
+constexpr int kStraight = 0;
+constexpr int kDiagonals[] = {1, 2};
+
+constexpr int kQuad = 4;
+constexpr int kGroupSize = 32;
+
+int groups_of(int lines, int lines_a_group) { return (lines + lines_a_group - 1) / lines_a_group; }
+
+const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+                         BandedSgmPaths::Group group) {
+  return context.program("banded_sgm_paths.cl", ocl::Defines()
+                                                    .set("MAX_CHUNKS", SearchBand::max_chunks(range))
+                                                    .set("PATHS", options.paths)
+                                                    .set("CODE_BYTES", 4 * Census::words(options.cost))
+                                                    .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
+                                                    .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
+                                                    .set("LANES", group.lanes)
+                                                    .set("LINES", group.lines)
+                                                    .set("PIXELS", 1));
+}
+
+}  // namespace
+
+BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range) {
+  // A GPU holds more work-items than an image's paths have with a few quads each.
+  const bool is_gpu = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU;
+  const int quads_a_lane = is_gpu ? 1 : 4;
+  const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), is_gpu ? kGroupSize : 256));
+  const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / kQuad;
+  int lanes = 1;
+  while (lanes * quads_a_lane < quads && 2 * lanes <= limit) lanes *= 2;
+  return {lanes, std::max(1, std::min(limit, kGroupSize) / lanes)};
+}
+
+std::size_t BandedSgmPaths::sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
+  return 2 * pixel_count(size) * (SearchBand::max_chunks(range) * EGOSGM_LANES + kQuad);
+}
+
+BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                               const BandedSgmOptions& options, Group group)
+    : context_(context),
+      size_(size),
+      paths_(options.paths),
+      group_(group),
+      forward_first_(context, sum_bytes(size, range)),
+      forward_second_(context, sum_bytes(size, range)),
+      backward_first_(context, sum_bytes(size, range)),
+      backward_second_(context, sum_bytes(size, range)),
+      follow_paths_(build(context, range, options, group), "follow_paths"),
+      find_winners_(build(context, range, options, group), "find_winners") {}
+
+void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs,
+                            Views views) {
+  const int groups = stage == kStraight ? groups_of(size_.height, group_.lines) + groups_of(size_.width, group_.lines)
+                                        : groups_of(size_.width + size_.height - 1, group_.lines);
+  const int work_items = group_.lanes * group_.lines;
+  const ocl::Range lines{cl::NDRange(work_items, groups, 2 * count(views)), cl::NDRange(work_items, 1, 1)};
+  const cl_int view_count = count(views);
+  follow_paths_(context_, lines, parameters, stage, view_count, inputs.codes, inputs.penalties, inputs.bands.bands,
+                inputs.bands.cell_offsets, forward_first_, forward_second_, backward_first_, backward_second_);
+}
+
+void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs,
+                                StereoMaps& measured, ocl::Buffer<cl_uint>& ranks, Views views) {
+  follow(kStraight, parameters, inputs, views);
+  if (paths_ == 8) {
+    for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);
+  }
+  const int work_items = group_.lanes * group_.lines;
+  const ocl::Range pixels{cl::NDRange(static_cast<std::size_t>(groups_of(size_.width, group_.lines)) * work_items,
+                                      size_.height, count(views)),
+                          cl::NDRange(work_items, 1, 1)};
+  find_winners_(context_, pixels, parameters, inputs.codes, inputs.bands.bands, inputs.bands.cell_offsets,
+                forward_first_, forward_second_, backward_first_, backward_second_, measured.disparity,
+                measured.variance, ranks);
+}
+
+}  // namespace egosgm

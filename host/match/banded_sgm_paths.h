@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/match/stripes.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// How BandedSgm runs on GPUs: a few work-items follow each path across the image (see
+/// kernels/match/banded_sgm_paths.cl).
+class BandedSgmPaths {
+ public:
+  /// Work-items that share a path, a power of two, and paths that share a work-group.
+  struct Group {
+    int lanes, lines;
+  };
+
+  BandedSgmPaths(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                 const BandedSgmOptions& options, Group group);
+
+  /// As BandedSgm.
+  void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
+                  ocl::Buffer<cl_uint>& ranks, Views views);
+
+  /// A quad of disparities a lane on GPUs, else a few, and a group that fills a GPU's smallest unit, as far as the
+  /// device allows it.
+  static Group default_group(const ocl::Context& context, shared::DisparityRange range);
+  /// Of one of the four buffers of partial sums: a byte a cell, and a quad a pixel, whose band may begin within one.
+  static std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range);
+
+ private:
+  using Parameters = const shared::SgmParameters;
+  using Codes = const ocl::Buffer<cl_uint>;
+  using Penalties = const ocl::Buffer<cl_uchar>;
+  using Bands = const ocl::Buffer<shared::Band>;
+  using Offsets = const ocl::Buffer<cl_uint>;
+  using Sums = ocl::Buffer<cl_uchar>;
+  using Maps = ocl::Buffer<float>;
+
+  void follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs, Views views);
+
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const int paths_;
+  const Group group_;
+  Sums forward_first_, forward_second_, backward_first_, backward_second_;  // partial sums of paths
+  ocl::Kernel<Parameters, const cl_int, const cl_int, Codes, Penalties, Bands, Offsets, Sums, Sums, Sums, Sums>
+      follow_paths_;
+  ocl::Kernel<Parameters, Codes, Bands, Offsets, const Sums, const Sums, const Sums, const Sums, Maps, Maps,
+              ocl::Buffer<cl_uint>>
+      find_winners_;
+};
+
+}  // namespace egosgm

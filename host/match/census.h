@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/image.h"
+#include "egosgm/options.h"
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// What matching compares: a code a pixel of both views, in padded rows, the right view's from right to left (see
+/// kernels/match/census.cl).
+class Census {
+ public:
+  /// Codes may be read up to `padding` pixels outside the image. `pixels`: of a work-item, 1 or 16; 0: what suits the
+  /// device. Same bits.
+  Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding, int pixels = 0);
+
+  /// `images`: both views' pixels, the left view first, without gaps.
+  void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes);
+
+  /// 32-bit words of a code, and of all codes.
+  static int words(MatchingCost cost) { return cost == MatchingCost::kCensus9x7 ? 2 : 1; }
+  static std::size_t words(MatchingCost cost, shared::ImageSize size, int padding) {
+    return 2 * (static_cast<std::size_t>(size.width) + 2 * static_cast<std::size_t>(padding)) * size.height *
+           words(cost);
+  }
+
+  using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>>;
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const cl_int padding_;
+  const int pixels_;
+  Kernel census_;
+};
+
+}  // namespace egosgm

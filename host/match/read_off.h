@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/maps.h"
+#include "host/ocl/kernel.h"
+
+namespace egosgm {
+
+/// The right view's disparities, whole ones, by the ranks that BandedSgm leaves there while it matches the left view
+/// (see kernels/match/sgm_cells.h).
+class ReadOff {
+ public:
+  /// `code_padding`: of the rows of ranks.
+  ReadOff(ocl::Context& context, shared::ImageSize size, int code_padding);
+
+  static std::size_t bytes(shared::ImageSize size, int code_padding);
+
+  /// For no left pixel to have been there.
+  void clear() { ranks_.fill(context_, ~cl_uint{0}); }
+  ocl::Buffer<cl_uint>& ranks() { return ranks_; }
+
+  /// Writes the right half of both maps.
+  void operator()(const shared::SgmParameters& parameters, StereoMaps& measured);
+
+ private:
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  ocl::Buffer<cl_uint> ranks_;
+  ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_uint>, ocl::Buffer<float>, ocl::Buffer<float>>
+      read_off_;
+};
+
+}  // namespace egosgm

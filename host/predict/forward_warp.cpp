@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/predict/forward_warp.h"
+
+namespace egosgm {
+namespace {
+
+const cl::Program& build(ocl::Context& context, int pixels) {
+  context.enter("ForwardWarp");
+  return context.program("forward_warp.cl", ocl::Defines().set("PIXELS", pixels));
+}
+
+// Gamma of eq. 1: (x - cx, y - cy, d + doffs, 1) ~ Gamma (X, Y, Z, 1).
+Eigen::Matrix4d disparity_from_space(const Calibration& calibration) {
+  Eigen::Matrix4d gamma = Eigen::Matrix4d::Zero();
+  gamma(0, 0) = calibration.fx;
+  gamma(1, 1) = calibration.fy;
+  gamma(2, 3) = calibration.fx * calibration.baseline_m;
+  gamma(3, 2) = 1;
+  return gamma;
+}
+
+// The motion as the view's own camera sees it: B^-1 T B for the right one.
+Eigen::Isometry3d motion_of_view(const Calibration& calibration, const Eigen::Isometry3d& current_from_previous,
+                                 int view) {
+  if (view == EGOSGM_LEFT) return current_from_previous;
+  const Eigen::Translation3d left_from_right(calibration.baseline_m, 0, 0);
+  return left_from_right.inverse() * current_from_previous * left_from_right;
+}
+
+void set_row(shared::f32 (&row)[4], const Eigen::Matrix4d& h, int index) {
+  for (int column = 0; column < 4; ++column) row[column] = static_cast<float>(h(index, column));
+}
+
+// A left perturbation moves the depth by dZ' = dt_z + w_x Y' - w_y X', and the disparity by -(d'^2 / (fx b)) dZ', where
+// X' d' = (x' - cx) b and Y' d' = (y' - cy) b fx / fy: so a disparity near zero divides nothing. X' is the left
+// camera's; the right one's is smaller by b.
+void set_noise(shared::DisparityMotion& motion, const Calibration& calibration,
+               const Eigen::Matrix<double, 6, 6>& covariance, double shift_m) {
+  constexpr int kTz = 2, kWx = 3, kWy = 4;
+  const double x = -2 * covariance(kTz, kWy), y = 2 * covariance(kTz, kWx);
+  const double xx = covariance(kWy, kWy), xy = -2 * covariance(kWx, kWy), yy = covariance(kWx, kWx);
+  const double one = covariance(kTz, kTz) + x * shift_m + xx * shift_m * shift_m;
+  const double by_d = 1 / (calibration.fx * calibration.baseline_m), by_u = 1 / calibration.fx,
+               by_v = 1 / calibration.fy;
+  motion.noise_dd = static_cast<float>(one * by_d * by_d);
+  motion.noise_dx = static_cast<float>((x + 2 * xx * shift_m) * by_d * by_u);
+  motion.noise_dy = static_cast<float>((y + xy * shift_m) * by_d * by_v);
+  motion.noise_xx = static_cast<float>(xx * by_u * by_u);
+  motion.noise_xy = static_cast<float>(xy * by_u * by_v);
+  motion.noise_yy = static_cast<float>(yy * by_v * by_v);
+}
+
+}  // namespace
+
+shared::DisparityMotion disparity_motion(const Calibration& calibration, const Motion& current_from_previous,
+                                         int view) {
+  const Eigen::Matrix4d gamma = disparity_from_space(calibration);
+  const Eigen::Isometry3d motion = motion_of_view(calibration, current_from_previous.current_from_previous, view);
+  const Eigen::Matrix4d h = gamma * motion.matrix() * gamma.inverse();
+  const bool is_right = view == EGOSGM_RIGHT;
+
+  shared::DisparityMotion result{};
+  set_row(result.x, h, 0);
+  set_row(result.y, h, 1);
+  set_row(result.w, h, 3);
+  result.cx = static_cast<float>(calibration.cx + (is_right ? calibration.doffs_px : 0));
+  result.cy = static_cast<float>(calibration.cy);
+  result.doffs = static_cast<float>(calibration.doffs_px);
+  set_noise(result, calibration, current_from_previous.covariance, is_right ? calibration.baseline_m : 0);
+  return result;
+}
+
+ForwardWarp::Atomics::Atomics(ocl::Context& context, shared::ImageSize size)
+    : move(build(context, 1), "move"),
+      splat_disparity(build(context, 1), "splat_disparity"),
+      splat_variance(build(context, 1), "splat_variance"),
+      decode(build(context, 1), "decode"),
+      landed(context, 2 * pixel_count(size)),
+      moved_key(context, 2 * pixel_count(size)),
+      moved_variance(context, 2 * pixel_count(size)),
+      zbuffer(context, 2 * pixel_count(size)) {}
+
+ForwardWarp::Bands::Bands(ocl::Context& context, shared::ImageSize size)
+    : find_spans(build(context, 16), "find_spans"),
+      splat_bands(build(context, 16), "splat_bands"),
+      spans(context, 4 * static_cast<std::size_t>(size.height)) {}
+
+ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
+                         const ForwardWarpOptions& options, shared::DisparityRange range, int pixels, int band_rows)
+    : context_((context.enter("ForwardWarp"), context)),
+      size_(size),
+      calibration_(calibration),
+      options_(options),
+      range_(range),
+      band_rows_(band_rows) {
+  if (pixels == 1 || (pixels == 0 && ocl::pixels_a_work_item(context) == 1)) {
+    atomics_.emplace(context, size);
+  } else {
+    bands_.emplace(context, size);
+  }
+}
+
+void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted,
+                             Views views) {
+  context_.enter("ForwardWarp");
+  Motion motion = current_from_previous;
+  motion.covariance *= static_cast<double>(options_.motion_noise);
+  const shared::DisparityMotion left = disparity_motion(calibration_, motion, EGOSGM_LEFT);
+  const shared::DisparityMotion right = disparity_motion(calibration_, motion, EGOSGM_RIGHT);
+  if (bands_) {
+    auto& [find_spans, splat_bands, spans] = *bands_;
+    const int bands = (size_.height + band_rows_ - 1) / band_rows_;
+    find_spans(context_, ocl::every_row(context_, size_, count(views)), size_, left, right, belief.disparity, spans);
+    splat_bands(context_, ocl::every_row(context_, {1, bands}, count(views)), size_, range_, left, right,
+                options_.process_noise_px2, band_rows_, spans, belief.disparity, belief.variance, predicted.disparity,
+                predicted.variance);
+    return;
+  }
+  const ocl::Range pixels = ocl::every_pixel(context_, size_, count(views));
+  auto& [move, splat_disparity, splat_variance, decode, landed, moved_key, moved_variance, zbuffer] = *atomics_;
+  move(context_, pixels, size_, range_, left, right, options_.process_noise_px2, belief.disparity, belief.variance,
+       landed, moved_key, moved_variance, zbuffer, predicted.variance);
+  splat_disparity(context_, pixels, size_, landed, moved_key, zbuffer);
+  splat_variance(context_, pixels, size_, landed, moved_key, moved_variance, zbuffer, predicted.variance);
+  decode(context_, pixels, size_, range_, zbuffer, predicted.disparity, predicted.variance);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/publish/output_variance.h"
+
+namespace egosgm {
+namespace {
+
+const cl::Program& build(ocl::Context& context, int pixels) {
+  context.enter("OutputVariance");
+  return context.program("output_variance.cl", ocl::Defines().set("PIXELS", pixels));
+}
+
+}  // namespace
+
+OutputVariance::OutputVariance(ocl::Context& context, shared::ImageSize size, const OutputVarianceOptions& options,
+                               int pixels)
+    : context_((context.enter("OutputVariance"), context)),
+      size_(size),
+      options_(options),
+      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
+      roughness_(context, 2 * pixel_count(size)),
+      mean_variance_(context, 2 * pixel_count(size)),
+      mean_roughness_(context, 2 * pixel_count(size)),
+      of_each_pixel_(build(context, pixels_), "of_each_pixel"),
+      row_means_(build(context, pixels_), "row_means"),
+      combine_(build(context, pixels_), "combine") {}
+
+void OutputVariance::operator()(const StereoMaps& maps, const StereoMaps& measured, Map& variance, Views views) {
+  context_.enter("OutputVariance");
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, count(views));
+  of_each_pixel_(context_, pixels, size_, maps.disparity, maps.variance, measured.disparity, measured.variance,
+                 variance, roughness_);
+  row_means_(context_, pixels, size_, variance, roughness_, mean_variance_, mean_roughness_);
+  combine_(context_, pixels, size_, options_.scale, options_.roughness_weight, options_.jump_weight, maps.disparity,
+           mean_variance_, mean_roughness_, variance);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/search/coarse_match.h"
+
+#include <algorithm>
+
+namespace egosgm {
+namespace {
+
+int floor_div(int a, int b) { return a / b - (a % b < 0); }
+
+const cl::Program& build(ocl::Context& context, PixelType type) {
+  context.enter("CoarseMatch");
+  return context.program("coarse_match.cl", ocl::Defines()
+                                                .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
+                                                .set("PIXELS", ocl::pixels_a_work_item(context)));
+}
+
+}  // namespace
+
+shared::ImageSize CoarseMatch::coarse_size(shared::ImageSize size) {
+  return {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE, (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
+}
+
+shared::DisparityRange CoarseMatch::coarse_range(shared::DisparityRange range) {
+  const int first = floor_div(range.min, EGOSGM_COARSE);
+  const int last = floor_div(range.min + range.count - 1, EGOSGM_COARSE);
+  return {first, last - first + 1};
+}
+
+BandedSgmOptions CoarseMatch::matcher(const PipelineOptions& options) {
+  BandedSgmOptions coarse = options.banded_sgm;
+  coarse.cost = MatchingCost::kCensus5x5;
+  coarse.p1 = options.coarse_match.p1;
+  coarse.p2 = options.coarse_match.p2;
+  coarse.p2_at_edges = options.coarse_match.p2_at_edges;
+  return coarse;
+}
+
+Shrink::Shrink(ocl::Context& context, shared::ImageSize size, PixelType type)
+    : context_(context), size_(size), shrink_(build(context, type), "shrink") {}
+
+void Shrink::operator()(const FrameImages& images, FrameImages& coarse) {
+  context_.enter("CoarseMatch");
+  const shared::ImageSize coarse_size = CoarseMatch::coarse_size(size_);
+  const int at_once = ocl::pixels_a_work_item(context_) == 1 ? 1 : EGOSGM_COARSE;
+  shrink_(context_, ocl::every_pixel(context_, {(coarse_size.width + at_once - 1) / at_once, coarse_size.height}),
+          size_, images.pixels, coarse.pixels);
+}
+
+CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options)
+    : context_((context.enter("CoarseMatch"), context)),
+      coarse_(coarse_size(size)),
+      range_(coarse_range({options.min_disparity, options.disparities})),
+      max_difference_px_(options.coarse_match.max_difference_px),
+      shrink_([=, &context](PixelType type) { return Shrink(context, size, type); }),
+      matcher_(context, coarse_, range_, matcher(options)),
+      consistency_(context, coarse_),
+      everything_(context, coarse_, range_),
+      images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(coarse_)), PixelType::kU16},
+      matched_(context, 2 * pixel_count(coarse_)) {
+  matcher_.prepare(PixelType::kU16);
+}
+
+void CoarseMatch::operator()(const FrameImages& images, StereoMaps& found) {
+  const ocl::Context::Within within(context_, "CoarseMatch");
+  shrink_[images.type](images, images_);
+  StereoMaps matched{matched_, found.variance};
+  matcher_(images_, everything_, matched, Views::kBoth);
+  consistency_(matched_, max_difference_px_, OutsideView::kDrop, found.disparity, found.variance);
+}
+
+std::uint64_t CoarseMatch::matched_cells() const {
+  const std::uint64_t lanes = static_cast<std::uint64_t>(SearchBand::max_chunks(range_)) * EGOSGM_LANES;
+  return 2 * lanes * coarse_.width * matcher_.banded_sgm().matched_rows();
+}
+
+}  // namespace egosgm

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. An innovation z - d' of more
+// deviations than p' + r allows says that p' is too small, so p' grows. Where the two contradict each other, by more
+// than the gate or because the measurement escaped its band, or where most pixels around are off to the same side,
+// as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide;
+// unless the pixels around speak against it. What is hidden by a surface nearer than the range (ForwardWarp) has no
+// disparity: whatever is measured there is a mismatch.
+#include "method.h"
+#include "pixels.h"
+
+// lint: PIXELS=1
+// lint: PIXELS=16
+
+// What the pixels around say of a measurement and of the prediction `other`: how many measure the former, how many
+// vouch for either, as their prediction and their measurement are near it.
+typedef struct {
+  Floats measuring, for_measured, for_other;
+} Support;
+
+static Support ask_around(const ImageSize size, const int x, const int y, const Floats measured, const Floats other,
+                          global const float* predictions, global const float* measurements) {
+  Support support = {0.0f, 0.0f, 0.0f};
+  const Floats near = EGOSGM_SUPPORT_PX;
+  for (int v = y - EGOSGM_SUPPORT_RADIUS; v <= y + EGOSGM_SUPPORT_RADIUS; v += EGOSGM_SUPPORT_STEP) {
+    if (v < 0 || v >= size.height) continue;
+    const size_t row = (size_t)v * size.width;
+    for (int u = x - EGOSGM_SUPPORT_RADIUS; u <= x + EGOSGM_SUPPORT_RADIUS; u += EGOSGM_SUPPORT_STEP) {
+      const Floats z = load_pixels(measurements + row, u, size.width);
+      const Floats d = load_pixels(predictions + row, u, size.width);
+      const Ints measures = fabs(z - measured) < near;
+      support.measuring += one_where(measures);
+      support.for_measured += one_where(measures & (fabs(d - measured) < near));
+      support.for_other += one_where((fabs(z - other) < near) & (fabs(d - other) < near));
+    }
+  }
+  return support;
+}
+
+static Ints is_off_to(const Floats side, const Floats d, const Floats z) {
+  return (d > INVALID) & (z > INVALID) & ((z - d) * side > (Floats)(EGOSGM_MOVING_AROUND_PX));
+}
+
+// Which of `moves` do so together with EGOSGM_MOVING_COUNT of the 25 around. The two beside are asked first and no row
+// once too many are not off: that decides nearly everywhere.
+static Ints move_together(const ImageSize size, const int x, const int y, const Floats side, Ints moves,
+                          global const float* predictions, global const float* measurements) {
+  const int step = EGOSGM_SUPPORT_STEP;
+  for (int u = x - step; u <= x + step && any_of(moves); u += 2 * step) {
+    const size_t row = (size_t)y * size.width;
+    moves &= is_off_to(side, load_pixels(predictions + row, u, size.width),
+                       load_pixels(measurements + row, u, size.width));
+  }
+  const Floats needed = EGOSGM_MOVING_COUNT;
+  Floats off = 0.0f;
+  for (int v = y - EGOSGM_SUPPORT_RADIUS; v <= y + EGOSGM_SUPPORT_RADIUS && any_of(moves); v += step) {
+    const int is_inside = v >= 0 && v < size.height;
+    const size_t row = is_inside ? (size_t)v * size.width : 0;
+    for (int u = x - EGOSGM_SUPPORT_RADIUS; is_inside && u <= x + EGOSGM_SUPPORT_RADIUS; u += step) {
+      off += one_where(is_off_to(side, load_pixels(predictions + row, u, size.width),
+                                 load_pixels(measurements + row, u, size.width)));
+    }
+    const Floats to_come = (y + EGOSGM_SUPPORT_RADIUS - v) / step * 5;
+    moves &= off + to_come >= needed;
+  }
+  return moves;
+}
+
+// `check`: of this frame; wrong predictions would vouch for each other, so that nobody is asked, and every innovation
+// of more than a deviation raises p'.
+// `warped`: the prediction before anything was dropped from it; may be `updated`. ask_neighbours: whether a prediction
+// that is nearer than what contradicts it stays, once, if more than twice as many of the pixels around vouch for it and
+// less than half measure the other; whether both go if none vouches for either and less than half measure it, or less
+// than EGOSGM_SUPPORT_MOST where the prediction was dropped; and whether a measurement is taken that differs as those
+// of EGOSGM_MOVING_COUNT around do. innovation_weight: p' is raised until this times the squared innovation is no more
+// than p' + r; 0: never.
+KERNEL void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
+                   const float innovation_weight, const float min_variance, global const PredictionState* check,
+                   global const float* warped, global const float* predicted, global const float* predicted_variance,
+                   global const float* measured, global const float* measured_variance, global float* updated,
+                   global float* updated_variance) {
+  const int width = size.width;
+  const int y = get_global_id(1);
+  const size_t view = (size_t)get_global_id(2) * size.height * width;
+  const size_t row = view + (size_t)y * width;
+  const int are_right = (check->is_wrong == 0) & (check->was_wrong == 0);
+  const int asks = ask_neighbours & are_right;
+  const float weight = are_right || innovation_weight <= 0.0f ? innovation_weight : fmax(innovation_weight, 1.0f);
+
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(predicted + row, x, width);
+    const Floats z = load_pixels(measured + row, x, width);
+    const Floats p = load_pixels(predicted_variance + row, x, width);
+    const Floats r = load_pixels(measured_variance + row, x, width);
+    const Ints has_prediction = d > INVALID;
+    const Ints has_measurement = (z > INVALID) & ~is_hidden(d, p);
+    const Floats escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+    const Ints has_both = has_prediction & has_measurement;
+    const Ints fuses = has_both & (fabs(z - d) <= gate) & (r < escaped);
+    const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
+
+    const Floats zero = 0.0f;
+    const Floats innovation = z - d;
+    const Floats unexplained = weight * innovation * innovation - r;
+    const Floats prior = p > unexplained ? p : unexplained;
+    const Floats sum = prior + r;
+    const Floats gain = sum > zero ? prior / sum : zero;
+    const Floats fused = d + gain * innovation;
+    const Floats fused_variance = (1.0f - gain) * prior;
+
+    const Floats contradicted = r < escaped ? escaped : r;
+    Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
+    Floats variance = fuses ? fused_variance : has_both ? contradicted : has_measurement ? r : p;
+
+    const Floats other = has_prediction ? d : load_pixels(warped + row, x, width);
+    const Ints was_dropped = (d <= INVALID) & (other > INVALID) & (fabs(z - other) > gate);
+    const Ints is_doubtful = has_measurement & (was_dropped | (has_prediction & !fuses & (p < escaped) & (z < other)));
+    const Floats moving = EGOSGM_MOVING_PX;
+    Ints moves = fuses & (fabs(innovation) > moving);
+    if (asks && any_of(is_doubtful)) {
+      const Support support = ask_around(size, x, y, z, other, predicted + view, measured + view);
+      const Floats half_of_them = EGOSGM_SUPPORT_HALF;
+      const Floats most_of_them = EGOSGM_SUPPORT_MOST;
+      const Ints stays = is_doubtful & (z < other) & (2.0f * support.for_measured < support.for_other) &
+                         (support.measuring < half_of_them);
+      const Ints goes = is_doubtful & (support.for_measured <= zero) &
+                        (support.measuring < (was_dropped ? most_of_them : half_of_them));
+      value = stays ? other : goes ? INVALID : value;
+      variance = stays ? escaped : variance;
+    }
+    if (asks && any_of(moves)) {
+      const Floats side = innovation > zero ? (Floats)(1.0f) : (Floats)(-1.0f);
+      moves = move_together(size, x, y, side, moves, predicted + view, measured + view);
+      value = moves ? z : value;
+      variance = moves ? escaped : variance;
+    }
+    const Floats least = min_variance;
+    const Floats bounded = variance < least ? least : variance;
+    store_pixels(value, updated + row, x, width);
+    store_pixels(value > INVALID ? bounded : zero, updated_variance + row, x, width);
+  }
+}

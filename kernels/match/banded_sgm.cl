@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+// Semi-global matching (Hirschmueller 2008) in a band per pixel, on diagonal wavefronts.
+//
+// Four of the eight paths come to a pixel from pixels that a sweep from the top left has done: from the left, the upper
+// left, above and the upper right. The other four are the same sweep over the image turned by 180 degrees. So two
+// sweeps do it all. They need each other's sums only where both have been: each goes to the middle of the image first,
+// the forward one down to it and the backward one up, and then on, over the sums of the other one, to the winners.
+//
+// In a sweep, a pixel needs the one before it and three of the row above; tiles skewed by a column a row need the tiles
+// to the left, above and to the upper right, so all tiles (i, j) with j + 2 i = wave run at once: a launch a wave, a
+// work-item a tile. Where a device has no more compute units than there are sweeps, a work-item takes all tiles of a
+// sweep up to the middle or from there, row by row, and nobody waits.
+//
+// Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d
+// +- 1) + P1, P2(p, q)), which is the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of
+// q, or outside the disparity range. The sweep that comes first leaves half the sum of its four paths, in 8 bits, in
+// `sums`; the other one adds its own and finds the winner.
+//
+// A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a
+// pixel reads its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them
+// before it writes its own. Vectors hold two chunks. Most pixels in bands have one, and those before them the same one:
+// two paths then share a vector, nothing is looked at beside it, and nothing is wiped. Bands of several vectors are
+// matched in blocks (block.h), of which the last one may hold a single vector.
+//
+// Where the right view is read off the left one's sums, the sweep that finds the winners leaves at each right pixel the
+// least rank of the left pixels that it may be (sgm_cells.h).
+
+#ifndef __ENDIAN_LITTLE__
+#error "bands and penalties are read as words: a little-endian device"
+#endif
+
+// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=9 TILE_HEIGHT=4 PIXELS=16
+// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=9 TILE_HEIGHT=4 PIXELS=16
+// lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 PARTIAL_CHUNKS=1 TILE_WIDTH=9 TILE_HEIGHT=4 PIXELS=16
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=9 TILE_HEIGHT=4 PIXELS=16
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=1 TILE_WIDTH=9 TILE_HEIGHT=4 PIXELS=1
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=0 PARTIAL_CHUNKS=0 TILE_WIDTH=9 TILE_HEIGHT=4 PIXELS=16
+// lint: MAX_CHUNKS=8 PATHS=8 CODE_BYTES=4 COST_SCALE=2 COST_SAD=1 PARTIAL_CHUNKS=1 TILE_WIDTH=9 TILE_HEIGHT=4 PIXELS=16
+
+#ifndef MAX_CHUNKS
+#error "MAX_CHUNKS: chunks of EGOSGM_LANES disparities in the whole range"
+#endif
+#ifndef PATHS
+#error "PATHS: 4 or 8"
+#endif
+#ifndef CODE_BYTES
+#error "CODE_BYTES: 4 or 8, the size of a code"
+#endif
+#ifndef COST_SCALE
+#error "COST_SCALE: what a bit of Hamming distance costs, 1 or 2"
+#endif
+#ifndef COST_SAD
+#error "COST_SAD: 0 for the Hamming distance of codes, 1 for a 3x3 sum of absolute differences of grey values"
+#endif
+#ifndef PARTIAL_CHUNKS
+#error "PARTIAL_CHUNKS: 1 if the range is not a multiple of two chunks"
+#endif
+#ifndef TILE_WIDTH
+#error "TILE_WIDTH: columns of a tile"
+#endif
+#ifndef TILE_HEIGHT
+#error "TILE_HEIGHT: rows of a tile"
+#endif
+
+#include "compiler.h"
+#include "narrow.h"
+#include "straight.h"
+#include "wide.h"
+
+// A pixel with more than one vector, as wide.h takes it.
+__attribute__((always_inline)) inline void match_wide(const bool meets, const SgmParameters q, const Row* row,
+                                                      const uint extent, const uint steps, const Place* place) {
+  const int origin = origin_of(extent);
+  Pixel pixel;
+#pragma unroll
+  for (int n = 0; n < DIRECTIONS; ++n) {
+    const uint start = n > 0 ? place->moved : -(uint)q.min_disparity;
+    pixel.at[n] = row->slot[n] + (start + (uint)origin);
+    pixel.wiped_at[n] = row->slot[n] + (start + (uint)origin_of(place->wiped[n]));
+    pixel.is_wiped[n] = !covers(extent, place->wiped[n]);
+    pixel.wiped[n] = place->wiped[n];
+    pixel.p2[n] = (uchar)(steps >> 8 * n);
+  }
+  pixel.p1 = (uchar)q.p1;
+  pixel.own = place->own;
+  pixel.other = place->other + origin;
+  pixel.row_above = row->row_above;
+  pixel.row_below = row->row_below;
+  pixel.disparities = q.disparities - (int)((uint)origin - (uint)q.min_disparity);
+  pixel.cells = place->cells;
+  pixel.origin = origin;
+  pixel.first = row->bands[place->k].first - origin;
+  pixel.last = row->bands[place->k].last - origin;
+  pixel.seen = row->seen ? row->seen + place->k - origin : 0;
+  match_blocks(meets, chunks_of(extent) / 2, &pixel, place->candidate);
+}
+
+// Matches the next pixel that does not go straight, and goes on to the one after it.
+__attribute__((always_inline)) inline void match_pixel(const bool meets, const bool backward, const SgmParameters q,
+                                                       const Row* row, const uint extent, const uint steps,
+                                                       Place* place) {
+  if (backward) place->cells -= EGOSGM_LANES * chunks_of(extent);
+  if (is_narrow(extent)) {
+    match_narrow(meets, q, row, extent, steps, place);
+  } else {
+    match_wide(meets, q, row, extent, steps, place);
+  }
+  // The next one's: what was to the upper right is above it.
+  if (meets) ++place->candidate;
+  if (!backward) place->cells += EGOSGM_LANES * chunks_of(extent);
+  place->wiped[0] = extent;
+  place->wiped[2] = place->wiped[1];
+  place->wiped[1] = place->wiped[3];
+  place->own += row->code_step;
+  place->other -= row->code_step;
+  place->k += row->step;
+  place->moved += SLOT;
+}
+
+__attribute__((always_inline)) inline void sweep_row(const bool meets, const bool backward, const SgmParameters q,
+                                                     const Row* row, Place* place) {
+  while (place->k != row->end) {
+    const uint extent = extent_at(row->bands + place->k);
+    place->wiped[3] = extent_at(row->bands + place->k + row->above_right);
+    const uint steps = penalties_to(backward, &place->around, row->penalties + place->k, row->above_right);
+    if (goes_straight(q, extent, place->wiped, (int)((uint)origin_of(extent) - (uint)q.min_disparity))) {
+      match_straight(meets, backward, q, row, extent, steps, place);
+    } else {
+      match_pixel(meets, backward, q, row, extent, steps, place);
+    }
+  }
+}
+
+// The row y of a sweep, from its pixel `from` to `to`. To the pixels before one on the four paths it is `left`, `above`
+// and so on; where there is none, to one whose band and penalty do no harm: wiping some place in the slot, and a step
+// from nowhere.
+__attribute__((always_inline)) inline Row row_at(const bool meets, const bool backward, const SgmParameters q,
+                                                 const int view, const int y, const int from, const int to,
+                                                 global const Band* bands, global const uchar* penalties,
+                                                 global uchar* slots, global uint* ranks) {
+  const int width = q.width, height = q.height, step = backward ? -1 : 1;
+  const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
+  const size_t first = (size_t)view * width * height + (size_t)image_y * width + image_x;
+  const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
+  Row row;
+  row.bands = bands + first;
+  row.penalties = (global const uint*)penalties + first;
+  row.slot[0] = slots + (size_t)y * SLOT;
+  row.slot[1] = slots + (size_t)(height + from) * SLOT;
+  row.slot[2] = slots + ((long)2 * height + width - y + from) * SLOT;
+  row.slot[3] = slots + (size_t)(2 * height + 2 * width + y + from) * SLOT;
+  row.seen = meets && q.reads_off ? ranks + (size_t)image_y * code_stride + q.padding + image_x : 0;
+  row.row_above = image_y > 0 ? -(long)code_stride : 0;
+  row.row_below = image_y + 1 < height ? (long)code_stride : 0;
+  row.above_right = y > 0 ? step - step * (long)width : 0;
+  row.end = step * (long)(to - from);
+  row.step = step;
+  row.code_step = view == EGOSGM_LEFT ? step : -step;
+  row.p1 = (uchar16)((uchar)q.p1);
+  return row;
+}
+
+// The first pixel of a row.
+__attribute__((always_inline)) inline Place place_in(const bool backward, const SgmParameters q, const Row* row,
+                                                     const int view, const int y, const int from, const int to,
+                                                     global const uint* all_codes, global const uint* offsets,
+                                                     global uchar* sums, Candidate* candidates) {
+  const int width = q.width, height = q.height;
+  const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
+  const size_t row_start = (size_t)view * width * height + (size_t)image_y * width;
+  const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
+  const int along = view == EGOSGM_LEFT ? image_x : width - 1 - image_x;
+  const long above = y > 0 ? -row->step * (long)width : 0, left = from > 0 ? -row->step : 0;
+  global const Code* codes = (global const Code*)all_codes + q.padding;
+  // The sums move along with the pixel; a backward sweep comes from their end. Where offsets and bands do not belong
+  // together, after a kernel that failed, it stays within the sums, which begin with a row that is nobody's.
+  const int cells_of_row = width * MAX_CHUNKS, offset = (int)offsets[row_start + image_x];
+  const int first_cell = backward ? clamp(offset + chunks_of(extent_at(row->bands)), 0, cells_of_row)
+                                  : clamp(offset, 0, cells_of_row - (to - from) * MAX_CHUNKS);
+  Place place;
+  place.k = 0;
+  place.cells = sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
+  place.own = codes + ((size_t)view * height + image_y) * code_stride + along;
+  place.other = codes + ((size_t)(1 - view) * height + image_y) * code_stride + (width - 1 - along);
+  place.candidate = candidates;
+  place.around.before = row->penalties[left];
+  place.around.above_before = row->penalties[above + left];
+  place.around.above = row->penalties[above];
+  place.wiped[0] = extent_at(row->bands + left);
+  place.wiped[1] = extent_at(row->bands + above);
+  place.wiped[2] = extent_at(row->bands + (above + left));
+  place.wiped[3] = 0;
+  place.last = (uchar16)(ABSENT);
+  if (from > 0 && is_narrow(place.wiped[0])) {
+    place.last = load(row->slot[0] + (origin_of(place.wiped[0]) - q.min_disparity));
+  }
+  place.moved = -(uint)q.min_disparity;
+  return place;
+}
+
+// Both flags are constants wherever it is called: each direction has code of its own, whose steps need no registers.
+__attribute__((always_inline)) inline void sweep_tile(const bool meets, const bool backward, const SgmParameters q,
+                                                      const int tile_x, const int first_y, const int end_y,
+                                                      const int view, global const uint* all_codes,
+                                                      global const Band* bands, global const uint* offsets,
+                                                      global const uchar* penalties, global uchar* slots,
+                                                      global uchar* sums, global ulong* winners, global uint* ranks) {
+  const int width = q.width, height = q.height;
+  slots += (size_t)(2 * view + backward) * 3 * (width + height) * SLOT + SLOT_PADDING;
+
+  Candidate candidates[TILE_WIDTH];
+  for (int y = first_y; y < end_y; ++y) {
+    const int skew = y - first_y;
+    const int from = max(0, tile_x * TILE_WIDTH - skew), to = min(width, (tile_x + 1) * TILE_WIDTH - skew);
+    if (from >= to) continue;
+    const Row row = row_at(meets, backward, q, view, y, from, to, bands, penalties, slots, ranks);
+    Place place = place_in(backward, q, &row, view, y, from, to, all_codes, offsets, sums, candidates);
+    sweep_row(meets, backward, q, &row, &place);
+    // Apart from the sweep, whose pixels wait for each other: these do not.
+    if (meets) {
+      global ulong* of_row = winners + (row.bands - bands);
+      for (int i = 0; i < to - from; ++i) of_row[row.step * i] = winner_of(q, &candidates[i]);
+    }
+  }
+}
+
+// The tile of a wave in a row of tiles, or all tiles of a view and direction.
+__attribute__((always_inline)) inline void sweep(const bool meets, const SgmParameters q, const int first_row,
+                                                 const int view, const bool backward, const int wave,
+                                                 const int tile_columns, global const uint* all_codes,
+                                                 global const Band* bands, global const uint* offsets,
+                                                 global const uchar* penalties, global uchar* slots, global uchar* sums,
+                                                 global ulong* winners, global uint* ranks) {
+  const bool all = wave == EGOSGM_ALL_TILES;
+  const int first_y = meets ? own_rows(q.height, backward) : 0;
+  const int end_y = meets ? q.height : own_rows(q.height, backward);
+  const int end_row = all ? (end_y - first_y + TILE_HEIGHT - 1) / TILE_HEIGHT : first_row + 1;
+  for (int tile_y = first_row; tile_y < end_row; ++tile_y) {
+    const int tile_of_wave = wave - 2 * tile_y;
+    const int first = all ? 0 : max(tile_of_wave, 0), end = all ? tile_columns : min(tile_of_wave + 1, tile_columns);
+    const int y = first_y + tile_y * TILE_HEIGHT;
+    for (int tile_x = first; tile_x < end; ++tile_x) {
+      if (backward) {
+        sweep_tile(meets, true, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
+                   slots, sums, winners, ranks);
+      } else {
+        sweep_tile(meets, false, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
+                   slots, sums, winners, ranks);
+      }
+    }
+  }
+}
+
+WITH_BIT_COUNT void to_middle(const SgmParameters q, const int first_row, const int view, const bool backward,
+                              const int wave, const int tile_columns, global const uint* all_codes,
+                              global const Band* bands, global const uint* offsets, global const uchar* penalties,
+                              global uchar* slots, global uchar* sums) {
+  sweep(false, q, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0,
+        0);
+}
+
+WITH_BIT_COUNT void from_middle(const SgmParameters q, const int first_row, const int view, const bool backward,
+                                const int wave, const int tile_columns, global const uint* all_codes,
+                                global const Band* bands, global const uint* offsets, global const uchar* penalties,
+                                global uchar* slots, global uchar* sums, global ulong* winners, global uint* ranks) {
+  sweep(true, q, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums,
+        winners, ranks);
+}
+
+// Both sweeps to the middle of the image, where they leave their sums.
+KERNEL void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
+                            global const Band* bands, global const uint* offsets, global const uchar* penalties,
+                            global uchar* slots, global uchar* sums) {
+  to_middle(q, get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands, offsets,
+            penalties, slots, sums);
+}
+
+// Both on from there, over the sums of the other one, to the winners.
+KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int tile_columns,
+                              global const uint* all_codes, global const Band* bands, global const uint* offsets,
+                              global const uchar* penalties, global uchar* slots, global const uchar* sums,
+                              global ulong* winners, global uint* ranks) {
+  from_middle(q, get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands,
+              offsets, penalties, slots, (global uchar*)sums, winners, ranks);
+}
+
+// Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, and the matching variance
+// (options.h).
+KERNEL void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
+                   global float* variances) {
+  const int width = q.width;
+  const size_t row = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width;
+  FOR_PIXELS(x, width) {
+    const Winners winner = load_winners(winners + row, x, width);
+    const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
+    const Ints steps = FIELD(winner, 48);
+    store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities + row, x, width);
+    store_pixels(matching_variance(q, steps, rise_before, rise_after), variances + row, x, width);
+  }
+}

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// What compilers must be told. OpenCL C only.
+#ifndef EGOSGM_KERNELS_MATCH_COMPILER_H
+#define EGOSGM_KERNELS_MATCH_COMPILER_H
+
+// Compilers that are made for many CPUs take this one for an older (PoCL as distributions build it). In a function that
+// says so, and is not inlined, they count bits in one instruction. Defined by the host where the CPU has it.
+#ifdef COUNTS_BITS
+#define WITH_BIT_COUNT __attribute__((noinline, target("avx512vpopcntdq")))
+#else
+#define WITH_BIT_COUNT inline
+#endif
+
+#endif

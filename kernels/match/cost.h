@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// Matching costs of BandedSgm: Hamming distances of codes, or sums of absolute differences. OpenCL C only.
+#ifndef EGOSGM_KERNELS_MATCH_COST_H
+#define EGOSGM_KERNELS_MATCH_COST_H
+
+#include "lanes.h"
+
+#define MAX_COST 63
+
+#if CODE_BYTES == 4
+typedef uint Code;
+typedef uint8 ChunkCodes;
+typedef uint16 Codes;
+#else
+typedef ulong Code;
+typedef ulong8 ChunkCodes;
+typedef ulong16 Codes;
+#endif
+typedef struct __attribute__((packed)) {
+  Codes codes;
+} PackedCodes;
+typedef struct __attribute__((packed)) {
+  ChunkCodes codes;
+} PackedChunkCodes;
+
+inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
+inline ChunkCodes load_chunk_codes(global const Code* from) { return ((global const PackedChunkCodes*)from)->codes; }
+
+// Bits set in each code; compilers know this form and use what the device has.
+#define REPEATED(Codes, byte) ((Codes)(~(Code)0 / 255 * (byte)))
+#define BIT_COUNT(Codes, x)                                                    \
+  x -= x >> (Codes)(1) & REPEATED(Codes, 0x55);                                \
+  x = (x & REPEATED(Codes, 0x33)) + (x >> (Codes)(2) & REPEATED(Codes, 0x33)); \
+  x = (x + (x >> (Codes)(4))) & REPEATED(Codes, 0x0f);                         \
+  x = x * REPEATED(Codes, 0x01) >> (Codes)(8 * CODE_BYTES - 8)
+
+// Matching cost of 16 disparities, or 8. `own` and `other` point at the pixel's code and at the first disparity's in
+// their padded rows, which run in opposite directions.
+#if COST_SAD
+#define MATCHING_COST(N, Codes, load)                                                     \
+  ushort##N sum = 0;                                                                      \
+  for (int dy = -1; dy <= 1; ++dy) {                                                      \
+    const long row = dy < 0 ? above : dy > 0 ? below : 0;                                 \
+    for (int dx = -1; dx <= 1; ++dx) {                                                    \
+      sum += convert_ushort##N(abs_diff((Codes)(own[row + dx]), load(other + row - dx))); \
+    }                                                                                     \
+  }                                                                                       \
+  return convert_uchar##N(min(sum / (ushort)9, (ushort##N)(MAX_COST)))
+#else
+// A product would melt into the bit count, which compilers then do not know any more.
+#define MATCHING_COST(N, Codes, load)            \
+  Codes x = (Codes)(own[0]) ^ load(other);       \
+  BIT_COUNT(Codes, x);                           \
+  const uchar##N distance = convert_uchar##N(x); \
+  return COST_SCALE == 2 ? add_sat(distance, distance) : distance
+#endif
+
+inline uchar16 matching_cost(global const Code* own, global const Code* other, const long above, const long below) {
+  MATCHING_COST(16, Codes, load_codes);
+}
+
+inline Block matching_cost_of_block(global const Code* own, global const Code* other, const long above,
+                                    const long below) {
+  const uchar16 first = matching_cost(own, other, above, below);
+#if BLOCK == 32
+  return (Block)(first, matching_cost(own, other + VECTOR, above, below));
+#else
+  return first;
+#endif
+}
+
+inline uchar8 matching_cost_of_chunk(global const Code* own, global const Code* other, const long above,
+                                     const long below) {
+  MATCHING_COST(8, ChunkCodes, load_chunk_codes);
+}
+
+#endif

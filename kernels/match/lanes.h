@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Vectors of disparities and slots of path costs, as the sweeps of BandedSgm load, store and mask them. OpenCL C only.
+#ifndef EGOSGM_KERNELS_MATCH_LANES_H
+#define EGOSGM_KERNELS_MATCH_LANES_H
+
+#include "block.h"
+#include "shared.h"
+
+#define ABSENT 255
+#define VECTOR (2 * EGOSGM_LANES)
+#define BLOCK_VECTORS (BLOCK / VECTOR)
+#define MAX_VECTORS ((MAX_CHUNKS + 1) / 2)
+#define MAX_BLOCKS ((MAX_VECTORS + BLOCK_VECTORS - 1) / BLOCK_VECTORS)
+#define SLOT_PADDING 32  // the larger block: one is read and left where a vector ends
+#define SLOT (MAX_VECTORS * VECTOR + 2 * SLOT_PADDING)
+#define DIRECTIONS (PATHS / 2)
+#define MAX_STEPS 8
+
+// vload16 and vstore16 go byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on
+// all.
+typedef struct __attribute__((packed)) {
+  uchar16 lanes;
+} Lanes;
+typedef struct __attribute__((packed)) {
+  uchar8 lanes;
+} Chunk;
+typedef struct __attribute__((packed)) {
+  Block lanes;
+} PackedBlock;
+typedef struct __attribute__((packed)) {
+  ushort16 totals;
+} Totals;
+typedef struct __attribute__((packed)) {
+  ushort8 totals;
+} HalfTotals;
+
+inline uchar16 load(global const uchar* from) { return ((global const Lanes*)from)->lanes; }
+inline void store(const uchar16 lanes, global uchar* to) { ((global Lanes*)to)->lanes = lanes; }
+inline uchar8 load_chunk(global const uchar* from) { return ((global const Chunk*)from)->lanes; }
+inline void store_chunk(const uchar8 lanes, global uchar* to) { ((global Chunk*)to)->lanes = lanes; }
+inline Block load_block(global const uchar* from) { return ((global const PackedBlock*)from)->lanes; }
+inline void store_block(const Block lanes, global uchar* to) { ((global PackedBlock*)to)->lanes = lanes; }
+inline ushort8 load_totals(const ushort* from) { return ((const HalfTotals*)from)->totals; }
+inline void store_totals(const ushort16 totals, ushort* to) { ((Totals*)to)->totals = totals; }
+inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535); }
+
+constant uchar16 kLane = (uchar16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+
+// The least lane of each vector, in all lanes.
+inline void minima(const uchar16* v, uchar16* least) {
+#if PATHS == 8
+  const uchar16 a = min((uchar16)(v[0].lo, v[1].lo), (uchar16)(v[0].hi, v[1].hi));
+  const uchar16 b = min((uchar16)(v[2].lo, v[3].lo), (uchar16)(v[2].hi, v[3].hi));
+  uchar16 of_four = min((uchar16)(a.s0123, a.s89ab, b.s0123, b.s89ab), (uchar16)(a.s4567, a.scdef, b.s4567, b.scdef));
+  of_four = min(of_four, of_four.s23016745ab89efcd);
+  of_four = min(of_four, of_four.s1032547698badcfe);
+  least[0] = (uchar16)(of_four.s0);
+  least[1] = (uchar16)(of_four.s4);
+  least[2] = (uchar16)(of_four.s8);
+  least[3] = (uchar16)(of_four.sc);
+#else
+  uchar16 of_two = min((uchar16)(v[0].lo, v[1].lo), (uchar16)(v[0].hi, v[1].hi));
+  of_two = min(of_two, of_two.s45670123cdef89ab);
+  of_two = min(of_two, of_two.s23016745ab89efcd);
+  of_two = min(of_two, of_two.s1032547698badcfe);
+  least[0] = (uchar16)(of_two.s0);
+  least[1] = (uchar16)(of_two.s8);
+#endif
+}
+
+// The same of vectors that hold two paths, a chunk of each.
+inline void minima_of_chunks(const uchar16* v, uchar16* least) {
+  uchar16 of_four = min((uchar16)(v[0].s0123, v[0].s89ab, v[1].s0123, v[1].s89ab),
+                        (uchar16)(v[0].s4567, v[0].scdef, v[1].s4567, v[1].scdef));
+  of_four = min(of_four, of_four.s23016745ab89efcd);
+  of_four = min(of_four, of_four.s1032547698badcfe);
+  least[0] = of_four.s0000000044444444;
+  least[1] = of_four.s88888888cccccccc;
+}
+
+// 255 in the lanes from `first` on, 0 in those before it.
+inline uchar16 lanes_from(const int first) { return as_uchar16(kLane >= (uchar16)((uchar)clamp(first, 0, VECTOR))); }
+
+// The lanes that lie outside of the disparity range, `first` being its end. In a range of whole vectors there are none.
+#if PARTIAL_CHUNKS
+#define absent_from(first) lanes_from(first)
+#else
+#define absent_from(first) ((uchar16)(0))
+#endif
+
+// The same of a block.
+inline Block block_from(const int first) {
+  return BLOCK_LANE >= (Block)((uchar)clamp(first, 0, BLOCK)) ? (Block)(ABSENT) : (Block)(0);
+}
+#if PARTIAL_CHUNKS
+#define absent_in_block(first) block_from(first)
+#else
+#define absent_in_block(first) ((Block)(0))
+#endif
+
+// 65535 where a lane is 255; lanes are 0 or 255.
+inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
+
+inline ushort minimum_of_chunk(ushort8 v) {
+  v = min(v, v.s45674567);
+  v = min(v, v.s23232323);
+  v = min(v, v.s11111111);
+  return v.s0;
+}
+
+inline ushort minimum_of_totals(const ushort16 totals) { return minimum_of_chunk(min(totals.lo, totals.hi)); }
+
+#endif

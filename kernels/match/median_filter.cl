@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// The median of 3x3 disparities, in both views. A neighbour outside the image or without a value votes for the centre;
+// a centre without a value gets the median (the upper of two middle ones) of its neighbours if at least `fill_from` of
+// the eight have one.
+#include "method.h"
+#include "pixels.h"
+
+// lint: PIXELS=1
+// lint: PIXELS=16
+
+static inline Floats lower(const Floats a, const Floats b) { return a < b ? a : b; }
+static inline Floats upper(const Floats a, const Floats b) { return a < b ? b : a; }
+static inline Floats median(const Floats a, const Floats b, const Floats c) {
+  return upper(lower(a, b), lower(upper(a, b), c));
+}
+
+typedef struct {
+  Floats low, middle, high;
+} Sorted;
+
+static inline Sorted sort(const Floats a, const Floats b, const Floats c) {
+  Sorted sorted;
+  sorted.low = lower(lower(a, b), c);
+  sorted.middle = median(a, b, c);
+  sorted.high = upper(upper(a, b), c);
+  return sorted;
+}
+
+// Where it does not fill, `fill_from` and `variance` are not looked at.
+static inline void filter_window(const bool fills, const ImageSize size, const int fill_from,
+                                 global const float* disparity, global float* filtered, global float* variance) {
+  const int y = get_global_id(1);
+  const int width = size.width;
+  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  global const float* here = disparity + row;
+  const int has_above = y >= 1;
+  const int has_below = y + 1 < size.height;
+  // Rows outside the image are read where they are not used.
+  global const float* above = has_above ? here - width : here;
+  global const float* below = has_below ? here + width : here;
+
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(here, x, width);
+    const Floats lowest = -1e30f;
+    const Floats highest = 1e30f;
+    const Ints is_hole = d == INVALID;
+    Ints holes = 0;
+    // Without a centre to vote for, neighbours without a value vote high and low by turns, which leaves the median of
+    // the others.
+#define VOTE(vote, exists, from, column)                                                 \
+  const Floats neighbour_##vote = (exists) ? load_pixels(from, column, width) : INVALID; \
+  const Ints absent_##vote = neighbour_##vote == INVALID;                                \
+  const Floats by_turns_##vote = (holes & 1) != 0 ? highest : lowest;                    \
+  const Floats abstained_##vote = (fills ? is_hole : (Ints)(0)) ? by_turns_##vote : d;   \
+  holes += absent_##vote ? (Ints)(1) : (Ints)(0);                                        \
+  const Floats vote = absent_##vote ? abstained_##vote : neighbour_##vote;
+    VOTE(left_above, has_above, above, x - 1)
+    VOTE(left_beside, 1, here, x - 1)
+    VOTE(left_below, has_below, below, x - 1)
+    VOTE(just_above, has_above, above, x)
+    VOTE(just_below, has_below, below, x)
+    VOTE(right_above, has_above, above, x + 1)
+    VOTE(right_beside, 1, here, x + 1)
+    VOTE(right_below, has_below, below, x + 1)
+    const Floats centre_vote = is_hole ? highest : d;
+
+    const Sorted left = sort(left_above, left_beside, left_below);
+    const Sorted centre = sort(just_above, centre_vote, just_below);
+    const Sorted right = sort(right_above, right_beside, right_below);
+    // The median of nine is the median of: the largest of the columns' lowest, the median of their medians, the
+    // smallest of their highest.
+    const Floats middle =
+        median(upper(upper(left.low, centre.low), right.low), median(left.middle, centre.middle, right.middle),
+               lower(lower(left.high, centre.high), right.high));
+    if (!fills) {
+      store_pixels(is_hole ? INVALID : middle, filtered + row, x, width);
+      continue;
+    }
+    const Ints is_filled = is_hole & (8 - holes >= fill_from);
+    store_pixels((is_hole != is_filled) ? INVALID : middle, filtered + row, x, width);
+    const Floats kept_variance = load_pixels(variance + row, x, width);
+    store_pixels(is_filled ? (Floats)(EGOSGM_FILLED_VARIANCE_PX2) : kept_variance, variance + row, x, width);
+  }
+}
+
+KERNEL void filter(const ImageSize size, global const float* disparity, global float* filtered) {
+  filter_window(false, size, 0, disparity, filtered, 0);
+}
+
+KERNEL void filter_and_fill(const ImageSize size, const int fill_from, global const float* disparity,
+                            global float* filtered, global float* variance) {
+  filter_window(true, size, fill_from, disparity, filtered, variance);
+}

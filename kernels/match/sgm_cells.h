@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What both ways of BandedSgm (banded_sgm.cl, banded_sgm_paths.cl) make of a winner. OpenCL C only.
+#ifndef EGOSGM_KERNELS_SGM_CELLS_H
+#define EGOSGM_KERNELS_SGM_CELLS_H
+
+#include "method.h"
+#include "pixels.h"
+
+// Where the right view is read off the left one's sums, a right pixel takes of the left pixels that it may be the one
+// with the least rank: this in its upper half, in the lower one how far the disparity lies behind the range's nearest
+// one, so that of what fits alike the nearer is taken. Sums are relative to a pixel's own paths and alone do not tell
+// which of two pixels fits better: of a pixel's least sum, 510 at most, three quarters do not count, and the matching
+// cost counts twelve times. What is added keeps ranks above 0, and cells outside of the band, of 65535, where they are.
+#define RANK(totals, least, costs) add_sat(totals, (costs) * (ushort)(12) + (ushort)(384 - 3 * (int)(least) / 4))
+#define NO_RANK 0xffff0000u  // and above: of no left pixel, or of a disparity that it does not search
+
+// Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, whose sums lie that much
+// above its own; 0 both where one is missing.
+inline Floats refined(const Ints winner, const Ints rise_before, const Ints rise_after) {
+  const Floats before = FLOATS_OF_INTS(rise_before), after = FLOATS_OF_INTS(rise_after);
+  const Floats slope = max(before, after);
+  const Ints is_risen = slope > 0.0f;
+  const Floats offset = (before - after) / (2.0f * (is_risen ? slope : (Floats)(1.0f)));
+  return FLOATS_OF_INTS(winner) + (is_risen ? clamp(offset, -0.5f, 0.5f) : (Floats)(0.0f));
+}
+
+// The matching variance (options.h), or that of a winner beyond which the sums fall on.
+inline Floats matching_variance(const SgmParameters q, const Ints steps, const Ints rise_before,
+                                const Ints rise_after) {
+  const Floats n = FLOATS_OF_INTS(steps);
+  const Floats counted = q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n);
+  return ((rise_before < 0) | (rise_after < 0)) ? (Floats)(EGOSGM_ESCAPED_VARIANCE_PX2) : counted;
+}
+
+#endif

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a pixel's costs lie in the slot of a path, and the penalties of the steps to it. OpenCL C only.
+#ifndef EGOSGM_KERNELS_MATCH_SLOTS_H
+#define EGOSGM_KERNELS_MATCH_SLOTS_H
+
+#include "lanes.h"
+
+// Of a band what says where a pixel's costs lie in a slot, in one word: its origin and its chunks.
+inline uint extent_at(global const Band* band) { return *(global const uint*)band; }
+inline int origin_of(const uint extent) { return (short)extent; }
+inline int chunks_of(const uint extent) { return extent >> 16; }
+// Bands that fit one vector.
+inline bool is_narrow(const uint extent) { return extent < 3u << 16; }
+inline bool is_chunk(const uint extent) { return extent < 2u << 16; }
+
+// Makes what a predecessor with `extent` left in a slot absent, `at` being its first disparity's place.
+inline void wipe(global uchar* at, const uint extent) {
+  store((uchar16)(ABSENT), at);
+  if (!is_narrow(extent)) {
+    for (int v = 1; v < chunks_of(extent) / 2; ++v) store((uchar16)(ABSENT), at + VECTOR * v);
+  }
+}
+
+// Whether what a predecessor with `extent` left in a slot is overwritten by a pixel with `own`.
+inline bool covers(const uint own, const uint extent) {
+  return origin_of(own) <= origin_of(extent) &&
+         origin_of(extent) + EGOSGM_LANES * chunks_of(extent) <= origin_of(own) + EGOSGM_LANES * chunks_of(own);
+}
+
+// What StepPenalties left at pixels around the next one of a backward sweep, a byte a path: before it, above that,
+// above.
+typedef struct {
+  uint before, above_before, above;
+} Penalties;
+
+// P2 of the steps to the next pixel, a byte a path. They lie at a step's lower or right pixel: for a backward sweep
+// that is the one it comes from.
+inline uint penalties_to(const bool backward, Penalties* around, global const uint* here, const long above_right) {
+  const uint own = here[0];
+  if (!backward) return own;
+  const uint right = here[above_right];
+  const uint steps =
+      (around->before & 0xff) | (around->above & 0xff00) | (around->above_before & 0xff0000) | (right & 0xff000000);
+  around->before = own;
+  around->above_before = around->above;
+  around->above = right;
+  return steps;
+}
+
+// The rows that a sweep takes before it comes to those that the other one has been to.
+inline int own_rows(const int height, const bool backward) { return backward ? height / 2 : height - height / 2; }
+
+#endif

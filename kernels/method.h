@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// The method's constants, each with its unit, in the C that host and kernels compile. What may be chosen is an option
+// (include/egosgm/options.h). The CPU twins have numbers of their own (tests/reference/method.h).
+#ifndef EGOSGM_KERNELS_METHOD_H
+#define EGOSGM_KERNELS_METHOD_H
+
+// A point whose depth shrinks to less than this part of itself is as good as behind the camera.
+#define EGOSGM_MIN_DEPTH_RATIO 1e-6f
+// A predicted variance is cut off here: with a deviation of 1000 px nothing is known.
+#define EGOSGM_MAX_VARIANCE_PX2 1e6f
+
+// SearchBand looks at a block's coarse pixels and the ones around them, and believes this many that have a disparity.
+#define EGOSGM_COARSE_MIN_COUNT 8
+// Of these, so many of the least and of the largest are taken for mismatches. REQUIRES: less than half of the count.
+#define EGOSGM_COARSE_OUTLIERS 2
+
+// SearchBand calls a ridge what lies nearer than something at most this many pixels to its left, and to its right: a
+// pole. CoarseMatch's maps are looked through too, that many of their pixels far.
+#define EGOSGM_RIDGE_REACH 6
+#define EGOSGM_COARSE_RIDGE_REACH 2
+// Of a warped map's block, at least so many pixels must be ridges. They are searched for in their own block and in this
+// many above and below.
+#define EGOSGM_RIDGE_MIN_COUNT 2
+#define EGOSGM_RIDGE_BLOCKS 6
+
+// The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside.
+// KalmanUpdate then takes the measurement instead of fusing it, as where the two differ by more than the gate, and the
+// next frame searches wide around it.
+#define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
+
+// OutputVariance: the filter's and the measurement's variance, each cut, at every fourth pixel around; the sum of two
+// second differences of disparities, each cut, at every pixel nearer by; and how far the disparities this far off to
+// eight sides are from a pixel's own, each cut.
+#define EGOSGM_VARIANCE_RADIUS 8
+#define EGOSGM_VARIANCE_STEP 4
+#define EGOSGM_MAX_MEAN_VARIANCE_PX2 2.0f
+#define EGOSGM_ROUGHNESS_RADIUS 3
+#define EGOSGM_MAX_ROUGHNESS_PX 1.5f
+#define EGOSGM_JUMP_DISTANCE 2
+#define EGOSGM_MAX_JUMP_PX 10.0f
+
+// KalmanUpdate asks every fourth pixel this far to all sides: 25. Near is what differs by less than this.
+#define EGOSGM_SUPPORT_RADIUS 8
+#define EGOSGM_SUPPORT_STEP 4
+#define EGOSGM_SUPPORT_PX 2.0f
+// A measurement that at least so many of them have too stands against a prediction, or against none that vouches.
+#define EGOSGM_SUPPORT_HALF 13
+#define EGOSGM_SUPPORT_MOST 18
+// What is measured further off than this moves by itself, where so many of them are off to the same side by the latter.
+#define EGOSGM_MOVING_PX 1.0f
+#define EGOSGM_MOVING_AROUND_PX 0.75f
+#define EGOSGM_MOVING_COUNT 15
+
+// PredictionCheck looks at every so many rows of the left view. Prediction and measurement differ where they do by more
+// than this.
+#define EGOSGM_CHECKED_ROWS 4
+#define EGOSGM_CHECKED_DIFFERENCE_PX 1.0f
+
+// DynamicMap looks this many pixels to all sides, and believes this many of the window that have a prediction and a
+// measurement: a third of it.
+#define EGOSGM_DYNAMIC_RADIUS 4
+#define EGOSGM_DYNAMIC_MIN_COUNT 27
+
+// The disparities of RightMap are whole numbers of such steps.
+#define EGOSGM_RIGHT_MAP_STEPS_PER_PX 65536.0f
+
+// The variance of a hole that MedianFilter fills.
+#define EGOSGM_FILLED_VARIANCE_PX2 1.0f
+
+// The 32 pixels dx, dy of a 13x11 window that MatchingCost::kCensus13x11 compares with its centre: on a golden-angle
+// spiral, as dense as a normal distribution of deviations 3.4 and 2.6 px, each moved to the nearest free pixel.
+#define EGOSGM_CENSUS13X11_RADIUS_X 6
+#define EGOSGM_CENSUS13X11_RADIUS_Y 5
+#define EGOSGM_CENSUS13X11                                                                                             \
+  {                                                                                                                    \
+    {1, 0}, {-1, 1}, {0, -1}, {1, 1}, {-2, 0}, {2, -1}, {-1, 2}, {-1, -2}, {3, 1}, {-3, 1}, {1, -2}, {1, 2}, {-3, -1}, \
+        {3, -1}, {-2, 2}, {-1, -3}, {3, 2}, {-4, 0}, {3, -2}, {0, 4}, {-3, -3}, {5, 1}, {-4, 2}, {1, -4}, {3, 4},      \
+        {-6, -1}, {6, -2}, {-3, 5}, {-2, -5}, {6, 3}, {-6, 2}, {                                                       \
+      5, -5                                                                                                            \
+    }                                                                                                                  \
+  }
+
+#endif

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// The right view's map by the left one's. Where the right view was measured, if it was, it has what the left pixel has
+// that it sees, or the measurement if that contradicts it. Elsewhere it has the nearest of the left surfaces that land
+// there: the left pixel x lands on the right pixel nearest to x - d.
+//
+// Several may land on one pixel. Each bids a key, of which the largest wins, so the result does not depend on the order
+// in which they come: d in steps of 2^-16 px, counted from one pixel below the range, so that 0 is nobody's. GPUs, a
+// pixel a work-item: atomic maxima. CPUs, where atomics are slow: a work-item owns a row.
+#include "method.h"
+#include "pixels.h"
+
+// lint: PIXELS=1
+// lint: PIXELS=16
+
+// Rows of keys are whole blocks.
+static inline size_t key_row(const int y, const int width) {
+  return (size_t)y * ((width + PIXELS - 1) / PIXELS * PIXELS);
+}
+
+static inline Ints load_keys(global const int* keys) {
+#if PIXELS == 1
+  return *keys;
+#else
+  return vload16(0, keys);
+#endif
+}
+
+// 0 bids nothing. On CPUs no branch asks for it, which holes would make mispredict.
+static inline void bid(const Ints keys, const Ints targets, global int* row) {
+#if PIXELS == 1
+  if (keys != 0) atomic_max(&row[targets], keys);
+#else
+  int key[PIXELS], target[PIXELS];
+  vstore16(keys, 0, key);
+  vstore16(targets, 0, target);
+  for (int i = 0; i < PIXELS; ++i) row[target[i]] = max(row[target[i]], key[i]);
+#endif
+}
+
+// REQUIRES: on GPUs, keys of 0.
+KERNEL void splat(const ImageSize size, const int min_disparity, global const float* disparity, global int* keys) {
+  const int y = get_global_id(1);
+  const int width = size.width;
+  const size_t row = (size_t)y * width;
+  global int* bids = keys + key_row(y, width);
+#if PIXELS > 1
+  for (int x = 0; x < width; x += PIXELS) vstore16((int16)(0), 0, bids + x);
+#endif
+
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats zero = 0.0f;
+    const Floats least = 1.0f;
+    const Floats most = 2147483520.0f;  // the largest below 2^31
+    // Asked of the floats, with comparisons that NaN fails, before they become integers.
+    const Floats here = FLOATS_OF_INTS(x + LANE_INDICES);
+    const Floats at = nearest(here - d);
+    const Ints lands = (d > INVALID) & (at >= zero) & (at < (Floats)(width));
+    const Floats steps = (d - (float)min_disparity + 1.0f) * EGOSGM_RIGHT_MAP_STEPS_PER_PX;
+    const Floats above = steps > least ? steps : least;
+    const Ints key = INTS_OF_FLOATS(above < most ? above : most);
+    bid(lands ? key : (Ints)(0), INTS_OF_FLOATS(lands ? at : here), bids);
+  }
+}
+
+// REQUIRES: unless is_measured, any maps as `measured`.
+KERNEL void decode(const ImageSize size, const int min_disparity, const float max_difference, const int is_measured,
+                   global const int* keys, global const float* measured, global const float* measured_variance,
+                   global float* disparity, global float* variance) {
+  const int y = get_global_id(1);
+  const int width = size.width;
+  const size_t row = (size_t)y * width;
+  const size_t right_row = ((size_t)EGOSGM_RIGHT * size.height + y) * width;
+  global const int* bids = keys + key_row(y, width);
+
+  FOR_PIXELS(x, width) {
+    const Floats zero = 0.0f;
+    const Floats z = is_measured ? load_pixels(measured + right_row, x, width) : INVALID;
+    const Ints key = load_keys(bids + x);
+    const Floats landed = FLOATS_OF_INTS(key) * (1.0f / EGOSGM_RIGHT_MAP_STEPS_PER_PX) - 1.0f + (float)min_disparity;
+    const Floats d = z > INVALID ? z : landed;
+    const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + d);
+    const Ints inside = ((z > INVALID) | (key != 0)) & (at >= zero) & (at < (Floats)(width));
+    const Ints left = INTS_OF_FLOATS(inside ? at : zero);
+    const Floats seen = gather(disparity + row, left);
+    const Ints agrees = inside & (seen > INVALID) & (fabs(seen - d) <= max_difference);
+    const Floats p = gather(variance + row, left), r = load_pixels(measured_variance + right_row, x, width);
+    const Floats otherwise = z > INVALID ? z : INVALID, its_variance = z > INVALID ? r : zero;
+    store_pixels(agrees ? seen : otherwise, disparity + right_row, x, width);
+    store_pixels(agrees ? p : its_variance, variance + right_row, x, width);
+  }
+}

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+// The variance that is given out: what measurement and filter say of the surroundings of a pixel, how rough the
+// disparities around it are, and how far they jump beside it. Most surfaces are planes, whose disparities have no
+// second difference; where those around a pixel have, or where there are holes, it is likely to be wrong. Beside a jump
+// it may lie on the wrong side.
+#include "method.h"
+#include "pixels.h"
+
+// lint: PIXELS=1
+// lint: PIXELS=16
+
+static inline Floats cut(const Floats value, const float most) { return value < most ? value : (Floats)(most); }
+
+// What lies outside of the image is negative.
+static inline Floats counted(const Floats value) { return value >= 0.0f ? (Floats)(1.0f) : (Floats)(0.0f); }
+static inline Floats if_inside(const Floats value) { return value >= 0.0f ? value : (Floats)(0.0f); }
+
+// |before - 2 at + after|; beside a hole as much as can be.
+static inline Floats second_difference(const Floats before, const Floats at, const Floats after) {
+  const Ints valid = (before > INVALID) & (at > INVALID) & (after > INVALID);
+  return valid ? cut(fabs((before + after) - 2.0f * at), EGOSGM_MAX_ROUGHNESS_PX) : (Floats)(EGOSGM_MAX_ROUGHNESS_PX);
+}
+
+// (p r^3)^(1/4), each cut; with nothing measured r is all that it may be. The filter takes the errors of its
+// measurements for independent; those of one surface are not, so that p falls from frame to frame and the errors
+// hardly.
+static inline Floats blend(const Floats p, const Floats measured, const Floats r) {
+  const Floats most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
+  const Floats cut_r = measured > INVALID ? cut(r, EGOSGM_MAX_MEAN_VARIANCE_PX2) : most;
+  return sqrt(cut_r * sqrt(cut_r * cut(p, EGOSGM_MAX_MEAN_VARIANCE_PX2)));
+}
+
+// Of each pixel: the variances' blend, and the sum of the horizontal and the vertical second difference. A pixel at the
+// image's edge is its own neighbour.
+KERNEL void of_each_pixel(const ImageSize size, global const float* disparity, global const float* variance,
+                          global const float* measured, global const float* measured_variance, global float* blended,
+                          global float* roughness) {
+  const int y = get_global_id(1);
+  const int width = size.width;
+  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  global const float* above = disparity + (y > 0 ? row - width : row);
+  global const float* below = disparity + (y + 1 < size.height ? row + width : row);
+  FOR_PIXELS(x, width) {
+    const Ints at = x + LANE_INDICES;
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats left = at > 0 ? load_pixels(disparity + row, x - 1, width) : d;
+    const Floats right = at < width - 1 ? load_pixels(disparity + row, x + 1, width) : d;
+    const Floats across = second_difference(left, d, right);
+    const Floats down = second_difference(load_pixels(above, x, width), d, load_pixels(below, x, width));
+    store_pixels(across + down, roughness + row, x, width);
+    const Floats p = load_pixels(variance + row, x, width);
+    const Floats r = load_pixels(measured_variance + row, x, width);
+    store_pixels(blend(p, load_pixels(measured + row, x, width), r), blended + row, x, width);
+  }
+}
+
+// Means along the row: of the variances at every fourth pixel; of the roughness at every pixel.
+KERNEL void row_means(const ImageSize size, global const float* variance, global const float* roughness,
+                      global float* mean_variance, global float* mean_roughness) {
+  const int width = size.width;
+  const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
+  FOR_PIXELS(x, width) {
+    Floats sum = 0.0f;
+    Floats count = 0.0f;
+    for (int u = -EGOSGM_VARIANCE_RADIUS; u <= EGOSGM_VARIANCE_RADIUS; u += EGOSGM_VARIANCE_STEP) {
+      const Floats p = load_pixels(variance + row, x + u, width);
+      sum += if_inside(p);
+      count += counted(p);
+    }
+    store_pixels(sum / count, mean_variance + row, x, width);
+
+    sum = 0.0f;
+    count = 0.0f;
+    for (int u = -EGOSGM_ROUGHNESS_RADIUS; u <= EGOSGM_ROUGHNESS_RADIUS; ++u) {
+      const Floats r = load_pixels(roughness + row, x + u, width);
+      sum += if_inside(r);
+      count += counted(r);
+    }
+    store_pixels(sum / count, mean_roughness + row, x, width);
+  }
+}
+
+// Mean of every step-th row within the radius, as far as the image reaches.
+static inline Floats column_mean(global const float* view, const ImageSize size, const int x, const int y,
+                                 const int radius, const int step) {
+  Floats sum = 0.0f;
+  float count = 0.0f;
+  for (int v = y - radius; v <= y + radius; v += step) {
+    if (v < 0 || v >= size.height) continue;
+    sum += load_pixels(view + (size_t)v * size.width, x, size.width);
+    count += 1.0f;
+  }
+  return sum / count;
+}
+
+// The largest of the differences to the disparities EGOSGM_JUMP_DISTANCE pixels off.
+static inline Floats jump_beside(global const float* view, const ImageSize size, const int x, const int y,
+                                 const Floats d) {
+  Floats most = 0.0f;
+  for (int v = y - EGOSGM_JUMP_DISTANCE; v <= y + EGOSGM_JUMP_DISTANCE; v += EGOSGM_JUMP_DISTANCE) {
+    if (v < 0 || v >= size.height) continue;
+    for (int u = x - EGOSGM_JUMP_DISTANCE; u <= x + EGOSGM_JUMP_DISTANCE; u += EGOSGM_JUMP_DISTANCE) {
+      const Floats other = load_pixels(view + (size_t)v * size.width, u, size.width);
+      const Floats difference = fabs(other - d);
+      most = ((other > INVALID) & (difference > most)) ? difference : most;
+    }
+  }
+  return cut(most, EGOSGM_MAX_JUMP_PX);
+}
+
+// The error^2 of a disparity on the right surface, which levels off, and the chance of a wrong one times its error^2:
+// as measured on KITTI and synthetic streets. Keeps the order of the sums; none is too small or too large for it.
+static inline Floats calibrated(const Floats sum) {
+  const Floats square = sum * sum;
+  return 0.18f / (1.0f + 0.07f / square) + 1.26f * sqrt(sum) / (1.0f + 0.8f / (square * square * sum));
+}
+
+KERNEL void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,
+                    global const float* disparity, global const float* mean_variance,
+                    global const float* mean_roughness, global float* variance) {
+  const int y = get_global_id(1);
+  const int width = size.width;
+  const size_t view = (size_t)get_global_id(2) * size.height * width;
+  const size_t row = view + (size_t)y * width;
+  FOR_PIXELS(x, width) {
+    const Floats p = column_mean(mean_variance + view, size, x, y, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP);
+    const Floats r = column_mean(mean_roughness + view, size, x, y, EGOSGM_ROUGHNESS_RADIUS, 1);
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats j = jump_beside(disparity + view, size, x, y, d);
+    const Floats sum = scale * (p * sqrt(p)) + roughness_weight * (r * r) + jump_weight * (j * j);
+    store_pixels(d > INVALID ? calibrated(sum) : (Floats)(0.0f), variance + row, x, width);
+  }
+}

@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/fuse/kalman_update.h"
+
+#include <gtest/gtest.h>
+
+#include "kernels/method.h"
+#include "tests/reference/fuse/kalman_update.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+
+/// What lies in the output must not shine through.
+testing::HostMaps before_update(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
+
+testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& warped,
+                         const testing::HostMaps& predicted, const testing::HostMaps& measured, int pixels = 0,
+                         const shared::PredictionState& check = {}, Views views = Views::kBoth) {
+  ocl::Context context(testing::any_device());
+  KalmanUpdate update(context, size, options, pixels);
+  const StereoMaps before = testing::upload(context, size, warped);
+  const StereoMaps prediction = testing::upload(context, size, predicted);
+  const StereoMaps measurement = testing::upload(context, size, measured);
+  StereoMaps out = testing::upload(context, size, before_update(size));
+  ocl::Buffer<shared::PredictionState> checked(context, 1);
+  checked.write(context, {check});
+  update(checked, before.disparity, prediction, measurement, out, views);
+  return testing::download(context, out);
+}
+
+struct Estimate {
+  float disparity, variance;
+  bool operator==(const Estimate&) const = default;
+};
+
+constexpr Estimate kNothing{kNone, 0};
+
+Estimate update_pixel(const KalmanUpdateOptions& options, Estimate predicted, Estimate measured) {
+  const testing::HostMaps warped{{kNone, kNone}, {0, 0}};
+  const testing::HostMaps updated =
+      update({1, 1}, options, warped, {{predicted.disparity, kNone}, {predicted.variance, 0}},
+             {{measured.disparity, kNone}, {measured.variance, 0}});
+  EXPECT_EQ(updated.disparity[1], kNone);
+  EXPECT_EQ(updated.variance[1], 0);
+  return {updated.disparity[0], updated.variance[0]};
+}
+
+class KalmanUpdateTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(KalmanUpdateTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  // Few disparities, so that some pixels vouch for each other; on the left most are off to the same side.
+  testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 6);
+  testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 7);
+  const testing::HostMaps warped = testing::random_maps(size, -8, 8, 0.3, 8);
+  for (std::size_t i = 0; i < measured.disparity.size(); ++i) {
+    if (i % 7 == 0) predicted.variance[i] += EGOSGM_ESCAPED_VARIANCE_PX2;
+    if (i % 11 == 0) measured.variance[i] += EGOSGM_ESCAPED_VARIANCE_PX2;
+    if (i % 5 == 0 && measured.disparity[i] != kNone) measured.disparity[i] -= 6;
+    if (static_cast<int>(i) % size.width < size.width / 2 && i % 23 != 0) {
+      predicted.disparity[i] = 0;
+      measured.disparity[i] = 0.25f * static_cast<float>(i % 9) + 0.5f;
+    }
+  }
+  for (const KalmanUpdateOptions& options :
+       {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false, .innovation_sigmas = 0},
+        KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
+    const testing::HostMaps expected = reference::kalman_update(size, options, warped.disparity, predicted, measured);
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps actual = update(size, options, warped, predicted, measured, pixels);
+      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+          << "gate " << options.gate_px << ", by " << pixels;
+      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
+          << "gate " << options.gate_px << ", by " << pixels;
+    }
+  }
+}
+
+TEST_P(KalmanUpdateTest, UpdatesTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 9);
+  const testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 10);
+  const testing::HostMaps warped = testing::random_maps(size, -8, 8, 0.3, 11);
+  const testing::HostMaps both = update(size, {}, warped, predicted, measured);
+  for (const int pixels : {1, 16}) {
+    const testing::HostMaps was = before_update(size);
+    const testing::HostMaps one = update(size, {}, warped, predicted, measured, pixels, {}, Views::kLeft);
+    EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
+    EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, KalmanUpdateTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+TEST(KalmanUpdate, WeighsByTheVariances) {
+  EXPECT_EQ(update_pixel({}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));
+  EXPECT_EQ(update_pixel({}, {10, 3}, {12, 1}), (Estimate{11.5f, 0.75f}));
+  EXPECT_EQ(update_pixel({}, {10, 1}, {12, 3}), (Estimate{10.5f, 0.75f}));
+}
+
+// An innovation of 2 px at two deviations asks for p' + r = 1 px^2.
+TEST(KalmanUpdate, BelievesAPredictionLessThatIsTooFarOff) {
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 2}, {10, 0.25f}, {12, 0.25f}), (Estimate{11.5f, 0.1875f}));
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 2}, {10, 0.25f}, {8, 0.25f}), (Estimate{8.5f, 0.1875f}));
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 2}, {10, 0.25f}, {11, 0.25f}), (Estimate{10.5f, 0.125f}));
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 1}, {10, 0.25f}, {11, 0.25f}), (Estimate{10.75f, 0.1875f}));
+  EXPECT_EQ(update_pixel({.innovation_sigmas = 0}, {10, 0.25f}, {12, 0.25f}), (Estimate{11, 0.125f}));
+}
+
+TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));
+  // With a variance for which the next frame searches wide.
+  const float wide = EGOSGM_ESCAPED_VARIANCE_PX2;
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12.25f, 1}), (Estimate{12.25f, wide}));
+  const KalmanUpdateOptions alone{.gate_px = 2, .ask_neighbours = false};
+  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 1}), (Estimate{7.75f, wide}));
+  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 2 * wide}), (Estimate{7.75f, 2 * wide}));
+  EXPECT_EQ(update_pixel({.gate_px = 0, .innovation_sigmas = 0}, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
+}
+
+TEST(KalmanUpdate, TakesAMeasurementThatEscapedItsBand) {
+  const float escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, escaped}), (Estimate{11, escaped}));
+  EXPECT_EQ(update_pixel({.gate_px = 0}, {10, 1}, {11, escaped}), (Estimate{11, escaped}));
+}
+
+TEST(KalmanUpdate, TakesWhatIsThere) {
+  EXPECT_EQ(update_pixel({}, kNothing, {12, 3}), (Estimate{12, 3}));
+  EXPECT_EQ(update_pixel({.keep_predicted = true}, {10, 5}, kNothing), (Estimate{10, 5}));
+  EXPECT_EQ(update_pixel({.keep_predicted = false}, {10, 5}, kNothing), kNothing);
+  EXPECT_EQ(update_pixel({}, kNothing, kNothing), kNothing);
+}
+
+TEST(KalmanUpdate, DropsWhatIsMeasuredWhereANearerSurfaceHidesIt) {
+  for (const bool ask_neighbours : {false, true}) {
+    const KalmanUpdateOptions options{.keep_predicted = true, .ask_neighbours = ask_neighbours};
+    EXPECT_EQ(update_pixel(options, {kNone, EGOSGM_MAX_VARIANCE_PX2}, {12, 3}), kNothing);
+    EXPECT_EQ(update_pixel(options, {kNone, EGOSGM_MAX_VARIANCE_PX2}, kNothing), kNothing);
+  }
+}
+
+/// 21x21 pixels: all have `around` as prediction and measurement, but for the pixel in the middle.
+struct Surroundings {
+  static constexpr shared::ImageSize kSize{21, 21};
+  static constexpr int kMiddle = 10 * 21 + 10;
+  testing::HostMaps warped, predicted, measured;
+
+  explicit Surroundings(float around) : predicted(all(around)), measured(all(around)) { warped = predicted; }
+
+  static testing::HostMaps all(float disparity) {
+    const std::size_t pixels = 2 * kSize.width * kSize.height;
+    return {std::vector<float>(pixels, disparity), std::vector<float>(pixels, 1)};
+  }
+  Estimate updated_in_the_middle(const KalmanUpdateOptions& options = {},
+                                 const shared::PredictionState& check = {}) const {
+    const testing::HostMaps updated = update(kSize, options, warped, predicted, measured, 0, check);
+    return {updated.disparity[kMiddle], updated.variance[kMiddle]};
+  }
+  void drop_prediction() {
+    predicted.disparity[kMiddle] = kNone;
+    predicted.variance[kMiddle] = 0;
+  }
+  /// Measures `disparity` in every row from `row` on.
+  void measure_from(int row, float disparity) {
+    for (int i = row * kSize.width; i < kSize.width * kSize.height; ++i) measured.disparity[i] = disparity;
+  }
+};
+
+constexpr float kEscaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+
+TEST(KalmanUpdate, KeepsAPredictionThatTheNeighboursVouchForOnce) {
+  Surroundings maps(20);
+  maps.measured.disparity[Surroundings::kMiddle] = 10;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 1, 0}), (Estimate{10, kEscaped})) << "the predictions are wrong";
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 0, 1}), (Estimate{10, kEscaped})) << "they were";
+  maps.predicted.variance[Surroundings::kMiddle] = kEscaped;  // was kept before
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kEscaped}));
+}
+
+TEST(KalmanUpdate, TakesWhatComesNearerOrWhatMostMeasure) {
+  Surroundings nearer(20);
+  nearer.measured.disparity[Surroundings::kMiddle] = 30;
+  EXPECT_EQ(nearer.updated_in_the_middle(), (Estimate{30, kEscaped}));
+  Surroundings most(20);
+  most.measure_from(10, 10);  // three of five rows
+  EXPECT_EQ(most.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  Surroundings few(20);
+  few.measure_from(14, 10);
+  few.measured.disparity[Surroundings::kMiddle] = 10;
+  EXPECT_EQ(few.updated_in_the_middle(), (Estimate{20, kEscaped}));
+}
+
+TEST(KalmanUpdate, DropsWhatNoneSpeaksForWhereADroppedPredictionContradicts) {
+  Surroundings maps(20);
+  maps.drop_prediction();
+  maps.measured.disparity[Surroundings::kMiddle] = 30;
+  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
+  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{30, 1}));
+  maps.warped.disparity[Surroundings::kMiddle] = 28;  // within the gate
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
+  maps.warped.disparity[Surroundings::kMiddle] = kNone;  // nothing was there
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
+  maps.warped.disparity[Surroundings::kMiddle] = 20;
+  maps.predicted.disparity[2 * 21 + 2] = maps.measured.disparity[2 * 21 + 2] = 31;  // one vouches
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
+}
+
+TEST(KalmanUpdate, TakesWhatMostMeasureThoughNoneVouches) {
+  Surroundings maps(20);
+  maps.drop_prediction();
+  maps.measure_from(6, 30);                  // four of five rows,
+  maps.measured.disparity[6 * 21 + 2] = 20;  // but for two pixels: 18 of 25
+  maps.measured.disparity[6 * 21 + 6] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
+  maps.measured.disparity[6 * 21 + 14] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
+}
+
+TEST(KalmanUpdate, KeepsADroppedPredictionThatTheNeighboursVouchFor) {
+  Surroundings maps(20);
+  maps.drop_prediction();
+  maps.measured.disparity[Surroundings::kMiddle] = 10;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kEscaped}));
+}
+
+TEST(KalmanUpdate, DropsBothWhereNoneVouchesForEither) {
+  Surroundings maps(20);
+  for (float& disparity : maps.measured.disparity) disparity = kNone;
+  maps.measured.disparity[Surroundings::kMiddle] = 10;
+  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
+  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kEscaped}));
+  maps.measure_from(10, 10);  // three of five rows
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  maps.measured.disparity[18 * 21 + 18] = maps.measured.disparity[18 * 21 + 14] = 20;  // one vouches for either
+  maps.predicted.disparity[18 * 21 + 10] = 10;
+  maps.measured.disparity[18 * 21 + 6] = maps.measured.disparity[18 * 21 + 2] = kNone;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  maps.measure_from(0, kNone);
+  maps.measured.disparity[Surroundings::kMiddle] = 30;  // nearer: a thin thing that was lost
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, kEscaped}));
+}
+
+/// All are measured `off` nearer than predicted, the pixel in the middle `innovation`.
+Surroundings shifted(float off, float innovation) {
+  Surroundings maps(20);
+  for (float& disparity : maps.measured.disparity) disparity += off;
+  maps.measured.disparity[Surroundings::kMiddle] = 20 + innovation;
+  return maps;
+}
+
+TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
+  for (const float sign : {1.0f, -1.0f}) {
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kEscaped}));
+    const Estimate fused{20 + sign * 0.625f, 0.5f};
+    EXPECT_EQ(shifted(sign * 0.75f, sign * 1.25f).updated_in_the_middle(), fused) << "the others not far enough";
+    EXPECT_EQ(shifted(sign * -0.875f, sign * 1.25f).updated_in_the_middle(), fused) << "to the other side";
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1).updated_in_the_middle(), (Estimate{20 + sign * 0.5f, 0.5f}));
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle({.ask_neighbours = false}), fused);
+  }
+  Surroundings maps = shifted(0.875f, 1.25f);
+  for (const int still : {2, 6, 10, 14, 18}) {
+    maps.measured.disparity[2 * 21 + still] = maps.measured.disparity[18 * 21 + still] = 20;
+  }
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kEscaped})) << "15 of 25";
+  maps.measured.disparity[6 * 21 + 2] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "14 of 25";
+  for (const int beside : {6, 14}) {
+    Surroundings between = shifted(0.875f, 1.25f);
+    between.measured.disparity[10 * 21 + beside] = 20;
+    EXPECT_EQ(between.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "but not beside";
+  }
+}
+
+TEST(KalmanUpdate, CountsNoPixelOutsideOfTheImageAmongThoseThatMove) {
+  Surroundings maps(20);
+  maps.measured = Surroundings::all(21.25f);
+  const testing::HostMaps updated = update(Surroundings::kSize, {}, maps.warped, maps.predicted, maps.measured);
+  const auto moved = [&](int view, int x, int y) { return updated.disparity[(view * 21 + y) * 21 + x] == 21.25f; };
+  for (const int view : {0, 1}) {
+    EXPECT_TRUE(moved(view, 10, 3) && moved(view, 10, 17)) << "15 of 25 lie in the image";
+    EXPECT_FALSE(moved(view, 7, 3) || moved(view, 13, 3)) << "12";
+    EXPECT_FALSE(moved(view, 7, 17) || moved(view, 13, 17));
+    EXPECT_FALSE(moved(view, 3, 10) || moved(view, 17, 10)) << "none beside";
+  }
+}
+
+TEST(KalmanUpdate, CountsEveryInnovationAfterWrongPredictions) {
+  Surroundings maps(20);
+  maps.measured.disparity[Surroundings::kMiddle] = 22;  // 4 px^2: p' is raised from 1 to 3
+  const Estimate raised{21.5f, 0.75f};
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21, 0.5f}));
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 1, 0}), raised);
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 0, 1}), raised);
+  EXPECT_EQ(maps.updated_in_the_middle({.innovation_sigmas = 0}, {{}, 1, 0}), (Estimate{21, 0.5f}));
+  EXPECT_EQ(maps.updated_in_the_middle({.innovation_sigmas = 0.5f}, {{}, 1, 0}),
+            maps.updated_in_the_middle({.innovation_sigmas = 0.5f}));
+}
+
+TEST(KalmanUpdate, NeverClaimsMoreThanTheFloor) {
+  const KalmanUpdateOptions options{.innovation_sigmas = 0, .min_variance_px2 = 0.25f};
+  EXPECT_EQ(update_pixel(options, {10, 0.25f}, {10, 0.25f}), (Estimate{10, 0.25f}));
+  EXPECT_EQ(update_pixel(options, kNothing, {12, 0.125f}), (Estimate{12, 0.25f}));
+  EXPECT_EQ(update_pixel(options, {10, 0.125f}, kNothing), (Estimate{10, 0.25f}));
+  EXPECT_EQ(update_pixel(options, {10, 0}, {11, 0}), (Estimate{10, 0.25f}));
+}
+
+}  // namespace
+}  // namespace egosgm

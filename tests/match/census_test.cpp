@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/match/census.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/reference/match/census.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+
+namespace egosgm {
+namespace {
+
+using Case = std::tuple<shared::ImageSize, PixelType, MatchingCost, int>;
+
+std::string name(const ::testing::TestParamInfo<Case>& info) {
+  const auto [size, type, cost, pixels] = info.param;
+  return std::to_string(size.width) + "x" + std::to_string(size.height) +
+         (type == PixelType::kU8 ? "_8bit" : "_16bit") +
+         (cost == MatchingCost::kCensus13x11 ? "_census13x11"
+          : cost == MatchingCost::kCensus9x7 ? "_census9x7"
+          : cost == MatchingCost::kCensus5x5 ? "_census5x5"
+                                             : "_grey") +
+         "_by_" + std::to_string(pixels);
+}
+
+class CensusTest : public ::testing::TestWithParam<Case> {};
+
+TEST_P(CensusTest, EqualsReference) {
+  const auto [size, type, cost, pixels] = GetParam();
+  const int padding = 19, bytes = type == PixelType::kU8 ? 1 : 2;
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> grey(0, type == PixelType::kU8 ? 255 : 65535);
+  std::vector<std::uint16_t> views[2];
+  std::vector<cl_uchar> raw;
+  for (auto& view : views) {
+    for (std::size_t i = 0; i < pixel_count(size); ++i) {
+      view.push_back(static_cast<std::uint16_t>(grey(random)));
+      for (int b = 0; b < bytes; ++b) raw.push_back(static_cast<cl_uchar>(view.back() >> (8 * b)));
+    }
+  }
+
+  ocl::Context context(testing::any_device());
+  Census census(context, size, type, cost, padding, pixels);
+  ocl::Buffer<cl_uchar> images(context, raw.size());
+  ocl::Buffer<cl_uint> codes(context, Census::words(cost, size, padding));
+  images.write(context, raw);
+  census(images, codes);
+
+  const auto expected = reference::padded_codes(size, reference::codes(size, views[0], 8 * bytes, cost),
+                                                reference::codes(size, views[1], 8 * bytes, cost), padding, cost);
+  const auto actual = codes.read(context);
+  EXPECT_TRUE(testing::same_bits(std::vector<std::uint32_t>(actual.begin(), actual.end()), expected,
+                                 {(size.width + 2 * padding) * Census::words(cost), size.height}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::kSizes),
+                                            ::testing::Values(PixelType::kU8, PixelType::kU16),
+                                            ::testing::Values(MatchingCost::kCensus13x11, MatchingCost::kCensus9x7,
+                                                              MatchingCost::kCensus5x5, MatchingCost::kSad3x3),
+                                            ::testing::Values(1, 16)),
+                         name);
+
+}  // namespace
+}  // namespace egosgm

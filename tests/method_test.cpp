@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/method.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <string>
+
+#include "host/frame/frame_transfer.h"
+#include "host/tuning_defaults.h"
+#include "tests/support/device.h"
+#include "tests/support/pipeline_video.h"
+
+namespace egosgm::testing {
+namespace {
+
+/// A method with what it has built.
+struct Built {
+  explicit Built(const std::function<void(PipelineOptions&)>& change = {})
+      : method(context, kSize, standard().scene().calibration(), options(32, 0, change),
+               with_defaults({}, Device::select().info())) {
+    method.prepare(PixelType::kU8);
+  }
+
+  bool has(const std::string& file, const std::string& define = "") const {
+    const auto programs = context.programs();
+    return std::any_of(programs.begin(), programs.end(), [&](const auto& program) {
+      return program.first.kernel_file == file && program.first.options.find(define) != std::string::npos;
+    });
+  }
+
+  ocl::Context context{any_device()};
+  Method method;
+};
+
+TEST(Method, BuildsWhatItsOptionsNeed) {
+  EXPECT_FALSE(Built().has("sad_check.cl"));
+  EXPECT_TRUE(Built([](auto& o) { o.sad_check.max_difference = 9; }).has("sad_check.cl"));
+  EXPECT_TRUE(Built().has("output_variance.cl"));
+  EXPECT_FALSE(Built([](auto& o) { o.output_variance.enabled = false; }).has("output_variance.cl"));
+  EXPECT_TRUE(Built().has("dynamic_map.cl"));
+  const Built alone([](auto& o) { o.temporal = false; });
+  for (const char* file : {"dynamic_map.cl", "forward_warp.cl", "kalman_update.cl", "coarse_match.cl"}) {
+    EXPECT_FALSE(alone.has(file)) << file;
+  }
+}
+
+TEST(Method, BuildsForOneTypeOfImageAndForTheOtherWhenItIsAskedTo) {
+  Built built;
+  for (const char* file : {"vertical_alignment.cl", "coarse_match.cl"}) {
+    EXPECT_TRUE(built.has(file, "PIXEL_BYTES=1")) << file;
+    EXPECT_FALSE(built.has(file, "PIXEL_BYTES=2")) << file;
+  }
+  const std::size_t bytes = built.context.allocated_bytes();
+  built.method.prepare(PixelType::kU16);
+  for (const char* file : {"vertical_alignment.cl", "coarse_match.cl"}) {
+    EXPECT_TRUE(built.has(file, "PIXEL_BYTES=2")) << file;
+  }
+  EXPECT_EQ(built.context.allocated_bytes(), bytes) << "memory is all allocated at first";
+}
+
+TEST(Method, BuildsNothingInAFrame) {
+  Built built;
+  const Video video(standard(), 3);
+  FrameTransfer transfer(built.context, kSize, {0, 32});
+  Belief before(built.context, kSize), after(built.context, kSize);
+  const std::size_t programs = built.context.programs().size();
+  for (int index = 0; index < video.size(); ++index) {
+    const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
+    const Plan plan =
+        plan_of(options(32, 0), before.missing, before.offset.is_known, video.motion(index), {Views::kBoth, true});
+    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.output_variance());
+    built.context.wait();
+    std::swap(before, after);
+  }
+  EXPECT_EQ(built.context.programs().size(), programs);
+}
+
+// A belief is a value: a frame leaves the one before it as it was, and may be run on it again.
+TEST(Method, AFrameLeavesTheBeliefBeforeItAsItWas) {
+  Built built;
+  const Video video(standard(), 2);
+  FrameTransfer transfer(built.context, kSize, {0, 32});
+  Belief first(built.context, kSize), second(built.context, kSize), nothing(built.context, kSize);
+  const auto frame = [&](int index, const Belief& before, Belief& after) {
+    const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
+    const Plan plan = plan_of(options(32, 0), before.missing, before.offset.is_known, video.motion(index), {});
+    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.output_variance());
+    built.context.wait();
+  };
+  frame(0, nothing, first);
+  const std::vector<float> disparity = first.maps.disparity.read(built.context);
+  const std::vector<float> variance = first.maps.variance.read(built.context);
+  const std::vector<float> terms = first.offset.terms.read(built.context);
+  frame(1, first, second);
+  const std::vector<float> once = second.maps.disparity.read(built.context);
+  EXPECT_EQ(first.maps.disparity.read(built.context), disparity);
+  EXPECT_EQ(first.maps.variance.read(built.context), variance);
+  EXPECT_EQ(first.offset.terms.read(built.context), terms);
+  frame(1, first, second);
+  EXPECT_EQ(second.maps.disparity.read(built.context), once);
+}
+
+}  // namespace
+}  // namespace egosgm::testing

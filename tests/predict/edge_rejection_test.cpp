@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/predict/edge_rejection.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/reference/predict/edge_rejection.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+
+testing::HostMaps reject(shared::ImageSize size, float max_jump_px, const testing::HostMaps& maps, int pixels = 0) {
+  ocl::Context context(testing::any_device());
+  EdgeRejection reject(context, size, {.max_jump_px = max_jump_px}, pixels);
+  StereoMaps in = testing::upload(context, size, maps);
+  StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
+  reject(in.disparity, out.disparity, in.variance);
+  return {out.disparity.read(context), in.variance.read(context)};
+}
+
+// One row in the left view; the right view is empty.
+std::vector<float> reject_row(const std::vector<float>& row, float max_jump_px) {
+  const shared::ImageSize size{static_cast<int>(row.size()), 1};
+  testing::HostMaps maps = testing::empty_maps(size);
+  std::copy(row.begin(), row.end(), maps.disparity.begin());
+  const std::vector<float> kept = reject(size, max_jump_px, maps).disparity;
+  return {kept.begin(), kept.begin() + size.width};
+}
+
+class EdgeRejectionTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(EdgeRejectionTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const float max_jump_px : {0.0f, 1.0f, 5.0f}) {
+    testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.2, 3);
+    for (std::size_t i = 0; i < maps.variance.size(); i += 3) maps.variance[i] = 7;  // also where nothing is
+    const testing::HostMaps expected = reference::edge_rejection(size, max_jump_px, maps);
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps actual = reject(size, max_jump_px, maps, pixels);
+      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+          << max_jump_px << " px, by " << pixels;
+      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << max_jump_px << " px, by " << pixels;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, EdgeRejectionTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+TEST(EdgeRejection, DropsBothSidesOfAJump) {
+  EXPECT_EQ(reject_row({10, 10, 10, 10, 30, 30, 30}, 5), (std::vector<float>{10, 10, 10, kNone, kNone, 30, 30}));
+}
+
+TEST(EdgeRejection, SeesAJumpAcrossOneHoleButNotAcrossTwo) {
+  EXPECT_EQ(reject_row({10, 10, kNone, 30, 30}, 5), (std::vector<float>{10, kNone, kNone, kNone, 30}));
+  EXPECT_EQ(reject_row({10, 10, kNone, kNone, 30, 30}, 5), (std::vector<float>{10, 10, kNone, kNone, 30, 30}));
+}
+
+TEST(EdgeRejection, KeepsSlopesAndStepsUpToTheLimit) {
+  const std::vector<float> row{10, 15, 20, 25, 20};
+  EXPECT_EQ(reject_row(row, 5), row);
+  EXPECT_NE(reject_row(row, 4.75f), row);
+}
+
+TEST(EdgeRejection, ZeroKeepsAll) {
+  const std::vector<float> row{0, 1000, 0, kNone, -500};
+  EXPECT_EQ(reject_row(row, 0), row);
+}
+
+TEST(EdgeRejection, LooksUpAndDownButNotIntoTheOtherViewOrRow) {
+  const shared::ImageSize size{1, 3};
+  testing::HostMaps maps = testing::empty_maps(size);
+  maps.disparity = {10, 10, 30, 60, 60, 60};  // left view, then right view
+  maps.variance = {1, 1, 1, 2, 2, 2};
+  const testing::HostMaps kept = reject(size, 5, maps);
+  EXPECT_EQ(kept.disparity, (std::vector<float>{10, kNone, kNone, 60, 60, 60}));
+  EXPECT_EQ(kept.variance, (std::vector<float>{1, 0, 0, 2, 2, 2}));
+
+  maps.disparity = {10, 10, 10, 90, 90, 90};
+  EXPECT_EQ(reject({3, 1}, 5, maps).disparity, maps.disparity);
+}
+
+TEST(EdgeRejection, KeepsTheVarianceOfAHiddenPixel) {
+  testing::HostMaps maps = testing::empty_maps({3, 1});
+  maps.disparity = {10, kNone, 90, kNone, kNone, kNone};
+  maps.variance = {1, 7, 1, 0, 0, 0};
+  EXPECT_EQ(reject({3, 1}, 5, maps).variance, (std::vector<float>{0, 7, 0, 0, 0, 0}));
+}
+
+TEST(EdgeRejection, DoesNotLookAroundTheEndOfARow) {
+  const shared::ImageSize size{3, 2};
+  testing::HostMaps maps = testing::empty_maps(size);
+  maps.disparity = {kNone, kNone, 90,    kNone, 10,    kNone,   // left view: left of the 10, over the edge, lies the 90
+                    kNone, 10,    kNone, 90,    kNone, kNone};  // right view: right of the 10
+  EXPECT_EQ(reject(size, 5, maps).disparity, maps.disparity);
+}
+
+}  // namespace
+}  // namespace egosgm

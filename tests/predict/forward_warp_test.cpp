@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/predict/forward_warp.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "kernels/method.h"
+#include "tests/reference/predict/forward_warp.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+constexpr shared::ImageSize kSize{101, 61};
+constexpr shared::DisparityRange kRange{0, 64};
+const Calibration kCalibration{.fx = 100, .fy = 100, .cx = 50, .cy = 30, .baseline_m = 0.5};  // Z = 50 / d
+
+// What lies in the output must not shine through.
+testing::HostMaps before(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
+
+testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, shared::DisparityRange range,
+                       float process_noise_px2, const testing::HostMaps& belief, const Motion& motion, int pixels = 0,
+                       Views views = Views::kBoth) {
+  ocl::Context context(testing::any_device());
+  ForwardWarp warp(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
+  const StereoMaps in = testing::upload(context, size, belief);
+  StereoMaps out = testing::upload(context, size, before(size));
+  warp(in, motion, out, views);
+  return testing::download(context, out);
+}
+
+testing::HostMaps warp(const testing::HostMaps& belief, const Motion& motion) {
+  return warp(kSize, kCalibration, kRange, 0.25f, belief, motion);
+}
+
+std::size_t at(shared::ImageSize size, int view, int x, int y) {
+  return (static_cast<std::size_t>(view) * size.height + y) * size.width + x;
+}
+
+Motion translation(double x_m, double y_m, double z_m) {
+  Motion motion;
+  motion.current_from_previous.translation() = Eigen::Vector3d(x_m, y_m, z_m);
+  return motion;
+}
+
+Motion rotation(const Eigen::Vector3d& axis, double angle_rad) {
+  Motion motion;
+  motion.current_from_previous.linear() = Eigen::AngleAxisd(angle_rad, axis.normalized()).toRotationMatrix();
+  return motion;
+}
+
+Eigen::Matrix<double, 6, 6> random_covariance(std::mt19937& random, double scale) {
+  std::normal_distribution<double> normal(0, scale);
+  const Eigen::Matrix<double, 6, 6> root = Eigen::Matrix<double, 6, 6>::NullaryExpr([&] { return normal(random); });
+  return root * root.transpose();
+}
+
+Motion random_motion(std::mt19937& random, double metres, double radians) {
+  std::uniform_real_distribution<double> unit(-1, 1);
+  Motion motion = rotation({unit(random), unit(random), unit(random)}, radians * unit(random));
+  motion.current_from_previous.translation() = metres * Eigen::Vector3d(unit(random), unit(random), unit(random));
+  return motion;
+}
+
+std::size_t count_valid(const std::vector<float>& disparity, int view) {
+  const auto first = disparity.begin() + view * static_cast<std::ptrdiff_t>(disparity.size() / 2);
+  const auto last = first + static_cast<std::ptrdiff_t>(disparity.size() / 2);
+  return static_cast<std::size_t>(std::count_if(first, last, [](float d) { return d > kNone; }));
+}
+
+class ForwardWarpTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(ForwardWarpTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  std::mt19937 random(11);
+  Calibration calibration{
+      .fx = 0.6 * size.width, .fy = 0.7 * size.width, .cx = 0.48 * size.width, .cy = 0.55 * size.height};
+  calibration.baseline_m = 0.5;
+  for (const shared::DisparityRange range : {shared::DisparityRange{0, 128}, {-20, 37}, {3, 1}}) {
+    calibration.doffs_px = range.min < 0 ? 25.5 : 0;
+    // The noise of few steps makes many equal disparities, so that ties are met.
+    testing::HostMaps belief = testing::random_maps(size, static_cast<float>(range.min) - 1,
+                                                    static_cast<float>(range.min + range.count), 0.2, 12);
+    for (float& d : belief.disparity) d = std::nearbyint(4 * d) / 4;
+    for (int repetition = 0; repetition < 3; ++repetition) {
+      Motion motion = random_motion(random, 0.5, 0.05);
+      if (repetition > 0) motion.covariance = random_covariance(random, 0.01);
+      const testing::HostMaps expected =
+          reference::forward_warp(size, range, disparity_motion(calibration, motion, EGOSGM_LEFT),
+                                  disparity_motion(calibration, motion, EGOSGM_RIGHT), 0.25f, belief);
+      for (const int pixels : {1, 16}) {
+        const testing::HostMaps actual = warp(size, calibration, range, 0.25f, belief, motion, pixels);
+        EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+            << "min " << range.min << ", by " << pixels;
+        EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
+            << "min " << range.min << ", by " << pixels;
+      }
+    }
+  }
+}
+
+TEST_P(ForwardWarpTest, PredictsTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const testing::HostMaps belief = testing::random_maps(size, 0, 70, 0.2, 18), was = before(size);
+  std::mt19937 random(19);
+  const Motion motion = random_motion(random, 0.3, 0.02);
+  const testing::HostMaps both = warp(size, kCalibration, kRange, 0.25f, belief, motion);
+  for (const int pixels : {1, 16}) {
+    const testing::HostMaps one = warp(size, kCalibration, kRange, 0.25f, belief, motion, pixels, Views::kLeft);
+    EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
+    EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, ForwardWarpTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+TEST(ForwardWarp, WithoutMotionOnlyTheVarianceGrows) {
+  const testing::HostMaps belief = testing::random_maps(kSize, 0, 63, 0.2, 13);
+  const testing::HostMaps predicted = warp(belief, {});
+  EXPECT_TRUE(testing::same_bits(predicted.disparity, belief.disparity, kSize));
+  for (std::size_t i = 0; i < belief.variance.size(); ++i) {
+    ASSERT_EQ(predicted.variance[i], belief.disparity[i] > kNone ? belief.variance[i] + 0.25f : 0.0f);
+  }
+}
+
+// 5 m away, 1 m forward: the depth is 4 / 5 of what it was, all that is relative to the principal point 5 / 4.
+TEST(ForwardWarp, ForwardMotionExpandsAboutThePrincipalPoint) {
+  testing::HostMaps belief = testing::empty_maps(kSize);
+  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
+    belief.disparity[at(kSize, view, 70, 38)] = 10;
+    belief.variance[at(kSize, view, 70, 38)] = 2;
+    belief.disparity[at(kSize, view, 50, 30)] = 10;
+  }
+  const testing::HostMaps predicted = warp(belief, translation(0, 0, -1));
+  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
+    EXPECT_EQ(count_valid(predicted.disparity, view), 2u);
+    EXPECT_FLOAT_EQ(predicted.disparity[at(kSize, view, 75, 40)], 12.5f);
+    EXPECT_FLOAT_EQ(predicted.variance[at(kSize, view, 75, 40)], 1.5625f * 2 + 0.25f);
+    EXPECT_FLOAT_EQ(predicted.disparity[at(kSize, view, 50, 30)], 12.5f);
+  }
+}
+
+TEST(ForwardWarp, RotationMovesPointsAtInfinity) {
+  testing::HostMaps belief = testing::empty_maps(kSize);
+  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) belief.disparity[at(kSize, view, 50, 30)] = 0;
+  // Yaw that carries the optical axis 10 px to the right; pitch that carries it 10 px up.
+  const testing::HostMaps yawed = warp(belief, rotation({0, 1, 0}, std::atan(0.1)));
+  const testing::HostMaps pitched = warp(belief, rotation({1, 0, 0}, std::atan(0.1)));
+  for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
+    EXPECT_EQ(yawed.disparity[at(kSize, view, 60, 30)], 0);
+    EXPECT_EQ(count_valid(yawed.disparity, view), 1u);
+    EXPECT_EQ(pitched.disparity[at(kSize, view, 50, 20)], 0);
+    EXPECT_EQ(count_valid(pitched.disparity, view), 1u);
+  }
+}
+
+// Sideways by 0.1 m: a disparity of 20 px moves by 4 px, one of 1 px by 0.2 px.
+TEST(ForwardWarp, NearestSurfaceWins) {
+  for (const int direction : {-1, 1}) {
+    testing::HostMaps belief = testing::empty_maps(kSize);
+    belief.disparity[at(kSize, EGOSGM_LEFT, 50, 30)] = 20;
+    belief.disparity[at(kSize, EGOSGM_LEFT, 50 + 4 * direction, 30)] = 1;
+    belief.variance[at(kSize, EGOSGM_LEFT, 50, 30)] = 0.5f;
+    belief.variance[at(kSize, EGOSGM_LEFT, 50 + 4 * direction, 30)] = 7;
+    const testing::HostMaps predicted = warp(belief, translation(0.1 * direction, 0, 0));
+    EXPECT_EQ(count_valid(predicted.disparity, EGOSGM_LEFT), 1u);
+    EXPECT_EQ(predicted.disparity[at(kSize, EGOSGM_LEFT, 50 + 4 * direction, 30)], 20);
+    EXPECT_EQ(predicted.variance[at(kSize, EGOSGM_LEFT, 50 + 4 * direction, 30)], 0.75f);
+  }
+}
+
+// Back by as much as the surface is away: x - cx and the disparity halve, so columns 53 .. 55 land on 52.
+TEST(ForwardWarp, OfEqualDisparitiesTheLeastCertainWins) {
+  for (const int uncertain : {53, 54, 55}) {
+    testing::HostMaps belief = testing::empty_maps(kSize);
+    for (const int x : {53, 54, 55}) {
+      belief.disparity[at(kSize, EGOSGM_LEFT, x, 30)] = 10;
+      belief.variance[at(kSize, EGOSGM_LEFT, x, 30)] = x == uncertain ? 4.0f : 1.0f;
+    }
+    const testing::HostMaps predicted = warp(belief, translation(0, 0, 5));
+    EXPECT_EQ(predicted.disparity[at(kSize, EGOSGM_LEFT, 52, 30)], 5);
+    EXPECT_EQ(predicted.variance[at(kSize, EGOSGM_LEFT, 52, 30)], 1.25f);
+  }
+}
+
+TEST(ForwardWarp, PointsBehindTheCameraVanish) {
+  testing::HostMaps belief = testing::empty_maps(kSize);
+  for (float& d : belief.disparity) d = 10;
+  const testing::HostMaps predicted = warp(belief, translation(0, 0, -6));
+  EXPECT_EQ(predicted.disparity, testing::empty_maps(kSize).disparity);
+  EXPECT_EQ(predicted.variance, testing::empty_maps(kSize).variance);
+
+  // At infinity the disparity does not tell, and half a turn mirrors the image into itself.
+  for (float& d : belief.disparity) d = 0;
+  EXPECT_EQ(warp(belief, rotation({0, 1, 0}, 3.14159)).disparity, testing::empty_maps(kSize).disparity);
+}
+
+TEST(ForwardWarp, DropsWhatLeavesTheDisparityRange) {
+  testing::HostMaps belief = testing::empty_maps(kSize);
+  belief.disparity[at(kSize, EGOSGM_LEFT, 50, 30)] = 50;
+  EXPECT_EQ(count_valid(warp(belief, translation(0, 0, -0.2)).disparity, EGOSGM_LEFT), 1u);   // 62.5 of 0 .. 63
+  EXPECT_EQ(count_valid(warp(belief, translation(0, 0, -0.25)).disparity, EGOSGM_LEFT), 0u);  // 66.7
+}
+
+// 1 m away, 0.25 m forward: column 53 moves to 54 and out of the range; what lies far away in column 54 stays there.
+TEST(ForwardWarp, WhatComesNearerThanTheRangeHidesWhatIsBehind) {
+  for (const int pixels : {1, 16}) {
+    testing::HostMaps belief = testing::empty_maps(kSize);
+    belief.disparity[at(kSize, EGOSGM_LEFT, 54, 30)] = 1;
+    const Motion forward = translation(0, 0, -0.25);
+    EXPECT_EQ(count_valid(warp(kSize, kCalibration, kRange, 0.25f, belief, forward, pixels).disparity, EGOSGM_LEFT),
+              1u);
+    belief.disparity[at(kSize, EGOSGM_LEFT, 53, 30)] = 50;
+    const testing::HostMaps hidden = warp(kSize, kCalibration, kRange, 0.25f, belief, forward, pixels);
+    EXPECT_EQ(hidden.disparity, testing::empty_maps(kSize).disparity);
+    EXPECT_EQ(hidden.variance[at(kSize, EGOSGM_LEFT, 54, 30)], EGOSGM_MAX_VARIANCE_PX2);
+    EXPECT_EQ(std::count(hidden.variance.begin(), hidden.variance.end(), 0.0f), 2 * 101 * 61 - 1);
+  }
+}
+
+TEST(ForwardWarp, SurvivesWildMotions) {
+  std::mt19937 random(14);
+  testing::HostMaps belief = testing::random_maps(kSize, -300, 3000, 0.1, 15);
+  for (std::size_t i = 0; i < belief.variance.size(); i += 7) belief.variance[i] = 1e30f;
+  for (std::size_t i = 0; i < belief.disparity.size(); i += 5) belief.disparity[i] = 0;
+  for (const double metres : {0.1, 10.0, 1e5, 1e30}) {
+    for (int repetition = 0; repetition < 5; ++repetition) {
+      Motion motion = random_motion(random, metres, 3.2);
+      motion.covariance = random_covariance(random, metres);
+      const testing::HostMaps predicted = warp(belief, motion);
+      const testing::HostMaps expected =
+          reference::forward_warp(kSize, kRange, disparity_motion(kCalibration, motion, EGOSGM_LEFT),
+                                  disparity_motion(kCalibration, motion, EGOSGM_RIGHT), 0.25f, belief);
+      EXPECT_TRUE(testing::same_bits(predicted.disparity, expected.disparity, kSize)) << metres << " m";
+      EXPECT_TRUE(testing::same_bits(predicted.variance, expected.variance, kSize)) << metres << " m";
+      for (std::size_t i = 0; i < predicted.disparity.size(); ++i) {
+        const float d = predicted.disparity[i], p = predicted.variance[i];
+        ASSERT_TRUE(d == kNone ? p == 0 || p == EGOSGM_MAX_VARIANCE_PX2
+                               : d >= 0 && d <= 63 && p >= 0.25f && p <= EGOSGM_MAX_VARIANCE_PX2)
+            << d << ", variance " << p << ", " << metres << " m";
+      }
+    }
+  }
+}
+
+// What a point in space looks like: an independent way to the same numbers, without H.
+struct Observation {
+  double x_left, x_right, y, disparity;
+};
+
+Observation observe(const Calibration& c, const Eigen::Vector3d& point) {
+  const double x_left = c.cx + c.fx * point.x() / point.z();
+  const double x_right = c.cx + c.doffs_px + c.fx * (point.x() - c.baseline_m) / point.z();
+  return {x_left, x_right, c.cy + c.fy * point.y() / point.z(), x_left - x_right};
+}
+
+Eigen::Vector3d point_at(const Calibration& c, double x, double y, double disparity) {
+  const double z = c.fx * c.baseline_m / (disparity + c.doffs_px);
+  return {(x - c.cx) * z / c.fx, (y - c.cy) * z / c.fy, z};
+}
+
+const Calibration kUneven{.fx = 120, .fy = 95, .cx = 47.25, .cy = 31.5, .baseline_m = 0.4, .doffs_px = 2};
+
+// One point in both maps: each view's prediction lies where the moved point is seen.
+TEST(ForwardWarp, BothViewsFollowThePointInSpace) {
+  std::mt19937 random(16);
+  std::uniform_int_distribution<int> xs(30, 70), ys(15, 45), disparities(5, 25);
+  for (int repetition = 0; repetition < 50; ++repetition) {
+    const int x = xs(random), y = ys(random), d = disparities(random);
+    const Motion motion = random_motion(random, 0.4, 0.1);
+    testing::HostMaps belief = testing::empty_maps(kSize);
+    belief.disparity[at(kSize, EGOSGM_LEFT, x, y)] = static_cast<float>(d);
+    belief.disparity[at(kSize, EGOSGM_RIGHT, x - d, y)] = static_cast<float>(d);
+
+    const testing::HostMaps predicted = warp(kSize, kUneven, kRange, 0, belief, motion);
+    const Observation seen = observe(kUneven, motion.current_from_previous * point_at(kUneven, x, y, d));
+    for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
+      const double seen_x = view == EGOSGM_LEFT ? seen.x_left : seen.x_right;
+      if (std::nearbyint(seen_x) < 0 || std::nearbyint(seen_x) >= kSize.width) continue;
+      if (std::nearbyint(seen.y) < 0 || std::nearbyint(seen.y) >= kSize.height) continue;
+      const std::size_t target =
+          at(kSize, view, static_cast<int>(std::nearbyint(seen_x)), static_cast<int>(std::nearbyint(seen.y)));
+      EXPECT_NEAR(predicted.disparity[target], seen.disparity, 1e-4) << "view " << view << ", " << repetition;
+      EXPECT_EQ(count_valid(predicted.disparity, view), 1u);
+    }
+  }
+}
+
+// q = J Sigma J^T, with J from finite differences of a perturbed motion.
+double variance_by_differences(const Motion& motion, const Eigen::Vector3d& point) {
+  constexpr double kStep = 1e-6;
+  const Eigen::Vector3d moved = motion.current_from_previous * point;
+  Eigen::Matrix<double, 1, 6> jacobian;
+  for (int i = 0; i < 6; ++i) {
+    const auto disparity_after = [&](double step) {
+      Eigen::Vector3d perturbed = moved;
+      if (i < 3) perturbed[i] += step;
+      if (i >= 3) perturbed = Eigen::AngleAxisd(step, Eigen::Vector3d::Unit(i - 3)) * moved;
+      return observe(kUneven, perturbed).disparity;
+    };
+    jacobian[i] = (disparity_after(kStep) - disparity_after(-kStep)) / (2 * kStep);
+  }
+  return (jacobian * motion.covariance * jacobian.transpose())(0, 0);
+}
+
+TEST(ForwardWarp, VarianceFollowsFromTheMotionsCovariance) {
+  std::mt19937 random(17);
+  std::uniform_int_distribution<int> xs(30, 70), ys(15, 45), disparities(5, 25);
+  for (int repetition = 0; repetition < 20; ++repetition) {
+    const int x = xs(random), y = ys(random), d = disparities(random);
+    Motion motion = random_motion(random, 0.3, 0.02);
+    motion.covariance = random_covariance(random, 0.05);
+    testing::HostMaps belief = testing::empty_maps(kSize);
+    belief.disparity[at(kSize, EGOSGM_LEFT, x, y)] = static_cast<float>(d);
+    belief.disparity[at(kSize, EGOSGM_RIGHT, x - d, y)] = static_cast<float>(d);
+    const testing::HostMaps predicted = warp(kSize, kUneven, kRange, 0, belief, motion);
+    const double expected = variance_by_differences(motion, point_at(kUneven, x, y, d));
+    for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
+      if (count_valid(predicted.disparity, view) == 0) continue;
+      const auto first = predicted.variance.begin() + view * static_cast<std::ptrdiff_t>(predicted.variance.size() / 2);
+      const float variance =
+          *std::max_element(first, first + static_cast<std::ptrdiff_t>(predicted.variance.size() / 2));
+      EXPECT_NEAR(variance / expected, 1, 1e-3) << "view " << view << ", " << repetition;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace egosgm

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/predict/hole_fill.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/reference/predict/hole_fill.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+
+testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps, int pixels = 0) {
+  ocl::Context context(testing::any_device());
+  HoleFill fill(context, size, {.max_difference_px = max_difference_px}, pixels);
+  const StereoMaps in = testing::upload(context, size, maps);
+  StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
+  fill(in, out);
+  return testing::download(context, out);
+}
+
+// The left view; the right one is empty.
+testing::HostMaps left_view(shared::ImageSize size, const std::vector<float>& disparity,
+                            const std::vector<float>& variance) {
+  testing::HostMaps maps = testing::empty_maps(size);
+  std::copy(disparity.begin(), disparity.end(), maps.disparity.begin());
+  std::copy(variance.begin(), variance.end(), maps.variance.begin());
+  return maps;
+}
+
+std::vector<float> fill_left(shared::ImageSize size, const std::vector<float>& disparity) {
+  std::vector<float> variance;
+  for (const float d : disparity) variance.push_back(d == kNone ? 0.0f : 1.0f);
+  std::vector<float> filled = fill(size, 1, left_view(size, disparity, variance)).disparity;
+  filled.resize(disparity.size());
+  return filled;
+}
+
+class HoleFillTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(HoleFillTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const float max_difference_px : {0.0f, 1.0f, 100.0f}) {
+    testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.4, 4);
+    for (std::size_t i = 0; i < maps.variance.size(); ++i) {
+      if (i % 3 > 0) maps.variance[i] = static_cast<float>(7 + i % 5);  // also where nothing is
+    }
+    const testing::HostMaps expected = reference::hole_fill(size, max_difference_px, maps);
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps actual = fill(size, max_difference_px, maps, pixels);
+      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
+          << max_difference_px << " px, by " << pixels;
+      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
+          << max_difference_px << " px, by " << pixels;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, HoleFillTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+TEST(HoleFill, FillsAGapWithTheMeanAndTheLargerVariance) {
+  for (const shared::ImageSize size : {shared::ImageSize{3, 1}, shared::ImageSize{1, 3}}) {
+    const testing::HostMaps filled = fill(size, 1, left_view(size, {10, kNone, 10.5f}, {0.5f, 0, 0.25f}));
+    EXPECT_EQ(filled.disparity, (std::vector<float>{10, 10.25f, 10.5f, kNone, kNone, kNone}));
+    EXPECT_EQ(filled.variance, (std::vector<float>{0.5f, 0.5f, 0.25f, 0, 0, 0}));
+  }
+}
+
+TEST(HoleFill, HidesWhatLiesBetweenHiddenPixels) {
+  for (const shared::ImageSize size : {shared::ImageSize{5, 1}, shared::ImageSize{1, 5}}) {
+    const testing::HostMaps filled = fill(size, 1, left_view(size, {kNone, 10, kNone, kNone, kNone}, {7, 1, 7, 0, 7}));
+    EXPECT_EQ(filled.disparity, testing::empty_maps(size).disparity);
+    EXPECT_EQ(filled.variance, (std::vector<float>{7, 7, 7, 7, 7, 0, 0, 0, 0, 0}));
+    const std::vector<float> seen{kNone, 10, 10, kNone, kNone};
+    EXPECT_EQ(fill(size, 1, left_view(size, seen, {7, 1, 1, 7, 7})).disparity, left_view(size, seen, {}).disparity);
+  }
+}
+
+TEST(HoleFill, LeavesJumpsWideGapsAndBorders) {
+  for (const std::vector<float>& line : std::vector<std::vector<float>>{
+           {10, kNone, 11, 11, 11}, {10, kNone, kNone, 10, 10}, {kNone, 10, 10, 10, kNone}, {10, 10, 10, 10, 10}}) {
+    EXPECT_EQ(fill_left({5, 1}, line), line);
+    EXPECT_EQ(fill_left({1, 5}, line), line);
+  }
+}
+
+// The middle row has no hole with two neighbours of its own; those above and below are filled first, then its column
+// is.
+TEST(HoleFill, FillsRowsThenColumnsOnTheirResult) {
+  EXPECT_EQ(fill_left({3, 3}, {8, kNone, 8,      //
+                               9, kNone, kNone,  //
+                               8.5f, kNone, 8.5f}),
+            (std::vector<float>{8, 8, 8,          //
+                                9, 8.25f, 8.25f,  //
+                                8.5f, 8.5f, 8.5f}));
+}
+
+TEST(HoleFill, DoesNotReachIntoTheOtherView) {
+  const shared::ImageSize size{1, 2};
+  testing::HostMaps maps = testing::empty_maps(size);
+  maps.disparity = {10, kNone, 10, 10};
+  EXPECT_EQ(fill(size, 1, maps).disparity, maps.disparity);
+}
+
+}  // namespace
+}  // namespace egosgm

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/reference/fuse/kalman_update.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/reference/method.h"
+
+namespace egosgm::reference {
+namespace {
+
+struct Estimate {
+  float disparity, variance;
+};
+
+constexpr Estimate kNone{EGOSGM_INVALID_DISPARITY, 0};
+
+bool is_valid(const Estimate& estimate) { return estimate.disparity != EGOSGM_INVALID_DISPARITY; }
+
+Estimate fuse(float innovation_sigmas, const Estimate& predicted, const Estimate& measured) {
+  const float innovation = measured.disparity - predicted.disparity;
+  float prior = predicted.variance;
+  if (innovation_sigmas > 0) {
+    const float least_sum = 1 / (innovation_sigmas * innovation_sigmas) * innovation * innovation;
+    prior = std::max(prior, least_sum - measured.variance);
+  }
+  const float sum = prior + measured.variance;
+  const float gain = sum > 0 ? prior / sum : 0;
+  return {predicted.disparity + gain * innovation, (1 - gain) * prior};
+}
+
+/// One view, and what the pixels of it say.
+class View {
+ public:
+  View(shared::ImageSize size, const float* predicted, const float* measured)
+      : size_(size), predicted_(predicted), measured_(measured) {}
+
+  /// Of the pixels around, those whose measurement is near `disparity`; and those whose prediction is, too.
+  int measuring(int x, int y, float disparity) const {
+    return count(x, y, [&](std::size_t i) { return is_near(measured_[i], disparity); });
+  }
+  int vouching(int x, int y, float disparity) const {
+    return count(x, y,
+                 [&](std::size_t i) { return is_near(measured_[i], disparity) && is_near(predicted_[i], disparity); });
+  }
+  /// Of the pixels around, those measured nearer than predicted (sign 1), or farther (-1), by more than 0.75 px.
+  int moving(int x, int y, float sign) const {
+    return count(x, y, [&](std::size_t i) { return is_moving(i, sign); });
+  }
+  /// Those to the left and to the right among them.
+  bool is_between_moving(int x, int y, float sign) const {
+    const std::size_t i = static_cast<std::size_t>(y) * size_.width + x;
+    return x >= kSupportStep && x + kSupportStep < size_.width && is_moving(i - kSupportStep, sign) &&
+           is_moving(i + kSupportStep, sign);
+  }
+
+ private:
+  bool is_moving(std::size_t i, float sign) const {
+    return predicted_[i] != EGOSGM_INVALID_DISPARITY && measured_[i] != EGOSGM_INVALID_DISPARITY &&
+           sign * (measured_[i] - predicted_[i]) > 0.75f;
+  }
+  static bool is_near(float a, float b) { return a != EGOSGM_INVALID_DISPARITY && std::abs(a - b) < kSupportPx; }
+
+  template <typename Condition>
+  int count(int x, int y, Condition&& condition) const {
+    int found = 0;
+    for (int v = -2; v <= 2; ++v) {
+      for (int u = -2; u <= 2; ++u) {
+        const int column = x + u * kSupportStep, row = y + v * kSupportStep;
+        if (column < 0 || column >= size_.width || row < 0 || row >= size_.height) continue;
+        found += condition(static_cast<std::size_t>(row) * size_.width + column);
+      }
+    }
+    return found;
+  }
+
+  const shared::ImageSize size_;
+  const float *predicted_, *measured_;
+};
+
+bool contradict(float gate_px, float a, float b) { return gate_px > 0 && std::abs(a - b) > gate_px; }
+
+Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int y, float warped,
+                const Estimate& predicted, const Estimate& measured) {
+  const bool is_hidden = !is_valid(predicted) && predicted.variance > 0;
+  if (is_hidden) return kNone;
+  if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
+  const float z = measured.disparity, escaped = kEscapedVariancePx2;
+  // Less than half of the 25; less than 18; 15 and more.
+  const auto vouch = [&](float disparity) { return view.vouching(x, y, disparity); };
+  const auto stays = [&](float other) {
+    return options.ask_neighbours && z < other && 2 * vouch(z) < vouch(other) && 2 * view.measuring(x, y, z) < 25;
+  };
+  const auto goes = [&](int enough) {
+    return options.ask_neighbours && vouch(z) == 0 && view.measuring(x, y, z) < enough;
+  };
+  if (!is_valid(predicted)) {
+    if (warped == EGOSGM_INVALID_DISPARITY || !contradict(options.gate_px, z, warped)) return measured;
+    if (stays(warped)) return {warped, escaped};
+    return goes(18) ? kNone : measured;
+  }
+  const float innovation = z - predicted.disparity;
+  if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < escaped) {
+    const bool moves = options.ask_neighbours && std::abs(innovation) > 1 &&
+                       view.is_between_moving(x, y, innovation > 0 ? 1.0f : -1.0f) &&
+                       view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 15;
+    return moves ? Estimate{z, escaped} : fuse(options.innovation_sigmas, predicted, measured);
+  }
+  if (predicted.variance < escaped) {
+    if (stays(predicted.disparity)) return {predicted.disparity, escaped};
+    if (innovation < 0 && goes(13)) return kNone;
+  }
+  return {z, std::max(measured.variance, escaped)};
+}
+
+}  // namespace
+
+testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOptions& options,
+                                const std::vector<float>& warped, const testing::HostMaps& predicted,
+                                const testing::HostMaps& measured) {
+  testing::HostMaps out = predicted;
+  const int pixels = size.width * size.height;
+  for (int i = 0; i < 2 * pixels; ++i) {
+    const int first = i / pixels * pixels;
+    const View view(size, &predicted.disparity[first], &measured.disparity[first]);
+    const Estimate estimate =
+        update(options, view, (i - first) % size.width, (i - first) / size.width, warped[i],
+               {predicted.disparity[i], predicted.variance[i]}, {measured.disparity[i], measured.variance[i]});
+    out.disparity[i] = estimate.disparity;
+    out.variance[i] = is_valid(estimate) ? std::max(estimate.variance, options.min_variance_px2) : 0;
+  }
+  return out;
+}
+
+}  // namespace egosgm::reference

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/reference/match/census.h"
+
+#include <algorithm>
+
+#include "tests/reference/method.h"
+
+namespace egosgm::reference {
+namespace {
+
+struct Offset {
+  int dx, dy;
+};
+
+std::vector<Offset> window(int radius_x, int radius_y) {
+  std::vector<Offset> offsets;
+  for (int dy = -radius_y; dy <= radius_y; ++dy) {
+    for (int dx = -radius_x; dx <= radius_x; ++dx) {
+      if (dx != 0 || dy != 0) offsets.push_back({dx, dy});
+    }
+  }
+  return offsets;
+}
+
+std::vector<Offset> sparse_window() {
+  const auto& kOffsets = kSparseWindow;
+  std::vector<Offset> offsets;
+  for (const auto& offset : kOffsets) offsets.push_back({offset[0], offset[1]});
+  return offsets;
+}
+
+}  // namespace
+
+std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::uint16_t>& image, int bits,
+                                 MatchingCost cost) {
+  const auto at = [&](int x, int y) {
+    return image[static_cast<std::size_t>(std::clamp(y, 0, size.height - 1)) * size.width +
+                 std::clamp(x, 0, size.width - 1)];
+  };
+  const std::vector<Offset> offsets = cost == MatchingCost::kCensus13x11 ? sparse_window()
+                                      : cost == MatchingCost::kCensus9x7 ? window(4, 3)
+                                      : cost == MatchingCost::kCensus5x5 ? window(2, 2)
+                                                                         : std::vector<Offset>{};
+  std::vector<std::uint64_t> codes;
+  codes.reserve(image.size());
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      std::uint64_t code = cost == MatchingCost::kSad3x3 ? at(x, y) >> (bits - 8) : 0;
+      for (const Offset& offset : offsets) code = 2 * code + (at(x + offset.dx, y + offset.dy) < at(x, y));
+      codes.push_back(code);
+    }
+  }
+  return codes;
+}
+
+std::vector<std::uint32_t> padded_codes(shared::ImageSize size, const std::vector<std::uint64_t>& left,
+                                        const std::vector<std::uint64_t>& right, int padding, MatchingCost cost) {
+  std::vector<std::uint32_t> words;
+  for (int view = 0; view < 2; ++view) {
+    for (int y = 0; y < size.height; ++y) {
+      for (int i = -padding; i < size.width + padding; ++i) {
+        const int along = std::clamp(i, 0, size.width - 1);
+        const int x = view == EGOSGM_LEFT ? along : size.width - 1 - along;
+        const std::uint64_t code = (view == EGOSGM_LEFT ? left : right)[static_cast<std::size_t>(y) * size.width + x];
+        words.push_back(static_cast<std::uint32_t>(code));
+        if (cost == MatchingCost::kCensus9x7) words.push_back(static_cast<std::uint32_t>(code >> 32));
+      }
+    }
+  }
+  return words;
+}
+
+}  // namespace egosgm::reference

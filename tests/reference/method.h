@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// The method's constants as the twins know them: numbers of their own, so that a wrong one of the kernels shows.
+#pragma once
+
+namespace egosgm::reference {
+
+inline constexpr float kCheckedDifferencePx = 1.0f;
+inline constexpr int kCheckedRows = 4;
+inline constexpr int kCoarseMinCount = 8;
+inline constexpr int kCoarseOutliers = 2;
+inline constexpr int kCoarseRidgeReach = 2;
+inline constexpr int kDynamicMinCount = 27;
+inline constexpr int kDynamicRadius = 4;
+inline constexpr float kEscapedVariancePx2 = 16.0f;
+inline constexpr float kFilledVariancePx2 = 1.0f;
+inline constexpr int kJumpDistance = 2;
+inline constexpr float kMaxJumpPx = 10.0f;
+inline constexpr float kMaxMeanVariancePx2 = 2.0f;
+inline constexpr float kMaxRoughnessPx = 1.5f;
+inline constexpr float kMaxVariancePx2 = 1e6f;
+inline constexpr float kMinDepthRatio = 1e-6f;
+inline constexpr int kRidgeBlocks = 6;
+inline constexpr int kRidgeMinCount = 2;
+inline constexpr int kRidgeReach = 6;
+inline constexpr float kRightMapStepsPerPx = 65536.0f;
+inline constexpr int kRoughnessRadius = 3;
+inline constexpr float kSupportPx = 2.0f;
+inline constexpr int kSupportStep = 4;
+inline constexpr int kVarianceRadius = 8;
+inline constexpr int kVarianceStep = 4;
+// dx, dy.
+inline constexpr int kSparseWindow[32][2] = {{1, 0}, {-1, 1},  {0, -1}, {1, 1},  {-2, 0},  {2, -1}, {-1, 2}, {-1, -2},
+                                             {3, 1}, {-3, 1},  {1, -2}, {1, 2},  {-3, -1}, {3, -1}, {-2, 2}, {-1, -3},
+                                             {3, 2}, {-4, 0},  {3, -2}, {0, 4},  {-3, -3}, {5, 1},  {-4, 2}, {1, -4},
+                                             {3, 4}, {-6, -1}, {6, -2}, {-3, 5}, {-2, -5}, {6, 3},  {-6, 2}, {5, -5}};
+
+}  // namespace egosgm::reference

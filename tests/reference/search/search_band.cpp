@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/reference/search/search_band.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "tests/reference/method.h"
+
+namespace egosgm::reference {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+// By trial: the fewest chunks that an allowed origin exists for, and of those origins the nearest to the centred one.
+shared::Band band_of(shared::DisparityRange range, float from, float to) {
+  const float lowest = static_cast<float>(range.min), highest = static_cast<float>(range.min + range.count - 1);
+  const int first = static_cast<int>(std::floor(std::clamp(from, lowest, highest)));
+  const int last = static_cast<int>(std::ceil(std::clamp(to, lowest, highest)));
+  for (int chunks = 1;; chunks += chunks > 1 ? 2 : 1) {
+    const int step = chunks > 1 ? EGOSGM_BAND_STEP : 1;
+    const int lanes = chunks * EGOSGM_LANES;
+    const int slack = lanes - (last - first + 1);
+    if (slack < 0) continue;
+    int best = -1;
+    for (int origin = 0; range.min + origin <= first; origin += step) {
+      if (range.min + origin + lanes <= last) continue;
+      if (origin > 0 && origin + lanes >= range.count + step) continue;
+      if (best < 0 || range.min + origin <= first - slack / 2) best = origin;
+    }
+    if (best < 0) continue;
+    return {static_cast<cl_short>(range.min + best), static_cast<cl_ushort>(chunks), static_cast<cl_short>(first),
+            static_cast<cl_short>(last)};
+  }
+}
+
+bool is_valid(float disparity) { return disparity > EGOSGM_INVALID_DISPARITY; }
+
+/// What the coarse match found around a block, in full pixels, but for the outermost; first > second: not enough.
+std::pair<float, float> found_around(shared::ImageSize size, const std::vector<float>& coarse, int view, int block_x,
+                                     int block_y) {
+  const int width = (size.width + 3) / 4, height = (size.height + 3) / 4;
+  std::vector<float> found;
+  for (int y = 2 * block_y - 1; y <= 2 * block_y + 2; ++y) {
+    for (int x = 2 * block_x - 1; x <= 2 * block_x + 2; ++x) {
+      if (coarse.empty() || x < 0 || y < 0 || x >= width || y >= height) continue;
+      const float d = coarse[(static_cast<std::size_t>(view) * height + y) * width + x];
+      if (!is_valid(d)) continue;
+      found.push_back(4 * d);
+    }
+  }
+  if (found.size() < kCoarseMinCount) return {kInfinity, -kInfinity};
+  std::sort(found.begin(), found.end());
+  return {found[kCoarseOutliers], found[found.size() - 1 - kCoarseOutliers]};
+}
+
+/// Is it nearer than something close on its left, and on its right?
+bool is_ridge(shared::ImageSize size, const std::vector<float>& disparity, int view, int x, int y, int reach,
+              float step) {
+  const auto at = [&](int u) {
+    return u < 0 || u >= size.width ? EGOSGM_INVALID_DISPARITY
+                                    : disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + u];
+  };
+  bool has_left = false, has_right = false;
+  for (int i = 1; i <= reach; ++i) {
+    has_left |= is_valid(at(x - i)) && at(x - i) < at(x) - step;
+    has_right |= is_valid(at(x + i)) && at(x + i) < at(x) - step;
+  }
+  return is_valid(at(x)) && has_left && has_right;
+}
+
+/// The ridges of a map whose blocks have `side` x `side` pixels, by block, where there are `enough`; first > second:
+/// not.
+std::vector<std::pair<float, float>> ridges_of(shared::ImageSize size, shared::ImageSize blocks, int side, int rows,
+                                               const std::vector<float>& disparity, int reach, float step, int enough) {
+  const std::size_t count = static_cast<std::size_t>(blocks.width) * blocks.height;
+  std::vector<std::pair<float, float>> ridges(2 * count, {kInfinity, -kInfinity});
+  std::vector<int> pixels(2 * count, 0);
+  for (int view = 0; view < 2 && !disparity.empty() && step > 0; ++view) {
+    for (int y = 0; y < size.height; y += rows) {
+      for (int x = 0; x < size.width; ++x) {
+        if (!is_ridge(size, disparity, view, x, y, reach, step)) continue;
+        const float d = disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
+        const std::size_t block = view * count + static_cast<std::size_t>(y / side) * blocks.width + x / side;
+        auto& [least, most] = ridges[block];
+        least = std::min(least, d), most = std::max(most, d), ++pixels[block];
+      }
+    }
+  }
+  for (std::size_t i = 0; i < ridges.size(); ++i) {
+    if (pixels[i] < enough) ridges[i] = {kInfinity, -kInfinity};
+  }
+  return ridges;
+}
+
+void join(std::pair<float, float>& range, std::pair<float, float> other) {
+  range = {std::min(range.first, other.first), std::max(range.second, other.second)};
+}
+
+/// What the ridges of the warped and of the coarse map span in each block, and in those above and below.
+std::vector<std::pair<float, float>> ridges_around(shared::ImageSize size, shared::ImageSize blocks, float step,
+                                                   const std::vector<float>& warped, const std::vector<float>& coarse) {
+  const auto fine = ridges_of(size, blocks, EGOSGM_BLOCK, 2, warped, kRidgeReach, step, kRidgeMinCount);
+  const auto found = ridges_of({(size.width + 3) / 4, (size.height + 3) / 4}, blocks, EGOSGM_BLOCK / EGOSGM_COARSE, 1,
+                               coarse, kCoarseRidgeReach, step / 2, 1);
+  std::vector<std::pair<float, float>> around(fine.size(), {kInfinity, -kInfinity});
+  for (int i = 0; i < static_cast<int>(fine.size()); ++i) {
+    const int view = i / (blocks.width * blocks.height);
+    const int y = i / blocks.width % blocks.height, x = i % blocks.width;
+    for (int v = std::max(0, y - kRidgeBlocks); v <= std::min(blocks.height - 1, y + kRidgeBlocks); ++v) {
+      const int near = (view * blocks.height + v) * blocks.width + x;
+      join(around[i], fine[near]);
+      join(around[i], {4 * found[near].first, 4 * found[near].second});
+    }
+  }
+  return around;
+}
+
+shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
+                             const testing::HostMaps& predicted, std::pair<float, float> coarse,
+                             std::pair<float, float> found, int view, int block_x, int block_y) {
+  float least = kInfinity, most = -kInfinity;
+  int count = 0;
+  for (int y = std::max(0, (block_y - 1) * EGOSGM_BLOCK); y < std::min(size.height, (block_y + 2) * EGOSGM_BLOCK);
+       ++y) {
+    for (int x = std::max(0, (block_x - 1) * EGOSGM_BLOCK); x < std::min(size.width, (block_x + 2) * EGOSGM_BLOCK);
+         ++x) {
+      const float d = predicted.disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
+      if (!is_valid(d)) continue;
+      least = std::min(least, d), most = std::max(most, d), ++count;
+    }
+  }
+  const bool is_found = found.first <= found.second;
+  const bool is_coarse = coarse.first <= coarse.second;
+  const float coarse_from = found.first - options.coarse_margin_px, coarse_to = found.second + options.coarse_margin_px;
+  if (count == 0 || count < options.neighbour_min_count) {
+    return is_coarse ? band_of(range, coarse_from, coarse_to) : band_of(range, -kInfinity, kInfinity);
+  }
+  const float from = least - options.neighbour_margin_px, to = most + options.neighbour_margin_px;
+  return is_found ? band_of(range, std::min(from, coarse_from), std::max(to, coarse_to)) : band_of(range, from, to);
+}
+
+shared::Band of_prediction(shared::DisparityRange range, const SearchBandOptions& options, float d, float p,
+                           std::pair<float, float> found) {
+  float half_width = options.sigmas * std::sqrt(p);
+  if (half_width <= options.min_half_width_px) half_width = options.min_half_width_px;
+  if (!(half_width <= static_cast<float>(range.count))) half_width = static_cast<float>(range.count);
+  float from = d - half_width, to = d + half_width;
+  if (found.first < from - options.coarse_tolerance_px || found.second > to + options.coarse_tolerance_px) {
+    const float below = found.first - options.coarse_margin_px, above = found.second + options.coarse_margin_px;
+    from = std::min(from, below), to = std::max(to, above);
+  }
+  return band_of(range, from, to);
+}
+
+void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, SearchBands& result) {
+  result.cell_offsets.resize(result.bands.size());
+  for (std::size_t row = 0; row < 2 * static_cast<std::size_t>(size.height); ++row) {
+    shared::RowSum sum{};
+    cl_uint chunks = 0;
+    for (std::size_t i = row * size.width; i < (row + 1) * size.width; ++i) {
+      const shared::Band& band = result.bands[i];
+      result.cell_offsets[i] = chunks;
+      chunks += band.chunks;
+      sum.cells += static_cast<cl_uint>(band.chunks) * EGOSGM_LANES;
+      sum.predicted += is_valid(disparity[i]);
+    }
+    result.row_sums.push_back(sum);
+  }
+}
+
+}  // namespace
+
+SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse,
+                        const std::vector<float>& warped) {
+  const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
+  std::vector<shared::Band> of_blocks;
+  std::vector<std::pair<float, float>> found =
+      ridges_around(size, {blocks_x, blocks_y}, options.ridge_step_px, warped, coarse);
+  for (int view = 0; view < 2; ++view) {
+    for (int y = 0; y < blocks_y; ++y) {
+      for (int x = 0; x < blocks_x; ++x) {
+        const std::pair<float, float> of_coarse = found_around(size, coarse, view, x, y);
+        join(found[of_blocks.size()], of_coarse);
+        of_blocks.push_back(options.from_neighbours ? from_neighbours(size, range, options, predicted, of_coarse,
+                                                                      found[of_blocks.size()], view, x, y)
+                                                    : band_of(range, -kInfinity, kInfinity));
+      }
+    }
+  }
+  SearchBands result;
+  for (int view = 0; view < 2; ++view) {
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const std::size_t i = (static_cast<std::size_t>(view) * size.height + y) * size.width + x;
+        const float d = predicted.disparity[i];
+        const std::size_t block =
+            (static_cast<std::size_t>(view) * blocks_y + y / EGOSGM_BLOCK) * blocks_x + x / EGOSGM_BLOCK;
+        result.bands.push_back(is_valid(d) ? of_prediction(range, options, d, predicted.variance[i], found[block])
+                                           : of_blocks[block]);
+      }
+    }
+  }
+  sum_rows(size, predicted.disparity, result);
+  return result;
+}
+
+SearchBands full_range(shared::ImageSize size, shared::DisparityRange range, const std::vector<float>& predicted) {
+  const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
+  SearchBands result{std::vector(pixels, band_of(range, -kInfinity, kInfinity)), {}, {}};
+  sum_rows(size, predicted.empty() ? std::vector<float>(pixels, EGOSGM_INVALID_DISPARITY) : predicted, result);
+  return result;
+}
+
+}  // namespace egosgm::reference
