@@ -189,7 +189,6 @@ class Batch {
     job.sequence = input.sequence.open();
     job.input = input.sequence.text();
     job.options = options_;
-    job.preset = arguments_.method.preset;
     job.poses_file = input.poses_file;
     job.odometry = arguments_.odometry;
     job.out = folder_.folder_of(entry);

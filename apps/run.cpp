@@ -72,7 +72,7 @@ class Run {
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
-        report_(sequence_, pipeline_, job.preset, motion_of(job), size_.width, size_.height),
+        report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height),
         earlier_(job.earlier),
         doubt_(sequence_.calibration) {
     expect_free(folder_, earlier_, report_.identity());
@@ -249,7 +249,6 @@ SequenceJob job_of(const RunArguments& arguments) {
   job.sequence = arguments.input.open();
   job.input = arguments.input.text();
   job.options = arguments.method.options();
-  job.preset = arguments.method.preset;
   job.poses_file = arguments.poses;
   job.odometry = arguments.odometry;
   job.out = arguments.out;

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "egosgm/options.h"
+#include "host/method_options.h"
 #include "host/banded_sgm_paths.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"

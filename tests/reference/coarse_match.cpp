@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "host/method_options.h"
 #include "tests/reference/coarse_match.h"
 
 #include <algorithm>
@@ -33,7 +34,7 @@ std::vector<std::uint16_t> shrink(shared::ImageSize size, const std::vector<int>
   return coarse;
 }
 
-std::vector<float> coarse_match(shared::ImageSize size, const PipelineOptions& options, const std::vector<int>& images,
+std::vector<float> coarse_match(shared::ImageSize size, const MethodOptions& options, const std::vector<int>& images,
                                 int bits) {
   const shared::ImageSize coarse{shrunk(size.width), shrunk(size.height)};
   const int first = static_cast<int>(std::floor(options.min_disparity / 4.0));
