@@ -20,14 +20,6 @@ namespace {
 constexpr std::size_t kMaxConfigBytes = 1 << 16;
 constexpr int kMaxDots = 3;  // in a section's name
 
-PipelineOptions preset_named(const std::string& name) {
-  if (name == "default") return {};
-  if (name == "paper") return PipelineOptions::paper();
-  const std::string nearest = suggestion(name, {"default", "paper"});
-  throw InvalidArgument("--preset \"" + name + "\": " + (nearest.empty() ? "" : "did you mean " + nearest + "? ") +
-                        "choose default or paper");
-}
-
 /// An option's value as TOML writes it: names are quoted, numbers and truth values are not.
 std::string toml_value(const std::string& value) {
   const bool bare =
@@ -76,7 +68,7 @@ void apply_config(PipelineOptions& options, const std::string& file) {
   try {
     items = CLI::ConfigTOML().from_config(text);
   } catch (const CLI::Error& error) {
-    throw InvalidArgument(file + ": " + error.what() + ": write one `stage.option = value` a line");
+    throw InvalidArgument(file + ": " + error.what() + ": write one `name = value` a line");
   }
   for (const CLI::ConfigItem& item : items) {
     if (item.name == "++" || item.name == "--") continue;  // CLI11's marks of where a section begins and ends
@@ -92,20 +84,31 @@ void apply_config(PipelineOptions& options, const std::string& file) {
 
 void apply_setting(PipelineOptions& options, const std::string& setting) {
   const auto equals = setting.find('=');
-  if (equals == std::string::npos) throw InvalidArgument("--set " + setting + ": write --set stage.option=value");
+  if (equals == std::string::npos) throw InvalidArgument("--set " + setting + ": write --set NAME=VALUE");
   set_option(options, setting.substr(0, equals), setting.substr(equals + 1));
 }
 
-std::string stage_options_help() {
+void set_preset(PipelineOptions& options, const std::string& name) {
+  const std::string nearest = suggestion(name, {"default", "paper"});
+  if (nearest != name) {
+    throw InvalidArgument("--preset \"" + name + "\": " + (nearest.empty() ? "" : "did you mean " + nearest + "? ") +
+                          "choose default or paper");
+  }
+  set_option(options, "preset", name);
+}
+
+std::string options_help() {
   const auto defaults = list_options(PipelineOptions{});
   const auto paper = list_options(PipelineOptions::paper());
-  std::string text =
-      fmt::format("Options of the stages, for --set and --config:\n  {:<38} {:<12} {}\n", "name", "default", "paper");
+  std::string help = "Options, for --set and --config (docs/options.md):\n";
   for (std::size_t i = 0; i < defaults.size(); ++i) {
-    text += fmt::format("  {:<38} {:<12} {}\n", defaults[i].name, defaults[i].value,
-                        paper[i].value == defaults[i].value ? "" : paper[i].value);
+    const OptionText& text = option_texts()[i];
+    const bool differs = paper[i].value != defaults[i].value;
+    help += fmt::format("  {} = {}{}\n      {}\n      Values: {}{}{}. {}\n", text.name, defaults[i].value,
+                        differs ? fmt::format("  (paper: {})", paper[i].value) : "", text.meaning, text.range,
+                        *text.unit ? " " : "", text.unit, text.when_to_change);
   }
-  return text;
+  return help;
 }
 
 }  // namespace
@@ -116,14 +119,10 @@ void OptionArguments::add_to(CLI::App& command) {
   command.add_option("--preset", preset, "default: the best known; paper: the choices of Fucek et al. 2017 [default]")
       ->type_name("default|paper")
       ->group(group);
-  command.add_option("--search", search, "search where the prediction says, or everywhere [band]")
-      ->type_name("band|full")
-      ->group(group);
   command.add_option("--temporal", temporal, "off: the plain single-frame matcher, full range [on]")
       ->type_name("on|off")
       ->group(group);
-  command
-      .add_option("--paths", paths, fmt::format("paths of the semi-global aggregation [{}]", defaults.banded_sgm.paths))
+  command.add_option("--paths", paths, fmt::format("paths of the semi-global aggregation [{}]", defaults.paths))
       ->type_name("4|8")
       ->group(group);
   command
@@ -136,28 +135,26 @@ void OptionArguments::add_to(CLI::App& command) {
                   fmt::format("least disparity, of either sign, px [{}]", defaults.min_disparity))
       ->type_name("N")
       ->group(group);
-  command.add_option("--set", settings, "set an option of a stage (list below); may be repeated")
-      ->type_name("stage.option=value")
+  command.add_option("--set", settings, "set an option (list below); may be repeated")
+      ->type_name("NAME=VALUE")
       ->allow_extra_args(false)
       ->group(group);
-  command.add_option("--config", config, "read options from a file, `stage.option = value` a line (TOML)")
+  command.add_option("--config", config, "read options from a file, `name = value` a line (TOML)")
       ->type_name("FILE")
       ->group(group);
   command.add_option("--save-config", save_config, "write the options in use to such a new file")
       ->type_name("FILE")
       ->group(group);
-  command.footer([] { return stage_options_help(); });
+  command.footer([] { return options_help(); });
 }
 
 PipelineOptions OptionArguments::options() const {
-  PipelineOptions options = preset_named(preset);
+  PipelineOptions options;
+  if (!preset.empty()) set_preset(options, preset);
   if (!config.empty()) apply_config(options, config);
   for (const std::string& setting : settings) apply_setting(options, setting);
-  const std::pair<const char*, const std::string&> named[] = {{"search", search},
-                                                              {"temporal", temporal},
-                                                              {"banded_sgm.paths", paths},
-                                                              {"disparities", disparities},
-                                                              {"min_disparity", min_disparity}};
+  const std::pair<const char*, const std::string&> named[] = {
+      {"temporal", temporal}, {"paths", paths}, {"disparities", disparities}, {"min_disparity", min_disparity}};
   for (const auto& [name, value] : named) {
     if (!value.empty()) set_option(options, name, value);
   }

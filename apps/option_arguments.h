@@ -10,11 +10,11 @@
 namespace egosgm::app {
 
 /// The arguments that choose the pipeline's options. They apply in this order, the last one wins: --preset, --config,
-/// --set, and those with a name of their own (--search, --disparities, ...).
+/// --set, and those with a name of their own (--temporal, --disparities, ...).
 struct OptionArguments {
-  std::string preset = "default", config, save_config;
+  std::string preset, config, save_config;
   std::vector<std::string> settings;
-  std::string search, temporal, paths, disparities, min_disparity;
+  std::string temporal, paths, disparities, min_disparity;
 
   void add_to(CLI::App& command);
   /// Reads --config, and looks whether --save-config can be written. Throws InvalidArgument, naming the option (and the

@@ -73,7 +73,7 @@ class Run {
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
-        report_(sequence_, pipeline_, job.preset, motion_of(job), size_.width, size_.height, job.batch_input),
+        report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height, job.batch_input),
         doubt_(sequence_.calibration) {
     folder_.begin(report_.identity());
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options.disparities, sequence_.calibration);
@@ -264,7 +264,6 @@ SequenceJob job_of(const RunArguments& arguments) {
   job.sequence = arguments.input.open();
   job.input = arguments.input.text();
   job.options = arguments.method.options();
-  job.preset = arguments.method.preset;
   job.poses_file = arguments.poses;
   job.odometry = arguments.odometry;
   job.kinds = parse_write_list(arguments.write);

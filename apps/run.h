@@ -18,7 +18,6 @@ struct SequenceJob {
   vision::StereoSequence sequence;
   std::string input;  // the arguments that named it, for messages
   PipelineOptions options;
-  std::string preset = "default";          // what the report calls the options
   std::string poses_file;                  // empty: stereo odometry,
   vision::StereoOdometryOptions odometry;  // with these options
   OutputFolder out;

@@ -76,7 +76,7 @@ nlohmann::ordered_json json_of(const Eigen::Isometry3d& motion) {
           {"current_from_previous", matrix}};
 }
 
-RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& preset,
+RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline,
                      const std::string& motion, int width, int height, const std::string& batch_input) {
   const DeviceInfo& device = pipeline.device().info();
   json_ = {{"program", "egosgm"},
@@ -94,7 +94,6 @@ RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pip
            {"device", json_of(device)},
            {"driver", device.driver},
            {"device_memory_bytes", pipeline.device_memory_bytes()},
-           {"preset", preset},
            {"options", json_of(pipeline.options())},
            {"finished", false},
            {"frames", Json::array()}};

@@ -21,7 +21,7 @@ struct HostTimes {
 class RunReport {
  public:
   /// `motion`: where the motions come from. `batch_input`: as in SequenceJob.
-  RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& preset,
+  RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline,
             const std::string& motion, int width, int height, const std::string& batch_input);
 
   /// All that the maps depend on. Two runs with equal identities give the same maps.

@@ -84,7 +84,7 @@ struct Place {
 /// A pipeline with the maps that a caller takes from it.
 class Matcher {
  public:
-  Matcher(const Clip& clip, const PipelineOptions& options, const Device& device)
+  Matcher(const Clip& clip, const MethodOptions& options, const Device& device)
       : pipeline_(clip.calibration, clip.frames.front().left.cols, clip.frames.front().left.rows, options, device),
         disparity_(clip.frames.front().left.size(), CV_32FC1),
         variance_(disparity_.size(), CV_32FC1) {}
@@ -131,7 +131,7 @@ Contender opencv(const OpencvMode& mode, const Clip& clip, int disparities, int 
           }};
 }
 
-Contender full_both(const Clip& clip, PipelineOptions options, const Device& device) {
+Contender full_both(const Clip& clip, MethodOptions options, const Device& device) {
   options.temporal = false;
   const auto matcher = std::make_shared<Matcher>(clip, options, device);
   return {"egosgm_full_both", [&clip, matcher] {
@@ -141,7 +141,7 @@ Contender full_both(const Clip& clip, PipelineOptions options, const Device& dev
           }};
 }
 
-Contender banded_frame(const std::string& name, const Clip& clip, const PipelineOptions& options,
+Contender banded_frame(const std::string& name, const Clip& clip, const MethodOptions& options,
                        const Device& device) {
   const auto matcher = std::make_shared<Matcher>(clip, options, device);
   return {name, [&clip, matcher] {
@@ -159,7 +159,7 @@ Contender banded_frame(const std::string& name, const Clip& clip, const Pipeline
 /// As `egosgm run` does it: a frame's odometry while the device is at work on the one before.
 class Stream {
  public:
-  Stream(const Clip& clip, const PipelineOptions& options, const Device& device)
+  Stream(const Clip& clip, const MethodOptions& options, const Device& device)
       : clip_(clip), matcher_(clip, options, device), odometry_(clip.calibration) {}
 
   Turn operator()() {
@@ -188,7 +188,7 @@ class Stream {
   vision::StereoOdometry odometry_;
 };
 
-Contender video_frame(const Clip& clip, const PipelineOptions& options, const Device& device) {
+Contender video_frame(const Clip& clip, const MethodOptions& options, const Device& device) {
   const auto stream = std::make_shared<Stream>(clip, options, device);
   return {"egosgm_video_frame", [stream] { return (*stream)(); }};
 }
@@ -197,7 +197,7 @@ Contender video_frame(const Clip& clip, const PipelineOptions& options, const De
 /// down.
 class LeftMatcher {
  public:
-  LeftMatcher(const Clip& clip, const PipelineOptions& options, const Device& device)
+  LeftMatcher(const Clip& clip, const MethodOptions& options, const Device& device)
       : size_{clip.frames.back().left.cols, clip.frames.back().left.rows},
         range_{options.min_disparity, options.disparities},
         context_(device.handle().device),
@@ -235,7 +235,7 @@ class LeftMatcher {
   std::vector<float> disparity_;
 };
 
-Contender full_left(const Clip& clip, const PipelineOptions& options, const Device& device) {
+Contender full_left(const Clip& clip, const MethodOptions& options, const Device& device) {
   const auto matcher = std::make_shared<LeftMatcher>(clip, options, device);
   return {"egosgm_full_left", [matcher] {
             const Stopwatch watch;
@@ -244,17 +244,18 @@ Contender full_left(const Clip& clip, const PipelineOptions& options, const Devi
           }};
 }
 
-PipelineOptions with(PipelineOptions options, const std::string& setting) {
+MethodOptions with(MethodOptions options, const std::string& setting) {
   const std::size_t equals = setting.find('=');
   if (equals == std::string::npos) throw InvalidArgument("--set " + setting + ": write NAME=VALUE");
-  set_option(options, setting.substr(0, equals), setting.substr(equals + 1));
-  return options;
+  MethodOptions chosen = options;
+  set_option(chosen, setting.substr(0, equals), setting.substr(equals + 1));
+  return chosen;
 }
 
 std::vector<Contender> contenders(const Clip& clip, int disparities, const std::vector<std::string>& settings,
                                   const Place& place) {
   const Device& device = place.device;
-  PipelineOptions options;
+  MethodOptions options;
   options.disparities = disparities;
   std::vector<Contender> list;
   for (const OpencvMode& mode : kOpencvModes) list.push_back(opencv(mode, clip, disparities, place.threads));

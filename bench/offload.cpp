@@ -12,6 +12,7 @@
 #include "bench/report.h"
 #include "bench/street.h"
 #include "egosgm/opencl.h"
+#include "host/method_options.h"
 
 namespace egosgm::bench {
 namespace {
@@ -77,7 +78,7 @@ constexpr int kWarmUp = 5;  // the rows' offset, the prediction, and its varianc
 
 class HostWay {
  public:
-  HostWay(const Street& street, const PipelineOptions& options, const Device& device)
+  HostWay(const Street& street, const MethodOptions& options, const Device& device)
       : street_(street), pipeline_(street.calibration, street.size.width, street.size.height, options, device) {
     for (int i = 0; i < kWarmUp; ++i) frame();
   }
@@ -93,7 +94,7 @@ class HostWay {
 /// A queue and the street's images in its context.
 class DeviceWay {
  public:
-  DeviceWay(const Street& street, const PipelineOptions& options) {
+  DeviceWay(const Street& street, const MethodOptions& options) {
     cl_platform_id platform = nullptr;
     cl_device_id device = nullptr;
     clGetPlatformIDs(1, &platform, nullptr);
@@ -132,7 +133,7 @@ class DeviceWay {
 
 struct Setting {
   Street street;
-  PipelineOptions options;
+  MethodOptions options;
   int rounds;
 
   Row row(const std::string& name, double ms) const { return {name, street.size, options.disparities, ms, {}}; }

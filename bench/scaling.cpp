@@ -15,6 +15,7 @@
 #include "bench/street.h"
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
+#include "host/method_options.h"
 
 namespace egosgm::bench {
 namespace {
@@ -37,7 +38,7 @@ constexpr shared::ImageSize kKittiSize{1242, 375};
 struct Point {
   std::string name;
   shared::ImageSize size = kKittiSize;
-  PipelineOptions options;
+  MethodOptions options;
 };
 
 /// A pipeline with a pair that it sees again and again, and where its maps go.

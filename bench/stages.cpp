@@ -103,8 +103,8 @@ class Frame {
   }
 
  private:
-  static PipelineOptions options(int disparities) {
-    PipelineOptions options;
+  static MethodOptions options(int disparities) {
+    MethodOptions options;
     options.disparities = disparities;
     return options;
   }
@@ -138,7 +138,7 @@ class Frame {
   ocl::Context& context_;
   const shared::ImageSize size_;
   const Motion motion_;
-  const PipelineOptions options_;
+  const MethodOptions options_;
   Method method_;
   FrameImages images_;
   Map variance_;

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "egosgm/image.h"
-#include "egosgm/options.h"
+#include "host/method_options.h"
 #include "host/ocl/buffer.h"
 #include "kernels/shared.h"
 
@@ -14,7 +14,7 @@ namespace egosgm {
 
 inline std::size_t pixel_count(shared::ImageSize size) { return static_cast<std::size_t>(size.width) * size.height; }
 
-inline shared::DisparityRange range_of(const PipelineOptions& options) {
+inline shared::DisparityRange range_of(const MethodOptions& options) {
   return {options.min_disparity, options.disparities};
 }
 

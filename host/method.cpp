@@ -54,7 +54,7 @@ void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction&
   belief.missing = fuse_ ? Unpredicted::kNo : Unpredicted::kNotTemporal;
 }
 
-Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options)
+Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : prediction(context, size),
       aligned{ocl::Buffer<cl_uchar>(context, options.vertical_alignment.enabled ? 2 * 2 * pixel_count(size) : 0)},
       first_offset(context),
@@ -66,7 +66,7 @@ Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const Pipeli
       dynamic(context, pixel_count(size)) {}
 
 Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
-               const PipelineOptions& options, const Tuning& tuning)
+               const MethodOptions& options, const Tuning& tuning)
     : options_(options),
       work_(context, size, options),
       unknown_(context),

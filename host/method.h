@@ -27,7 +27,7 @@ struct Workspace {
   Fusion fusion;
   ocl::Buffer<cl_uchar> dynamic;
 
-  Workspace(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options);
+  Workspace(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
 };
 
 /// What a frame left on the device. Handles: it is there until a later frame overwrites it.
@@ -40,7 +40,7 @@ struct FrameResults {
 /// The method: from a pair of images and the belief of the frame before to the belief of this one.
 class Method {
  public:
-  Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration, const PipelineOptions& options,
+  Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration, const MethodOptions& options,
          const Tuning& tuning);
 
   /// Builds what images of `type` need. Enqueues nothing.
@@ -72,7 +72,7 @@ class Method {
   void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
             const PredictionCheck::State& agreement, Fusion& fusion, Belief& belief);
 
-  const PipelineOptions options_;
+  const MethodOptions options_;
   Workspace work_;
   const VerticalOffset unknown_;
   std::optional<PredictRoom> predict_;

@@ -1,240 +1,225 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
-#include <charconv>
-#include <cmath>
+// The public options: one table of what each is, and where those of earlier versions went.
+#include "egosgm/options.h"
 
-#include "egosgm/error.h"
-#include "egosgm/named_options.h"
+#include <algorithm>
+
 #include "host/edit_distance.h"
+#include "host/method_options.h"
+#include "host/option_text.h"
 
 namespace egosgm {
 namespace {
 
-// The one list of names. Calls `visit(name, member)` in the order of options.h.
+using namespace option_text;  // NOLINT(google-build-using-namespace)
+
 template <typename Options, typename Visit>
 void for_each(Options& o, Visit&& visit) {
-  visit("disparities", o.disparities);
-  visit("min_disparity", o.min_disparity);
-  visit("search", o.search);
-  visit("temporal", o.temporal);
-  visit("track_right", o.track_right);
-  visit("forward_warp.process_noise_px2", o.forward_warp.process_noise_px2);
-  visit("forward_warp.motion_noise", o.forward_warp.motion_noise);
-  visit("edge_rejection.max_jump_px", o.edge_rejection.max_jump_px);
-  visit("hole_fill.max_difference_px", o.hole_fill.max_difference_px);
-  visit("consistency.prediction_px", o.consistency.prediction_px);
-  visit("consistency.measurement_px", o.consistency.measurement_px);
-  visit("consistency.update_px", o.consistency.update_px);
-  visit("consistency.read_off_px", o.consistency.read_off_px);
-  visit("coarse_match.enabled", o.coarse_match.enabled);
-  visit("coarse_match.p1", o.coarse_match.p1);
-  visit("coarse_match.p2", o.coarse_match.p2);
-  visit("coarse_match.p2_at_edges", o.coarse_match.p2_at_edges);
-  visit("coarse_match.max_difference_px", o.coarse_match.max_difference_px);
-  visit("search_band.sigmas", o.search_band.sigmas);
-  visit("search_band.min_half_width_px", o.search_band.min_half_width_px);
-  visit("search_band.from_neighbours", o.search_band.from_neighbours);
-  visit("search_band.neighbour_min_count", o.search_band.neighbour_min_count);
-  visit("search_band.neighbour_margin_px", o.search_band.neighbour_margin_px);
-  visit("search_band.coarse_tolerance_px", o.search_band.coarse_tolerance_px);
-  visit("search_band.coarse_margin_px", o.search_band.coarse_margin_px);
-  visit("search_band.ridge_step_px", o.search_band.ridge_step_px);
-  visit("vertical_alignment.enabled", o.vertical_alignment.enabled);
-  visit("vertical_alignment.gain", o.vertical_alignment.gain);
-  visit("banded_sgm.cost", o.banded_sgm.cost);
-  visit("banded_sgm.paths", o.banded_sgm.paths);
-  visit("banded_sgm.p1", o.banded_sgm.p1);
-  visit("banded_sgm.p2", o.banded_sgm.p2);
-  visit("banded_sgm.p2_at_edges", o.banded_sgm.p2_at_edges);
-  visit("banded_sgm.p2_slope", o.banded_sgm.p2_slope);
-  visit("banded_sgm.s_max", o.banded_sgm.s_max);
-  visit("banded_sgm.variance_floor_px2", o.banded_sgm.variance_floor_px2);
-  visit("banded_sgm.variance_per_step_px2", o.banded_sgm.variance_per_step_px2);
-  visit("banded_sgm.variance_per_square_px2", o.banded_sgm.variance_per_square_px2);
-  visit("banded_sgm.scheduling", o.banded_sgm.scheduling);
-  visit("banded_sgm.max_memory_mib", o.banded_sgm.max_memory_mib);
-  visit("median_filter.enabled", o.median_filter.enabled);
-  visit("sad_check.max_difference", o.sad_check.max_difference);
-  visit("speckle_removal.max_size_px", o.speckle_removal.max_size_px);
-  visit("speckle_removal.max_difference_px", o.speckle_removal.max_difference_px);
-  visit("kalman_update.gate_px", o.kalman_update.gate_px);
-  visit("kalman_update.keep_predicted", o.kalman_update.keep_predicted);
-  visit("kalman_update.ask_neighbours", o.kalman_update.ask_neighbours);
-  visit("kalman_update.innovation_sigmas", o.kalman_update.innovation_sigmas);
-  visit("kalman_update.min_variance_px2", o.kalman_update.min_variance_px2);
-  visit("dynamic_map.enabled", o.dynamic_map.enabled);
-  visit("prediction_check.enabled", o.prediction_check.enabled);
-  visit("output_variance.enabled", o.output_variance.enabled);
-  visit("output_variance.scale", o.output_variance.scale);
-  visit("output_variance.roughness_weight", o.output_variance.roughness_weight);
-  visit("output_variance.jump_weight", o.output_variance.jump_weight);
-  visit("dynamic_map.min_difference_px", o.dynamic_map.min_difference_px);
+  visit(OptionText{"preset", "Chooses the constants of the method, and where the other options start from.", "",
+                   "default, paper", "Set paper to compare with Fućek et al. (2017). Put it before other options."},
+        o.preset);
+  visit(
+      OptionText{
+          "disparities", "Number D of disparities that a pixel can have.", "px", "1 to 4096",
+          "Raise it if near objects are cut off: the nearest depth is fx * baseline / D. Lower it if nothing is near."},
+      o.disparities);
+  visit(OptionText{"min_disparity", "Least disparity: the range is [min_disparity, min_disparity + D).", "px",
+                   "-16384 to 16384", "Set it below 0 if the cameras converge or rectification left an offset."},
+        o.min_disparity);
+  visit(OptionText{"temporal", "Predict each frame from the one before.", "", "true, false",
+                   "Set it to false if most of the scene moves, or to match single pairs."},
+        o.temporal);
+  visit(OptionText{"track_right", "Predict, match and filter the right view as well.", "", "true, false",
+                   "Set it to true if errors count more than time, or if you need a good right map."},
+        o.track_right);
+  visit(OptionText{"keep_predicted", "A pixel without a measurement keeps its prediction.", "", "true, false",
+                   "Set it to false if you want only what this frame confirms."},
+        o.keep_predicted);
+  visit(OptionText{"coarse_match", "Also match at a quarter of the resolution, without the prediction.", "",
+                   "true, false", "Set it to false to save time where nothing moves by itself."},
+        o.coarse_match);
+  visit(OptionText{"thin_objects", "Search the disparity of thin objects above and below them, too.", "", "true, false",
+                   "Set it to false to save time where there are no poles, wires or branches."},
+        o.thin_objects);
+  visit(OptionText{"vertical_alignment",
+                   "Estimate how far the rows of the two views are off, and resample the right one.", "", "true, false",
+                   "Set it to false if your rectification is exact, as for rendered images."},
+        o.vertical_alignment);
+  visit(OptionText{"cost",
+                   "Matching cost of a pixel pair: Hamming distance of census codes, or sum of absolute differences.",
+                   "", "census13x11, census9x7, census5x5, sad3x3",
+                   "Set census5x5 if thin objects are lost; sad3x3 needs cameras of equal brightness."},
+        o.cost);
+  visit(OptionText{"paths", "Paths of the semi-global aggregation.", "", "4, 8", "Set 4 to save time."}, o.paths);
+  visit(OptionText{"p1", "Penalty of a step of one disparity between neighbours.", "cost", "0 to p2",
+                   "Raise it for smooth surfaces without texture; lower it for slanted ones."},
+        o.p1);
+  visit(OptionText{"p2", "Penalty of a larger step; it is lower where the image has an edge.", "cost", "0 to 190",
+                   "Raise it for noisy images; lower it if thin objects are lost."},
+        o.p2);
+  visit(OptionText{"max_speckle_px", "Connected regions of at most this size are dropped.", "pixels",
+                   "0 (none) or more", "Raise it if small islands of wrong disparity stay."},
+        o.max_speckle_px);
+  visit(OptionText{"max_memory_mib", "Device memory for path sums; a larger image is matched in horizontal stripes.",
+                   "MiB", "0 (what the device has) or more", "Set it if other programs need the device's memory."},
+        o.max_memory_mib);
+  visit(OptionText{"left_right_px", "Largest difference between the disparities of the two views.", "px", "0 or more",
+                   "Lower it if wrong pixels stay; raise it if too many are missing."},
+        o.left_right_px);
+  visit(OptionText{"search_sigmas", "Half-width of a predicted pixel's search, in standard deviations.", "",
+                   "0 or more", "Raise it if your poses or calibration are worse than their covariance says."},
+        o.search_sigmas);
+  visit(OptionText{"min_half_width_px", "A predicted pixel searches at least this far to either side.", "px",
+                   "0 or more", "Raise it if the frame rate is low or turns are fast."},
+        o.min_half_width_px);
+  visit(OptionText{"process_noise_px2", "Variance that a frame adds to every prediction (q, eq. 6).", "px^2",
+                   "0 or more", "Lower it if your poses are exact; raise it if they are not."},
+        o.process_noise_px2);
+  visit(OptionText{"gate_px", "Where prediction and measurement differ by more, the measurement counts.", "px",
+                   "0 (average always) or more", "Lower it if moving objects smear; raise it if the map flickers."},
+        o.gate_px);
 }
 
-template <typename Enum>
-struct Choice {
+/// Where the options of version 0.1 went. An empty new name: a constant of the method.
+struct Moved {
   const char* name;
-  Enum value;
+  const char* to;
 };
-constexpr Choice<MatchingCost> choice(MatchingCost, int i) {
-  constexpr Choice<MatchingCost> choices[] = {{"census13x11", MatchingCost::kCensus13x11},
-                                              {"census9x7", MatchingCost::kCensus9x7},
-                                              {"census5x5", MatchingCost::kCensus5x5},
-                                              {"sad3x3", MatchingCost::kSad3x3}};
-  return i < 4 ? choices[i] : Choice<MatchingCost>{nullptr, {}};
-}
-constexpr Choice<SearchMode> choice(SearchMode, int i) {
-  constexpr Choice<SearchMode> choices[] = {{"band", SearchMode::kBand}, {"full", SearchMode::kFull}};
-  return i < 2 ? choices[i] : Choice<SearchMode>{nullptr, {}};
-}
-constexpr Choice<Scheduling> choice(Scheduling, int i) {
-  constexpr Choice<Scheduling> choices[] = {
-      {"automatic", Scheduling::kAutomatic}, {"wavefront", Scheduling::kWavefront}, {"paths", Scheduling::kPaths}};
-  return i < 3 ? choices[i] : Choice<Scheduling>{nullptr, {}};
-}
+constexpr Moved kMoved[] = {
+    {"search", ""},
+    {"forward_warp.process_noise_px2", "process_noise_px2"},
+    {"forward_warp.motion_noise", "covariance"},
+    {"consistency.prediction_px", "left_right_px"},
+    {"consistency.measurement_px", "left_right_px"},
+    {"consistency.update_px", "left_right_px"},
+    {"coarse_match.enabled", "coarse_match"},
+    {"search_band.sigmas", "search_sigmas"},
+    {"search_band.min_half_width_px", "min_half_width_px"},
+    {"search_band.ridge_step_px", "thin_objects"},
+    {"banded_sgm.cost", "cost"},
+    {"banded_sgm.paths", "paths"},
+    {"banded_sgm.p1", "p1"},
+    {"banded_sgm.p2", "p2"},
+    {"banded_sgm.scheduling", "tuning"},
+    {"banded_sgm.max_memory_mib", "max_memory_mib"},
+    {"vertical_alignment.enabled", "vertical_alignment"},
+    {"speckle_removal.max_size_px", "max_speckle_px"},
+    {"kalman_update.gate_px", "gate_px"},
+    {"kalman_update.keep_predicted", "keep_predicted"},
+    {"dynamic_map.enabled", "output"},
+};
 
-std::string text_of(int value) { return std::to_string(value); }
-std::string text_of(bool value) { return value ? "true" : "false"; }
-std::string text_of(float value) {
-  char buffer[32];
-  const auto result =
-      std::to_chars(buffer, buffer + sizeof buffer, value);  // the shortest that reads back to the same bits
-  return {buffer, result.ptr};
-}
-template <typename Enum>
-std::string text_of(Enum value) {
-  for (int i = 0; choice(value, i).name; ++i) {
-    if (choice(value, i).value == value) return choice(value, i).name;
+std::string where_it_went(std::string_view name) {
+  std::string to;
+  for (const Moved& moved : kMoved) {
+    if (name == moved.name) to = moved.to;
   }
-  return "?";
+  if (to == "covariance") return "scale the covariance of the motion instead";
+  if (to == "tuning") return "it is a tuning now, `scheduling`, as it changes no result";
+  if (to == "output") return "ask for the output `dynamic` instead";
+  if (to.empty()) return "it is a constant of the method now (docs/options.md)";
+  return "it is called " + to + " now";
 }
 
-[[noreturn]] void refuse(std::string_view name, std::string_view value, const std::string& allowed) {
-  throw InvalidArgument("option " + std::string(name) + ": \"" + std::string(value) + "\" is not " + allowed);
-}
-
-template <typename Number>
-void parse_number(std::string_view name, std::string_view text, Number& value, const char* allowed) {
-  Number parsed{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), parsed);
-  if (error != std::errc() || end != text.data() + text.size()) refuse(name, text, allowed);
-  value = parsed;
-}
-void parse(std::string_view name, std::string_view text, int& value) {
-  parse_number(name, text, value, "a whole number");
-}
-void parse(std::string_view name, std::string_view text, float& value) { parse_number(name, text, value, "a number"); }
-void parse(std::string_view name, std::string_view text, bool& value) {
-  if (text == "true" || text == "on" || text == "yes" || text == "1") {
-    value = true;
-  } else if (text == "false" || text == "off" || text == "no" || text == "0") {
-    value = false;
-  } else {
-    refuse(name, text, "on or off (nor true, false, yes, no, 1, 0)");
+bool was_an_option(std::string_view name) {
+  if (name == "dynamic_map.enabled") return true;
+  for (const NamedOption& parameter : list_parameters({})) {
+    if (name == parameter.name) return true;
   }
+  return false;
 }
-template <typename Enum>
-void parse(std::string_view name, std::string_view text, Enum& value) {
-  std::string allowed;
-  for (int i = 0; choice(value, i).name; ++i) {
-    if (text == choice(value, i).name) {
-      value = choice(value, i).value;
-      return;
-    }
-    allowed += std::string(i ? ", " : "one of ") + choice(value, i).name;
+
+/// Before the names of constants, which benches set as they set options.
+constexpr std::string_view kConstants = "constants.";
+
+void set_constant(PipelineOptions& options, std::string_view name, std::string_view value) {
+  MethodOptions any;
+  set_parameter(any, name, value);  // throws where it does not exist, or the value does not parse
+  for (auto& [known, text] : options.constants) {
+    if (known != name) continue;
+    text = value;
+    return;
   }
-  refuse(name, text, allowed);
+  options.constants.emplace_back(name, value);
 }
 
-template <typename Number>
-void expect(const char* name, Number value, bool allowed, const char* remedy) {
-  if (!allowed) throw InvalidArgument(std::string("option ") + name + " is " + text_of(value) + ": " + remedy);
-}
-
-void expect_not_negative(const char* name, float value) {
-  expect(name, value, std::isfinite(value) && value >= 0, "choose a finite number, zero or more");
+/// The options nearest to a name: few letters off, or named so in part. Farther is not a typing error: empty.
+std::string nearest_to(const PipelineOptions& options, std::string_view name) {
+  std::string nearest;
+  int least = static_cast<int>(name.size()) / 3 + 1;  // letters that a typing error may change
+  for_each(options, [&](const OptionText& text, const auto&) {
+    const bool is_part = name.size() > 2 && std::string_view(text.name).find(name) != std::string_view::npos;
+    const int distance = std::min(edit_distance(name, text.name), is_part ? 3 : 1 << 20);
+    if (distance > least || name.empty()) return;
+    nearest = (distance < least ? "" : nearest.empty() ? "" : nearest + " or ") + std::string(text.name);
+    least = distance;
+  });
+  return nearest;
 }
 
 }  // namespace
 
+// NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): the defaults of the parameters are written once, there
+PipelineOptions::PipelineOptions() : preset(Preset::kDefault) { MethodOptions().give_options(*this); }
+
 PipelineOptions PipelineOptions::paper() {
   PipelineOptions options;
+  options.preset = Preset::kPaper;
   options.track_right = true;
-  options.forward_warp.process_noise_px2 = 0.5f;
-  options.forward_warp.motion_noise = 0.0f;
-  options.edge_rejection.max_jump_px = 3.0f;
-  options.search_band.sigmas = 3.0f;
-  options.search_band.min_half_width_px = 0.0f;
-  options.search_band.from_neighbours = false;
-  options.search_band.ridge_step_px = 0.0f;
-  options.coarse_match.enabled = false;
-  options.kalman_update.gate_px = 0.0f;
-  options.kalman_update.ask_neighbours = false;
-  options.kalman_update.innovation_sigmas = 0.0f;
-  options.prediction_check.enabled = false;
-  options.output_variance.enabled = false;
+  options.process_noise_px2 = 0.5f;
+  options.search_sigmas = 3.0f;
+  options.min_half_width_px = 0.0f;
+  options.coarse_match = false;
+  options.thin_objects = false;
+  options.gate_px = 0.0f;
   return options;
 }
 
 void PipelineOptions::validate() const {
   expect("disparities", disparities, disparities >= 1 && disparities <= 4096, "choose 1 to 4096");
   expect("min_disparity", min_disparity, min_disparity >= -16384 && min_disparity <= 16384, "choose -16384 to 16384");
-  for_each(*this, [](const char* name, const auto& value) {
-    if constexpr (std::is_same_v<std::decay_t<decltype(value)>, float>) expect_not_negative(name, value);
+  for_each(*this, [](const OptionText& text, const auto& value) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(value)>, float>) expect_not_negative(text.name, value);
   });
-  expect("search_band.neighbour_min_count", search_band.neighbour_min_count, search_band.neighbour_min_count >= 1,
-         "choose 1 or more");
-  expect("coarse_match.p2", coarse_match.p2, coarse_match.p2 >= 0 && coarse_match.p2 <= 190, "choose 0 to 190");
-  expect("coarse_match.p2_at_edges", coarse_match.p2_at_edges,
-         coarse_match.p2_at_edges >= 0 && coarse_match.p2_at_edges <= 190, "choose 0 to 190");
-  expect("coarse_match.p1", coarse_match.p1, coarse_match.p1 >= 0 && coarse_match.p1 <= coarse_match.p2,
-         "choose 0 to coarse_match.p2");
-  expect("vertical_alignment.gain", vertical_alignment.gain, vertical_alignment.gain <= 1, "choose 0 to 1");
-  expect("banded_sgm.paths", banded_sgm.paths, banded_sgm.paths == 4 || banded_sgm.paths == 8, "choose 4 or 8");
-  expect("banded_sgm.p2", banded_sgm.p2, banded_sgm.p2 >= 0 && banded_sgm.p2 <= 190,
-         "choose 0 to 190: path costs have 8 bits");
-  expect("banded_sgm.p2_at_edges", banded_sgm.p2_at_edges, banded_sgm.p2_at_edges >= 0 && banded_sgm.p2_at_edges <= 190,
-         "choose 0 to 190");
-  expect("banded_sgm.p2_slope", banded_sgm.p2_slope, banded_sgm.p2_slope >= 0 && banded_sgm.p2_slope <= 255,
-         "choose 0 (the same penalty everywhere) to 255");
-  expect("banded_sgm.p1", banded_sgm.p1, banded_sgm.p1 >= 0 && banded_sgm.p1 <= banded_sgm.p2,
-         "choose 0 to banded_sgm.p2");
-  expect("banded_sgm.s_max", banded_sgm.s_max, banded_sgm.s_max >= 1 && banded_sgm.s_max <= 32767, "choose 1 to 32767");
-  expect("banded_sgm.max_memory_mib", banded_sgm.max_memory_mib, banded_sgm.max_memory_mib >= 0,
-         "choose 0 (what the device has) or more");
-  expect("banded_sgm.variance_floor_px2", banded_sgm.variance_floor_px2, banded_sgm.variance_floor_px2 > 0,
-         "choose a positive number");
-  expect("speckle_removal.max_size_px", speckle_removal.max_size_px, speckle_removal.max_size_px >= 0,
-         "choose 0 (off) or more");
+  expect("paths", paths, paths == 4 || paths == 8, "choose 4 or 8");
+  expect("p2", p2, p2 >= 0 && p2 <= 190, "choose 0 to 190: path costs have 8 bits");
+  expect("p1", p1, p1 >= 0 && p1 <= p2, "choose 0 to p2");
+  expect("max_speckle_px", max_speckle_px, max_speckle_px >= 0, "choose 0 (off) or more");
+  expect("max_memory_mib", max_memory_mib, max_memory_mib >= 0, "choose 0 (what the device has) or more");
+  MethodOptions(*this).validate();
 }
 
 std::vector<NamedOption> list_options(const PipelineOptions& options) {
   std::vector<NamedOption> list;
-  for_each(options, [&](const char* name, const auto& value) { list.push_back({name, text_of(value)}); });
+  for_each(options, [&](const OptionText& text, const auto& value) { list.push_back({text.name, text_of(value)}); });
+  for (const auto& [name, value] : options.constants) list.push_back({std::string(kConstants) + name, value});
   return list;
 }
 
+const std::vector<OptionText>& option_texts() {
+  static const std::vector<OptionText> texts = [] {
+    std::vector<OptionText> list;
+    const PipelineOptions options;
+    for_each(options, [&](const OptionText& text, const auto&) { list.push_back(text); });
+    return list;
+  }();
+  return texts;
+}
+
 void set_option(PipelineOptions& options, std::string_view name, std::string_view value) {
-  const auto behind_dot = [](std::string_view text) { return text.substr(text.rfind('.') + 1); };
-  const std::string_view last = behind_dot(name);
+  if (name.starts_with(kConstants)) return set_constant(options, name.substr(kConstants.size()), value);
   bool found = false;
-  std::string nearest;
-  int least = 1 << 20;
-  for_each(options, [&](const char* known, auto& member) {
-    if (name == known) {
-      found = true;
-      parse(name, value, member);
-    }
-    // Of the whole, or of the part behind the dot, with another stage before it. Farther is not a typing error.
-    const int of_whole = edit_distance(name, known);
-    const int of_last = edit_distance(last, behind_dot(known));
-    int distance = of_last * 3 < static_cast<int>(last.size()) + 3 ? of_last + (last.size() < name.size()) : 1 << 20;
-    if (of_whole * 3 < static_cast<int>(name.size()) + 3) distance = std::min(distance, of_whole);
-    if (distance > least || distance == 1 << 20) return;
-    nearest = (distance < least ? "" : nearest + " or ") + known;
-    least = distance;
+  for_each(options, [&](const OptionText& text, auto& member) {
+    if (name != text.name) return;
+    found = true;
+    parse(name, value, member);
   });
+  if (found && name == "preset")
+    options = options.preset == Preset::kPaper ? PipelineOptions::paper() : PipelineOptions();
   if (found) return;
+  if (was_an_option(name))
+    throw InvalidArgument("no option named \"" + std::string(name) + "\": " + where_it_went(name));
+  const std::string nearest = nearest_to(options, name);
   throw InvalidArgument("no option named \"" + std::string(name) + "\": " +
                         (nearest.empty() ? "`egosgm run --help` lists them" : "did you mean " + nearest + "?"));
 }

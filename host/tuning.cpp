@@ -5,6 +5,7 @@
 #include <charconv>
 
 #include "egosgm/error.h"
+#include "host/option_text.h"
 #include "host/tuning_defaults.h"
 
 namespace egosgm {
@@ -48,12 +49,13 @@ void Tuning::validate() const {
 }
 
 std::vector<NamedOption> list_tuning(const Tuning& tuning) {
-  std::vector<NamedOption> list;
+  std::vector<NamedOption> list{{"scheduling", option_text::text_of(tuning.scheduling)}};
   for (const Size& size : kSizes) list.push_back({size.name, std::to_string(tuning.*size.value)});
   return list;
 }
 
 void set_tuning(Tuning& tuning, std::string_view name, std::string_view value) {
+  if (name == "scheduling") return option_text::parse(name, value, tuning.scheduling);
   for (const Size& size : kSizes) {
     if (name != size.name) continue;
     int parsed = 0;
@@ -63,8 +65,8 @@ void set_tuning(Tuning& tuning, std::string_view name, std::string_view value) {
     tuning.*size.value = parsed;
     return;
   }
-  std::string all;
-  for (const Size& size : kSizes) all += (all.empty() ? "" : ", ") + std::string(size.name);
+  std::string all = "scheduling";
+  for (const Size& size : kSizes) all += ", " + std::string(size.name);
   throw InvalidArgument("no tuning named \"" + std::string(name) + "\": choose from " + all);
 }
 

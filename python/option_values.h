@@ -15,7 +15,7 @@ namespace py = pybind11;
 /// 150.0 as 150: a number that is whole may be given for a count, whatever its type. Others as they are.
 py::object whole(const py::handle& value);
 
-/// Options by name with Python's values: `banded_sgm__p2=150`, `banded_sgm={"p2": 150}` or `**{"banded_sgm.p2": 150}`.
+/// Options by name with Python's values: `p2=150`; constants of the method as `constants={"coarse_match.p1": 7}`.
 /// Throws InvalidArgument, as set_option does.
 void set_options(PipelineOptions& options, const py::dict& values);
 

@@ -38,9 +38,9 @@ struct Frame {
 };
 
 PipelineOptions preset_named(const std::string& name) {
-  if (name == "default") return {};
-  if (name == "paper") return PipelineOptions::paper();
-  throw InvalidArgument("preset \"" + name + "\": choose default or paper");
+  PipelineOptions options;
+  set_option(options, "preset", name);
+  return options;
 }
 
 /// A dict of arrays to fill, or names of arrays to make.
@@ -292,6 +292,16 @@ void bind_values(py::module_& module) {
   module.def(
       "pipeline_options", [](const std::string& preset) { return dict_of(preset_named(preset)); },
       py::arg("preset") = "default", "All options of Pipeline by name, with the values of a preset.");
+  module.def(
+      "_option_texts",
+      [] {
+        py::list texts;
+        for (const OptionText& t : option_texts()) {
+          texts.append(py::make_tuple(t.name, t.meaning, t.unit, t.range, t.when_to_change));
+        }
+        return texts;
+      },
+      "Name, meaning, unit, range and when to change, of every option of Pipeline.");
 }
 
 void bind_frame(py::module_& module) {

@@ -13,16 +13,7 @@ spec.loader.exec_module(module)
 lines = ["# Generated from the library's own list of options. Do not edit.", "from typing import TypedDict", ""]
 for name, options in (("PipelineOptions", module.pipeline_options()), ("StereoOdometryOptions", module.odometry_options()),
                       ("SyntheticOptions", module.synthetic_options())):
-    stages = {}
-    for key, value in options.items():
-        stage, dot, field = key.partition(".")
-        if dot:
-            stages.setdefault(stage, []).append(f"    {field}: {type(value).__name__}")
-    classes = {stage: "".join(part.title() for part in stage.split("_")) + "Options" for stage in stages}
-    for stage, fields in stages.items():
-        lines += [f"class {classes[stage]}(TypedDict, total=False):", *fields, ""]
     lines.append(f"class {name}(TypedDict, total=False):")
-    lines += [f"    {stage}: {kind}" for stage, kind in classes.items()]
-    lines += [f"    {key.replace('.', '__')}: {type(value).__name__}  # {value}" for key, value in options.items()]
+    lines += [f"    {key}: {type(value).__name__}  # {value}" for key, value in options.items()]
     lines.append("")
 (folder / "_options.pyi").write_text("\n".join(lines))

@@ -9,6 +9,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/opencl.h"
+#include "host/method_options.h"
 #include "host/ocl/device_handle.h"
 #include "tests/support/expect_refused.h"
 #include "tests/support/fault_layer.h"
@@ -72,11 +73,9 @@ cl_command_queue_properties queue_properties(const Device& device) {
   return device.handle().device.getInfo<CL_DEVICE_QUEUE_PROPERTIES>();
 }
 
-DevicePipeline pipeline_on(const OwnQueue& queue, bool wants_dynamic = true) {
+DevicePipeline pipeline_on(const OwnQueue& queue) {
   const Scene scene(ShortVideo::kSize);
-  PipelineOptions options = ShortVideo::options();
-  options.dynamic_map.enabled = wants_dynamic;
-  return {queue.get(), scene.calibration(), ShortVideo::kSize.width, ShortVideo::kSize.height, options};
+  return {queue.get(), scene.calibration(), ShortVideo::kSize.width, ShortVideo::kSize.height, ShortVideo::options()};
 }
 
 /// A short video's frames in the memory of a queue, a pipeline on it, and what the host's way gives.
@@ -98,7 +97,7 @@ struct VideoOnDevice {
   VideoOnDevice& operator=(const VideoOnDevice&) = delete;
 
   DeviceMaps enqueue(int index, cl_event* done = nullptr) {
-    return device.enqueue({pixels[index], video.type()}, video.motion(index), done);
+    return device.enqueue({pixels[index], video.type()}, video.motion(index), done, /*wants_dynamic=*/true);
   }
   void expect_same(const DeviceMaps& maps, int index) const {
     const auto same = [&](cl_mem map, int view, const testing::MapMemory<float>& values) {
@@ -214,7 +213,7 @@ TEST_F(DevicePipelineTest, GoesOnAfterAFrameThatFailed) {
 
 TEST_F(DevicePipelineTest, ADynamicMapThatIsNotAskedForCostsNothing) {
   VideoOnDevice frames;
-  DevicePipeline without = pipeline_on(frames.queue, /*wants_dynamic=*/false);
+  DevicePipeline without = pipeline_on(frames.queue);
   for (int index = 0; index < ShortVideo::kFrames; ++index) {
     layer_.disarm();  // counts from here
     EXPECT_NE(frames.enqueue(index).dynamic, nullptr);

@@ -12,6 +12,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
+#include "host/method_options.h"
 #include "tests/support/fault_layer.h"
 #include "tests/support/frame_memory.h"
 #include "tests/support/scene.h"
@@ -22,8 +23,8 @@ namespace {
 constexpr int kWidth = 24, kHeight = 12;
 constexpr float kUntouched = 12345.0f;
 
-PipelineOptions small_options() {
-  PipelineOptions options;
+MethodOptions small_options() {
+  MethodOptions options;
   options.disparities = 16;
   options.sad_check.max_difference = 60;
   options.speckle_removal.max_size_px = 4;
@@ -311,7 +312,7 @@ TEST_P(OverlappedFaultTest, EveryCallOfTwoFramesUnderWay) {
 TEST_P(OverlappedFaultTest, TheVerticalOffsetOfFramesThatFailedIsForgotten) {
   constexpr shared::ImageSize kSize{127, 61};
   const testing::Scene scene(kSize, 0, 0.4);
-  PipelineOptions options;
+  MethodOptions options;
   options.disparities = 32;
   Pipeline pipeline(scene.calibration(), kSize.width, kSize.height, options);
   const auto submit_frame = [&](int index) {

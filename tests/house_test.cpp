@@ -129,7 +129,7 @@ TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
 }
 
 TEST(House, TwinsShareNothingWithTheKernelsButTheirLayouts) {
-  const std::regex foreign(R"(#\s*include\s*"(host/|CL/|kernels/method))");
+  const std::regex foreign(R"(#\s*include\s*"(host/(?!method_options\.h)|CL/|kernels/method))");
   for (const fs::path& file : files({".h", ".cpp"}, {"tests/reference"})) {
     EXPECT_FALSE(std::regex_search(text_of(file), foreign)) << file;
   }

@@ -17,7 +17,7 @@ namespace {
 
 /// A method with what it has built.
 struct Built {
-  explicit Built(const std::function<void(PipelineOptions&)>& change = {})
+  explicit Built(const std::function<void(MethodOptions&)>& change = {})
       : method(context, kSize, standard().scene().calibration(), options(32, 0, change),
                with_defaults({}, Device::select().info())) {
     method.prepare(PixelType::kU8);

@@ -11,6 +11,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/programs.h"
+#include "host/method_options.h"
 #include "tests/support/expect_refused.h"
 #include "tests/support/fault_layer.h"
 #include "tests/support/short_video.h"
@@ -71,8 +72,8 @@ class CompiledTest : public ::testing::Test {
 
   void TearDown() override { layer_.forbid_sources(0); }
 
-  static PipelineOptions options(Scheduling scheduling) {
-    PipelineOptions options = ShortVideo::options();
+  static MethodOptions options(Scheduling scheduling) {
+    MethodOptions options = ShortVideo::options();
     options.banded_sgm.scheduling = scheduling;
     return options;
   }
@@ -115,7 +116,7 @@ TEST_F(CompiledTest, ProgramsOfADeviceServeItsComputeUnits) {
   const Device device = Device::select();
   if (device.info().compute_units < 2) GTEST_SKIP() << "the device has one compute unit";
   const ShortVideo video;
-  const PipelineOptions chosen = options(Scheduling::kWavefront);
+  const MethodOptions chosen = options(Scheduling::kWavefront);
   const std::vector<OutputMemory> expected = video.through(device, chosen);
   layer_.forbid_sources(1);
   const Device part = device.compute_units(1, 1).with_programs(folder_ / "wavefront");

@@ -14,7 +14,7 @@ constexpr const char* kUnpredicted[] = {"-", "first frame", "reset", "no motion"
 std::string text_of(Views views) { return views == Views::kBoth ? "both" : "left"; }
 
 /// What is decided, in a row.
-std::string row(const PipelineOptions& options, Unpredicted missing, bool knows_offset, bool has_motion) {
+std::string row(const MethodOptions& options, Unpredicted missing, bool knows_offset, bool has_motion) {
   const Plan plan = plan_of(options, missing, knows_offset, has_motion ? std::optional(Motion{}) : std::nullopt, {});
   EXPECT_EQ(plan.motion.has_value(), plan.predicts());
   std::ostringstream text;
@@ -63,7 +63,7 @@ constexpr Case kCases[] = {
 
 TEST(Plan, DecidesEveryCase) {
   for (const Case& c : kCases) {
-    PipelineOptions options;
+    MethodOptions options;
     options.temporal = c.temporal;
     options.search = c.search;
     options.track_right = c.track_right;
@@ -75,7 +75,7 @@ TEST(Plan, DecidesEveryCase) {
 }
 
 TEST(Plan, MatchesTwiceWhereTheFirstMatchGivesTheVerticalOffset) {
-  PipelineOptions options;
+  MethodOptions options;
   EXPECT_EQ(plan_of(options, kFirstFrame, false, {}, {}).matches, 2);
   EXPECT_EQ(plan_of(options, kFirstFrame, true, {}, {}).matches, 1);
   options.vertical_alignment.enabled = false;
@@ -83,13 +83,13 @@ TEST(Plan, MatchesTwiceWhereTheFirstMatchGivesTheVerticalOffset) {
 }
 
 TEST(Plan, HasACoarseMatchOnlyWhereItIsOn) {
-  PipelineOptions options;
+  MethodOptions options;
   options.coarse_match.enabled = false;
   EXPECT_EQ(row(options, kNo, true, true), "- | bands | tracks left | matches left x1");
 }
 
 TEST(Plan, MakesTheVarianceThatIsGivenOutOnlyWhereItIsOn) {
-  PipelineOptions options;
+  MethodOptions options;
   EXPECT_EQ(plan_of(options, kNo, true, {}, {Views::kBoth, true}).wanted.variance, Views::kBoth);
   EXPECT_FALSE(plan_of(options, kNo, true, {}, {{}, true}).wanted.variance);
   EXPECT_TRUE(plan_of(options, kNo, true, {}, {{}, true}).wanted.dynamic);

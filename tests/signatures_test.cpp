@@ -5,6 +5,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 #include "kernels/shared.h"
 #include "tests/support/device.h"
@@ -98,7 +99,7 @@ TEST(Times, ThatADriverLeavesOutAreThoseOfTheNextStep) {
 
 TEST(AllKernels, HaveTheSignatureThatTheirStagesDeclare) {
   for (const MatchingCost cost : {MatchingCost::kCensus9x7, MatchingCost::kSad3x3}) {
-    PipelineOptions options;
+    MethodOptions options;
     options.disparities = 16;
     options.banded_sgm.cost = cost;
     EXPECT_NO_THROW(Pipeline({.fx = 20, .fy = 20, .cx = 8, .cy = 4, .baseline_m = 0.5}, 16, 8, options));

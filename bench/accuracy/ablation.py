@@ -13,40 +13,40 @@ ABLATION = [
     ("single frame", SINGLE_FRAME, "What the same matcher gives without the frames before: the whole range, every time."),
     ("paper", PAPER, "The choices of the paper: unpredicted pixels search everything, three sigma with no least half-width, constant q."),
     ("paper, single frame", PAPER + SINGLE_FRAME, "The paper's own baseline: its matcher alone."),
-    ("temporal, full range", ("--search", "full"), "Fusion without the band: what the narrow search costs or gains."),
-    ("no band from neighbours", settings("search_band.from_neighbours=false"),
+    ("temporal, full range", settings("constants.search=full"), "Fusion without the band: what the narrow search costs or gains."),
+    ("no band from neighbours", settings("constants.search_band.from_neighbours=false"),
      "A pixel without a prediction then searches everything, not the range that its neighbours span."),
-    ("no least half-width", settings("search_band.min_half_width_px=0"),
+    ("no least half-width", settings("min_half_width_px=0"),
      "The least half-width is for motion errors that three sigma of a confident pixel would not cover."),
-    ("no gate", settings("kalman_update.gate_px=0"), "Prediction and measurement are then averaged even where they contradict each other, as on moving objects."),
-    ("neighbours not asked", settings("kalman_update.ask_neighbours=false"),
+    ("no gate", settings("gate_px=0"), "Prediction and measurement are then averaged even where they contradict each other, as on moving objects."),
+    ("neighbours not asked", settings("constants.kalman_update.ask_neighbours=false"),
      "The measurement then counts wherever it contradicts the prediction, though all around speaks against it, and what moves by itself is averaged "
      "with where it was."),
-    ("no prediction kept", settings("kalman_update.keep_predicted=false"),
+    ("no prediction kept", settings("keep_predicted=false"),
      "What is not measured in this frame is forgotten: holes stay holes."),
-    ("no edge rejection", settings("edge_rejection.max_jump_px=0"),
+    ("no edge rejection", settings("constants.edge_rejection.max_jump_px=0"),
      "Predictions beside a jump may lie on the wrong surface, and a narrow search cannot get back."),
-    ("no hole fill", settings("hole_fill.max_difference_px=0"), "Gaps that forward motion tears open stay unpredicted."),
-    ("motion's covariance unused", settings("forward_warp.motion_noise=0"), "Then the constant q alone stands for the motion's error."),
-    ("process noise x 4", settings("forward_warp.process_noise_px2=0.04"), "More trust in the measurement, wider bands."),
-    ("left-right within 1 px", settings("consistency.prediction_px=1", "consistency.measurement_px=1", "consistency.read_off_px=1", "consistency.update_px=1"),
+    ("no hole fill", settings("constants.hole_fill.max_difference_px=0"), "Gaps that forward motion tears open stay unpredicted."),
+    ("motion's covariance unused", settings("constants.forward_warp.motion_noise=0"), "Then the constant q alone stands for the motion's error."),
+    ("process noise x 4", settings("process_noise_px2=0.04"), "More trust in the measurement, wider bands."),
+    ("left-right within 1 px", settings("left_right_px=1", "constants.consistency.read_off_px=1"),
      "The paper's strict check: it drops slanted surfaces with the errors."),
     ("both views tracked", settings("track_right=true"),
      "The right view is then predicted, searched and filtered as the left one is, instead of following from it, which takes longer."),
-    ("no vertical alignment", settings("vertical_alignment.enabled=false"),
+    ("no vertical alignment", settings("vertical_alignment=false"),
      "Half a pixel between the rows of the views costs matches; the estimate takes it out."),
-    ("no coarse match", settings("coarse_match.enabled=false"),
+    ("no coarse match", settings("coarse_match=false"),
      "What moves by itself, or lies where a wrong motion does not point, is then outside of the band."),
-    ("no ridges", settings("search_band.ridge_step_px=0"),
+    ("no ridges", settings("thin_objects=false"),
      "Poles that were lost hide behind their background's narrow bands: less is searched, and more of them lost."),
-    ("no median", settings("median_filter.enabled=false"), "Single outliers survive to the left-right check."),
-    ("no speckle removal", settings("speckle_removal.max_size_px=0"), "Small wrong regions agree in both views by chance."),
-    ("with SAD check", settings("sad_check.max_difference=20"), "The paper's check of the grey values; off by default."),
+    ("no median", settings("constants.median_filter.enabled=false"), "Single outliers survive to the left-right check."),
+    ("no speckle removal", settings("max_speckle_px=0"), "Small wrong regions agree in both views by chance."),
+    ("with SAD check", settings("constants.sad_check.max_difference=20"), "The paper's check of the grey values; off by default."),
     ("four paths", ("--paths", "4"), "Half the aggregation, in about half the time."),
-    ("census 9x7", settings("banded_sgm.cost=census9x7"), "All 62 comparisons of the usual window: twice the code bytes."),
-    ("census 5x5", settings("banded_sgm.cost=census5x5"), "A smaller window: cheaper codes that tell less."),
-    ("SAD 3x3", settings("banded_sgm.cost=sad3x3"), "The cost that the paper may have used; brightness differences between the cameras spoil it."),
-    ("P2 = 80", settings("banded_sgm.p2=80"), "Half the penalty of a jump."),
+    ("census 9x7", settings("cost=census9x7"), "All 62 comparisons of the usual window: twice the code bytes."),
+    ("census 5x5", settings("cost=census5x5"), "A smaller window: cheaper codes that tell less."),
+    ("SAD 3x3", settings("cost=sad3x3"), "The cost that the paper may have used; brightness differences between the cameras spoil it."),
+    ("P2 = 80", settings("p2=80"), "Half the penalty of a jump."),
 ]
 # Least half-widths for the plot of error against search fraction.
 HALF_WIDTHS_PX = (0.5, 1, 2, 4, 8, 16, 32)
@@ -105,7 +105,7 @@ def curves(bench, inputs):
         if not source.truth:
             continue
         for half_width in HALF_WIDTHS_PX:
-            figures = mean_figures(source, bench.run(source, settings(f"search_band.min_half_width_px={half_width}")))
+            figures = mean_figures(source, bench.run(source, settings(f"min_half_width_px={half_width}")))
             against_search.append({"input": source.title, "half_width_px": half_width, **figures})
     over_frames = []
     for source in inputs:

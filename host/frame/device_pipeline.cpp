@@ -52,7 +52,8 @@ DevicePipeline::DevicePipeline(cl_command_queue queue, const Calibration& calibr
                                const PipelineOptions& options, const std::string& programs)
     : pipeline_(calibration, width, height, options, device_on(queue, programs)) {}
 
-DeviceMaps DevicePipeline::enqueue(const DeviceImages& images, const std::optional<Motion>& motion, cl_event* done) {
+DeviceMaps DevicePipeline::enqueue(const DeviceImages& images, const std::optional<Motion>& motion, cl_event* done,
+                                   bool wants_dynamic) {
   FrameQueue& frames = *pipeline_.impl_;
   if (pipeline_.under_way() > 0) {
     throw InvalidArgument("enqueue: a frame that was submitted is under way: collect it first");
@@ -60,7 +61,7 @@ DeviceMaps DevicePipeline::enqueue(const DeviceImages& images, const std::option
   if (motion) motion->validate();
   return ocl::translated(frames.context(), [&] {
     frames.context().enter("enqueue");
-    return frames.enqueue(images_on(frames.context(), images, frames.size()), motion, done);
+    return frames.enqueue(images_on(frames.context(), images, frames.size()), motion, done, wants_dynamic);
   });
 }
 

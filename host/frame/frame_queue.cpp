@@ -12,6 +12,14 @@ ocl::Context context_on(const Device::Handle& device) {
   return device.queue() ? ocl::Context(device.queue, device.programs) : ocl::Context(device.device, device.programs);
 }
 
+/// `options` as a pipeline on a device with this tuning runs them.
+MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning) {
+  MethodOptions method(options);
+  Scheduling& scheduling = method.banded_sgm.scheduling;
+  if (scheduling == Scheduling::kAutomatic) scheduling = tuning.scheduling;
+  return method;
+}
+
 }  // namespace
 
 FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options,
@@ -19,9 +27,11 @@ FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, c
     : options_(options),
       device_(device),
       size_(size),
+      tuning_(with_defaults(device.handle().tuning, device.info())),
+      method_options_(method_of(options, tuning_)),
       context_(context_on(device.handle())),
-      method_(context_, size, calibration, options, with_defaults(device.handle().tuning, device.info())),
-      transfers_{{{context_, size, range_of(options)}, {context_, size, range_of(options)}}},
+      method_(context_, size, calibration, method_options_, tuning_),
+      transfers_{{{context_, size, range_of(method_options_)}, {context_, size, range_of(method_options_)}}},
       memory_{{{context_, size}, {context_, size}, {context_, size}}},
       belief_(memory_.front()) {
   method_.prepare(type);
@@ -38,7 +48,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   Wanted wanted{{}, outputs.dynamic.data != nullptr};
   if (outputs.variance.data) wanted.variance = Views::kLeft;
   if (outputs.right_variance.data) wanted.variance = Views::kBoth;
-  const Plan plan = plan_of(options_, belief_.missing, belief_.offset.is_known, motion, wanted);
+  const Plan plan = plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, wanted);
   const FrameImages& images = frame.transfer->upload(left, right);
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
   Map& variance = frame.transfer->output_variance();
@@ -64,7 +74,8 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   under_way_.push_back(std::move(frame));
 }
 
-DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done) {
+DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done,
+                               bool wants_dynamic) {
   expect_device_frame_not_failed();
   method_.prepare(images.type);
   FrameTransfer& transfer = free_transfer();
@@ -72,7 +83,7 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   ocl::Drain drain{context_};
   release_results();
   const Plan plan =
-      plan_of(options_, belief_.missing, belief_.offset.is_known, motion, {Views::kBoth, options_.dynamic_map.enabled});
+      plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, {Views::kBoth, wants_dynamic});
   method_.frame(plan, images, belief_, after, transfer.output_variance());
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
 

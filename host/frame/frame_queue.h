@@ -31,7 +31,8 @@ class FrameQueue {
   void record_commands(bool wanted) { records_commands_ = wanted; }
 
   /// As DevicePipeline. REQUIRES: no frame is under way.
-  DeviceMaps enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done);
+  DeviceMaps enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done,
+                     bool wants_dynamic);
 
   void validate(const ImageView& left, const ImageView& right, const FrameOutputs& outputs) const {
     transfers_[0].validate(left, right, outputs);
@@ -66,6 +67,8 @@ class FrameQueue {
   const PipelineOptions options_;
   const Device device_;
   const shared::ImageSize size_;
+  const Tuning tuning_;
+  const MethodOptions method_options_;
   ocl::Context context_;
   Method method_;
   std::array<FrameTransfer, Pipeline::kMaxUnderWay> transfers_;

@@ -4,7 +4,7 @@
 namespace egosgm {
 namespace {
 
-Unpredicted unpredicted(const PipelineOptions& options, Unpredicted missing, const std::optional<Motion>& motion) {
+Unpredicted unpredicted(const MethodOptions& options, Unpredicted missing, const std::optional<Motion>& motion) {
   if (!options.temporal) return Unpredicted::kNotTemporal;
   if (missing != Unpredicted::kNo) return missing;
   return motion ? Unpredicted::kNo : Unpredicted::kNoMotion;
@@ -12,8 +12,8 @@ Unpredicted unpredicted(const PipelineOptions& options, Unpredicted missing, con
 
 }  // namespace
 
-Plan plan_of(const PipelineOptions& options, Unpredicted missing, bool knows_offset,
-             const std::optional<Motion>& motion, const Wanted& wanted) {
+Plan plan_of(const MethodOptions& options, Unpredicted missing, bool knows_offset, const std::optional<Motion>& motion,
+             const Wanted& wanted) {
   Plan plan{};
   plan.unpredicted = unpredicted(options, missing, motion);
   const bool searches_bands = plan.predicts() && options.search == SearchMode::kBand;

@@ -33,7 +33,7 @@ struct Plan {
 };
 
 /// `missing`: why the belief has no maps; kNo: it has. `knows_offset`: whether it has a vertical offset.
-Plan plan_of(const PipelineOptions& options, Unpredicted missing, bool knows_offset,
-             const std::optional<Motion>& motion, const Wanted& wanted);
+Plan plan_of(const MethodOptions& options, Unpredicted missing, bool knows_offset, const std::optional<Motion>& motion,
+             const Wanted& wanted);
 
 }  // namespace egosgm

@@ -12,7 +12,7 @@ namespace egosgm {
 namespace {
 
 /// With every stage that can be on.
-PipelineOptions all_stages(PipelineOptions options) {
+MethodOptions all_stages(MethodOptions options) {
   options.temporal = true;
   options.search = SearchMode::kBand;
   options.coarse_match.enabled = true;

@@ -3,7 +3,7 @@
 
 namespace egosgm {
 
-FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options, const Tuning& tuning)
+FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning)
     : left_right_px_(options.consistency.update_px),
       prediction_check_(context, size, options.prediction_check, tuning.row_group),
       kalman_update_(context, size, options.kalman_update),

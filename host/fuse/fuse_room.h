@@ -23,7 +23,7 @@ struct Fusion {
 /// Compares prediction and measurement, and makes one map of the two.
 class FuseRoom {
  public:
-  FuseRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options, const Tuning& tuning);
+  FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning);
 
   /// Builds what images of `type` need.
   void prepare(PixelType type);

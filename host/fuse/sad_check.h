@@ -2,7 +2,7 @@
 #pragma once
 
 #include "egosgm/image.h"
-#include "egosgm/options.h"
+#include "host/method_options.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
 

@@ -3,11 +3,11 @@
 
 #include <optional>
 
-#include "egosgm/options.h"
 #include "host/maps.h"
 #include "host/match/banded_sgm_paths.h"
 #include "host/match/read_off.h"
 #include "host/match/stripes.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 #include "host/search/search_band.h"
 #include "host/tuning_defaults.h"

@@ -11,7 +11,7 @@ std::optional<BandedSgmPaths::Group> path_group(const Tuning& tuning) {
 
 }  // namespace
 
-MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options,
+MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options,
                      const Tuning& tuning)
     : left_right_(options.consistency),
       matcher_(context, size, range_of(options), options.banded_sgm,

@@ -21,7 +21,7 @@ struct Matching {
 /// Measures disparities and variances within bands, and drops what is doubtful.
 class MatchRoom {
  public:
-  MatchRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options, const Tuning& tuning);
+  MatchRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning);
 
   /// Builds what images of `type` need.
   void prepare(PixelType type) { matcher_.prepare(type); }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "egosgm/options.h"
+#include "host/method_options.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
 

@@ -5,7 +5,7 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/motion.h"
-#include "egosgm/options.h"
+#include "host/method_options.h"
 #include "host/maps.h"
 #include "host/ocl/kernel.h"
 #include "host/tuning_defaults.h"

@@ -4,7 +4,7 @@
 namespace egosgm {
 
 PredictRoom::PredictRoom(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
-                         const PipelineOptions& options, const Tuning& tuning)
+                         const MethodOptions& options, const Tuning& tuning)
     : left_right_px_(options.consistency.prediction_px),
       forward_warp_(context, size, calibration, options.forward_warp, range_of(options), 0, tuning.warp_band_rows),
       right_map_(context, size, range_of(options)),

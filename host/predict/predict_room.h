@@ -27,7 +27,7 @@ struct Prediction {
 class PredictRoom {
  public:
   PredictRoom(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
-              const PipelineOptions& options, const Tuning& tuning);
+              const MethodOptions& options, const Tuning& tuning);
 
   /// REQUIRES: the plan has a motion.
   void operator()(const Plan& plan, const StereoMaps& belief, Prediction& prediction);

@@ -3,7 +3,7 @@
 
 namespace egosgm {
 
-PublishRoom::PublishRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options)
+PublishRoom::PublishRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : context_(context) {
   if (options.output_variance.enabled) output_variance_.emplace(context, size, options.output_variance);
   if (options.temporal) dynamic_map_.emplace(context, size, options.dynamic_map);

@@ -11,7 +11,7 @@ namespace egosgm {
 /// Makes what is given out and no later frame rests on.
 class PublishRoom {
  public:
-  PublishRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options);
+  PublishRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
 
   /// Writes the variance [px^2] of the `belief` and the marks of what contradicts a static world, as the plan wants
   /// them.

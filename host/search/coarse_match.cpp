@@ -27,7 +27,7 @@ shared::DisparityRange CoarseMatch::coarse_range(shared::DisparityRange range) {
   return {first, last - first + 1};
 }
 
-BandedSgmOptions CoarseMatch::matcher(const PipelineOptions& options) {
+BandedSgmOptions CoarseMatch::matcher(const MethodOptions& options) {
   BandedSgmOptions coarse = options.banded_sgm;
   coarse.cost = MatchingCost::kCensus5x5;
   coarse.p1 = options.coarse_match.p1;
@@ -47,7 +47,7 @@ void Shrink::operator()(const FrameImages& images, FrameImages& coarse) {
           size_, images.pixels, coarse.pixels);
 }
 
-CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options)
+CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : context_((context.enter("CoarseMatch"), context)),
       coarse_(coarse_size(size)),
       range_(coarse_range({options.min_disparity, options.disparities})),

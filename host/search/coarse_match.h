@@ -3,9 +3,9 @@
 
 #include <cstdint>
 
-#include "egosgm/options.h"
 #include "host/match/consistency_check.h"
 #include "host/match/matcher.h"
+#include "host/method_options.h"
 
 namespace egosgm {
 
@@ -27,7 +27,7 @@ class Shrink {
 /// disparity for EGOSGM_COARSE times as many.
 class CoarseMatch {
  public:
-  CoarseMatch(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options);
+  CoarseMatch(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
 
   /// Builds what images of `type` need.
   void prepare(PixelType type) { shrink_.prepare(type); }
@@ -42,7 +42,7 @@ class CoarseMatch {
   static shared::ImageSize coarse_size(shared::ImageSize size);
   static shared::DisparityRange coarse_range(shared::DisparityRange range);
   /// The options of BandedSgm at that resolution.
-  static BandedSgmOptions matcher(const PipelineOptions& options);
+  static BandedSgmOptions matcher(const MethodOptions& options);
 
  private:
   ocl::Context& context_;

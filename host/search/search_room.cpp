@@ -3,7 +3,7 @@
 
 namespace egosgm {
 
-SearchRoom::SearchRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options,
+SearchRoom::SearchRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options,
                        const Tuning& tuning)
     : search_band_(context, size, range_of(options), options.search_band, tuning.row_group) {
   if (options.coarse_match.enabled && options.temporal && options.search == SearchMode::kBand) {

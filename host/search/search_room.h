@@ -11,7 +11,7 @@ namespace egosgm {
 /// Says where each pixel is searched.
 class SearchRoom {
  public:
-  SearchRoom(ocl::Context& context, shared::ImageSize size, const PipelineOptions& options, const Tuning& tuning);
+  SearchRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning);
 
   /// Builds what images of `type` need.
   void prepare(PixelType type);

@@ -11,17 +11,30 @@
 
 namespace egosgm {
 
-/// An option by its name, `stage.option` (for example `banded_sgm.p2`), with its value as text.
+/// An option by its name, for example `p2`, with its value as text.
 struct NamedOption {
   std::string name;
   std::string value;
 };
 
-/// All options of `options`, in the order of options.h.
+/// What an option is, in a sentence each. The strings live as long as the program.
+struct OptionText {
+  const char* name;
+  const char* meaning;
+  const char* unit;            // "" where it has none
+  const char* range;           // the values that it takes
+  const char* when_to_change;  // for whom the default does not fit, and what then
+};
+
+/// All options of `options`: the preset first, then in the order of docs/options.md; then its constants, if any, as
+/// `constants.NAME`.
 EGOSGM_EXPORT std::vector<NamedOption> list_options(const PipelineOptions& options);
 
-/// Sets one. Throws InvalidArgument for a name that does not exist (with the nearest that does) or a value that does
-/// not parse.
+/// What each of them is, in the same order, without constants.
+EGOSGM_EXPORT const std::vector<OptionText>& option_texts();
+
+/// Sets one. `preset` sets all others, too. `constants.NAME` sets a constant of the method, for experiments. Throws InvalidArgument for a value that does not parse, and for a name that
+/// does not exist: with the nearest that does, or, for a name of an earlier version, with where it went.
 EGOSGM_EXPORT void set_option(PipelineOptions& options, std::string_view name, std::string_view value);
 
 }  // namespace egosgm

@@ -32,7 +32,7 @@ struct DeviceMaps {
   cl_mem disparity = nullptr;
   cl_mem variance = nullptr;
   Unpredicted unpredicted = Unpredicted::kNo;  // as in FrameReport
-  cl_mem dynamic = nullptr;  // bytes, the left view's, as in FrameOutputs; null unless options.dynamic_map.enabled
+  cl_mem dynamic = nullptr;  // bytes, the left view's, as in FrameOutputs; null unless it was wanted
 };
 
 /// A Pipeline whose kernels run on the caller's queue, between the caller's own commands, on images that are there
@@ -45,11 +45,13 @@ class EGOSGM_EXPORT DevicePipeline {
                  const PipelineOptions& options = {}, const std::string& programs = {});
 
   /// Enqueues a frame behind what is enqueued on the queue, and returns. The images must not change until it has ended.
-  /// `done`, if not null, becomes an event of its end, which the caller releases.
+  /// `done`, if not null, becomes an event of its end, which the caller releases. `wants_dynamic`: makes
+  /// DeviceMaps::dynamic, too.
   /// Throws InvalidArgument before anything is enqueued, or DeviceError: then nothing of the frame is left on the
   /// queue, and the pipeline is as it was before. A frame that fails on the device later (its event says so) makes the
   /// next call throw DeviceError; that one forgets what went before, as `Pipeline::reset` does.
-  DeviceMaps enqueue(const DeviceImages& images, const std::optional<Motion>& motion, cl_event* done = nullptr);
+  DeviceMaps enqueue(const DeviceImages& images, const std::optional<Motion>& motion, cl_event* done = nullptr,
+                     bool wants_dynamic = false);
 
   /// The pipeline itself: options, memory, reset, and frames whose images and maps are the host's, in between. Their
   /// reports name no times where the caller's queue does not profile.

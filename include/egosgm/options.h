@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be chosen: one aggregate a stage, the pipeline's options are their sum. A default is written here and
-// nowhere else.
 #pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "egosgm/export.h"
 
@@ -10,117 +15,45 @@ namespace egosgm {
 /// Matching cost of a pixel pair: Hamming distance of census codes, or the mean absolute difference of a 3x3 window.
 /// kCensus13x11 compares 32 pixels of its window, denser towards the centre, and counts each twice.
 enum class MatchingCost { kCensus13x11, kCensus9x7, kCensus5x5, kSad3x3 };
-/// kBand: search where the prediction says (the method). kFull: search the whole range in every frame.
-enum class SearchMode { kBand, kFull };
-/// How the paths of BandedSgm run: diagonal wavefronts of tiles (CPUs, FPGAs) or a work-group a path (GPUs). Same bits.
-enum class Scheduling { kAutomatic, kWavefront, kPaths };
 
-struct ForwardWarpOptions {
-  float process_noise_px2 = 0.01f;  // constant part of q, added to every variance (eq. 6)
-  float motion_noise = 1.0f;        // factor of the other part, J Sigma J^T by the motion's covariance Sigma
-};
-struct EdgeRejectionOptions {
-  float max_jump_px = 5.0f;  // a larger step to a neighbour drops the prediction on both sides; 0 keeps all
-};
-struct HoleFillOptions {
-  float max_difference_px = 1.0f;  // gamma (eqs. 7-8): neighbours that differ by less fill the gap between them
-};
-struct ConsistencyCheckOptions {
-  float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
-  float read_off_px = 1.45f;  // of the measurement, where the right view is read off, unless predictions were wrong
-};
-struct CoarseMatchOptions {
-  bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
-  int p1 = 6, p2 = 60, p2_at_edges = 40;  // as in BandedSgmOptions, for a census of 5x5 coarse pixels
-  float max_difference_px = 1.0f;         // of the left-right check, in coarse pixels
-};
-struct SearchBandOptions {
-  float sigmas = 2.0f;             // half-width of a predicted pixel's band, in standard deviations
-  float min_half_width_px = 2.5f;  // and at least this
-  bool from_neighbours = true;     // unpredicted pixels search the range of the predictions around them
-  int neighbour_min_count = 8;     // with fewer predictions than this around, the whole range
-  float neighbour_margin_px = 4.0f;
-  // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
-  float coarse_tolerance_px = 2.0f, coarse_margin_px = 2.0f;
-  float ridge_step_px = 3.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
-};
-struct BandedSgmOptions {
-  MatchingCost cost = MatchingCost::kCensus13x11;
-  int paths = 8;  // 4 (horizontal and vertical) or 8
-  int p1 = 10;    // penalty of a step of one disparity
-  // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: p2 - p2_slope * g, but not
-  // below p2_at_edges (nor above p2).
-  int p2 = 170;  // p1 <= p2 <= 190
-  int p2_at_edges = 70, p2_slope = 2;
-  // Matching variance r = floor + n (per_step + per_square n), n = n_l + n_r the steps to both sides until the (halved)
-  // path sums above the minimum add up to s_max, at most 8 a side.
-  int s_max = 80;
-  float variance_floor_px2 = 0.15f;
-  float variance_per_step_px2 = 0.1f, variance_per_square_px2 = 0.045f;
-  Scheduling scheduling = Scheduling::kAutomatic;
-  // Memory for the path sums. An image that needs more is matched in horizontal stripes that overlap by 32 rows, almost
-  // as well (docs/reliability.md). 0: what the device has.
-  int max_memory_mib = 0;
-};
+/// Where the options start from, and what chooses the constants of the method.
+/// kPaper: prediction, search and fusion as in Fućek et al. (IFAC 2017), with this library's matcher.
+enum class Preset { kDefault, kPaper };
 
-struct VerticalAlignmentOptions {
-  bool enabled = true;  // estimate vertical offsets between the views (a quadratic), and resample the right image
-  float gain = 0.1f;    // part of what a frame finds that is added to the offsets, once they are known; 0 to 1
-};
-struct MedianFilterOptions {
-  bool enabled = true;  // 3x3 median of the disparities, before the left-right check
-};
-struct SadCheckOptions {
-  float max_difference = 0.0f;  // mean absolute grey difference of the 3x3 windows (8-bit scale); 0: no check
-};
-struct SpeckleRemovalOptions {
-  int max_size_px = 40;            // connected regions up to this size are dropped; 0: none
-  float max_difference_px = 2.0f;  // neighbours within this belong to one region
-};
-struct KalmanUpdateOptions {
-  float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
-  bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
-  bool ask_neighbours = true;  // which of the two they speak for, instead; and whether all of them move
-  float innovation_sigmas = 4.0f;  // where the two differ by more deviations, p' is raised until they do not; 0: never
-  float min_variance_px2 = 0.02f;
-};
-struct PredictionCheckOptions {
-  bool enabled = true;  // where predictions were wrong (a gap, a wrong motion), the next frame searches everything
-};
-struct OutputVarianceOptions {
-  bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
-  // Of the averaged variance to the power 1.5; of the squares of the distance from a plane and of jumps beside [px^2].
-  float scale = 1.3f, roughness_weight = 1.2f, jump_weight = 0.02f;
-};
-struct DynamicMapOptions {
-  bool enabled = false;            // of every frame, for DeviceMaps::dynamic; FrameOutputs::dynamic needs no option
-  float min_difference_px = 1.0f;  // of prediction and measurement, to contradict each other; changes no disparity
-};
-
+/// What a user can choose. Meaning, unit, range and when to change each: list_options, `egosgm run --help` and
+/// docs/options.md, from one table. Value semantics; not thread-safe.
+///
+/// The layout is fixed: a later version takes new options from `reserved`, and the library's constructor fills them, so
+/// that programs which were compiled with this header go on working.
 struct EGOSGM_EXPORT PipelineOptions {
-  int disparities = 128, min_disparity = 0;  // D >= 1 of them, from a first one of either sign on
-  SearchMode search = SearchMode::kBand;
-  bool temporal = true;      // false: every frame alone, full range, left-right checked (the plain matcher)
-  bool track_right = false;  // predict, match, filter the right view too, slower; false: it follows from the left one
+  int disparities;          ///< D: number of disparities; the range is [min_disparity, min_disparity + D) px
+  int min_disparity;        ///< least disparity [px], of either sign
+  bool temporal;            ///< false: every frame alone, over the full range
+  bool track_right;         ///< predict, match and filter the right view too
+  bool keep_predicted;      ///< a pixel without a measurement keeps its prediction
+  bool coarse_match;        ///< also match at a quarter of the resolution, without the prediction
+  bool thin_objects;        ///< also search what stands out above and below
+  bool vertical_alignment;  ///< estimate and remove vertical offsets between the views
+  MatchingCost cost;
+  int paths;                ///< 4 or 8
+  int p1, p2;               ///< penalties of a step of one disparity, and of a larger one
+  int max_speckle_px;       ///< connected regions of at most this size [pixels] are dropped; 0: none
+  int max_memory_mib;       ///< memory for path sums [MiB]; 0: what the device has
+  float left_right_px;      ///< largest difference between the views' disparities [px]
+  float search_sigmas;      ///< half-width of a predicted pixel's search [standard deviations],
+  float min_half_width_px;  ///< and at least this [px]
+  float process_noise_px2;  ///< q: variance that a frame adds to every prediction [px^2] (eq. 6)
+  float gate_px;            ///< a larger difference of prediction and measurement is not averaged [px]; 0: no gate
+  Preset preset;            ///< chooses the constants of the method, and nothing above
 
-  ForwardWarpOptions forward_warp;
-  EdgeRejectionOptions edge_rejection;
-  HoleFillOptions hole_fill;
-  ConsistencyCheckOptions consistency;
-  CoarseMatchOptions coarse_match;
-  SearchBandOptions search_band;
-  VerticalAlignmentOptions vertical_alignment;
-  BandedSgmOptions banded_sgm;
-  MedianFilterOptions median_filter;
-  SadCheckOptions sad_check;
-  SpeckleRemovalOptions speckle_removal;
-  KalmanUpdateOptions kalman_update;
-  PredictionCheckOptions prediction_check;
-  OutputVarianceOptions output_variance;
-  DynamicMapOptions dynamic_map;
+  /// Constants of the method that differ from the preset's, as (name, value): for experiments. They may change or go.
+  std::vector<std::pair<std::string, std::string>> constants;
+  std::array<std::uint64_t, 16> reserved{};  ///< zero
 
-  /// Prediction, bands and filter of Fućek et al. (IFAC 2017), both views tracked; all else is as default, also where
-  /// the paper says how it matches: docs/how-it-works.md has the differences.
+  /// The default preset.
+  PipelineOptions();
+  /// Fućek et al. (IFAC 2017): both views tracked, constant q, three sigmas without a least half-width, unpredicted
+  /// pixels search everything, no gate, the filter's variance. The matcher is this library's.
   static PipelineOptions paper();
 
   /// Throws InvalidArgument, naming the option, its value and what is allowed.

@@ -9,8 +9,12 @@
 
 namespace egosgm {
 
-/// Sizes that decide how fast a device is, and change no bit of a result. 0: what suits the device's class.
+/// How the paths of BandedSgm run: diagonal wavefronts of tiles (CPUs, FPGAs) or a work-group a path (GPUs).
+enum class Scheduling { kAutomatic, kWavefront, kPaths };
+
+/// Sizes that decide how fast a device is, and change no bit of a result. 0, kAutomatic: what suits the device's class.
 struct EGOSGM_EXPORT Tuning {
+  Scheduling scheduling = Scheduling::kAutomatic;
   int tile_width = 0;          // BandedSgm in wavefronts: columns of a tile, 16 to 1024,
   int tile_height = 0;         // and rows, at most as many
   int block_lanes = 0;         // and disparities matched at once, 16 or 32
@@ -26,10 +30,10 @@ struct EGOSGM_EXPORT Tuning {
   bool operator==(const Tuning&) const = default;
 };
 
-/// All sizes by name, in the order above.
+/// All of them by name, in the order above.
 EGOSGM_EXPORT std::vector<NamedOption> list_tuning(const Tuning& tuning);
 
-/// Sets one. Throws InvalidArgument for a name that does not exist or a value that is no whole number.
+/// Sets one. Throws InvalidArgument for a name that does not exist or a value that does not parse.
 EGOSGM_EXPORT void set_tuning(Tuning& tuning, std::string_view name, std::string_view value);
 
 }  // namespace egosgm

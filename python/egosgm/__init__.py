@@ -35,10 +35,10 @@ _egosgm.Pipeline.__doc__ = """Disparity and its variance for every frame of rect
 Pipeline(calibration, width, height, *, device="", preset="default", **options)
 
 device: a number, a type or a part of a name, see devices(); "" is the environment variable EGOSGM_DEVICE, else the first one.
-preset: "default" or "paper".
-options: by name, `banded_sgm__p2=150`, or by stage, `banded_sgm={"p2": 150}`. They are, with their defaults:
-""" + "".join(f"    {_name.replace('.', '__')}={_value!r}\n" for _name, _value in _egosgm.pipeline_options().items())
+Options, with their defaults:
+""" + "".join(f"    {_name}={_egosgm.pipeline_options()[_name]!r}\n        {_meaning} {_range}{' ' + _unit if _unit else ''}. {_when}\n"
+              for _name, _meaning, _unit, _range, _when in _egosgm._option_texts())
 _egosgm.Pipeline.__signature__ = _signature(("calibration", "width", "height"),
-                                            {"device": "", "preset": "default", **_egosgm.pipeline_options()})
+                                            {"device": "", **_egosgm.pipeline_options()})
 _egosgm.StereoOdometry.__signature__ = _signature(("calibration",), _egosgm.odometry_options())
 _egosgm.SyntheticSequence.__signature__ = _signature((), _egosgm.synthetic_options())

@@ -3,6 +3,7 @@
 // calibration and option that must be refused.
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
+#include "host/method_options.h"
 #include "tests/fuzz/random_motion.h"
 #include "tests/fuzz/target.h"
 
@@ -16,7 +17,7 @@ Calibration calibration() { return {.fx = 10, .fy = 10, .cx = 6, .cy = 3, .basel
 
 Pipeline& pipeline() {
   static Pipeline pipeline = [] {
-    PipelineOptions options;
+    MethodOptions options;
     options.disparities = 16;
     return Pipeline(calibration(), kWidth, kHeight, options);
   }();

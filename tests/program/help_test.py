@@ -36,8 +36,8 @@ class Help(ProgramTest):
     def test_run_lists_all_its_options_and_those_of_the_stages(self):
         text = self.assert_works("run", "--help")
         for option in ("--kitti", "--scene", "--odometry", "--left", "--right", "--calib", "--frames", "--out", "--poses", "--preset",
-                       "--search", "--temporal", "--paths", "--disparities", "--min-disparity", "--device", "--tuning", "--interpolate",
-                       "--write", "--trace", "--resume", "--overwrite", "--set", "--config", "--save-config", "--quiet", "banded_sgm.p2", "kalman_update.gate_px"):
+                       "--temporal", "--paths", "--disparities", "--min-disparity", "--device", "--tuning", "--interpolate",
+                       "--write", "--trace", "--resume", "--overwrite", "--set", "--config", "--save-config", "--quiet", "p2 = 170", "gate_px = 3", "Raise it if near objects are cut off"):
             self.assertIn(option, text)
 
     def test_version(self):
@@ -58,7 +58,7 @@ class Help(ProgramTest):
         self.assertEqual(self.complete("run", "--disp"), ["--disparities"])
         self.assertEqual(self.complete("run", "--preset", "p"), ["paper"])
         self.assertEqual(self.complete("run", "--odometry", "str"), ["street"])
-        self.assertIn("banded_sgm.p2=", self.complete("run", "--set", "banded_sgm.p"))
+        self.assertIn("p2=", self.complete("run", "--set", "p"))
         self.assertEqual(self.complete("run", "--write", "color,ov"), ["color,overview"])
         self.assertEqual(self.complete("run", "--disparities", ""), [])
         self.assertEqual(self.complete("odometry", "str"), ["street"])
@@ -83,7 +83,7 @@ class Help(ProgramTest):
             os.write(terminal, f"unsetopt zle_bracketed_paste; autoload -U compinit; compinit -u -D; source {script}; echo rea''dy\n".encode())
             wait_for(b"ready")
             for typed, completed in (("view --vid", "--video"), ("run --odometry st", "street/"), ("run --preset pap", "paper"),
-                                     ("run --set banded_sgm.p2_s", "banded_sgm.p2_slope="), ("run --write ove", "overview"), ("devi", "devices")):
+                                     ("run --set max_sp", "max_speckle_px="), ("run --write ove", "overview"), ("devi", "devices")):
                 os.write(terminal, f"egosgm {typed}\t".encode())
                 wait_for(completed.encode())
                 os.write(terminal, b"\x15")  # clears the line

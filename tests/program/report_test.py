@@ -42,7 +42,7 @@ class ReportTest(ProgramTest):
     def setUpClass(cls):
         super().setUpClass()
         cls.out = cls.folder / "out"
-        cls.works("run", "--odometry", cls.street, "--out", cls.out, "--write", "variance,search", "--quiet", "--set", "banded_sgm.p2=150",
+        cls.works("run", "--odometry", cls.street, "--out", cls.out, "--write", "variance,search", "--quiet", "--set", "p2=150",
                   "--disparities", 64)
         cls.works("report", cls.out, "--truth", cls.street / "truth/left_disp_noc", "--poses", cls.street / "poses.txt")
         cls.page = cls.out / "report.html"
@@ -126,7 +126,7 @@ class Report(ReportTest):
         self.assertEqual(data["pooled"], own["pooled"])
         self.assertEqual([data["metrics"][str(i)]["bad_or_missing"] for i in range(FRAMES)],
                          [pair["bad_or_missing"] for pair in own["pairs"]])
-        self.assertEqual(sorted(data["changed"]), ["banded_sgm.p2", "disparities"])
+        self.assertEqual(sorted(data["changed"]), ["disparities", "p2"])
         self.assertEqual((len(data["path"]), len(data["true_path"])), (FRAMES, FRAMES))
         self.assertAlmostEqual(data["path"][-1][1], data["true_path"][-1][1], delta=0.2)
 
@@ -293,7 +293,7 @@ class ReportInBrowser(ReportTest):
             self.assertTrue(series and all(length > 50 for length in series), series)
         self.assertGreater(browser.evaluate("document.querySelectorAll('#options tr').length"), 30)
         self.assertEqual(sorted(browser.evaluate("[...document.querySelectorAll('.changed td:first-child')].map(e => e.textContent)")),
-                         ["banded_sgm.p2", "disparities"])
+                         ["disparities", "p2"])
 
         loaded = "(async () => { for (const id of ['above', 'below']) await document.getElementById(id).decode(); " \
                  "return ['above', 'below'].map(id => document.getElementById(id).naturalWidth) })()"

@@ -210,7 +210,7 @@ class Run(ProgramTest):
 
     def test_search_full_still_predicts(self):
         out = self.new_folder()
-        self.assert_works("run", "--odometry", self.street, "--out", out, "--search", "full")
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--set", "constants.search=full")
         last = self.report(out)["frames"][-1]
         self.assertEqual(last["search_fraction"], 1)
         self.assertGreater(last["predicted_fraction"], 0.5)
@@ -234,13 +234,13 @@ class Run(ProgramTest):
                           folder / "calib.toml", "--out", out, "--disparities", 19, "--min-disparity", "-3", "--paths", 4)
         self.assertEqual(self.assert_whole(out), 2)
         options = self.report(out)["options"]
-        self.assertEqual((options["disparities"], options["min_disparity"], options["banded_sgm.paths"]), (19, -3, 4))
+        self.assertEqual((options["disparities"], options["min_disparity"], options["paths"]), (19, -3, 4))
 
     def test_a_saved_configuration_gives_the_same_bits(self):
         first, second = self.new_folder(), self.new_folder()
         saved, again = first / "saved.toml", second / "again.toml"
-        self.assert_works("run", "--odometry", self.street, "--out", first, "--preset", "paper", "--set", "banded_sgm.p2=97",
-                          "--set", "search_band.sigmas=2.7", "--disparities", 50, "--save-config", saved)
+        self.assert_works("run", "--odometry", self.street, "--out", first, "--preset", "paper", "--set", "p2=97",
+                          "--set", "search_sigmas=2.7", "--disparities", 50, "--save-config", saved)
         self.assert_works("run", "--odometry", self.street, "--out", second, "--config", saved, "--save-config", again)
         self.assertEqual(saved.read_text(), again.read_text())
         for file in first.glob("disparity/*"):
@@ -249,11 +249,11 @@ class Run(ProgramTest):
     def test_the_last_choice_wins_preset_config_set_named(self):
         folder = self.new_folder()
         config = folder / "config.toml"
-        config.write_text("# a comment\ndisparities = 40\n[banded_sgm]\np1 = 7\np2 = 77\n")
+        config.write_text("# a comment\ndisparities = 40\np1 = 7\np2 = 77\n")
         self.assert_works("run", "--odometry", self.street, "--out", folder / "out", "--frames", "0", "--config", config, "--set",
-                          "banded_sgm.p2=88", "--set", "disparities=41", "--disparities", 42)
+                          "p2=88", "--set", "disparities=41", "--disparities", 42)
         options = self.report(folder / "out")["options"]
-        self.assertEqual((options["disparities"], options["banded_sgm.p1"], options["banded_sgm.p2"]), (42, 7, 88))
+        self.assertEqual((options["disparities"], options["p1"], options["p2"]), (42, 7, 88))
 
     def test_paper_preset_searches_everything_that_is_not_predicted(self):
         default, paper = self.new_folder(), self.new_folder()
@@ -334,7 +334,7 @@ class Limits(ProgramTest):
 
     def test_small_work_groups_give_the_same_bits(self):
         for scheduling in ("wavefront", "paths"):
-            arguments = ("--frames", ":1", "--disparities", 32, "--set", f"banded_sgm.scheduling={scheduling}")
+            arguments = ("--frames", ":1", "--disparities", 32, "--set", f"constants.banded_sgm.scheduling={scheduling}")
             expected = self.run_with(*arguments)
             for size in ("1", "6"):
                 with self.subTest(scheduling=scheduling, size=size):
@@ -355,13 +355,13 @@ class Limits(ProgramTest):
         report = self.report(out)
         self.assertGreater(report["frames"][0]["stripes"], 1)
         self.assertLess(report["device_memory_bytes"], 1 << 30)
-        self.assert_refused([*run, "--overwrite", "--disparities", 64, "--set", "banded_sgm.max_memory_mib=3"],
+        self.assert_refused([*run, "--overwrite", "--disparities", 64, "--set", "max_memory_mib=3"],
                             "BandedSgm: a stripe of 96 rows needs", "max_memory_mib allows 3 MiB", "fewer disparities", code=1)
 
     def test_stripes_are_almost_as_good(self):
         street, bad = self.new_folder(), {}
         self.assert_works("synth", "--out", street, "--frames", 3, "--width", 320, "--height", 240, "--seed", 7, "--quiet")
-        for name, arguments in (("whole", []), ("stripes", ["--set", "banded_sgm.max_memory_mib=8"])):
+        for name, arguments in (("whole", []), ("stripes", ["--set", "max_memory_mib=8"])):
             out = self.new_folder()
             self.assert_works("run", "--odometry", street, "--out", out, "--disparities", 64, *arguments)
             self.assertTrue(all((frame["stripes"] > 1) == (name == "stripes") for frame in self.report(out)["frames"]))

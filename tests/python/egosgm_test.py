@@ -16,7 +16,7 @@ import egosgm
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 WIDTH, HEIGHT, FRAMES = 160, 64, 3
-OPTIONS = dict(disparities=48, banded_sgm__paths=4)
+OPTIONS = dict(disparities=48, paths=4)
 
 
 @pytest.fixture(scope="module")
@@ -115,24 +115,24 @@ def test_outputs_fill_the_callers_arrays(pipeline, frames):
 
 def test_options_have_the_librarys_names_and_defaults(street):
     defaults, paper = egosgm.pipeline_options(), egosgm.pipeline_options("paper")
-    assert isinstance(defaults["edge_rejection.max_jump_px"], float) and isinstance(defaults["banded_sgm.p2"], int)
-    assert isinstance(defaults["median_filter.enabled"], bool) and isinstance(defaults["banded_sgm.cost"], str)
-    assert defaults["kalman_update.gate_px"] != paper["kalman_update.gate_px"] == 0
+    assert isinstance(defaults["gate_px"], float) and isinstance(defaults["p2"], int)
+    assert isinstance(defaults["coarse_match"], bool) and isinstance(defaults["cost"], str)
+    assert defaults["gate_px"] != paper["gate_px"] == 0
     shown = inspect.signature(egosgm.Pipeline).parameters
     for name, value in defaults.items():
         assert shown[name.replace(".", "__")].default == value
         assert name.replace(".", "__") in egosgm.Pipeline.__doc__
     pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, preset="paper", disparities=np.int64(32), temporal=False,
-                               banded_sgm={"p1": 7, "p2": 97}, search_band__sigmas=np.float32(2.7), **{"banded_sgm.cost": "sad3x3"})
-    changed = {"disparities": 32, "temporal": False, "banded_sgm.p1": 7, "banded_sgm.p2": 97, "banded_sgm.cost": "sad3x3"}
+                               p1=7, p2=97, search_sigmas=np.float32(2.7), cost="sad3x3")
+    changed = {"disparities": 32, "temporal": False, "p1": 7, "p2": 97, "cost": "sad3x3"}
     options = pipeline.options
-    assert options.pop("search_band.sigmas") == pytest.approx(2.7)
-    assert options == {name: value for name, value in {**paper, **changed}.items() if name != "search_band.sigmas"}
+    assert options.pop("search_sigmas") == pytest.approx(2.7)
+    assert options == {name: value for name, value in {**paper, **changed}.items() if name != "search_sigmas"}
 
 
 @pytest.mark.parametrize("options, named", [
-    (dict(banded_sgm__p22=3), "banded_sgm.p2"), (dict(disparities=0), "1 to 4096"), (dict(disparities=2.5), "whole number"),
-    (dict(banded_sgm={"cost": "sad"}), "census13x11"), (dict(preset="papers"), "default or paper"), (dict(device="no such"), "no such")])
+    (dict(p22=3), "did you mean p2"), (dict(banded_sgm__p2=3), "called p2 now"), (dict(disparities=0), "1 to 4096"), (dict(disparities=2.5), "whole number"),
+    (dict(cost="sad"), "census13x11"), (dict(preset="papers"), "default, paper"), (dict(device="no such"), "no such")])
 def test_wrong_options_are_refused_by_name(street, options, named):
     with pytest.raises(egosgm.InvalidArgument, match=named) as refused:
         egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, **options)
@@ -203,7 +203,7 @@ def test_other_threads_run_meanwhile(pipeline, frames):
 
 
 def test_threads_that_share_a_pipeline_take_turns(street, frames):
-    pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, temporal=False, vertical_alignment__enabled=False, **OPTIONS)
+    pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, temporal=False, vertical_alignment=False, **OPTIONS)
     pairs = [(frame.left, frame.right) for frame in frames]
     expected = [pipeline.process(*pair).disparity for pair in pairs]
     start, wrong = threading.Barrier(len(pairs)), []
@@ -322,7 +322,7 @@ def test_the_stub_and_the_module_name_the_same():
         if not issubclass(getattr(egosgm, name), Exception):
             assert public(members) == public(vars(getattr(egosgm, name))), name
     generated = (folder / "_options.pyi").read_text()
-    assert "banded_sgm__p2: int" in generated and "ransac_iterations: int" in generated
+    assert "p2: int" in generated and "ransac_iterations: int" in generated
     assert (folder / "py.typed").exists()
 
 

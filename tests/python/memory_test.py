@@ -10,7 +10,7 @@ import pytest
 import egosgm
 
 WIDTH, HEIGHT, FRAMES = 96, 48, 4
-OPTIONS = dict(disparities=32, banded_sgm__paths=4)
+OPTIONS = dict(disparities=32, paths=4)
 
 
 @pytest.fixture(scope="module")
@@ -101,11 +101,11 @@ def test_arrays_that_are_not_aligned(pipeline, frames):
 
 def test_numbers_of_any_type_set_options(street):
     for value in (150, 150.0, np.int64(150), np.uint8(150), np.float32(150)):
-        pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, banded_sgm={"p2": value}, disparities=np.int32(32))
-        assert pipeline.options["banded_sgm.p2"] == 150
+        pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, p2=value, disparities=np.int32(32))
+        assert pipeline.options["p2"] == 150
     for value in (150.5, float("nan"), "many"):
-        with pytest.raises(egosgm.InvalidArgument, match="banded_sgm.p2"):
-            egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, banded_sgm__p2=value)
+        with pytest.raises(egosgm.InvalidArgument, match="option p2"):
+            egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, p2=value)
     egosgm.StereoOdometry(street.calibration, max_features=np.float64(500))
     with pytest.raises(egosgm.InvalidArgument, match="max_features"):
         egosgm.StereoOdometry(street.calibration, max_features=0.5)
@@ -187,10 +187,17 @@ def test_random_submits_and_collects(pipeline, frames):
     assert all((each == 7).all() for each in bystanders)
 
 
-def test_the_stub_knows_options_by_stage():
+def test_constants_of_the_method_are_set_by_name(street):
+    pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, constants={"coarse_match.p1": 7}, **OPTIONS)
+    assert pipeline.options["constants.coarse_match.p1"] == 7
+    with pytest.raises(egosgm.InvalidArgument, match="no constant"):
+        egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, constants={"coarse_match.p9": 7})
+
+
+def test_the_stub_knows_every_option():
     import pathlib
     stub = (pathlib.Path(egosgm.__file__).parent / "_options.pyi").read_text()
     names = {}
     exec(compile(stub, "_options.pyi", "exec"), names)
-    assert names["PipelineOptions"].__annotations__["banded_sgm"] is names["BandedSgmOptions"]
-    assert names["BandedSgmOptions"].__annotations__["p2"] is int
+    assert set(names["PipelineOptions"].__annotations__) == set(egosgm.pipeline_options())
+    assert names["PipelineOptions"].__annotations__["p2"] is int

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "host/method_options.h"
 #include "tests/reference/pipeline.h"
 
 #include <algorithm>
@@ -22,7 +23,7 @@
 
 namespace egosgm::reference {
 
-Pipeline::Pipeline(shared::ImageSize size, const PipelineOptions& options, int code_padding)
+Pipeline::Pipeline(shared::ImageSize size, const MethodOptions& options, int code_padding)
     : size_(size), range_{options.min_disparity, options.disparities}, options_(options), code_padding_(code_padding) {}
 
 void Pipeline::reset() {

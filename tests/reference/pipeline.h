@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "egosgm/options.h"
+#include "host/method_options.h"
 #include "kernels/shared.h"
 #include "tests/reference/align/vertical_alignment.h"
 #include "tests/reference/search/search_band.h"
@@ -52,7 +52,7 @@ struct Frame {
 class Pipeline {
  public:
   /// `code_padding`: of the rows of `Pass::codes`.
-  Pipeline(shared::ImageSize size, const PipelineOptions& options, int code_padding);
+  Pipeline(shared::ImageSize size, const MethodOptions& options, int code_padding);
 
   Frame process(const Images& images, const std::optional<ViewMotions>& motions);
   void reset();
@@ -64,7 +64,7 @@ class Pipeline {
 
   shared::ImageSize size_;
   shared::DisparityRange range_;
-  PipelineOptions options_;
+  MethodOptions options_;
   int code_padding_;
   std::optional<testing::HostMaps> belief_;
   std::string no_belief_reason_ = "first frame";

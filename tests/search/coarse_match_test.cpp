@@ -29,7 +29,7 @@ std::vector<int> blotches(shared::ImageSize size, int disparity, int bits) {
   return images;
 }
 
-std::vector<float> run(shared::ImageSize size, const PipelineOptions& options, const std::vector<int>& images,
+std::vector<float> run(shared::ImageSize size, const MethodOptions& options, const std::vector<int>& images,
                        PixelType type) {
   ocl::Context context(testing::any_device());
   CoarseMatch stage(context, size, options);
@@ -61,7 +61,7 @@ TEST_P(CoarseMatchTest, EqualsReference) {
   const int bits = type == PixelType::kU8 ? 8 : 16;
   for (const auto& [min, count] : {std::pair{0, 1}, {0, 64}, {-22, 37}}) {
     SCOPED_TRACE("min " + std::to_string(min) + ", count " + std::to_string(count));
-    PipelineOptions options;
+    MethodOptions options;
     options.min_disparity = min;
     options.disparities = count;
     const std::vector<int> images = blotches(size, 12, bits);
@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, CoarseMatchTest,
 
 TEST(CoarseMatch, FindsAQuarterOfTheDisparity) {
   const shared::ImageSize size{200, 60};
-  PipelineOptions options;
+  MethodOptions options;
   options.disparities = 64;
   const std::vector<float> found = run(size, options, blotches(size, 24, 8), PixelType::kU8);
   int near = 0;

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <string>
 
-#include "egosgm/named_options.h"
+#include "host/method_options.h"
 #include "tests/support/frame_memory.h"
 #include "tests/support/scene.h"
 
@@ -77,9 +77,9 @@ class Stream {
 
 int soak(int frames, shared::ImageSize size, int disparities, const std::string& scheduling) {
   const Stream stream(size);
-  PipelineOptions options;
+  MethodOptions options;
   options.disparities = disparities;
-  set_option(options, "banded_sgm.scheduling", scheduling);
+  set_parameter(options, "banded_sgm.scheduling", scheduling);
   Pipeline pipeline(stream.calibration(), size.width, size.height, options);
   const std::uint64_t device_bytes = pipeline.device_memory_bytes();
   testing::OutputMemory outputs(size);

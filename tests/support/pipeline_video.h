@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "egosgm/pipeline.h"
+#include "host/method_options.h"
 #include "host/predict/forward_warp.h"
 #include "tests/reference/pipeline.h"
 #include "tests/support/frame_memory.h"
@@ -22,7 +23,7 @@ namespace egosgm::testing {
 struct Setting {
   std::string name;
   shared::ImageSize size;
-  PipelineOptions options;
+  MethodOptions options;
   PixelType type = PixelType::kU8;
   Layout layout = {};
   double doffs_px = 0;
@@ -33,9 +34,9 @@ struct Setting {
 };
 
 // Few speckles are dropped and few pixels a region has, so that small images keep something.
-inline PipelineOptions options(int disparities, int min_disparity,
-                               const std::function<void(PipelineOptions&)>& change = {}) {
-  PipelineOptions options;
+inline MethodOptions options(int disparities, int min_disparity,
+                               const std::function<void(MethodOptions&)>& change = {}) {
+  MethodOptions options;
   options.disparities = disparities;
   options.min_disparity = min_disparity;
   options.speckle_removal.max_size_px = 12;
@@ -51,22 +52,22 @@ inline std::vector<Setting> settings() {
   std::vector<Setting> all{standard()};
   all.push_back({"negative_min_16bit_odd_stride", kSize, options(32, -10), PixelType::kU16, {.padding = 3}, 12.25});
   all.push_back({"bottom_up", kSize, options(37, -1), PixelType::kU8, {.padding = 5, .bottom_up = true}, 0, -0.8});
-  PipelineOptions paper = PipelineOptions::paper();
+  MethodOptions paper = PipelineOptions::paper();
   paper.disparities = 32;
   all.push_back({"paper", kSize, paper});
-  all.push_back({"census5x5_four_paths_sad_check", kSize, options(24, 0, [](PipelineOptions& o) {
+  all.push_back({"census5x5_four_paths_sad_check", kSize, options(24, 0, [](MethodOptions& o) {
                    o.banded_sgm.cost = MatchingCost::kCensus5x5;
                    o.banded_sgm.paths = 4;
                    o.sad_check.max_difference = 9;
                  })});
   all.push_back({"sad3x3_sad_check_16bit", kSize,
                  options(24, 0,
-                         [](PipelineOptions& o) {
+                         [](MethodOptions& o) {
                            o.banded_sgm.cost = MatchingCost::kSad3x3;
                            o.sad_check.max_difference = 6;
                          }),
                  PixelType::kU16});
-  all.push_back({"sparse", kSize, options(24, 0, [](PipelineOptions& o) {
+  all.push_back({"sparse", kSize, options(24, 0, [](MethodOptions& o) {
                    o.kalman_update.keep_predicted = false;
                    o.kalman_update.gate_px = 0.25f;
                    o.kalman_update.min_variance_px2 = 0.3f;
@@ -84,17 +85,17 @@ inline std::vector<Setting> settings() {
                    o.banded_sgm.p2_at_edges = 25;
                    o.banded_sgm.p2_slope = 9;
                  })});
-  const auto track_both = [](PipelineOptions& o) { o.track_right = true; };
+  const auto track_both = [](MethodOptions& o) { o.track_right = true; };
   all.push_back({"both_tracked", kSize, options(32, -10, track_both), PixelType::kU16, {}, 12.25});
   all.push_back({"both_tracked_7x5", {7, 5}, options(16, 0, track_both)});
-  all.push_back({"along_paths_full_search", kSize, options(24, 0, [](PipelineOptions& o) {
+  all.push_back({"along_paths_full_search", kSize, options(24, 0, [](MethodOptions& o) {
                    o.search = SearchMode::kFull;
                    o.banded_sgm.scheduling = Scheduling::kPaths;
                    o.consistency.read_off_px = 3;
                  })});
-  all.push_back({"full_search", kSize, options(24, 0, [](PipelineOptions& o) { o.search = SearchMode::kFull; })});
-  all.push_back({"not_temporal", kSize, options(24, 0, [](PipelineOptions& o) { o.temporal = false; })});
-  all.push_back({"not_aligned_sharp_jumps", kSize, options(24, 0, [](PipelineOptions& o) {
+  all.push_back({"full_search", kSize, options(24, 0, [](MethodOptions& o) { o.search = SearchMode::kFull; })});
+  all.push_back({"not_temporal", kSize, options(24, 0, [](MethodOptions& o) { o.temporal = false; })});
+  all.push_back({"not_aligned_sharp_jumps", kSize, options(24, 0, [](MethodOptions& o) {
                    o.track_right = true;
                    o.vertical_alignment.enabled = false;
                    o.banded_sgm.p1 = 3;
@@ -111,7 +112,7 @@ inline std::vector<Setting> settings() {
       const int min = disparities == 37 ? -7 : disparities == 1 ? 6 : 0;
       all.push_back(
           {std::to_string(size.width) + "x" + std::to_string(size.height) + "_D" + std::to_string(disparities), size,
-           options(disparities, min, [](PipelineOptions& o) { o.speckle_removal.max_size_px = 2; }),
+           options(disparities, min, [](MethodOptions& o) { o.speckle_removal.max_size_px = 2; }),
            disparities == 16 ? PixelType::kU16 : PixelType::kU8});
     }
   }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "egosgm/pipeline.h"
+#include "host/method_options.h"
 #include "tests/support/frame_memory.h"
 #include "tests/support/scene.h"
 
@@ -22,14 +23,14 @@ class ShortVideo {
     }
   }
 
-  static PipelineOptions options() {
-    PipelineOptions options;
+  static MethodOptions options() {
+    MethodOptions options;
     options.disparities = 32;
     options.speckle_removal.max_size_px = 12;
     return options;
   }
 
-  Pipeline pipeline(const Device& device, const PipelineOptions& chosen = options()) const {
+  Pipeline pipeline(const Device& device, const MethodOptions& chosen = options()) const {
     return Pipeline(scene_.calibration(), kSize.width, kSize.height, chosen, device);
   }
   ImageView image(int index, int view) const { return images_[2 * index + view].view(); }
@@ -37,7 +38,7 @@ class ShortVideo {
   Motion motion(int index) const { return scene_.motion(index); }
 
   /// Of all frames, through a new pipeline.
-  std::vector<OutputMemory> through(const Device& device, const PipelineOptions& chosen = options()) const {
+  std::vector<OutputMemory> through(const Device& device, const MethodOptions& chosen = options()) const {
     Pipeline processing = pipeline(device, chosen);
     std::vector<OutputMemory> outputs;
     for (int index = 0; index < kFrames; ++index) {

@@ -15,7 +15,7 @@ namespace egosgm::testing {
 /// Frames of the method, each looked at after every room. Maps that a later stage of the room overwrote are empty.
 class StageChain {
  public:
-  StageChain(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options, PixelType type)
+  StageChain(const Calibration& calibration, shared::ImageSize size, const MethodOptions& options, PixelType type)
       : options_(options),
         size_(size),
         method_(context_, size, calibration, options, with_defaults({}, Device::select().info())),
@@ -98,7 +98,7 @@ class StageChain {
     frame.updated = download(context_, after_.maps);
   }
 
-  const PipelineOptions options_;
+  const MethodOptions options_;
   const shared::ImageSize size_;
   ocl::Context context_{any_device()};
   Method method_;

@@ -11,6 +11,7 @@
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/synthetic.h"
+#include "host/method_options.h"
 
 namespace egosgm::vision {
 namespace {
@@ -29,7 +30,7 @@ struct Video {
 
 /// Percent of the pixels in `masks`, of the steady frames, that are off by more than 3 px or have no disparity.
 double bad_or_missing(const Video& video, const std::vector<cv::Mat>& masks, bool temporal) {
-  PipelineOptions options;
+  MethodOptions options;
   options.temporal = temporal;
   const cv::Size size = video.frames.front().left.size();
   Pipeline pipeline(video.sequence.calibration(), size.width, size.height, options);

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "egosgm/options.h"
+#include "host/method_options.h"
 #include "kernels/shared.h"
 #include "tests/support/random_maps.h"
 

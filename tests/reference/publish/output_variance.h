@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "egosgm/options.h"
+#include "host/method_options.h"
 #include "kernels/shared.h"
 #include "tests/support/random_maps.h"
 

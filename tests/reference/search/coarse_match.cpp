@@ -33,7 +33,7 @@ std::vector<std::uint16_t> shrink(shared::ImageSize size, const std::vector<int>
   return coarse;
 }
 
-std::vector<float> coarse_match(shared::ImageSize size, const PipelineOptions& options, const std::vector<int>& images,
+std::vector<float> coarse_match(shared::ImageSize size, const MethodOptions& options, const std::vector<int>& images,
                                 int bits) {
   const shared::ImageSize coarse{shrunk(size.width), shrunk(size.height)};
   const int first = static_cast<int>(std::floor(options.min_disparity / 4.0));

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "egosgm/options.h"
+#include "host/method_options.h"
 #include "kernels/shared.h"
 
 namespace egosgm::reference {
@@ -13,7 +13,7 @@ namespace egosgm::reference {
 std::vector<std::uint16_t> shrink(shared::ImageSize size, const std::vector<int>& images, int bits);
 
 /// Left-right consistent disparities of both views, of EGOSGM_COARSE x EGOSGM_COARSE pixels each.
-std::vector<float> coarse_match(shared::ImageSize size, const PipelineOptions& options, const std::vector<int>& images,
+std::vector<float> coarse_match(shared::ImageSize size, const MethodOptions& options, const std::vector<int>& images,
                                 int bits);
 
 }  // namespace egosgm::reference
