@@ -100,7 +100,6 @@ SequenceJob job_of(const BatchArguments& arguments, const PipelineOptions& optio
   job.sequence = input.sequence.open();
   job.input = input.sequence.text();
   job.options = options;
-  job.preset = arguments.method.preset;
   job.poses_file = input.poses_file;
   job.odometry = arguments.odometry;
   job.kinds = parse_write_list(arguments.write);

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes docs/measured.md from what the benches left in docs/measured/: the only page with figures that a run could change.
+"""Writes docs/measured.md, and the table of README.md, from what the benches left in docs/measured/: the only places with figures that a run
+could change.
 
   scripts/write_measured.py           writes the page
   scripts/write_measured.py --check   exit code 1 where the page is not what would be written, 77 where there is nothing to write it from
@@ -23,6 +24,16 @@ CONTENDERS = {
     "egosgm_banded_frame": "EgoSGM, steady frame, motion given",
     "egosgm_video_frame": "EgoSGM, steady frame with odometry",
 }
+# Rows of the README's table: the name there, and the input and figure of a row of bench/accuracy.
+RESULTS = [
+    ("KITTI 2012 scene 000151, frame 10 of 7 to 10", "2012 / 000151", "bad_or_missing"),
+    ("the same, holes filled as KITTI's kit does", "2012 / 000151", "interpolated"),
+    ("KITTI 2015 scene 000002, frame 10 after 11 (D1)", "2015 / 000002", "d1, frame 10"),
+    ("synthetic street, seed 1, frames 3 to 19", "synthetic, seed 1", "bad_or_missing, pixels from frame 3 on"),
+    ("synthetic street, seed 2, frames 3 to 19", "synthetic, seed 2", "bad_or_missing, pixels from frame 3 on"),
+]
+TIMES = ("opencv_hh", "opencv_3way", "egosgm_full_left", "egosgm_banded_frame")
+BEGIN, END = "<!-- results: scripts/write_measured.py writes this -->\n", "<!-- end of results -->\n"
 NO_FILES, DIFFERS = 77, 1
 
 
@@ -124,14 +135,39 @@ def page(found):
     return "\n".join([head, accuracy(found["accuracy"]), video(found["video"]), speed(found["compare"]), stages(found["stages"])])
 
 
+def results(found):
+    """The table of the README: a few rows of accuracy beside the single frame's, and of speed."""
+    rows = []
+    for title, where, figure in RESULTS:
+        chosen = [row for row in found["accuracy"]["rows"] if row["input"].startswith(where) and row["figure"] == figure and "value" in row
+                  and row["single_frame"] is not None]
+        rows += [[title, f"{row['value']:.2f} %", f"{row['single_frame']:.2f} %"] for row in chosen[:1]]
+    text = table(["bad or missing (off by more than 3 px)", "EgoSGM", "the same matcher, single frames"], rows) + "\n"
+    compare = found["compare"]
+    largest = max((row for row in compare["rows"]), key=lambda row: (row["width"] == 1242, row["disparities"] == 128))
+    times = [[CONTENDERS[row["name"]], f"{row['median_ms']:.1f} ms"] for name in TIMES for row in compare["rows"]
+             if row["name"] == name and all(row[key] == largest[key] for key in ("width", "height", "disparities"))]
+    title = f"time of a pair, {largest['width']}×{largest['height']}, D = {largest['disparities']}, {compare['threads']} threads"
+    return text + table([title, ""], times)
+
+
+def with_results(readme, text):
+    if BEGIN not in readme or END not in readme:
+        raise Refused("README.md has no place for the results: put the two comments back")
+    return readme[:readme.index(BEGIN) + len(BEGIN)] + text + readme[readme.index(END):]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="write nothing")
-    parser.add_argument("--docs", metavar="DIR", type=pathlib.Path, default=DOCS, help="where measured/ and measured.md are (docs)")
+    parser.add_argument("--docs", metavar="DIR", type=pathlib.Path, default=DOCS, help="where measured/ and measured.md are, beside README.md (docs)")
     arguments = parser.parse_args()
-    written = arguments.docs / "measured.md"
+    written, readme = arguments.docs / "measured.md", arguments.docs.resolve().parent / "README.md"
     try:
-        text = page(read(arguments.docs / "measured"))
+        found = read(arguments.docs / "measured")
+        texts = {written: page(found)}
+        if readme.exists():
+            texts[readme] = with_results(readme.read_text(), results(found))
     except FileNotFoundError as missing:
         print(f"write_measured: not there: {missing}: run scripts/measure", file=sys.stderr)
         # A page without its files is worse than none.
@@ -139,12 +175,14 @@ def main():
     except Refused as reason:
         print(f"write_measured: {reason}", file=sys.stderr)
         return DIFFERS
-    if not arguments.check:
-        written.write_text(text)
-    elif not written.exists() or written.read_text() != text:
-        print(f"write_measured: {written} is not what its files say: run scripts/write_measured.py", file=sys.stderr)
-        return DIFFERS
-    return 0
+    status = 0
+    for file, text in texts.items():
+        if not arguments.check:
+            file.write_text(text)
+        elif not file.exists() or file.read_text() != text:
+            print(f"write_measured: {file} is not what its files say: run scripts/write_measured.py", file=sys.stderr)
+            status = DIFFERS
+    return status
 
 
 if __name__ == "__main__":

@@ -64,11 +64,15 @@ class Page(unittest.TestCase):
     def setUp(self):
         holder = tempfile.TemporaryDirectory()
         self.addCleanup(holder.cleanup)
-        self.docs = pathlib.Path(holder.name)
+        self.docs = pathlib.Path(holder.name) / "docs"
+        self.docs.mkdir()
+        self.readme = self.docs.parent / "README.md"
+        self.readme.write_text("# Before\n<!-- results: scripts/write_measured.py writes this -->\nold\n<!-- end of results -->\nbehind\n")
 
     def put(self, **changed):
         table = Table()
         table.add("street", "bad_or_missing", 1.25, single=2.5, at_most=1)
+        table.add("2012 / 000151, frames 7 to 10", "bad_or_missing", 3.25, single=6.5)
         table.rows.append({"input": "2012", "figure": "skipped: not there", "skipped": True, "passed": None})
         content = {"accuracy": {"rows": table.rows}, "video": {"video": VIDEO}, "compare": {"rows": COMPARED}, "stages": {"rows": STAGES}}
         (self.docs / "measured").mkdir(exist_ok=True)
@@ -89,6 +93,19 @@ class Page(unittest.TestCase):
                      "| street | EgoSGM | 0.250 | 12.50 |", "| street | EgoSGM, single frame | 1.25 |  |", "- KITTI: skipped: not there",
                      "| street | 1 degree, 0 cm | 3.50 |", "| street | 2 | 4.50 |"):
             self.assertIn(text, page)
+
+    def test_the_readme_has_a_few_rows(self):
+        self.put()
+        self.assertEqual(self.write(), 0)
+        readme = self.readme.read_text()
+        self.assertIn("| 3.25 % | 6.50 % |", readme)
+        self.assertIn("| OpenCV MODE_HH, 8 paths, left view | 20.0 ms |", readme)
+        self.assertTrue(readme.startswith("# Before\n") and readme.endswith("behind\n") and "old" not in readme)
+        self.readme.write_text(readme.replace("3.25 %", "3.24 %"))
+        self.assertEqual(self.write("--check"), 1)
+        self.readme.write_text("no place\n")
+        self.assertEqual(self.write(), 1)
+        self.assertEqual(self.readme.read_text(), "no place\n")
 
     def test_check_tells_a_page_that_was_edited(self):
         self.assertEqual(self.write("--check"), 77)
