@@ -247,7 +247,7 @@ Contender full_left(const Clip& clip, const MethodOptions& options, const Device
 MethodOptions with(MethodOptions options, const std::string& setting) {
   const std::size_t equals = setting.find('=');
   if (equals == std::string::npos) throw InvalidArgument("--set " + setting + ": write NAME=VALUE");
-  MethodOptions chosen = options;
+  PipelineOptions chosen = options;
   set_option(chosen, setting.substr(0, equals), setting.substr(equals + 1));
   return chosen;
 }
