@@ -44,7 +44,8 @@ py::tuple tuple_of(const cv::Rect& r) { return py::make_tuple(r.x, r.y, r.width,
 
 /// A copy, as rows may lie at any stride.
 cv::Mat mat_of(const py::object& image, const char* name) {
-  const ImageView view = image_of(image, name).view;
+  const ImageArray owner = image_of(image, name);
+  const ImageView& view = owner.view;
   cv::Mat mat(view.height, view.width, view.type == PixelType::kU8 ? CV_8UC1 : CV_16UC1);
   for (int y = 0; y < view.height; ++y) {
     std::memcpy(mat.ptr(y), static_cast<const char*>(view.data) + y * view.stride_bytes,
