@@ -38,7 +38,9 @@ Tuning tuning_of(const Json& sizes, const std::filesystem::path& file) {
   if (!sizes.is_object()) refuse(file, "not a tuning file");
   Tuning tuning;
   try {
-    for (const auto& [name, value] : sizes.items()) set_tuning(tuning, name, value.dump());
+    for (const auto& [name, value] : sizes.items()) {
+      set_tuning(tuning, name, value.is_string() ? value.get<std::string>() : value.dump());
+    }
     tuning.validate();
   } catch (const InvalidArgument& error) {
     refuse(file, error.what());
@@ -86,7 +88,10 @@ void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, c
   expect_tuning_file(file);
   Json json = std::filesystem::is_regular_file(file) ? read(file) : Json::object();
   Json sizes = Json::object();
-  for (const auto& [name, value] : list_tuning(tuning)) sizes[name] = std::stoi(value);
+  for (const auto& [name, value] : list_tuning(tuning)) {
+    const Json number = Json::parse(value, nullptr, /*allow_exceptions=*/false);
+    sizes[name] = number.is_discarded() ? Json(value) : number;
+  }
   json[key_of(device)] = sizes;
   vision::write_file(file, json.dump(2) + '\n');
 }

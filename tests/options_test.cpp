@@ -140,7 +140,7 @@ TEST(Options, TakeEveryNameOfAChoice) {
 TEST(Options, UnknownNamesGetTheNearestOne) {
   const std::pair<const char*, const char*> cases[] = {{"p3", "p1 or p2"},
                                                        {"path", "paths"},
-                                                       {"disparity", "disparities"},
+                                                       {"disparity", "disparities or min_disparity"},
                                                        {"min-disparity", "min_disparity"},
                                                        {"sigmas", "search_sigmas"},
                                                        {"Temporal", "temporal"},

@@ -37,11 +37,15 @@ TEST(Pipeline, RefusesFramesOutOfTurn) {
 TEST(Tuning, NamesEverySizeAndRefusesWhatCannotBe) {
   Tuning tuning;
   int value = 1;
-  for (const NamedOption& size : list_tuning(tuning)) set_tuning(tuning, size.name, std::to_string(16 * value++));
+  for (const NamedOption& size : list_tuning(tuning)) {
+    set_tuning(tuning, size.name, size.name == "scheduling" ? "paths" : std::to_string(16 * value++));
+  }
+  EXPECT_EQ(tuning.scheduling, Scheduling::kPaths);
   EXPECT_EQ(tuning.tile_width, 16);
   EXPECT_EQ(tuning.row_group, 16 * 8);
   expect_refused([&] { set_tuning(tuning, "tile_with", "1"); }, {"tile_with", "tile_width"});
   expect_refused([&] { set_tuning(tuning, "tile_width", "1.5"); }, {"tile_width", "1.5", "whole number"});
+  expect_refused([&] { set_tuning(tuning, "scheduling", "1"); }, {"scheduling", "automatic, wavefront, paths"});
   const Device device = Device::select();
   const std::pair<Tuning, const char*> wrong[] = {{{.tile_width = 32, .tile_height = 33}, "tile_height is 33"},
                                                   {{.tile_width = 32}, "tile_height is 0"},

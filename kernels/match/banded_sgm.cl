@@ -68,7 +68,7 @@
 #include "wide.h"
 
 // A pixel with more than one vector, as wide.h takes it.
-__attribute__((always_inline)) inline void match_wide(const bool meets, const SgmParameters q, const Row* row,
+ALWAYS_INLINE void match_wide(const bool meets, const SgmParameters q, const Row* row,
                                                       const uint extent, const uint steps, const Place* place) {
   const int origin = origin_of(extent);
   Pixel pixel;
@@ -96,7 +96,7 @@ __attribute__((always_inline)) inline void match_wide(const bool meets, const Sg
 }
 
 // Matches the next pixel that does not go straight, and goes on to the one after it.
-__attribute__((always_inline)) inline void match_pixel(const bool meets, const bool backward, const SgmParameters q,
+ALWAYS_INLINE void match_pixel(const bool meets, const bool backward, const SgmParameters q,
                                                        const Row* row, const uint extent, const uint steps,
                                                        Place* place) {
   if (backward) place->cells -= EGOSGM_LANES * chunks_of(extent);
@@ -117,7 +117,7 @@ __attribute__((always_inline)) inline void match_pixel(const bool meets, const b
   place->moved += SLOT;
 }
 
-__attribute__((always_inline)) inline void sweep_row(const bool meets, const bool backward, const SgmParameters q,
+ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmParameters q,
                                                      const Row* row, Place* place) {
   while (place->k != row->end) {
     const uint extent = extent_at(row->bands + place->k);
@@ -134,7 +134,7 @@ __attribute__((always_inline)) inline void sweep_row(const bool meets, const boo
 // The row y of a sweep, from its pixel `from` to `to`. To the pixels before one on the four paths it is `left`, `above`
 // and so on; where there is none, to one whose band and penalty do no harm: wiping some place in the slot, and a step
 // from nowhere.
-__attribute__((always_inline)) inline Row row_at(const bool meets, const bool backward, const SgmParameters q,
+ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParameters q,
                                                  const int view, const int y, const int from, const int to,
                                                  global const Band* bands, global const uchar* penalties,
                                                  global uchar* slots, global uint* ranks) {
@@ -161,7 +161,7 @@ __attribute__((always_inline)) inline Row row_at(const bool meets, const bool ba
 }
 
 // The first pixel of a row.
-__attribute__((always_inline)) inline Place place_in(const bool backward, const SgmParameters q, const Row* row,
+ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const Row* row,
                                                      const int view, const int y, const int from, const int to,
                                                      global const uint* all_codes, global const uint* offsets,
                                                      global uchar* sums, Candidate* candidates) {
@@ -199,7 +199,7 @@ __attribute__((always_inline)) inline Place place_in(const bool backward, const 
 }
 
 // Both flags are constants wherever it is called: each direction has code of its own, whose steps need no registers.
-__attribute__((always_inline)) inline void sweep_tile(const bool meets, const bool backward, const SgmParameters q,
+ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmParameters q,
                                                       const int tile_x, const int first_y, const int end_y,
                                                       const int view, global const uint* all_codes,
                                                       global const Band* bands, global const uint* offsets,
@@ -225,7 +225,7 @@ __attribute__((always_inline)) inline void sweep_tile(const bool meets, const bo
 }
 
 // The tile of a wave in a row of tiles, or all tiles of a view and direction.
-__attribute__((always_inline)) inline void sweep(const bool meets, const SgmParameters q, const int first_row,
+ALWAYS_INLINE void sweep(const bool meets, const SgmParameters q, const int first_row,
                                                  const int view, const bool backward, const int wave,
                                                  const int tile_columns, global const uint* all_codes,
                                                  global const Band* bands, global const uint* offsets,

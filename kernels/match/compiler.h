@@ -11,4 +11,12 @@
 #define WITH_BIT_COUNT inline
 #endif
 
+// Functions that must become part of the kernel's loop. Unoptimised code, which oclgrind and valgrind run, needs no such
+// thing, and oclgrind does not know what compilers note where they inline.
+#ifdef __OPTIMIZE__
+#define ALWAYS_INLINE __attribute__((always_inline)) inline
+#else
+#define ALWAYS_INLINE inline
+#endif
+
 #endif

@@ -3,11 +3,12 @@
 #ifndef EGOSGM_KERNELS_MATCH_NARROW_H
 #define EGOSGM_KERNELS_MATCH_NARROW_H
 
+#include "compiler.h"
 #include "recurrence.h"
 #include "row.h"
 
 // The path costs of a pixel, which it leaves in the slots in place of those before it.
-__attribute__((always_inline)) inline void follow_narrow(const SgmParameters q, const Row* row, const uint extent,
+ALWAYS_INLINE void follow_narrow(const SgmParameters q, const Row* row, const uint extent,
                                                          const uint steps, const uchar16 absent, const uchar16 cost,
                                                          Place* place, uchar16* r) {
   const uint lane = (uint)origin_of(extent) - (uint)q.min_disparity,
@@ -37,7 +38,7 @@ __attribute__((always_inline)) inline void follow_narrow(const SgmParameters q, 
 }
 
 // Matches a pixel, and leaves its sum, or with the other sweep's its winner.
-__attribute__((always_inline)) inline void match_narrow(const bool meets, const SgmParameters q, const Row* row,
+ALWAYS_INLINE void match_narrow(const bool meets, const SgmParameters q, const Row* row,
                                                         const uint extent, const uint steps, Place* place) {
   const int origin = origin_of(extent), lane = (int)((uint)origin - (uint)q.min_disparity);
   const uchar16 absent = lanes_from(EGOSGM_LANES * chunks_of(extent)) | absent_from(q.disparities - lane);

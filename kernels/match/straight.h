@@ -3,6 +3,7 @@
 #ifndef EGOSGM_KERNELS_MATCH_STRAIGHT_H
 #define EGOSGM_KERNELS_MATCH_STRAIGHT_H
 
+#include "compiler.h"
 #include "recurrence.h"
 #include "row.h"
 
@@ -21,7 +22,7 @@ inline bool goes_straight(const SgmParameters q, const uint extent, const uint* 
 }
 
 // The sum of a pixel's chunk, and with the other sweep's its winner.
-__attribute__((always_inline)) inline void leave_chunk(const bool meets, const SgmParameters q, const Row* row,
+ALWAYS_INLINE void leave_chunk(const bool meets, const SgmParameters q, const Row* row,
                                                        const Place* place, const int origin, const uchar8 cost,
                                                        const uchar8 sum) {
   if (!meets) {
@@ -42,7 +43,7 @@ __attribute__((always_inline)) inline void leave_chunk(const bool meets, const S
 }
 
 // Matches a pixel that goes straight and those after it, as long as they do. `steps`: the penalties to it.
-__attribute__((always_inline)) inline void match_straight(const bool meets, const bool backward, const SgmParameters q,
+ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const SgmParameters q,
                                                           const Row* row, const uint extent, uint steps, Place* place) {
   const int origin = origin_of(extent);
   const uint lane = (uint)origin - (uint)q.min_disparity, moved_lane = place->moved + (uint)origin;

@@ -3,6 +3,7 @@
 #ifndef EGOSGM_KERNELS_MATCH_WIDE_H
 #define EGOSGM_KERNELS_MATCH_WIDE_H
 
+#include "compiler.h"
 #include "cost.h"
 #include "recurrence.h"
 #include "slots.h"
@@ -104,7 +105,7 @@ inline void find_winner(const Pixel* pixel, const int vectors, const PathCosts* 
   }
 }
 
-__attribute__((always_inline)) inline void match_blocks(const bool meets, const int vectors, const Pixel* pixel,
+ALWAYS_INLINE void match_blocks(const bool meets, const int vectors, const Pixel* pixel,
                                                         Candidate* candidate) {
   const int blocks = vectors / BLOCK_VECTORS;
   const bool has_tail = vectors % BLOCK_VECTORS != 0;
