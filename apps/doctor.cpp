@@ -16,6 +16,7 @@
 #include "apps/sequence_arguments.h"
 #include "egosgm/error.h"
 #include "egosgm/options.h"
+#include "egosgm/vision/image_io.h"
 #include "egosgm/vision/rectification.h"
 
 namespace egosgm::app {
@@ -59,7 +60,7 @@ struct Samples {
   std::vector<vision::PairMatch> matches;
   std::vector<double> disparity, row_error;  // of the matches: x_left - x_right, y_right - y_left
   double left_brightness = 0, right_brightness = 0;
-  int frames = 0, depth_bits = 8;
+  int frames = 0, narrow = 0, depth_bits = 8;  // narrow: 8 bits in 16
 };
 
 class Doctor {
@@ -105,6 +106,7 @@ class Doctor {
       samples_.left_brightness += cv::mean(images.left)[0];
       samples_.right_brightness += cv::mean(images.right)[0];
       ++samples_.frames;
+      samples_.narrow += vision::holds_8_bits_in_16(images.left) && vision::holds_8_bits_in_16(images.right);
       for (const vision::PairMatch& match : vision::match_pair(images.left, images.right)) {
         samples_.matches.push_back(match);
         samples_.disparity.push_back(match.left.x - match.right.x);
@@ -116,6 +118,10 @@ class Doctor {
   void check_images() {
     const std::string text = fmt::format("{} of {}x{}, {} bit", counted(sequence_.frames.size(), "pair"), size_.width,
                                          size_.height, samples_.depth_bits);
+    if (samples_.narrow == samples_.frames) {
+      return problem("images", text + ", but no value above 255: the upper 8 bits, which tell edges, are empty",
+                     "save them with 8 bits, or multiply the values by 257");
+    }
     const double ratio = (samples_.left_brightness + 1) / (samples_.right_brightness + 1);
     if (std::max(ratio, 1 / ratio) <= kMaxBrightness) return fine("images", text);
     add(Verdict::kNote, "images",

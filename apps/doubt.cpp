@@ -15,8 +15,9 @@ void append(std::string& text, const std::string& part) { text += (text.empty() 
 
 bool is_baseline_mistaken(const Calibration& calibration) { return calibration.baseline_m > kMaxBaseline_m; }
 
-void Doubt::add(double density, bool has_motion) {
+void Doubt::add(double density, bool has_motion, bool holds_8_bits_in_16) {
   density_ += density;
+  if (holds_8_bits_in_16) ++narrow_;
   if (frames_++ > 0 && !has_motion) ++without_motion_;
 }
 
@@ -27,6 +28,7 @@ std::string Doubt::text() const {
   if (density < kMinDensity) append(text, fmt::format("density {:.0f} % in the mean", 100 * density));
   if (2 * without_motion_ > frames_ - 1)
     append(text, fmt::format("no motion in {} of {} frames", without_motion_, frames_ - 1));
+  if (narrow_ == frames_) append(text, "values of 8 bits in images of 16");
   if (is_baseline_mistaken(calibration_))
     append(text, fmt::format("a baseline of {:.4g} m ({})", calibration_.baseline_m, kMistakenBaseline));
   return text;

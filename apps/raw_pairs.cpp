@@ -14,6 +14,7 @@
 #include "apps/counted.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
+#include "egosgm/vision/image_io.h"
 #include "host/vision/text_rows.h"
 
 namespace egosgm::app {
@@ -37,6 +38,7 @@ bool is_foreign(const fs::path& file) {
 }
 
 cv::Mat read_image(const fs::path& file) {
+  if (!is_foreign(file)) return vision::read_stored_image(file);
   cv::Mat image = cv::imread(file.string(), cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
   if (image.empty() || (image.depth() != CV_8U && image.depth() != CV_16U)) {
     throw InvalidArgument(file.string() + ": cannot be read as an image of 8 or 16 bits");

@@ -166,7 +166,7 @@ class Run {
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
     report_.add(frame, result, prepared.motion, times, unstorable);
-    doubt_.add(result.density, prepared.motion.motion.has_value());
+    doubt_.add(result.density, prepared.motion.motion.has_value(), vision::holds_8_bits_in_16(prepared.images.left));
     poses_.push_back(prepared.motion.first_from_camera);
     tell(frame, result, prepared.motion, times, unstorable, progress);
   }

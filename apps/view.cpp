@@ -69,7 +69,7 @@ class DrawnSequence {
     outputs.search_width = {search_width_.ptr<std::uint16_t>(), size_.width, size_.height,
                             static_cast<std::ptrdiff_t>(search_width_.step)};
     report_ = pipeline_.process(vision::image_view(images.left), vision::image_view(images.right), motion, outputs);
-    doubt_.add(report_.density, motion.has_value());
+    doubt_.add(report_.density, motion.has_value(), vision::holds_8_bits_in_16(images.left));
     return panels_.all({frame, images.left, disparity_, variance_, search_width_}, cell_width_);
   }
 

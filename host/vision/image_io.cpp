@@ -34,6 +34,12 @@ cv::Mat read_grey_image(const std::filesystem::path& file) {
   return grey;
 }
 
+cv::Mat read_stored_image(const std::filesystem::path& file) {
+  cv::Mat pixels = decode_image(file);
+  if (pixels.channels() == 3) cv::cvtColor(pixels, pixels, cv::COLOR_RGB2BGR);
+  return pixels;
+}
+
 cv::Mat read_color_image(const std::filesystem::path& file) {
   cv::Mat pixels = decode_image(file), picture;
   if (pixels.channels() == 1) return color_grey(pixels);
@@ -41,6 +47,8 @@ cv::Mat read_color_image(const std::filesystem::path& file) {
   cv::cvtColor(pixels, picture, cv::COLOR_RGB2BGR);
   return picture;
 }
+
+bool holds_8_bits_in_16(const cv::Mat& grey) { return grey.type() == CV_16UC1 && cv::norm(grey, cv::NORM_INF) < 256; }
 
 cv::Size read_image_size(const std::filesystem::path& file) {
   const std::string start = read_file_start(file, kPngHeaderBytes);

@@ -12,6 +12,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/text_rows.h"
 
 namespace egosgm::vision {
 namespace {
@@ -113,7 +114,7 @@ cv::Mat parse_npy(std::string_view bytes, const std::filesystem::path& file) {
     return type.size() >= 5 && type.substr(2, 2) == n.name && type[4] == type[0];
   });
   if (numbers == kNumbers.end()) {
-    refuse(file, "its numbers are " + std::string(type.substr(0, 12)) + ", not floats or integers");
+    refuse(file, "its numbers are " + quoted(type.substr(0, 12)) + ", not floats or integers");
   }
   const bool is_big = type[1] == '>';
   const bool swap = numbers->bytes > 1 && is_big != (std::endian::native == std::endian::big);

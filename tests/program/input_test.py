@@ -101,6 +101,20 @@ class Doctor(InputTest):
         self.assertIn(f" {FRAMES} pairs of ", text)
         self.assertIn(" 1 pair of ", self.assert_works("doctor", "--odometry", self.street, "--frames", "0"))
 
+    def test_values_of_8_bits_in_16(self):
+        for factor in (1, 257):
+            street = self.broken_street()
+            for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+                rows = (read_grey(file).astype(">u2") * factor).astype(">u2")
+                file.write_bytes(png(WIDTH, HEIGHT, 16, (row.tobytes() for row in rows)))
+            said = self.assert_works("run", "--odometry", street, "--out", street / "out")
+            if factor == 1:
+                self.assertIn("no value above 255", self.assert_only_problem("images", street)["text"])
+                self.assertIn("values of 8 bits in images of 16: `egosgm doctor", said)
+            else:
+                self.assertEqual(self.examine(street)["images"]["verdict"], "ok")
+                self.assertNotIn("doctor", said)
+
     def shifted(self, shift_px):
         street = self.broken_street()
         for file in (street / "image_1").iterdir():
@@ -417,6 +431,10 @@ class Rectify(RectifyTest):
         refused(good, "calib.txt", arguments=["--side-by-side", self.street / "calib.txt"])
         refused(good, "--unit inch", arguments=[*self.PAIRS, "--unit", "inch"])
         refused(good, "--alpha 2", arguments=[*self.PAIRS, "--alpha", 2])
+        for name, cut in {"cut.png": self.street / "image_0/000000.png", "cut.jpg": None}.items():  # one line, whole or not at all
+            broken = self.raw_folder / name
+            broken.write_bytes(cut.read_bytes()[:-2000] if cut else b"\xff\xd8\xff\xe0" + bytes(200))
+            refused(good, name, "not a readable image", arguments=["--side-by-side", broken])
         (self.raw_folder / "bad.txt").write_text("cam0/9.png\n")
         refused(good, "bad.txt:1", arguments=["--list", self.raw_folder / "bad.txt"])
         self.assertFalse(out.exists())

@@ -147,6 +147,7 @@ TEST(DisparityIo, BrokenNpyIsRefused) {
       {npy("<f4", "False", "(1, 1)", ""), "0 bytes of numbers instead of 4"},
       {npy("<f4", "False", "(1, 2)", four), "4 bytes of numbers instead of 8"},
       {npy("<c8", "False", "(1, 1)", four), "not floats"},
+      {npy("<c\n", "False", "(1, 1)", four), "not floats"},
       {npy("<f4", "False", "(1,)", four), "1 sides"},
       {npy("<f4", "False", "(2, 2, 2)", four), "3 sides"},
       {npy("<f4", "False", "(0, 2)", four), "not positive"},

@@ -193,6 +193,19 @@ TEST(ImageIo, NonImagesAreRefused) {
   expect_refused([&] { write_png(file, cv::Mat(1, 1, CV_32FC1)); }, {file.string()});
 }
 
+TEST(ImageIo, StoredImagesKeepTheirDepthAndChannels) {
+  const TemporaryFolder folder;
+  const cv::Mat grey = (cv::Mat_<std::uint16_t>(1, 2) << 7, 255), color(1, 2, CV_8UC3, cv::Scalar(1, 2, 3));
+  write_png(folder / "grey.png", grey);
+  write_png(folder / "color.png", color);
+  expect_equal(read_stored_image(folder / "grey.png"), grey);
+  expect_equal(read_stored_image(folder / "color.png"), color);
+  expect_refused([&] { read_stored_image(folder / "none.png"); }, {"none.png"});
+  EXPECT_TRUE(holds_8_bits_in_16(grey));
+  EXPECT_FALSE(holds_8_bits_in_16(grey + 1));
+  EXPECT_FALSE(holds_8_bits_in_16(cv::Mat(1, 2, CV_8UC1, cv::Scalar(9))));
+}
+
 TEST(ImageIo, ViewsKeepTheStride) {
   cv::Mat image(10, 20, CV_16UC1);
   const ImageView view = image_view(image(cv::Rect(3, 2, 5, 4)));

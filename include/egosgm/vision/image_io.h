@@ -21,9 +21,17 @@ inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 28;
 /// damaged or neither. Thread-safe.
 EGOSGM_EXPORT cv::Mat read_grey_image(const std::filesystem::path& file);
 
+/// Reads such a file as it is stored: CV_8UC1, CV_16UC1, CV_8UC3 or CV_16UC3, colour as BGR. Throws as read_grey_image
+/// does. Thread-safe.
+EGOSGM_EXPORT cv::Mat read_stored_image(const std::filesystem::path& file);
+
 /// Reads such a file to be looked at: CV_8UC3, BGR. Colour of 16 bits keeps its upper 8, grey is stretched as
 /// color_grey does. Throws as read_grey_image does. Thread-safe.
 EGOSGM_EXPORT cv::Mat read_color_image(const std::filesystem::path& file);
+
+/// Whether a grey image of 16 bits holds values below 256 only, as where 8-bit images were saved with 16. The strength
+/// of edges, the vertical alignment and the SAD cost look at the upper 8 bits, which are empty then.
+EGOSGM_EXPORT bool holds_8_bits_in_16(const cv::Mat& grey);
 
 /// Width and height from the header of such a file; the pixels are not looked at. Throws as read_grey_image does.
 /// Thread-safe.
