@@ -109,29 +109,15 @@ def moved(calibration, x, y, d, motion):
             calibration.fx * calibration.baseline_m / z - calibration.doffs_px)
 
 
-def warped(calibration, disparity, motion):
-    """`disparity` moved to the nearest pixels of the next frame, the nearest surface on top."""
-    height, width = disparity.shape
-    y, x = np.nonzero(disparity + calibration.doffs_px > 0.1)
-    moved_x, moved_y, d = moved(calibration, x, y, disparity[y, x].astype(float), motion)
-    seen = np.isfinite(d) & (moved_x > -0.5) & (moved_x < width - 0.5) & (moved_y > -0.5) & (moved_y < height - 0.5)
-    order = np.argsort(d[seen], kind="stable")
-    to = np.rint(moved_y[seen]).astype(int)[order], np.rint(moved_x[seen]).astype(int)[order]
-    result = np.full(disparity.shape, egosgm.INVALID_DISPARITY, np.float32)
-    result[to] = d[seen][order]
-    return result
-
-
 def flicker(video, first, **options):
-    """Mean |d_k - warped d_(k-1)| over the pixels that have both, from frame number `first` on."""
-    total, pixels, previous = 0.0, 0, None
+    """Mean |d_k - d_(k-1) moved| over the pixels that have both, from frame number `first` on."""
+    maps, poses = [], [np.eye(4)]
     for k, frame in play(video, **options):
-        if previous is not None and k >= first:
-            before = warped(video.calibration, previous, matrix_of(video.motion(k, k - 1)))
-            both = is_valid(before) & is_valid(frame.disparity)
-            total, pixels = total + float(np.abs(before - frame.disparity)[both].sum()), pixels + int(both.sum())
-        previous = frame.disparity
-    return total / pixels
+        if k >= first - 1:
+            maps.append(frame.disparity.copy())
+        if len(maps) > 1:
+            poses.append(poses[-1] @ np.linalg.inv(matrix_of(video.motion(k, k - 1))))
+    return egosgm.evaluate_video(maps, calibration=video.calibration, world_from_camera=np.stack(poses)).figures.flicker_px
 
 
 def turned(axis, degrees):

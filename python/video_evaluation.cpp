@@ -147,6 +147,17 @@ py::dict evaluate_video(const py::object& estimates, const py::object& truths, c
 
 }  // namespace
 
-void bind_video_evaluation(py::module_& module) { module.def("_evaluate_video", &evaluate_video); }
+void bind_video_evaluation(py::module_& module) {
+  module.def("_evaluate_video", &evaluate_video);
+  module.def(
+      "move_map",
+      [](const py::object& disparity, const Calibration& calibration, const py::object& current_from_previous) {
+        py::array keep;
+        return array_of(vision::move_map(map_of(disparity, "disparity", keep), calibration,
+                                         transform_of(current_from_previous, "current_from_previous")));
+      },
+      py::arg("disparity"), py::arg("calibration"), py::arg("current_from_previous"),
+      "A disparity map as the next frame sees it, the nearest surface on top; INVALID_DISPARITY where nothing lies.");
+}
 
 }  // namespace egosgm::python

@@ -12,7 +12,7 @@ import pathlib
 import sys
 
 DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs"
-FILES = ("accuracy", "compare", "stages")
+FILES = ("accuracy", "video", "compare", "stages")
 CONTENDERS = {
     "opencv_hh": "OpenCV MODE_HH, 8 paths, left view",
     "opencv_hh4": "OpenCV MODE_HH4, 4 paths, left view",
@@ -76,6 +76,23 @@ def accuracy(content):
     return text + ("\nNot measured:\n\n" + "\n".join(skipped) + "\n" if skipped else "")
 
 
+def video_table(found):
+    """Rows of titles and numbers; those that were skipped are told below."""
+    rows = [[value if isinstance(value, str) else number(value) for value in row] for row in found["rows"] if len(row) == len(found["headings"])]
+    skipped = [f"- {': '.join(row)}" for row in found["rows"] if len(row) != len(found["headings"])]
+    return table(found["headings"], rows) + ("\nNot measured:\n\n" + "\n".join(skipped) + "\n" if skipped else "")
+
+
+def video(content):
+    found = content["video"]
+    return "\n".join([
+        "## Over time\n\nFrom frame 3 on, pixels that both views see; percent unless px. \"Harm\" and \"help\": of the pixels that differ from the single "
+        "frame's by more than 1 px. The filters are those of cameras: 0.4 of the new and 0.6 of the old disparity where they differ by less than the step. "
+        "[What each figure is](evaluation.md).\n", video_table(found["methods"]),
+        "### A wrong motion\n\nThe true motions, each off by so much in a random direction, and believed.\n", video_table(found["pose_noise"]),
+        "### Missing frames\n\nThe last frame, when the frames before it are missing.\n", video_table(found["dropped_frames"])])
+
+
 def speed(content):
     ms = {(row["name"], row["width"], row["height"], row["disparities"]): row["median_ms"] for row in content["rows"]}
     rows = []
@@ -104,7 +121,7 @@ def page(found):
             f"{machine['device']}, {machine['compute_units']} compute units, {machine['version']}, driver {machine['driver']}; commit {machine['commit']}; "
             f"{machine['date'][:10]}. Speed on {machine['input']}.\n`scripts/measure` runs all of it again. \"Search\" counts every cell that is matched "
             "([how much is searched](how-it-works.md#how-much-is-searched)).\n")
-    return "\n".join([head, accuracy(found["accuracy"]), speed(found["compare"]), stages(found["stages"])])
+    return "\n".join([head, accuracy(found["accuracy"]), video(found["video"]), speed(found["compare"]), stages(found["stages"])])
 
 
 def main():

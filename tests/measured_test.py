@@ -19,6 +19,11 @@ COMPARED = [{"name": "opencv_hh", **SHAPE, "median_ms": 20, "cpus": 1.0}, {"name
             {"name": "egosgm_banded_frame_1t", **SHAPE, "median_ms": 11, "cpus": 0.99, "search_fraction": 0.136}]
 STAGES = [{"name": "Census", **SHAPE, "median_ms": 1.5, "device_ms": 1.25, "GB_s": 3.5}]
 
+VIDEO = {"methods": {"headings": ["video", "method", "flicker [px]", "harm"],
+                     "rows": [["street", "EgoSGM", 0.25, 12.5], ["street", "EgoSGM, single frame", 1.25, None], ["KITTI", "skipped: not there"]]},
+         "pose_noise": {"headings": ["video", "each motion is off by", "bad"], "rows": [["street", "1 degree, 0 cm", 3.5]]},
+         "dropped_frames": {"headings": ["video", "dropped", "bad"], "rows": [["street", "2", 4.5]]}}
+
 
 class Tables(unittest.TestCase):
     def test_a_figure_of_accuracy_has_its_single_frames(self):
@@ -65,7 +70,7 @@ class Page(unittest.TestCase):
         table = Table()
         table.add("street", "bad_or_missing", 1.25, single=2.5, at_most=1)
         table.rows.append({"input": "2012", "figure": "skipped: not there", "skipped": True, "passed": None})
-        content = {"accuracy": {"rows": table.rows}, "compare": {"rows": COMPARED}, "stages": {"rows": STAGES}}
+        content = {"accuracy": {"rows": table.rows}, "video": {"video": VIDEO}, "compare": {"rows": COMPARED}, "stages": {"rows": STAGES}}
         (self.docs / "measured").mkdir(exist_ok=True)
         for name, rows in content.items():
             (self.docs / f"measured/{name}.json").write_text(json.dumps({**MACHINE, **rows, **changed.get(name, {})}))
@@ -80,7 +85,9 @@ class Page(unittest.TestCase):
         page = (self.docs / "measured.md").read_text()
         for text in ("| street | bad_or_missing | 1.25 % | 2.50 | ≤ 1 **missed** |", "- 2012: skipped: not there", "a CPU", "driver 1.0", "0123456789", "2026-01-02",
                      "| EgoSGM, steady frame, motion given | 320×96, 32 | 1 | 0.990 | 11.00 ms | 0.500 | 13.6 % |",
-                     "| OpenCV MODE_HH, 8 paths, left view | 320×96, 32 | 2 | 1.00 | 20.00 ms | 1.00 |  |", "| Census | 320×96, 32 | 1.50 ms | 1.25 ms | 3.50 |"):
+                     "| OpenCV MODE_HH, 8 paths, left view | 320×96, 32 | 2 | 1.00 | 20.00 ms | 1.00 |  |", "| Census | 320×96, 32 | 1.50 ms | 1.25 ms | 3.50 |",
+                     "| street | EgoSGM | 0.250 | 12.50 |", "| street | EgoSGM, single frame | 1.25 |  |", "- KITTI: skipped: not there",
+                     "| street | 1 degree, 0 cm | 3.50 |", "| street | 2 | 4.50 |"):
             self.assertIn(text, page)
 
     def test_check_tells_a_page_that_was_edited(self):
@@ -98,7 +105,7 @@ class Page(unittest.TestCase):
             self.put(compare=changed)
             self.assertEqual(self.write(), 1)
         dirty = {"commit": "0123456789-dirty"}
-        self.put(accuracy=dirty, compare=dirty, stages=dirty)
+        self.put(accuracy=dirty, video=dirty, compare=dirty, stages=dirty)
         self.assertEqual(self.write(), 1)
         self.assertFalse((self.docs / "measured.md").exists())
 

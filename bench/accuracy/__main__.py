@@ -5,6 +5,7 @@
   python3 bench/accuracy                      the table of limits (exit code 1 where one is missed, 3 where rows were skipped)
   python3 bench/accuracy --ego-motion         the table of stereo odometry alone: drift, error, time, and what it is worth to the disparities
   python3 bench/accuracy --ablation           and every addition on and off, OpenCV's matchers, and the figures of the plots
+  python3 bench/accuracy --video              over time: beside the single frame, OpenCV and its maps averaged in time; wrong motions, dropped frames
   python3 bench/accuracy --kitti2015 DIR --scenes 84,87,130,146,148 --frames 0:10
                                       the table of Fucek et al. (IFAC 2017) on KITTI 2015's multi-view data
 Plots and markdown from the JSON: bench/plot.py.
@@ -13,6 +14,7 @@ import argparse
 import datetime
 import json
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -20,6 +22,7 @@ from ablation import ablation, ablation_inputs, curves, paper_table
 from ego_motion import ego_motion_table
 from inputs import PROJECT, Bench
 from rows import main_table
+from video import video_tables
 
 
 def commit():
@@ -43,6 +46,7 @@ def parse_arguments():
     parser.add_argument("--no-speed", action="store_true", help="do not run egosgm_compare or egosgm_odometry")
     parser.add_argument("--compare-json", metavar="FILE", help="take the speed from what egosgm_compare --json wrote")
     parser.add_argument("--no-maps", action="store_true", help="leave out what needs the maps pixel by pixel: flicker, poles, variances, 500 frames")
+    parser.add_argument("--video", action="store_true", help="the figures over time (docs/evaluation.md), and nothing else")
     parser.add_argument("--ego-motion", action="store_true", help="stereo odometry alone, and nothing else")
     parser.add_argument("--ablation", action="store_true", help="every addition on and off, OpenCV's matchers, figures of the plots")
     parser.add_argument("--inputs", metavar="REGEX", default="", help="only these inputs of --ablation, by title")
@@ -59,6 +63,10 @@ def main():
     if arguments.kitti2015:
         content["kitti2015"] = paper_table(bench, arguments)
         skipped = [row for row in content["kitti2015"] if "skipped" in row]
+        code = 3 if skipped else 0
+    elif arguments.video:
+        content["video"] = video_tables(bench, re.compile(arguments.only))
+        skipped = [row for row in content["video"]["methods"]["rows"] if "skipped" in row[1]]
         code = 3 if skipped else 0
     else:
         table = ego_motion_table(bench, arguments) if arguments.ego_motion else main_table(bench, arguments)

@@ -5,6 +5,7 @@
 #include <bit>
 #include <opencv2/imgproc.hpp>
 
+#include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "host/vision/disparity_error.h"
 
@@ -170,8 +171,11 @@ PixelMotion::PixelMotion(const Calibration& calibration, const Eigen::Isometry3d
       size_(size) {}
 
 cv::Mat move_map(const cv::Mat& disparity, const Calibration& calibration,
-                 const Eigen::Isometry3d& target_from_source) {
-  const PixelMotion motion(calibration, target_from_source, disparity.size());
+                 const Eigen::Isometry3d& current_from_previous) {
+  if (disparity.empty() || disparity.type() != CV_32FC1) {
+    throw InvalidArgument("move_map: a disparity map must be CV_32FC1 and not empty");
+  }
+  const PixelMotion motion(calibration, current_from_previous, disparity.size());
   cv::Mat moved(disparity.size(), CV_32FC1, cv::Scalar(kInvalidDisparity));
   MovedPixel pixel;
   for (int y = 0; y < disparity.rows; ++y) {

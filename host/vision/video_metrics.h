@@ -42,9 +42,6 @@ class PixelMotion {
   cv::Size size_;
 };
 
-/// Z: every pixel of the map moved to where it lies after the motion, the nearest surface (largest disparity) on top.
-cv::Mat move_map(const cv::Mat& disparity, const Calibration& calibration, const Eigen::Isometry3d& target_from_source);
-
 /// Mean |e_t - Z(e_t-1)| of the pixels that have both. `moved` is Z(e_t-1).
 TemporalCounts count_flicker(const cv::Mat& estimate, const cv::Mat& moved);
 

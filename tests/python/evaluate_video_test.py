@@ -73,6 +73,30 @@ def pairs(world_from_camera):
         yield k, np.linalg.inv(world_from_camera[k]) @ world_from_camera[k - 1]
 
 
+def forward(metres):
+    motion = np.eye(4)
+    motion[2, 3] = -metres
+    return motion
+
+
+def test_a_wall_comes_nearer():
+    camera = egosgm.Calibration(fx=100, fy=100, cx=20, cy=10, baseline_m=0.5)
+    wall = np.full((21, 41), 5.0, np.float32)  # 10 m away
+    near = egosgm.move_map(wall, camera, forward(5))
+    seen = near > NO
+    np.testing.assert_allclose(near[seen], 10, rtol=1e-6)
+    assert not seen[10, 21] and seen[10, 22], "points move apart, from the principal point on"
+
+
+def test_the_nearest_surface_is_on_top():
+    camera = egosgm.Calibration(fx=100, fy=100, cx=20, cy=10, baseline_m=0.5)
+    points = np.full((21, 41), NO, np.float32)
+    points[10, 24], points[10, 26] = 10, 5  # 5 and 10 m away; both land 8 pixels right of the centre
+    near = egosgm.move_map(points, camera, forward(2.5))
+    assert near[10, 28] == pytest.approx(20)
+    assert (near > NO).sum() == 1
+
+
 def test_flicker_is_the_mean_over_the_pixels_that_have_both():
     estimates, _, _, world_from_camera = noisy_video()
     differences = []

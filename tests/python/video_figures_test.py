@@ -24,28 +24,6 @@ class Still:
         return np.eye(4)
 
 
-def forward(metres):
-    motion = np.eye(4)
-    motion[2, 3] = -metres
-    return motion
-
-
-def test_a_wall_comes_nearer():
-    wall = np.full((21, 41), 5.0, np.float32)  # 10 m away
-    near = figures.warped(CAMERA, wall, forward(5))
-    seen = near > NONE
-    np.testing.assert_allclose(near[seen], 10, rtol=1e-6)
-    assert not seen[10, 21] and seen[10, 22], "points move apart, from the principal point on"
-
-
-def test_the_nearest_surface_is_on_top():
-    maps = np.full((21, 41), NONE, np.float32)
-    maps[10, 24], maps[10, 26] = 10, 5  # 5 and 10 m away; both land 8 pixels right of the centre
-    near = figures.warped(CAMERA, maps, forward(2.5))
-    assert near[10, 28] == pytest.approx(20)
-    assert (near > NONE).sum() == 1
-
-
 def test_flicker_is_the_mean_change(monkeypatch):
     first, second = np.full((24, 48), 4, np.float32), np.full((24, 48), 4, np.float32)
     second[:, :24] += 0.5

@@ -56,6 +56,11 @@ struct VideoEvaluationOptions {
 EGOSGM_EXPORT VideoEvaluation evaluate_video(const Video& video, const VideoEvaluationOptions& options = {},
                                              const std::function<void(int frame)>& done = {});
 
+/// Every pixel of a disparity map moved to where it lies after the motion, the nearest surface (largest disparity) on
+/// top; what is measured over time is compared with this. Thread-safe.
+EGOSGM_EXPORT cv::Mat move_map(const cv::Mat& disparity, const Calibration& calibration,
+                               const Eigen::Isometry3d& current_from_previous);
+
 /// Whether each file name is of the frame after the one before it: only the last number in them differs, by no more
 /// than one and a half times the median of such differences (a larger one is a gap). Thread-safe.
 EGOSGM_EXPORT std::vector<bool> find_successors(const std::vector<std::string>& names);
