@@ -124,11 +124,19 @@ VideoInput::VideoInput(const ComparisonArguments& compared, const VideoArguments
 
 /// Every estimate, with its truth where it has one.
 void VideoInput::list_frames(const ComparisonArguments& compared) {
-  if (!compared.truth.empty()) {
-    truth_pairs_ = find_truth_pairs(compared.estimate, compared.truth, compared.frames);
-  } else {
-    truth_pairs_.without_truth = vision::list_maps(
+  const auto all_maps = [&] {
+    return vision::list_maps(
         compared.estimate, compared.frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(compared.frames));
+  };
+  if (compared.truth.empty()) {
+    truth_pairs_.without_truth = all_maps();
+  } else {
+    truth_pairs_ = find_truth_pairs(compared.estimate, compared.truth, compared.frames);
+    if (!arguments_.sequence.empty() && !is_directory(fs::path(compared.truth))) {
+      // One truth file: the frames around it are measured over time all the same.
+      truth_pairs_.without_truth = all_maps();
+      std::erase(truth_pairs_.without_truth, truth_pairs_.pairs.front().estimate);
+    }
   }
   for (const vision::EvaluationPair& pair : truth_pairs_.pairs) {
     FrameFiles& frame = frames_.emplace_back(pair.name, pair.estimate);

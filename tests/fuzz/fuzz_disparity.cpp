@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Disparity maps: KITTI's PNG and PFM of both byte orders.
+// Disparity maps: KITTI's PNG, PFM of both byte orders and .npy.
 #include "egosgm/vision/disparity_io.h"
 #include "tests/fuzz/png_seed.h"
 #include "tests/fuzz/target.h"

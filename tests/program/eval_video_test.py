@@ -46,6 +46,13 @@ class EvalOverTime(ProgramTest):
         again = self.evaluate(*arguments, street, "--poses", self.street / "poses.txt")["video"]
         self.assertEqual(again["figures"], given["figures"])
 
+    def test_one_truth_file_leaves_the_other_frames_in_the_video(self):
+        maps, truth = self.street / "truth/left_disp_occ", self.street / "truth/left_disp_noc/000002.png"
+        result = self.evaluate("--estimate", maps, "--truth", truth, "--sequence", self.street)
+        self.assertEqual([pair["name"] for pair in result["pairs"]], ["000002"])
+        self.assertEqual(result["video"]["frames"], FRAMES)
+        self.assertEqual(self.evaluate("--estimate", maps, "--truth", truth)["video"]["frames"], 1)
+
     def test_two_folders_are_enough_for_a_jump(self):
         estimate, truth = self.maps([10, 12, 10.5]), self.maps([10, 10, 10])
         result = self.evaluate(estimate, truth)

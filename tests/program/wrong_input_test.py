@@ -46,11 +46,12 @@ class WrongArguments(ProgramTest):
             self.assertEqual(done.returncode, 2, arguments)
             self.assertNotIn("did you mean", done.stderr)
             self.assertNotIn("main function", done.stderr)
-        self.assert_refused(self.run_with("--set", "p2=150"), "did you mean coarse_match.p2 or banded_sgm.p2?", cwd=folder)
+        self.assert_refused(self.run_with("--set", "p3=150"), "did you mean p1 or p2?", cwd=folder)
+        self.assert_refused(self.run_with("--set", "banded_sgm.p2=150"), "it is called p2 now", cwd=folder)
         self.assert_refused(self.run_with("--preset", "papr"), "did you mean paper?", cwd=folder)
         config = folder / "config.toml"
-        config.write_text("# options\n\n[banded_sgm]\np2 = 150\np9 = 1\n")
-        self.assert_refused(self.run_with("--config", config), f"{config}:5: ", "banded_sgm.p9", "did you mean banded_sgm.p1 or")
+        config.write_text("# options\n\n[constants.banded_sgm]\np2 = 150\np9 = 1\n")
+        self.assert_refused(self.run_with("--config", config), f"{config}:5: ", "banded_sgm.p9")
         (folder / "list").write_text(f"a {str(self.street)[:-1]}\n")
         self.assertFalse((folder / "never").exists())
 
