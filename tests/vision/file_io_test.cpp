@@ -122,6 +122,83 @@ TEST(FileIo, UnwritablePlacesAreNamedWithTheReason) {
   EXPECT_TRUE(std::filesystem::is_directory(folder / "a/b/c"));
 }
 
+TEST(FileIo, TheModeOfAnOldFileStaysAndWhatIsProtectedIsNotReplaced) {
+  const TemporaryFolder folder;
+  write_file(folder / "file", "old");
+  ASSERT_EQ(::chmod((folder / "file").c_str(), 0600), 0);
+  write_file(folder / "file", "new");
+  struct stat status {};
+  ASSERT_EQ(::stat((folder / "file").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 07777, 0600u);
+  EXPECT_EQ(read_file(folder / "file", 10), "new");
+  if (::geteuid() == 0) return;  // who may write to all files
+  ASSERT_EQ(::chmod((folder / "file").c_str(), 0400), 0);
+  expect_refused<IoError>([&] { write_file(folder / "file", "newer"); }, {"file", "Permission denied"});
+  EXPECT_EQ(read_file(folder / "file", 10), "new");
+}
+
+TEST(FileIo, LinksAreFollowedAndHardLinksAreCut) {
+  const TemporaryFolder folder;
+  make_folder(folder / "elsewhere");
+  write_file(folder / "elsewhere/file", "old");
+  std::filesystem::create_hard_link(folder / "elsewhere/file", folder / "second_name");
+  std::filesystem::create_symlink("elsewhere/file", folder / "link");
+  std::filesystem::create_symlink("link", folder / "link_to_link");
+  write_file(folder / "link_to_link", "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link_to_link"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(read_file(folder / "elsewhere/file", 10), "new");
+  EXPECT_EQ(read_file(folder / "second_name", 10), "old");
+  std::filesystem::create_symlink("elsewhere/none", folder / "to_nothing");
+  write_file(folder / "to_nothing", "made");
+  EXPECT_EQ(read_file(folder / "elsewhere/none", 10), "made");
+  std::filesystem::create_symlink("loop", folder / "loop");
+  expect_refused<IoError>([&] { write_file(folder / "loop", "x"); }, {"loop", "symbolic links"});
+}
+
+TEST(FileIo, PipesAndDescriptorsAreWrittenThrough) {
+  const TemporaryFolder folder;
+  const std::filesystem::path pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const int reading = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
+  ASSERT_GE(reading, 0);
+  EXPECT_TRUE(is_stream(pipe));
+  write_file(pipe, "through");
+  char bytes[16] = {};
+  EXPECT_EQ(::read(reading, bytes, sizeof bytes), 7);
+  ::close(reading);
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+
+  const int open_file = ::open((folder / "open").c_str(), O_WRONLY | O_CREAT, 0600);
+  ASSERT_GE(open_file, 0);
+  ASSERT_EQ(::write(open_file, "before ", 7), 7);
+  const std::string name = "/dev/fd/" + std::to_string(open_file);
+  EXPECT_TRUE(is_stream(name));
+  write_file(name, "after");
+  ::close(open_file);
+  EXPECT_EQ(read_file(folder / "open", 20), "before after");
+  EXPECT_FALSE(is_stream(folder / "open"));
+  EXPECT_FALSE(is_stream(folder / "none"));
+}
+
+TEST(FileIo, LooksWithoutATraceAndMovesAsItWrites) {
+  const TemporaryFolder folder;
+  expect_writable(folder / "none");
+  expect_refused<IoError>([&] { expect_writable(folder / "no/folder"); }, {"no/folder", "No such file"});
+  EXPECT_EQ(count_entries(folder.path()), 0u);
+  write_file(folder / "from", "moved");
+  write_file(folder / "to", "old");
+  ASSERT_EQ(::chmod((folder / "to").c_str(), 0600), 0);
+  std::filesystem::create_symlink("to", folder / "link");
+  move_file(folder / "from", folder / "link");
+  EXPECT_EQ(read_file(folder / "to", 10), "moved");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "from"));
+  struct stat status {};
+  ASSERT_EQ(::stat((folder / "to").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 07777, 0600u);
+}
+
 TEST(FileIo, UnreadablePlacesAreNamedWithTheReason) {
   const TemporaryFolder folder;
   expect_refused([&] { read_file(folder / "none", 10); }, {"none", "No such file or directory"});
