@@ -70,7 +70,7 @@ class Report(ReportTest):
         shutil.copytree(self.out, out)
         report = out / "report.json"
         text = report.read_text().rstrip().removesuffix("}")
-        resume = ["run", "--odometry", self.street, "--out", out, "--resume", "--quiet", "--set", "banded_sgm.p2=150", "--disparities", 64]
+        resume = ["run", "--odometry", self.street, "--out", out, "--resume", "--quiet", "--set", "p2=150", "--disparities", 64]
         for extra, named in (('"x": ' + "[" * 200_000 + "]" * 200_000, "nested deeper than 64"),
                              ('"x": ' + '{"a":' * 200_000 + "1" + "}" * 200_000, "nested deeper than 64"),
                              ('"x": {' + ",".join(f'"k{i}": 0' for i in range(200_000)) + "}", "more than 2000 keys")):
