@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of stereo odometry alone."""
+import shutil
 import json
 import re
 import statistics
@@ -91,6 +92,7 @@ def ego_motion_a(bench, table):
 def ego_motion_synthetic(bench, table, size):
     width, height = size
     folder, poses = bench.work / f"ego_motion_{width}x{height}", bench.work / f"poses_{width}x{height}.txt"
+    shutil.rmtree(folder, ignore_errors=True)  # one of an earlier run of this bench
     bench.egosgm("synth", "--out", folder, "--frames", 100, "--width", width, "--height", height, "--quiet")
     bench.egosgm("odometry", folder, "--out", poses, "--quiet")
     result = bench.evaluate_poses(poses, folder / "poses.txt")

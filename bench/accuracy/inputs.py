@@ -5,6 +5,7 @@ import os
 import pathlib
 import re
 import statistics
+import shutil
 import subprocess
 import sys
 
@@ -125,6 +126,7 @@ class Bench:
         """A folder of `egosgm synth`."""
         folder = self.work / name
         if name not in self.results:
+            shutil.rmtree(folder, ignore_errors=True)  # one of an earlier run of this bench
             self.egosgm("synth", "--out", folder, "--quiet", *arguments)
             self.results[name] = True
         return folder

@@ -76,7 +76,7 @@ class Jpeg(ProgramTest):
         shutil.copytree(self.jpegs, broken)
         file = broken / "image_1/000001.jpg"
         file.write_bytes(file.read_bytes()[:-200])
-        for command in (["run", broken, "--out", broken / "out"], ["view", broken, "--pictures", broken / "pictures"]):
+        for command in (["run", broken, "--out", broken.parent / "out"], ["view", broken, "--pictures", broken.parent / "pictures"]):
             self.assert_refused(command, file)
 
 

@@ -181,8 +181,8 @@ class Run(ProgramTest):
         for broken in ("", "[]", "{", json.dumps({key: {"tile_width": 3, "tile_height": 3}}), json.dumps({key: {"tiles": 3}}),
                        json.dumps({key: 7}), json.dumps({key: {"tile_width": "wide"}})):
             file.write_text(broken)
-            self.assert_refused(["run", "--odometry", self.street, "--out", plain], file, "egosgm tune", env=environment)
-        self.assert_refused(["run", "--odometry", self.street, "--out", plain, "--tuning", "/nonexistent"], "/nonexistent")
+            self.assert_refused(["run", "--odometry", self.street, "--out", folder / "never"], file, "egosgm tune", env=environment)
+        self.assert_refused(["run", "--odometry", self.street, "--out", folder / "never", "--tuning", "/nonexistent"], "/nonexistent")
         self.assert_refused(["tune", "--file", "/proc/tuning.json"], "/proc/tuning.json", code=1)
 
     def test_a_terminal_gets_a_bar(self):
