@@ -62,7 +62,7 @@ cv::Mat FramePanels::overview(const ShownFrame& shown) {
 
 std::vector<Layer> FramePanels::layers(const ShownFrame& shown) {
   std::vector<Layer> layers;
-  if (!shown.frame.left.empty()) layers.push_back({"left image", vision::read_color_png(shown.frame.left), {}});
+  if (!shown.frame.left.empty()) layers.push_back({"left image", vision::read_color_image(shown.frame.left), {}});
   layers.push_back(disparity_layer(shown));
   if (!shown.variance.empty()) layers.push_back(variance_layer(shown));
   if (!shown.search_width.empty()) layers.push_back(search_layer(shown));

@@ -157,7 +157,7 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
       {"color", [&](const Path& path) { vision::write_png(path, panels_.disparity(disparity_)); }},
       {"cloud",
        [&](const Path& path) {
-         const cv::Mat colors = vision::read_color_png(frame.left);
+         const cv::Mat colors = vision::read_color_image(frame.left);
          vision::write_ply(path, vision::point_cloud(disparity_, variance_, colors, calibration_));
        }},
       {"depth", [&](const Path& path) { vision::write_depth_png(path, depth_m()); }},

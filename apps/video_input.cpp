@@ -232,11 +232,11 @@ vision::VideoFrame VideoInput::read(int i) const {
   frame.next_truth = read_into(files.next_truth, disparity(arguments_.truth_scale));
   frame.uncertainty = read_into(files.uncertainty, vision::read_values);
   if (!arguments_.confidence.empty() && !frame.uncertainty.empty()) frame.uncertainty *= -1;
-  const cv::Mat moving = read_into(files.moving, vision::read_grey_png);
+  const cv::Mat moving = read_into(files.moving, vision::read_grey_image);
   if (!moving.empty()) frame.moving = moving != 0;
-  frame.image = read_into(files.image, vision::read_grey_png);
+  frame.image = read_into(files.image, vision::read_grey_image);
   frame.flow_to_next = read_into(files.flow, vision::read_flow);
-  const cv::Mat kept = read_into(files.mask, vision::read_grey_png);
+  const cv::Mat kept = read_into(files.mask, vision::read_grey_image);
   if (!kept.empty()) frame.truth.setTo(kInvalidDisparity, kept == 0);
   return frame;
 }

@@ -59,7 +59,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    const cv::Mat left = vision::read_grey_png(argv[2]), right = vision::read_grey_png(argv[3]);
+    const cv::Mat left = vision::read_grey_image(argv[2]), right = vision::read_grey_image(argv[3]);
     vision::write_disparity_png(
         argv[5], bench::match(left, right, bench::mode_named(argv[1]), bench::parse_disparities(argv[4])));
     return 0;

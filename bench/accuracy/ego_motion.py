@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The table of stereo odometry alone."""
-import shutil
 import json
 import re
+import shutil
 import statistics
 
 from inputs import SINGLE_FRAME, Input, Missing, expect

@@ -4,8 +4,8 @@ import json
 import os
 import pathlib
 import re
-import statistics
 import shutil
+import statistics
 import subprocess
 import sys
 

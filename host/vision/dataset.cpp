@@ -306,7 +306,7 @@ StereoSequence open_folder(const fs::path& folder, FrameRange range) {
 }
 
 StereoImages read_images(const StereoFrame& frame) {
-  StereoImages images{read_grey_png(frame.left), read_grey_png(frame.right)};
+  StereoImages images{read_grey_image(frame.left), read_grey_image(frame.right)};
   const auto describe_image = [](const cv::Mat& image) {
     return std::to_string(image.cols) + "x" + std::to_string(image.rows) + ", " +
            std::to_string(8 * image.elemSize1()) + " bit";
@@ -322,7 +322,7 @@ cv::Size check_image_sizes(const StereoSequence& sequence) {
   std::optional<cv::Size> expected;
   for (const StereoFrame& frame : sequence.frames) {
     for (const fs::path& file : {frame.left, frame.right}) {
-      const cv::Size size = read_png_size(file);
+      const cv::Size size = read_image_size(file);
       if (!expected) expected = size;
       if (size == *expected) continue;
       throw InvalidArgument(file.string() + ": " + std::to_string(size.width) + "x" + std::to_string(size.height) +

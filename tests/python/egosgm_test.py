@@ -16,22 +16,8 @@ import egosgm
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 WIDTH, HEIGHT, FRAMES = 160, 64, 3
+SEED = 7
 OPTIONS = dict(disparities=48, paths=4)
-
-
-@pytest.fixture(scope="module")
-def street():
-    return egosgm.SyntheticSequence(frames=FRAMES, width=WIDTH, height=HEIGHT, seed=7)
-
-
-@pytest.fixture(scope="module")
-def frames(street):
-    return [street.render(i) for i in range(FRAMES)]
-
-
-@pytest.fixture(scope="module")
-def shared_pipeline(street):
-    return egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, **OPTIONS)
 
 
 @pytest.fixture

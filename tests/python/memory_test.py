@@ -10,22 +10,8 @@ import pytest
 import egosgm
 
 WIDTH, HEIGHT, FRAMES = 96, 48, 4
+SEED = 3
 OPTIONS = dict(disparities=32, paths=4)
-
-
-@pytest.fixture(scope="module")
-def street():
-    return egosgm.SyntheticSequence(frames=FRAMES, width=WIDTH, height=HEIGHT, seed=3)
-
-
-@pytest.fixture(scope="module")
-def frames(street):
-    return [street.render(i) for i in range(FRAMES)]
-
-
-@pytest.fixture(scope="module")
-def shared_pipeline(street):
-    return egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, **OPTIONS)
 
 
 @pytest.fixture

@@ -37,11 +37,6 @@ EGOSGM_EXPORT bool holds_8_bits_in_16(const cv::Mat& grey);
 /// Thread-safe.
 EGOSGM_EXPORT cv::Size read_image_size(const std::filesystem::path& file);
 
-// The names from before JPEG was read.
-inline cv::Mat read_grey_png(const std::filesystem::path& file) { return read_grey_image(file); }
-inline cv::Mat read_color_png(const std::filesystem::path& file) { return read_color_image(file); }
-inline cv::Size read_png_size(const std::filesystem::path& file) { return read_image_size(file); }
-
 /// Writes CV_8UC1, CV_8UC3 (BGR) or CV_16UC1, whole or not at all. Throws IoError, and InvalidArgument for another type
 /// or an empty image. Thread-safe for different files.
 EGOSGM_EXPORT void write_png(const std::filesystem::path& file, const cv::Mat& image);
