@@ -30,7 +30,7 @@ void require_map(const cv::Mat& map, const std::filesystem::path& file) {
   }
 }
 
-bool fits_png(float disparity) { return disparity >= 0 && disparity < 65536.0f / kKittiStepsPerPx; }
+bool fits_png(float disparity) { return (disparity >= 0) & (disparity < 65536.0f / kKittiStepsPerPx); }
 
 cv::Mat parse_disparity_png(std::string_view bytes, const std::filesystem::path& file, float steps_per_px) {
   const cv::Mat stored = decode_png(bytes, file);
@@ -39,13 +39,13 @@ cv::Mat parse_disparity_png(std::string_view bytes, const std::filesystem::path&
                           std::to_string(stored.channels()) + " channel(s) of " +
                           std::to_string(8 * stored.elemSize1()) + " bit");
   }
-  cv::Mat disparity(stored.size(), CV_32FC1);
+  cv::Mat disparity;
+  stored.convertTo(disparity, CV_32FC1);
   for (int y = 0; y < stored.rows; ++y) {
-    const auto* from = stored.ptr<std::uint16_t>(y);
-    std::transform(from, from + stored.cols, disparity.ptr<float>(y), [&](std::uint16_t value) {
-      return value == 0 ? kInvalidDisparity : static_cast<float>(value) / steps_per_px;
-    });
+    auto* row = disparity.ptr<float>(y);
+    for (int x = 0; x < stored.cols; ++x) row[x] /= steps_per_px;
   }
+  disparity.setTo(kInvalidDisparity, stored == 0);
   return disparity;
 }
 
@@ -178,7 +178,8 @@ std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Ma
     const auto* from = disparity.ptr<float>(y);
     auto* to = stored.ptr<std::uint16_t>(y);
     for (int x = 0; x < disparity.cols; ++x) {
-      if (fits_png(from[x])) to[x] = static_cast<std::uint16_t>(std::max(from[x] * kKittiStepsPerPx, 1.0f));
+      const float steps = from[x] * kKittiStepsPerPx, least = steps < 1.0f ? 1.0f : steps;
+      to[x] = static_cast<std::uint16_t>(static_cast<int>(fits_png(from[x]) ? least : 0.0f));
     }
   }
   write_png(file, stored);
@@ -189,7 +190,7 @@ std::int64_t count_outside_png(const cv::Mat& disparity) {
   std::int64_t outside = 0;
   for (int y = 0; y < disparity.rows; ++y) {
     const auto* row = disparity.ptr<float>(y);
-    outside += std::count_if(row, row + disparity.cols, [](float d) { return is_valid_disparity(d) && !fits_png(d); });
+    outside += std::count_if(row, row + disparity.cols, [](float d) { return is_valid_disparity(d) & !fits_png(d); });
   }
   return outside;
 }

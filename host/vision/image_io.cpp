@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "egosgm/vision/image_io.h"
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/render.h"
 #include "host/vision/image_bounds.h"
 #include "host/vision/jpeg.h"
+#include "host/vision/plain_png.h"
 #include "host/vision/png.h"
 
 namespace egosgm::vision {
@@ -66,13 +65,7 @@ void write_png(const std::filesystem::path& file, const cv::Mat& image) {
     throw InvalidArgument(file.string() +
                           ": only non-empty images of 8 or 16 bit grey or 8 bit BGR are written as PNG");
   }
-  std::vector<std::uint8_t> bytes;
-  try {
-    if (!cv::imencode(".png", image, bytes)) throw IoError(file.string() + ": cannot be encoded as PNG");
-  } catch (const cv::Exception& error) {
-    throw IoError(file.string() + ": cannot be encoded as PNG: " + error.err);
-  }
-  write_file(file, std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+  write_file(file, encode_plain_png(image));
 }
 
 ImageView image_view(const cv::Mat& grey) {

@@ -11,6 +11,7 @@
 
 #include "egosgm/vision/image_io.h"
 #include "host/vision/image_bounds.h"
+#include "host/vision/plain_png.h"
 
 namespace egosgm::vision {
 namespace {
@@ -105,6 +106,7 @@ cv::Size parse_png_size(std::string_view bytes, const std::filesystem::path& fil
 
 cv::Mat decode_png(std::string_view bytes, const std::filesystem::path& file) {
   const cv::Size size = parse_png_size(bytes, file);
+  if (std::optional<cv::Mat> plain = decode_plain_png(bytes, size, file)) return *std::move(plain);
   Decoder decoder;
   decoder.next = bytes.data();
   decoder.left = bytes.size();

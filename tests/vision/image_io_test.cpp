@@ -36,19 +36,29 @@ void expect_equal(const cv::Mat& a, const cv::Mat& b) {
   EXPECT_EQ(cv::norm(a, b, cv::NORM_INF), 0.0);
 }
 
-/// OpenCV writes neither palettes nor interlaced files.
-void write_with_libpng(const std::filesystem::path& file, const cv::Mat& image, int color_type, int interlace) {
+struct PngForm {
+  int color_type = PNG_COLOR_TYPE_GRAY, interlace = PNG_INTERLACE_NONE, filters = PNG_ALL_FILTERS;
+  std::size_t chunk_bytes = 8192;
+};
+
+/// OpenCV writes neither palettes nor interlaced files, and chooses the filters itself.
+void write_with_libpng(const std::filesystem::path& file, const cv::Mat& image, const PngForm& form) {
   std::FILE* stream = std::fopen(file.c_str(), "wb");
   ASSERT_NE(stream, nullptr);
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png_create_info_struct(png);
   png_init_io(png, stream);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(image.cols), static_cast<png_uint_32>(image.rows), 8, color_type,
-               interlace, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_filter(png, 0, form.filters);
+  png_set_compression_buffer_size(png, form.chunk_bytes);
+  png_set_IHDR(png, info, static_cast<png_uint_32>(image.cols), static_cast<png_uint_32>(image.rows),
+               static_cast<int>(8 * image.elemSize1()), form.color_type, form.interlace, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
   png_color palette[256];
   for (int i = 0; i < 256; ++i) palette[i] = {static_cast<png_byte>(i), static_cast<png_byte>(255 - i), 7};
-  if (color_type == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette, 256);
+  if (form.color_type == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette, 256);
   png_write_info(png, info);
+  if (image.depth() == CV_16U) png_set_swap(png);
+  if (image.channels() == 3) png_set_bgr(png);
   std::vector<png_bytep> rows;
   for (int y = 0; y < image.rows; ++y) rows.push_back(const_cast<png_bytep>(image.ptr(y)));
   png_write_image(png, rows.data());
@@ -65,6 +75,7 @@ TEST(ImageIo, GreyImagesKeepEveryBit) {
       const cv::Mat image = random_image(random, width, height, type);
       write_png(folder / "image.png", image);
       expect_equal(read_grey_image(folder / "image.png"), image);
+      expect_equal(cv::imread((folder / "image.png").string(), cv::IMREAD_UNCHANGED), image);
       EXPECT_EQ(read_image_size(folder / "image.png"), image.size());
     }
   }
@@ -109,10 +120,10 @@ TEST(ImageIo, InterlacedAndPaletteAndBilevelFilesAreRead) {
   std::mt19937 random(3);
   const TemporaryFolder folder;
   const cv::Mat image = random_image(random, 29, 19, CV_8UC1);
-  write_with_libpng(folder / "interlaced.png", image, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7);
+  write_with_libpng(folder / "interlaced.png", image, {.interlace = PNG_INTERLACE_ADAM7});
   expect_equal(read_grey_image(folder / "interlaced.png"), image);
 
-  write_with_libpng(folder / "palette.png", image, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE);
+  write_with_libpng(folder / "palette.png", image, {.color_type = PNG_COLOR_TYPE_PALETTE});
   cv::Mat expected;
   cv::cvtColor(cv::imread((folder / "palette.png").string(), cv::IMREAD_COLOR), expected, cv::COLOR_BGR2GRAY);
   expect_equal(read_grey_image(folder / "palette.png"), expected);
@@ -120,6 +131,22 @@ TEST(ImageIo, InterlacedAndPaletteAndBilevelFilesAreRead) {
   const cv::Mat bilevel = image > 128;
   ASSERT_TRUE(cv::imwrite((folder / "bilevel.png").string(), bilevel, {cv::IMWRITE_PNG_BILEVEL, 1}));
   expect_equal(read_grey_image(folder / "bilevel.png"), bilevel);
+}
+
+TEST(ImageIo, PlainFilesOfEveryFilterAreReadAsTheyAre) {
+  std::mt19937 random(6);
+  const TemporaryFolder folder;
+  const auto file = folder / "image.png";
+  for (int type : {CV_8UC1, CV_16UC1, CV_8UC3}) {
+    const int color_type = type == CV_8UC3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY;
+    for (int filters : {PNG_FILTER_NONE, PNG_FILTER_SUB, PNG_FILTER_UP, PNG_FILTER_AVG, PNG_FILTER_PAETH}) {
+      for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {65, 3}, {127, 33}}) {
+        const cv::Mat image = random_image(random, width, height, type);
+        write_with_libpng(file, image, {.color_type = color_type, .filters = filters, .chunk_bytes = 100});
+        expect_equal(read_stored_image(file), image);
+      }
+    }
+  }
 }
 
 TEST(ImageIo, EveryTruncationIsRefusedInSilence) {
@@ -136,15 +163,18 @@ TEST(ImageIo, EveryTruncationIsRefusedInSilence) {
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
 
-TEST(ImageIo, DamagedPixelsAreRefused) {
+TEST(ImageIo, EveryDamagedByteIsRefused) {
   std::mt19937 random(5);
   const TemporaryFolder folder;
   const auto file = folder / "image.png";
-  write_png(file, random_image(random, 40, 40, CV_8UC1));
-  std::string bytes = read_file(file, 1 << 20);
-  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
-  write_file(file, bytes);
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
+  write_png(file, random_image(random, 23, 11, CV_16UC1));
+  const std::string whole = read_file(file, 1 << 20);
+  for (std::size_t at = 0; at < whole.size(); ++at) {
+    std::string bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ 4);
+    write_file(file, bytes);
+    expect_refused([&] { read_grey_image(file); }, {file.string()});
+  }
 }
 
 std::string with_header_size(std::string png, std::uint32_t width, std::uint32_t height) {
@@ -177,8 +207,24 @@ TEST(ImageIo, HugeSizesAreRefusedFromTheHeader) {
   // Within the limits, but no 100 bytes hold so many pixels.
   write_file(file, with_header_size(small, 16384, 16384));
   expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
+  write_with_libpng(file, cv::Mat(2, 2, CV_8UC1, cv::Scalar(0)), {.interlace = PNG_INTERLACE_ADAM7});
+  write_file(file, with_header_size(read_file(file, 1000), 16384, 16384));
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
   write_file(file, with_header_size(small, 0, 5));
   expect_refused([&] { read_grey_image(file); }, {file.string(), "zero"});
+}
+
+// What is compressed may hold fewer pixels than the header says, or more, which libpng overlooks.
+TEST(ImageIo, PixelsAreAsManyAsTheHeaderSays) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.png";
+  const cv::Mat image = (cv::Mat_<std::uint8_t>(3, 2) << 1, 2, 3, 4, 5, 6);
+  write_png(file, image);
+  const std::string whole = read_file(file, 1000);
+  write_file(file, with_header_size(whole, 2, 4));
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
+  write_file(file, with_header_size(whole, 2, 2));
+  expect_equal(read_grey_image(file), image.rowRange(0, 2));
 }
 
 TEST(ImageIo, NonImagesAreRefused) {
