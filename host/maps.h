@@ -57,6 +57,9 @@ struct StereoMaps {
       : disparity(context, 2 * pixel_count(size)), variance(context, 2 * pixel_count(size)) {}
 };
 
+/// A map of both views of bytes: not 0 where a surface that came nearer than the range hides what is behind.
+using HiddenMap = ocl::Buffer<cl_uchar>;
+
 /// Of which views something is made. The values are their number.
 enum class Views { kLeft = 1, kBoth = 2 };
 inline int count(Views views) { return static_cast<int>(views); }

@@ -23,10 +23,11 @@
 #define EGOSGM_RIDGE_MIN_COUNT 2
 #define EGOSGM_RIDGE_BLOCKS 6
 
-// The matching variance where the path sums fall on beyond the end of a band: the true disparity rather lies outside.
-// KalmanUpdate then takes the measurement instead of fusing it, as where the two differ by more than the gate, and the
-// next frame searches wide around it.
-#define EGOSGM_ESCAPED_VARIANCE_PX2 16.0f
+// A deviation of 4 px: what is known no better is doubtful. KalmanUpdate takes such a measurement instead of fusing it,
+// and keeps no such prediction against a measurement. This is the matching variance where the path sums fall on beyond
+// the end of a band, as the true disparity rather lies outside, and the least variance where measurement and prediction
+// contradict each other: so the next frame searches wide.
+#define EGOSGM_DOUBTFUL_VARIANCE_PX2 16.0f
 
 // OutputVariance: the filter's and the measurement's variance, each cut, at every fourth pixel around; the sum of two
 // second differences of disparities, each cut, at every pixel nearer by; and how far the disparities this far off to

@@ -47,9 +47,6 @@ static inline int any_of(const Ints condition) {
 #endif
 }
 
-// Whether ForwardWarp says that a surface nearer than the range hides what is behind: no disparity, but a variance.
-static inline Ints is_hidden(const Floats d, const Floats variance) { return (d <= INVALID) & (variance > 0.0f); }
-
 // Pixels x .. x + PIXELS - 1 of a row; what lies outside of it is invalid.
 static inline Floats load_pixels(global const float* row, const int x, const int width) {
 #if PIXELS == 1
@@ -91,7 +88,19 @@ typedef struct __attribute__((packed)) {
   uchar16 lanes;
 } PackedBytes;
 
-// The same of bytes. REQUIRES: values from 0 to 255; x lies in the row.
+// Bytes x .. x + PIXELS - 1 of a row; what lies outside of it is 0.
+static inline Ints load_bytes(global const uchar* row, const int x, const int width) {
+#if PIXELS == 1
+  return x >= 0 && x < width ? row[x] : 0;
+#else
+  if (x >= 0 && x + PIXELS <= width) return convert_int16(((global const PackedBytes*)(row + x))->lanes);
+  int lanes[PIXELS];
+  for (int i = 0; i < PIXELS; ++i) lanes[i] = x + i >= 0 && x + i < width ? row[x + i] : 0;
+  return vload16(0, lanes);
+#endif
+}
+
+// Writes bytes. REQUIRES: values from 0 to 255; x lies in the row.
 static inline void store_bytes(const Ints values, global uchar* row, const int x, const int width) {
 #if PIXELS == 1
   row[x] = (uchar)values;

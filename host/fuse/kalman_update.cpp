@@ -29,11 +29,11 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
       update_(build(context, pixels_), "update") {}
 
 void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check, const Map& warped,
-                              const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated,
-                              Views views) {
+                              const HiddenMap& hidden, const StereoMaps& predicted, const StereoMaps& measured,
+                              StereoMaps& updated, Views views) {
   context_.enter("KalmanUpdate");
   update_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, gate_px_, keep_predicted_,
-          ask_neighbours_, innovation_weight_, min_variance_px2_, check, warped, predicted.disparity,
+          ask_neighbours_, innovation_weight_, min_variance_px2_, check, warped, hidden, predicted.disparity,
           predicted.variance, measured.disparity, measured.variance, updated.disparity, updated.variance);
 }
 

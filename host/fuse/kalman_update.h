@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {
@@ -16,10 +16,11 @@ class KalmanUpdate {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
 
-  /// `check`: what PredictionCheck says of this frame. `warped`: predicted disparities before any was dropped.
+  /// `check`: what PredictionCheck says of this frame. `warped`: predicted disparities before any was dropped. Nothing
+  /// is believed of what is `hidden`.
   /// REQUIRES: `updated` is neither `predicted` nor `measured`.
-  void operator()(const ocl::Buffer<shared::PredictionState>& check, const Map& warped, const StereoMaps& predicted,
-                  const StereoMaps& measured, StereoMaps& updated, Views views);
+  void operator()(const ocl::Buffer<shared::PredictionState>& check, const Map& warped, const HiddenMap& hidden,
+                  const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated, Views views);
 
  private:
   ocl::Context& context_;
@@ -29,9 +30,9 @@ class KalmanUpdate {
   const cl_int keep_predicted_, ask_neighbours_;
   const float innovation_weight_, min_variance_px2_;
   ocl::Kernel<const shared::ImageSize, const float, const cl_int, const cl_int, const float, const float,
-              const ocl::Buffer<shared::PredictionState>, const ocl::Buffer<float>, const ocl::Buffer<float>,
-              const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>,
-              ocl::Buffer<float>>
+              const ocl::Buffer<shared::PredictionState>, const ocl::Buffer<float>, const HiddenMap,
+              const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<float>, ocl::Buffer<float>>
       update_;
 };
 

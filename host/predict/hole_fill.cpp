@@ -18,15 +18,16 @@ HoleFill::HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFill
       max_difference_px_(options.max_difference_px),
       fill_rows_(build(context, pixels_), "fill_rows"),
       fill_columns_(build(context, pixels_), "fill_columns"),
-      rows_filled_(context, size) {}
+      rows_filled_(context, size),
+      rows_hidden_(context, 2 * pixel_count(size)) {}
 
-void HoleFill::operator()(const StereoMaps& in, StereoMaps& out) {
+void HoleFill::operator()(const StereoMaps& in, const HiddenMap& hidden, StereoMaps& out, HiddenMap& out_hidden) {
   context_.enter("HoleFill");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_);
-  fill_rows_(context_, pixels, size_, max_difference_px_, in.disparity, in.variance, rows_filled_.disparity,
-             rows_filled_.variance);
+  fill_rows_(context_, pixels, size_, max_difference_px_, in.disparity, in.variance, hidden, rows_filled_.disparity,
+             rows_filled_.variance, rows_hidden_);
   fill_columns_(context_, pixels, size_, max_difference_px_, rows_filled_.disparity, rows_filled_.variance,
-                out.disparity, out.variance);
+                rows_hidden_, out.disparity, out.variance, out_hidden);
 }
 
 }  // namespace egosgm

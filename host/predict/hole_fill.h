@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {
@@ -15,18 +15,20 @@ class HoleFill {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFillOptions& options, int pixels = 0);
 
-  /// REQUIRES: `out` is not `in`.
-  void operator()(const StereoMaps& in, StereoMaps& out);
+  /// REQUIRES: the outputs are not the inputs.
+  void operator()(const StereoMaps& in, const HiddenMap& hidden, StereoMaps& out, HiddenMap& out_hidden);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
   const float max_difference_px_;
-  using FillKernel = ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>,
-                                 const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>;
+  using FillKernel =
+      ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+                  const HiddenMap, ocl::Buffer<float>, ocl::Buffer<float>, HiddenMap>;
   FillKernel fill_rows_, fill_columns_;
   StereoMaps rows_filled_;
+  HiddenMap rows_hidden_;
 };
 
 }  // namespace egosgm

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "host/frame/plan.h"
 #include "host/match/consistency_check.h"
 #include "host/predict/edge_rejection.h"
 #include "host/predict/forward_warp.h"
-#include "host/frame/plan.h"
 #include "host/predict/hole_fill.h"
 #include "host/predict/right_map.h"
 
@@ -15,12 +15,17 @@ struct Prediction {
   StereoMaps warped;     // before anything was dropped; of what EdgeRejection dropped, the variances are gone
   Map rejected, filled;  // disparities after those stages
   StereoMaps maps;
+  HiddenMap warped_hidden, hidden;  // before and after holes were filled
 
   Prediction(ocl::Context& context, shared::ImageSize size)
       : warped(context, size),
         rejected(context, 2 * pixel_count(size)),
         filled(context, 2 * pixel_count(size)),
-        maps(context, size) {}
+        maps(context, size),
+        warped_hidden(context, 2 * pixel_count(size)),
+        hidden(context, 2 * pixel_count(size)) {
+    warped_hidden.write(context, std::vector<cl_uchar>(warped_hidden.size()));  // a view that is not tracked stays so
+  }
 };
 
 /// Moves the maps of the last frame into this one, and drops what is doubtful.

@@ -20,8 +20,7 @@ struct ProgramFile;  // egosgm/programs.h
 
 /// Where a frame's maps go: views of the caller's memory, width x height of the pipeline each. Empty views are not
 /// filled and cost nothing. Disparities in pixels, variances in px^2; kInvalidDisparity (and variance 0) where there is
-/// no value. A predicted variance of 1e6 px^2 without a disparity: a surface that came nearer than the range hides what
-/// was there.
+/// no value.
 struct FrameOutputs {
   MapView<float> disparity, variance;              // the left view's result
   MapView<float> right_disparity, right_variance;  // the right view's

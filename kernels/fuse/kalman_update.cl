@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. An innovation z - d' of more
 // deviations than p' + r allows says that p' is too small, so p' grows. Where the two contradict each other, by more
-// than the gate or because the measurement escaped its band, or where most pixels around are off to the same side,
+// than the gate or because the measurement is doubtful, or where most pixels around are off to the same side,
 // as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide;
 // unless the pixels around speak against it. What is hidden by a surface nearer than the range (ForwardWarp) has no
 // disparity: whatever is measured there is a mismatch.
@@ -47,8 +47,8 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
   const int step = EGOSGM_SUPPORT_STEP;
   for (int u = x - step; u <= x + step && any_of(moves); u += 2 * step) {
     const size_t row = (size_t)y * size.width;
-    moves &= is_off_to(side, load_pixels(predictions + row, u, size.width),
-                       load_pixels(measurements + row, u, size.width));
+    moves &=
+        is_off_to(side, load_pixels(predictions + row, u, size.width), load_pixels(measurements + row, u, size.width));
   }
   const Floats needed = EGOSGM_MOVING_COUNT;
   Floats off = 0.0f;
@@ -67,17 +67,17 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
 
 // `check`: of this frame; wrong predictions would vouch for each other, so that nobody is asked, and every innovation
 // of more than a deviation raises p'.
-// `warped`: the prediction before anything was dropped from it; may be `updated`. ask_neighbours: whether a prediction
-// that is nearer than what contradicts it stays, once, if more than twice as many of the pixels around vouch for it and
-// less than half measure the other; whether both go if none vouches for either and less than half measure it, or less
-// than EGOSGM_SUPPORT_MOST where the prediction was dropped; and whether a measurement is taken that differs as those
-// of EGOSGM_MOVING_COUNT around do. innovation_weight: p' is raised until this times the squared innovation is no more
-// than p' + r; 0: never.
+// `warped`: the prediction before anything was dropped from it; may be `updated`. `hidden`: not 0 where a surface
+// nearer than the range hides what is behind. ask_neighbours: whether a prediction that is nearer than what contradicts
+// it stays, once, if more than twice as many of the pixels around vouch for it and less than half measure the other;
+// whether both go if none vouches for either and less than half measure it, or less than EGOSGM_SUPPORT_MOST where the
+// prediction was dropped; and whether a measurement is taken that differs as those of EGOSGM_MOVING_COUNT around do.
+// innovation_weight: p' is raised until this times the squared innovation is no more than p' + r; 0: never.
 KERNEL void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
                    const float innovation_weight, const float min_variance, global const PredictionState* check,
-                   global const float* warped, global const float* predicted, global const float* predicted_variance,
-                   global const float* measured, global const float* measured_variance, global float* updated,
-                   global float* updated_variance) {
+                   global const float* warped, global const uchar* hidden, global const float* predicted,
+                   global const float* predicted_variance, global const float* measured,
+                   global const float* measured_variance, global float* updated, global float* updated_variance) {
   const int width = size.width;
   const int y = get_global_id(1);
   const size_t view = (size_t)get_global_id(2) * size.height * width;
@@ -92,10 +92,10 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
     const Floats p = load_pixels(predicted_variance + row, x, width);
     const Floats r = load_pixels(measured_variance + row, x, width);
     const Ints has_prediction = d > INVALID;
-    const Ints has_measurement = (z > INVALID) & ~is_hidden(d, p);
-    const Floats escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+    const Ints has_measurement = (z > INVALID) & (load_bytes(hidden + row, x, width) == 0);
+    const Floats doubtful = EGOSGM_DOUBTFUL_VARIANCE_PX2;
     const Ints has_both = has_prediction & has_measurement;
-    const Ints fuses = has_both & (fabs(z - d) <= gate) & (r < escaped);
+    const Ints fuses = has_both & (fabs(z - d) <= gate) & (r < doubtful);
     const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
 
     const Floats zero = 0.0f;
@@ -107,13 +107,13 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
     const Floats fused = d + gain * innovation;
     const Floats fused_variance = (1.0f - gain) * prior;
 
-    const Floats contradicted = r < escaped ? escaped : r;
+    const Floats contradicted = r < doubtful ? doubtful : r;
     Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
     Floats variance = fuses ? fused_variance : has_both ? contradicted : has_measurement ? r : p;
 
     const Floats other = has_prediction ? d : load_pixels(warped + row, x, width);
     const Ints was_dropped = (d <= INVALID) & (other > INVALID) & (fabs(z - other) > gate);
-    const Ints is_doubtful = has_measurement & (was_dropped | (has_prediction & !fuses & (p < escaped) & (z < other)));
+    const Ints is_doubtful = has_measurement & (was_dropped | (has_prediction & !fuses & (p < doubtful) & (z < other)));
     const Floats moving = EGOSGM_MOVING_PX;
     Ints moves = fuses & (fabs(innovation) > moving);
     if (asks && any_of(is_doubtful)) {
@@ -125,13 +125,13 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
       const Ints goes = is_doubtful & (support.for_measured <= zero) &
                         (support.measuring < (was_dropped ? most_of_them : half_of_them));
       value = stays ? other : goes ? INVALID : value;
-      variance = stays ? escaped : variance;
+      variance = stays ? doubtful : variance;
     }
     if (asks && any_of(moves)) {
       const Floats side = innovation > zero ? (Floats)(1.0f) : (Floats)(-1.0f);
       moves = move_together(size, x, y, side, moves, predicted + view, measured + view);
       value = moves ? z : value;
-      variance = moves ? escaped : variance;
+      variance = moves ? doubtful : variance;
     }
     const Floats least = min_variance;
     const Floats bounded = variance < least ? least : variance;

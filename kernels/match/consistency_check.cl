@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Left-right consistency: the left pixel x sees what the right pixel x - d sees, the right pixel x what the left pixel
-// x + d sees. A pixel without a disparity keeps its variance, by which ForwardWarp says that it is hidden.
+// x + d sees.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -28,6 +28,6 @@ KERNEL void check(const ImageSize size, const float max_difference, const float 
     const Ints keeps = inside ? agree : valid & ((Ints)(keep_outside) != 0);
 
     store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);
-    clear_dropped(keeps ? (Ints)(0) : (d != INVALID), variance + row, x, width);
+    clear_dropped(!keeps, variance + row, x, width);
   }
 }

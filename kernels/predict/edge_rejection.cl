@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Edge rejection: drops a disparity whose nearest valid neighbour among the next two pixels to the left, right, above
 // or below differs by more than max_jump. Both sides of a jump see each other, so both go.
-// A pixel without a disparity keeps its variance, by which ForwardWarp says that it is hidden.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -31,6 +30,6 @@ KERNEL void reject(const ImageSize size, const float max_jump, global const floa
                        is_jump(d, load_pixels(above, x, width), load_pixels(far_above, x, width), max_jump) |
                        is_jump(d, load_pixels(below, x, width), load_pixels(far_below, x, width), max_jump);
     store_pixels(jumps ? INVALID : d, kept_disparity + row, x, width);
-    clear_dropped(jumps & (d > INVALID), variance + row, x, width);
+    clear_dropped(jumps, variance + row, x, width);
   }
 }

@@ -3,7 +3,7 @@
 //
 // Several sources may land on one target. The largest disparity wins, of equal ones the one with the largest variance,
 // so the result does not depend on the order in which they come. What came nearer than the range still hides what is
-// behind it: such a target has no disparity, and the largest variance. GPUs, a pixel a work-item: disparities bid by
+// behind it: such a target has no disparity, and is marked as hidden. GPUs, a pixel a work-item: disparities bid by
 // atomic maxima of keys that are ordered as they are, then variances do among the sources that reached the winner.
 // CPUs, where atomics are slow: a work-item owns a band of target rows and looks through the source rows that reach
 // into it.
@@ -112,14 +112,15 @@ KERNEL void splat_variance(const ImageSize size, global const int* landed, globa
 }
 
 KERNEL void decode(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
-                   global float* disparity, global float* variance) {
+                   global float* disparity, global float* variance, global uchar* hidden) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
   const size_t i = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width + x;
   const float d = zbuffer[i] == 0 ? EGOSGM_INVALID_DISPARITY : disparity_of(zbuffer[i]);
   const int is_beyond = d > range.min + range.count - 1;
   disparity[i] = is_beyond ? EGOSGM_INVALID_DISPARITY : d;
-  if (is_beyond) variance[i] = EGOSGM_MAX_VARIANCE_PX2;
+  if (is_beyond) variance[i] = 0.0f;
+  hidden[i] = is_beyond;
 }
 
 #else
@@ -183,7 +184,7 @@ KERNEL void find_spans(const ImageSize size, const DisparityMotion left, const D
 KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const DisparityMotion left,
                         const DisparityMotion right, const float process_noise, const int band_rows,
                         global const int* spans, global const float* disparity, global const float* variance,
-                        global float* predicted, global float* predicted_variance) {
+                        global float* predicted, global float* predicted_variance, global uchar* hidden) {
   const int view = get_global_id(1);
   const int width = size.width;
   const int first = get_global_id(0) * band_rows;
@@ -225,10 +226,10 @@ KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const 
   for (int i = 0; i < pixels; i += PIXELS) {
     const Floats d = load_pixels(band, i, pixels);
     const Ints is_beyond = d > (Floats)(range.min + range.count - 1);
+    store_bytes(is_beyond ? (Ints)(1) : (Ints)(0), hidden + (rows + first) * width, i, pixels);
     if (!any_of(is_beyond)) continue;
     store_pixels(is_beyond ? INVALID : d, band, i, pixels);
-    const Floats hidden = EGOSGM_MAX_VARIANCE_PX2;
-    store_pixels(is_beyond ? hidden : load_pixels(band_variance, i, pixels), band_variance, i, pixels);
+    clear_dropped(is_beyond, band_variance, i, pixels);
   }
 }
 

@@ -28,7 +28,9 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
   StereoMaps out = testing::upload(context, size, before_update(size));
   ocl::Buffer<shared::PredictionState> checked(context, 1);
   checked.write(context, {check});
-  update(checked, before.disparity, prediction, measurement, out, views);
+  HiddenMap hidden(context, predicted.disparity.size());
+  hidden.write(context, predicted.hidden.empty() ? std::vector<cl_uchar>(hidden.size()) : predicted.hidden);
+  update(checked, before.disparity, hidden, prediction, measurement, out, views);
   return testing::download(context, out);
 }
 
@@ -39,10 +41,11 @@ struct Estimate {
 
 constexpr Estimate kNothing{kNone, 0};
 
-Estimate update_pixel(const KalmanUpdateOptions& options, Estimate predicted, Estimate measured) {
+Estimate update_pixel(const KalmanUpdateOptions& options, Estimate predicted, Estimate measured, int is_hidden = 0) {
   const testing::HostMaps warped{{kNone, kNone}, {0, 0}};
   const testing::HostMaps updated =
-      update({1, 1}, options, warped, {{predicted.disparity, kNone}, {predicted.variance, 0}},
+      update({1, 1}, options, warped,
+             {{predicted.disparity, kNone}, {predicted.variance, 0}, {static_cast<std::uint8_t>(is_hidden), 0}},
              {{measured.disparity, kNone}, {measured.variance, 0}});
   EXPECT_EQ(updated.disparity[1], kNone);
   EXPECT_EQ(updated.variance[1], 0);
@@ -58,10 +61,12 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
   testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 7);
   const testing::HostMaps warped = testing::random_maps(size, -8, 8, 0.3, 8);
   for (std::size_t i = 0; i < measured.disparity.size(); ++i) {
-    if (i % 7 == 0) predicted.variance[i] += EGOSGM_ESCAPED_VARIANCE_PX2;
-    if (i % 11 == 0) measured.variance[i] += EGOSGM_ESCAPED_VARIANCE_PX2;
+    predicted.hidden.push_back(predicted.disparity[i] == kNone && i % 13 < 4);
+    if (i % 7 == 0 && predicted.disparity[i] != kNone) predicted.variance[i] += EGOSGM_DOUBTFUL_VARIANCE_PX2;
+    if (i % 11 == 0) measured.variance[i] += EGOSGM_DOUBTFUL_VARIANCE_PX2;
     if (i % 5 == 0 && measured.disparity[i] != kNone) measured.disparity[i] -= 6;
     if (static_cast<int>(i) % size.width < size.width / 2 && i % 23 != 0) {
+      predicted.hidden[i] = 0;
       predicted.disparity[i] = 0;
       measured.disparity[i] = 0.25f * static_cast<float>(i % 9) + 0.5f;
     }
@@ -114,7 +119,7 @@ TEST(KalmanUpdate, BelievesAPredictionLessThatIsTooFarOff) {
 TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));
   // With a variance for which the next frame searches wide.
-  const float wide = EGOSGM_ESCAPED_VARIANCE_PX2;
+  const float wide = EGOSGM_DOUBTFUL_VARIANCE_PX2;
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12.25f, 1}), (Estimate{12.25f, wide}));
   const KalmanUpdateOptions alone{.gate_px = 2, .ask_neighbours = false};
   EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 1}), (Estimate{7.75f, wide}));
@@ -123,7 +128,7 @@ TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
 }
 
 TEST(KalmanUpdate, TakesAMeasurementThatEscapedItsBand) {
-  const float escaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+  const float escaped = EGOSGM_DOUBTFUL_VARIANCE_PX2;
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, escaped}), (Estimate{11, escaped}));
   EXPECT_EQ(update_pixel({.gate_px = 0}, {10, 1}, {11, escaped}), (Estimate{11, escaped}));
 }
@@ -138,8 +143,8 @@ TEST(KalmanUpdate, TakesWhatIsThere) {
 TEST(KalmanUpdate, DropsWhatIsMeasuredWhereANearerSurfaceHidesIt) {
   for (const bool ask_neighbours : {false, true}) {
     const KalmanUpdateOptions options{.keep_predicted = true, .ask_neighbours = ask_neighbours};
-    EXPECT_EQ(update_pixel(options, {kNone, EGOSGM_MAX_VARIANCE_PX2}, {12, 3}), kNothing);
-    EXPECT_EQ(update_pixel(options, {kNone, EGOSGM_MAX_VARIANCE_PX2}, kNothing), kNothing);
+    EXPECT_EQ(update_pixel(options, kNothing, {12, 3}, /*is_hidden=*/1), kNothing);
+    EXPECT_EQ(update_pixel(options, kNothing, kNothing, /*is_hidden=*/1), kNothing);
   }
 }
 
@@ -170,30 +175,30 @@ struct Surroundings {
   }
 };
 
-constexpr float kEscaped = EGOSGM_ESCAPED_VARIANCE_PX2;
+constexpr float kDoubtful = EGOSGM_DOUBTFUL_VARIANCE_PX2;
 
 TEST(KalmanUpdate, KeepsAPredictionThatTheNeighboursVouchForOnce) {
   Surroundings maps(20);
   maps.measured.disparity[Surroundings::kMiddle] = 10;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kEscaped}));
-  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kEscaped}));
-  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 1, 0}), (Estimate{10, kEscaped})) << "the predictions are wrong";
-  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 0, 1}), (Estimate{10, kEscaped})) << "they were";
-  maps.predicted.variance[Surroundings::kMiddle] = kEscaped;  // was kept before
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kDoubtful}));
+  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kDoubtful}));
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 1, 0}), (Estimate{10, kDoubtful})) << "the predictions are wrong";
+  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 0, 1}), (Estimate{10, kDoubtful})) << "they were";
+  maps.predicted.variance[Surroundings::kMiddle] = kDoubtful;  // was kept before
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kDoubtful}));
 }
 
 TEST(KalmanUpdate, TakesWhatComesNearerOrWhatMostMeasure) {
   Surroundings nearer(20);
   nearer.measured.disparity[Surroundings::kMiddle] = 30;
-  EXPECT_EQ(nearer.updated_in_the_middle(), (Estimate{30, kEscaped}));
+  EXPECT_EQ(nearer.updated_in_the_middle(), (Estimate{30, kDoubtful}));
   Surroundings most(20);
   most.measure_from(10, 10);  // three of five rows
-  EXPECT_EQ(most.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  EXPECT_EQ(most.updated_in_the_middle(), (Estimate{10, kDoubtful}));
   Surroundings few(20);
   few.measure_from(14, 10);
   few.measured.disparity[Surroundings::kMiddle] = 10;
-  EXPECT_EQ(few.updated_in_the_middle(), (Estimate{20, kEscaped}));
+  EXPECT_EQ(few.updated_in_the_middle(), (Estimate{20, kDoubtful}));
 }
 
 TEST(KalmanUpdate, DropsWhatNoneSpeaksForWhereADroppedPredictionContradicts) {
@@ -226,7 +231,7 @@ TEST(KalmanUpdate, KeepsADroppedPredictionThatTheNeighboursVouchFor) {
   Surroundings maps(20);
   maps.drop_prediction();
   maps.measured.disparity[Surroundings::kMiddle] = 10;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kDoubtful}));
 }
 
 TEST(KalmanUpdate, DropsBothWhereNoneVouchesForEither) {
@@ -234,16 +239,16 @@ TEST(KalmanUpdate, DropsBothWhereNoneVouchesForEither) {
   for (float& disparity : maps.measured.disparity) disparity = kNone;
   maps.measured.disparity[Surroundings::kMiddle] = 10;
   EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
-  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kDoubtful}));
   maps.measure_from(10, 10);  // three of five rows
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kDoubtful}));
   maps.measured.disparity[18 * 21 + 18] = maps.measured.disparity[18 * 21 + 14] = 20;  // one vouches for either
   maps.predicted.disparity[18 * 21 + 10] = 10;
   maps.measured.disparity[18 * 21 + 6] = maps.measured.disparity[18 * 21 + 2] = kNone;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kDoubtful}));
   maps.measure_from(0, kNone);
   maps.measured.disparity[Surroundings::kMiddle] = 30;  // nearer: a thin thing that was lost
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, kEscaped}));
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, kDoubtful}));
 }
 
 /// All are measured `off` nearer than predicted, the pixel in the middle `innovation`.
@@ -256,7 +261,7 @@ Surroundings shifted(float off, float innovation) {
 
 TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
   for (const float sign : {1.0f, -1.0f}) {
-    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kEscaped}));
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kDoubtful}));
     const Estimate fused{20 + sign * 0.625f, 0.5f};
     EXPECT_EQ(shifted(sign * 0.75f, sign * 1.25f).updated_in_the_middle(), fused) << "the others not far enough";
     EXPECT_EQ(shifted(sign * -0.875f, sign * 1.25f).updated_in_the_middle(), fused) << "to the other side";
@@ -267,7 +272,7 @@ TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
   for (const int still : {2, 6, 10, 14, 18}) {
     maps.measured.disparity[2 * 21 + still] = maps.measured.disparity[18 * 21 + still] = 20;
   }
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kEscaped})) << "15 of 25";
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kDoubtful})) << "15 of 25";
   maps.measured.disparity[6 * 21 + 2] = 20;
   EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "14 of 25";
   for (const int beside : {6, 14}) {

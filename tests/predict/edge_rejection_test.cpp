@@ -36,8 +36,7 @@ class EdgeRejectionTest : public ::testing::TestWithParam<shared::ImageSize> {};
 TEST_P(EdgeRejectionTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const float max_jump_px : {0.0f, 1.0f, 5.0f}) {
-    testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.2, 3);
-    for (std::size_t i = 0; i < maps.variance.size(); i += 3) maps.variance[i] = 7;  // also where nothing is
+    const testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.2, 3);
     const testing::HostMaps expected = reference::edge_rejection(size, max_jump_px, maps);
     for (const int pixels : {1, 16}) {
       const testing::HostMaps actual = reject(size, max_jump_px, maps, pixels);
@@ -81,13 +80,6 @@ TEST(EdgeRejection, LooksUpAndDownButNotIntoTheOtherViewOrRow) {
 
   maps.disparity = {10, 10, 10, 90, 90, 90};
   EXPECT_EQ(reject({3, 1}, 5, maps).disparity, maps.disparity);
-}
-
-TEST(EdgeRejection, KeepsTheVarianceOfAHiddenPixel) {
-  testing::HostMaps maps = testing::empty_maps({3, 1});
-  maps.disparity = {10, kNone, 90, kNone, kNone, kNone};
-  maps.variance = {1, 7, 1, 0, 0, 0};
-  EXPECT_EQ(reject({3, 1}, 5, maps).variance, (std::vector<float>{0, 7, 0, 0, 0, 0}));
 }
 
 TEST(EdgeRejection, DoesNotLookAroundTheEndOfARow) {

@@ -21,6 +21,7 @@ constexpr shared::ImageSize kSize{101, 61};
 constexpr shared::DisparityRange kRange{0, 64};
 const Calibration kCalibration{.fx = 100, .fy = 100, .cx = 50, .cy = 30, .baseline_m = 0.5};  // Z = 50 / d
 
+constexpr std::uint8_t kWasHidden = 9;
 // What lies in the output must not shine through.
 testing::HostMaps before(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
 
@@ -31,8 +32,12 @@ testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, s
   ForwardWarp warp(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
   StereoMaps out = testing::upload(context, size, before(size));
-  warp(in, motion, out, views);
-  return testing::download(context, out);
+  HiddenMap hidden(context, out.disparity.size());
+  hidden.write(context, std::vector<cl_uchar>(hidden.size(), kWasHidden));
+  warp(in, motion, out, hidden, views);
+  testing::HostMaps predicted = testing::download(context, out);
+  predicted.hidden = hidden.read(context);
+  return predicted;
 }
 
 testing::HostMaps warp(const testing::HostMaps& belief, const Motion& motion) {
@@ -100,6 +105,7 @@ TEST_P(ForwardWarpTest, EqualsReference) {
             << "min " << range.min << ", by " << pixels;
         EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
             << "min " << range.min << ", by " << pixels;
+        EXPECT_EQ(actual.hidden, expected.hidden) << "min " << range.min << ", by " << pixels;
       }
     }
   }
@@ -115,6 +121,10 @@ TEST_P(ForwardWarpTest, PredictsTheLeftViewAlone) {
     const testing::HostMaps one = warp(size, kCalibration, kRange, 0.25f, belief, motion, pixels, Views::kLeft);
     EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
     EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
+    const std::size_t left = one.hidden.size() / 2;
+    EXPECT_TRUE(
+        std::equal(one.hidden.begin(), one.hidden.begin() + static_cast<std::ptrdiff_t>(left), both.hidden.begin()));
+    EXPECT_EQ(std::count(one.hidden.begin(), one.hidden.end(), kWasHidden), static_cast<std::ptrdiff_t>(left));
   }
 }
 
@@ -219,8 +229,9 @@ TEST(ForwardWarp, WhatComesNearerThanTheRangeHidesWhatIsBehind) {
     belief.disparity[at(kSize, EGOSGM_LEFT, 53, 30)] = 50;
     const testing::HostMaps hidden = warp(kSize, kCalibration, kRange, 0.25f, belief, forward, pixels);
     EXPECT_EQ(hidden.disparity, testing::empty_maps(kSize).disparity);
-    EXPECT_EQ(hidden.variance[at(kSize, EGOSGM_LEFT, 54, 30)], EGOSGM_MAX_VARIANCE_PX2);
-    EXPECT_EQ(std::count(hidden.variance.begin(), hidden.variance.end(), 0.0f), 2 * 101 * 61 - 1);
+    EXPECT_EQ(hidden.variance, testing::empty_maps(kSize).variance);
+    EXPECT_EQ(hidden.hidden[at(kSize, EGOSGM_LEFT, 54, 30)], 1);
+    EXPECT_EQ(std::count(hidden.hidden.begin(), hidden.hidden.end(), 0), 2 * 101 * 61 - 1);
   }
 }
 
@@ -241,8 +252,7 @@ TEST(ForwardWarp, SurvivesWildMotions) {
       EXPECT_TRUE(testing::same_bits(predicted.variance, expected.variance, kSize)) << metres << " m";
       for (std::size_t i = 0; i < predicted.disparity.size(); ++i) {
         const float d = predicted.disparity[i], p = predicted.variance[i];
-        ASSERT_TRUE(d == kNone ? p == 0 || p == EGOSGM_MAX_VARIANCE_PX2
-                               : d >= 0 && d <= 63 && p >= 0.25f && p <= EGOSGM_MAX_VARIANCE_PX2)
+        ASSERT_TRUE(d == kNone ? p == 0 : d >= 0 && d <= 63 && p >= 0.25f && p <= EGOSGM_MAX_VARIANCE_PX2)
             << d << ", variance " << p << ", " << metres << " m";
       }
     }

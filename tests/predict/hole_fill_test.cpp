@@ -18,14 +18,21 @@ testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const te
   HoleFill fill(context, size, {.max_difference_px = max_difference_px}, pixels);
   const StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  fill(in, out);
-  return testing::download(context, out);
+  HiddenMap hidden(context, in.disparity.size()), still_hidden(context, in.disparity.size());
+  hidden.write(context, maps.hidden);
+  still_hidden.write(context, std::vector<cl_uchar>(maps.hidden.size(), 9));
+  fill(in, hidden, out, still_hidden);
+  testing::HostMaps filled = testing::download(context, out);
+  filled.hidden = still_hidden.read(context);
+  return filled;
 }
 
 // The left view; the right one is empty.
 testing::HostMaps left_view(shared::ImageSize size, const std::vector<float>& disparity,
-                            const std::vector<float>& variance) {
+                            const std::vector<float>& variance, const std::vector<std::uint8_t>& hidden = {}) {
   testing::HostMaps maps = testing::empty_maps(size);
+  maps.hidden.assign(maps.disparity.size(), 0);
+  std::copy(hidden.begin(), hidden.end(), maps.hidden.begin());
   std::copy(disparity.begin(), disparity.end(), maps.disparity.begin());
   std::copy(variance.begin(), variance.end(), maps.variance.begin());
   return maps;
@@ -46,7 +53,8 @@ TEST_P(HoleFillTest, EqualsReference) {
   for (const float max_difference_px : {0.0f, 1.0f, 100.0f}) {
     testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.4, 4);
     for (std::size_t i = 0; i < maps.variance.size(); ++i) {
-      if (i % 3 > 0) maps.variance[i] = static_cast<float>(7 + i % 5);  // also where nothing is
+      if (maps.disparity[i] != kNone) maps.variance[i] = static_cast<float>(7 + i % 5);
+      maps.hidden.push_back(maps.disparity[i] == kNone && i % 3 > 0);
     }
     const testing::HostMaps expected = reference::hole_fill(size, max_difference_px, maps);
     for (const int pixels : {1, 16}) {
@@ -55,6 +63,7 @@ TEST_P(HoleFillTest, EqualsReference) {
           << max_difference_px << " px, by " << pixels;
       EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
           << max_difference_px << " px, by " << pixels;
+      EXPECT_EQ(actual.hidden, expected.hidden) << max_difference_px << " px, by " << pixels;
     }
   }
 }
@@ -71,11 +80,24 @@ TEST(HoleFill, FillsAGapWithTheMeanAndTheLargerVariance) {
 
 TEST(HoleFill, HidesWhatLiesBetweenHiddenPixels) {
   for (const shared::ImageSize size : {shared::ImageSize{5, 1}, shared::ImageSize{1, 5}}) {
-    const testing::HostMaps filled = fill(size, 1, left_view(size, {kNone, 10, kNone, kNone, kNone}, {7, 1, 7, 0, 7}));
+    const std::vector<float> none(5, kNone);
+    const testing::HostMaps filled =
+        fill(size, 1, left_view(size, {kNone, 10, kNone, kNone, kNone}, {0, 1, 0, 0, 0}, {1, 0, 1, 0, 1}));
     EXPECT_EQ(filled.disparity, testing::empty_maps(size).disparity);
-    EXPECT_EQ(filled.variance, (std::vector<float>{7, 7, 7, 7, 7, 0, 0, 0, 0, 0}));
+    EXPECT_EQ(filled.variance, testing::empty_maps(size).variance);
+    EXPECT_EQ(filled.hidden, left_view(size, none, {}, {1, 1, 1, 1, 1}).hidden);
     const std::vector<float> seen{kNone, 10, 10, kNone, kNone};
-    EXPECT_EQ(fill(size, 1, left_view(size, seen, {7, 1, 1, 7, 7})).disparity, left_view(size, seen, {}).disparity);
+    const testing::HostMaps kept = fill(size, 1, left_view(size, seen, {0, 1, 1, 0, 0}, {1, 0, 0, 1, 1}));
+    EXPECT_EQ(kept.disparity, left_view(size, seen, {}).disparity);
+    EXPECT_EQ(kept.hidden, left_view(size, none, {}, {1, 0, 0, 1, 1}).hidden);
+  }
+}
+
+TEST(HoleFill, SeesWhatShowsThroughAHiddenPixel) {
+  for (const shared::ImageSize size : {shared::ImageSize{3, 1}, shared::ImageSize{1, 3}}) {
+    const testing::HostMaps filled = fill(size, 1, left_view(size, {10, kNone, 10}, {1, 0, 2}, {0, 1, 0}));
+    EXPECT_EQ(filled.disparity, left_view(size, {10, 10, 10}, {}).disparity);
+    EXPECT_EQ(filled.hidden, left_view(size, {}, {}).hidden);
   }
 }
 
@@ -100,7 +122,7 @@ TEST(HoleFill, FillsRowsThenColumnsOnTheirResult) {
 
 TEST(HoleFill, DoesNotReachIntoTheOtherView) {
   const shared::ImageSize size{1, 2};
-  testing::HostMaps maps = testing::empty_maps(size);
+  testing::HostMaps maps = left_view(size, {}, {});
   maps.disparity = {10, kNone, 10, 10};
   EXPECT_EQ(fill(size, 1, maps).disparity, maps.disparity);
 }

@@ -147,7 +147,7 @@ TEST(OutputVariance, LooksForJumpsAboveAndBelow) {
 
 TEST(OutputVariance, CutsAVarianceThatSaysOnlyThatItIsLarge) {
   const testing::HostMaps maps = maps_of(
-      {1, 1}, [](int, int) { return 5.0f; }, [](int, int) { return EGOSGM_ESCAPED_VARIANCE_PX2; });
+      {1, 1}, [](int, int) { return 5.0f; }, [](int, int) { return EGOSGM_DOUBTFUL_VARIANCE_PX2; });
   const float most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
   EXPECT_FLOAT_EQ(output_variance({1, 1}, maps, {.scale = 1})[0], given_for(most * std::sqrt(most)));
 }
@@ -164,7 +164,7 @@ TEST(OutputVariance, RestsOnTheMeasurementMoreThanOnTheFilter) {
   expect_mean(0.5f, row_of(7, 1), "(1/16 * 1^3)^(1/4)");
   const float most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
   const float of_the_most = std::pow(most * most * most / 16, 0.25f);
-  expect_mean(of_the_most, row_of(7, EGOSGM_ESCAPED_VARIANCE_PX2), "cut");
+  expect_mean(of_the_most, row_of(7, EGOSGM_DOUBTFUL_VARIANCE_PX2), "cut");
   expect_mean(of_the_most, row_of(kNone, 0), "nothing measured");
 }
 

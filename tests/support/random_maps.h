@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <random>
 #include <vector>
 
@@ -8,9 +9,11 @@
 
 namespace egosgm::testing {
 
-/// Disparity and variance of both views, as the twins take them.
+/// Disparity and variance of both views, as the twins take them. Of a prediction, `hidden` is 1 where a surface nearer
+/// than the range hides what is behind.
 struct HostMaps {
   std::vector<float> disparity, variance;
+  std::vector<std::uint8_t> hidden = {};
 };
 
 /// Piecewise smooth disparities in [min, max] with jumps, noise and about `holes` of the pixels invalid.

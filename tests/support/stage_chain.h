@@ -71,6 +71,7 @@ class StageChain {
     frame.without_edges = {prediction.rejected.read(context_), prediction.warped.variance.read(context_)};
     frame.filled.disparity = prediction.filled.read(context_);
     frame.predicted = download(context_, prediction.maps);
+    frame.predicted.hidden = prediction.hidden.read(context_);
   }
 
   void look_at_images(const FrameImages& images, reference::Frame& frame) {

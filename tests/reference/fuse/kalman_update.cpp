@@ -82,10 +82,8 @@ bool contradict(float gate_px, float a, float b) { return gate_px > 0 && std::ab
 
 Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int y, float warped,
                 const Estimate& predicted, const Estimate& measured) {
-  const bool is_hidden = !is_valid(predicted) && predicted.variance > 0;
-  if (is_hidden) return kNone;
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
-  const float z = measured.disparity, escaped = kEscapedVariancePx2;
+  const float z = measured.disparity, doubtful = kDoubtfulVariancePx2;
   // Less than half of the 25; less than 18; 15 and more.
   const auto vouch = [&](float disparity) { return view.vouching(x, y, disparity); };
   const auto stays = [&](float other) {
@@ -96,21 +94,21 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
   };
   if (!is_valid(predicted)) {
     if (warped == EGOSGM_INVALID_DISPARITY || !contradict(options.gate_px, z, warped)) return measured;
-    if (stays(warped)) return {warped, escaped};
+    if (stays(warped)) return {warped, doubtful};
     return goes(18) ? kNone : measured;
   }
   const float innovation = z - predicted.disparity;
-  if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < escaped) {
+  if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < doubtful) {
     const bool moves = options.ask_neighbours && std::abs(innovation) > 1 &&
                        view.is_between_moving(x, y, innovation > 0 ? 1.0f : -1.0f) &&
                        view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 15;
-    return moves ? Estimate{z, escaped} : fuse(options.innovation_sigmas, predicted, measured);
+    return moves ? Estimate{z, doubtful} : fuse(options.innovation_sigmas, predicted, measured);
   }
-  if (predicted.variance < escaped) {
-    if (stays(predicted.disparity)) return {predicted.disparity, escaped};
+  if (predicted.variance < doubtful) {
+    if (stays(predicted.disparity)) return {predicted.disparity, doubtful};
     if (innovation < 0 && goes(13)) return kNone;
   }
-  return {z, std::max(measured.variance, escaped)};
+  return {z, std::max(measured.variance, doubtful)};
 }
 
 }  // namespace
@@ -123,9 +121,11 @@ testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOption
   for (int i = 0; i < 2 * pixels; ++i) {
     const int first = i / pixels * pixels;
     const View view(size, &predicted.disparity[first], &measured.disparity[first]);
-    const Estimate estimate =
-        update(options, view, (i - first) % size.width, (i - first) / size.width, warped[i],
-               {predicted.disparity[i], predicted.variance[i]}, {measured.disparity[i], measured.variance[i]});
+    const bool is_hidden = !predicted.hidden.empty() && predicted.hidden[i] != 0;
+    const Estimate estimate = is_hidden ? kNone
+                                        : update(options, view, (i - first) % size.width, (i - first) / size.width,
+                                                 warped[i], {predicted.disparity[i], predicted.variance[i]},
+                                                 {measured.disparity[i], measured.variance[i]});
     out.disparity[i] = estimate.disparity;
     out.variance[i] = is_valid(estimate) ? std::max(estimate.variance, options.min_variance_px2) : 0;
   }

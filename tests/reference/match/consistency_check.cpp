@@ -8,15 +8,13 @@ namespace egosgm::reference {
 testing::HostMaps consistency_check(shared::ImageSize size, float max_difference_px, bool keep_outside,
                                     const testing::HostMaps& in) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
-  testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f)};
+  testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f),
+                        in.hidden};
   for (std::size_t i = 0; i < 2 * pixels; ++i) {
     const bool is_left = i < pixels;
     const std::size_t x = i % size.width, y = i % pixels / size.width;
     const float d = in.disparity[i];
-    if (d == EGOSGM_INVALID_DISPARITY) {
-      out.variance[i] = in.variance[i];  // by which ForwardWarp says that it is hidden
-      continue;
-    }
+    if (d == EGOSGM_INVALID_DISPARITY) continue;
     const float other_x = std::nearbyint(is_left ? static_cast<float>(x) - d : static_cast<float>(x) + d);
     const bool inside = other_x >= 0 && other_x < static_cast<float>(size.width);
     if (!inside && !keep_outside) continue;

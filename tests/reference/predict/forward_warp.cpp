@@ -21,7 +21,7 @@ float variance_of_motion(const shared::DisparityMotion& m, float u, float v, flo
 
 void warp_view(shared::ImageSize size, shared::DisparityRange range, const shared::DisparityMotion& m,
                float process_noise_px2, const float* disparity, const float* variance, float* out_disparity,
-               float* out_variance) {
+               float* out_variance, std::uint8_t* hidden) {
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const std::size_t source = static_cast<std::size_t>(y) * size.width + x;
@@ -50,7 +50,8 @@ void warp_view(shared::ImageSize size, shared::DisparityRange range, const share
   for (std::size_t i = 0; i < static_cast<std::size_t>(size.width) * size.height; ++i) {
     if (!(out_disparity[i] > static_cast<float>(range.min + range.count - 1))) continue;
     out_disparity[i] = EGOSGM_INVALID_DISPARITY;
-    out_variance[i] = kMaxVariancePx2;
+    out_variance[i] = 0;
+    hidden[i] = 1;
   }
 }
 
@@ -60,11 +61,12 @@ testing::HostMaps forward_warp(shared::ImageSize size, shared::DisparityRange ra
                                const shared::DisparityMotion& left, const shared::DisparityMotion& right,
                                float process_noise_px2, const testing::HostMaps& belief) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
-  testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f)};
+  testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f),
+                        std::vector<std::uint8_t>(2 * pixels, 0)};
   warp_view(size, range, left, process_noise_px2, belief.disparity.data(), belief.variance.data(), out.disparity.data(),
-            out.variance.data());
+            out.variance.data(), out.hidden.data());
   warp_view(size, range, right, process_noise_px2, belief.disparity.data() + pixels, belief.variance.data() + pixels,
-            out.disparity.data() + pixels, out.variance.data() + pixels);
+            out.disparity.data() + pixels, out.variance.data() + pixels, out.hidden.data() + pixels);
   return out;
 }
 

@@ -7,16 +7,13 @@
 namespace egosgm::reference {
 namespace {
 
-bool is_hidden(const testing::HostMaps& maps, std::size_t i) {
-  return maps.disparity[i] == EGOSGM_INVALID_DISPARITY && maps.variance[i] > 0;
-}
-
 // Fills pixel i from its neighbours i - step and i + step.
 void fill(const testing::HostMaps& in, std::size_t i, std::size_t step, float max_difference_px,
           testing::HostMaps& out) {
-  if (is_hidden(in, i - step) && is_hidden(in, i + step) && !is_hidden(in, i)) {
+  if (in.hidden[i - step] && in.hidden[i + step]) {
     out.disparity[i] = EGOSGM_INVALID_DISPARITY;
-    out.variance[i] = std::max(in.variance[i - step], in.variance[i + step]);
+    out.variance[i] = 0;
+    out.hidden[i] = 1;
     return;
   }
   const float before = in.disparity[i - step], after = in.disparity[i + step];
@@ -25,6 +22,7 @@ void fill(const testing::HostMaps& in, std::size_t i, std::size_t step, float ma
   if (!(std::abs(before - after) < max_difference_px)) return;
   out.disparity[i] = 0.5f * (before + after);
   out.variance[i] = std::max(in.variance[i - step], in.variance[i + step]);
+  out.hidden[i] = 0;
 }
 
 }  // namespace

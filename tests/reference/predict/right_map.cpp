@@ -36,6 +36,7 @@ testing::HostMaps right_map(shared::ImageSize size, int min_disparity, float max
   const std::vector<float> nearest = landed(size, min_disparity, maps);
   const bool is_measured = !measured.disparity.empty();
   testing::HostMaps out = maps;
+  if (!out.hidden.empty()) std::fill(out.hidden.begin() + static_cast<std::ptrdiff_t>(pixels), out.hidden.end(), 0);
   for (std::size_t i = 0; i < pixels; ++i) {
     const float z = is_measured ? measured.disparity[pixels + i] : kNone, d = z > kNone ? z : nearest[i];
     out.disparity[pixels + i] = z > kNone ? z : kNone;
