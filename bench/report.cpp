@@ -8,11 +8,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <fstream>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 
 #include "commit.h"  // written by the build
+#include "egosgm/vision/file_io.h"
 
 namespace egosgm::bench {
 namespace {
@@ -190,22 +191,16 @@ void print_machine(const Machine& machine) {
 }
 
 void write_json(const std::string& file, const Machine& machine, const std::vector<Row>& rows) {
-  const std::string unfinished = file + ".part";
-  {
-    std::ofstream out(unfinished);
-    out << "{\"device\": " << quoted(machine.device.name) << ",\n \"driver\": " << quoted(machine.device.driver)
-        << ",\n \"version\": " << quoted(machine.device.version)
-        << ",\n \"compute_units\": " << machine.device.compute_units << ",\n \"threads\": " << machine.threads
-        << ",\n \"commit\": " << quoted(EGOSGM_COMMIT) << ",\n \"date\": " << quoted(now())
-        << ",\n \"input\": " << quoted(machine.input) << ",\n \"copy_gb_s\": " << number(machine.copy_gb_s)
-        << ",\n \"rows\": [";
-    for (std::size_t i = 0; i < rows.size(); ++i) out << (i ? ",\n  " : "\n  ") << json_of(rows[i]);
-    out << "]}\n";
-    out.close();
-    if (!out) throw std::runtime_error(file + ": cannot be written: choose another --json FILE");
-  }
-  if (std::rename(unfinished.c_str(), file.c_str()) != 0)
-    throw std::runtime_error(file + ": cannot be written: " + std::strerror(errno));
+  std::ostringstream out;
+  out << "{\"device\": " << quoted(machine.device.name) << ",\n \"driver\": " << quoted(machine.device.driver)
+      << ",\n \"version\": " << quoted(machine.device.version)
+      << ",\n \"compute_units\": " << machine.device.compute_units << ",\n \"threads\": " << machine.threads
+      << ",\n \"commit\": " << quoted(EGOSGM_COMMIT) << ",\n \"date\": " << quoted(now())
+      << ",\n \"input\": " << quoted(machine.input) << ",\n \"copy_gb_s\": " << number(machine.copy_gb_s)
+      << ",\n \"rows\": [";
+  for (std::size_t i = 0; i < rows.size(); ++i) out << (i ? ",\n  " : "\n  ") << json_of(rows[i]);
+  out << "]}\n";
+  vision::write_file(file, out.str());
 }
 
 int guarded(const char* program, int (*main_body)(int, char**), int argc, char** argv) {
