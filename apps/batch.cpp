@@ -341,6 +341,7 @@ int report_shard(const Shard& shard, const std::vector<BatchEntry>& failed) {
 int batch(const BatchArguments& arguments) {
   const std::vector<BatchEntry> entries = read_batch_list(arguments.list);
   const PipelineOptions options = arguments.method.options();
+  arguments.method.expect_saves();
   const Json settings = batch_settings(options, arguments.odometry, parse_write_list(arguments.write));
   const BatchFolder folder(arguments.out, settings, arguments.overwrite && !arguments.merge);
   if (arguments.merge) return report_all(arguments, entries, folder);

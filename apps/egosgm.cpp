@@ -4,18 +4,21 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <filesystem>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <new>
+#include <optional>
+#include <set>
 
 #include "apps/command.h"
 #include "apps/standard_output.h"
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
+#include "host/vision/text_rows.h"
 
 namespace egosgm::app {
 namespace {
@@ -47,7 +50,8 @@ std::string help_hint(const CLI::App& command) {
 
 int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
   const CLI::App& command = chosen_command(program);
-  const std::vector<std::string> unknown = program.remaining(true);
+  std::vector<std::string> unknown = program.remaining(true);
+  std::erase(unknown, "--");
   if (unknown.empty()) {
     std::string what = error.what();
     if (const std::string prefix = "Could not convert: "; what.starts_with(prefix))
@@ -72,11 +76,29 @@ std::string meant_path(const MissingPath& error) {
   return path.empty() ? "" : "; did you mean " + path + "?";
 }
 
+/// Whether what --help calls the value is a number.
+bool takes_number(const CLI::Option& option) {
+  static const std::set<std::string> numbers{"N", "W", "H", "S", "M", "DEG", "G", "PX", "A", "D", "STEPS"};
+  const std::string type = option.get_type_name();
+  return numbers.contains(type.substr(0, type.find(':')));
+}
+
+/// CLI11 also takes hexadecimal numbers, and 010 for eight.
+bool is_decimal(const std::string& text) {
+  const std::optional<double> number = vision::parse_number(text);
+  const std::string_view digits = std::string_view(text).substr(text.starts_with('-'));
+  const bool has_leading_zero = digits.size() > 1 && digits[0] == '0' && digits[1] >= '0' && digits[1] <= '9';
+  return number && std::isfinite(*number) && !has_leading_zero && text[0] != '+';
+}
+
 /// An empty value is a variable of the shell that was not set.
-void refuse_empty_values(const CLI::App& command) {
+void refuse_odd_values(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& value : option->results()) {
       if (value.empty()) throw InvalidArgument(option->get_name() + " \"\": is empty: give a value, or leave it out");
+      if (!takes_number(*option) || is_decimal(value)) continue;
+      throw InvalidArgument(fmt::format("{} \"{}\": write a decimal number without blanks, plus or leading zeros",
+                                        option->get_name(), value));
     }
   }
 }
@@ -125,7 +147,7 @@ int run_program(int argc, char** argv) {
   }
   const auto chosen =
       std::find_if(std::begin(commands), std::end(commands), [](const Command& c) { return c.arguments->parsed(); });
-  refuse_empty_values(*chosen->arguments);
+  refuse_odd_values(*chosen->arguments);
   return flushed(chosen->run());
 }
 
@@ -140,7 +162,8 @@ int exit_code_of(int argc, char** argv) {
     return fail(kFailed, error.what());
   } catch (const DeviceError& error) {
     return fail(kFailed, error.what());
-  } catch (const std::filesystem::filesystem_error& error) {  // a loop of links, a name too long, a folder without rights
+  } catch (
+      const std::filesystem::filesystem_error& error) {  // a loop of links, a name too long, a folder without rights
     return fail(kBadInput, error.what() + std::string(": give another path"));
   } catch (const std::bad_alloc&) {
     return fail(kFailed, "out of memory: choose smaller images or fewer --disparities");

@@ -27,12 +27,6 @@ std::string toml_value(const std::string& value) {
   return bare ? value : '"' + value + '"';
 }
 
-std::string toml_of(const PipelineOptions& options) {
-  std::string text = "# Options of egosgm run: read back with --config.\n";
-  for (const auto& [name, value] : list_options(options)) text += name + " = " + toml_value(value) + '\n';
-  return text;
-}
-
 /// The line, from 1, that sets `option`; 0: none that is written as usual.
 int line_of(const std::string& text, const std::string& option) {
   std::istringstream lines(text);
@@ -48,21 +42,25 @@ int line_of(const std::string& text, const std::string& option) {
   return 0;
 }
 
-/// CLI11 keeps a section of N parts as N names of up to N parts.
-void check_sections(const std::string& text, const std::string& file) {
+/// CLI11 keeps a section of N parts as N names of up to N parts, and takes a name alone for true, or for nothing.
+void check_rows(const std::string& text, const std::string& file) {
   for (const vision::TextRow& row : vision::split_rows(text, file)) {
     const std::size_t first = std::min(row.text.find_first_not_of(" \t\r\v\f"), row.text.size());
-    if (!row.text.substr(first).starts_with('[') || std::count(row.text.begin(), row.text.end(), '.') <= kMaxDots) {
-      continue;
+    const std::string_view rest = row.text.substr(first);
+    if (rest.empty() || rest.starts_with('#')) continue;
+    if (!rest.starts_with('[') && rest.find('=') == std::string_view::npos) {
+      vision::refuse_row(file, row.number, vision::quoted(row.text) + " is not `name = value`");
     }
+    if (!rest.starts_with('[') || std::count(rest.begin(), rest.end(), '.') <= kMaxDots) continue;
     vision::refuse_row(file, row.number,
                        vision::quoted(row.text) + " is nested too deep: write one `stage.option = value` a line");
   }
 }
 
 void apply_config(PipelineOptions& options, const std::string& file) {
-  const std::string read = vision::read_file(file, kMaxConfigBytes);
-  check_sections(read, file);
+  const std::string bytes = vision::read_file(file, kMaxConfigBytes);
+  const std::string read(vision::without_mark(bytes));
+  check_rows(read, file);
   std::istringstream text(read);
   std::vector<CLI::ConfigItem> items;
   try {
@@ -159,12 +157,21 @@ PipelineOptions OptionArguments::options() const {
     if (!value.empty()) set_option(options, name, value);
   }
   options.validate();
-  if (!save_config.empty()) expect_new_file("--save-config", save_config);
   return options;
 }
 
+void OptionArguments::expect_saves() const {
+  if (!save_config.empty()) expect_new_file("--save-config", save_config);
+}
+
 void OptionArguments::save(const PipelineOptions& options) const {
-  if (!save_config.empty()) vision::write_file(save_config, toml_of(options));
+  if (!save_config.empty()) vision::write_file(save_config, config_text(options));
+}
+
+std::string config_text(const PipelineOptions& options) {
+  std::string text = "# Options of egosgm run: read back with --config.\n";
+  for (const auto& [name, value] : list_options(options)) text += name + " = " + toml_value(value) + '\n';
+  return text;
 }
 
 }  // namespace egosgm::app

@@ -17,11 +17,15 @@ struct OptionArguments {
   std::string temporal, paths, disparities, min_disparity;
 
   void add_to(CLI::App& command);
-  /// Reads --config, and looks whether --save-config can be written. Throws InvalidArgument, naming the option (and the
-  /// file), or IoError.
+  /// Reads --config. Throws InvalidArgument, naming the option (and the file).
   PipelineOptions options() const;
+  /// Throws InvalidArgument where --save-config names a file that is there, and IoError where it cannot be written.
+  void expect_saves() const;
   /// Writes --save-config. Throws IoError.
   void save(const PipelineOptions& options) const;
 };
+
+/// What --save-config writes.
+std::string config_text(const PipelineOptions& options);
 
 }  // namespace egosgm::app

@@ -5,7 +5,6 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <limits>
 
 #include "egosgm/error.h"
@@ -21,13 +20,6 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
 constexpr std::size_t kAnySize = std::numeric_limits<std::size_t>::max() - 1;
 constexpr const char *kJsonDigestBegin = ",\n  \"digest\": \"", *kJsonDigestEnd = "\"\n}\n";
-
-/// FNV-1a.
-std::string digest_of(std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3u;
-  return fmt::format("{:016x}", hash);
-}
 
 /// Where a path leads, also one that is not there yet.
 fs::path place_of(const fs::path& path) {
@@ -72,7 +64,7 @@ bool is_map(const fs::path& file) {
 }
 
 bool is_own_json(const fs::path& file) {
-  return is_regular(file) && is_signed(vision::read_file(file, kMaxReportBytes), kJsonDigestBegin, kJsonDigestEnd);
+  return is_regular(file) && is_signed_json(vision::read_file(file, kMaxReportBytes));
 }
 
 void remove_file(const fs::path& file) {
@@ -191,11 +183,15 @@ bool is_own_page(const fs::path& file) {
   return is_regular(file) && is_signed(vision::read_file(file, kMaxReportBytes), kPageDigestBegin, kPageDigestEnd);
 }
 
-void write_own_json(const fs::path& file, const Json& json) {
+std::string signed_json(const Json& json) {
   std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace);
   text.resize(text.size() - 2);  // "\n}"
-  vision::write_file(file, signed_text(text, kJsonDigestBegin, kJsonDigestEnd));
+  return signed_text(text, kJsonDigestBegin, kJsonDigestEnd);
 }
+
+bool is_signed_json(const std::string& text) { return is_signed(text, kJsonDigestBegin, kJsonDigestEnd); }
+
+void write_own_json(const fs::path& file, const Json& json) { vision::write_file(file, signed_json(json)); }
 
 void expect_own_json(const fs::path& file) {
   if (!is_there(file) || is_own_json(file)) return;
@@ -207,19 +203,53 @@ OutputFolder::OutputFolder(const std::string& folder, const Inputs& inputs, Earl
                            const std::vector<std::string>& planned)
     : shown_(folder), treatment_(treatment), planned_(planned) {
   planned_.emplace_back("poses.txt");
+  replaced_.insert("poses.txt");
   expect_named("--out", folder);
   inputs.expect_apart(folder);
   path_ = place_of(folder);
   std::error_code none;
   if (is_there(path_) && !fs::is_directory(path_, none)) vision::make_folder(path_);  // says what is wrong
+  look();
+}
+
+void OutputFolder::look() {
+  files_.clear();
+  earlier_ = Json();
+  const std::map<std::string, std::string> recorded = record_ ? record_->files() : recorded_files(path_);
   read_report();
-  if (!earlier_.is_null() && treatment == EarlierRun::kRefuse) {
+  for (const auto& [name, digest] : recorded) files_[name] = digest;
+  const bool holds_a_run = !earlier_.is_null() || !files_.empty();
+  if (holds_a_run && treatment_ == EarlierRun::kRefuse) {
     throw InvalidArgument(fmt::format(
         "--out {}: holds an earlier run: give --resume to go on with it, --overwrite to replace it, or another folder",
         shown_));
   }
+  if (holds_a_run && earlier_.is_null() && resumes()) {
+    throw InvalidArgument(fmt::format(
+        "--resume: {} has no report.json, which says how that run was made: give --overwrite to start anew", shown_));
+  }
   expect_unchanged();
   expect_room_for(planned_);
+}
+
+fs::path OutputFolder::named_file(const std::string& option, const std::string& file) {
+  if (file.empty()) return {};
+  const fs::path path = place_of(fs::absolute(file).parent_path()) / fs::path(file).filename();
+  std::error_code none;
+  const std::string name = path.lexically_relative(path_).string();
+  if (!is_plain_name(name) || fs::is_symlink(path, none) || vision::is_stream(path)) {
+    expect_new_file(option, file);
+    return file;
+  }
+  const std::set<std::string> folders = folders_of(planned_);
+  if (name == "report.json" || name == kFileRecord || folders.contains(name) ||
+      std::find(planned_.begin(), planned_.end(), name) != planned_.end()) {
+    throw InvalidArgument(option + " " + file + ": is what the run writes itself: give another name");
+  }
+  const bool is_new_folders = path.parent_path() == path_ && !is_there(path_);
+  if (!is_new_folders && !files_.contains(name)) expect_new_file(option, file);
+  if (!replaced_.insert(name).second) throw InvalidArgument(option + " " + file + ": another option names it, too");
+  return path;
 }
 
 void OutputFolder::read_report() {
@@ -238,8 +268,8 @@ void OutputFolder::read_report() {
     const std::string name = entry[0];
     const Json& digest = entry[1];
     if (!is_plain_name(name) || name == "report.json") refuse("lists \"" + name + "\", which is no file of a run");
-    if (!digest.is_null() && !digest.is_string()) refuse("has no digest of " + name);
-    files_[name] = digest.is_null() ? "" : digest.get<std::string>();
+    if (!digest.is_string()) refuse("has no digest of " + name);
+    files_[name] = digest;
   }
 }
 
@@ -247,7 +277,7 @@ void OutputFolder::expect_unchanged() const {
   for (const auto& [name, digest] : files_) {
     const fs::path file = path_ / name;
     if (!is_there(file)) continue;
-    if (is_regular(file) && (digest.empty() || digest == digest_of(vision::read_file(file, kAnySize)))) continue;
+    if (is_regular(file) && digest == digest_of(vision::read_file(file, kAnySize))) continue;
     throw InvalidArgument(
         fmt::format("{}: was changed after the run wrote it: move it away, or choose another --out", file.string()));
   }
@@ -282,12 +312,19 @@ void OutputFolder::expect_room_for(const std::vector<std::string>& planned) cons
 }
 
 void OutputFolder::begin(const Json& identity) {
-  if (resumes() && !earlier_.is_null()) expect_same(shown_, earlier_, identity);
+  vision::make_folder(path_);
+  record_ = std::make_shared<FileRecord>(path_);
+  try {
+    look();
+    if (resumes() && !earlier_.is_null()) expect_same(shown_, earlier_, identity);
+  } catch (const std::exception&) {
+    if (record_->files().empty()) record_->remove();  // it was none before
+    throw;
+  }
   if (treatment_ == EarlierRun::kOverwrite) remove_earlier();
   earlier_ = Json();
-  vision::make_folder(path_);
-  for (const std::string& file : planned_) {
-    if (file != "poses.txt") files_.try_emplace(file);  // which is announced at the end
+  for (const std::string& name : replaced_) {
+    if (files_.erase(name) > 0) remove_file(path_ / name);
   }
 }
 
@@ -304,22 +341,22 @@ void OutputFolder::remove_earlier() {
   if (is_own_page(path_ / "report.html")) remove_file(path_ / "report.html");
   if (is_own_json(path_ / "done.json")) remove_file(path_ / "done.json");
   files_.clear();
+  record_->clear();
 }
 
-void OutputFolder::wrote(const std::string& file) {
-  files_[file] = digest_of(vision::read_file(path_ / file, kAnySize));
+void OutputFolder::record(const fs::path& file, std::string_view bytes) {
+  const std::string name = file.lexically_relative(path_).string();
+  if (!is_plain_name(name) || name == "report.json") return;
+  const std::string digest = digest_of(bytes);
+  record_->add(name, digest);
+  files_[name] = digest;
 }
 
-void OutputFolder::close() {
-  std::erase_if(files_, [this](const auto& file) { return file.second.empty() && !is_there(path_ / file.first); });
-  for (const auto& [name, digest] : files_) {
-    if (digest.empty()) wrote(name);  // a stopped run had written it, and this one did not come to it
-  }
-}
+void OutputFolder::end() { record_->remove(); }
 
 Json OutputFolder::files() const {
   Json json = Json::array();  // an object of so many keys is refused by readers
-  for (const auto& [name, digest] : files_) json.push_back({name, digest.empty() ? Json() : Json(digest)});
+  for (const auto& [name, digest] : files_) json.push_back({name, digest});
   return json;
 }
 

@@ -3,16 +3,20 @@
 
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "apps/file_record.h"
 #include "apps/sequence_arguments.h"
 #include "egosgm/vision/dataset.h"
 
 // Where the program may write. It replaces and removes only what it can prove to be its own:
-// - In the folder of a run, what the folder's report.json lists, with the digest of each file that it wrote.
+// - In the folder of a run, what the folder's report.json lists, with the digest of each file that it wrote; while the
+//   run is under way, and after a kill, the folder's FileRecord does so.
 // - JSON and HTML of its own that ends with a digest of all before, so that a file that was edited is another one.
 // Every other file that exists is in the way, and is refused before anything is written.
 
@@ -48,6 +52,9 @@ std::string signed_text(const std::string& text, const std::string& begin, const
 /// Whether the text is one of these, and as it was written.
 bool is_signed(const std::string& text, const std::string& begin, const std::string& end);
 
+/// JSON with a digest of itself, as text, and whether a text is such, and as it was written.
+std::string signed_json(const nlohmann::ordered_json& json);
+bool is_signed_json(const std::string& text);
 /// Writes JSON with a digest of itself. Throws IoError.
 void write_own_json(const std::filesystem::path& file, const nlohmann::ordered_json& json);
 /// Throws InvalidArgument where the file exists and is not as write_own_json left it.
@@ -67,27 +74,32 @@ class OutputFolder {
  public:
   OutputFolder() = default;
   /// Looks at the folder, and changes nothing. `planned`: the maps that are to be written, relative to it. Throws
-  /// InvalidArgument where a file is in the way: one that report.json does not list, or that was changed since.
+  /// InvalidArgument where a file is in the way: one that report.json does not list, or that was changed since. So it
+  /// does where another run is writing there.
   OutputFolder(const std::string& folder, const Inputs& inputs, EarlierRun treatment,
                const std::vector<std::string>& planned);
 
   const std::filesystem::path& path() const { return path_; }
   bool resumes() const { return treatment_ == EarlierRun::kResume; }
 
-  /// Makes OUT ready: removes what the earlier run wrote, or throws InvalidArgument where that run's report differs in
-  /// `identity` (RunReport::identity) from the one that is to go on.
+  /// The file that `option` names, which may lie in OUT, and is one of the run's own then. An empty name is none.
+  /// Throws InvalidArgument as expect_new_file does, and where the run writes that one anyway.
+  std::filesystem::path named_file(const std::string& option, const std::string& file);
+
+  /// Makes OUT ready, looking again: removes what the earlier run wrote, or throws InvalidArgument where that run's
+  /// report differs in `identity` (RunReport::identity) from the one that is to go on. No other run begins there then.
   void begin(const nlohmann::ordered_json& identity);
 
-  /// Lists a file that is about to be written. The report with it is to be written first.
-  void announce(const std::string& file) { files_[file].clear(); }
-  void wrote(const std::string& file);
-  /// Forgets what was announced and not written.
-  void close();
+  /// To be called before a file is written: the record has it before the disk.
+  void record(const std::filesystem::path& file, std::string_view bytes);
+  /// To be called once report.json lists all files.
+  void end();
 
-  /// For "files" of report.json: pairs of a name and a digest, null until the file is written.
+  /// For "files" of report.json: pairs of a name and a digest.
   nlohmann::ordered_json files() const;
 
  private:
+  void look();
   void read_report();
   void expect_unchanged() const;
   void expect_room_for(const std::vector<std::string>& planned) const;
@@ -97,8 +109,10 @@ class OutputFolder {
   std::string shown_;  // as the user wrote it
   EarlierRun treatment_ = EarlierRun::kRefuse;
   std::vector<std::string> planned_;
+  std::set<std::string> replaced_;            // by a run that goes on, too
   nlohmann::ordered_json earlier_;            // its report, null without one
-  std::map<std::string, std::string> files_;  // digests by name, empty until a file is written
+  std::map<std::string, std::string> files_;  // digests by name
+  std::shared_ptr<FileRecord> record_;        // while the run is under way
 };
 
 }  // namespace egosgm::app

@@ -32,6 +32,8 @@
 namespace egosgm::app {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr const char* kKilled = "a kill, or it is still running";
 
 using Clock = std::chrono::steady_clock;
@@ -67,7 +69,7 @@ class Run {
   Run(const SequenceJob& job, const Device& device)
       : quiet_(job.quiet),
         folder_(job.out),
-        kinds_(job.kinds),
+        save_config_(job.save_config),
         sequence_(job.sequence),
         input_(job.input),
         size_(vision::check_image_sizes(sequence_)),
@@ -83,8 +85,10 @@ class Run {
   }
 
   bool operator()() {
+    const vision::BeforeWrite recording([this](const auto& file, auto bytes) { folder_.record(file, bytes); });
     write_report(false, kKilled);
     try {
+      if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
       const bool finished = process_all();
       finish(finished, finished ? "" : "an interrupt");
       if (!finished) {
@@ -161,7 +165,6 @@ class Run {
     const vision::StereoFrame& frame = sequence_.frames[prepared.index];
     const auto before_write = Clock::now();
     const std::int64_t unstorable = outputs_->write(frame, prepared.images.left, folder_.resumes());
-    for (const std::string& file : output_files(kinds_, frame.name)) folder_.wrote(file);
     const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
@@ -199,15 +202,10 @@ class Run {
 
   void finish(bool finished, const std::string& why_not) {
     report_.set_doubt(doubt_.text());
-    folder_.close();
-    if (!poses_.empty()) {
-      folder_.announce("poses.txt");
-      write_report(false, kKilled);
-      vision::write_poses(folder_.path() / "poses.txt", poses_);
-      folder_.wrote("poses.txt");
-    }
-    write_report(finished, why_not);
+    if (!poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
     if (trace_) trace_->write();
+    write_report(finished, why_not);
+    folder_.end();
     if (trace_ && !trace_->has_device_times() && !quiet_) {
       fmt::print("{} gives no times of commands: the trace has those of the host only\n",
                  pipeline_.device().info().name);
@@ -234,7 +232,7 @@ class Run {
 
   const bool quiet_;
   OutputFolder folder_;
-  const std::set<std::string> kinds_;
+  const fs::path save_config_;
   const vision::StereoSequence& sequence_;
   const std::string& input_;
   const cv::Size size_;
@@ -272,8 +270,8 @@ SequenceJob job_of(const RunArguments& arguments) {
   for (const std::string& file : {arguments.poses, arguments.method.config, arguments.tuning}) inputs.add_file(file);
   inputs.add_folder(arguments.programs);
   job.out = OutputFolder(arguments.out, inputs, earlier, output_files(job.kinds, job.sequence));
-  if (!arguments.trace.empty()) expect_new_file("--trace", arguments.trace);
-  job.trace = arguments.trace;
+  job.trace = job.out.named_file("--trace", arguments.trace);
+  job.save_config = job.out.named_file("--save-config", arguments.method.save_config);
   job.quiet = arguments.quiet;
   return job;
 }
@@ -283,7 +281,6 @@ int run(const RunArguments& arguments) {
   Device device = Device::select(arguments.device);
   if (arguments.programs.empty() || !arguments.tuning.empty()) device = tuned_by_argument(device, arguments.tuning);
   if (!arguments.programs.empty()) device = device.with_programs(arguments.programs);
-  arguments.method.save(job.options);
   catch_interrupts();
   return run_sequence(job, device) ? kOk : kInterrupted;
 }

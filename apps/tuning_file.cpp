@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
+#include "apps/output_folder.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "host/json_text.h"
@@ -24,13 +25,10 @@ std::string key_of(const DeviceInfo& device) { return device.name + ", driver " 
       fmt::format("{}: {}: move it away and run egosgm tune again, or give --tuning none", file.string(), what));
 }
 
-[[noreturn]] void refuse_to_store(const std::filesystem::path& file) {
-  throw InvalidArgument(file.string() + ": not a tuning file, and stays as it is: give another --file");
-}
-
 Json read(const std::filesystem::path& file) {
   Json json = parse_json(vision::read_file(file, kMaxBytes), file);
   if (!json.is_object()) refuse(file, "not a tuning file");
+  json.erase("digest");
   return json;
 }
 
@@ -74,14 +72,10 @@ void expect_tuning_file(const std::filesystem::path& file) {
   if (file.has_parent_path()) vision::make_folder(file.parent_path());
   vision::expect_writable(file);
   if (!std::filesystem::is_regular_file(file)) return;
-  const Json json = read(file);
-  const auto is_tuning = [](const auto& entry) {
-    return entry.key().find(", driver ") != std::string::npos && entry.value().is_object();
-  };
-  for (const auto& entry : json.items()) {
-    if (!is_tuning(entry)) refuse_to_store(file);
-  }
-  if (json.empty()) refuse_to_store(file);
+  if (is_signed_json(vision::read_file(file, kMaxBytes))) return;
+  throw InvalidArgument(file.string() +
+                        ": is not as egosgm tune wrote it, or not its file at all, and stays: give another --file, or "
+                        "move it away");
 }
 
 void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, const Tuning& tuning) {
@@ -93,7 +87,7 @@ void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, c
     sizes[name] = number.is_discarded() ? Json(value) : number;
   }
   json[key_of(device)] = sizes;
-  vision::write_file(file, json.dump(2) + '\n');
+  vision::write_file(file, signed_json(json));
 }
 
 }  // namespace egosgm::app

@@ -242,6 +242,7 @@ int view(const ViewArguments& arguments) {
   if (window) require_display();
   vision::StereoSequence sequence = arguments.input.open();
   const PipelineOptions options = arguments.method.options();
+  arguments.method.expect_saves();
   if (!arguments.pictures.empty()) new_folder("--pictures", arguments.pictures, Inputs(arguments.input, sequence));
   if (!arguments.video.empty()) expect_video(arguments.video);
   DrawnSequence drawn(arguments, std::move(sequence), options);

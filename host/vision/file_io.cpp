@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <limits>
 #include <system_error>
 #include <utility>
@@ -51,8 +52,21 @@ class Descriptor {
                 "; free some space or choose a folder that can be written");
 }
 
+/// For what a pipe without its other end would be waited for without an end: whether to try again.
+class Patience {
+ public:
+  bool goes_on() {
+    constexpr timespec kPause{.tv_sec = 0, .tv_nsec = 10'000'000};
+    ::nanosleep(&kPause, nullptr);
+    return ++tries_ < 500;
+  }
+
+ private:
+  int tries_ = 0;
+};
+
 Descriptor open_for_reading(const std::filesystem::path& file) {
-  Descriptor descriptor(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  Descriptor descriptor(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));  // a pipe may have no writer yet
   if (!descriptor.is_open()) fail_reading(file, errno);
   struct stat status {};
   if (::fstat(descriptor.get(), &status) != 0) fail_reading(file, errno);
@@ -68,6 +82,8 @@ std::string read_up_to(const Descriptor& descriptor, const std::filesystem::path
   constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
   struct stat status {};
   std::string bytes;
+  Patience patience;
+  bool has_writer = false;
   if (::fstat(descriptor.get(), &status) == 0 && status.st_size > 0) {
     bytes.reserve(std::min(max_bytes, static_cast<std::size_t>(status.st_size)));
   }
@@ -80,9 +96,17 @@ std::string read_up_to(const Descriptor& descriptor, const std::filesystem::path
     do {
       got = ::read(descriptor.get(), bytes.data() + begin, wanted);
     } while (got < 0 && errno == EINTR);
-    if (got < 0) fail_reading(file, errno);
-    bytes.resize(begin + static_cast<std::size_t>(got));
-    if (got == 0) break;
+    bytes.resize(begin + static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
+    if (got < 0 && errno == EAGAIN) {  // a pipe's writer is there: from here on reads wait
+      has_writer = true;
+      ::fcntl(descriptor.get(), F_SETFL, 0);
+    } else if (got < 0) {
+      fail_reading(file, errno);
+    } else if (got == 0 && S_ISFIFO(status.st_mode) && !has_writer && bytes.empty()) {
+      if (!patience.goes_on()) throw InvalidArgument(file.string() + ": is a pipe that nobody writes to; give a file");
+    } else if (got == 0) {
+      break;
+    }
   }
   return bytes;
 }
@@ -153,9 +177,18 @@ void write_through(const Target& target, const fs::path& file, std::string_view 
   if (target.exists && S_ISBLK(target.status.st_mode)) {
     throw IoError(file.string() + ": is a disk: choose the name of a file");
   }
-  Descriptor descriptor(target.descriptor >= 0 ? ::fcntl(target.descriptor, F_DUPFD_CLOEXEC, 0)
-                                               : ::open(file.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY));
+  const auto open = [&] {
+    return target.descriptor >= 0 ? ::fcntl(target.descriptor, F_DUPFD_CLOEXEC, 0)
+                                  : ::open(file.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
+  };
+  Descriptor descriptor(open());
+  const auto has_no_reader = [&] { return !descriptor.is_open() && errno == ENXIO && S_ISFIFO(target.status.st_mode); };
+  for (Patience patience; has_no_reader();) {
+    if (!patience.goes_on()) throw IoError(file.string() + ": is a pipe that nobody reads; give a file");
+    descriptor = Descriptor(open());
+  }
   if (!descriptor.is_open()) fail_writing(file, errno);
+  if (target.descriptor < 0) ::fcntl(descriptor.get(), F_SETFL, 0);  // writes wait for room
   int error = write_all(descriptor, bytes);
   if (descriptor.close() != 0 && error == 0) error = errno;
   if (error != 0) fail_writing(file, error);
@@ -231,7 +264,12 @@ class Unfinished {
   fs::path hidden_;  // its name until it is whole, where it has one
 };
 
+thread_local const BeforeWrite* before_write = nullptr;
+
 }  // namespace
+
+BeforeWrite::BeforeWrite(Function before) : before_(std::move(before)), outer_(before_write) { before_write = this; }
+BeforeWrite::~BeforeWrite() { before_write = outer_; }
 
 std::string read_file(const std::filesystem::path& file, std::size_t max_bytes) {
   std::string bytes = read_up_to(open_for_reading(file), file, max_bytes + 1);
@@ -249,6 +287,7 @@ std::string read_file_start(const std::filesystem::path& file, std::size_t bytes
 bool is_stream(const std::filesystem::path& file) { return target_of(file).is_stream(); }
 
 void write_file(const std::filesystem::path& file, std::string_view bytes) {
+  if (before_write) before_write->before_(file, bytes);
   const Target target = target_of(file);
   if (target.is_stream()) return write_through(target, file, bytes);
   Unfinished unfinished(target);

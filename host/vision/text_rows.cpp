@@ -15,14 +15,6 @@ std::vector<std::string_view> split_tokens(std::string_view text) {
   return tokens;
 }
 
-std::optional<double> parse_number(std::string_view token) {
-  if (token.size() > 1 && token.front() == '+' && token[1] != '-') token.remove_prefix(1);
-  double value = 0;
-  const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), value);
-  if (error != std::errc() || end != token.data() + token.size()) return std::nullopt;
-  return value;
-}
-
 void append_number(std::string& text, double value, int digits) {
   char buffer[64];
   const auto [end, error] = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::scientific, digits);

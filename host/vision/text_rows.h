@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
 #include <filesystem>
 #include <optional>
@@ -43,10 +44,18 @@ inline std::string quoted(std::string_view text) {
   throw InvalidArgument(file.string() + ":" + std::to_string(row) + ": " + why);
 }
 
-/// All rows of `file`, blank ones too; views into `text`. Throws InvalidArgument where a row has more than 65,536 bytes
-/// or there are more than 2,000,000.
+/// `text` without the mark of UTF-8 that some editors begin a file with.
+inline std::string_view without_mark(std::string_view text) {
+  constexpr std::string_view kMark = "\xef\xbb\xbf";
+  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
+  return text;
+}
+
+/// All rows of `file`, blank ones too; views into `text`, which may begin with the mark of UTF-8. Throws
+/// InvalidArgument where a row has more than 65,536 bytes or there are more than 2,000,000.
 inline std::vector<TextRow> split_rows(std::string_view text, const std::filesystem::path& file) {
   std::vector<TextRow> rows;
+  text = without_mark(text);
   for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     if (rows.size() == kMaxRows) {
@@ -67,7 +76,13 @@ inline std::vector<TextRow> split_rows(std::string_view text, const std::filesys
 std::vector<std::string_view> split_tokens(std::string_view text);
 
 /// The whole of `token` as a decimal number; empty if it is none. May be infinite or NaN. Independent of the locale.
-std::optional<double> parse_number(std::string_view token);
+inline std::optional<double> parse_number(std::string_view token) {
+  if (token.size() > 1 && token.front() == '+' && token[1] != '-') token.remove_prefix(1);
+  double value = 0;
+  const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), value);
+  if (error != std::errc() || end != token.data() + token.size()) return std::nullopt;
+  return value;
+}
 
 /// Appends `value` in scientific notation with `digits` decimals, independent of the locale.
 void append_number(std::string& text, double value, int digits);

@@ -28,6 +28,19 @@ def state(folder):
     return found
 
 
+def digest_of(data):
+    digest = 0xcbf29ce484222325
+    for byte in data:
+        digest = (digest ^ byte) * 0x100000001b3 % 2**64
+    return f"{digest:016x}"
+
+
+def signed(json_object):
+    """As the program writes its own JSON: a forgery, here."""
+    text = json.dumps({key: value for key, value in json_object.items() if key != "digest"}, indent=2)[:-2]
+    return f'{text},\n  "digest": "{digest_of(text.encode())}"\n}}\n'
+
+
 class FilesTest(ProgramTest):
     def user_folder(self):
         """left, right, calib.toml, poses.txt, config.toml: what a user has."""
@@ -177,17 +190,15 @@ class OwnFiles(FilesTest):
         for name in ("../user/poses.txt", str(user / "poses.txt"), "right/000000.png", "disparity/../../user/poses.txt", "", ".", "..", "disparity",
                      "disparity/", "./poses.txt", "report.json"):
             report = json.loads(whole)
-            del report["digest"]
-            report["files"].append([name, None])
-            text = json.dumps(report, indent=2)[:-2]
-            digest = 0xcbf29ce484222325
-            for byte in text.encode():
-                digest = (digest ^ byte) * 0x100000001b3 % 2**64
-            (out / "report.json").write_text(f'{text},\n  "digest": "{digest:016x}"\n}}\n')
+            report["files"].append([name, digest_of((out / name).read_bytes()) if (out / name).is_file() else "0" * 16])
+            (out / "report.json").write_text(signed(report))
             for how in ("--overwrite", "--resume"):
                 with self.subTest(name=name, how=how):
                     self.assert_refused_and_untouched(user.parent, ["run", "--odometry", self.street, "--frames", "0:1", *METHOD, "--out", out, how])
-        for broken in (whole[:len(whole) // 2], "", "{}", "[]", whole.replace("egosgm", "EGOSGM", 1), "[" * 200000):
+        report = json.loads(whole)
+        report["files"].append(["disparity/000009.png", None])
+        shutil.copy(user / "left/000000.png", out / "disparity/000009.png")
+        for broken in (signed(report), whole[:len(whole) // 2], "", "{}", "[]", whole.replace("egosgm", "EGOSGM", 1), "[" * 200000):
             (out / "report.json").write_text(broken)
             for how in ("--overwrite", "--resume"):
                 self.assert_refused_and_untouched(user.parent, ["run", "--odometry", self.street, "--frames", "0:1", *METHOD, "--out", out, how],
@@ -208,6 +219,34 @@ class OwnFiles(FilesTest):
         self.assert_refused_and_untouched(user, ["run", "--odometry", self.street, *METHOD, "--out", fresh, "--write", "variance"])
         (fresh / "poses.txt").unlink()
         self.assert_refused_and_untouched(user, ["run", "--odometry", self.street, *METHOD, "--out", fresh, "--write", "variance"], "a link")
+
+    def test_named_files_in_out_are_the_runs(self):
+        out = self.new_folder() / "out"
+        run = ["run", "--odometry", self.street, "--frames", "0:1", *METHOD, "--out", out]
+        named = ["--trace", out / "trace.json", "--save-config", out / "used.toml"]
+        self.assert_works(*run, *named)
+        self.assertLessEqual({"trace.json", "used.toml"}, {name for name, _ in self.report(out)["files"]})
+        for how in ("--overwrite", "--resume"):
+            self.assert_works(*run, *named, how)
+            self.assertIn("traceEvents", json.loads((out / "trace.json").read_text()))
+        (out / "used.toml").write_text("disparities = 16 # mine\n")
+        self.assert_refused_and_untouched(out, [*run, *named, "--overwrite"], "used.toml")
+        (out / "used.toml").unlink()
+        (out / "mine.json").write_text("mine")
+        self.assert_refused_and_untouched(out, [*run, "--trace", out / "mine.json", "--overwrite"], "mine.json", "is there already")
+        self.assert_works(*run, "--overwrite")
+        self.assertEqual(sorted(file.name for file in out.rglob("*") if file.is_file()),
+                         ["000000.png", "000001.png", "mine.json", "poses.txt", "report.json"])
+
+    def test_named_files_that_the_run_writes_anyway(self):
+        for name in ("report.json", "poses.txt", "disparity", "disparity/000000.png", "files.part"):
+            for option in ("--trace", "--save-config"):
+                out = self.new_folder()
+                with self.subTest(name=name, option=option):
+                    self.assert_refused_and_untouched(out, ["run", "--odometry", self.street, *METHOD, "--out", out, option, out / name], option)
+        out = self.new_folder()
+        self.assert_refused_and_untouched(out, ["run", "--odometry", self.street, *METHOD, "--out", out, "--trace", out / "a", "--save-config", f"{out}/./a"],
+                                          "another option")
 
     def test_a_page_is_made_again_unless_it_was_edited(self):
         out = self.new_folder()
@@ -319,15 +358,27 @@ class TuneFiles(FilesTest):
         self.assert_works("tune", "--file", file, "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "ForwardWarp")
         kept = json.loads(file.read_text())
         next(iter(kept.values()))["tile_width"] = 96
-        file.write_text(json.dumps(kept))
+        file.write_text(signed(kept))
         before = file.read_bytes()
         process = subprocess.Popen([PROGRAM, "tune", "--file", file, "--width", "64", "--height", "24", "--disparities", "16", "--rounds", "1000"],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
-        process.communicate(timeout=600)
+        _, errors = process.communicate(timeout=600)
         self.assertNotEqual(process.returncode, 0)
+        self.assertNotIn("stays", errors)
         self.assertEqual(file.read_bytes(), before)
+
+    def test_a_file_that_tune_did_not_write_stays(self):
+        folder = self.new_folder()
+        tune = ["tune", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "ForwardWarp", "--file"]
+        self.assert_works(*tune, folder / "tuning.json")
+        self.assert_works(*tune, folder / "tuning.json")
+        self.assert_works("run", "--odometry", self.street, "--frames", "0", *METHOD, "--out", folder / "out", "--tuning", folder / "tuning.json")
+        whole = json.loads((folder / "tuning.json").read_text())
+        for name, text in (("shape.json", '{"a, driver b": {}}'), ("edited.json", json.dumps(whole)), ("empty.json", "{}")):
+            (folder / name).write_text(text)
+            self.assert_refused_and_untouched(folder, [*tune, folder / name], name, "stays")
 
 
 if __name__ == "__main__":

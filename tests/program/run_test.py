@@ -167,7 +167,8 @@ class Run(ProgramTest):
         environment = dict(os.environ, XDG_CONFIG_HOME=str(folder), POCL_MAX_PTHREAD_COUNT="5", POCL_CPU_MAX_CU_COUNT="5")
         self.assert_works("tune", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "SpeckleRemoval", env=environment)
         stored = json.loads(file.read_text())
-        self.assertEqual(len(stored), 1)
+        self.assertEqual(list(stored)[1:], ["digest"])
+        del stored["digest"]
         key, sizes = stored.popitem()
         self.assertIn("driver", key)
         self.assertIn("tile_width", sizes)

@@ -184,6 +184,81 @@ class Disk(LongRuns):
         self.assertEqual(list(out.iterdir()), [])
 
 
+class Killed(LongRuns):
+    """A run that was killed leaves a record of what it wrote, which proves what is its own; the lock on it goes with the process."""
+
+    def killed(self):
+        street, out = self.long_street(), self.new_folder()
+        process = self.start(street, out, "--write", "variance", lines=3)
+        process.kill()
+        process.communicate()
+        self.assertTrue((out / "files.part").exists())
+        return street, out
+
+    def state(self, out):
+        return {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+
+    def assert_stays(self, street, out, *named):
+        before = self.state(out)
+        for how in ("--overwrite", "--resume"):
+            self.assert_refused(["run", "--odometry", street, "--out", out, "--write", "variance", how], *named)
+            self.assertEqual(self.state(out), before)
+
+    def test_what_it_wrote_is_replaced(self):
+        street, out = self.killed()
+        (out / "notes.txt").write_text("mine")
+        self.assert_works("run", "--odometry", street, "--out", out, "--frames", "0", "--overwrite")
+        self.assertEqual(sorted(file.name for file in out.rglob("*") if file.is_file()), ["000000.png", "notes.txt", "poses.txt", "report.json"])
+
+    def test_what_was_edited_or_put_there_since_stays(self):
+        street, out = self.killed()
+        (out / "disparity/000001.png").write_text("mine")
+        self.assert_stays(street, out, "disparity/000001.png")
+        (out / "disparity/000001.png").unlink()
+        (out / f"variance/{self.LONG - 1:06d}.pfm").write_text("mine")
+        self.assert_stays(street, out, f"variance/{self.LONG - 1:06d}.pfm")
+
+    def test_a_record_that_is_not_its_own_stays(self):
+        street, out = self.killed()
+        record = out / "files.part"
+        whole = record.read_bytes()
+        lines = whole.splitlines(keepends=True)
+        for edited in (b"mine", b"".join(lines[:2] + lines[3:]), whole.replace(b"disparity", b"Disparity", 1), whole + b"mine\n"):
+            record.write_bytes(edited)
+            self.assert_stays(street, out, "files.part")
+        record.unlink()
+        record.symlink_to(out / "report.json")
+        self.assert_stays(street, out, "files.part")
+        fresh = self.new_folder()
+        (fresh / "files.part").write_text("mine")
+        self.assert_stays(street, fresh, "files.part")
+        record.unlink()
+        record.write_bytes(whole[:-5])  # a kill in the midst of a line: the file of that line is not there
+        last = out / lines[-1].split()[-1].decode()
+        last.unlink(missing_ok=True)
+        self.assert_works("run", "--odometry", street, "--out", out, "--write", "variance", "--resume")
+        self.assertFalse(record.exists())
+
+    def test_a_run_without_its_report_does_not_go_on(self):
+        street, out = self.killed()
+        (out / "report.json").unlink()
+        self.assert_refused(["run", "--odometry", street, "--out", out, "--write", "variance", "--resume"], "report.json", "--overwrite")
+        self.assert_works("run", "--odometry", street, "--out", out, "--frames", "0", "--overwrite")
+
+    def test_a_run_under_way_is_left_alone(self):
+        street, out = self.long_street(), self.new_folder() / "one"
+        process = self.start(street, out, lines=2)
+        for how in ([], ["--overwrite"], ["--resume"]):
+            self.assert_refused(["run", "--odometry", street, "--out", out, *how], out, "another egosgm is writing there")
+        batch_list = self.new_folder() / "list"
+        batch_list.write_text(f"one {street}\n")
+        self.assert_refused(["batch", batch_list, "--out", out.parent, "--overwrite"], "another egosgm is writing there")
+        _, errors = process.communicate(timeout=600)
+        self.assertEqual((process.returncode, errors), (0, ""))
+        self.assertEqual(self.assert_whole(out), self.LONG)
+        self.assertFalse((out / "files.part").exists())
+
+
 class Resume(LongRuns):
     """An earlier run in OUT: in the way, replaced, or gone on with."""
     FRAMES = 12

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -23,6 +24,23 @@ EGOSGM_EXPORT std::string read_file_start(const std::filesystem::path& file, std
 /// regular file (a pipe, a terminal, /dev/stdout) is written through; a disk is refused. Not flushed to the medium: a
 /// power cut may lose it. Throws IoError. Thread-safe for different files.
 EGOSGM_EXPORT void write_file(const std::filesystem::path& file, std::string_view bytes);
+
+/// While it lives, `before` is called by each write_file of its thread with the file and its bytes, before the file has
+/// them: for a record of files that is never behind them. What `before` throws ends the write. The last one made
+/// counts.
+class EGOSGM_EXPORT BeforeWrite {
+ public:
+  using Function = std::function<void(const std::filesystem::path& file, std::string_view bytes)>;
+  explicit BeforeWrite(Function before);
+  ~BeforeWrite();
+  BeforeWrite(const BeforeWrite&) = delete;
+  BeforeWrite& operator=(const BeforeWrite&) = delete;
+
+ private:
+  const Function before_;
+  const BeforeWrite* const outer_;
+  friend EGOSGM_EXPORT void write_file(const std::filesystem::path& file, std::string_view bytes);
+};
 
 /// Whether write_file writes through to what stands there, and replaces nothing. Throws IoError. Thread-safe.
 EGOSGM_EXPORT bool is_stream(const std::filesystem::path& file);
