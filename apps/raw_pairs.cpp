@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cmath>
 #include <map>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -198,14 +200,9 @@ std::unique_ptr<RawPairs> open_list(const fs::path& file) {
     std::string left, right, time, more;
     if (!(words >> left)) continue;
     words >> right >> time;
-    std::optional<double> seconds;
-    std::size_t end = 0;
-    try {
-      if (!time.empty()) seconds = std::stod(time, &end);
-    } catch (const std::exception&) {
-      end = 0;
-    }
-    if (right.empty() || end != time.size() || words >> more) {
+    const std::optional<double> seconds = vision::parse_number(time);
+    const bool is_time = time.empty() || (seconds && std::isfinite(*seconds));
+    if (right.empty() || !is_time || words >> more) {
       vision::refuse_row(file, row.number, "give LEFT RIGHT or LEFT RIGHT SECONDS");
     }
     pairs.push_back({file.parent_path() / left, file.parent_path() / right, seconds});
@@ -223,8 +220,10 @@ std::map<std::int64_t, fs::path> euroc_images(const fs::path& camera) {
     if (vision::trim(row.text).empty() || row.text.starts_with('#')) continue;
     const std::size_t comma = std::min(row.text.find(','), row.text.size());
     const std::string_view name = vision::trim(row.text.substr(std::min(comma + 1, row.text.size())));
+    const std::string_view time = vision::trim(row.text.substr(0, comma));
     std::int64_t time_ns = 0;
-    if (name.empty() || !(std::istringstream(std::string(row.text.substr(0, comma))) >> time_ns)) {
+    const auto [end, error] = std::from_chars(time.data(), time.data() + time.size(), time_ns);
+    if (name.empty() || error != std::errc() || end != time.data() + time.size()) {
       vision::refuse_row(file, row.number, vision::quoted(row.text) + " is not TIME,FILE");
     }
     images[time_ns] = camera / "data" / name;

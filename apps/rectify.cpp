@@ -87,7 +87,12 @@ class SequenceFolder {
   explicit SequenceFolder(const fs::path& folder) : folder_(folder) {}
 
   void add(const RawPair& pair) {
+    if (frames_ > 0 && pair.left.size() != size_) {
+      throw InvalidArgument(fmt::format("pair {} is {}x{}, the pairs before {}x{}: all need one size", frames_ + 1,
+                                        pair.left.cols, pair.left.rows, size_.width, size_.height));
+    }
     if (frames_ == 0) {
+      size_ = pair.left.size();
       colour_ = pair.left.channels() > 1;
       for (const char* side : {left(), right()}) vision::make_folder(folder_ / side);
     }
@@ -124,6 +129,7 @@ class SequenceFolder {
   }
 
   const fs::path folder_;
+  cv::Size size_;
   bool colour_ = false, timeless_ = false;
   int frames_ = 0;
   std::string times_;
@@ -167,6 +173,10 @@ int rectify(const RectifyArguments& arguments) {
     }
     if (pairs->note() != note) progress.note(pairs->note());
   }
+  if (interrupted() && folder.frames() == 0) {
+    fmt::print(stderr, "egosgm: interrupted before the first pair\n");
+    return kInterrupted;
+  }
   folder.finish(rectifier);
   if (!arguments.quiet) {
     const Calibration& c = rectifier.calibration();
@@ -176,9 +186,12 @@ int rectify(const RectifyArguments& arguments) {
       fmt::print("valid: left {}, right {} (valid.png has the left one's pixels)\n",
                  rectangle_text(rectification->valid_left), rectangle_text(rectification->valid_right));
     }
-    fmt::print("egosgm doctor {0}; egosgm run --odometry {0} --out OUT\n", arguments.out);
+    fmt::print("egosgm doctor {0}; egosgm run --odometry {0} --out OUT\n", shell_word(arguments.out));
   }
-  return interrupted() ? kInterrupted : kOk;
+  if (!interrupted()) return kOk;
+  fmt::print(stderr, "egosgm: interrupted after {}: what is in {} is whole\n",
+             counted(static_cast<std::size_t>(folder.frames()), "pair"), arguments.out);
+  return kInterrupted;
 }
 
 }  // namespace

@@ -48,7 +48,10 @@ Json read_run(const fs::path& folder) {
   for (const char* key : {"input", "version", "device", "calibration", "options", "frames"}) {
     if (!has(key)) throw InvalidArgument(file.string() + ": not the report of a run: it has no \"" + key + "\"");
   }
-  if (run["frames"].empty()) throw InvalidArgument(file.string() + ": the run has no frames: run it again");
+  if (run["frames"].empty()) {
+    throw InvalidArgument(file.string() + ": lists no frame, as the run was killed, is under way, or was stopped before "
+                                          "its first: let it end, or run it again with --resume");
+  }
   return run;
 }
 

@@ -3,6 +3,8 @@
 
 #include <fmt/core.h>
 
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
@@ -27,9 +29,15 @@ fs::path report_of(const fs::path& path) {
   return {};
 }
 
+constexpr int kMaxNumber = std::numeric_limits<int>::max() - 1;
+constexpr int kMaxFrames = 2'000'000;  // as many rows as a text of poses may have
+
+/// From 0 to kMaxNumber, or -1.
 int integer(const Json& json, const char* key) {
   const auto found = json.find(key);
-  return found != json.end() && found->is_number_integer() ? found->get<int>() : -1;
+  if (found == json.end() || !found->is_number_unsigned()) return -1;
+  const auto number = found->get<std::uint64_t>();
+  return number <= kMaxNumber ? static_cast<int>(number) : -1;
 }
 
 /// All numbers of the sequence that the run's were chosen from, where they have no gaps.
@@ -37,7 +45,7 @@ std::vector<int> numbers_of(const Json& run) {
   const auto sequence = run.find("sequence");
   if (sequence == run.end() || !sequence->is_object()) return {};
   const int first = integer(*sequence, "first_frame"), frames = integer(*sequence, "frames");
-  if (first < 0 || frames < 1 || integer(*sequence, "last_frame") - first + 1 != frames) return {};
+  if (first < 0 || frames < 1 || frames > kMaxFrames || integer(*sequence, "last_frame") - first + 1 != frames) return {};
   std::vector<int> numbers(static_cast<std::size_t>(frames));
   std::iota(numbers.begin(), numbers.end(), first);
   return numbers;

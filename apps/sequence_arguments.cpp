@@ -99,16 +99,21 @@ vision::StereoSequence SequenceArguments::open() const {
   return vision::open_patterns(left, right, calib, range, pairing);
 }
 
+std::string shell_word(const std::string& text) {
+  const bool is_plain = std::all_of(text.begin(), text.end(), [](unsigned char c) {
+    return std::isalnum(c) || std::string_view("/._-+=:,@%").find(static_cast<char>(c)) != std::string_view::npos;
+  });
+  if (is_plain && !text.empty()) return text;
+  std::string quoted = "'";
+  for (const char c : text) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  return quoted + "'";
+}
+
 std::string SequenceArguments::text() const {
   std::string text;
   const auto append = [&](const char* name, const std::string& value) {
     if (value.empty()) return;
-    const bool is_plain = std::all_of(value.begin(), value.end(), [](unsigned char c) {
-      return std::isalnum(c) || std::string_view("/._-+=:,@%").find(static_cast<char>(c)) != std::string_view::npos;
-    });
-    std::string quoted = "'";
-    for (const char c : value) quoted += c == '\'' ? "'\\''" : std::string(1, c);
-    text += (text.empty() ? "" : " ") + std::string(name) + (is_plain ? value : quoted + "'");
+    text += (text.empty() ? "" : " ") + std::string(name) + shell_word(value);
   };
   append("", folder);
   append("--kitti ", kitti);

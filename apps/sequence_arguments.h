@@ -25,4 +25,7 @@ void add_pair_by(CLI::App& command, std::string& pair_by, const std::string& gro
 /// "name", "order" or empty. Throws InvalidArgument.
 vision::PairBy parse_pair_by(const std::string& pair_by);
 
+/// `text` as a word of a shell's command.
+std::string shell_word(const std::string& text);
+
 }  // namespace egosgm::app

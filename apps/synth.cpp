@@ -5,6 +5,7 @@
 #include "apps/counted.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
+#include "apps/sequence_arguments.h"
 #include "egosgm/vision/synthetic.h"
 
 namespace egosgm::app {
@@ -27,7 +28,7 @@ int render(const SynthArguments& arguments) {
   }
   if (!arguments.quiet) {
     fmt::print("{} in {}: egosgm run --odometry {} --out OUT\n", counted(arguments.options.frames, "frame"),
-               arguments.out, arguments.out);
+               arguments.out, shell_word(arguments.out));
   }
   return kOk;
 }

@@ -158,6 +158,10 @@ bool is_parent(const fs::path& file, const fs::path& folder) {
 }
 
 void require_image(const fs::path& file) {
+  if (std::error_code none; fs::is_directory(file, none)) {
+    throw InvalidArgument(file.string() + ": is a folder; give a pattern of its images, '" + (file / "*.png").string() +
+                          "' for example");
+  }
   if (!is_file(file)) throw MissingPath(file.string(), "no such image; give an existing PNG or JPEG file");
 }
 
@@ -187,7 +191,8 @@ fs::path image_named(const fs::path& folder, const std::string& stem) {
 
 FrameRange parse_frame_range(const std::string& text) {
   const auto refuse = [&]() -> FrameRange {
-    throw InvalidArgument("frames '" + text + "': give FIRST:LAST, FIRST:, :LAST or one number, for example 7:10");
+    throw InvalidArgument("frames '" + text +
+                          "': give FIRST:LAST with FIRST at most LAST, FIRST:, :LAST or one number, for example 7:10");
   };
   const std::size_t colon = text.find(':');
   FrameRange range;

@@ -69,7 +69,7 @@ bool is_standstill(const Motion& motion) {
 
 void StereoOdometryOptions::validate() const {
   const auto positive = [](double value) { return std::isfinite(value) && value > 0; };
-  require(positive(max_translation_m), "max_translation_m must be positive");
+  require(positive(max_translation_m), "max_translation_m must be positive and finite");
   require(positive(max_rotation_deg) && max_rotation_deg <= 180, "max_rotation_deg must be in (0, 180]");
   require(corner_threshold > 0 && corner_threshold <= 4000, "corner_threshold must be in 1..4000");
   require(max_features > 0, "max_features must be positive");

@@ -4,6 +4,7 @@
 #include <initializer_list>
 #include <opencv2/calib3d.hpp>
 #include <string>
+#include <string_view>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
@@ -28,9 +29,25 @@ auto blaming(const fs::path& file, Read&& read) {
   }
 }
 
+/// OpenCV's parsers call themselves for what is nested, as deep as it is: what begins something is counted.
+void check_nesting(const std::string& text, const fs::path& file) {
+  constexpr int kMost = 2000;
+  int begun = 0;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool ends_word =
+        i + 1 == text.size() || std::string_view(" \t\r\n").find(text[i + 1]) != std::string_view::npos;
+    if (std::string_view("[{<").find(text[i]) != std::string_view::npos) ++begun;
+    if (ends_word && (text[i] == ':' || text[i] == '-')) ++begun;
+  }
+  if (begun <= kMost) return;
+  throw InvalidArgument(file.string() + ": has " + std::to_string(begun) + " nested or named parts, the most is " +
+                        std::to_string(kMost) + "; give a calibration alone");
+}
+
 /// A file of OpenCV's cv::FileStorage, also without its header, as others write YAML.
 cv::FileStorage open_storage(const fs::path& file) {
   std::string text = read_file(file, kMaxBytes);
+  check_nesting(text, file);
   if (text.find_first_of("<{") != text.find_first_not_of(" \t\r\n") && !text.starts_with("%YAML")) {
     text = "%YAML:1.0\n---\n" + text;
   }
@@ -111,8 +128,9 @@ std::optional<StereoRig> opencv_rig(const fs::path& file, double unit_m, bool is
     try {
       files.push_back(open_storage(file));
     } catch (const InvalidArgument&) {
-      if (read_file_start(file, 5) == "%YAML") throw;
-      return std::nullopt;  // one of the formats that are no YAML
+      const std::string start = read_file_start(file, 5);
+      if (start == "%YAML" || start.starts_with('{') || start.starts_with('<')) throw;
+      return std::nullopt;  // one of the formats that are none of OpenCV's
     }
   }
   const cv::Mat left = find_matrix(files, {"M1", "K1", "cameraMatrix1", "camera_matrix_1", "cameraMatrixL", "KL"});

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a small file may take: the bounds of SECURITY.md, measured at the program's peak."""
+import json
 import os
 import resource
 import subprocess
@@ -58,6 +59,23 @@ class Bounds(ProgramTest):
                 file = self.new_folder() / "report.json"
                 file.write_text(text)
                 self.assert_bounded(file, "report", file.parent, says="nested deeper than 64 levels")
+
+    def test_calibrations_that_are_nested_deep(self):
+        file = self.new_folder() / "nested.yml"
+        pairs = ["--left", self.street / "image_0/*.png", "--right", self.street / "image_1/*.png", "--out", file.parent / "out"]
+        for text in ("%YAML:1.0\n---\nM1: " + "[" * 60000, "%YAML:1.0\n---\nM1: " + "a: " * 20000, '{"M1":' + '{"data":' * 7000, "<?xml version='1.0'?>" + "<a>" * 20000):
+            file.write_text(text)
+            self.assert_bounded(file, "rectify", *pairs, "--calib", file, says="nested or named parts")
+
+    def test_reports_of_more_frames_than_there_are(self):
+        out = self.new_folder() / "out"
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0", "--disparities", 16, "--quiet")
+        report = self.report(out)
+        for sequence in ({"first_frame": 0, "last_frame": 2147483645, "frames": 2147483646}, {"first_frame": 0, "last_frame": 2**40, "frames": 2**40 + 1},
+                         {"first_frame": 1, "last_frame": 2147483647, "frames": -2147483648}):
+            (out / "report.json").write_text(json.dumps({**report, "sequence": sequence}))
+            self.assert_works("report", out, "--out", out / "page.html", preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (CEILING_MIB << 20, CEILING_MIB << 20)))
+            (out / "page.html").unlink()
 
     def test_configurations_of_deep_sections(self):
         file = self.new_folder() / "config.toml"

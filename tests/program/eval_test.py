@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm synth and eval."""
 import json
+import shlex
 import subprocess
 import unittest
 
@@ -15,6 +16,12 @@ class Synth(ProgramTest):
             self.assertEqual([f.name for f in sorted((street / folder).iterdir())], ["000000.png", "000001.png"], folder)
         for file in ("calib.txt", "poses.txt", "times.txt"):
             self.assertTrue((street / file).read_text().strip(), file)
+
+    def test_the_command_that_it_names_can_be_pasted(self):
+        street = self.new_folder() / "it's a street"
+        said = self.assert_works("synth", "--out", street, "--frames", 1, "--width", 80, "--height", 40)
+        command = said.splitlines()[-1].split(": ", 1)[1]
+        self.assertEqual(shlex.split(command), ["egosgm", "run", "--odometry", str(street), "--out", "OUT"])
 
     def test_a_seed_is_a_street(self):
         first, same, other = (self.new_folder() / "street" for _ in range(3))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Wrong arguments and broken files: one line each that names the value and the remedy."""
+import os
 import struct
 import unittest
 import zlib
@@ -54,6 +55,20 @@ class WrongArguments(ProgramTest):
         self.assert_refused(self.run_with("--config", config), f"{config}:5: ", "banded_sgm.p9")
         (folder / "list").write_text(f"a {str(self.street)[:-1]}\n")
         self.assertFalse((folder / "never").exists())
+
+    def test_numbers_are_decimal(self):
+        commands = (self.run_with("--max-translation"), self.run_with("--max-rotation"), self.run_with("--disparities"), self.run_with("--min-disparity"),
+                    *(["synth", "--out", self.folder / "never", option] for option in ("--frames", "--width", "--seed", "--speed", "--noise")),
+                    ["eval", "--estimate", self.street, "--truth", self.street, "--near"], ["eval", "--estimate", self.street, "--truth", self.street, "--truth-scale"], ["tune", "--rounds"], ["tune", "--width"],
+                    ["report", self.street, "--picture-width"], ["view", self.street, "--pictures", self.folder / "never", "--fps"],
+                    ["rectify", "--alpha"], ["doctor", self.street, "--disparities"])
+        for command in commands:
+            for value in ("0x10", "010", " 16", "16 ", "+16", "nan", "inf", "1e999", "1,5", "1e", "0x1p3"):
+                with self.subTest(command=command, value=value):
+                    self.assert_refused([*command, value])
+
+    def test_words_after_two_dashes(self):
+        self.assert_refused(["run", "--out", self.folder / "never", "--", self.street, "more"], 'unexpected argument "more"')
 
     def test_empty_values_are_refused(self):
         for option in ("--temporal", "--device", "--config", "--set"):
@@ -141,6 +156,44 @@ class BrokenInput(ProgramTest):
     def test_empty_folder(self):
         empty = self.new_folder()
         self.assert_sequence_refused(empty, empty, "image_0")
+
+    def test_a_pipe_among_the_images(self):
+        street = self.broken_street()
+        (street / "image_0/000002.png").unlink()
+        os.mkfifo(street / "image_0/000002.png")
+        self.assert_sequence_refused(street, "image_0/000002.png", "nobody writes to")
+
+    def test_texts_may_begin_with_the_mark_of_utf_8(self):
+        street = self.broken_street()
+        files = {name: street / name for name in ("calib.txt", "poses.txt", "config.toml", "list")}
+        files["config.toml"].write_text("disparities = 16\r\n")
+        files["list"].write_text(f"a {street} --poses {files['poses.txt']} --frames 0:1\r\n")
+        for file in files.values():
+            file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes())
+        self.assert_works("batch", files["list"], "--out", self.new_folder(), "--config", files["config.toml"], "--quiet")
+
+    def test_rows_of_a_configuration_that_say_nothing(self):
+        config = self.new_folder() / "config.toml"
+        for text in ("p2\n", "p2 150\n", "# fine\n\n  dynamic\n"):
+            config.write_text(text)
+            self.assert_sequence_refused(self.street, "config.toml:", "name = value", options=["--config", config])
+
+    def test_raw_pairs_of_two_sizes(self):
+        street = self.broken_street()
+        for side in (0, 1):
+            (street / f"image_{side}/000002.png").write_bytes(grey_png(WIDTH, HEIGHT + 2))
+        self.assert_refused(["rectify", "--left", street / "image_0/*.png", "--right", street / "image_1/*.png", "--calib", street / "calib.txt",
+                             "--out", self.new_folder(), "--quiet"], "pair 3", f"{WIDTH}x{HEIGHT + 2}", "one size")
+
+    def test_times_of_pairs_are_finite_numbers(self):
+        street = self.broken_street()
+        for time in ("nan", "inf", "0x10", "1e", "1,5"):
+            (street / "list").write_text(f"image_0/000000.png image_1/000000.png {time}\n")
+            self.assert_refused(["rectify", "--list", street / "list", "--calib", street / "calib.txt", "--out", self.new_folder() / "out"], "list:1")
+
+    def test_folders_where_patterns_belong(self):
+        self.assert_refused(["run", "--left", self.street / "image_0", "--right", self.street / "image_1", "--calib", self.street / "calib.txt",
+                             "--out", self.new_folder() / "out"], "image_0: is a folder", "image_0/*.png")
 
     def test_missing_frame(self):
         street = self.broken_street()

@@ -9,7 +9,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "tests/support/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
@@ -179,6 +181,57 @@ TEST(FileIo, PipesAndDescriptorsAreWrittenThrough) {
   EXPECT_EQ(read_file(folder / "open", 20), "before after");
   EXPECT_FALSE(is_stream(folder / "open"));
   EXPECT_FALSE(is_stream(folder / "none"));
+}
+
+TEST(FileIo, APipeWithoutItsOtherEndIsNotWaitedForWithoutEnd) {
+  const TemporaryFolder folder;
+  const std::filesystem::path pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  expect_refused([&] { read_file(pipe, 100); }, {"pipe", "nobody writes to"});
+  expect_refused<IoError>([&] { write_file(pipe, "x"); }, {"pipe", "nobody reads"});
+}
+
+TEST(FileIo, APipeThatIsWrittenLateAndInPiecesIsReadWhole) {
+  const TemporaryFolder folder;
+  const std::filesystem::path pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::string piece(100000, 'x');  // more than a pipe holds
+  const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(100)); };
+  std::thread writer([&] {
+    pause();
+    const int writing = ::open(pipe.c_str(), O_WRONLY);
+    pause();
+    for (int i = 0; i < 2; ++i, pause()) {
+      for (std::string_view rest = piece; !rest.empty();) {
+        const ssize_t written = ::write(writing, rest.data(), rest.size());
+        if (written <= 0) break;
+        rest.remove_prefix(static_cast<std::size_t>(written));
+      }
+    }
+    ::close(writing);
+  });
+  EXPECT_EQ(read_file(pipe, 1000000), piece + piece);
+  writer.join();
+}
+
+TEST(FileIo, TellsOfAFileBeforeItIsThere) {
+  const TemporaryFolder folder;
+  std::string told;
+  {
+    const BeforeWrite outer([&](const auto&, std::string_view) { told += "outer "; });
+    {
+      const BeforeWrite inner([&](const std::filesystem::path& file, std::string_view bytes) {
+        told += file.filename().string() + "=" + std::string(bytes) + (std::filesystem::exists(file) ? " late " : " ");
+      });
+      write_file(folder / "a", "1");
+    }
+    write_file(folder / "b", "2");
+    const BeforeWrite none([](const auto&, std::string_view) { throw IoError("no record"); });
+    expect_refused<IoError>([&] { write_file(folder / "c", "3"); }, {"no record"});
+  }
+  write_file(folder / "d", "4");
+  EXPECT_EQ(told, "a=1 outer ");
+  EXPECT_FALSE(std::filesystem::exists(folder / "c"));
 }
 
 TEST(FileIo, LooksWithoutATraceAndMovesAsItWrites) {

@@ -182,6 +182,22 @@ TEST(RigFiles, OpenCvsNamesAndUnits) {
   expect_refused([&] { read_euroc_rig(folder / "mav0"); }, "sensor.yaml");
 }
 
+TEST(RigFiles, NestingHasABound) {
+  const TemporaryFolder folder;
+  const auto many = [](const std::string& text) {
+    std::string all;
+    for (int i = 0; i < 100000; ++i) all += text;
+    return all;
+  };
+  const std::string yaml = "%YAML:1.0\n---\nM1: ", json = "{\"M1\":", xml = "<?xml version=\"1.0\"?>\n<opencv_storage>";
+  for (const std::string& text :
+       {yaml + many("["), yaml + many("{data: "), yaml + many("a: "), yaml + many("- "), yaml + many("-\t"),
+        json + many("["), json + many("{\"data\":"), xml + many("<a>"), xml + many("<a b=\"1\">")}) {
+    write_file(folder / "nested.yml", text);
+    expect_refused([&] { read_opencv_rig(folder / "nested.yml"); }, "nested or named parts");
+  }
+}
+
 TEST(PairMatches, LieInTheRowsOfRectifiedImages) {
   const SyntheticSequence street({.frames = 1, .width = 320, .height = 128, .seed = 5});
   const SyntheticFrame frame = street.render(0);
