@@ -39,8 +39,15 @@ bool is_foreign(const fs::path& file) {
   return std::find(extensions.begin(), extensions.end(), lower_extension(file)) != extensions.end();
 }
 
+/// For OpenCV, which would wait for a pipe without an end.
+void expect_file(const fs::path& file) {
+  if (!fs::exists(file)) throw MissingPath(file.string(), "no such file");
+  if (!fs::is_regular_file(file)) throw InvalidArgument(file.string() + ": is no file; give an image or a video");
+}
+
 cv::Mat read_image(const fs::path& file) {
   if (!is_foreign(file)) return vision::read_stored_image(file);
+  expect_file(file);
   cv::Mat image = cv::imread(file.string(), cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
   if (image.empty() || (image.depth() != CV_8U && image.depth() != CV_16U)) {
     throw InvalidArgument(file.string() + ": cannot be read as an image of 8 or 16 bits");
@@ -64,7 +71,7 @@ class Video : public ImageSource {
  public:
   explicit Video(const std::string& file) : file_(file) {
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said once, below
-    if (!fs::exists(file)) throw MissingPath(file, "no such file");
+    expect_file(file);
     if (!video_.open(file)) throw InvalidArgument(file + ": neither an image nor a video that OpenCV can read");
   }
   cv::Mat next() override {

@@ -163,6 +163,16 @@ class BrokenInput(ProgramTest):
         os.mkfifo(street / "image_0/000002.png")
         self.assert_sequence_refused(street, "image_0/000002.png", "nobody writes to")
 
+    def test_pipes_folders_and_devices_that_opencv_would_read(self):
+        folder = self.new_folder()
+        for name in ("pipe.avi", "pipe.tif"):
+            os.mkfifo(folder / name)
+        for source in (folder / "pipe.avi", folder / "pipe.tif", self.street / "image_0", "/dev/zero"):
+            self.assert_refused(["rectify", "--side-by-side", source, "--calib", self.street / "calib.txt", "--out", self.new_folder() / "out"],
+                                source, "is no file")
+        self.assert_refused(["rectify", "--side-by-side", folder / "none.avi", "--calib", self.street / "calib.txt", "--out", self.new_folder() / "out"],
+                            "none.avi", "no such file")
+
     def test_texts_may_begin_with_the_mark_of_utf_8(self):
         street = self.broken_street()
         files = {name: street / name for name in ("calib.txt", "poses.txt", "config.toml", "list")}
