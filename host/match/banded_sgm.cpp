@@ -183,14 +183,14 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
   const int first_wave = is_whole ? EGOSGM_ALL_TILES : 0;
   const int end_wave = is_whole ? EGOSGM_ALL_TILES + 1 : tile_columns + 2 * (tile_rows - 1);
 
-  wavefront.slots.fill(context_, 255);
+  wavefront.slots.fill(context_, 255, wavefront.slots.size() / 2 * count(views));
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.to_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
-                        inputs.bands.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums);
+                        inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots, wavefront.sums);
   }
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
-                          inputs.bands.cell_offsets, inputs.penalties, wavefront.slots, wavefront.sums,
+                          inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots, wavefront.sums,
                           wavefront.winners, read_off_.ranks());
   }
   wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), count(views)),

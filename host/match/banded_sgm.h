@@ -59,12 +59,13 @@ class BandedSgm {
   static int code_padding(shared::DisparityRange range);
 
   using ToMiddle = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
-                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
-                               ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
+                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>,
+                               const ocl::Buffer<shared::RowSum>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>,
+                               ocl::Buffer<cl_uchar>>;
   using FromMiddle =
       ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
-                  const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<cl_uchar>,
-                  ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>, ocl::Buffer<cl_uint>>;
+                  const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<shared::RowSum>,
+                  const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>, ocl::Buffer<cl_uint>>;
   using Refine =
       ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
 

@@ -58,6 +58,7 @@ void StripeMemory::load(const MatchInputs& image, const Stripe& stripe) {
   load_rows(image.penalties, penalties_, kViews, StepPenalties::kStepsAPixel * width, stripe.first_row);
   load_rows(image.bands.bands, bands_.bands, kViews, width, stripe.first_row);
   load_rows(image.bands.cell_offsets, bands_.cell_offsets, kViews, width, stripe.first_row);
+  load_rows(image.bands.row_sums, bands_.row_sums, kViews, 1, stripe.first_row);
 }
 
 void StripeMemory::store(const Stripe& stripe, StereoMaps& image) {

@@ -32,9 +32,11 @@ class Buffer {
   void write(Context& context, const std::vector<T>& values) {
     context.queue().enqueueWriteBuffer(buffer_, CL_TRUE, 0, values.size() * sizeof(T), values.data());
   }
-  void fill(Context& context, T value) {
+  void fill(Context& context, T value) { fill(context, value, size_); }
+  /// The first `count` elements.
+  void fill(Context& context, T value, std::size_t count) {
     cl::Event done;
-    context.queue().enqueueFillBuffer(buffer_, value, 0, size_ * sizeof(T), nullptr, &done);
+    context.queue().enqueueFillBuffer(buffer_, value, 0, count * sizeof(T), nullptr, &done);
     context.record(done, "fill");
   }
   /// Copies `count` elements from `from` to here.

@@ -35,6 +35,8 @@ SearchBands::SearchBands(ocl::Context& context, shared::ImageSize size, shared::
     offsets[i] = static_cast<cl_uint>(i % static_cast<std::size_t>(size.width)) * band.chunks;
   }
   cell_offsets.write(context, offsets);
+  const cl_uint cells_of_row = static_cast<cl_uint>(size.width) * band.chunks * EGOSGM_LANES;
+  row_sums.write(context, std::vector(row_sums.size(), shared::RowSum{cells_of_row, 0}));
 }
 
 SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,

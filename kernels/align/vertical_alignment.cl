@@ -18,13 +18,13 @@
 #endif
 
 #if PIXEL_BYTES == 1
-#define vload_pixels(offset, from) convert_ushort16(vload16(offset, from))
+#define load_wide(from) convert_ushort16(load_grey(from))
 #define convert_pixels convert_uchar16
 typedef ushort16 Wide;
 typedef ushort Weight;
 #define rounded_to_8_bit(value) (value)
 #else
-#define vload_pixels(offset, from) convert_uint16(vload16(offset, from))
+#define load_wide(from) convert_uint16(load_grey(from))
 #define convert_pixels convert_ushort16
 typedef uint16 Wide;
 typedef uint Weight;
@@ -81,9 +81,12 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
     global const Pixel* lower = from + (size_t)clamp_row(above + 1, size.height) * size.width;
 #if AT_ONCE > 1
     if (x + BLOCK <= size.width) {
-      const Wide sum =
-          vload_pixels(0, upper + x) * (Wide)(ROW_STEPS - weight) + vload_pixels(0, lower + x) * (Wide)(weight);
-      vstore16(convert_pixels((sum + (Wide)(ROW_STEPS / 2)) >> (Wide)(8)), 0, to + x);
+      Pixels pixels = load_grey(upper + x);
+      if (weight != 0) {
+        const Wide sum = load_wide(upper + x) * (Wide)(ROW_STEPS - weight) + load_wide(lower + x) * (Wide)(weight);
+        pixels = convert_pixels((sum + (Wide)(ROW_STEPS / 2)) >> (Wide)(8));
+      }
+      ((global PackedPixels*)(to + x))->pixels = pixels;
       continue;
     }
 #endif

@@ -224,16 +224,32 @@ ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmPa
   }
 }
 
+// The rows that the forward sweep takes before it comes to those that the backward one has been to. Half of them; where a
+// work-item takes all tiles of a sweep, those that take half of the time: as long as a row's cells and so many a pixel.
+#define CELLS_A_PIXEL 16
+inline int rows_to_middle(const SgmParameters q, const int view, const int wave, global const RowSum* row_sums) {
+  if (wave != EGOSGM_ALL_TILES) return q.height - q.height / 2;
+  global const RowSum* rows = row_sums + (size_t)view * q.height;
+  const ulong a_row = (ulong)q.width * CELLS_A_PIXEL;
+  ulong all = a_row * q.height;
+  for (int y = 0; y < q.height; ++y) all += rows[y].cells;
+  ulong before = 0;
+  int middle = 0;
+  for (; middle < q.height && 2 * before < all; ++middle) before += a_row + rows[middle].cells;
+  return middle;
+}
+
 // The tile of a wave in a row of tiles, or all tiles of a view and direction.
-ALWAYS_INLINE void sweep(const bool meets, const SgmParameters q, const int first_row,
-                                                 const int view, const bool backward, const int wave,
-                                                 const int tile_columns, global const uint* all_codes,
+ALWAYS_INLINE void sweep(const bool meets, const SgmParameters q, const int middle,
+                                                 const int first_row, const int view, const bool backward,
+                                                 const int wave, const int tile_columns, global const uint* all_codes,
                                                  global const Band* bands, global const uint* offsets,
                                                  global const uchar* penalties, global uchar* slots, global uchar* sums,
                                                  global ulong* winners, global uint* ranks) {
   const bool all = wave == EGOSGM_ALL_TILES;
-  const int first_y = meets ? own_rows(q.height, backward) : 0;
-  const int end_y = meets ? q.height : own_rows(q.height, backward);
+  const int own_rows = backward ? q.height - middle : middle;
+  const int first_y = meets ? own_rows : 0;
+  const int end_y = meets ? q.height : own_rows;
   const int end_row = all ? (end_y - first_y + TILE_HEIGHT - 1) / TILE_HEIGHT : first_row + 1;
   for (int tile_y = first_row; tile_y < end_row; ++tile_y) {
     const int tile_of_wave = wave - 2 * tile_y;
@@ -251,36 +267,36 @@ ALWAYS_INLINE void sweep(const bool meets, const SgmParameters q, const int firs
   }
 }
 
-WITH_BIT_COUNT void to_middle(const SgmParameters q, const int first_row, const int view, const bool backward,
+WITH_BIT_COUNT void to_middle(const SgmParameters q, const int middle, const int first_row, const int view, const bool backward,
                               const int wave, const int tile_columns, global const uint* all_codes,
                               global const Band* bands, global const uint* offsets, global const uchar* penalties,
                               global uchar* slots, global uchar* sums) {
-  sweep(false, q, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0,
+  sweep(false, q, middle, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0,
         0);
 }
 
-WITH_BIT_COUNT void from_middle(const SgmParameters q, const int first_row, const int view, const bool backward,
+WITH_BIT_COUNT void from_middle(const SgmParameters q, const int middle, const int first_row, const int view, const bool backward,
                                 const int wave, const int tile_columns, global const uint* all_codes,
                                 global const Band* bands, global const uint* offsets, global const uchar* penalties,
                                 global uchar* slots, global uchar* sums, global ulong* winners, global uint* ranks) {
-  sweep(true, q, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums,
+  sweep(true, q, middle, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums,
         winners, ranks);
 }
 
 // Both sweeps to the middle of the image, where they leave their sums.
 KERNEL void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
-                            global const Band* bands, global const uint* offsets, global const uchar* penalties,
-                            global uchar* slots, global uchar* sums) {
-  to_middle(q, get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands, offsets,
+                            global const Band* bands, global const uint* offsets, global const RowSum* row_sums,
+                            global const uchar* penalties, global uchar* slots, global uchar* sums) {
+  to_middle(q, rows_to_middle(q, get_global_id(1), wave, row_sums), get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands, offsets,
             penalties, slots, sums);
 }
 
 // Both on from there, over the sums of the other one, to the winners.
 KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int tile_columns,
                               global const uint* all_codes, global const Band* bands, global const uint* offsets,
-                              global const uchar* penalties, global uchar* slots, global const uchar* sums,
-                              global ulong* winners, global uint* ranks) {
-  from_middle(q, get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands,
+                              global const RowSum* row_sums, global const uchar* penalties, global uchar* slots,
+                              global const uchar* sums, global ulong* winners, global uint* ranks) {
+  from_middle(q, rows_to_middle(q, get_global_id(1), wave, row_sums), get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands,
               offsets, penalties, slots, (global uchar*)sums, winners, ranks);
 }
 

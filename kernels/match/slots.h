@@ -47,7 +47,4 @@ inline uint penalties_to(const bool backward, Penalties* around, global const ui
   return steps;
 }
 
-// The rows that a sweep takes before it comes to those that the other one has been to.
-inline int own_rows(const int height, const bool backward) { return backward ? height / 2 : height - height / 2; }
-
 #endif
