@@ -14,6 +14,7 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "host/cpu_clones.h"
 #include "host/vision/image_bounds.h"
 #include "host/vision/npy.h"
 #include "host/vision/png.h"
@@ -30,7 +31,27 @@ void require_map(const cv::Mat& map, const std::filesystem::path& file) {
   }
 }
 
-bool fits_png(float disparity) { return (disparity >= 0) & (disparity < 65536.0f / kKittiStepsPerPx); }
+inline bool fits_png(float disparity) { return (disparity >= 0) & (disparity < 65536.0f / kKittiStepsPerPx); }
+
+// Without branches, which would keep compilers from vectors.
+EGOSGM_CPU_CLONES
+void store_row(const float* __restrict disparity, int width, std::uint16_t* __restrict stored) {
+  for (int x = 0; x < width; ++x) {
+    const float steps = disparity[x] * kKittiStepsPerPx, least = steps < 1.0f ? 1.0f : steps;
+    stored[x] = static_cast<std::uint16_t>(static_cast<int>(fits_png(disparity[x]) ? least : 0.0f));
+  }
+}
+
+EGOSGM_CPU_CLONES
+int count_outside(const float* disparity, int width) {
+  int count = 0;
+  for (int x = 0; x < width; ++x) {
+    const float d = disparity[x];
+    const bool is_valid = (d > kInvalidDisparity) & (d <= std::numeric_limits<float>::max());
+    count += is_valid & !fits_png(d);
+  }
+  return count;
+}
 
 cv::Mat parse_disparity_png(std::string_view bytes, const std::filesystem::path& file, float steps_per_px) {
   const cv::Mat stored = decode_png(bytes, file);
@@ -173,14 +194,9 @@ cv::Mat read_disparity_png(const std::filesystem::path& file) {
 
 std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity) {
   require_map(disparity, file);
-  cv::Mat stored(disparity.size(), CV_16UC1, cv::Scalar(0));
+  cv::Mat stored(disparity.size(), CV_16UC1);
   for (int y = 0; y < disparity.rows; ++y) {
-    const auto* from = disparity.ptr<float>(y);
-    auto* to = stored.ptr<std::uint16_t>(y);
-    for (int x = 0; x < disparity.cols; ++x) {
-      const float steps = from[x] * kKittiStepsPerPx, least = steps < 1.0f ? 1.0f : steps;
-      to[x] = static_cast<std::uint16_t>(static_cast<int>(fits_png(from[x]) ? least : 0.0f));
-    }
+    store_row(disparity.ptr<float>(y), disparity.cols, stored.ptr<std::uint16_t>(y));
   }
   write_png(file, stored);
   return count_outside_png(disparity);
@@ -188,10 +204,7 @@ std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Ma
 
 std::int64_t count_outside_png(const cv::Mat& disparity) {
   std::int64_t outside = 0;
-  for (int y = 0; y < disparity.rows; ++y) {
-    const auto* row = disparity.ptr<float>(y);
-    outside += std::count_if(row, row + disparity.cols, [](float d) { return is_valid_disparity(d) & !fits_png(d); });
-  }
+  for (int y = 0; y < disparity.rows; ++y) outside += count_outside(disparity.ptr<float>(y), disparity.cols);
   return outside;
 }
 

@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "host/cpu_clones.h"
+
 namespace egosgm::vision::odometry {
 namespace {
 
@@ -21,6 +23,7 @@ const std::uint8_t* view_row(const ImageView& image, int y) {
 // knows that of parameters only.
 
 // Sums of three and of five rows, and the step between the upper and the lower two.
+EGOSGM_CPU_CLONES
 void sum_columns(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b, const std::uint8_t* __restrict c,
                  const std::uint8_t* __restrict d, const std::uint8_t* __restrict e, std::uint16_t* __restrict column3,
                  std::uint16_t* __restrict column5, std::int16_t* __restrict step, int width) {
@@ -33,6 +36,7 @@ void sum_columns(const std::uint8_t* __restrict a, const std::uint8_t* __restric
 }
 
 // Blob: 2 box3 + 7 centre - box5; corner: the step's difference from left to right; smoothed: box3 / 9.
+EGOSGM_CPU_CLONES
 void filter_columns(const std::uint16_t* __restrict column3, const std::uint16_t* __restrict column5,
                     const std::int16_t* __restrict step, const std::uint8_t* __restrict centre,
                     std::int16_t* __restrict blob, std::int16_t* __restrict corner, std::uint8_t* __restrict smooth,
@@ -48,12 +52,14 @@ void filter_columns(const std::uint16_t* __restrict column3, const std::uint16_t
 
 using Row = const std::int16_t* __restrict;
 
+EGOSGM_CPU_CLONES
 void column_maxima(Row a, Row b, Row c, Row d, Row e, Row f, Row g, std::int16_t* __restrict out, int width) {
   for (int x = 0; x < width; ++x) {
     out[x] = std::max(std::max(std::max(a[x], b[x]), std::max(c[x], d[x])), std::max(std::max(e[x], f[x]), g[x]));
   }
 }
 
+EGOSGM_CPU_CLONES
 void column_minima(Row a, Row b, Row c, Row d, Row e, Row f, Row g, std::int16_t* __restrict out, int width) {
   for (int x = 0; x < width; ++x) {
     out[x] = std::min(std::min(std::min(a[x], b[x]), std::min(c[x], d[x])), std::min(std::min(e[x], f[x]), g[x]));
@@ -61,6 +67,7 @@ void column_minima(Row a, Row b, Row c, Row d, Row e, Row f, Row g, std::int16_t
 }
 
 // Extrema over x - 3 .. x + 3.
+EGOSGM_CPU_CLONES
 void row_extrema(const std::int16_t* __restrict in, std::int16_t* __restrict maxima, std::int16_t* __restrict minima,
                  int width) {
   for (int x = kSuppressionRadius; x < width - kSuppressionRadius; ++x) {
@@ -74,6 +81,7 @@ void row_extrema(const std::int16_t* __restrict in, std::int16_t* __restrict max
 }
 
 // Bit 0: a maximum, bit 1: a minimum.
+EGOSGM_CPU_CLONES
 void flag_extrema(const std::int16_t* __restrict response, const std::int16_t* __restrict maxima,
                   const std::int16_t* __restrict minima, std::int16_t threshold, std::uint8_t* __restrict flags,
                   int width) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "host/cpu_clones.h"
 #include "host/vision/odometry_subpixel.h"
 
 namespace egosgm::vision::odometry {
@@ -22,6 +23,7 @@ struct Box {
   int x0, x1, y0, y1;  // inclusive
 };
 
+EGOSGM_CPU_CLONES
 int best_match(const FeatureSet& set, int feature_class, const Descriptor& descriptor, const Box& box) {
   int best = kNoMatch, least = kMaxDistance;
   const int last_row = std::min(box.y1, set.height - 1);

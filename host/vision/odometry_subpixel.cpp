@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/cpu_clones.h"
+
 namespace egosgm::vision::odometry {
 namespace {
 
@@ -16,6 +18,7 @@ constexpr int kRegionStride = 24;
 constexpr int kSource = kPatchRows + 2;
 
 // `image` at integer offsets from (x0, y0), the border repeated.
+EGOSGM_CPU_CLONES
 void load(const GreyImage& image, int x0, int y0, int rows, int columns, float* out, int stride) {
   const bool inside = x0 >= 0 && y0 >= 0 && x0 + columns <= image.width && y0 + rows <= image.height;
   for (int i = 0; i < rows; ++i) {
@@ -53,6 +56,7 @@ void sample(const GreyImage& image, float x, float y, float scale, float source[
 }
 
 // Removes from `gradient` its mean and its part along `values`, which have zero mean and squared norm `norm2`.
+EGOSGM_CPU_CLONES
 void make_orthogonal(const float values[kPatchRows][kPatchColumns], float norm2,
                      float gradient[kPatchRows][kPatchColumns]) {
   float mean = 0, along = 0;
@@ -75,6 +79,7 @@ struct Sums {
 };
 
 // Products of the gradients with the image shifted to (column, row) of the region.
+EGOSGM_CPU_CLONES
 Sums correlate(const Patch& patch, const float* region, float column, float row) {
   const int j0 = static_cast<int>(column), i0 = static_cast<int>(row);
   const float a = column - j0, b = row - i0;
@@ -98,6 +103,7 @@ Sums correlate(const Patch& patch, const float* region, float column, float row)
 }
 
 // Root of the summed squared deviation of the region's values, whole pixels from (column, row).
+EGOSGM_CPU_CLONES
 float deviation(const float* region, float column, float row) {
   const auto nearest = [](float position) { return static_cast<int>(std::floor(position + 0.5f)); };
   const float* first = region + nearest(row) * kRegionStride + nearest(column);
@@ -117,6 +123,7 @@ float deviation(const float* region, float column, float row) {
   return std::sqrt(std::max(0.0f, total2 - total * total / (kPatchRows * kPatchRows)));
 }
 
+EGOSGM_CPU_CLONES
 float correlation(const Patch& patch, const float* region, float column, float row) {
   const int j0 = static_cast<int>(column), i0 = static_cast<int>(row);
   const float a = column - j0, b = row - i0;
@@ -138,6 +145,7 @@ float correlation(const Patch& patch, const float* region, float column, float r
 
 }  // namespace
 
+EGOSGM_CPU_CLONES
 bool make_patch(const GreyImage& image, float x, float y, float scale, Patch& patch) {
   float source[kSource][kSource];
   sample(image, x, y, scale, source);

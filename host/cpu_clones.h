@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// Loops that are worth a version of their own for CPUs with wider vectors than every x86-64 has. All versions give the
+// same bits: contraction is off, and no compiler reorders sums.
+#pragma once
+
+// Sanitizers instrument what chooses the version, which runs before they are ready.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
+#define EGOSGM_CPU_CLONES [[gnu::target_clones("avx2", "default")]]
+#else
+#define EGOSGM_CPU_CLONES
+#endif
