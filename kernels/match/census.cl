@@ -8,8 +8,9 @@
 // A view's codes lie in rows of `stride` = padding + width + padding, the right view's from right to left, so that the
 // codes a pixel is compared with at growing disparities lie at growing addresses in both views. The padding repeats the
 // border's codes.
-#include "method.h"
+#include "block.h"
 #include "grey.h"
+#include "method.h"
 
 // lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
@@ -46,8 +47,22 @@ typedef ulong Code;
 constant char kSparse[32][2] = EGOSGM_CENSUS13X11;
 #endif
 
-inline Code code_at(const ImageSize size, global const Pixel* image, const int x, const int y) {
-#define AT(dx, dy) image[(size_t)clamp(y + (dy), 0, size.height - 1) * size.width + clamp(x + (dx), 0, size.width - 1)]
+// The rows of the window around a pixel; outside the image its border's.
+typedef struct {
+  global const Pixel* at[2 * RADIUS_Y + 1];
+} Rows;
+
+inline Rows rows_around(const ImageSize size, global const Pixel* image, const int y) {
+  Rows rows;
+#pragma unroll
+  for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) {
+    rows.at[RADIUS_Y + dy] = image + (size_t)clamp(y + dy, 0, size.height - 1) * size.width;
+  }
+  return rows;
+}
+
+inline Code code_at(const int width, const Rows* rows, const int x) {
+#define AT(dx, dy) rows->at[RADIUS_Y + (dy)][clamp(x + (dx), 0, width - 1)]
 #if COMPARISONS == 0
   return to_8_bit(AT(0, 0));
 #elif COMPARISONS == 1
@@ -80,7 +95,8 @@ KERNEL void census(const ImageSize size, const int padding, global const uchar* 
   global const Pixel* image = (global const Pixel*)images + (size_t)view * size.height * size.width;
   const int along = clamp(at - padding, 0, size.width - 1);
   const int x = view == EGOSGM_LEFT ? along : size.width - 1 - along;
-  ((global Code*)all_codes)[row * stride + at] = code_at(size, image, x, y);
+  const Rows rows = rows_around(size, image, y);
+  ((global Code*)all_codes)[row * stride + at] = code_at(size.width, &rows, x);
 }
 
 #else
@@ -97,49 +113,85 @@ typedef struct __attribute__((packed)) {
   Codes codes;
 } PackedCodes;
 
+#if COMPARISONS == 2 && PIXEL_BYTES == 1
+
+// A block of pixels at once.
+#define AT_ONCE BLOCK
+typedef struct __attribute__((packed)) {
+  Block greys;
+} PackedBlock;
+inline Block load_block(global const Pixel* from) { return ((global const PackedBlock*)from)->greys; }
+
+inline Codes joined(const uchar16 first, const uchar16 second, const uchar16 third, const uchar16 fourth) {
+  const ushort16 upper = convert_ushort16(first) << (ushort16)(8) | convert_ushort16(second);
+  const ushort16 lower = convert_ushort16(third) << (ushort16)(8) | convert_ushort16(fourth);
+  return convert_uint16(upper) << (uint16)(16) | convert_uint16(lower);
+}
+
+// Where no column needs clamping. Bits are appended to bytes: compilers keep these in narrow vectors.
+inline void codes_at(const Rows* rows, const int x, Codes* codes) {
+  const Block centre = load_block(rows->at[RADIUS_Y] + x);
+  Block bytes[4];
+#pragma unroll
+  for (int byte = 0; byte < 4; ++byte) {
+    Block bits = 0;
+#pragma unroll
+    for (int i = 8 * byte; i < 8 * byte + 8; ++i) {
+      const Block other = load_block(rows->at[RADIUS_Y + kSparse[i][1]] + x + kSparse[i][0]);
+      bits = bits + bits + (other < centre ? (Block)(1) : (Block)(0));
+    }
+    bytes[byte] = bits;
+  }
+  codes[0] = joined(FIRST_VECTOR(bytes[0]), FIRST_VECTOR(bytes[1]), FIRST_VECTOR(bytes[2]), FIRST_VECTOR(bytes[3]));
+#if BLOCK == 32
+  codes[1] = joined(SECOND_VECTOR(bytes[0]), SECOND_VECTOR(bytes[1]), SECOND_VECTOR(bytes[2]), SECOND_VECTOR(bytes[3]));
+#endif
+}
+
+#else
+
+#define AT_ONCE 16
+
 // Appends a bit to codes of 8 bits: compilers keep these in narrow vectors.
 inline uchar16 append(const uchar16 bits, const Pixels first, const Pixels second) {
   return bits + bits - as_uchar16(convert_char16(first < second));
 }
 
 // 16 pixels at once, where no column needs clamping.
-inline Codes codes_at(const ImageSize size, global const Pixel* image, const int x, const int y) {
-#define ROW(dy) (image + (size_t)clamp(y + (dy), 0, size.height - 1) * size.width + x)
-  Codes codes = 0;
+inline void codes_at(const Rows* rows, const int x, Codes* codes) {
 #if COMPARISONS == 0
-  codes = convert_codes(to_8_bit(load_grey(ROW(0))));
+  *codes = convert_codes(to_8_bit(load_grey(rows->at[RADIUS_Y] + x)));
 #elif COMPARISONS == 1
-  const Pixels centre = load_grey(ROW(0));
+  const Pixels centre = load_grey(rows->at[RADIUS_Y] + x);
   uchar16 bits = 0;
   int count = 0;
+  *codes = 0;
 #pragma unroll
   for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) {
-    global const Pixel* row = ROW(dy);
 #pragma unroll
     for (int dx = -RADIUS_X; dx <= RADIUS_X; ++dx) {
       if (dx == 0 && dy == 0) continue;
-      bits = append(bits, load_grey(row + dx), centre);
-      if (++count % 8 == 0) codes = (codes << (Codes)(8)) | convert_codes(bits);
+      bits = append(bits, load_grey(rows->at[RADIUS_Y + dy] + x + dx), centre);
+      if (++count % 8 == 0) *codes = (*codes << (Codes)(8)) | convert_codes(bits);
     }
   }
-  codes = (codes << (Codes)(count % 8)) | (convert_codes(bits) & (Codes)((1 << count % 8) - 1));
+  *codes = (*codes << (Codes)(count % 8)) | (convert_codes(bits) & (Codes)((1 << count % 8) - 1));
 #else
-  const Pixels centre = load_grey(ROW(0));
-  global const Pixel* rows[2 * RADIUS_Y + 1];
-#pragma unroll
-  for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) rows[RADIUS_Y + dy] = ROW(dy);
+  const Pixels centre = load_grey(rows->at[RADIUS_Y] + x);
+  *codes = 0;
 #pragma unroll
   for (int byte = 0; byte < 4; ++byte) {
     uchar16 bits = 0;
 #pragma unroll
     for (int i = 8 * byte; i < 8 * byte + 8; ++i) {
-      bits = append(bits, load_grey(rows[RADIUS_Y + kSparse[i][1]] + kSparse[i][0]), centre);
+      bits = append(bits, load_grey(rows->at[RADIUS_Y + kSparse[i][1]] + x + kSparse[i][0]), centre);
     }
-    codes = (codes << (Codes)(8)) | convert_codes(bits);
+    *codes = (*codes << (Codes)(8)) | convert_codes(bits);
   }
 #endif
-  return codes;
 }
+
+#endif
 
 // A work-item a row and view.
 KERNEL void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
@@ -149,25 +201,30 @@ KERNEL void census(const ImageSize size, const int padding, global const uchar* 
 
   const int width = size.width;
   const size_t stride = (size_t)width + 2 * (size_t)padding;
-  global const Pixel* image = (global const Pixel*)images + (size_t)view * size.height * width;
+  const Rows rows = rows_around(size, (global const Pixel*)images + (size_t)view * size.height * width, y);
   global Code* row = (global Code*)all_codes + ((size_t)view * size.height + y) * stride + padding;
 
-  // Blocks of 16 from RADIUS_X on; the last one overlaps the one before it, to leave few pixels to the slow way.
-  const int last_block = width - RADIUS_X - 16;
+  // Blocks from RADIUS_X on; the last one overlaps the one before it, to leave few pixels to the slow way.
+  const int last_block = width - RADIUS_X - AT_ONCE;
   int x = 0;
   while (x < width) {
     const bool inside = last_block >= RADIUS_X && x >= RADIUS_X && x < width - RADIUS_X;
     if (inside) {
       const int first = min(x, last_block);
-      const Codes codes = codes_at(size, image, first, y);
-      if (view == EGOSGM_LEFT) {
-        ((global PackedCodes*)(row + first))->codes = codes;
-      } else {
-        ((global PackedCodes*)(row + width - 16 - first))->codes = codes.sfedcba9876543210;
+      Codes codes[AT_ONCE / 16];
+      codes_at(&rows, first, codes);
+#pragma unroll
+      for (int i = 0; i < AT_ONCE / 16; ++i) {
+        const int at = first + 16 * i;
+        if (view == EGOSGM_LEFT) {
+          ((global PackedCodes*)(row + at))->codes = codes[i];
+        } else {
+          ((global PackedCodes*)(row + width - 16 - at))->codes = codes[i].sfedcba9876543210;
+        }
       }
-      x += first - x + 16;
+      x += first - x + AT_ONCE;
     } else {
-      row[view == EGOSGM_LEFT ? x : width - 1 - x] = code_at(size, image, x, y);
+      row[view == EGOSGM_LEFT ? x : width - 1 - x] = code_at(width, &rows, x);
       x += 1;
     }
   }
