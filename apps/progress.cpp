@@ -28,6 +28,14 @@ std::string clock_text(double seconds) {
 
 }  // namespace
 
+Waiting::Waiting(const std::string& what, bool quiet) : shown_(!quiet && isatty(STDOUT_FILENO) == 1) {
+  if (shown_) print_now(kEraseLine + what);
+}
+
+Waiting::~Waiting() {
+  if (shown_) print_now(kEraseLine);
+}
+
 Progress::Progress(int frames, bool quiet) : frames_(frames), quiet_(quiet), terminal_(isatty(STDOUT_FILENO) == 1) {}
 
 Progress::~Progress() {

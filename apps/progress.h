@@ -6,6 +6,18 @@
 
 namespace egosgm::app {
 
+/// Says on a terminal what is waited for, in a line that goes with it. Nothing elsewhere, or if quiet.
+class Waiting {
+ public:
+  Waiting(const std::string& what, bool quiet);
+  ~Waiting();
+  Waiting(const Waiting&) = delete;
+  Waiting& operator=(const Waiting&) = delete;
+
+ private:
+  const bool shown_;
+};
+
 /// Progress on the standard output: a bar with frames per second and the time left on a terminal, a line a frame
 /// elsewhere, nothing if quiet.
 class Progress {

@@ -74,6 +74,7 @@ class Run {
         input_(job.input),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
+        waiting_(std::in_place, fmt::format("building the kernels for {} ...", device.info().name), quiet_),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
         report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height, job.batch_input),
         doubt_(sequence_.calibration) {
@@ -160,6 +161,7 @@ class Run {
   /// The oldest frame under way: waits for it, writes and reports it.
   void collect(Progress& progress) {
     const FrameReport result = pipeline_.collect();
+    waiting_.reset();
     const PreparedFrame prepared = std::move(under_way_.front());
     under_way_.pop_front();
     const vision::StereoFrame& frame = sequence_.frames[prepared.index];
@@ -238,6 +240,7 @@ class Run {
   const cv::Size size_;
   MotionSource motions_;
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
+  std::optional<Waiting> waiting_;     // until the first frame is there: drivers build in its launches, too
   Pipeline pipeline_;
   RunReport report_;
   Doubt doubt_;

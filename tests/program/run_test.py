@@ -186,7 +186,7 @@ class Run(ProgramTest):
         self.assert_refused(["run", "--odometry", self.street, "--out", folder / "never", "--tuning", "/nonexistent"], "/nonexistent")
         self.assert_refused(["tune", "--file", "/proc/tuning.json"], "/proc/tuning.json", code=1)
 
-    def test_a_terminal_gets_a_bar(self):
+    def test_a_terminal_is_told_what_is_waited_for_and_gets_a_bar(self):
         terminal, side = pty.openpty()
         with subprocess.Popen([PROGRAM, "run", "--odometry", self.street, "--out", self.new_folder()], stdout=side) as process:
             os.close(side)
@@ -198,6 +198,7 @@ class Run(ProgramTest):
                 pass
         os.close(terminal)
         self.assertEqual(process.returncode, 0)
+        self.assertTrue(text.startswith(b"\r\x1b[Kbuilding the kernels for "), text[:80])
         self.assertIn(b"frames/s", text)
         self.assertIn(f"{FRAMES}/{FRAMES}".encode(), text)
         self.assertGreaterEqual(text.count(b"\r\x1b[K"), FRAMES)
