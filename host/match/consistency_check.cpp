@@ -23,17 +23,17 @@ ConsistencyCheck::ConsistencyCheck(ocl::Context& context, shared::ImageSize size
 }
 
 void ConsistencyCheck::operator()(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept,
-                                  Map& variance) {
-  (*this)(disparity, max_difference_px, max_difference_px, no_doubt_, outside, kept, variance);
+                                  Map& variance, Views views) {
+  (*this)(disparity, max_difference_px, max_difference_px, no_doubt_, outside, kept, variance, views);
 }
 
 void ConsistencyCheck::operator()(const Map& disparity, float max_difference_px, float in_doubt_px,
                                   const ocl::Buffer<shared::PredictionState>& last, OutsideView outside, Map& kept,
-                                  Map& variance) {
+                                  Map& variance, Views views) {
   context_.enter("ConsistencyCheck");
   const cl_int keep_outside = outside == OutsideView::kKeep;
-  check_(context_, ocl::every_pixels(context_, size_, pixels_), size_, max_difference_px, in_doubt_px, last,
-         keep_outside, disparity, kept, variance);
+  check_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_difference_px, in_doubt_px,
+         last, keep_outside, disparity, kept, variance);
 }
 
 }  // namespace egosgm

@@ -16,11 +16,14 @@ class ConsistencyCheck {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   ConsistencyCheck(ocl::Context& context, shared::ImageSize size, int pixels = 0);
 
-  /// Writes what is kept of `disparity` to `kept`, which is another map; what is dropped loses its `variance`.
-  void operator()(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept, Map& variance);
+  /// Writes what is kept of the `views` of `disparity` to `kept`, which is another map; what is dropped loses its
+  /// `variance`. Of `disparity`, both views are read.
+  void operator()(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept, Map& variance,
+                  Views views);
   /// With another tolerance where the predictions of the `last` frame were wrong.
   void operator()(const Map& disparity, float max_difference_px, float in_doubt_px,
-                  const ocl::Buffer<shared::PredictionState>& last, OutsideView outside, Map& kept, Map& variance);
+                  const ocl::Buffer<shared::PredictionState>& last, OutsideView outside, Map& kept, Map& variance,
+                  Views views);
 
  private:
   ocl::Context& context_;

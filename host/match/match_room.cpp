@@ -11,8 +11,7 @@ std::optional<BandedSgmPaths::Group> path_group(const Tuning& tuning) {
 
 }  // namespace
 
-MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options,
-                     const Tuning& tuning)
+MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning)
     : left_right_(options.consistency),
       matcher_(context, size, range_of(options), options.banded_sgm,
                {path_group(tuning), {tuning.tile_width, tuning.tile_height, tuning.block_lanes}}),
@@ -34,9 +33,10 @@ void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const Se
   const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;
   if (reads_off) {
     consistency_(smoothed, left_right_.read_off_px, left_right_.measurement_px, agreement, OutsideView::kDrop,
-                 measured.disparity, measured.variance);
+                 measured.disparity, measured.variance, Views::kBoth);
   } else {
-    consistency_(smoothed, left_right_.measurement_px, OutsideView::kDrop, measured.disparity, measured.variance);
+    consistency_(smoothed, left_right_.measurement_px, OutsideView::kDrop, measured.disparity, measured.variance,
+                 Views::kBoth);
   }
   speckle_removal_(measured, plan.matched);
 }

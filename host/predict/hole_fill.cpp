@@ -21,12 +21,14 @@ HoleFill::HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFill
       rows_filled_(context, size),
       rows_hidden_(context, 2 * pixel_count(size)) {}
 
-void HoleFill::operator()(const StereoMaps& in, const HiddenMap& hidden, StereoMaps& out, HiddenMap& out_hidden) {
+void HoleFill::operator()(const StereoMaps& in, const HiddenMap& hidden, StereoMaps& out, HiddenMap& out_hidden,
+                          Views views) {
   context_.enter("HoleFill");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_);
-  fill_rows_(context_, pixels, size_, max_difference_px_, in.disparity, in.variance, hidden, rows_filled_.disparity,
-             rows_filled_.variance, rows_hidden_);
-  fill_columns_(context_, pixels, size_, max_difference_px_, rows_filled_.disparity, rows_filled_.variance,
+  const cl_int whole_views = count(views);
+  fill_rows_(context_, pixels, size_, max_difference_px_, whole_views, in.disparity, in.variance, hidden,
+             rows_filled_.disparity, rows_filled_.variance, rows_hidden_);
+  fill_columns_(context_, pixels, size_, max_difference_px_, whole_views, rows_filled_.disparity, rows_filled_.variance,
                 rows_hidden_, out.disparity, out.variance, out_hidden);
 }
 

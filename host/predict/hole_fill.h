@@ -15,8 +15,9 @@ class HoleFill {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFillOptions& options, int pixels = 0);
 
-  /// REQUIRES: the outputs are not the inputs.
-  void operator()(const StereoMaps& in, const HiddenMap& hidden, StereoMaps& out, HiddenMap& out_hidden);
+  /// Disparities of both views; variances of `views`, and what is hidden there. REQUIRES: the outputs are not the
+  /// inputs.
+  void operator()(const StereoMaps& in, const HiddenMap& hidden, StereoMaps& out, HiddenMap& out_hidden, Views views);
 
  private:
   ocl::Context& context_;
@@ -24,8 +25,8 @@ class HoleFill {
   const int pixels_;
   const float max_difference_px_;
   using FillKernel =
-      ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
-                  const HiddenMap, ocl::Buffer<float>, ocl::Buffer<float>, HiddenMap>;
+      ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>,
+                  const ocl::Buffer<float>, const HiddenMap, ocl::Buffer<float>, ocl::Buffer<float>, HiddenMap>;
   FillKernel fill_rows_, fill_columns_;
   StereoMaps rows_filled_;
   HiddenMap rows_hidden_;

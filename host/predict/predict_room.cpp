@@ -18,8 +18,8 @@ void PredictRoom::operator()(const Plan& plan, const StereoMaps& belief, Predict
   if (plan.tracked == Views::kLeft) right_map_(left_right_px_, warped);
   edge_rejection_(warped.disparity, rejected, warped.variance);
   StereoMaps holes_filled{filled, maps.variance};
-  hole_fill_({rejected, warped.variance}, warped_hidden, holes_filled, hidden);
-  consistency_(filled, left_right_px_, OutsideView::kKeep, maps.disparity, maps.variance);
+  hole_fill_({rejected, warped.variance}, warped_hidden, holes_filled, hidden, plan.tracked);
+  consistency_(filled, left_right_px_, OutsideView::kKeep, maps.disparity, maps.variance, plan.tracked);
 }
 
 }  // namespace egosgm

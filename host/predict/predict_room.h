@@ -10,7 +10,8 @@
 
 namespace egosgm {
 
-/// What the last frame's maps say of this one: of both views, also where the left one alone is tracked.
+/// What the last frame's maps say of this one. Where the left view alone is tracked, the right one is there to check it
+/// by: its disparities but for the last check, and no variances.
 struct Prediction {
   StereoMaps warped;     // before anything was dropped; of what EdgeRejection dropped, the variances are gone
   Map rejected, filled;  // disparities after those stages
@@ -24,7 +25,8 @@ struct Prediction {
         maps(context, size),
         warped_hidden(context, 2 * pixel_count(size)),
         hidden(context, 2 * pixel_count(size)) {
-    warped_hidden.write(context, std::vector<cl_uchar>(warped_hidden.size()));  // a view that is not tracked stays so
+    // A view that is not tracked stays so.
+    for (HiddenMap* map : {&warped_hidden, &hidden}) map->write(context, std::vector<cl_uchar>(map->size()));
   }
 };
 

@@ -66,7 +66,7 @@ void CoarseMatch::operator()(const FrameImages& images, StereoMaps& found) {
   shrink_[images.type](images, images_);
   StereoMaps matched{matched_, found.variance};
   matcher_(images_, everything_, matched, Views::kBoth);
-  consistency_(matched_, max_difference_px_, OutsideView::kDrop, found.disparity, found.variance);
+  consistency_(matched_, max_difference_px_, OutsideView::kDrop, found.disparity, found.variance, Views::kBoth);
 }
 
 std::uint64_t CoarseMatch::matched_cells() const {

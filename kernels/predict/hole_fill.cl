@@ -24,17 +24,23 @@ static inline void store_filled(const Ints fills, const Floats mean, const Float
   store_bytes(is_hidden, hidden, x, width);
 }
 
-KERNEL void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
+// `whole_views`: those of which more than disparities is filled.
+KERNEL void fill_rows(const ImageSize size, const float gamma, const int whole_views, global const float* disparity,
                       global const float* variance, global const uchar* hidden, global float* filled_disparity,
                       global float* filled_variance, global uchar* still_hidden) {
   const int width = size.width;
   const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
+  const bool is_whole = get_global_id(2) < (size_t)whole_views;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
     const Floats left = load_pixels(disparity + row, x - 1, width);
     const Floats right = load_pixels(disparity + row, x + 1, width);
     const Ints fills = is_gap(d, left, right, gamma);
+    if (!is_whole) {
+      store_pixels(fills ? mean_of(left, right) : d, filled_disparity + row, x, width);
+      continue;
+    }
     const Floats p = load_pixels(variance + row, x, width);
     const Floats p_around =
         larger_of(load_pixels(variance + row, x - 1, width), load_pixels(variance + row, x + 1, width));
@@ -45,7 +51,7 @@ KERNEL void fill_rows(const ImageSize size, const float gamma, global const floa
   }
 }
 
-KERNEL void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
+KERNEL void fill_columns(const ImageSize size, const float gamma, const int whole_views, global const float* disparity,
                          global const float* variance, global const uchar* hidden, global float* filled_disparity,
                          global float* filled_variance, global uchar* still_hidden) {
   const int y = get_global_id(1);
@@ -54,12 +60,17 @@ KERNEL void fill_columns(const ImageSize size, const float gamma, global const f
   // At the border the row itself, whose pixels are valid or no neighbours.
   const size_t row_above = y >= 1 ? row - width : row;
   const size_t row_below = y + 1 < size.height ? row + width : row;
+  const bool is_whole = get_global_id(2) < (size_t)whole_views;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
     const Floats above = load_pixels(disparity + row_above, x, width);
     const Floats below = load_pixels(disparity + row_below, x, width);
     const Ints fills = is_gap(d, above, below, gamma);
+    if (!is_whole) {
+      store_pixels(fills ? mean_of(above, below) : d, filled_disparity + row, x, width);
+      continue;
+    }
     const Floats p = load_pixels(variance + row, x, width);
     const Floats p_around =
         larger_of(load_pixels(variance + row_above, x, width), load_pixels(variance + row_below, x, width));

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "tests/reference/match/consistency_check.h"
@@ -16,12 +17,12 @@ namespace {
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
 testing::HostMaps check(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps,
-                        OutsideView outside = OutsideView::kDrop, int pixels = 0) {
+                        OutsideView outside = OutsideView::kDrop, int pixels = 0, Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   ConsistencyCheck check(context, size, pixels);
   StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  check(in.disparity, max_difference_px, outside, out.disparity, in.variance);
+  check(in.disparity, max_difference_px, outside, out.disparity, in.variance, views);
   return {out.disparity.read(context), in.variance.read(context)};
 }
 
@@ -45,6 +46,13 @@ TEST_P(ConsistencyCheckTest, EqualsReference) {
           reference::consistency_check(size, max_difference_px, outside == OutsideView::kKeep, maps);
       for (const int pixels : {1, 16}) {
         const testing::HostMaps actual = check(size, max_difference_px, maps, outside, pixels);
+        const testing::HostMaps of_left = check(size, max_difference_px, maps, outside, pixels, Views::kLeft);
+        std::vector<float> variance = expected.variance;
+        const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(variance.size() / 2);
+        std::copy(maps.variance.begin() + right, maps.variance.end(), variance.begin() + right);
+        EXPECT_TRUE(testing::same_bits(of_left.variance, variance, size)) << "of the right view all stay";
+        EXPECT_TRUE(
+            std::equal(expected.disparity.begin(), expected.disparity.begin() + right, of_left.disparity.begin()));
         EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
             << max_difference_px << " px, by " << pixels;
         EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
@@ -90,7 +98,7 @@ TEST(ConsistencyCheck, HasAnotherToleranceWhereTheLastPredictionsWereWrong) {
     for (const auto& [usual_px, in_doubt_px] : {std::pair{0.4375f, 0.5f}, {0.5f, 0.4375f}}) {
       last.write(context, {{.counts = {}, .is_wrong = is_wrong, .was_wrong = 0}});
       StereoMaps in = testing::upload(context, size, maps);
-      check(in.disparity, usual_px, in_doubt_px, last, OutsideView::kDrop, out.disparity, in.variance);
+      check(in.disparity, usual_px, in_doubt_px, last, OutsideView::kDrop, out.disparity, in.variance, Views::kBoth);
       EXPECT_EQ(out.disparity.read(context)[1], (is_wrong ? in_doubt_px : usual_px) == 0.5f ? 1.25f : kNone);
     }
   }

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/reference/predict/hole_fill.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
@@ -13,7 +15,8 @@ namespace {
 
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
-testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps, int pixels = 0) {
+testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps, int pixels = 0,
+                       Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   HoleFill fill(context, size, {.max_difference_px = max_difference_px}, pixels);
   const StereoMaps in = testing::upload(context, size, maps);
@@ -21,7 +24,7 @@ testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const te
   HiddenMap hidden(context, in.disparity.size()), still_hidden(context, in.disparity.size());
   hidden.write(context, maps.hidden);
   still_hidden.write(context, std::vector<cl_uchar>(maps.hidden.size(), 9));
-  fill(in, hidden, out, still_hidden);
+  fill(in, hidden, out, still_hidden, views);
   testing::HostMaps filled = testing::download(context, out);
   filled.hidden = still_hidden.read(context);
   return filled;
@@ -65,6 +68,23 @@ TEST_P(HoleFillTest, EqualsReference) {
           << max_difference_px << " px, by " << pixels;
       EXPECT_EQ(actual.hidden, expected.hidden) << max_difference_px << " px, by " << pixels;
     }
+  }
+}
+
+// Where the left view alone is tracked, nothing of the right one is hidden, and its variances are nobody's.
+TEST_P(HoleFillTest, OfAViewThatIsNotTrackedItFillsDisparities) {
+  const shared::ImageSize size = GetParam();
+  testing::HostMaps maps = testing::random_maps(size, -20, 100, 0.4, 4);
+  maps.hidden.assign(maps.disparity.size(), 0);
+  const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(maps.disparity.size() / 2);
+  for (std::ptrdiff_t i = 0; i < right; ++i) maps.hidden[i] = maps.disparity[i] == kNone && i % 3 > 0;
+  testing::HostMaps expected = reference::hole_fill(size, 1, maps);
+  for (const int pixels : {1, 16}) {
+    const testing::HostMaps actual = fill(size, 1, maps, pixels, Views::kLeft);
+    EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << "by " << pixels;
+    std::copy(actual.variance.begin() + right, actual.variance.end(), expected.variance.begin() + right);
+    EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << "by " << pixels;
+    EXPECT_TRUE(std::equal(actual.hidden.begin(), actual.hidden.begin() + right, expected.hidden.begin()));
   }
 }
 
