@@ -16,6 +16,7 @@ enum class Search { kBands, kEverything };
 struct Wanted {
   std::optional<Views> variance;  // the one that is given out
   bool dynamic = false;
+  bool right = true;  // the right view's maps, too; where that is not tracked, no later frame needs them
 };
 
 /// All that is decided before a frame.

@@ -38,7 +38,8 @@ void FuseRoom::fuse(const Plan& plan, const FrameImages& images, const Predictio
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (plan.tracked == Views::kLeft) right_map_(measured, left_right_px_, smoothed);
-  consistency_(smoothed.disparity, left_right_px_, OutsideView::kKeep, belief.disparity, belief.variance, Views::kBoth);
+  consistency_(smoothed.disparity, left_right_px_, OutsideView::kKeep, belief.disparity, belief.variance,
+               plan.wanted.right ? Views::kBoth : plan.tracked);
   if (sad_check_) (*sad_check_)[images.type](images.pixels, belief);
 }
 
