@@ -231,7 +231,9 @@ Device Device::select(const std::string& wanted) {
   if (found.devices.empty()) {
     throw InvalidArgument(
         "no OpenCL device: " +
-        (without.empty() ? "install one, on Debian and Ubuntu `apt install pocl-opencl-icd` for the CPU" : without));
+        (without.empty() ? "install one, for the CPU `apt install pocl-opencl-icd` (Debian, Ubuntu) or, beside the "
+                           "wheel, `pip install \"egosgm[cpu]\"`"
+                         : without));
   }
   const char* from_environment = std::getenv("EGOSGM_DEVICE");
   const std::string given = !wanted.empty() ? wanted : from_environment ? from_environment : "";

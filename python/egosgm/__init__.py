@@ -13,6 +13,10 @@
 """
 import inspect as _inspect
 
+from . import cpu_driver as _cpu_driver
+
+_cpu_driver.show()  # before the library is loaded, which asks the loader
+
 from . import _egosgm
 from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
