@@ -18,4 +18,7 @@ set(PNG_PNG_INCLUDE_DIR ${EGOSGM_WHEEL_PREFIX}/include)
 set(PNG_LIBRARY ${third_party}/liblibpng.a)
 set(JPEG_INCLUDE_DIR ${EGOSGM_WHEEL_PREFIX}/include)
 set(JPEG_LIBRARY ${third_party}/liblibjpeg-turbo.a)
+set(ISAL_INCLUDE_DIR /usr/include)
+set(ISAL_LIBRARY ${EGOSGM_WHEEL_PREFIX}/lib/libisal.so)  # which auditwheel takes along
+link_directories(${EGOSGM_WHEEL_PREFIX}/lib)
 set(EGOSGM_FMT fmt::fmt-header-only)

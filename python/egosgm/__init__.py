@@ -2,6 +2,11 @@
 """Dense disparity from stereo video on OpenCL devices.
 
     import egosgm
+    for frame in egosgm.run("street"):
+        frame.disparity  # float32, pixels, egosgm.INVALID_DISPARITY where there is none
+
+The same, step by step:
+
     sequence = egosgm.open_folder("street")
     width, height = sequence.size
     pipeline = egosgm.Pipeline(sequence.calibration, width, height, disparities=128)
@@ -9,7 +14,7 @@
     for frame in sequence.frames:
         left, right = frame.read()
         result = pipeline.process(left, right, odometry.process(left, right).motion)
-        result.disparity  # float32, pixels, egosgm.INVALID_DISPARITY where there is none
+        result.disparity
 """
 import inspect as _inspect
 
@@ -20,9 +25,11 @@ _cpu_driver.show()  # before the library is loaded, which asks the loader
 from . import _egosgm
 from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
+from .drive import Drive, DriveFrame, run
+from .values import as_dataclass as _as_dataclass
 from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video
 
-__all__ = ["__version__", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video",
+__all__ = ["__version__", "Drive", "DriveFrame", "run", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 
@@ -46,3 +53,31 @@ _egosgm.Pipeline.__signature__ = _signature(("calibration", "width", "height"),
                                             {"device": "", **_egosgm.pipeline_options()})
 _egosgm.StereoOdometry.__signature__ = _signature(("calibration",), _egosgm.odometry_options())
 _egosgm.SyntheticSequence.__signature__ = _signature((), _egosgm.synthetic_options())
+
+for _values in (_egosgm.Calibration, _egosgm.DeviceInfo, _egosgm.DisparityCounts, _egosgm.DisparityMetrics, _egosgm.FrameReport,
+                _egosgm.PoseEvaluation, _egosgm.SegmentError):
+    _as_dataclass(_values)
+
+
+def _shown(cls, text):
+    cls.__repr__ = lambda self: f"<{cls.__name__} {text(self)}>"
+
+
+def _motion_text(motion):
+    """Where the camera went, in the frame that it was in."""
+    moved = motion.current_from_previous
+    return "to ({:.3f}, {:.3f}, {:.3f}) m".format(*(-moved[:3, :3].T @ moved[:3, 3]))
+
+
+def _maps_of(frame):
+    names = (name for name, member in vars(_egosgm.Frame).items() if isinstance(member, property) and name != "report")
+    return "of " + ", ".join(name for name in names if getattr(frame, name) is not None)
+
+
+_shown(_egosgm.Motion, _motion_text)
+_shown(_egosgm.Frame, _maps_of)
+_shown(_egosgm.OdometryResult, lambda found: f"{found.motion!r}, {found.inliers} of {found.matches} matches" if found.motion else f"no motion: {found.reason}")
+_shown(_egosgm.Pipeline, lambda pipeline: f"on {pipeline.device.name}, {pipeline.options['disparities']} disparities")
+_shown(_egosgm.StereoSequence, lambda sequence: f"{sequence.title}, {len(sequence)} frames")
+_shown(_egosgm.StereoFrame, lambda frame: f"{frame.name}: {frame.left}, {frame.right}")
+_shown(_egosgm.SyntheticSequence, lambda street: f"of {len(street)} frames, {street.options['width']}x{street.options['height']}")

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
+import dataclasses
 import os
-from typing import Any, Optional, Sequence, Union
+from typing import Any, ClassVar, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import Unpack
 
 from ._options import PipelineOptions, StereoOdometryOptions, SyntheticOptions
+from .drive import Drive as Drive
+from .drive import DriveFrame as DriveFrame
+from .drive import run as run
 from .video_evaluation import DensityFigures as DensityFigures
 from .video_evaluation import RegionFigures as RegionFigures
 from .video_evaluation import VideoEvaluation as VideoEvaluation
@@ -26,6 +30,7 @@ class DeviceError(RuntimeError): ...
 class BuildError(DeviceError): ...
 
 class Calibration:
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
     def __init__(self, fx: float, fy: float, cx: float, cy: float, baseline_m: float, doffs_px: float = 0.0) -> None: ...
     @property
     def fx(self) -> float: ...
@@ -48,6 +53,7 @@ class Motion:
     def covariance(self) -> _Transform: ...
 
 class DeviceInfo:
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
     @property
     def name(self) -> str: ...
     @property
@@ -68,6 +74,7 @@ class DeviceInfo:
     def max_allocation_bytes(self) -> int: ...
 
 class FrameReport:
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
     @property
     def unpredicted(self) -> str: ...
     @property
@@ -244,6 +251,7 @@ class StereoSequence:
     def __len__(self) -> int: ...
 
 class DisparityMetrics:
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
     @property
     def bad_or_missing(self) -> float: ...
     @property
@@ -260,6 +268,7 @@ class DisparityMetrics:
     def mae_px(self) -> float: ...
 
 class DisparityCounts:
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
     def __init__(self) -> None: ...
     @property
     def truth(self) -> int: ...
@@ -280,6 +289,7 @@ class DisparityCounts:
     def __add__(self, other: DisparityCounts) -> DisparityCounts: ...
 
 class SegmentError:
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
     @property
     def length_m(self) -> float: ...
     @property
@@ -290,6 +300,7 @@ class SegmentError:
     def rotation_deg_per_m(self) -> float: ...
 
 class PoseEvaluation:
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
     @property
     def translation_mean_m(self) -> float: ...
     @property

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A street, its frames and a pipeline for each file of tests, by the file's own WIDTH, HEIGHT, FRAMES, SEED and OPTIONS."""
 import egosgm
+import numpy as np
 import pytest
 
 
@@ -18,3 +19,17 @@ def frames(request, street):
 @pytest.fixture(scope="module")
 def shared_pipeline(request, street):
     return egosgm.Pipeline(street.calibration, request.module.WIDTH, request.module.HEIGHT, **request.module.OPTIONS)
+
+
+@pytest.fixture
+def street_folder(street, frames, tmp_path):
+    """The street in the layout of KITTI odometry."""
+    folder = tmp_path / "out/demo/street"
+    for side in (0, 1):
+        (folder / f"image_{side}").mkdir(parents=True)
+        for i, frame in enumerate(frames):
+            egosgm.write_disparity(folder / f"image_{side}/{i:06d}.png", (frame.left, frame.right)[side].astype(np.float32))
+    c = street.calibration
+    (folder / "calib.txt").write_text("".join(
+        f"P{i}: {c.fx} 0 {c.cx} {-c.fx * c.baseline_m * (i % 2)} 0 {c.fy} {c.cy} 0 0 0 1 0\n" for i in range(4)))
+    return folder

@@ -312,15 +312,7 @@ def test_the_stub_and_the_module_name_the_same():
     assert (folder / "py.typed").exists()
 
 
-def test_the_readmes_lines_run(tmp_path, frames, street, monkeypatch):
-    folder = tmp_path / "out/demo/street"
-    for side in (0, 1):
-        (folder / f"image_{side}").mkdir(parents=True)
-        for i, frame in enumerate(frames):
-            egosgm.write_disparity(folder / f"image_{side}/{i:06d}.png", (frame.left, frame.right)[side].astype(np.float32))
-    c = street.calibration
-    (folder / "calib.txt").write_text("".join(
-        f"P{i}: {c.fx} 0 {c.cx} {-c.fx * c.baseline_m * (i % 2)} 0 {c.fy} {c.cy} 0 0 0 1 0\n" for i in range(4)))
+def test_the_readmes_lines_run(tmp_path, street_folder, monkeypatch):
     monkeypatch.chdir(tmp_path)
     exec((SOURCE / "README.md").read_text().split("```python\n")[1].split("```")[0], {})
 

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""run(), reports as dataclasses, what repr says, and the stub's parameters."""
+import ast
+import dataclasses
+import inspect
+import json
+import pathlib
+import re
+import sys
+
+import numpy as np
+import pytest
+
+import egosgm
+
+WIDTH, HEIGHT, FRAMES = 320, 96, 3
+SEED = 7
+OPTIONS = dict(disparities=48, paths=4)
+
+
+def test_a_folder_and_its_pairs_give_the_maps_of_the_pipeline(street_folder, shared_pipeline):
+    drive = egosgm.run(street_folder, **OPTIONS, outputs=("disparity", "variance", "search_width"))
+    assert len(drive) == FRAMES and "3 frames" in repr(drive)
+    found = list(drive)
+    assert [frame.number for frame in found] == [0, 1, 2] and [frame.name for frame in found] == ["000000", "000001", "000002"]
+    odometry = egosgm.StereoOdometry(drive.calibration)
+    shared_pipeline.reset()
+    for frame, file in zip(found, drive.sequence.frames, strict=True):
+        left, right = file.read()
+        expected = shared_pipeline.process(left, right, odometry.process(left, right).motion)
+        np.testing.assert_array_equal(frame.left, left)
+        np.testing.assert_array_equal(frame.disparity, expected.disparity)
+        np.testing.assert_array_equal(frame.variance, expected.variance)
+        assert frame.maps.search_width.dtype == np.uint16 and frame.maps.predicted is None
+        valid = frame.disparity > 0
+        assert np.isnan(frame.depth[~valid]).all()
+        np.testing.assert_allclose(frame.depth[valid], drive.calibration.fx * drive.calibration.baseline_m / frame.disparity[valid], rtol=1e-5)
+    assert found[0].motion is None and found[0].odometry.reason and found[2].motion is not None
+    again = [frame.disparity for frame in drive]  # from its start
+    pairs = [frame.read() for frame in drive.sequence.frames]
+    of_pairs = [frame.disparity for frame in egosgm.run(iter(pairs), drive.calibration, **OPTIONS)]
+    for a, b, c in zip(found, again, of_pairs, strict=True):
+        np.testing.assert_array_equal(a.disparity, b)
+        np.testing.assert_array_equal(a.disparity, c)
+
+
+def test_without_motion_every_frame_is_searched_whole(street_folder):
+    drive = egosgm.run(street_folder, frames="1:2", motion=False, **OPTIONS)
+    reports = [frame.report for frame in drive]
+    assert [report.searched_everything for report in reports] == [True, True] and "no motion" in repr(drive)
+
+
+def test_what_is_wrong_is_said_before_a_frame_is_read(street_folder):
+    for call, named in ((lambda: egosgm.run(street_folder, p22=1), "did you mean p2"), (lambda: egosgm.run([]), "calibration: pairs"),
+                        (lambda: egosgm.run([], egosgm.run(street_folder, motion=False).calibration, frames="1:2"), "frames='1:2'"),
+                        (lambda: egosgm.run(street_folder, odometry=dict(min_inlier=1)), "min_inliers"),
+                        (lambda: next(iter(egosgm.run(street_folder, outputs="disparty", motion=False, **OPTIONS))), 'output "disparty"')):
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            call()
+    with pytest.raises(egosgm.InvalidArgument, match="missing: no such folder"):
+        egosgm.run(street_folder / "missing")
+
+
+def test_a_bar_is_shown_where_it_is_asked_for(street_folder, monkeypatch, capfd):
+    monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    with pytest.raises(egosgm.InvalidArgument, match="pip install tqdm"):
+        egosgm.run(street_folder, progress=True)
+    assert len(list(egosgm.run(street_folder, motion=False, **OPTIONS))) == FRAMES
+    calls = []
+
+    class Module:
+        @staticmethod
+        def tqdm(frames, **options):
+            calls.append(options)
+            return frames
+
+    monkeypatch.setitem(sys.modules, "tqdm", Module)
+    monkeypatch.setitem(sys.modules, "tqdm.auto", Module)
+    for progress, disable in ((None, None), (True, False)):
+        assert len(list(egosgm.run(street_folder, progress=progress, motion=False, **OPTIONS))) == FRAMES
+        assert calls.pop() == dict(total=FRAMES, unit=" frames", disable=disable)
+    list(egosgm.run(street_folder, progress=False, motion=False, **OPTIONS))
+    assert not calls
+
+
+def test_reports_are_dataclasses(shared_pipeline, street, frames):
+    report = shared_pipeline.process(frames[0].left, frames[0].right).report
+    values = dataclasses.asdict(report)
+    assert values["density"] == report.density and values["stages"] == report.stages
+    assert json.loads(json.dumps(values))["stripes"] == report.stripes
+    assert repr(report).startswith("FrameReport(unpredicted=") and f"density={report.density!r}" in repr(report)
+    assert {field.name for field in dataclasses.fields(report)} == {name for name in dir(report) if not name.startswith("_")}
+    same = egosgm.Calibration(**dataclasses.asdict(street.calibration))
+    assert same == street.calibration and same != egosgm.Calibration(1, 1, 1, 1, 1) and same != 3
+    assert eval(repr(same), vars(egosgm)) == same
+
+
+def test_repr_says_what_it_is(shared_pipeline, street, frames):
+    result = shared_pipeline.process(frames[0].left, frames[0].right, outputs="disparity")
+    assert repr(result) == "<Frame of disparity>"
+    assert "48 disparities" in repr(shared_pipeline) and f"{FRAMES} frames, {WIDTH}x{HEIGHT}" in repr(street)
+    motion = np.eye(4)
+    motion[:3, 3] = (0.1, 0, -0.8)
+    assert repr(egosgm.Motion(motion)) == "<Motion to (-0.100, 0.000, 0.800) m>"
+    assert "no motion: " in repr(egosgm.StereoOdometry(street.calibration).process(frames[0].left, frames[0].right))
+
+
+def parameters_of(documented):
+    """Their names, of the line that pybind11 writes over a function's text."""
+    return [name for name in re.findall(r"[(,] *(\w+): ", documented.split("\n")[0]) if name != "self"]
+
+
+def test_the_stub_has_the_parameters_of_the_module():
+    stub = ast.parse((pathlib.Path(egosgm.__file__).parent / "__init__.pyi").read_text())
+    compared = 0
+    for node in stub.body:
+        functions = [(egosgm, node)] if isinstance(node, ast.FunctionDef) else []
+        if isinstance(node, ast.ClassDef):
+            functions += [(getattr(egosgm, node.name), item) for item in node.body if isinstance(item, ast.FunctionDef)
+                          and not item.decorator_list and (item.name == "__init__" or not item.name.startswith("_"))]
+        for owner, function in functions:
+            documented = getattr(owner, function.name).__doc__ or ""
+            if not documented.startswith(f"{function.name}("):
+                continue
+            stubbed = [a.arg for a in function.args.args + function.args.kwonlyargs if a.arg != "self"]
+            assert stubbed == parameters_of(documented), f"{owner.__name__}.{function.name}"
+            compared += 1
+    assert compared > 40
+    assert "frames" in inspect.signature(egosgm.run).parameters
