@@ -35,8 +35,9 @@ struct Maps {
 
   /// An H x W x 2 array.
   cv::Mat flow_at(int i) const {
-    if (items.is_none() || py::object(items[py::int_(i)]).is_none()) return {};
-    const py::array_t<float, py::array::c_style | py::array::forcecast> flow(py::object(items[py::int_(i)]));
+    const py::object item = items.is_none() ? py::none() : py::object(items[py::int_(i)]);
+    if (item.is_none()) return {};
+    const py::array_t<float, py::array::c_style | py::array::forcecast> flow(item);
     if (flow.ndim() != 3 || flow.shape(2) != 2 || flow.size() == 0) {
       throw InvalidArgument(std::string(name) + ": give H x W x 2 arrays");
     }

@@ -127,3 +127,10 @@ def test_the_stub_has_the_parameters_of_the_module():
             compared += 1
     assert compared > 40
     assert "frames" in inspect.signature(egosgm.run).parameters
+
+
+def test_what_the_page_shows_is_what_comes_out():
+    import doctest
+    page = pathlib.Path(__file__).resolve().parents[2] / "docs/python.md"
+    failed, tried = doctest.testfile(str(page), module_relative=False, optionflags=doctest.ELLIPSIS)
+    assert failed == 0 and tried > 10

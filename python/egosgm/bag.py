@@ -1,0 +1,479 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recorded drives of robots: `egosgm run --bag`, or python -m egosgm.bag. ROS 2's MCAP and SQLite, and ROS 1's bags, by rosbags."""
+import argparse
+import collections
+import contextlib
+import dataclasses
+import os
+import pathlib
+import sys
+from typing import Any, Callable, Deque, Dict, Iterator, List, Optional, Sequence, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _egosgm
+from .ros_images import (BODY_FROM_OPTICAL, Cameras, are_raw, depth_maps, grey_of, quaternion_of, ros_disparity, rotation_of, stamp_ns)
+
+_IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+_POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
+
+
+def _needs(module: str) -> Any:
+    import importlib
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise _egosgm.InvalidArgument('bags need the packages rosbags and mcap: pip install "egosgm[bag]"') from None
+
+
+@dataclasses.dataclass
+class Gaps:
+    """What is unusual about the times of a drive."""
+
+    unpaired_left: int = 0
+    unpaired_right: int = 0
+    nearest_ms: Optional[float] = None
+    steps_back: int = 0
+    gaps: List[Tuple[int, float]] = dataclasses.field(default_factory=list)
+    largest_skew_ms: float = 0.0
+
+    def text(self) -> str:
+        parts = []
+        if self.unpaired_left or self.unpaired_right:
+            parts.append(f"{self.unpaired_left} left and {self.unpaired_right} right images have no partner")
+        if self.largest_skew_ms:
+            parts.append(f"stamps of a pair differ by up to {self.largest_skew_ms:.3f} ms")
+        if self.gaps:
+            at, longest = max(self.gaps, key=lambda gap: gap[1])
+            parts.append(f"{len(self.gaps)} gap{'s' if len(self.gaps) > 1 else ''}, the longest of {longest:.3f} s before frame {at}")
+        if self.steps_back:
+            parts.append(f"time steps back {self.steps_back} times, where the method starts anew")
+        return "; ".join(parts)
+
+
+class Pairing:
+    """Left and right by their stamps, each with the nearest one, no further than `bound_ns` away."""
+
+    def __init__(self, bound_ns: int) -> None:
+        self.bound_ns = bound_ns
+        self.gaps = Gaps()
+        self._waiting: Tuple[Deque[Tuple[int, Any]], Deque[Tuple[int, Any]]] = (collections.deque(), collections.deque())
+
+    def add(self, side: int, stamp: int, message: Any) -> Iterator[Tuple[Tuple[int, Any], Tuple[int, Any]]]:
+        waiting = self._waiting[side]
+        if waiting and stamp < waiting[-1][0]:  # a recording that starts over
+            yield from self.end()
+        waiting.append((stamp, message))
+        yield from self._pairs(False)
+
+    def end(self) -> Iterator[Tuple[Tuple[int, Any], Tuple[int, Any]]]:
+        yield from self._pairs(True)
+        self._drop_all()
+
+    def _drop(self, side: int) -> None:
+        self._waiting[side].popleft()
+        if side:
+            self.gaps.unpaired_right += 1
+        else:
+            self.gaps.unpaired_left += 1
+
+    def _drop_all(self) -> None:
+        for side in (0, 1):
+            while self._waiting[side]:
+                self._drop(side)
+
+    def _pairs(self, is_end: bool) -> Iterator[Tuple[Tuple[int, Any], Tuple[int, Any]]]:
+        left, right = self._waiting
+        while left and right:
+            apart = abs(left[0][0] - right[0][0])
+            self.gaps.nearest_ms = min(apart / 1e6, self.gaps.nearest_ms if self.gaps.nearest_ms is not None else np.inf)
+            earlier = 0 if left[0][0] < right[0][0] else 1
+            if apart > self.bound_ns:
+                self._drop(earlier)
+                continue
+            if apart:  # the next one of the earlier side may be nearer
+                later = self._waiting[1 - earlier][0][0]
+                if len(self._waiting[earlier]) < 2 and not is_end:
+                    return
+                if len(self._waiting[earlier]) > 1 and abs(self._waiting[earlier][1][0] - later) < apart:
+                    self._drop(earlier)
+                    continue
+            self.gaps.largest_skew_ms = max(self.gaps.largest_skew_ms, apart / 1e6)
+            yield left.popleft(), right.popleft()
+
+
+@dataclasses.dataclass
+class BagFrame:
+    """A rectified pair of a bag."""
+
+    number: int
+    stamp_ns: int
+    frame_id: str
+    left: NDArray[Any]
+    right: NDArray[Any]
+    starts_anew: bool
+    world_from_camera: Optional[NDArray[np.float64]]
+
+
+class Bag:
+    """Frames of a bag, from its start each time. `cameras` and `gaps` are known when frames are read."""
+
+    def __init__(self, path: "str | os.PathLike[str]", left_topic: str, right_topic: str, info_topics: Sequence[str] = (),
+                 pose_topic: str = "", max_skew_ms: float = 0.0, rectify: Optional[bool] = None, pose_axes: str = "body") -> None:
+        highlevel = _needs("rosbags.highlevel")
+        self.path = pathlib.Path(path)
+        if not self.path.exists():
+            raise _egosgm.InvalidArgument(f"{self.path}: no such file or folder: give a .mcap, a .bag, or a bag's folder")
+        if len(info_topics) not in (0, 2):
+            raise _egosgm.InvalidArgument(f"info topics: give two, left and right, not {len(info_topics)}")
+        if not max_skew_ms >= 0:
+            raise _egosgm.InvalidArgument(f"max skew {max_skew_ms} ms: give 0 for equal stamps, or how far they may differ")
+        if pose_axes not in ("body", "optical"):
+            raise _egosgm.InvalidArgument(f"pose axes \"{pose_axes}\": choose body (x forward, z up) or optical (z forward, y down)")
+        self._highlevel = highlevel
+        self._default_types = _needs("rosbags.typesys")
+        self.images = left_topic, right_topic
+        self.infos = tuple(info_topics) or tuple(_info_topic(topic) for topic in self.images)
+        self._pose_topic, self._bound_ns, self._rectify, self._pose_axes = pose_topic, int(max_skew_ms * 1e6), rectify, pose_axes
+        self.cameras: Optional[Cameras] = None
+        self.is_rectified_here = False
+        self.gaps = Gaps()
+        with self._opened() as reader:
+            self._check_topics(reader)
+            self.count = min(sum(c.msgcount for c in reader.connections if c.topic == topic) for topic in self.images)
+
+    @contextlib.contextmanager
+    def _opened(self) -> Iterator[Any]:
+        stores = self._default_types
+        try:
+            with self._highlevel.AnyReader([self.path], default_typestore=stores.get_typestore(stores.Stores.LATEST)) as reader:
+                yield reader
+        except _egosgm.InvalidArgument:
+            raise
+        except Exception as error:
+            if type(error).__module__.startswith("rosbags") or isinstance(error, FileNotFoundError):
+                raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {error}") from None
+            raise
+
+    def _check_topics(self, reader: Any) -> None:
+        types = {connection.topic: connection.msgtype for connection in reader.connections}
+        wanted = [(topic, _IMAGES, "images") for topic in self.images] + [(topic, ("sensor_msgs/msg/CameraInfo",), "camera infos") for topic in self.infos]
+        if self._pose_topic:
+            wanted.append((self._pose_topic, _POSES, "poses"))
+        for topic, kinds, what in wanted:
+            there = ", ".join(sorted(name for name, kind in types.items() if kind in kinds)) or "none"
+            if topic not in types:
+                raise _egosgm.InvalidArgument(f"{self.path}: has no topic \"{topic}\"; its topics of {what}: {there}")
+            if types[topic] not in kinds:
+                raise _egosgm.InvalidArgument(f"{self.path}: \"{topic}\" is of type {types[topic]}; its topics of {what}: {there}")
+
+    def _first_infos(self, reader: Any) -> Cameras:
+        found = []
+        for topic in self.infos:
+            connections = [c for c in reader.connections if c.topic == topic]
+            message = next((reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(connections=connections)), None)
+            if message is None:
+                raise _egosgm.InvalidArgument(f"{self.path}: \"{topic}\" has no message")
+            found.append(message)
+        self.is_rectified_here = are_raw(found[0], self.images[0]) if self._rectify is None else self._rectify
+        return Cameras(*found, self.is_rectified_here)
+
+    def __len__(self) -> int:
+        return self.count
+
+    def frames(self) -> Iterator[BagFrame]:
+        pairing = Pairing(self._bound_ns)
+        self.gaps = pairing.gaps
+        poses: List[Tuple[int, NDArray[np.float64]]] = []
+        with self._opened() as reader:
+            self.cameras = self._first_infos(reader)
+            if self._pose_topic:
+                poses = self._read_poses(reader)
+            connections = [c for c in reader.connections if c.topic in self.images]
+            number, last, interval = 0, None, None
+
+            def frame_of(pair: Any) -> BagFrame:
+                nonlocal number, last, interval
+                (stamp, left), (_, right) = pair
+                steps_back = last is not None and stamp <= last
+                if steps_back:
+                    pairing.gaps.steps_back += 1
+                elif last is not None:
+                    if interval is not None and stamp - last > 1.5 * interval:
+                        pairing.gaps.gaps.append((number, (stamp - last) / 1e9))
+                    else:
+                        interval = stamp - last
+                images = [grey_of(message) for message in (left, right)]
+                for image, topic in zip(images, self.images):
+                    if image.shape != (self.cameras.size[1], self.cameras.size[0]):
+                        raise _egosgm.InvalidArgument(f"{topic}: an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
+                                                      f"{self.cameras.size[0]}x{self.cameras.size[1]}")
+                if images[0].dtype != images[1].dtype:
+                    raise _egosgm.InvalidArgument(f"{self.images[0]} has {images[0].dtype}, {self.images[1]} has {images[1].dtype}: both need one depth")
+                images = self.cameras.rectified(*images)
+                frame = BagFrame(number, stamp, left.header.frame_id, *images, last is None or steps_back, _pose_at(poses, stamp))
+                number, last = number + 1, stamp
+                return frame
+
+            for connection, _, raw in reader.messages(connections=connections):
+                message = reader.deserialize(raw, connection.msgtype)
+                for pair in pairing.add(self.images.index(connection.topic), stamp_ns(message), message):
+                    yield frame_of(pair)
+            for pair in pairing.end():
+                yield frame_of(pair)
+        if number == 0:
+            nearest = f"the nearest stamps differ by {pairing.gaps.nearest_ms:.3f} ms: allow that by --max-skew-ms" if pairing.gaps.nearest_ms is not None \
+                else "one of the topics has no image"
+            raise _egosgm.InvalidArgument(f"{self.path}: no left image has a right one of its time; {nearest}")
+
+    def _read_poses(self, reader: Any) -> List[Tuple[int, NDArray[np.float64]]]:
+        poses = []
+        for connection, _, raw in reader.messages(connections=[c for c in reader.connections if c.topic == self._pose_topic]):
+            message = reader.deserialize(raw, connection.msgtype)
+            pose = message.pose.pose if hasattr(message.pose, "pose") else message.pose
+            world_from_body = np.eye(4)
+            world_from_body[:3, :3] = rotation_of(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w)
+            world_from_body[:3, 3] = pose.position.x, pose.position.y, pose.position.z
+            poses.append((stamp_ns(message), world_from_body @ BODY_FROM_OPTICAL if self._pose_axes == "body" else world_from_body))
+        return sorted(poses, key=lambda item: item[0])
+
+
+def _info_topic(image_topic: str) -> str:
+    """Where ROS puts the camera info of an image: beside it. A compressed image lies one level deeper."""
+    parts = image_topic.rstrip("/").split("/")
+    if parts[-1] in ("compressed", "compressedDepth", "theora", "zstd"):
+        parts = parts[:-1]
+    return "/".join([*parts[:-1], "camera_info"])
+
+
+def _pose_at(poses: List[Tuple[int, NDArray[np.float64]]], stamp: int) -> Optional[NDArray[np.float64]]:
+    """Between the poses before and after, which lie no further than half a second apart; None elsewhere."""
+    times = [time for time, _ in poses]
+    after = int(np.searchsorted(times, stamp))
+    if after < len(poses) and times[after] == stamp:
+        return poses[after][1]
+    if after == 0 or after == len(poses) or times[after] - times[after - 1] > 500_000_000:
+        return None
+    (before_time, before), (after_time, later) = poses[after - 1], poses[after]
+    part = (stamp - before_time) / (after_time - before_time)
+    a, b = quaternion_of(before[:3, :3]), quaternion_of(later[:3, :3])
+    b = b if a @ b >= 0 else -b
+    result = np.eye(4)
+    result[:3, :3] = rotation_of(*((1 - part) * a + part * b))
+    result[:3, 3] = (1 - part) * before[:3, 3] + part * later[:3, 3]
+    return result
+
+
+class McapOutput:
+    """Depth, disparity, variance, odometry and camera infos as a ROS 2 MCAP file, which appears when all of it is there."""
+
+    def __init__(self, file: pathlib.Path, disparities: int) -> None:
+        writer = _needs("mcap.writer")
+        typesys = _needs("rosbags.typesys")
+        if not file.parent.is_dir():
+            raise _egosgm.InvalidArgument(f"{file}: {file.parent}: no such folder")
+        if file.exists():
+            raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name")
+        self._file, self._disparities = file, disparities
+        self._store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+        self._types = self._store.types
+        self._part = file.with_name(file.name + ".part")
+        self._stream = open(self._part, "xb")
+        self._writer = writer.Writer(self._stream)
+        self._writer.start(profile="ros2", library="egosgm")
+        self._schemas: Dict[str, int] = {}
+        self._channels: Dict[str, int] = {}
+        self._world_from_camera = np.eye(4)
+
+    def _write(self, topic: str, kind: str, message: Any, time: int) -> None:
+        if kind not in self._schemas:
+            text = self._store.generate_msgdef(kind, ros_version=2)[0]
+            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text.encode())
+        if topic not in self._channels:
+            self._channels[topic] = self._writer.register_channel(topic, "cdr", self._schemas[kind])
+        self._writer.add_message(self._channels[topic], time, bytes(self._store.serialize_cdr(message, kind)), time)
+
+    def _header(self, time: int, frame_id: str) -> Any:
+        stamp = self._types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
+        return self._types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame_id)
+
+    def _image(self, header: Any, map_: NDArray[Any], encoding: str) -> Any:
+        height, width = map_.shape
+        return self._types["sensor_msgs/msg/Image"](header=header, height=height, width=width, encoding=encoding, is_bigendian=0,
+                                                    step=width * map_.itemsize, data=np.ascontiguousarray(map_).view(np.uint8).reshape(-1))
+
+    def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
+        time, types = frame.stamp_ns, self._types
+        header = self._header(time, frame.frame_id)
+        depth, variance = depth_maps(maps.disparity, maps.variance, calibration)
+        self._write("/egosgm/depth", "sensor_msgs/msg/Image", self._image(header, depth, "32FC1"), time)
+        self._write("/egosgm/variance", "sensor_msgs/msg/Image", self._image(header, variance, "32FC1"), time)
+        height, width = depth.shape
+        region = types["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=height, width=width, do_rectify=False)
+        self._write("/egosgm/disparity", "stereo_msgs/msg/DisparityImage", types["stereo_msgs/msg/DisparityImage"](
+            header=header, image=self._image(header, ros_disparity(maps.disparity, calibration), "32FC1"), f=calibration.fx,
+            t=calibration.baseline_m, valid_window=region, min_disparity=max(0.0, calibration.doffs_px),
+            max_disparity=self._disparities - 1 + calibration.doffs_px, delta_d=0.0), time)
+        reason = getattr(maps, "reason", None)
+        if reason is not None:
+            self._write("/egosgm/reason", "sensor_msgs/msg/Image", self._image(header, reason, "mono8"), time)
+        for side, shift in (("left", 0.0), ("right", -calibration.fx * calibration.baseline_m)):
+            self._write(f"/egosgm/{side}/camera_info", "sensor_msgs/msg/CameraInfo", self._info(header, calibration, shift, width, height, region), time)
+        if motion is not None:
+            self._world_from_camera = self._world_from_camera @ np.linalg.inv(motion)
+        self._write("/egosgm/odom", "nav_msgs/msg/Odometry", self._odometry(header), time)
+
+    def _info(self, header: Any, c: _egosgm.Calibration, shift: float, width: int, height: int, region: Any) -> Any:
+        cx = c.cx + (c.doffs_px if shift else 0.0)
+        return self._types["sensor_msgs/msg/CameraInfo"](
+            header=header, height=height, width=width, distortion_model="plumb_bob", d=np.zeros(5), k=np.array([c.fx, 0, cx, 0, c.fy, c.cy, 0, 0, 1.0]),
+            r=np.eye(3).reshape(-1), p=np.array([c.fx, 0, cx, shift, 0, c.fy, c.cy, 0, 0, 0, 1.0, 0]), binning_x=0, binning_y=0, roi=region)
+
+    def _odometry(self, header: Any) -> Any:
+        types = self._types
+        pose = BODY_FROM_OPTICAL @ self._world_from_camera @ BODY_FROM_OPTICAL.T
+        x, y, z, w = quaternion_of(pose[:3, :3])
+        vector, zero = types["geometry_msgs/msg/Vector3"], np.zeros(36)
+        return types["nav_msgs/msg/Odometry"](
+            header=types["std_msgs/msg/Header"](stamp=header.stamp, frame_id="odom"), child_frame_id="egosgm_camera",
+            pose=types["geometry_msgs/msg/PoseWithCovariance"](pose=types["geometry_msgs/msg/Pose"](
+                position=types["geometry_msgs/msg/Point"](x=pose[0, 3], y=pose[1, 3], z=pose[2, 3]),
+                orientation=types["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w)), covariance=zero),
+            twist=types["geometry_msgs/msg/TwistWithCovariance"](twist=types["geometry_msgs/msg/Twist"](
+                linear=vector(x=0.0, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=0.0)), covariance=zero))
+
+    def finish(self) -> None:
+        self._writer.finish()
+        self._stream.close()
+        os.replace(self._part, self._file)
+
+    def give_up(self) -> None:
+        self._stream.close()
+        self._part.unlink(missing_ok=True)
+
+
+class FolderOutput:
+    """disparity/NUMBER.png as the program writes them, and the calibration of the rectified images."""
+
+    def __init__(self, folder: pathlib.Path) -> None:
+        self._folder = folder
+        if folder.exists() and any(folder.iterdir()):
+            raise _egosgm.InvalidArgument(f"{folder}: holds files already: give a new folder")
+        (folder / "disparity").mkdir(parents=True, exist_ok=True)
+
+    def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
+        if frame.number == 0:
+            _egosgm.write_calibration(self._folder / "calibration.txt", calibration)
+        _egosgm.write_disparity(self._folder / "disparity" / f"{frame.number:06d}.png", maps.disparity)
+
+    def finish(self) -> None:
+        pass
+
+    def give_up(self) -> None:
+        pass
+
+
+def run(bag: Bag, output: Optional[Any] = None, progress: Optional[bool] = None,
+        on_frame: Optional[Callable[[BagFrame, Any], None]] = None, **options: Any) -> Dict[str, Any]:
+    """Matches all frames of a bag, and writes them. options: those of Pipeline. Returns what happened."""
+    from .drive import _bar
+    pipeline = odometry = previous = None
+    density = 0.0
+    frames = moved = 0
+    for frame in _bar(progress)(bag.frames(), len(bag)):
+        calibration = bag.cameras.calibration
+        if pipeline is None:
+            pipeline = _egosgm.Pipeline(calibration, *bag.cameras.size, **options)
+            odometry = _egosgm.StereoOdometry(calibration)
+        if frame.starts_anew:
+            pipeline.reset()
+            odometry.reset()
+            previous = None
+        motion = odometry.process(frame.left, frame.right).motion
+        if frame.world_from_camera is not None and previous is not None:
+            motion = _egosgm.Motion(np.linalg.inv(frame.world_from_camera) @ previous)
+        previous = frame.world_from_camera
+        maps = pipeline.process(frame.left, frame.right, motion)
+        if output:
+            output.add(frame, maps, motion.current_from_previous if motion else None, calibration)
+        if on_frame:
+            on_frame(frame, maps)
+        frames, moved, density = frames + 1, moved + (motion is not None), density + maps.report.density
+    return {"frames": frames, "density": density / max(1, frames), "motions": moved, "calibration": bag.cameras.calibration,
+            "rectified": bag.is_rectified_here, "device": pipeline.device.name, "gaps": bag.gaps}
+
+
+def _value(text: str) -> Any:
+    for kind in (int, float):
+        with contextlib.suppress(ValueError):
+            return kind(text)
+    return {"true": True, "false": False}.get(text, text)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="egosgm run --bag", description=__doc__, allow_abbrev=False)
+    add = parser.add_argument
+    add("--bag", required=True, metavar="FILE.mcap|FILE.bag|FOLDER", help="ROS 2 (MCAP, SQLite) or ROS 1")
+    add("--left-topic", required=True, metavar="TOPIC", help="raw or compressed images")
+    add("--right-topic", required=True, metavar="TOPIC")
+    add("--info-topics", nargs=2, default=(), metavar=("LEFT", "RIGHT"), help="camera infos [camera_info beside the images]")
+    add("--pose-topic", default="", metavar="TOPIC", help="motion from there (Odometry, PoseStamped) in place of stereo odometry")
+    add("--pose-axes", default="body", metavar="body|optical", help="of the poses: x forward, z up, or z forward, y down [body]")
+    add("--max-skew-ms", type=float, default=0.0, metavar="MS", help="how far the stamps of a pair may differ [0]")
+    add("--rectify", default="auto", choices=("auto", "on", "off"), help="images by their infos [auto: where the infos have a distortion and "
+        "the topic is not named rect]")
+    add("--out", metavar="FILE.mcap|FOLDER", help="depth, disparity, variance, odometry and camera infos; or disparity maps as PNG")
+    add("--device", default="", metavar="DEVICE")
+    add("--preset", default="default", metavar="PRESET")
+    add("--set", action="append", default=[], metavar="NAME=VALUE", help="an option, as egosgm run has it")
+    add("--quiet", action="store_true", help="no progress")
+    return parser
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> int:
+    """What the program prints and returns."""
+    try:
+        return _main(_parser().parse_args(arguments))
+    except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError, OSError) as error:
+        print(f"egosgm: error: {error}", file=sys.stderr)
+        return 2 if isinstance(error, _egosgm.InvalidArgument) else 1
+    except KeyboardInterrupt:
+        print("egosgm: interrupted", file=sys.stderr)
+        return 130
+
+
+def _main(given: argparse.Namespace) -> int:
+    options = {}
+    for text in given.set:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise _egosgm.InvalidArgument(f"--set {text}: give NAME=VALUE")
+        options[name.replace(".", "__")] = _value(value)
+    bag = Bag(given.bag, given.left_topic, given.right_topic, given.info_topics, given.pose_topic, given.max_skew_ms,
+              {"auto": None, "on": True, "off": False}[given.rectify], given.pose_axes)
+    output = None
+    if given.out:
+        out = pathlib.Path(given.out)
+        if out.suffix == ".mcap":
+            disparities = options.get("disparities", _egosgm.pipeline_options(given.preset)["disparities"])
+            output = McapOutput(out, int(disparities))
+        else:
+            output = FolderOutput(out)
+    try:
+        told = run(bag, output, progress=False if given.quiet else None, device=given.device, preset=given.preset, **options)
+    except BaseException:
+        if output:
+            output.give_up()
+        raise
+    if output:
+        output.finish()
+    print(f"{bag.path.name}: {told['frames']} frames, {bag.cameras.size[0]}x{bag.cameras.size[1]}{', rectified here' if told['rectified'] else ''}, "
+          f"on {told['device']}; {told['motions']} motions; density {told['density']:.1%} in the mean" + (f": {given.out}" if given.out else ""))
+    if told["gaps"].text():
+        print(told["gaps"].text())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""ROS's images and camera infos as the library's, and its maps as ROS wants them. Messages of rclpy and of rosbags, ROS 1 and 2."""
+import pathlib
+import tempfile
+from typing import Any, Optional, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _egosgm
+
+# Bytes between neighbouring pixels of an encoding, and where the brightness lies in them, or red, green and blue.
+_GREY8 = {"mono8": (1, 0), "8UC1": (1, 0), "yuv422": (2, 1), "uyvy": (2, 1), "yuv422_yuy2": (2, 0), "yuyv": (2, 0), "nv12": (1, 0),
+          "nv21": (1, 0)}
+_COLOURS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)), "bgra8": (4, (2, 1, 0)), "8UC3": (3, (2, 1, 0))}
+_GREY16 = ("mono16", "16UC1")
+
+
+def grey_of(message: Any) -> NDArray[Any]:
+    """A sensor_msgs Image or CompressedImage as uint8 or uint16, H x W."""
+    if hasattr(message, "format"):
+        return _decompressed(bytes(message.data), message.format)
+    height, width, step, encoding = message.height, message.width, message.step, message.encoding
+    data = np.frombuffer(bytes(message.data), np.uint8)
+    pixel_bytes = _GREY8.get(encoding, (0,))[0] or _COLOURS.get(encoding, (0,))[0] or (2 if encoding in _GREY16 else 0)
+    if not pixel_bytes:
+        known = ", ".join((*_GREY8, *_COLOURS, *_GREY16))
+        raise _egosgm.InvalidArgument(f"images of encoding \"{encoding}\" are not read: convert them to one of {known}")
+    if step < width * pixel_bytes or data.size < height * step:
+        raise _egosgm.InvalidArgument(f"an image of {width}x{height} px of {encoding} with rows of {step} bytes has {data.size} bytes")
+    rows = data[:height * step].reshape(height, step)
+    if encoding in _GREY16:
+        order = ">u2" if message.is_bigendian else "<u2"
+        return rows[:, :2 * width].copy().view(order).astype(np.uint16)
+    pixels = rows[:, :width * pixel_bytes].reshape(height, width, pixel_bytes)
+    if encoding in _GREY8:
+        return np.ascontiguousarray(pixels[:, :, _GREY8[encoding][1]])
+    red, green, blue = (pixels[:, :, channel].astype(np.uint32) for channel in _COLOURS[encoding][1])
+    return ((9798 * red + 19235 * green + 3735 * blue + (1 << 14)) >> 15).astype(np.uint8)  # as OpenCV weighs and rounds
+
+
+def _decompressed(data: bytes, kind: str) -> NDArray[Any]:
+    with tempfile.TemporaryDirectory(prefix="egosgm_") as folder:
+        file = pathlib.Path(folder) / "image"
+        file.write_bytes(data)
+        try:
+            return _egosgm.read_grey(file)
+        except (ValueError, OSError) as error:
+            reason = str(error).replace(str(file), "the image")
+            raise _egosgm.InvalidArgument(f"a compressed image ({kind}) cannot be read, PNG and JPEG are: {reason}") from None
+
+
+def stamp_ns(message: Any) -> int:
+    stamp = message.header.stamp
+    return int(stamp.sec if hasattr(stamp, "sec") else stamp.secs) * 10**9 + int(
+        stamp.nanosec if hasattr(stamp, "nanosec") else stamp.nsecs)
+
+
+def _matrix(info: Any, name: str, rows: int, columns: int) -> NDArray[np.float64]:
+    values = np.array(getattr(info, name.lower(), None) if hasattr(info, name.lower()) else getattr(info, name), dtype=float)
+    return values.reshape(rows, columns)
+
+
+class Cameras:
+    """Two sensor_msgs/CameraInfo: the calibration of rectified images, and how raw ones are rectified."""
+
+    def __init__(self, left: Any, right: Any, rectify: bool) -> None:
+        """Throws InvalidArgument where they are no calibration."""
+        left_p, right_p = _matrix(left, "P", 3, 4), _matrix(right, "P", 3, 4)
+        if not left_p[0, 0] > 0 or not right_p[0, 0] > 0:
+            raise _egosgm.InvalidArgument("camera info: P is zero: the cameras are not calibrated")
+        if not right_p[0, 3] < 0:
+            raise _egosgm.InvalidArgument("camera info: P of the right camera has no baseline (Tx is not negative): is it of a stereo pair, "
+                                          "and are left and right not swapped?")
+        if abs(left_p[0, 0] - right_p[0, 0]) > 1e-3 * left_p[0, 0] or abs(left_p[1, 2] - right_p[1, 2]) > 1e-2:
+            raise _egosgm.InvalidArgument("camera info: P of both cameras have different focal lengths or rows: they are not of one rectified pair")
+        self.size = int(left.width), int(left.height)
+        self._rectification: Optional[_egosgm.Rectification] = None
+        if rectify:
+            self._rectification = _egosgm.Rectification(_rig(left, right, right_p[0, 3] / right_p[0, 0]), *self.size)
+            self.calibration = self._rectification.calibration
+        else:
+            self.calibration = _egosgm.Calibration(left_p[0, 0], left_p[1, 1], left_p[0, 2], left_p[1, 2],
+                                                   -right_p[0, 3] / right_p[0, 0], right_p[0, 2] - left_p[0, 2])
+
+    def rectified(self, left: NDArray[Any], right: NDArray[Any]) -> Tuple[NDArray[Any], NDArray[Any]]:
+        return self._rectification.rectify(left, right) if self._rectification else (left, right)
+
+
+def are_raw(info: Any, topic: str) -> bool:
+    """Whether images of this camera need rectifying, by its name and its distortion."""
+    if any("rect" in part for part in topic.split("/")[-2:]):
+        return False
+    distortion = np.array(getattr(info, "d", None) if hasattr(info, "d") else info.D, dtype=float)
+    return bool(np.any(distortion != 0)) or not np.allclose(_matrix(info, "R", 3, 3), np.eye(3), atol=1e-9)
+
+
+def _rig(left: Any, right: Any, shift: float) -> _egosgm.StereoRig:
+    """From where both cameras look after rectification: a point's x differs by `shift` there."""
+    models = {getattr(info, "distortion_model") for info in (left, right)}
+    fisheye = models == {"equidistant"}
+    if not fisheye and not models <= {"plumb_bob", "rational_polynomial", ""}:
+        raise _egosgm.InvalidArgument(f"camera info: distortion of the model {' and '.join(sorted(models))} is not known: "
+                                      "plumb_bob, rational_polynomial or equidistant is; or give rectified images")
+    left_r, right_r = _matrix(left, "R", 3, 3), _matrix(right, "R", 3, 3)
+    distortions = [np.array(getattr(info, "d", None) if hasattr(info, "d") else info.D, dtype=float) for info in (left, right)]
+    return _egosgm.StereoRig(_matrix(left, "K", 3, 3), distortions[0], _matrix(right, "K", 3, 3), distortions[1],
+                             right_r.T @ left_r, right_r.T @ np.array([shift, 0, 0]), fisheye, (int(left.width), int(left.height)))
+
+
+def depth_maps(disparity: NDArray[np.float32], variance: NDArray[np.float32],
+               calibration: _egosgm.Calibration) -> Tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Depth [m] and its variance [m^2], NaN where there is none (REP 118)."""
+    depth = np.asarray(_egosgm.depth_from_disparity(disparity, calibration))
+    depth = np.where(depth > 0, depth, np.float32(np.nan))
+    of_depth = (depth * depth / np.float32(calibration.fx * calibration.baseline_m)) ** 2 * variance
+    return depth, of_depth.astype(np.float32)
+
+
+def ros_disparity(disparity: NDArray[np.float32], calibration: _egosgm.Calibration) -> NDArray[np.float32]:
+    """As stereo_msgs/DisparityImage means it: depth is f T / d, so without the offset of the principal points; -1, which is below
+    min_disparity, where there is none."""
+    shifted = disparity + np.float32(calibration.doffs_px)
+    return np.where((disparity == _egosgm.INVALID_DISPARITY) | (shifted < 0), np.float32(-1), shifted)
+
+
+# The body's axes (x forward, y left, z up; REP 103) from the camera's (x right, y down, z forward).
+BODY_FROM_OPTICAL = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+
+
+def quaternion_of(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(x, y, z, w) of a rotation matrix: the eigenvector of the largest eigenvalue of Bar-Itzhack's matrix."""
+    r = rotation
+    k = np.array([[r[0, 0] - r[1, 1] - r[2, 2], 0, 0, 0], [r[1, 0] + r[0, 1], r[1, 1] - r[0, 0] - r[2, 2], 0, 0],
+                  [r[2, 0] + r[0, 2], r[2, 1] + r[1, 2], r[2, 2] - r[0, 0] - r[1, 1], 0],
+                  [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], r[0, 0] + r[1, 1] + r[2, 2]]]) / 3
+    q = np.linalg.eigh(k)[1][:, -1]
+    return q if q[3] >= 0 else -q
+
+
+def rotation_of(x: float, y: float, z: float, w: float) -> NDArray[np.float64]:
+    n = x * x + y * y + z * z + w * w
+    if not n > 0:
+        raise _egosgm.InvalidArgument("a pose has the quaternion 0, 0, 0, 0, which is no rotation")
+    s = 2 / n
+    return np.array([[1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
+                     [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
+                     [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)]])

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bags of robots in and out: what is read equals the images that were recorded, and what is written says where things are."""
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+import egosgm
+
+from egosgm import bag as bags
+from egosgm import ros_images
+
+WIDTH, HEIGHT, FRAMES = 320, 96, 3
+SEED = 7
+OPTIONS = dict(disparities=48, paths=4)
+RATE_NS = 100_000_000
+START = 1_700_000_000_000_000_000
+SET = ["--set", "disparities=48", "--set", "paths=4", "--quiet"]
+TOPICS = ["--left-topic", "/left/image_rect", "--right-topic", "/right/image_rect"]
+
+
+class Recording:
+    """Messages of one bag, whatever its format."""
+
+    def __init__(self, kind):
+        self.kind = kind
+        self.store = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.ROS2_HUMBLE)
+        self.types = self.store.types
+        self.messages = []
+
+    def header(self, time):
+        stamp = self.types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
+        seq = {"seq": 0} if self.kind == "ros1" else {}
+        return self.types["std_msgs/msg/Header"](**seq, stamp=stamp, frame_id="left_optical")
+
+    def add(self, topic, kind, time, received=None, **fields):
+        message = self.types[kind](header=self.header(time), **fields)
+        self.messages.append((START + len(self.messages) if received is None else received, topic, kind, message))
+
+    def image(self, topic, time, pixels, encoding=None, received=None):
+        height, width = pixels.shape[:2]
+        encoding = encoding or {np.dtype(np.uint8): "mono8", np.dtype(np.uint16): "mono16"}[pixels.dtype]
+        data = np.ascontiguousarray(pixels)
+        self.add(topic, "sensor_msgs/msg/Image", time, received, height=height, width=width, encoding=encoding, is_bigendian=0,
+                 step=data.strides[0], data=data.view(np.uint8).reshape(-1))
+
+    def info(self, topic, calibration, is_right, distortion=(0, 0, 0, 0, 0), rotation=np.eye(3)):
+        c = calibration
+        k = np.array([c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1.0])
+        p = np.array([c.fx, 0, c.cx, -c.fx * c.baseline_m * is_right, 0, c.fy, c.cy, 0, 0, 0, 1.0, 0])
+        region = self.types["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
+        values = dict(d=np.array(distortion, float), k=k, r=np.asarray(rotation, float).reshape(-1), p=p)
+        if self.kind == "ros1":
+            values = {name.upper(): value for name, value in values.items()}
+        self.add(topic, "sensor_msgs/msg/CameraInfo", START, height=HEIGHT, width=WIDTH, distortion_model="plumb_bob", **values,
+                 binning_x=0, binning_y=0, roi=region)
+
+    def write(self, path):
+        self.messages.sort(key=lambda item: item[0])
+        plugin = {} if self.kind == "ros1" else dict(version=9, storage_plugin=StoragePlugin.MCAP if self.kind == "mcap" else StoragePlugin.SQLITE3)
+        with (Writer1(path) if self.kind == "ros1" else Writer(path, **plugin)) as writer:
+            connections = {}
+            for time, topic, kind, message in self.messages:
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(topic, kind, typestore=self.store)
+                data = self.store.serialize_ros1(message, kind) if self.kind == "ros1" else self.store.serialize_cdr(message, kind)
+                writer.write(connections[topic], time, data)
+        return next(path.glob("*.mcap")) if self.kind == "mcap" else path
+
+
+def record(kind, path, street, frames, skew_ns=0, left_out=(), times=None, **infos):
+    recording = Recording(kind)
+    for side, name in enumerate(("left", "right")):
+        recording.info(f"/{name}/camera_info", street.calibration, side, **infos)
+    for i, frame in enumerate(frames):
+        time = times[i] if times else START + i * RATE_NS
+        if (i, "left") not in left_out:
+            recording.image("/left/image_rect", time, frame.left)
+        if (i, "right") not in left_out:
+            recording.image("/right/image_rect", time + skew_ns, frame.right)
+    return recording.write(path)
+
+
+def program(*arguments):
+    return subprocess.run([sys.executable, "-B", "-m", "egosgm.bag", *map(str, arguments)], capture_output=True, text=True, timeout=300)
+
+
+@pytest.mark.parametrize("kind, name", [("mcap", "drive"), ("sqlite", "drive"), ("ros1", "drive.bag")])
+def test_every_kind_of_bag_gives_the_recorded_images(kind, name, tmp_path, street, frames):
+    bag = bags.Bag(record(kind, tmp_path / name, street, frames), "/left/image_rect", "/right/image_rect")
+    assert len(bag) == FRAMES
+    for _ in range(2):
+        found = list(bag.frames())
+        assert [frame.stamp_ns for frame in found] == [START + i * RATE_NS for i in range(FRAMES)]
+        for frame, expected in zip(found, frames, strict=True):
+            np.testing.assert_array_equal(frame.left, expected.left)
+            np.testing.assert_array_equal(frame.right, expected.right)
+    assert found[0].starts_anew and not found[1].starts_anew and found[0].frame_id == "left_optical"
+    for name in ("fx", "fy", "cx", "cy", "baseline_m", "doffs_px"):
+        assert getattr(bag.cameras.calibration, name) == pytest.approx(getattr(street.calibration, name))
+    assert bag.gaps.text() == ""
+
+
+def test_the_written_bag_says_where_things_are(tmp_path, street, frames, shared_pipeline):
+    """Depth in metres by f T / d, the disparities of the pipeline, and nothing left beside them."""
+    out = tmp_path / "result.mcap"
+    bag = record("mcap", tmp_path / "drive", street, frames)
+    told = program("--bag", bag, *TOPICS, "--out", out, *SET)
+    assert told.returncode == 0, told.stderr
+    assert told.stdout.startswith(f"{bag.name}: {FRAMES} frames, {WIDTH}x{HEIGHT}, on ") and f"{FRAMES - 1} motions" in told.stdout
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["drive", "result.mcap"]
+    odometry = egosgm.StereoOdometry(street.calibration)
+    shared_pipeline.reset()
+    expected = [shared_pipeline.process(f.left, f.right, odometry.process(f.left, f.right).motion) for f in frames]
+    found = {}
+    with AnyReader([out]) as reader:
+        for connection, time, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            assert time == ros_images.stamp_ns(message)
+            found.setdefault(connection.topic, []).append(message)
+    assert {topic: len(messages) for topic, messages in found.items()} == dict.fromkeys(
+        [f"/egosgm/{name}" for name in ("depth", "variance", "disparity", "odom", "left/camera_info", "right/camera_info")], FRAMES)
+    c = street.calibration
+    for i, result in enumerate(expected):
+        message = found["/egosgm/disparity"][i]
+        disparity = message.image.data.view(np.float32).reshape(HEIGHT, WIDTH)
+        valid = result.disparity != egosgm.INVALID_DISPARITY
+        np.testing.assert_array_equal(disparity[valid], result.disparity[valid])
+        assert (disparity[~valid] < message.min_disparity).all() and message.min_disparity <= disparity[valid].min()
+        assert disparity.max() <= message.max_disparity == 47
+        assert message.f == pytest.approx(c.fx) and message.t == pytest.approx(c.baseline_m)
+        assert (message.valid_window.width, message.valid_window.height) == (WIDTH, HEIGHT)
+        depth = found["/egosgm/depth"][i].data.view(np.float32).reshape(HEIGHT, WIDTH)
+        seen = disparity > 0
+        np.testing.assert_allclose(depth[seen], message.f * message.t / disparity[seen], rtol=1e-5)
+        assert np.isnan(depth[~seen]).all() and found["/egosgm/depth"][i].encoding == "32FC1"
+        variance = found["/egosgm/variance"][i].data.view(np.float32).reshape(HEIGHT, WIDTH)
+        near = seen & (disparity > 5)
+        step = message.f * message.t / (disparity[near] - 0.01) - depth[near]  # a hundredth of a pixel, in metres
+        np.testing.assert_allclose(variance[near], (100 * step) ** 2 * result.variance[near], rtol=0.01)
+    right = found["/egosgm/right/camera_info"][0]
+    assert -right.p[3] / right.p[0] == pytest.approx(c.baseline_m) and right.p[2] == pytest.approx(c.cx)
+    position = found["/egosgm/odom"][-1].pose.pose.position  # x forward
+    assert position.x == pytest.approx(2 * 0.8, abs=0.1) and abs(position.y) < 0.1 and abs(position.z) < 0.1
+    refused = program("--bag", bag, *TOPICS, "--out", out, *SET)
+    assert refused.returncode == 2 and "is there already" in refused.stderr
+    again = bags.Bag(out, "/egosgm/depth", "/egosgm/depth", ["/egosgm/left/camera_info", "/egosgm/right/camera_info"])
+    assert again.count == FRAMES  # a bag as any other
+
+
+def test_a_folder_of_maps_is_what_the_program_writes(tmp_path, street, frames):
+    bag = record("sqlite", tmp_path / "drive", street, frames)
+    told = program("--bag", bag, *TOPICS, "--out", tmp_path / "result", *SET)
+    assert told.returncode == 0, told.stderr
+    assert egosgm.read_disparity(tmp_path / "result/disparity/000002.png").shape == (HEIGHT, WIDTH)
+    assert egosgm.read_calibration(tmp_path / "result/calibration.txt").baseline_m == pytest.approx(street.calibration.baseline_m)
+    refused = program("--bag", bag, *TOPICS, "--out", tmp_path / "result", *SET)
+    assert refused.returncode == 2 and "holds files already" in refused.stderr
+
+
+def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, frames):
+    times = [START, START + RATE_NS, START + 2 * RATE_NS, START + 7 * RATE_NS, START + 3 * RATE_NS]
+    path = record("mcap", tmp_path / "drive", street, [frames[i % FRAMES] for i in range(5)], skew_ns=2_000_000, times=times,
+                  left_out=[(1, "right")])
+    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", max_skew_ms=3)
+    found = list(bag.frames())
+    assert [(frame.stamp_ns - START) // RATE_NS for frame in found] == [0, 2, 7, 3]
+    assert [frame.starts_anew for frame in found] == [True, False, False, True]
+    text = bag.gaps.text()
+    assert "1 left and 0 right images have no partner" in text and "differ by up to 2.000 ms" in text
+    assert "1 gap, the longest of 0.500 s before frame 2" in text and "steps back 1 times" in text
+    with pytest.raises(egosgm.InvalidArgument, match="nearest stamps differ by 2.000 ms: allow that by --max-skew-ms"):
+        list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames())
+
+
+def test_the_nearest_partner_is_taken():
+    pairing = bags.Pairing(5)
+    pairs = []
+    for side, stamp in ((0, 10), (1, 6), (1, 11), (0, 20), (1, 19), (1, 21), (0, 30)):
+        pairs += pairing.add(side, stamp, None)
+    pairs += pairing.end()
+    assert [(left[0], right[0]) for left, right in pairs] == [(10, 11), (20, 19)]
+    assert pairing.gaps.unpaired_right == 2 and pairing.gaps.unpaired_left == 1
+
+
+def test_encodings_give_the_same_grey(street, frames):
+    recording = Recording("mcap")
+    grey = frames[0].left
+
+    def read(pixels, encoding):
+        recording.messages.clear()
+        recording.image("/x", START, pixels, encoding)
+        return ros_images.grey_of(recording.messages[0][3])
+
+    padded = np.pad(grey, ((0, 0), (0, 13)))
+    recording.image("/x", START, padded, "mono8")
+    message = recording.messages[0][3]
+    message.width = WIDTH
+    np.testing.assert_array_equal(ros_images.grey_of(message), grey)
+    for encoding, channels in (("rgb8", 3), ("bgr8", 3), ("rgba8", 4), ("bgra8", 4)):
+        np.testing.assert_array_equal(read(np.repeat(grey[:, :, None], channels, axis=2), encoding), grey)
+    red = np.zeros((2, 2, 3), np.uint8)
+    red[:, :, 0] = 255
+    assert (read(red, "rgb8") == 76).all() and (read(red, "bgr8") == 29).all()
+    wide = grey.astype(np.uint16) * 257
+    assert read(wide, "mono16").dtype == np.uint16
+    np.testing.assert_array_equal(read(wide, "mono16"), wide)
+    yuv = np.stack([grey, np.full_like(grey, 128)], axis=2)
+    np.testing.assert_array_equal(read(yuv, "yuyv"), grey)
+    np.testing.assert_array_equal(read(yuv[:, :, ::-1], "uyvy"), grey)
+    with pytest.raises(egosgm.InvalidArgument, match="bayer_rggb8"):
+        read(grey, "bayer_rggb8")
+    message.step = WIDTH - 1
+    with pytest.raises(egosgm.InvalidArgument, match="rows of"):
+        ros_images.grey_of(message)
+
+
+def test_compressed_images_are_read(tmp_path, street, frames):
+    recording = Recording("mcap")
+    egosgm.write_disparity(tmp_path / "left.png", frames[0].left.astype(np.float32))
+    expected = egosgm.read_grey(tmp_path / "left.png")
+    for name, data in (("left", (tmp_path / "left.png").read_bytes()), ("right", (tmp_path / "left.png").read_bytes())):
+        recording.info(f"/{name}/camera_info", street.calibration, name == "right")
+        recording.add(f"/{name}/image_rect/compressed", "sensor_msgs/msg/CompressedImage", START, format="png", data=np.frombuffer(data, np.uint8))
+    path = recording.write(tmp_path / "drive")
+    frame, = bags.Bag(path, "/left/image_rect/compressed", "/right/image_rect/compressed").frames()
+    np.testing.assert_array_equal(frame.left, expected)
+    recording.messages[-1][3].data = np.frombuffer(b"no image at all", np.uint8)
+    with pytest.raises(egosgm.InvalidArgument, match="compressed image .png. cannot be read"):
+        ros_images.grey_of(recording.messages[-1][3])
+
+
+def test_raw_images_are_rectified_by_their_infos(street):
+    """Points of raw cameras that are turned against each other come to lie in equal rows."""
+    angle = 0.02
+    turn = np.array([[1, 0, 0], [0, np.cos(angle), -np.sin(angle)], [0, np.sin(angle), np.cos(angle)]])
+    recording = Recording("mcap")
+    recording.info("/left/camera_info", street.calibration, 0, distortion=(0.1, 0.01, 0, 0, 0))
+    recording.info("/right/camera_info", street.calibration, 1, rotation=turn)
+    left, right = (item[3] for item in recording.messages)
+    assert ros_images.are_raw(left, "/left/image_raw") and not ros_images.are_raw(left, "/left/image_rect")
+    assert ros_images.are_raw(right, "/right/image") and not ros_images.are_raw(right, "/camera/infra1/image_rect_raw")
+    cameras = ros_images.Cameras(left, right, True)
+    assert cameras.calibration.baseline_m == pytest.approx(street.calibration.baseline_m)
+    points = np.array([[0.5, 0.1, 4.0], [-1.0, -0.2, 6.0], [2.0, 0.3, 9.0]])
+    c = street.calibration
+    raw = np.zeros((2, HEIGHT, WIDTH), np.uint8)
+    for point, value in zip(points, (255, 200, 150)):
+        for side in (0, 1):
+            x, y, z = (point - [c.baseline_m, 0, 0]) @ turn if side else point  # R takes raw to rectified
+            x, y = x / z, y / z
+            if not side:
+                r = x * x + y * y
+                x, y = x * (1 + 0.1 * r + 0.01 * r * r), y * (1 + 0.1 * r + 0.01 * r * r)
+            u, v = c.fx * x + c.cx, c.fy * y + c.cy
+            grid_y, grid_x = np.mgrid[:HEIGHT, :WIDTH]
+            spot = value * np.exp(-((grid_x - u) ** 2 + (grid_y - v) ** 2) / 8)
+            raw[side] = np.maximum(raw[side], spot.astype(np.uint8))
+    rectified = cameras.rectified(raw[0], raw[1])
+    for point, value in zip(points, (255, 200, 150)):
+        places = []
+        for side, image in enumerate(rectified):
+            x = cameras.calibration.fx * (point[0] - side * c.baseline_m) / point[2] + cameras.calibration.cx + side * cameras.calibration.doffs_px
+            y = cameras.calibration.fy * point[1] / point[2] + cameras.calibration.cy
+            # The library turns both cameras by half of what they are turned against each other: two rows here.
+            top, first = max(0, int(y) - 7), max(0, int(x) - 7)
+            window = image[top:top + 15, first:first + 15].astype(float)
+            weight = np.where(window > 40, window, 0)
+            places.append((top + (weight.sum(1) @ np.arange(window.shape[0])) / weight.sum(),
+                           first + (weight.sum(0) @ np.arange(window.shape[1])) / weight.sum()))
+        assert places[0][0] == pytest.approx(places[1][0], abs=0.3)
+        assert places[0][1] - places[1][1] == pytest.approx(cameras.calibration.fx * c.baseline_m / point[2] - cameras.calibration.doffs_px, abs=0.5)
+
+
+def test_poses_of_the_bag_are_the_motion(tmp_path, street, frames):
+    recording = Recording("mcap")
+    for side, name in enumerate(("left", "right")):
+        recording.info(f"/{name}/camera_info", street.calibration, side)
+    types = recording.types
+    for i, frame in enumerate(frames):
+        recording.image("/left/image_rect", START + i * RATE_NS, frame.left)
+        recording.image("/right/image_rect", START + i * RATE_NS, frame.right)
+    for i in (-1, 0, 1, 2, 3):  # between the frames, of a constant speed of 8 m/s, forward
+        recording.add("/odom", "geometry_msgs/msg/PoseStamped", START + i * RATE_NS + RATE_NS // 2, pose=types["geometry_msgs/msg/Pose"](
+            position=types["geometry_msgs/msg/Point"](x=0.8 * i, y=0.0, z=0.0),
+            orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)))
+    path = recording.write(tmp_path / "drive")
+    found = list(bags.Bag(path, "/left/image_rect", "/right/image_rect", pose_topic="/odom").frames())
+    moved = np.linalg.inv(found[1].world_from_camera) @ found[0].world_from_camera
+    np.testing.assert_allclose(moved[:3, 3], (0, 0, -0.8), atol=1e-9)  # z is forward
+    np.testing.assert_allclose(moved[:3, :3], np.eye(3), atol=1e-9)
+
+
+@pytest.mark.parametrize("change, named", [
+    (dict(left_topic="/none"), r'has no topic "/none"; its topics of images: /left/image_rect, /right/image_rect'),
+    (dict(left_topic="/left/camera_info"), "is of type sensor_msgs/msg/CameraInfo"), (dict(info_topics=["/left/camera_info"]), "give two"),
+    (dict(pose_topic="/odom"), "its topics of poses: none"), (dict(max_skew_ms=-1), "max skew -1"), (dict(pose_axes="x"), 'pose axes "x"')])
+def test_wrong_arguments_are_refused_by_name(change, named, tmp_path, street, frames):
+    path = record("mcap", tmp_path / "drive", street, frames[:1])
+    with pytest.raises(egosgm.InvalidArgument, match=named):
+        bags.Bag(path, **{**dict(left_topic="/left/image_rect", right_topic="/right/image_rect"), **change})
+
+
+def test_wrong_files_and_options_leave_nothing(tmp_path, street, frames):
+    path = record("mcap", tmp_path / "drive", street, frames[:1])
+    (tmp_path / "broken.mcap").write_bytes(path.read_bytes()[:200])
+    for arguments, named in ((["--bag", tmp_path / "none.mcap", *TOPICS], "no such file"), (["--bag", tmp_path / "broken.mcap", *TOPICS], "broken.mcap: cannot be read as a bag"),
+                             (["--bag", path, *TOPICS, "--set", "p22=3"], "did you mean p2"), (["--bag", path, *TOPICS, "--set", "p2"], "NAME=VALUE"),
+                             (["--bag", path, *TOPICS, "--out", tmp_path / "no/x.mcap"], "no such folder")):
+        told = program(*arguments, *([] if "--out" in arguments else ["--out", tmp_path / "out.mcap"]))
+        assert told.returncode == 2 and told.stderr.startswith("egosgm: error: ") and told.stderr.count("\n") == 1, told.stderr
+        assert named in told.stderr
+        assert sorted(os.listdir(tmp_path)) == ["broken.mcap", "drive"]
