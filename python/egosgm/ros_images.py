@@ -21,7 +21,7 @@ def grey_of(message: Any) -> NDArray[Any]:
     if hasattr(message, "format"):
         return _decompressed(bytes(message.data), message.format)
     height, width, step, encoding = message.height, message.width, message.step, message.encoding
-    data = np.frombuffer(bytes(message.data), np.uint8)
+    data = np.frombuffer(message.data, np.uint8)
     pixel_bytes = _GREY8.get(encoding, (0,))[0] or _COLOURS.get(encoding, (0,))[0] or (2 if encoding in _GREY16 else 0)
     if not pixel_bytes:
         known = ", ".join((*_GREY8, *_COLOURS, *_GREY16))
