@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+from setuptools import setup
+
+setup(
+    name="egosgm_ros",
+    version="0.1.0",
+    packages=["egosgm_ros"],
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/egosgm_ros"]),
+        ("share/egosgm_ros", ["package.xml"]),
+        ("share/egosgm_ros/launch", ["launch/egosgm.launch.py"]),
+        ("share/egosgm_ros/rviz", ["rviz/egosgm.rviz"]),
+    ],
+    install_requires=["setuptools", "egosgm"],
+    license="Apache-2.0",
+    entry_points={"console_scripts": ["egosgm_node = egosgm_ros.node:main"]},
+)
