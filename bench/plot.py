@@ -103,18 +103,14 @@ def accuracy_table(content):
 
 
 def ablation_table(content):
-    titles = list(content["ablation"][0]["inputs"])
-    header = ["configuration"] + [f"{title}: bad or missing → interpolated, search [%]" for title in titles] + ["why"]
-    rows = []
-    for row in content["ablation"]:
-        cells = []
-        for title in titles:
-            figures = row["inputs"].get(title, {})
-            text = " → ".join(number(figures[name]) for name in ("bad_or_missing", "interpolated") if name in figures)
-            if "search" in figures:
-                text += f"{', ' if text else 'search '}{figures['search']:.1f}"
-            cells.append(text)
-        rows.append([row["name"], *cells, row["why"]])
+    """A configuration's figures and, where the interval does not hold 0, in bold what they are above the default's."""
+    kinds = list(content["ablation"][0]["kinds"])
+
+    def cell(at):
+        above = f"{at['above']:+.2f}"
+        return f"{at['value']:.2f} ({f'**{above}**' if at['low'] * at['high'] > 0 else above})"
+    header = ["configuration"] + [f"{kind}: bad or missing, bad of valid, interpolated [%]" for kind in kinds] + ["why"]
+    rows = [[row["name"], *(", ".join(map(cell, row["kinds"][kind].values())) for kind in kinds), row["why"]] for row in content["ablation"]]
     return "### Ablation\n\n" + markdown(header, rows)
 
 
@@ -217,51 +213,6 @@ def draw_scaling(plt, content):
     return figure
 
 
-def grid(plt, titles, height):
-    """A panel a title, three in a row."""
-    columns = min(3, len(titles))
-    rows = -(-len(titles) // columns)
-    figure, panels = plt.subplots(rows, columns, figsize=(5.2 * columns, height * rows), squeeze=False)
-    for axes in panels.flat[len(titles):]:
-        axes.set_visible(False)
-    for axes, title in zip(panels.flat, titles):
-        axes.set_title(title, fontsize=10)
-    return figure, panels.flat
-
-
-def draw_error_against_search(plt, content):
-    inputs = sorted({point["input"] for point in content["curves"]["error_against_search"]})
-    figure, panels = grid(plt, inputs, height=4)
-    for axes, title in zip(panels, inputs):
-        points = sorted((p["search"], p["bad_or_missing"]) for p in content["curves"]["error_against_search"] if p["input"] == title)
-        axes.plot(*zip(*points), "o-", color=OURS, ms=4, label="least half-width of the band, 0.5 to 32 px")
-        configurations = {row["name"]: (row["inputs"][title]["search"], row["inputs"][title]["bad_or_missing"])
-                          for row in content.get("ablation", []) if "bad_or_missing" in row["inputs"].get(title, {})}
-        for name, at in configurations.items():
-            opencv = name.startswith("opencv")
-            axes.plot(*at, "s" if opencv else "x", color=THEIRS if opencv else ACCENT, ms=5)
-            if name == "default" or any(max(a, b) > 1.2 * min(a, b) for a, b in zip(at, configurations["default"])):  # else they overlap
-                beside = {"xytext": (-4, 2), "ha": "right"} if at[0] > 50 else {"xytext": (3, 2)}
-                axes.annotate(name, at, fontsize=6, textcoords="offset points", **beside)
-        axes.set_xscale("log")
-        label(axes, "search [% of all cells]", "bad or missing, non-occluded [%]")
-    return figure
-
-
-def draw_error_over_frames(plt, content):
-    inputs = sorted({curve["input"] for curve in content["curves"]["error_over_frames"]})
-    figure, panels = grid(plt, inputs, height=3.6)
-    colors = {"default": OURS, "single frame": THEIRS, "paper": ACCENT}
-    for axes, title in zip(panels, inputs):
-        for curve in content["curves"]["error_over_frames"]:
-            if curve["input"] == title:
-                axes.plot(curve["frames"], curve["bad_or_missing"], "o-", ms=3, label=curve["name"], color=colors[curve["name"]])
-        axes.set_ylim(bottom=0)
-        axes.xaxis.get_major_locator().set_params(integer=True)
-        label(axes, "frame", "bad or missing, non-occluded [%]")
-    return figure
-
-
 def draw_uncertainty(plt, content):
     curves = content["curves"]["uncertainty"]
     figure, axes = plt.subplots(figsize=(5.2, 4.4))
@@ -291,10 +242,6 @@ def contents_of(content):
         tables.append(ablation_table)
     if content.get("kitti2015"):
         tables.append(paper_table)
-    if content.get("curves", {}).get("error_against_search"):
-        drawings["error_against_search"] = draw_error_against_search
-    if content.get("curves", {}).get("error_over_frames"):
-        drawings["error_over_frames"] = draw_error_over_frames
     if content.get("curves", {}).get("uncertainty"):
         drawings["uncertainty"] = draw_uncertainty
     return tables, drawings

@@ -4,7 +4,7 @@
 
   python3 bench/accuracy                      the table of limits (exit code 1 where one is missed, 3 where rows were skipped)
   python3 bench/accuracy --ego-motion         the table of stereo odometry alone: drift, error, time, and what it is worth to the disparities
-  python3 bench/accuracy --ablation           and every addition on and off, OpenCV's matchers, and the figures of the plots
+  python3 bench/accuracy --ablation           every correction on and off, on four kinds of input apart
   python3 bench/accuracy --video              over time: beside the single frame, OpenCV and its maps averaged in time; wrong motions, dropped frames
   python3 bench/accuracy --kitti2015 DIR --scenes 84,87,130,146,148 --frames 0:10
                                       the table of Fucek et al. (IFAC 2017) on KITTI 2015's multi-view data
@@ -18,7 +18,7 @@ import re
 import subprocess
 import sys
 
-from ablation import ablation, ablation_inputs, curves, paper_table
+from ablation import ablation, paper_table
 from ego_motion import ego_motion_table
 from inputs import PROJECT, Bench
 from rows import main_table
@@ -48,7 +48,7 @@ def parse_arguments():
     parser.add_argument("--no-maps", action="store_true", help="leave out what needs the maps pixel by pixel: flicker, poles, variances, 500 frames")
     parser.add_argument("--video", action="store_true", help="the figures over time (docs/evaluation.md), and nothing else")
     parser.add_argument("--ego-motion", action="store_true", help="stereo odometry alone, and nothing else")
-    parser.add_argument("--ablation", action="store_true", help="every addition on and off, OpenCV's matchers, figures of the plots")
+    parser.add_argument("--ablation", action="store_true", help="every correction on and off, on four kinds of input apart, and nothing else")
     parser.add_argument("--inputs", metavar="REGEX", default="", help="only these inputs of --ablation, by title")
     parser.add_argument("--kitti2015", metavar="DIR", help="KITTI 2015 multi-view data: the paper's table, and nothing else")
     parser.add_argument("--scenes", metavar="LIST", default="84,87,130,146,148", help="of --kitti2015")
@@ -64,6 +64,9 @@ def main():
         content["kitti2015"] = paper_table(bench, arguments)
         skipped = [row for row in content["kitti2015"] if "skipped" in row]
         code = 3 if skipped else 0
+    elif arguments.ablation:
+        content["ablation"] = ablation(bench, arguments.inputs)
+        skipped, code = [], 0
     elif arguments.video:
         content["video"] = video_tables(bench, re.compile(arguments.only))
         skipped = [row for row in content["video"]["methods"]["rows"] if "skipped" in row[1]]
@@ -73,10 +76,6 @@ def main():
         table.print()
         content["rows"], content["curves"] = table.rows, table.curves
         skipped, code = table.skipped(), table.exit_code()
-        if arguments.ablation:
-            inputs = ablation_inputs(bench, arguments.inputs)
-            content["ablation"] = ablation(bench, inputs)
-            content["curves"].update(curves(bench, inputs))
     content["device"] = bench.device.get("name", "")
     content["driver"] = bench.device.get("driver", "")
     print(f"\n{content['device']}, driver {content['driver']}, commit {content['commit']}, {content['date']}")

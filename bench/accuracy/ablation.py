@@ -1,121 +1,166 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every addition on and off, and the paper's own table."""
-import pathlib
+"""Every correction on and off, on four kinds of input apart, with bootstrap intervals; and the paper's own table."""
 import re
 
-from inputs import PAPER, SINGLE_FRAME, Failed, Missing, mean_figures, settings
-
-OPENCV_MODES = ("opencv_hh", "opencv_hh4", "opencv_3way")
+from inputs import SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect
 
 # What is switched, and why it is there.
 ABLATION = [
-    ("default", (), "The method with everything on."),
-    ("single frame", SINGLE_FRAME, "What the same matcher gives without the frames before: the whole range, every time."),
-    ("paper", PAPER, "The choices of the paper: unpredicted pixels search everything, three sigma with no least half-width, constant q."),
-    ("paper, single frame", PAPER + SINGLE_FRAME, "The paper's own baseline: its matcher alone."),
-    ("temporal, full range", settings("constants.search=full"), "Fusion without the band: what the narrow search costs or gains."),
-    ("no band from neighbours", settings("constants.search_band.from_neighbours=false"),
-     "A pixel without a prediction then searches everything, not the range that its neighbours span."),
-    ("no least half-width", settings("min_half_width_px=0"),
-     "The least half-width is for motion errors that three sigma of a confident pixel would not cover."),
-    ("no gate", settings("gate_px=0"), "Prediction and measurement are then averaged even where they contradict each other, as on moving objects."),
-    ("neighbours not asked", settings("constants.kalman_update.ask_neighbours=false"),
-     "The measurement then counts wherever it contradicts the prediction, though all around speaks against it, and what moves by itself is averaged "
-     "with where it was."),
-    ("no prediction kept", settings("keep_predicted=false"),
-     "What is not measured in this frame is forgotten: holes stay holes."),
-    ("no edge rejection", settings("constants.edge_rejection.max_jump_px=0"),
-     "Predictions beside a jump may lie on the wrong surface, and a narrow search cannot get back."),
-    ("no hole fill", settings("constants.hole_fill.max_difference_px=0"), "Gaps that forward motion tears open stay unpredicted."),
-    ("motion's covariance unused", settings("constants.forward_warp.motion_noise=0"), "Then the constant q alone stands for the motion's error."),
-    ("process noise x 4", settings("process_noise_px2=0.04"), "More trust in the measurement, wider bands."),
-    ("left-right within 1 px", settings("left_right_px=1", "constants.consistency.read_off_px=1"),
-     "The paper's strict check: it drops slanted surfaces with the errors."),
-    ("both views tracked", settings("track_right=true"),
-     "The right view is then predicted, searched and filtered as the left one is, instead of following from it, which takes longer."),
-    ("no vertical alignment", settings("vertical_alignment=false"),
-     "Half a pixel between the rows of the views costs matches; the estimate takes it out."),
-    ("no coarse match", settings("coarse_match=false"),
-     "What moves by itself, or lies where a wrong motion does not point, is then outside of the band."),
-    ("no ridges", settings("thin_objects=false"),
-     "Poles that were lost hide behind their background's narrow bands: less is searched, and more of them lost."),
-    ("no median", settings("constants.median_filter.enabled=false"), "Single outliers survive to the left-right check."),
-    ("no speckle removal", settings("max_speckle_px=0"), "Small wrong regions agree in both views by chance."),
-    ("with SAD check", settings("constants.sad_check.max_difference=20"), "The paper's check of the grey values; off by default."),
-    ("four paths", ("--paths", "4"), "Half the aggregation, in about half the time."),
-    ("census 9x7", settings("cost=census9x7"), "All 62 comparisons of the usual window: twice the code bytes."),
-    ("census 5x5", settings("cost=census5x5"), "A smaller window: cheaper codes that tell less."),
-    ("SAD 3x3", settings("cost=sad3x3"), "The cost that the paper may have used; brightness differences between the cameras spoil it."),
-    ("P2 = 80", settings("p2=80"), "Half the penalty of a jump."),
+    ("default", {}, "The method with everything on."),
+    ("single frame", {"temporal": False}, "What the same matcher gives without the frames before."),
+    ("both views tracked", {"track_right": True}, "The right view predicted, searched and filtered as the left one is."),
+    ("full range", {"constants.search": "full"}, "Fusion without the band: what the narrow search costs or gains."),
+    ("half-width 2.5", {"min_half_width_px": 2.5}, "A narrower least band."),
+    ("half-width 6", {"min_half_width_px": 6}, "A wider one."),
+    ("eight paths", {"paths": 8}, "Twice the aggregation."),
+    ("census 13x11", {"cost": "census13x11"}, "32 pixels of a larger window."),
+    ("census 5x5", {"cost": "census5x5"}, "A smaller window."),
+    ("no band from neighbours", {"constants.search_band.from_neighbours": False}, "A pixel without a prediction then searches everything."),
+    ("no gate", {"gate_px": 0}, "Prediction and measurement are averaged even where they contradict each other."),
+    ("neighbours not asked", {"constants.kalman_update.ask_neighbours": False}, "The measurement counts wherever it contradicts the prediction."),
+    ("innovations not looked at", {"constants.kalman_update.innovation_sigmas": 0}, "A large innovation does not raise the predicted variance."),
+    ("predictions not checked", {"constants.prediction_check.enabled": False}, "Wrong predictions do not make the next frame search everything."),
+    ("no prediction kept", {"keep_predicted": False}, "What is not measured in this frame is forgotten."),
+    ("no edge rejection", {"constants.edge_rejection.max_jump_px": 0}, "Predictions beside a jump stay (the paper's)."),
+    ("no hole fill", {"constants.hole_fill.max_difference_px": 0}, "Gaps that forward motion tears open stay unpredicted (the paper's)."),
+    ("motion's covariance unused", {"constants.forward_warp.motion_noise": 0}, "The constant q alone stands for the motion's error."),
+    ("no vertical alignment", {"vertical_alignment": False}, "The rows of the views are off by what rectification leaves."),
+    ("no coarse match", {"coarse_match": False}, "What moves by itself, or lies where a wrong motion does not point, is outside of the band."),
+    ("no thin objects", {"thin_objects": False}, "What stands out above and below is not searched for."),
+    ("no median", {"constants.median_filter.enabled": False}, "Single outliers survive to the left-right check."),
+    ("no speckle removal", {"max_speckle_px": 0}, "Small wrong regions agree in both views by chance."),
 ]
-# Least half-widths for the plot of error against search fraction.
-HALF_WIDTHS_PX = (0.5, 1, 2, 4, 8, 16, 32)
+FIGURES = ("bad_or_missing", "bad_of_valid", "interpolated")
+BLOCK_PX, ROUNDS = 64, 1000
+DARKER = 0.6  # the grey values after an exposure step
 
 
-def ablation_inputs(bench, pattern):
-    openers = [lambda: bench.multiview(2012, "000151", "7:10"), lambda: bench.backwards(2012, "000138"),
-               lambda: bench.backwards(2015, "000002"), bench.odometry_a]
-    openers += [lambda p=p, m=m: bench.synthetic(p, m) for p in (True, False) for m in (False, True)]
-    inputs = []
-    for opener in openers:
+class Case:
+    """A video, how it is played and the frames that count."""
+
+    def __init__(self, kind, title, video, numbers, scored, **disturbance):
+        self.kind, self.title, self.video, self.numbers, self.scored, self.disturbance = kind, title, video, numbers, scored, disturbance
+
+
+class Darkened:
+    """A video whose exposure is less from frame number `at` on."""
+
+    def __init__(self, video, at):
+        self.video, self.at = video, at
+
+    def __getattr__(self, name):
+        return getattr(self.video, name)
+
+    def images(self, k):
+        images = self.video.images(k)
+        return images if k < self.at else [(DARKER * image).round().astype(image.dtype) for image in images]
+
+
+def cases(bench, pattern):
+    """The inputs at hand whose title matches."""
+    figures = bench.video_figures()
+    last = 9
+
+    def rendered(name):
+        folder = expect(bench.data / "rendered" / name)
+        video = figures.Recorded(figures.egosgm.open_folder(folder))
+        video.truth = figures.Street(folder).truth
+        return video
+
+    def street(seed, moving):
+        return figures.Street(bench.synthetic_folder(moving, frames=14, seed=seed))
+    openers = [("KITTI", f"{year} / {scene}", lambda y=year, s=scene, n=numbers: (bench.scene(y, s, n), n, [10]))
+               for year, scene, numbers in ((2012, "000151", (7, 8, 9, 10)), (2012, "000138", (11, 10)), (2015, "000002", (11, 10)))]
+    openers += [("rendered", name, lambda n=name: (rendered(n), range(last), range(STEADY_FROM, last))) for name in ("warehouse", "forest", "kitchen")]
+    openers += [("streets", f"street {seed}{', moving' if moving else ''}",
+                 lambda s=seed, m=moving: (street(s, m), range(last), range(STEADY_FROM, last)))
+                for moving, seeds in ((False, range(1, 10)), (True, (1, 2, 3))) for seed in seeds]
+    found = []
+    for kind, title, opener in openers:
+        if not re.search(pattern, title):
+            continue
         try:
-            source = opener()
+            found.append(Case(kind, title, *opener()))
         except Missing as reason:
             print(f"skipped: {reason}")
+    for title, opener in [(name, lambda n=name: figures.Street(expect(bench.data / "rendered" / n))) for name in ("warehouse", "kitchen")] + \
+            [(f"street {seed}{', moving' if moving else ''}", lambda s=seed, m=moving: street(s, m)) for seed, moving in ((1, False), (2, False), (1, True))]:
+        if not re.search(pattern, title):
             continue
-        if re.search(pattern, source.title):
-            inputs.append(source)
-    return inputs
+        try:
+            video = opener()
+        except Missing:
+            continue
+        found += [Case("disturbances", f"{title}, yaw wrong by 1 degree", video, range(7), (4, 5, 6), wrong={4: figures.turned(1, 1)}),
+                  Case("disturbances", f"{title}, a gap of 3 frames", video, (0, 1, 2, 6, 7, 8), (6, 7, 8)),
+                  Case("disturbances", f"{title}, an exposure step", Darkened(video, 4), range(7), (4, 5, 6))]
+    return found
 
 
-def ablation(bench, inputs):
-    rows = []
-    configurations = [(name, why, lambda source, a=a: bench.run(source, a)) for name, a, why in ABLATION]
-    configurations += [(mode, "OpenCV's StereoSGBM, left view, padded on the left by D.", lambda source, m=mode: bench.run_opencv(source, m))
-                       for mode in OPENCV_MODES]
-    for name, why, run in configurations:
-        row = {"name": name, "why": why, "inputs": {}}
-        for source in inputs:
-            if name.startswith("opencv") and not source.truth:
-                continue
-            try:
-                result = run(source)
-                row["inputs"][source.title] = {**mean_figures(source, result), "drift": result["drift"]}
-            except (Missing, Failed) as reason:
-                row["inputs"][source.title] = {"skipped": str(reason)}
+def counts_by_block(figures, case, options):
+    """Sums of a block's pixels over the scored frames, a row each: truth, valid, bad, bad or missing, bad interpolated."""
+    np, egosgm = figures.np, figures.egosgm
+    sums = 0
+    for k, frame in figures.play(case.video, case.numbers, **case.disturbance, **options):
+        if k not in case.scored:
+            continue
+        truth = case.video.truth(k)
+        known = figures.is_valid(truth)
+
+        def is_bad(disparity):
+            return known & ~(figures.is_valid(disparity) & (np.abs(disparity - truth) <= figures.BAD_PX))
+        valid, bad = known & figures.is_valid(frame.disparity), is_bad(frame.disparity)
+        y, x = np.nonzero(known)
+        block = y // BLOCK_PX * -(-truth.shape[1] // BLOCK_PX) + x // BLOCK_PX
+        blocks = -(-truth.shape[0] // BLOCK_PX) * -(-truth.shape[1] // BLOCK_PX)
+        maps = (known, valid, bad & valid, bad, is_bad(egosgm.interpolate_background(frame.disparity)))
+        sums = sums + np.stack([np.bincount(block, values[y, x], blocks) for values in maps])
+    return sums
+
+
+def percentages(counts):
+    """Of FIGURES, along the first axis."""
+    truth, valid, bad_valid, bad, bad_interpolated = counts
+    return [100 * bad / truth, 100 * bad_valid / valid, 100 * bad_interpolated / truth]
+
+
+def ablation(bench, pattern):
+    """Rows: a configuration's figures, the mean over the inputs of a kind, and what they are above the default's, with a 95 % interval by
+    drawing each input's blocks anew, the same ones for both."""
+    figures = bench.video_figures()
+    np, device = figures.np, figures.egosgm.devices()[0]
+    bench.device = {"name": device.name, "driver": device.driver}
+    inputs = cases(bench, pattern)
+    kinds = list(dict.fromkeys(case.kind for case in inputs))
+    random, draws, of_default, rows = np.random.default_rng(1), {}, {}, []
+    for name, options, why in ABLATION:
+        drawn, found = {kind: [] for kind in kinds}, {kind: [] for kind in kinds}
+        for case in inputs:
+            counts = counts_by_block(figures, case, options)
+            blocks = counts.shape[1]
+            if case.title not in draws:
+                draws[case.title] = random.multinomial(blocks, np.full(blocks, 1 / blocks), ROUNDS).T
+            found[case.kind].append(percentages(counts.sum(axis=1)))
+            drawn[case.kind].append(percentages(counts @ draws[case.title]))
+        row = {"name": name, "why": why, "kinds": {}}
+        for kind in kinds:
+            mean, rounds = np.mean(found[kind], axis=0), np.mean(drawn[kind], axis=0)
+            base, base_rounds = of_default.setdefault(kind, (mean, rounds))
+            low, high = np.percentile(rounds - base_rounds, [2.5, 97.5], axis=1)
+            row["kinds"][kind] = {figure: {"value": float(mean[i]), "above": float(mean[i] - base[i]), "low": float(low[i]), "high": float(high[i])}
+                                  for i, figure in enumerate(FIGURES)}
         rows.append(row)
         print_ablation_row(row)
     return rows
 
 
 def print_ablation_row(row):
+    """A star: the interval does not hold 0."""
     print(f"\n{row['name']}: {row['why']}")
-    for title, figures in row["inputs"].items():
-        if "skipped" in figures:
-            print(f"  {title:<40} {figures['skipped']}")
-            continue
-        print(f"  {title:<40} " + "  ".join(f"{name} {figures[name]:.2f}" for name in ("bad_or_missing", "interpolated", "d1_interpolated",
-                                                                                      "search", "density") if name in figures))
-
-
-def curves(bench, inputs):
-    """What plot.py draws: error against search fraction, and error over frames."""
-    against_search = []
-    for source in inputs:
-        if not source.truth:
-            continue
-        for half_width in HALF_WIDTHS_PX:
-            figures = mean_figures(source, bench.run(source, settings(f"min_half_width_px={half_width}")))
-            against_search.append({"input": source.title, "half_width_px": half_width, **figures})
-    over_frames = []
-    for source in inputs:
-        if not source.title.startswith("synthetic"):
-            continue
-        for name, a in (("default", ()), ("single frame", SINGLE_FRAME), ("paper", PAPER)):
-            frames = bench.run(source, a)["frames"]
-            over_frames.append({"input": source.title, "name": name, "frames": sorted(frames),
-                                "bad_or_missing": [frames[number].get("bad_or_missing") for number in sorted(frames)]})
-    return {"error_against_search": against_search, "error_over_frames": over_frames}
+    for kind, by_figure in row["kinds"].items():
+        cells = [f"{figure} {at['value']:.2f} ({at['above']:+.2f}, {at['low']:+.2f} to {at['high']:+.2f}){'*' if at['low'] * at['high'] > 0 else ''}"
+                 for figure, at in by_figure.items()]
+        print(f"  {kind:<14} " + "  ".join(cells), flush=True)
 
 
 def scenes_of(text):

@@ -5,7 +5,6 @@ import os
 import pathlib
 import re
 import shutil
-import statistics
 import subprocess
 import sys
 
@@ -203,25 +202,8 @@ class Bench:
         self.opencv(mode, *source.images(number), 128, estimate)
         return estimate
 
-    def run_opencv(self, source, mode):
-        key = (source.title, mode)
-        if key not in self.results:
-            frames = {}
-            for number in scored_frames(source, self.run(source)):
-                estimate = self.match_opencv(source, number, mode)
-                frames[number] = {"search": 100.0, **self.evaluate(estimate, source.truth_of(number))["pooled"]}
-            self.results[key] = {"frames": frames, "drift": None}
-        return self.results[key]
-
 
 def scored_frames(source, result):
     if source.scored is not None:
         return [source.scored]
     return sorted(result["frames"])[STEADY_FROM:]
-
-
-def mean_figures(source, result):
-    """The mean of each figure over the frames that count."""
-    frames = [result["frames"][number] for number in scored_frames(source, result) if number in result["frames"]]
-    return {name: statistics.mean(frame[name] for frame in frames) for name in frames[0]
-            if all(frame.get(name) is not None for frame in frames)}
