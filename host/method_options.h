@@ -45,8 +45,8 @@ struct SearchBandOptions {
   float ridge_step_px = 3.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
 };
 struct BandedSgmOptions {
-  MatchingCost cost = MatchingCost::kCensus13x11;
-  int paths = 8;  // 4 (horizontal and vertical) or 8
+  MatchingCost cost = MatchingCost::kCensus9x7;
+  int paths = 4;  // 4 (horizontal and vertical) or 8
   int p1 = 10;    // penalty of a step of one disparity
   // Penalty of a larger step between neighbours whose grey values (8 bits) differ by g: p2 - p2_slope * g, but not
   // below p2_at_edges (nor above p2).

@@ -50,7 +50,7 @@ void for_each(Options& o, Visit&& visit) {
                    "", "census13x11, census9x7, census5x5, sad3x3",
                    "Set census5x5 if thin objects are lost; sad3x3 needs cameras of equal brightness."},
         o.cost);
-  visit(OptionText{"paths", "Paths of the semi-global aggregation.", "", "4, 8", "Set 4 to save time."}, o.paths);
+  visit(OptionText{"paths", "Paths of the semi-global aggregation.", "", "4, 8", "Set 8 if single pairs count more than time."}, o.paths);
   visit(OptionText{"p1", "Penalty of a step of one disparity between neighbours.", "cost", "0 to p2",
                    "Raise it for smooth surfaces without texture; lower it for slanted ones."},
         o.p1);
@@ -166,6 +166,7 @@ PipelineOptions PipelineOptions::paper() {
   PipelineOptions options;
   options.preset = Preset::kPaper;
   options.track_right = true;
+  options.paths = 8;
   options.process_noise_px2 = 0.5f;
   options.search_sigmas = 3.0f;
   options.min_half_width_px = 0.0f;
