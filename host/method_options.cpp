@@ -36,7 +36,6 @@ void for_each(Options& o, Visit&& visit) {
   visit("search_band.neighbour_margin_px", o.search_band.neighbour_margin_px);
   visit("search_band.coarse_tolerance_px", o.search_band.coarse_tolerance_px);
   visit("search_band.coarse_margin_px", o.search_band.coarse_margin_px);
-  visit("search_band.ridge_step_px", o.search_band.ridge_step_px);
   visit("vertical_alignment.enabled", o.vertical_alignment.enabled);
   visit("vertical_alignment.gain", o.vertical_alignment.gain);
   visit("banded_sgm.cost", o.banded_sgm.cost);
@@ -106,14 +105,12 @@ void choose_as_the_paper(MethodOptions& method) {
 
 void MethodOptions::give_options(PipelineOptions& options) const {
   for_each_chosen(options, *this, [](auto& option, const auto& parameter) { option = parameter; });
-  options.thin_objects = search_band.ridge_step_px > 0;
 }
 
 MethodOptions::MethodOptions(const PipelineOptions& options) {
   if (options.preset == Preset::kPaper) choose_as_the_paper(*this);
   for_each_chosen(options, *this, [](const auto& option, auto& parameter) { parameter = option; });
   consistency.prediction_px = consistency.update_px = options.left_right_px;
-  if (!options.thin_objects) search_band.ridge_step_px = 0;
   for (const auto& [name, value] : options.constants) set_parameter(*this, name, value);
 }
 

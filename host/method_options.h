@@ -42,7 +42,6 @@ struct SearchBandOptions {
   float neighbour_margin_px = 4.0f;
   // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
   float coarse_tolerance_px = 2.0f, coarse_margin_px = 2.0f;
-  float ridge_step_px = 3.0f;  // what stands out from both sides by more, a pole, is searched above and below; 0: off
 };
 struct BandedSgmOptions {
   MatchingCost cost = MatchingCost::kCensus9x7;

@@ -38,9 +38,6 @@ void for_each(Options& o, Visit&& visit) {
   visit(OptionText{"coarse_match", "Also match at a quarter of the resolution, without the prediction.", "",
                    "true, false", "Set it to false to save time where nothing moves by itself."},
         o.coarse_match);
-  visit(OptionText{"thin_objects", "Search the disparity of thin objects above and below them, too.", "", "true, false",
-                   "Set it to false to save time where there are no poles, wires or branches."},
-        o.thin_objects);
   visit(OptionText{"vertical_alignment",
                    "Estimate how far the rows of the two views are off, and resample the right one.", "", "true, false",
                    "Set it to false if your rectification is exact, as for rendered images."},
@@ -95,7 +92,6 @@ constexpr Moved kMoved[] = {
     {"coarse_match.enabled", "coarse_match"},
     {"search_band.sigmas", "search_sigmas"},
     {"search_band.min_half_width_px", "min_half_width_px"},
-    {"search_band.ridge_step_px", "thin_objects"},
     {"banded_sgm.cost", "cost"},
     {"banded_sgm.paths", "paths"},
     {"banded_sgm.p1", "p1"},
@@ -171,7 +167,6 @@ PipelineOptions PipelineOptions::paper() {
   options.search_sigmas = 3.0f;
   options.min_half_width_px = 0.0f;
   options.coarse_match = false;
-  options.thin_objects = false;
   options.gate_px = 0.0f;
   return options;
 }

@@ -14,15 +14,6 @@
 // Of these, so many of the least and of the largest are taken for mismatches. REQUIRES: less than half of the count.
 #define EGOSGM_COARSE_OUTLIERS 2
 
-// SearchBand calls a ridge what lies nearer than something at most this many pixels to its left, and to its right: a
-// pole. CoarseMatch's maps are looked through too, that many of their pixels far.
-#define EGOSGM_RIDGE_REACH 6
-#define EGOSGM_COARSE_RIDGE_REACH 2
-// Of a warped map's block, at least so many pixels must be ridges. They are searched for in their own block and in this
-// many above and below.
-#define EGOSGM_RIDGE_MIN_COUNT 2
-#define EGOSGM_RIDGE_BLOCKS 6
-
 // A deviation of 4 px: what is known no better is doubtful. KalmanUpdate takes such a measurement instead of fusing it,
 // and keeps no such prediction against a measurement. This is the matching variance where the path sums fall on beyond
 // the end of a band, as the true disparity rather lies outside, and the least variance where measurement and prediction

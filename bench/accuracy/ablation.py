@@ -10,8 +10,7 @@ ABLATION = [
     ("single frame", {"temporal": False}, "What the same matcher gives without the frames before."),
     ("both views tracked", {"track_right": True}, "The right view predicted, searched and filtered as the left one is."),
     ("full range", {"constants.search": "full"}, "Fusion without the band: what the narrow search costs or gains."),
-    ("half-width 2.5", {"min_half_width_px": 2.5}, "A narrower least band."),
-    ("half-width 6", {"min_half_width_px": 6}, "A wider one."),
+    ("half-width 4", {"min_half_width_px": 4}, "A wider least band."),
     ("eight paths", {"paths": 8}, "Twice the aggregation."),
     ("census 13x11", {"cost": "census13x11"}, "32 pixels of a larger window."),
     ("census 5x5", {"cost": "census5x5"}, "A smaller window."),
@@ -26,7 +25,6 @@ ABLATION = [
     ("motion's covariance unused", {"constants.forward_warp.motion_noise": 0}, "The constant q alone stands for the motion's error."),
     ("no vertical alignment", {"vertical_alignment": False}, "The rows of the views are off by what rectification leaves."),
     ("no coarse match", {"coarse_match": False}, "What moves by itself, or lies where a wrong motion does not point, is outside of the band."),
-    ("no thin objects", {"thin_objects": False}, "What stands out above and below is not searched for."),
     ("no median", {"constants.median_filter.enabled": False}, "Single outliers survive to the left-right check."),
     ("no speckle removal", {"max_speckle_px": 0}, "Small wrong regions agree in both views by chance."),
 ]

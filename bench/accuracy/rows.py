@@ -174,10 +174,8 @@ def poles(bench, table):
         video = figures.Street(folder)
         own, pixels = figures.of_thin_things(video, STEADY_FROM)
         single, _ = figures.of_thin_things(video, STEADY_FROM, **figures.SINGLE_FRAME)
-        no_ridges, _ = figures.of_thin_things(video, STEADY_FROM, thin_objects=False)
         title = f"synthetic, poles of {width} px"
         table.add(title, f"bad_or_missing of {pixels} thin pixels", own, limit="poles", single=single)
-        table.add(title, "the same with thin_objects=false", no_ridges)
 
 
 def uncertainty(bench, table):

@@ -49,13 +49,10 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       row_group_(row_group > 0 ? row_group : ocl::row_group(context)),
       block_ranges_(context, 2 * pixel_count(blocks_)),
       coarse_ranges_(context, 2 * pixel_count(blocks_)),
-      ridges_(context, 2 * pixel_count(blocks_)),
-      ridges_with_coarse_(context, 2 * pixel_count(blocks_)),
       none_(context, 2 * pixel_count(blocks_)),
       found_(context, 2 * pixel_count(blocks_)),
       block_bands_(context, 2 * pixel_count(blocks_)),
       gather_blocks_(build(context, row_group_), "gather_blocks"),
-      gather_ridges_(build(context, row_group_), "gather_ridges"),
       gather_coarse_(build(context, row_group_), "gather_coarse"),
       bands_of_blocks_(build(context, row_group_), "bands_of_blocks"),
       bands_of_pixels_(build(context, row_group_), "bands_of_pixels"),
@@ -70,18 +67,13 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
 void SearchBand::operator()(const StereoMaps& predicted, const Hints& hints, SearchBands& bands, Views views) {
   context_.enter("SearchBand");
   const ocl::Range blocks = ocl::every_pixel(context_, blocks_, count(views));
-  const bool has_ridges = hints.warped && options_.ridge_step_px > 0;
-  if (has_ridges) gather_ridges_(context_, blocks, size_, options_.ridge_step_px, *hints.warped, ridges_);
-  const Ranges& ridges = has_ridges ? ridges_ : none_;
-  if (hints.coarse) {
-    gather_coarse_(context_, blocks, size_, options_.ridge_step_px, *hints.coarse, ridges, coarse_ranges_,
-                   ridges_with_coarse_);
+  if (hints.coarse) gather_coarse_(context_, blocks, size_, *hints.coarse, coarse_ranges_);
+  if (options_.from_neighbours) {
+    gather_blocks_(context_, blocks, size_, hints.warped ? *hints.warped : predicted.disparity, block_ranges_);
   }
-  if (options_.from_neighbours) gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
   bands_of_blocks_(context_, blocks, size_, range_, options_.from_neighbours, options_.neighbour_margin_px,
                    options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_,
-                   hints.coarse ? coarse_ranges_ : none_, options_.ridge_step_px > 0 ? EGOSGM_RIDGE_BLOCKS : -1,
-                   hints.coarse ? ridges_with_coarse_ : ridges, found_, block_bands_);
+                   hints.coarse ? coarse_ranges_ : none_, found_, block_bands_);
   bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}, count(views)), size_, range_,
                    options_.sigmas, options_.min_half_width_px, predicted.disparity, predicted.variance,
                    options_.coarse_tolerance_px, options_.coarse_margin_px, found_, block_bands_, bands.bands);

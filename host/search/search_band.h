@@ -21,10 +21,9 @@ struct SearchBands {
 ///
 /// A predicted pixel searches d +- max(min_half_width_px, sigmas * sqrt(p)), another one the range that the predictions
 /// around it span, one with none near everything. Where CoarseMatch found disparities beyond that by more than
-/// coarse_tolerance_px, as on an object that moves by itself, the band reaches there too; and to ridges above and
-/// below, things of a few pixels' width, which CoarseMatch hardly sees. Bands hold one chunk of EGOSGM_LANES lanes, or
-/// an even number of chunks; lanes outside of the disparity range, which there may be at its end, do not exist for
-/// BandedSgm.
+/// coarse_tolerance_px, as on an object that moves by itself, the band reaches there too. Bands hold one chunk of
+/// EGOSGM_LANES lanes, or an even number of chunks; lanes outside of the disparity range, which there may be at its end,
+/// do not exist for BandedSgm.
 class SearchBand {
  public:
   /// `row_group`: work-items that share a row when chunks are summed up; 0: one on a CPU, many elsewhere. Same bits.
@@ -33,7 +32,7 @@ class SearchBand {
 
   /// What bands rest on beside the prediction, where there is such a thing.
   struct Hints {
-    const Map* warped = nullptr;  // predicted disparities before any was dropped: their ridges
+    const Map* warped = nullptr;  // predicted disparities before any was dropped: what blocks span
     const Map* coarse = nullptr;  // the disparities that CoarseMatch found
     const ocl::Buffer<shared::PredictionState>* last = nullptr;  // of the frame before: were its predictions wrong?
   };
@@ -61,13 +60,12 @@ class SearchBand {
   const shared::DisparityRange range_;
   const SearchBandOptions options_;
   const int row_group_;
-  Ranges block_ranges_, coarse_ranges_, ridges_, ridges_with_coarse_, none_, found_;
+  Ranges block_ranges_, coarse_ranges_, none_, found_;
   ocl::Buffer<shared::Band> block_bands_;
   ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_blocks_;
-  ocl::Kernel<const shared::ImageSize, const float, Disparities, Ranges> gather_ridges_;
-  ocl::Kernel<const shared::ImageSize, const float, Disparities, const Ranges, Ranges, Ranges> gather_coarse_;
+  ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_coarse_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const cl_int, const float, const cl_int,
-              const float, const Ranges, const Ranges, const cl_int, const Ranges, Ranges, ocl::Buffer<shared::Band>>
+              const float, const Ranges, const Ranges, Ranges, ocl::Buffer<shared::Band>>
       bands_of_blocks_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
               const float, const float, const Ranges, const ocl::Buffer<shared::Band>, ocl::Buffer<shared::Band>>

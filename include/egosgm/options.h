@@ -32,7 +32,6 @@ struct EGOSGM_EXPORT PipelineOptions {
   bool track_right;         ///< predict, match and filter the right view too
   bool keep_predicted;      ///< a pixel without a measurement keeps its prediction
   bool coarse_match;        ///< also match at a quarter of the resolution, without the prediction
-  bool thin_objects;        ///< also search what stands out above and below
   bool vertical_alignment;  ///< estimate and remove vertical offsets between the views
   MatchingCost cost;
   int paths;                ///< 4 or 8

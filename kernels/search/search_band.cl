@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span; and
-// what CoarseMatch found there and what thin things stand above or below, where these lie elsewhere.
+// what its block's predictions span and CoarseMatch found there, where that lies elsewhere.
 #include "bands.h"
-#include "ridges.h"
 #include "spans.h"
 
 // lint: ROW_GROUP=1
@@ -33,33 +32,10 @@ KERNEL void gather_blocks(const ImageSize size, global const float* disparity, g
   ranges[index_of(blocks, view, x, y)] = range_of(spans);
 }
 
-// What is a ridge in a block, before EdgeRejection drops it: of every other row, since poles are upright; a single
-// pixel is none. A work-item a block and view.
-KERNEL void gather_ridges(const ImageSize size, const float step, global const float* disparity,
-                          global BlockRange* ridges) {
-  const ImageSize blocks = blocks_of(size);
-  const int x = get_global_id(0);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
-  if (x >= blocks.width || y >= blocks.height) return;
-
-  Spans spans = no_spans();
-  const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
-  for (int v = y * EGOSGM_BLOCK; v < end; v += 2) {
-    global const float* row = disparity + ((size_t)view * size.height + v) * size.width;
-    const int8 found = ridges_from(row, x * EGOSGM_BLOCK, size.width, EGOSGM_RIDGE_REACH, step);
-    spans = with(spans, eight(row, x * EGOSGM_BLOCK, size.width), found);
-  }
-  const BlockRange found = range_of(spans);
-  ridges[index_of(blocks, view, x, y)] = found.count < EGOSGM_RIDGE_MIN_COUNT ? range_of(no_spans()) : found;
-}
-
 // What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at
-// either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. And the block's
-// ridges, with its own coarse ones. A work-item a block and view.
-KERNEL void gather_coarse(const ImageSize size, const float step, global const float* coarse,
-                          global const BlockRange* ridges, global BlockRange* ranges,
-                          global BlockRange* ridges_with_coarse) {
+// either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. A work-item a
+// block and view.
+KERNEL void gather_coarse(const ImageSize size, global const float* coarse, global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
   const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
@@ -101,28 +77,16 @@ KERNEL void gather_coarse(const ImageSize size, const float step, global const f
   range.min = EGOSGM_COARSE * least[EGOSGM_COARSE_OUTLIERS].x;
   range.max = EGOSGM_COARSE * most[EGOSGM_COARSE_OUTLIERS].x;
   range.count = count.x + count.y + count.z + count.w;
-  const size_t here = index_of(blocks, view, x, y);
-  ranges[here] = range;
-
-  // Of the lanes, two lie in the block.
-  const int8 inside = (int8)(-1, -1, 0, 0, 0, 0, 0, 0);
-  Spans spans = no_spans();
-  for (int v = 2 * y; step > 0.0f && v <= min(2 * y + 1, height - 1); ++v) {
-    global const float* row = coarse + ((size_t)view * height + v) * width;
-    const int8 found = inside & ridges_from(row, 2 * x, width, EGOSGM_COARSE_RIDGE_REACH, step / (EGOSGM_COARSE / 2));
-    spans = with(spans, EGOSGM_COARSE * eight(row, 2 * x, width), found);
-  }
-  ridges_with_coarse[here] = step > 0.0f ? joined(ridges[here], range_of(spans)) : ridges[here];
+  ranges[index_of(blocks, view, x, y)] = range;
 }
 
-// The band of a block's unpredicted pixels: what the predictions in the 3x3 blocks around it, the coarse match and the
-// ridges near span, up to `ridge_blocks` above and below (-1: none). `found`: what the latter two span, for the
-// predicted ones. A work-item a block and view.
+// The band of a block's unpredicted pixels: what the predictions in the 3x3 blocks around it and the coarse match span.
+// `found`: what the block's own predictions and the coarse match span, for the predicted ones: beside a jump a prediction
+// may lie on the wrong side of it. A work-item a block and view.
 KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
                             const float margin, const int min_count, const float coarse_margin,
                             global const BlockRange* ranges, global const BlockRange* coarse_ranges,
-                            const int ridge_blocks, global const BlockRange* ridges, global BlockRange* found,
-                            global Band* bands) {
+                            global BlockRange* found, global Band* bands) {
   const ImageSize blocks = blocks_of(size);
   const int x = get_global_id(0);
   const int y = get_global_id(1);
@@ -141,26 +105,23 @@ KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, co
     }
   }
   const size_t here = index_of(blocks, view, x, y);
-  BlockRange near = {INFINITY, -INFINITY, 0};
-  for (int v = max(y - ridge_blocks, 0); v <= min(y + ridge_blocks, blocks.height - 1); ++v) {
-    near = joined(near, ridges[index_of(blocks, view, x, v)]);
-  }
   const bool has_around = count > 0 && count >= (uint)max(min_count, 0);
   const bool has_coarse = coarse_ranges[here].count >= EGOSGM_COARSE_MIN_COUNT;
-  BlockRange both = near;
-  if (has_coarse) both = joined(coarse_ranges[here], near);
-  found[here] = both;
+  const BlockRange coarse = coarse_ranges[here];
+  BlockRange both = {INFINITY, -INFINITY, 0};
+  if (has_coarse) both = coarse;
+  found[here] = joined(both, ranges[here]);
 
-  const bool has_any = from_neighbours && (has_around || has_coarse);  // a ridge alone does not tell what is behind
+  const bool has_any = from_neighbours && (has_around || has_coarse);
   float from = has_any ? INFINITY : -INFINITY;
   float to = -from;
   if (has_any && has_around) {
     from = least - margin;
     to = most + margin;
   }
-  if (has_any && both.count > 0) {
-    from = fmin(from, both.min - coarse_margin);
-    to = fmax(to, both.max + coarse_margin);
+  if (has_any && has_coarse) {
+    from = fmin(from, coarse.min - coarse_margin);
+    to = fmax(to, coarse.max + coarse_margin);
   }
   bands[here] = first_of(bands_of(range, from, to));
 }

@@ -3,6 +3,7 @@
 #ifndef EGOSGM_KERNELS_SEARCH_SPANS_H
 #define EGOSGM_KERNELS_SEARCH_SPANS_H
 
+#include "method.h"
 #include "shared.h"
 
 // What pixels that are looked through one after another span, lane by lane.
@@ -43,6 +44,22 @@ BlockRange joined(const BlockRange a, const BlockRange b) {
   both.max = b.count > 0 && (a.count == 0 || b.max > a.max) ? b.max : a.max;
   both.count = a.count + b.count;
   return both;
+}
+
+// Keeps the EGOSGM_COARSE_OUTLIERS + 1 least values of each lane, in rising order; the most, in falling order.
+void insert_least(float4* least, float4 value) {
+  for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
+    const float4 before = least[i];
+    least[i] = value < before ? value : before;
+    value = value < before ? before : value;
+  }
+}
+void insert_most(float4* most, float4 value) {
+  for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
+    const float4 before = most[i];
+    most[i] = value > before ? value : before;
+    value = value > before ? before : value;
+  }
 }
 
 ImageSize blocks_of(const ImageSize size) {

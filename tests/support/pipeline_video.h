@@ -77,7 +77,6 @@ inline std::vector<Setting> settings() {
                    o.hole_fill.max_difference_px = 0.25f;
                    o.search_band.neighbour_min_count = 30;
                    o.search_band.neighbour_margin_px = 1;
-                   o.search_band.ridge_step_px = 0.5f;
                    o.speckle_removal.max_size_px = 0;
                    o.median_filter.enabled = false;
                    o.forward_warp = {.process_noise_px2 = 0.4f, .motion_noise = 2.5f};

@@ -55,90 +55,36 @@ std::pair<float, float> found_around(shared::ImageSize size, const std::vector<f
   return {found[kCoarseOutliers], found[found.size() - 1 - kCoarseOutliers]};
 }
 
-/// Is it nearer than something close on its left, and on its right?
-bool is_ridge(shared::ImageSize size, const std::vector<float>& disparity, int view, int x, int y, int reach,
-              float step) {
-  const auto at = [&](int u) {
-    return u < 0 || u >= size.width ? EGOSGM_INVALID_DISPARITY
-                                    : disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + u];
-  };
-  bool has_left = false, has_right = false;
-  for (int i = 1; i <= reach; ++i) {
-    has_left |= is_valid(at(x - i)) && at(x - i) < at(x) - step;
-    has_right |= is_valid(at(x + i)) && at(x + i) < at(x) - step;
-  }
-  return is_valid(at(x)) && has_left && has_right;
-}
-
-/// The ridges of a map whose blocks have `side` x `side` pixels, by block, where there are `enough`; first > second:
-/// not.
-std::vector<std::pair<float, float>> ridges_of(shared::ImageSize size, shared::ImageSize blocks, int side, int rows,
-                                               const std::vector<float>& disparity, int reach, float step, int enough) {
-  const std::size_t count = static_cast<std::size_t>(blocks.width) * blocks.height;
-  std::vector<std::pair<float, float>> ridges(2 * count, {kInfinity, -kInfinity});
-  std::vector<int> pixels(2 * count, 0);
-  for (int view = 0; view < 2 && !disparity.empty() && step > 0; ++view) {
-    for (int y = 0; y < size.height; y += rows) {
-      for (int x = 0; x < size.width; ++x) {
-        if (!is_ridge(size, disparity, view, x, y, reach, step)) continue;
-        const float d = disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
-        const std::size_t block = view * count + static_cast<std::size_t>(y / side) * blocks.width + x / side;
-        auto& [least, most] = ridges[block];
-        least = std::min(least, d), most = std::max(most, d), ++pixels[block];
-      }
+/// What is predicted in the blocks from (first_x, first_y) to (last_x, last_y).
+struct Predicted {
+  float least = kInfinity, most = -kInfinity;
+  int count = 0;
+};
+Predicted predicted_in(shared::ImageSize size, const std::vector<float>& disparity, int view, int first_x, int first_y,
+                       int last_x, int last_y) {
+  Predicted found;
+  for (int y = std::max(0, first_y * EGOSGM_BLOCK); y < std::min(size.height, (last_y + 1) * EGOSGM_BLOCK); ++y) {
+    for (int x = std::max(0, first_x * EGOSGM_BLOCK); x < std::min(size.width, (last_x + 1) * EGOSGM_BLOCK); ++x) {
+      const float d = disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
+      if (!is_valid(d)) continue;
+      found.least = std::min(found.least, d), found.most = std::max(found.most, d), ++found.count;
     }
   }
-  for (std::size_t i = 0; i < ridges.size(); ++i) {
-    if (pixels[i] < enough) ridges[i] = {kInfinity, -kInfinity};
-  }
-  return ridges;
-}
-
-void join(std::pair<float, float>& range, std::pair<float, float> other) {
-  range = {std::min(range.first, other.first), std::max(range.second, other.second)};
-}
-
-/// What the ridges of the warped and of the coarse map span in each block, and in those above and below.
-std::vector<std::pair<float, float>> ridges_around(shared::ImageSize size, shared::ImageSize blocks, float step,
-                                                   const std::vector<float>& warped, const std::vector<float>& coarse) {
-  const auto fine = ridges_of(size, blocks, EGOSGM_BLOCK, 2, warped, kRidgeReach, step, kRidgeMinCount);
-  const auto found = ridges_of({(size.width + 3) / 4, (size.height + 3) / 4}, blocks, EGOSGM_BLOCK / EGOSGM_COARSE, 1,
-                               coarse, kCoarseRidgeReach, step / 2, 1);
-  std::vector<std::pair<float, float>> around(fine.size(), {kInfinity, -kInfinity});
-  for (int i = 0; i < static_cast<int>(fine.size()); ++i) {
-    const int view = i / (blocks.width * blocks.height);
-    const int y = i / blocks.width % blocks.height, x = i % blocks.width;
-    for (int v = std::max(0, y - kRidgeBlocks); v <= std::min(blocks.height - 1, y + kRidgeBlocks); ++v) {
-      const int near = (view * blocks.height + v) * blocks.width + x;
-      join(around[i], fine[near]);
-      join(around[i], {4 * found[near].first, 4 * found[near].second});
-    }
-  }
-  return around;
+  return found;
 }
 
 shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                             const testing::HostMaps& predicted, std::pair<float, float> coarse,
-                             std::pair<float, float> found, int view, int block_x, int block_y) {
-  float least = kInfinity, most = -kInfinity;
-  int count = 0;
-  for (int y = std::max(0, (block_y - 1) * EGOSGM_BLOCK); y < std::min(size.height, (block_y + 2) * EGOSGM_BLOCK);
-       ++y) {
-    for (int x = std::max(0, (block_x - 1) * EGOSGM_BLOCK); x < std::min(size.width, (block_x + 2) * EGOSGM_BLOCK);
-         ++x) {
-      const float d = predicted.disparity[(static_cast<std::size_t>(view) * size.height + y) * size.width + x];
-      if (!is_valid(d)) continue;
-      least = std::min(least, d), most = std::max(most, d), ++count;
-    }
-  }
-  const bool is_found = found.first <= found.second;
+                             const std::vector<float>& predicted, std::pair<float, float> coarse, int view, int x,
+                             int y) {
+  const Predicted around = predicted_in(size, predicted, view, x - 1, y - 1, x + 1, y + 1);
   const bool is_coarse = coarse.first <= coarse.second;
-  const float coarse_from = found.first - options.coarse_margin_px, coarse_to = found.second + options.coarse_margin_px;
-  if (count == 0 || count < options.neighbour_min_count) {
+  const float coarse_from = coarse.first - options.coarse_margin_px,
+              coarse_to = coarse.second + options.coarse_margin_px;
+  if (around.count == 0 || around.count < options.neighbour_min_count) {
     return is_coarse ? band_of(range, coarse_from, coarse_to) : band_of(range, -kInfinity, kInfinity);
   }
-  const float from = least - options.neighbour_margin_px, to = most + options.neighbour_margin_px;
-  return is_found ? band_of(range, std::min(from, coarse_from), std::max(to, coarse_to)) : band_of(range, from, to);
+  const float from = around.least - options.neighbour_margin_px, to = around.most + options.neighbour_margin_px;
+  return is_coarse ? band_of(range, std::min(from, coarse_from), std::max(to, coarse_to)) : band_of(range, from, to);
 }
 
 shared::Band of_prediction(shared::DisparityRange range, const SearchBandOptions& options, float d, float p,
@@ -178,16 +124,17 @@ SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, co
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   std::vector<shared::Band> of_blocks;
-  std::vector<std::pair<float, float>> found =
-      ridges_around(size, {blocks_x, blocks_y}, options.ridge_step_px, warped, coarse);
+  std::vector<std::pair<float, float>> found;
+  const std::vector<float>& whole = warped.empty() ? predicted.disparity : warped;
   for (int view = 0; view < 2; ++view) {
     for (int y = 0; y < blocks_y; ++y) {
       for (int x = 0; x < blocks_x; ++x) {
         const std::pair<float, float> of_coarse = found_around(size, coarse, view, x, y);
-        join(found[of_blocks.size()], of_coarse);
-        of_blocks.push_back(options.from_neighbours ? from_neighbours(size, range, options, predicted, of_coarse,
-                                                                      found[of_blocks.size()], view, x, y)
-                                                    : band_of(range, -kInfinity, kInfinity));
+        of_blocks.push_back(options.from_neighbours
+                                ? from_neighbours(size, range, options, whole, of_coarse, view, x, y)
+                                : band_of(range, -kInfinity, kInfinity));
+        const Predicted own = options.from_neighbours ? predicted_in(size, whole, view, x, y, x, y) : Predicted{};
+        found.push_back({std::min(of_coarse.first, own.least), std::max(of_coarse.second, own.most)});
       }
     }
   }

@@ -15,7 +15,7 @@ struct SearchBands {
   std::vector<shared::RowSum> row_sums;
 };
 
-/// `coarse`: what reference::coarse_match gives; `warped`: where ridges are looked for, empty: nowhere.
+/// `coarse`: what reference::coarse_match gives; `warped`: predictions before any was dropped, empty: `predicted`.
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
                         const testing::HostMaps& predicted, const std::vector<float>& coarse = {},
                         const std::vector<float>& warped = {});
