@@ -57,7 +57,6 @@ void for_each(Options& o, Visit&& visit) {
   visit("kalman_update.gate_px", o.kalman_update.gate_px);
   visit("kalman_update.keep_predicted", o.kalman_update.keep_predicted);
   visit("kalman_update.ask_neighbours", o.kalman_update.ask_neighbours);
-  visit("kalman_update.innovation_sigmas", o.kalman_update.innovation_sigmas);
   visit("kalman_update.min_variance_px2", o.kalman_update.min_variance_px2);
   visit("prediction_check.enabled", o.prediction_check.enabled);
   visit("output_variance.enabled", o.output_variance.enabled);
@@ -96,7 +95,6 @@ void choose_as_the_paper(MethodOptions& method) {
   method.edge_rejection.max_jump_px = 3.0f;
   method.search_band.from_neighbours = false;
   method.kalman_update.ask_neighbours = false;
-  method.kalman_update.innovation_sigmas = 0.0f;
   method.prediction_check.enabled = false;
   method.output_variance.enabled = false;
 }

@@ -80,7 +80,6 @@ struct KalmanUpdateOptions {
   float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   bool ask_neighbours = true;  // which of the two they speak for, instead; and whether all of them move
-  float innovation_sigmas = 4.0f;  // where the two differ by more deviations, p' is raised until they do not; 0: never
   float min_variance_px2 = 0.02f;
 };
 struct PredictionCheckOptions {

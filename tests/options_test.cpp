@@ -218,7 +218,6 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
   EXPECT_GT(paper.forward_warp.process_noise_px2, 0) << "a constant q,";
   EXPECT_EQ(paper.forward_warp.motion_noise, 0) << "and nothing else";
   EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged,";
-  EXPECT_EQ(paper.kalman_update.innovation_sigmas, 0) << "by the variances as they are";
   EXPECT_FALSE(paper.output_variance.enabled) << "the variance is the filter's";
   EXPECT_EQ(paper.banded_sgm.paths, 8);
   EXPECT_EQ(paper.search, SearchMode::kBand);

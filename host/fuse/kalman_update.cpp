@@ -11,9 +11,6 @@ const cl::Program& build(ocl::Context& context, int pixels) {
   return context.program("kalman_update.cl", ocl::Defines().set("PIXELS", pixels));
 }
 
-// 1 / sigmas^2; 0: of none.
-float weight_of(float sigmas) { return sigmas > 0 ? 1 / (sigmas * sigmas) : 0.0f; }
-
 }  // namespace
 
 KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options,
@@ -24,7 +21,6 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
       gate_px_(options.gate_px > 0 ? options.gate_px : std::numeric_limits<float>::max()),
       keep_predicted_(options.keep_predicted),
       ask_neighbours_(options.ask_neighbours),
-      innovation_weight_(weight_of(options.innovation_sigmas)),
       min_variance_px2_(options.min_variance_px2),
       update_(build(context, pixels_), "update") {}
 
@@ -33,7 +29,7 @@ void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check,
                               StereoMaps& updated, Views views) {
   context_.enter("KalmanUpdate");
   update_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, gate_px_, keep_predicted_,
-          ask_neighbours_, innovation_weight_, min_variance_px2_, check, warped, hidden, predicted.disparity,
+          ask_neighbours_, min_variance_px2_, check, warped, hidden, predicted.disparity,
           predicted.variance, measured.disparity, measured.variance, updated.disparity, updated.variance);
 }
 

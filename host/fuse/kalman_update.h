@@ -28,8 +28,8 @@ class KalmanUpdate {
   const int pixels_;
   const float gate_px_;
   const cl_int keep_predicted_, ask_neighbours_;
-  const float innovation_weight_, min_variance_px2_;
-  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const cl_int, const float, const float,
+  const float min_variance_px2_;
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const cl_int, const float,
               const ocl::Buffer<shared::PredictionState>, const ocl::Buffer<float>, const HiddenMap,
               const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>,
               ocl::Buffer<float>, ocl::Buffer<float>>

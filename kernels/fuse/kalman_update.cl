@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. An innovation z - d' of more
-// deviations than p' + r allows says that p' is too small, so p' grows. Where the two contradict each other, by more
-// than the gate or because the measurement is doubtful, or where most pixels around are off to the same side,
-// as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide;
+// Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two contradict each
+// other, by more than the gate or because the measurement is doubtful, or where most pixels around are off to the same
+// side, as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide;
 // unless the pixels around speak against it. What is hidden by a surface nearer than the range (ForwardWarp) has no
 // disparity: whatever is measured there is a mismatch.
 #include "method.h"
@@ -65,16 +64,14 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
   return moves;
 }
 
-// `check`: of this frame; wrong predictions would vouch for each other, so that nobody is asked, and every innovation
-// of more than a deviation raises p'.
+// `check`: of this frame; wrong predictions would vouch for each other, so that nobody is asked.
 // `warped`: the prediction before anything was dropped from it; may be `updated`. `hidden`: not 0 where a surface
 // nearer than the range hides what is behind. ask_neighbours: whether a prediction that is nearer than what contradicts
 // it stays, once, if more than twice as many of the pixels around vouch for it and less than half measure the other;
 // whether both go if none vouches for either and less than half measure it, or less than EGOSGM_SUPPORT_MOST where the
 // prediction was dropped; and whether a measurement is taken that differs as those of EGOSGM_MOVING_COUNT around do.
-// innovation_weight: p' is raised until this times the squared innovation is no more than p' + r; 0: never.
 KERNEL void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
-                   const float innovation_weight, const float min_variance, global const PredictionState* check,
+                   const float min_variance, global const PredictionState* check,
                    global const float* warped, global const uchar* hidden, global const float* predicted,
                    global const float* predicted_variance, global const float* measured,
                    global const float* measured_variance, global float* updated, global float* updated_variance) {
@@ -82,9 +79,7 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
   const int y = get_global_id(1);
   const size_t view = (size_t)get_global_id(2) * size.height * width;
   const size_t row = view + (size_t)y * width;
-  const int are_right = (check->is_wrong == 0) & (check->was_wrong == 0);
-  const int asks = ask_neighbours & are_right;
-  const float weight = are_right || innovation_weight <= 0.0f ? innovation_weight : fmax(innovation_weight, 1.0f);
+  const int asks = ask_neighbours & (check->is_wrong == 0) & (check->was_wrong == 0);
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(predicted + row, x, width);
@@ -100,12 +95,10 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
 
     const Floats zero = 0.0f;
     const Floats innovation = z - d;
-    const Floats unexplained = weight * innovation * innovation - r;
-    const Floats prior = p > unexplained ? p : unexplained;
-    const Floats sum = prior + r;
-    const Floats gain = sum > zero ? prior / sum : zero;
+    const Floats sum = p + r;
+    const Floats gain = sum > zero ? p / sum : zero;
     const Floats fused = d + gain * innovation;
-    const Floats fused_variance = (1.0f - gain) * prior;
+    const Floats fused_variance = (1.0f - gain) * p;
 
     const Floats contradicted = r < doubtful ? doubtful : r;
     Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;

@@ -72,7 +72,7 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
     }
   }
   for (const KalmanUpdateOptions& options :
-       {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false, .innovation_sigmas = 0},
+       {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false},
         KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
     const testing::HostMaps expected = reference::kalman_update(size, options, warped.disparity, predicted, measured);
     for (const int pixels : {1, 16}) {
@@ -107,15 +107,6 @@ TEST(KalmanUpdate, WeighsByTheVariances) {
   EXPECT_EQ(update_pixel({}, {10, 1}, {12, 3}), (Estimate{10.5f, 0.75f}));
 }
 
-// An innovation of 2 px at two deviations asks for p' + r = 1 px^2.
-TEST(KalmanUpdate, BelievesAPredictionLessThatIsTooFarOff) {
-  EXPECT_EQ(update_pixel({.innovation_sigmas = 2}, {10, 0.25f}, {12, 0.25f}), (Estimate{11.5f, 0.1875f}));
-  EXPECT_EQ(update_pixel({.innovation_sigmas = 2}, {10, 0.25f}, {8, 0.25f}), (Estimate{8.5f, 0.1875f}));
-  EXPECT_EQ(update_pixel({.innovation_sigmas = 2}, {10, 0.25f}, {11, 0.25f}), (Estimate{10.5f, 0.125f}));
-  EXPECT_EQ(update_pixel({.innovation_sigmas = 1}, {10, 0.25f}, {11, 0.25f}), (Estimate{10.75f, 0.1875f}));
-  EXPECT_EQ(update_pixel({.innovation_sigmas = 0}, {10, 0.25f}, {12, 0.25f}), (Estimate{11, 0.125f}));
-}
-
 TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));
   // With a variance for which the next frame searches wide.
@@ -124,7 +115,7 @@ TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   const KalmanUpdateOptions alone{.gate_px = 2, .ask_neighbours = false};
   EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 1}), (Estimate{7.75f, wide}));
   EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 2 * wide}), (Estimate{7.75f, 2 * wide}));
-  EXPECT_EQ(update_pixel({.gate_px = 0, .innovation_sigmas = 0}, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
+  EXPECT_EQ(update_pixel({.gate_px = 0}, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
 }
 
 TEST(KalmanUpdate, TakesAMeasurementThatEscapedItsBand) {
@@ -295,20 +286,8 @@ TEST(KalmanUpdate, CountsNoPixelOutsideOfTheImageAmongThoseThatMove) {
   }
 }
 
-TEST(KalmanUpdate, CountsEveryInnovationAfterWrongPredictions) {
-  Surroundings maps(20);
-  maps.measured.disparity[Surroundings::kMiddle] = 22;  // 4 px^2: p' is raised from 1 to 3
-  const Estimate raised{21.5f, 0.75f};
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21, 0.5f}));
-  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 1, 0}), raised);
-  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 0, 1}), raised);
-  EXPECT_EQ(maps.updated_in_the_middle({.innovation_sigmas = 0}, {{}, 1, 0}), (Estimate{21, 0.5f}));
-  EXPECT_EQ(maps.updated_in_the_middle({.innovation_sigmas = 0.5f}, {{}, 1, 0}),
-            maps.updated_in_the_middle({.innovation_sigmas = 0.5f}));
-}
-
 TEST(KalmanUpdate, NeverClaimsMoreThanTheFloor) {
-  const KalmanUpdateOptions options{.innovation_sigmas = 0, .min_variance_px2 = 0.25f};
+  const KalmanUpdateOptions options{.min_variance_px2 = 0.25f};
   EXPECT_EQ(update_pixel(options, {10, 0.25f}, {10, 0.25f}), (Estimate{10, 0.25f}));
   EXPECT_EQ(update_pixel(options, kNothing, {12, 0.125f}), (Estimate{12, 0.25f}));
   EXPECT_EQ(update_pixel(options, {10, 0.125f}, kNothing), (Estimate{10, 0.25f}));

@@ -138,10 +138,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
 void Pipeline::update(const Images& images, Frame& frame) const {
   const Pass& pass = frame.passes.back();
   KalmanUpdateOptions kalman = options_.kalman_update;
-  if (prediction_.is_wrong || prediction_.was_wrong) {
-    kalman.ask_neighbours = false;
-    kalman.innovation_sigmas = std::min(kalman.innovation_sigmas, 1.0f);
-  }
+  if (prediction_.is_wrong || prediction_.was_wrong) kalman.ask_neighbours = false;
   frame.fused = kalman_update(size_, kalman, frame.warped.disparity, frame.predicted, pass.measured);
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
   if (!options_.track_right) {

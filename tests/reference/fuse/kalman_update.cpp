@@ -17,16 +17,10 @@ constexpr Estimate kNone{EGOSGM_INVALID_DISPARITY, 0};
 
 bool is_valid(const Estimate& estimate) { return estimate.disparity != EGOSGM_INVALID_DISPARITY; }
 
-Estimate fuse(float innovation_sigmas, const Estimate& predicted, const Estimate& measured) {
-  const float innovation = measured.disparity - predicted.disparity;
-  float prior = predicted.variance;
-  if (innovation_sigmas > 0) {
-    const float least_sum = 1 / (innovation_sigmas * innovation_sigmas) * innovation * innovation;
-    prior = std::max(prior, least_sum - measured.variance);
-  }
-  const float sum = prior + measured.variance;
-  const float gain = sum > 0 ? prior / sum : 0;
-  return {predicted.disparity + gain * innovation, (1 - gain) * prior};
+Estimate fuse(const Estimate& predicted, const Estimate& measured) {
+  const float sum = predicted.variance + measured.variance;
+  const float gain = sum > 0 ? predicted.variance / sum : 0;
+  return {predicted.disparity + gain * (measured.disparity - predicted.disparity), (1 - gain) * predicted.variance};
 }
 
 /// One view, and what the pixels of it say.
@@ -102,7 +96,7 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
     const bool moves = options.ask_neighbours && std::abs(innovation) > 1 &&
                        view.is_between_moving(x, y, innovation > 0 ? 1.0f : -1.0f) &&
                        view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 15;
-    return moves ? Estimate{z, doubtful} : fuse(options.innovation_sigmas, predicted, measured);
+    return moves ? Estimate{z, doubtful} : fuse(predicted, measured);
   }
   if (predicted.variance < doubtful) {
     if (stays(predicted.disparity)) return {predicted.disparity, doubtful};
