@@ -45,7 +45,7 @@ const char* const kWriteListHelp =
     "  right, predicted, measured, interpolated\n"
     "                 these disparity maps, KITTI's PNG\n"
     "  interpolated_certain\n"
-    "                 the same, but variances above 3 px^2 become holes before they are filled: of a video a little "
+    "                 the same, but variances above 6 px^2 become holes before they are filled: of a video a little "
     "better\n"
     "  search         disparities searched at each pixel, 16-bit PNG\n"
     "  dynamic        255 where prediction and measurement contradict each other, as on what moves by itself, 8-bit "

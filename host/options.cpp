@@ -47,7 +47,9 @@ void for_each(Options& o, Visit&& visit) {
                    "", "census13x11, census9x7, census5x5, sad3x3",
                    "Set census5x5 if thin objects are lost; sad3x3 needs cameras of equal brightness."},
         o.cost);
-  visit(OptionText{"paths", "Paths of the semi-global aggregation.", "", "4, 8", "Set 8 if single pairs count more than time."}, o.paths);
+  visit(OptionText{"paths", "Paths of the semi-global aggregation.", "", "4, 8",
+                   "Set 8 if single pairs count more than time."},
+        o.paths);
   visit(OptionText{"p1", "Penalty of a step of one disparity between neighbours.", "cost", "0 to p2",
                    "Raise it for smooth surfaces without texture; lower it for slanted ones."},
         o.p1);

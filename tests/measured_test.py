@@ -36,9 +36,9 @@ class Tables(unittest.TestCase):
 
     def test_limits(self):
         table = Table()
-        for value, passed in ((5, True), (5.01, False), (float("nan"), False), (None, False)):
+        for value, passed in ((30, True), (30.01, False), (float("nan"), False), (None, False)):
             table.add("street", "bad_or_missing", value, single=0, limit="poles")
-            self.assertEqual((table.rows[-1]["at_most"], table.rows[-1]["goal"], table.rows[-1]["passed"]), (5, 1, passed))
+            self.assertEqual((table.rows[-1]["at_most"], table.rows[-1]["goal"], table.rows[-1]["passed"]), (30, 1, passed))
 
     def test_what_was_skipped_is_not_kept(self):
         def missing():

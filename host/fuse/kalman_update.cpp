@@ -29,8 +29,8 @@ void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check,
                               StereoMaps& updated, Views views) {
   context_.enter("KalmanUpdate");
   update_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, gate_px_, keep_predicted_,
-          ask_neighbours_, min_variance_px2_, check, warped, hidden, predicted.disparity,
-          predicted.variance, measured.disparity, measured.variance, updated.disparity, updated.variance);
+          ask_neighbours_, min_variance_px2_, check, warped, hidden, predicted.disparity, predicted.variance,
+          measured.disparity, measured.variance, updated.disparity, updated.variance);
 }
 
 }  // namespace egosgm

@@ -71,10 +71,10 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
 // whether both go if none vouches for either and less than half measure it, or less than EGOSGM_SUPPORT_MOST where the
 // prediction was dropped; and whether a measurement is taken that differs as those of EGOSGM_MOVING_COUNT around do.
 KERNEL void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
-                   const float min_variance, global const PredictionState* check,
-                   global const float* warped, global const uchar* hidden, global const float* predicted,
-                   global const float* predicted_variance, global const float* measured,
-                   global const float* measured_variance, global float* updated, global float* updated_variance) {
+                   const float min_variance, global const PredictionState* check, global const float* warped,
+                   global const uchar* hidden, global const float* predicted, global const float* predicted_variance,
+                   global const float* measured, global const float* measured_variance, global float* updated,
+                   global float* updated_variance) {
   const int width = size.width;
   const int y = get_global_id(1);
   const size_t view = (size_t)get_global_id(2) * size.height * width;

@@ -81,8 +81,8 @@ KERNEL void gather_coarse(const ImageSize size, global const float* coarse, glob
 }
 
 // The band of a block's unpredicted pixels: what the predictions in the 3x3 blocks around it and the coarse match span.
-// `found`: what the block's own predictions and the coarse match span, for the predicted ones: beside a jump a prediction
-// may lie on the wrong side of it. A work-item a block and view.
+// `found`: what the block's own predictions and the coarse match span, for the predicted ones: beside a jump a
+// prediction may lie on the wrong side of it. A work-item a block and view.
 KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
                             const float margin, const int min_count, const float coarse_margin,
                             global const BlockRange* ranges, global const BlockRange* coarse_ranges,

@@ -58,7 +58,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, OutputVarianceTest, ::testing::ValuesIn(testing:
 
 /// What is given out for a sum of squares.
 float given_for(float sum) {
-  return 0.18f * sum * sum / (sum * sum + 0.07f) + 1.26f * std::pow(sum, 5.5f) / (std::pow(sum, 5.0f) + 0.8f);
+  return 0.36f * sum * sum / (sum * sum + 0.07f) + 2.52f * std::pow(sum, 5.5f) / (std::pow(sum, 5.0f) + 0.8f);
 }
 
 void expect_given_for(const std::vector<float>& sums, const std::vector<float>& variances, const char* what = "") {
@@ -172,7 +172,7 @@ TEST(OutputVariance, KnowsNoSumThatIsTooSmallOrTooLarge) {
   const testing::HostMaps maps = maps_of(
       {1, 1}, [](int, int) { return 5.0f; }, [](int, int) { return 1.0f; });
   const float all = std::numeric_limits<float>::max();
-  EXPECT_FLOAT_EQ(output_variance({1, 1}, maps, {.scale = all})[0], 0.18f + 1.26f * std::sqrt(all));
+  EXPECT_FLOAT_EQ(output_variance({1, 1}, maps, {.scale = all})[0], 0.36f + 2.52f * std::sqrt(all));
   EXPECT_EQ(output_variance({1, 1}, maps, {.scale = 0})[0], 0);
 }
 

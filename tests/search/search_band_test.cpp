@@ -180,8 +180,7 @@ TEST(SearchBand, PredictedPixelSearchesItsDeviations) {
   auto maps = nothing(size);
   maps.disparity[0] = 40.25f, maps.variance[0] = 4.0f;  // +- 3 * 2
   maps.disparity[1] = 60.5f, maps.variance[1] = 0.01f;  // +- the minimum
-  const auto bands =
-      run(size, {0, 128}, {.sigmas = 3, .min_half_width_px = 2, .from_neighbours = false}, maps).bands;
+  const auto bands = run(size, {0, 128}, {.sigmas = 3, .min_half_width_px = 2, .from_neighbours = false}, maps).bands;
   EXPECT_EQ(bands[0].first, 34);  // 34.25
   EXPECT_EQ(bands[0].last, 47);   // 46.25
   EXPECT_EQ(bands[1].first, 58);  // 58.5

@@ -50,7 +50,7 @@ EGOSGM_EXPORT DisparityMetrics metrics_of(const DisparityCounts& counts);
 EGOSGM_EXPORT DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images);
 
 /// Of OutputVariance: what is above is wrong about as often as what the background would fill in.
-constexpr float kCertainVariancePx2 = 3.0f;
+constexpr float kCertainVariancePx2 = 6.0f;
 
 /// Fills the holes from the background, as KITTI's development kit does: in each row, a run of invalid pixels between
 /// two valid ones gets the smaller of the two, the ends of a row its nearest valid value; then the top and bottom of

@@ -87,7 +87,7 @@ std::vector<float> blends(const testing::HostMaps& maps, const testing::HostMaps
 
 float calibrated(float sum) {
   const float square = sum * sum;
-  return 0.18f / (1 + 0.07f / square) + 1.26f * std::sqrt(sum) / (1 + 0.8f / (square * square * sum));
+  return 0.36f / (1 + 0.07f / square) + 2.52f * std::sqrt(sum) / (1 + 0.8f / (square * square * sum));
 }
 
 }  // namespace
