@@ -14,8 +14,8 @@
 // Of these, so many of the least and of the largest are taken for mismatches. REQUIRES: less than half of the count.
 #define EGOSGM_COARSE_OUTLIERS 2
 
-// A deviation of 4 px: what is known no better is doubtful. KalmanUpdate takes such a measurement instead of fusing it,
-// and keeps no such prediction against a measurement. This is the matching variance where the path sums fall on beyond
+// A deviation of 4 px: what is known no better is doubtful. KalmanUpdate takes such a measurement instead of fusing it.
+// This is the matching variance where the path sums fall on beyond
 // the end of a band, as the true disparity rather lies outside, and the least variance where measurement and prediction
 // contradict each other: so the next frame searches wide.
 #define EGOSGM_DOUBTFUL_VARIANCE_PX2 16.0f
@@ -31,13 +31,9 @@
 #define EGOSGM_JUMP_DISTANCE 2
 #define EGOSGM_MAX_JUMP_PX 10.0f
 
-// KalmanUpdate asks every fourth pixel this far to all sides: 25. Near is what differs by less than this.
+// KalmanUpdate asks every fourth pixel this far to all sides: 25.
 #define EGOSGM_SUPPORT_RADIUS 8
 #define EGOSGM_SUPPORT_STEP 4
-#define EGOSGM_SUPPORT_PX 2.0f
-// A measurement that at least so many of them have too stands against a prediction, or against none that vouches.
-#define EGOSGM_SUPPORT_HALF 13
-#define EGOSGM_SUPPORT_MOST 18
 // What is measured further off than this moves by itself, where so many of them are off to the same side by the latter.
 #define EGOSGM_MOVING_PX 1.0f
 #define EGOSGM_MOVING_AROUND_PX 0.75f

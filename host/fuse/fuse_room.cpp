@@ -33,7 +33,7 @@ void FuseRoom::fuse(const Plan& plan, const FrameImages& images, const Predictio
                     const StereoMaps& measured, const PredictionCheck::State& agreement, Fusion& fusion,
                     StereoMaps& belief) {
   StereoMaps fused{fusion.fused, belief.variance};
-  kalman_update_(agreement, prediction.warped.disparity, prediction.hidden, prediction.maps, measured, fused,
+  kalman_update_(agreement, prediction.hidden, prediction.maps, measured, fused,
                  plan.tracked);
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};

@@ -24,12 +24,12 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
       min_variance_px2_(options.min_variance_px2),
       update_(build(context, pixels_), "update") {}
 
-void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check, const Map& warped,
-                              const HiddenMap& hidden, const StereoMaps& predicted, const StereoMaps& measured,
-                              StereoMaps& updated, Views views) {
+void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check, const HiddenMap& hidden,
+                              const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated,
+                              Views views) {
   context_.enter("KalmanUpdate");
   update_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, gate_px_, keep_predicted_,
-          ask_neighbours_, min_variance_px2_, check, warped, hidden, predicted.disparity, predicted.variance,
+          ask_neighbours_, min_variance_px2_, check, hidden, predicted.disparity, predicted.variance,
           measured.disparity, measured.variance, updated.disparity, updated.variance);
 }
 

@@ -9,17 +9,15 @@ namespace egosgm {
 
 /// Fuses prediction and measurement, pixel by pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the
 /// two differ by more than the gate, or as most around do (something moves by itself), or only the measurement is
-/// there, the measurement is taken, unless the pixels around, by what is both predicted and measured there, speak
-/// against it.
+/// there, the measurement is taken.
 class KalmanUpdate {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
 
-  /// `check`: what PredictionCheck says of this frame. `warped`: predicted disparities before any was dropped. Nothing
-  /// is believed of what is `hidden`.
+  /// `check`: what PredictionCheck says of this frame. Nothing is believed of what is `hidden`.
   /// REQUIRES: `updated` is neither `predicted` nor `measured`.
-  void operator()(const ocl::Buffer<shared::PredictionState>& check, const Map& warped, const HiddenMap& hidden,
+  void operator()(const ocl::Buffer<shared::PredictionState>& check, const HiddenMap& hidden,
                   const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated, Views views);
 
  private:
@@ -30,9 +28,9 @@ class KalmanUpdate {
   const cl_int keep_predicted_, ask_neighbours_;
   const float min_variance_px2_;
   ocl::Kernel<const shared::ImageSize, const float, const cl_int, const cl_int, const float,
-              const ocl::Buffer<shared::PredictionState>, const ocl::Buffer<float>, const HiddenMap,
-              const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>,
-              ocl::Buffer<float>, ocl::Buffer<float>>
+              const ocl::Buffer<shared::PredictionState>, const HiddenMap, const ocl::Buffer<float>,
+              const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>,
+              ocl::Buffer<float>>
       update_;
 };
 

@@ -1,39 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two contradict each
 // other, by more than the gate or because the measurement is doubtful, or where most pixels around are off to the same
-// side, as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide;
-// unless the pixels around speak against it. What is hidden by a surface nearer than the range (ForwardWarp) has no
-// disparity: whatever is measured there is a mismatch.
+// side, as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide.
+// What is hidden by a surface nearer than the range (ForwardWarp) has no disparity: whatever is measured there is a
+// mismatch.
 #include "method.h"
 #include "pixels.h"
 
 // lint: PIXELS=1
 // lint: PIXELS=16
-
-// What the pixels around say of a measurement and of the prediction `other`: how many measure the former, how many
-// vouch for either, as their prediction and their measurement are near it.
-typedef struct {
-  Floats measuring, for_measured, for_other;
-} Support;
-
-static Support ask_around(const ImageSize size, const int x, const int y, const Floats measured, const Floats other,
-                          global const float* predictions, global const float* measurements) {
-  Support support = {0.0f, 0.0f, 0.0f};
-  const Floats near = EGOSGM_SUPPORT_PX;
-  for (int v = y - EGOSGM_SUPPORT_RADIUS; v <= y + EGOSGM_SUPPORT_RADIUS; v += EGOSGM_SUPPORT_STEP) {
-    if (v < 0 || v >= size.height) continue;
-    const size_t row = (size_t)v * size.width;
-    for (int u = x - EGOSGM_SUPPORT_RADIUS; u <= x + EGOSGM_SUPPORT_RADIUS; u += EGOSGM_SUPPORT_STEP) {
-      const Floats z = load_pixels(measurements + row, u, size.width);
-      const Floats d = load_pixels(predictions + row, u, size.width);
-      const Ints measures = fabs(z - measured) < near;
-      support.measuring += one_where(measures);
-      support.for_measured += one_where(measures & (fabs(d - measured) < near));
-      support.for_other += one_where((fabs(z - other) < near) & (fabs(d - other) < near));
-    }
-  }
-  return support;
-}
 
 static Ints is_off_to(const Floats side, const Floats d, const Floats z) {
   return (d > INVALID) & (z > INVALID) & ((z - d) * side > (Floats)(EGOSGM_MOVING_AROUND_PX));
@@ -64,17 +39,13 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
   return moves;
 }
 
-// `check`: of this frame; wrong predictions would vouch for each other, so that nobody is asked.
-// `warped`: the prediction before anything was dropped from it; may be `updated`. `hidden`: not 0 where a surface
-// nearer than the range hides what is behind. ask_neighbours: whether a prediction that is nearer than what contradicts
-// it stays, once, if more than twice as many of the pixels around vouch for it and less than half measure the other;
-// whether both go if none vouches for either and less than half measure it, or less than EGOSGM_SUPPORT_MOST where the
-// prediction was dropped; and whether a measurement is taken that differs as those of EGOSGM_MOVING_COUNT around do.
+// `check`: of this frame; after wrong predictions all are off, so that nobody is asked.
+// `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
+// is taken that differs as those of EGOSGM_MOVING_COUNT around do.
 KERNEL void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
-                   const float min_variance, global const PredictionState* check, global const float* warped,
-                   global const uchar* hidden, global const float* predicted, global const float* predicted_variance,
-                   global const float* measured, global const float* measured_variance, global float* updated,
-                   global float* updated_variance) {
+                   const float min_variance, global const PredictionState* check, global const uchar* hidden,
+                   global const float* predicted, global const float* predicted_variance, global const float* measured,
+                   global const float* measured_variance, global float* updated, global float* updated_variance) {
   const int width = size.width;
   const int y = get_global_id(1);
   const size_t view = (size_t)get_global_id(2) * size.height * width;
@@ -104,22 +75,8 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
     Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
     Floats variance = fuses ? fused_variance : has_both ? contradicted : has_measurement ? r : p;
 
-    const Floats other = has_prediction ? d : load_pixels(warped + row, x, width);
-    const Ints was_dropped = (d <= INVALID) & (other > INVALID) & (fabs(z - other) > gate);
-    const Ints is_doubtful = has_measurement & (was_dropped | (has_prediction & !fuses & (p < doubtful) & (z < other)));
     const Floats moving = EGOSGM_MOVING_PX;
     Ints moves = fuses & (fabs(innovation) > moving);
-    if (asks && any_of(is_doubtful)) {
-      const Support support = ask_around(size, x, y, z, other, predicted + view, measured + view);
-      const Floats half_of_them = EGOSGM_SUPPORT_HALF;
-      const Floats most_of_them = EGOSGM_SUPPORT_MOST;
-      const Ints stays = is_doubtful & (z < other) & (2.0f * support.for_measured < support.for_other) &
-                         (support.measuring < half_of_them);
-      const Ints goes = is_doubtful & (support.for_measured <= zero) &
-                        (support.measuring < (was_dropped ? most_of_them : half_of_them));
-      value = stays ? other : goes ? INVALID : value;
-      variance = stays ? doubtful : variance;
-    }
     if (asks && any_of(moves)) {
       const Floats side = innovation > zero ? (Floats)(1.0f) : (Floats)(-1.0f);
       moves = move_together(size, x, y, side, moves, predicted + view, measured + view);

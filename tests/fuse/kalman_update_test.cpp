@@ -17,12 +17,11 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 /// What lies in the output must not shine through.
 testing::HostMaps before_update(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
 
-testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& warped,
-                         const testing::HostMaps& predicted, const testing::HostMaps& measured, int pixels = 0,
-                         const shared::PredictionState& check = {}, Views views = Views::kBoth) {
+testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& predicted,
+                         const testing::HostMaps& measured, int pixels = 0, const shared::PredictionState& check = {},
+                         Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   KalmanUpdate update(context, size, options, pixels);
-  const StereoMaps before = testing::upload(context, size, warped);
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const StereoMaps measurement = testing::upload(context, size, measured);
   StereoMaps out = testing::upload(context, size, before_update(size));
@@ -30,7 +29,7 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
   checked.write(context, {check});
   HiddenMap hidden(context, predicted.disparity.size());
   hidden.write(context, predicted.hidden.empty() ? std::vector<cl_uchar>(hidden.size()) : predicted.hidden);
-  update(checked, before.disparity, hidden, prediction, measurement, out, views);
+  update(checked, hidden, prediction, measurement, out, views);
   return testing::download(context, out);
 }
 
@@ -42,9 +41,8 @@ struct Estimate {
 constexpr Estimate kNothing{kNone, 0};
 
 Estimate update_pixel(const KalmanUpdateOptions& options, Estimate predicted, Estimate measured, int is_hidden = 0) {
-  const testing::HostMaps warped{{kNone, kNone}, {0, 0}};
   const testing::HostMaps updated =
-      update({1, 1}, options, warped,
+      update({1, 1}, options,
              {{predicted.disparity, kNone}, {predicted.variance, 0}, {static_cast<std::uint8_t>(is_hidden), 0}},
              {{measured.disparity, kNone}, {measured.variance, 0}});
   EXPECT_EQ(updated.disparity[1], kNone);
@@ -56,10 +54,9 @@ class KalmanUpdateTest : public ::testing::TestWithParam<shared::ImageSize> {};
 
 TEST_P(KalmanUpdateTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
-  // Few disparities, so that some pixels vouch for each other; on the left most are off to the same side.
+  // On the left most are off to the same side.
   testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 6);
   testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 7);
-  const testing::HostMaps warped = testing::random_maps(size, -8, 8, 0.3, 8);
   for (std::size_t i = 0; i < measured.disparity.size(); ++i) {
     predicted.hidden.push_back(predicted.disparity[i] == kNone && i % 13 < 4);
     if (i % 7 == 0 && predicted.disparity[i] != kNone) predicted.variance[i] += EGOSGM_DOUBTFUL_VARIANCE_PX2;
@@ -74,9 +71,9 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
   for (const KalmanUpdateOptions& options :
        {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false},
         KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
-    const testing::HostMaps expected = reference::kalman_update(size, options, warped.disparity, predicted, measured);
+    const testing::HostMaps expected = reference::kalman_update(size, options, predicted, measured);
     for (const int pixels : {1, 16}) {
-      const testing::HostMaps actual = update(size, options, warped, predicted, measured, pixels);
+      const testing::HostMaps actual = update(size, options, predicted, measured, pixels);
       EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
           << "gate " << options.gate_px << ", by " << pixels;
       EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
@@ -89,11 +86,10 @@ TEST_P(KalmanUpdateTest, UpdatesTheLeftViewAlone) {
   const shared::ImageSize size = GetParam();
   const testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 9);
   const testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 10);
-  const testing::HostMaps warped = testing::random_maps(size, -8, 8, 0.3, 11);
-  const testing::HostMaps both = update(size, {}, warped, predicted, measured);
+  const testing::HostMaps both = update(size, {}, predicted, measured);
   for (const int pixels : {1, 16}) {
     const testing::HostMaps was = before_update(size);
-    const testing::HostMaps one = update(size, {}, warped, predicted, measured, pixels, {}, Views::kLeft);
+    const testing::HostMaps one = update(size, {}, predicted, measured, pixels, {}, Views::kLeft);
     EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
     EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
   }
@@ -143,9 +139,9 @@ TEST(KalmanUpdate, DropsWhatIsMeasuredWhereANearerSurfaceHidesIt) {
 struct Surroundings {
   static constexpr shared::ImageSize kSize{21, 21};
   static constexpr int kMiddle = 10 * 21 + 10;
-  testing::HostMaps warped, predicted, measured;
+  testing::HostMaps predicted, measured;
 
-  explicit Surroundings(float around) : predicted(all(around)), measured(all(around)) { warped = predicted; }
+  explicit Surroundings(float around) : predicted(all(around)), measured(all(around)) {}
 
   static testing::HostMaps all(float disparity) {
     const std::size_t pixels = 2 * kSize.width * kSize.height;
@@ -153,94 +149,12 @@ struct Surroundings {
   }
   Estimate updated_in_the_middle(const KalmanUpdateOptions& options = {},
                                  const shared::PredictionState& check = {}) const {
-    const testing::HostMaps updated = update(kSize, options, warped, predicted, measured, 0, check);
+    const testing::HostMaps updated = update(kSize, options, predicted, measured, 0, check);
     return {updated.disparity[kMiddle], updated.variance[kMiddle]};
-  }
-  void drop_prediction() {
-    predicted.disparity[kMiddle] = kNone;
-    predicted.variance[kMiddle] = 0;
-  }
-  /// Measures `disparity` in every row from `row` on.
-  void measure_from(int row, float disparity) {
-    for (int i = row * kSize.width; i < kSize.width * kSize.height; ++i) measured.disparity[i] = disparity;
   }
 };
 
 constexpr float kDoubtful = EGOSGM_DOUBTFUL_VARIANCE_PX2;
-
-TEST(KalmanUpdate, KeepsAPredictionThatTheNeighboursVouchForOnce) {
-  Surroundings maps(20);
-  maps.measured.disparity[Surroundings::kMiddle] = 10;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kDoubtful}));
-  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kDoubtful}));
-  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 1, 0}), (Estimate{10, kDoubtful})) << "the predictions are wrong";
-  EXPECT_EQ(maps.updated_in_the_middle({}, {{}, 0, 1}), (Estimate{10, kDoubtful})) << "they were";
-  maps.predicted.variance[Surroundings::kMiddle] = kDoubtful;  // was kept before
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kDoubtful}));
-}
-
-TEST(KalmanUpdate, TakesWhatComesNearerOrWhatMostMeasure) {
-  Surroundings nearer(20);
-  nearer.measured.disparity[Surroundings::kMiddle] = 30;
-  EXPECT_EQ(nearer.updated_in_the_middle(), (Estimate{30, kDoubtful}));
-  Surroundings most(20);
-  most.measure_from(10, 10);  // three of five rows
-  EXPECT_EQ(most.updated_in_the_middle(), (Estimate{10, kDoubtful}));
-  Surroundings few(20);
-  few.measure_from(14, 10);
-  few.measured.disparity[Surroundings::kMiddle] = 10;
-  EXPECT_EQ(few.updated_in_the_middle(), (Estimate{20, kDoubtful}));
-}
-
-TEST(KalmanUpdate, DropsWhatNoneSpeaksForWhereADroppedPredictionContradicts) {
-  Surroundings maps(20);
-  maps.drop_prediction();
-  maps.measured.disparity[Surroundings::kMiddle] = 30;
-  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
-  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{30, 1}));
-  maps.warped.disparity[Surroundings::kMiddle] = 28;  // within the gate
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
-  maps.warped.disparity[Surroundings::kMiddle] = kNone;  // nothing was there
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
-  maps.warped.disparity[Surroundings::kMiddle] = 20;
-  maps.predicted.disparity[2 * 21 + 2] = maps.measured.disparity[2 * 21 + 2] = 31;  // one vouches
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
-}
-
-TEST(KalmanUpdate, TakesWhatMostMeasureThoughNoneVouches) {
-  Surroundings maps(20);
-  maps.drop_prediction();
-  maps.measure_from(6, 30);                  // four of five rows,
-  maps.measured.disparity[6 * 21 + 2] = 20;  // but for two pixels: 18 of 25
-  maps.measured.disparity[6 * 21 + 6] = 20;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, 1}));
-  maps.measured.disparity[6 * 21 + 14] = 20;
-  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
-}
-
-TEST(KalmanUpdate, KeepsADroppedPredictionThatTheNeighboursVouchFor) {
-  Surroundings maps(20);
-  maps.drop_prediction();
-  maps.measured.disparity[Surroundings::kMiddle] = 10;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20, kDoubtful}));
-}
-
-TEST(KalmanUpdate, DropsBothWhereNoneVouchesForEither) {
-  Surroundings maps(20);
-  for (float& disparity : maps.measured.disparity) disparity = kNone;
-  maps.measured.disparity[Surroundings::kMiddle] = 10;
-  EXPECT_EQ(maps.updated_in_the_middle(), kNothing);
-  EXPECT_EQ(maps.updated_in_the_middle({.ask_neighbours = false}), (Estimate{10, kDoubtful}));
-  maps.measure_from(10, 10);  // three of five rows
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kDoubtful}));
-  maps.measured.disparity[18 * 21 + 18] = maps.measured.disparity[18 * 21 + 14] = 20;  // one vouches for either
-  maps.predicted.disparity[18 * 21 + 10] = 10;
-  maps.measured.disparity[18 * 21 + 6] = maps.measured.disparity[18 * 21 + 2] = kNone;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{10, kDoubtful}));
-  maps.measure_from(0, kNone);
-  maps.measured.disparity[Surroundings::kMiddle] = 30;  // nearer: a thin thing that was lost
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{30, kDoubtful}));
-}
 
 /// All are measured `off` nearer than predicted, the pixel in the middle `innovation`.
 Surroundings shifted(float off, float innovation) {
@@ -258,6 +172,8 @@ TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
     EXPECT_EQ(shifted(sign * -0.875f, sign * 1.25f).updated_in_the_middle(), fused) << "to the other side";
     EXPECT_EQ(shifted(sign * 0.875f, sign * 1).updated_in_the_middle(), (Estimate{20 + sign * 0.5f, 0.5f}));
     EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle({.ask_neighbours = false}), fused);
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle({}, {{}, 1, 0}), fused) << "wrong predictions";
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle({}, {{}, 0, 1}), fused) << "they were";
   }
   Surroundings maps = shifted(0.875f, 1.25f);
   for (const int still : {2, 6, 10, 14, 18}) {
@@ -276,7 +192,7 @@ TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
 TEST(KalmanUpdate, CountsNoPixelOutsideOfTheImageAmongThoseThatMove) {
   Surroundings maps(20);
   maps.measured = Surroundings::all(21.25f);
-  const testing::HostMaps updated = update(Surroundings::kSize, {}, maps.warped, maps.predicted, maps.measured);
+  const testing::HostMaps updated = update(Surroundings::kSize, {}, maps.predicted, maps.measured);
   const auto moved = [&](int view, int x, int y) { return updated.disparity[(view * 21 + y) * 21 + x] == 21.25f; };
   for (const int view : {0, 1}) {
     EXPECT_TRUE(moved(view, 10, 3) && moved(view, 10, 17)) << "15 of 25 lie in the image";

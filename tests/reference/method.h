@@ -20,7 +20,6 @@ inline constexpr float kMaxVariancePx2 = 1e6f;
 inline constexpr float kMinDepthRatio = 1e-6f;
 inline constexpr float kRightMapStepsPerPx = 65536.0f;
 inline constexpr int kRoughnessRadius = 3;
-inline constexpr float kSupportPx = 2.0f;
 inline constexpr int kSupportStep = 4;
 inline constexpr int kVarianceRadius = 8;
 inline constexpr int kVarianceStep = 4;

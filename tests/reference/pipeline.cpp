@@ -139,7 +139,7 @@ void Pipeline::update(const Images& images, Frame& frame) const {
   const Pass& pass = frame.passes.back();
   KalmanUpdateOptions kalman = options_.kalman_update;
   if (prediction_.is_wrong || prediction_.was_wrong) kalman.ask_neighbours = false;
-  frame.fused = kalman_update(size_, kalman, frame.warped.disparity, frame.predicted, pass.measured);
+  frame.fused = kalman_update(size_, kalman, frame.predicted, pass.measured);
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
   if (!options_.track_right) {
     frame.fused_smoothed =

@@ -29,14 +29,6 @@ class View {
   View(shared::ImageSize size, const float* predicted, const float* measured)
       : size_(size), predicted_(predicted), measured_(measured) {}
 
-  /// Of the pixels around, those whose measurement is near `disparity`; and those whose prediction is, too.
-  int measuring(int x, int y, float disparity) const {
-    return count(x, y, [&](std::size_t i) { return is_near(measured_[i], disparity); });
-  }
-  int vouching(int x, int y, float disparity) const {
-    return count(x, y,
-                 [&](std::size_t i) { return is_near(measured_[i], disparity) && is_near(predicted_[i], disparity); });
-  }
   /// Of the pixels around, those measured nearer than predicted (sign 1), or farther (-1), by more than 0.75 px.
   int moving(int x, int y, float sign) const {
     return count(x, y, [&](std::size_t i) { return is_moving(i, sign); });
@@ -53,7 +45,6 @@ class View {
     return predicted_[i] != EGOSGM_INVALID_DISPARITY && measured_[i] != EGOSGM_INVALID_DISPARITY &&
            sign * (measured_[i] - predicted_[i]) > 0.75f;
   }
-  static bool is_near(float a, float b) { return a != EGOSGM_INVALID_DISPARITY && std::abs(a - b) < kSupportPx; }
 
   template <typename Condition>
   int count(int x, int y, Condition&& condition) const {
@@ -74,23 +65,11 @@ class View {
 
 bool contradict(float gate_px, float a, float b) { return gate_px > 0 && std::abs(a - b) > gate_px; }
 
-Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int y, float warped,
-                const Estimate& predicted, const Estimate& measured) {
+Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int y, const Estimate& predicted,
+                const Estimate& measured) {
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
   const float z = measured.disparity, doubtful = kDoubtfulVariancePx2;
-  // Less than half of the 25; less than 18; 15 and more.
-  const auto vouch = [&](float disparity) { return view.vouching(x, y, disparity); };
-  const auto stays = [&](float other) {
-    return options.ask_neighbours && z < other && 2 * vouch(z) < vouch(other) && 2 * view.measuring(x, y, z) < 25;
-  };
-  const auto goes = [&](int enough) {
-    return options.ask_neighbours && vouch(z) == 0 && view.measuring(x, y, z) < enough;
-  };
-  if (!is_valid(predicted)) {
-    if (warped == EGOSGM_INVALID_DISPARITY || !contradict(options.gate_px, z, warped)) return measured;
-    if (stays(warped)) return {warped, doubtful};
-    return goes(18) ? kNone : measured;
-  }
+  if (!is_valid(predicted)) return measured;
   const float innovation = z - predicted.disparity;
   if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < doubtful) {
     const bool moves = options.ask_neighbours && std::abs(innovation) > 1 &&
@@ -98,18 +77,13 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
                        view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 15;
     return moves ? Estimate{z, doubtful} : fuse(predicted, measured);
   }
-  if (predicted.variance < doubtful) {
-    if (stays(predicted.disparity)) return {predicted.disparity, doubtful};
-    if (innovation < 0 && goes(13)) return kNone;
-  }
   return {z, std::max(measured.variance, doubtful)};
 }
 
 }  // namespace
 
 testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOptions& options,
-                                const std::vector<float>& warped, const testing::HostMaps& predicted,
-                                const testing::HostMaps& measured) {
+                                const testing::HostMaps& predicted, const testing::HostMaps& measured) {
   testing::HostMaps out = predicted;
   const int pixels = size.width * size.height;
   for (int i = 0; i < 2 * pixels; ++i) {
@@ -118,7 +92,7 @@ testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOption
     const bool is_hidden = !predicted.hidden.empty() && predicted.hidden[i] != 0;
     const Estimate estimate = is_hidden ? kNone
                                         : update(options, view, (i - first) % size.width, (i - first) / size.width,
-                                                 warped[i], {predicted.disparity[i], predicted.variance[i]},
+                                                 {predicted.disparity[i], predicted.variance[i]},
                                                  {measured.disparity[i], measured.variance[i]});
     out.disparity[i] = estimate.disparity;
     out.variance[i] = is_valid(estimate) ? std::max(estimate.variance, options.min_variance_px2) : 0;

@@ -8,7 +8,6 @@
 namespace egosgm::reference {
 
 testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOptions& options,
-                                const std::vector<float>& warped, const testing::HostMaps& predicted,
-                                const testing::HostMaps& measured);
+                                const testing::HostMaps& predicted, const testing::HostMaps& measured);
 
 }  // namespace egosgm::reference
