@@ -291,7 +291,7 @@ class ReportInBrowser(ReportTest):
         self.assertEqual(len(titles), 7, titles)
         for series in browser.evaluate("[...document.querySelectorAll('.chart')].map(e => [...e.querySelectorAll('.series')].map(s => s.getTotalLength()))"):
             self.assertTrue(series and all(length > 50 for length in series), series)
-        self.assertEqual(browser.evaluate("document.querySelectorAll('#options tr').length"), 20)
+        self.assertEqual(browser.evaluate("document.querySelectorAll('#options tr').length"), 19)
         self.assertEqual(sorted(browser.evaluate("[...document.querySelectorAll('.changed td:first-child')].map(e => e.textContent)")),
                          ["disparities", "p2"])
 
