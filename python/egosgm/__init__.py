@@ -26,10 +26,11 @@ from . import _egosgm
 from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
 from .drive import Drive, DriveFrame, run
+from .matcher import Matcher
 from .values import as_dataclass as _as_dataclass
 from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video
 
-__all__ = ["__version__", "Drive", "DriveFrame", "run", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video",
+__all__ = ["__version__", "Drive", "DriveFrame", "Matcher", "run", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 

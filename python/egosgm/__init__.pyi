@@ -11,6 +11,7 @@ from ._options import PipelineOptions, StereoOdometryOptions, SyntheticOptions
 from .drive import Drive as Drive
 from .drive import DriveFrame as DriveFrame
 from .drive import run as run
+from .matcher import Matcher as Matcher
 from .video_evaluation import DensityFigures as DensityFigures
 from .video_evaluation import RegionFigures as RegionFigures
 from .video_evaluation import VideoEvaluation as VideoEvaluation

@@ -134,3 +134,28 @@ def test_what_the_page_shows_is_what_comes_out():
     page = pathlib.Path(__file__).resolve().parents[2] / "docs/python.md"
     failed, tried = doctest.testfile(str(page), module_relative=False, optionflags=doctest.ELLIPSIS)
     assert failed == 0 and tried > 10
+
+
+def test_the_matcher_has_opencvs_values(street, frames):
+    matcher = egosgm.Matcher(disparities=48, paths=4)
+    found = matcher.compute(frames[0].left, frames[0].right)
+    assert found.dtype == np.int16 and repr(matcher) == "<Matcher of 48 disparities from 0>"
+    single = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, temporal=False, **OPTIONS).process(frames[0].left, frames[0].right).disparity
+    valid = single != egosgm.INVALID_DISPARITY
+    assert valid.any() and not valid.all()
+    np.testing.assert_array_equal(found[valid], np.rint(16 * single[valid]))
+    assert (found[~valid] == -16).all()
+    assert matcher.compute(frames[0].left[:48], frames[0].right[:48]).shape == (48, WIDTH)
+    for call, named in ((lambda: egosgm.Matcher(2000, 128), "do not fit"), (lambda: matcher.compute(np.zeros((4, 4, 3), np.uint8), None), "H x W"),
+                        (lambda: egosgm.Matcher(p22=1).compute(frames[0].left, frames[0].right), "did you mean p2")):
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            call()
+
+
+def test_the_page_for_those_who_come_from_elsewhere_names_options_that_exist():
+    page = (pathlib.Path(__file__).resolve().parents[2] / "docs/coming-from.md").read_text()
+    names = {"disparities", "min_disparity", "cost", "p1", "p2", "left_right_px", "max_speckle_px", "paths"}
+    assert names <= set(egosgm.pipeline_options())
+    assert all(f"`{name}`" in page or f"`{name} = " in page for name in names)
+    for cost in re.findall(r"`((?:census|sad)\d+x\d+)`", page):
+        egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 16, 0.1), 64, 32, disparities=16, cost=cost)

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A matcher of single pairs with the calling form and the values of OpenCV's."""
+from typing import Any, Optional, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _egosgm
+
+
+class Matcher:
+    """In place of cv2.StereoSGBM: compute(left, right) gives int16, 16 steps a pixel, (min_disparity - 1) * 16 where there is none."""
+
+    def __init__(self, min_disparity: int = 0, disparities: int = 128, *, device: str = "", preset: str = "default", **options: Any) -> None:
+        if not (min_disparity > -2047 and min_disparity + disparities <= 2047):
+            raise _egosgm.InvalidArgument(f"disparities {min_disparity} to {min_disparity + disparities - 1} do not fit into 16 bits with 16 steps "
+                                          "a pixel; Pipeline gives float")
+        self.min_disparity, self.disparities = min_disparity, disparities
+        self._options = {"device": device, "preset": preset, **options, "min_disparity": min_disparity, "disparities": disparities, "temporal": False}
+        self._pipeline: Optional[_egosgm.Pipeline] = None
+        self._made_for: Tuple[Any, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Matcher of {self.disparities} disparities from {self.min_disparity}>"
+
+    def compute(self, left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.int16]:
+        """A rectified pair, H x W, uint8 or uint16."""
+        made_for = np.shape(left), np.asarray(left).dtype
+        if self._pipeline is None or made_for != self._made_for:
+            if len(made_for[0]) != 2:
+                raise _egosgm.InvalidArgument(f"left is an array of the shape {made_for[0]}: give a grey image, H x W")
+            height, width = made_for[0]
+            camera = _egosgm.Calibration(1000, 1000, width / 2, height / 2, 1)  # nothing depends on it without prediction
+            self._pipeline, self._made_for = _egosgm.Pipeline(camera, width, height, **self._options), made_for
+        disparity = self._pipeline.process(left, right, None, "disparity").disparity
+        none = np.int16((self.min_disparity - 1) * 16)
+        valid = disparity != _egosgm.INVALID_DISPARITY
+        return np.where(valid, np.rint(np.where(valid, disparity, 0) * 16), none).astype(np.int16)

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/matcher.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "egosgm/error.h"
+#include "egosgm/pipeline.h"
+#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/synthetic.h"
+
+namespace egosgm::vision {
+namespace {
+
+SyntheticSequence street() { return SyntheticSequence({.frames = 2, .width = 160, .height = 64, .seed = 7}); }
+
+PipelineOptions few() {
+  PipelineOptions options;
+  options.disparities = 48;
+  options.paths = 4;
+  return options;
+}
+
+/// As a caller of either has it.
+template <typename Any>
+cv::Mat disparity_by(Any& matcher, const cv::Mat& left, const cv::Mat& right) {
+  cv::Mat disparity;
+  matcher.compute(left, right, disparity);
+  return disparity;
+}
+
+TEST(Matcher, IsCalledAsOpenCvsAndMeansTheSame) {
+  const SyntheticFrame frame = street().render(0);
+  Matcher ours(few());
+  const cv::Mat found = disparity_by(ours, frame.left, frame.right);
+  const auto theirs = cv::StereoSGBM::create(0, 48, 5);
+  const cv::Mat expected = disparity_by(*theirs, frame.left, frame.right);
+  ASSERT_EQ(found.type(), expected.type());
+  ASSERT_EQ(found.size(), expected.size());
+  const cv::Mat none = found == -16;  // theirs, too
+  int both = 0, close = 0;
+  for (int y = 0; y < found.rows; ++y) {
+    for (int x = 0; x < found.cols; ++x) {
+      if (none.at<uchar>(y, x) || expected.at<short>(y, x) < 0) continue;
+      ++both;
+      close += std::abs(found.at<short>(y, x) - expected.at<short>(y, x)) <= 16;
+    }
+  }
+  EXPECT_GT(both, found.rows * found.cols / 3);
+  EXPECT_GT(close, both * 8 / 10);
+}
+
+TEST(Matcher, GivesThePipelinesDisparitiesInSixteenths) {
+  const SyntheticSequence sequence = street();
+  for (const int least : {0, -3}) {
+    PipelineOptions options = few();
+    options.min_disparity = least;
+    Matcher matcher(sequence.calibration(), options);
+    Pipeline pipeline(sequence.calibration(), 160, 64, options);
+    EXPECT_EQ(matcher.min_disparity(), least);
+    EXPECT_EQ(matcher.num_disparities(), 48);
+    for (int k = 0; k < 2; ++k) {
+      const SyntheticFrame frame = sequence.render(k);
+      const auto motion = k ? std::optional(sequence.motion(k)) : std::nullopt;
+      cv::Mat expected(64, 160, CV_32FC1), found;
+      FrameOutputs outputs;
+      outputs.disparity = map_view(expected);
+      pipeline.process(image_view(frame.left), image_view(frame.right), motion, outputs);
+      matcher.compute(frame.left, frame.right, found, motion);
+      for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 160; ++x) {
+          const float d = expected.at<float>(y, x);
+          const int wanted = d == kInvalidDisparity ? (least - 1) * 16 : cvRound(d * 16);
+          ASSERT_EQ(found.at<short>(y, x), wanted) << k << ": " << x << ", " << y;
+        }
+      }
+    }
+  }
+}
+
+TEST(Matcher, TakesColourDepthAndOtherSizes) {
+  const SyntheticFrame frame = street().render(0);
+  Matcher matcher(few());
+  const cv::Mat grey = disparity_by(matcher, frame.left, frame.right);
+  cv::Mat left, right;
+  cv::cvtColor(frame.left, left, cv::COLOR_GRAY2BGR);
+  cv::cvtColor(frame.right, right, cv::COLOR_GRAY2BGR);
+  Matcher of_colours(few());
+  EXPECT_EQ(cv::countNonZero(disparity_by(of_colours, left, right) != grey), 0);
+  const cv::Rect part(0, 0, 120, 48);
+  EXPECT_EQ(disparity_by(matcher, frame.left(part), frame.right(part)).size(), part.size());
+  cv::Mat deep_left, deep_right;
+  frame.left.convertTo(deep_left, CV_16U, 257);
+  frame.right.convertTo(deep_right, CV_16U, 257);
+  EXPECT_EQ(disparity_by(matcher, deep_left, deep_right).type(), CV_16SC1);
+  EXPECT_EQ(cv::countNonZero(disparity_by(matcher, frame.left, frame.right) != grey), 0);  // a new pipeline, again
+}
+
+TEST(Matcher, RefusesWhatHasNoMeaning) {
+  const SyntheticFrame frame = street().render(0);
+  Matcher matcher(few());
+  cv::Mat disparity, real;
+  frame.left.convertTo(real, CV_32F);
+  EXPECT_THROW(matcher.compute(real, real, disparity), InvalidArgument);
+  EXPECT_THROW(matcher.compute(cv::Mat(), frame.right, disparity), InvalidArgument);
+  EXPECT_THROW(matcher.compute(frame.left, frame.right.colRange(0, 100), disparity), InvalidArgument);
+  PipelineOptions wide = few();
+  wide.min_disparity = 2000;
+  EXPECT_THROW(Matcher{wide}, InvalidArgument);
+}
+
+}  // namespace
+}  // namespace egosgm::vision
