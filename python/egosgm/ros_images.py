@@ -113,7 +113,8 @@ def depth_maps(disparity: NDArray[np.float32], variance: NDArray[np.float32],
     """Depth [m] and its variance [m^2], NaN where there is none (REP 118)."""
     depth = np.asarray(_egosgm.depth_from_disparity(disparity, calibration))
     depth = np.where(depth > 0, depth, np.float32(np.nan))
-    of_depth = (depth * depth / np.float32(calibration.fx * calibration.baseline_m)) ** 2 * variance
+    with np.errstate(over="ignore"):  # infinitely uncertain, where the disparity is next to nothing
+        of_depth = (depth * depth / np.float32(calibration.fx * calibration.baseline_m)) ** 2 * variance
     return depth, of_depth.astype(np.float32)
 
 

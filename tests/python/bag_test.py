@@ -278,6 +278,12 @@ def test_raw_images_are_rectified_by_their_infos(street):
         assert places[0][1] - places[1][1] == pytest.approx(cameras.calibration.fx * c.baseline_m / point[2] - cameras.calibration.doffs_px, abs=0.5)
 
 
+@pytest.mark.filterwarnings("error")
+def test_next_to_no_disparity_is_infinitely_uncertain(street):
+    depth, variance = ros_images.depth_maps(np.full((1, 1), 1e-20, np.float32), np.ones((1, 1), np.float32), street.calibration)
+    assert depth[0, 0] > 1e20 and np.isinf(variance[0, 0])
+
+
 def test_poses_of_the_bag_are_the_motion(tmp_path, street, frames):
     recording = Recording("mcap")
     for side, name in enumerate(("left", "right")):
