@@ -29,7 +29,7 @@ def publish(frames, rate, right_width):
     c = street.calibration
     rclpy.init()
     node = rclpy.create_node("publisher")
-    qos = QoSProfile(depth=10)
+    qos = QoSProfile(depth=100)
     images = [node.create_publisher(Image, f"{side}/image_rect", qos) for side in ("left", "right")]
     infos = [node.create_publisher(CameraInfo, f"{side}/camera_info", qos) for side in ("left", "right")]
     while any(publisher.get_subscription_count() == 0 for publisher in images + infos):
@@ -83,7 +83,7 @@ def subscribe(frames, seconds):
     def count(name):
         return lambda message: told.__setitem__(name, told[name] + 1)
 
-    qos = QoSProfile(depth=50)
+    qos = QoSProfile(depth=100)
     node.create_subscription(DisparityImage, "disparity", on_disparity, qos)
     for name, kind, topic in (("depth", Image, "depth"), ("variance", Image, "variance"), ("points", PointCloud2, "points2"), ("odom", Odometry, "odom")):
         node.create_subscription(kind, topic, count(name), qos)
@@ -109,7 +109,7 @@ class Node(unittest.TestCase):
         environment = {**os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
         seconds = seconds or 60 + 2 * frames / rate
         start = [sys.executable, "-B", __file__]
-        ros = ["--ros-args", "-p", "reliable:=true", "-p", "queue_size:=20", *(word for p in parameters for word in ("-p", p))]
+        ros = ["--ros-args", "-p", "reliable:=true", "-p", "queue_size:=100", *(word for p in parameters for word in ("-p", p))]
         node = subprocess.Popen([sys.executable, "-B", str(NODE), *ros], env=environment)
         subscriber = subprocess.Popen([*start, "subscribe", str(frames), str(seconds)], env=environment, stdout=subprocess.PIPE, text=True)
         publisher = subprocess.Popen([*start, "publish", str(frames), str(rate), str(right_width)], env=environment)

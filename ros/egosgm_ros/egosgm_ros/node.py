@@ -71,9 +71,9 @@ class EgosgmNode(LifecycleNode):
             self.get_logger().error(self._problem)
             return TransitionCallbackReturn.FAILURE
         self._pairing = Pairing(int(self._value("max_skew_ms") * 1e6))
-        qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE) if self._value("reliable") else qos_profile_sensor_data
+        qos = QoSProfile(depth=self._value("queue_size"), reliability=ReliabilityPolicy.RELIABLE) if self._value("reliable") else qos_profile_sensor_data
         self._outputs = {name: self.create_lifecycle_publisher(kind, name, qos) for name, kind in OUTPUTS.items()}
-        self._outputs["odom"] = self.create_lifecycle_publisher(Odometry, "odom", 10)
+        self._outputs["odom"] = self.create_lifecycle_publisher(Odometry, "odom", self._value("queue_size"))
         self._inputs = []
         for index, side in enumerate(SIDES):
             self._inputs.append(self.create_subscription(CameraInfo, f"{side}/camera_info", lambda info, side=side: self._on_info(side, info), qos))
