@@ -30,6 +30,13 @@
 #define EGOSGM_MAX_ROUGHNESS_PX 1.5f
 #define EGOSGM_JUMP_DISTANCE 2
 #define EGOSGM_MAX_JUMP_PX 10.0f
+// From the weighted sum s of these to an error^2, between what clean streets have and what videos with noise and fine
+// structures have: that of a disparity on the right surface, which levels off (half of it at s^2 = HALF), and that of a
+// wrong one, EGOSGM_WRONG_SURFACE_PX2 sqrt(s), times its chance (a half at s^5 = HALF).
+#define EGOSGM_RIGHT_SURFACE_PX2 0.36f
+#define EGOSGM_RIGHT_SURFACE_HALF 0.07f
+#define EGOSGM_WRONG_SURFACE_PX2 2.52f
+#define EGOSGM_WRONG_SURFACE_HALF 0.8f
 
 // KalmanUpdate asks every fourth pixel this far to all sides: 25.
 #define EGOSGM_SUPPORT_RADIUS 8
@@ -52,8 +59,38 @@
 // The disparities of RightMap are whole numbers of such steps.
 #define EGOSGM_RIGHT_MAP_STEPS_PER_PX 65536.0f
 
-// The variance of a hole that MedianFilter fills.
+// MedianFilter fills a hole that has at least so many of its eight neighbours, with this variance.
+#define EGOSGM_FILL_MIN_COUNT 6
 #define EGOSGM_FILLED_VARIANCE_PX2 1.0f
+
+// The largest matching cost of MatchingCost::kSad3x3, in grey values: about that of a census, so that path sums fit a
+// byte.
+#define EGOSGM_MAX_COST 63
+
+// Where the right view is read off the left one's sums, a right pixel takes of the left pixels that it may be the one
+// with the least rank (match/sgm_cells.h). Sums are relative to a pixel's own paths and alone do not tell which of two
+// pixels fits better: so many quarters of a pixel's least sum, 510 at most, do not count, and the matching cost counts
+// so many times. What is added keeps ranks above 0.
+#define EGOSGM_RANK_LEAST_QUARTERS 3
+#define EGOSGM_RANK_COSTS 12
+#define EGOSGM_RANK_ADDED 384
+
+// VerticalAlignment samples every fourth row and second column, and not so many rows next to the upper and lower
+// border, where the resampled image may repeat one.
+#define EGOSGM_ALIGNED_BORDER_ROWS 4
+#define EGOSGM_ALIGNED_ROW_STRIDE 4
+#define EGOSGM_ALIGNED_COLUMN_STRIDE 2
+// In grey values of 8 bits: a larger residual is rather a wrong match or an occlusion than an offset; a smaller
+// gradient is noise. Fewer samples than this tell nothing.
+#define EGOSGM_ALIGNED_MAX_RESIDUAL 12
+#define EGOSGM_ALIGNED_MIN_GRADIENT 2
+#define EGOSGM_ALIGNED_MIN_SAMPLES 256
+// No row is moved by more than this. A frame moves a term by at most this: beyond, the linearisation does not hold.
+#define EGOSGM_MAX_OFFSET_PX 2.0f
+#define EGOSGM_MAX_OFFSET_STEP_PX 1.0f
+// Pulls all terms but the first to 0, as if this share of the samples said so: where they lie in a corner of the image,
+// they tell nothing of the others.
+#define EGOSGM_OFFSET_PRIOR 0.01f
 
 // The 32 pixels dx, dy of a 13x11 window that MatchingCost::kCensus13x11 compares with its centre: on a golden-angle
 // spiral, as dense as a normal distribution of deviations 3.4 and 2.6 px, each moved to the nearest free pixel.

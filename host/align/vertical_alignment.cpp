@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <vector>
 
+#include "kernels/method.h"
+
 namespace egosgm {
 namespace {
 
-// As kernels/align/vertical_alignment.cl has them.
-constexpr int kFirstRow = 4, kRowStride = 4, kSums = 9;
+constexpr int kSums = 9;  // a row, as kernels/align/vertical_alignment.cl has them
 constexpr std::size_t kTerms = EGOSGM_OFFSET_TERMS + 1;
 
 const cl::Program& build(ocl::Context& context, PixelType type, int row_group) {
@@ -18,7 +19,8 @@ const cl::Program& build(ocl::Context& context, PixelType type, int row_group) {
 }
 
 int sampled_rows(shared::ImageSize size) {
-  return std::max(1, (size.height - 2 * kFirstRow + kRowStride - 1) / kRowStride);
+  constexpr int kStride = EGOSGM_ALIGNED_ROW_STRIDE;
+  return std::max(1, (size.height - 2 * EGOSGM_ALIGNED_BORDER_ROWS + kStride - 1) / kStride);
 }
 
 }  // namespace

@@ -6,8 +6,6 @@
 namespace egosgm {
 namespace {
 
-constexpr cl_int kFillFrom = 6;  // of eight neighbours
-
 const cl::Program& build(ocl::Context& context, int pixels) {
   context.enter("MedianFilter");
   return context.program("median_filter.cl", ocl::Defines().set("PIXELS", pixels));
@@ -29,8 +27,8 @@ void MedianFilter::operator()(const Map& disparity, Map& filtered, Views views) 
 
 void MedianFilter::fill(const Map& disparity, Map& filtered, Map& variance, Views views) {
   context_.enter("MedianFilter");
-  filter_and_fill_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, kFillFrom, disparity,
-                   filtered, variance);
+  filter_and_fill_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, disparity, filtered,
+                   variance);
 }
 
 }  // namespace egosgm

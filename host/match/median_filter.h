@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {
@@ -25,7 +25,7 @@ class MedianFilter {
   const shared::ImageSize size_;
   const int pixels_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, ocl::Buffer<float>> filter_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       filter_and_fill_;
 };
 

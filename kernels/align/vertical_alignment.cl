@@ -9,6 +9,7 @@
 // two gradients instead of g g: so the noise of a pixel biases neither sum. All sums of a row are of integers, so their
 // order does not matter.
 #include "grey.h"
+#include "method.h"
 
 // lint: PIXEL_BYTES=1 ROW_GROUP=1
 // lint: PIXEL_BYTES=2 ROW_GROUP=64
@@ -44,7 +45,7 @@ typedef uint Weight;
 #define PLACES_BITS 8
 #define PLACES (1 << PLACES_BITS)  // from the middle of the image to its end
 
-#define MAX_OFFSET 2.0f  // [px]
+inline float bounded(const float offset_px) { return clamp(offset_px, -EGOSGM_MAX_OFFSET_PX, EGOSGM_MAX_OFFSET_PX); }
 
 inline int clamp_row(const int y, const int height) { return clamp(y, 0, height - 1); }
 
@@ -73,7 +74,7 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
   // One offset for BLOCK columns: on KITTI it changes by less than a 20th of a pixel over them.
   for (int x = get_local_id(0) * AT_ONCE; x < size.width; x += ROW_GROUP * AT_ONCE) {
     const float u = (float)place(x / BLOCK * BLOCK + BLOCK / 2, size.width, PLACES) / PLACES;
-    const float dy = clamp(constant_term + (linear_term + square_term * u) * u, -MAX_OFFSET, MAX_OFFSET);
+    const float dy = bounded(constant_term + (linear_term + square_term * u) * u);
     const int offset = is_moved ? convert_int_rte(dy * ROW_STEPS) : 0;
     const int above = y + (offset >> 8);
     const Weight weight = offset & (ROW_STEPS - 1);
@@ -96,16 +97,10 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
   }
 }
 
-// Rows and columns that are sampled: every fourth row and second column. Nearer to the upper and lower border than
-// this, the resampled image may repeat a row.
-#define FIRST_ROW 4
-#define ROW_STRIDE 4
-#define COLUMN_STRIDE 2
-
 // Residuals and gradients are those of 8-bit grey values in 64ths: 4 by smoothing, 16 by interpolation.
 #define GREY 64
-#define MAX_RESIDUAL (12 * GREY)  // beyond, it is rather a wrong match or an occlusion than an offset
-#define MIN_GRADIENT (2 * GREY)   // below, it is noise
+#define MAX_RESIDUAL (EGOSGM_ALIGNED_MAX_RESIDUAL * GREY)
+#define MIN_GRADIENT (EGOSGM_ALIGNED_MIN_GRADIENT * GREY)
 
 // Of a row: sums of g clamp(r) u^n for n = 0 to 2, of g_I g_J u^n for n = 0 to 4, and of 1; u: the column in the right
 // image, -COARSE_PLACES to COARSE_PLACES, so that no sum is too large for 63 bits. A work-group of ROW_GROUP a sampled
@@ -123,15 +118,15 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
                                                                             global long* row_sums) {
   const int lane = get_local_id(0);
   const int sampled_row = get_global_id(1);
-  const int y = FIRST_ROW + sampled_row * ROW_STRIDE;
+  const int y = EGOSGM_ALIGNED_BORDER_ROWS + sampled_row * EGOSGM_ALIGNED_ROW_STRIDE;
   const size_t width = size.width;
   const float last = (float)(COLUMN_STEPS * (size.width - 2));
   long sums[SUMS] = {0};
-  if (y + FIRST_ROW < size.height) {
+  if (y + EGOSGM_ALIGNED_BORDER_ROWS < size.height) {
     const size_t row = (size_t)y * width;
     global const Pixel* left = (global const Pixel*)images + row;
     global const Pixel* right = (global const Pixel*)images + width * size.height + row;
-    for (int x = lane * COLUMN_STRIDE; x < size.width; x += ROW_GROUP * COLUMN_STRIDE) {
+    for (int x = lane * EGOSGM_ALIGNED_COLUMN_STRIDE; x < size.width; x += ROW_GROUP * EGOSGM_ALIGNED_COLUMN_STRIDE) {
       const float d = disparity[row + x];
       const float at = ((float)x - d) * COLUMN_STEPS;
       // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
@@ -174,12 +169,7 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
 }
 
 #define TERMS EGOSGM_OFFSET_TERMS
-#define MIN_SAMPLES 256     // fewer tell nothing
-#define MAX_STEP 1.0f       // of a term in a frame [px]: beyond, the linearisation does not hold
 #define MAX_ESTIMATES 1e6f  // counted no further
-// Pulls all terms but the first to 0, as if this share of the samples said so: where they lie in a corner of the image,
-// they tell nothing of the others.
-#define PRIOR 0.01f
 
 constant const int POWER_OF_U[TERMS] = {0, 1, 0, 1, 2, 0};
 constant const int POWER_OF_V[TERMS] = {0, 0, 1, 1, 0, 2};
@@ -219,7 +209,7 @@ inline float moment_of(const int height, const int rows, const int n, const int 
                        global const long* row_sums) {
   long high = 0, low = 0;
   for (int row = 0; row < rows; ++row) {
-    const long v = place(FIRST_ROW + row * ROW_STRIDE, height, PLACES);
+    const long v = place(EGOSGM_ALIGNED_BORDER_ROWS + row * EGOSGM_ALIGNED_ROW_STRIDE, height, PLACES);
     long power = 1;
     for (int i = 0; i < m; ++i) power *= v;
     const long u_sum = row_sums[SUMS * row + sum];
@@ -261,16 +251,16 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update(const 
     const float all = matrix[0][0];
     const float mean_step = step[0] / all;
     for (int i = 1; i < TERMS; ++i) {
-      matrix[i][i] += PRIOR * all;
-      step[i] -= PRIOR * all * state[i];
+      matrix[i][i] += EGOSGM_OFFSET_PRIOR * all;
+      step[i] -= EGOSGM_OFFSET_PRIOR * all * state[i];
     }
-    const int enough = (count >= MIN_SAMPLES) & (all > 0.0f);
-    const int has_terms = enough && solve(matrix, step, 0.5f * PRIOR * all);
+    const int enough = (count >= EGOSGM_ALIGNED_MIN_SAMPLES) & (all > 0.0f);
+    const int has_terms = enough && solve(matrix, step, 0.5f * EGOSGM_OFFSET_PRIOR * all);
     const float estimates = state[TERMS];
     const float share = fmax(gain, 1.0f / fmax(estimates, 1.0f));
     for (int i = 0; i < TERMS; ++i) {
       const float change = has_terms ? step[i] : enough && i == 0 ? mean_step : 0.0f;
-      next[i] = clamp(state[i] + share * clamp(change, -MAX_STEP, MAX_STEP), -MAX_OFFSET, MAX_OFFSET);
+      next[i] = bounded(state[i] + share * clamp(change, -EGOSGM_MAX_OFFSET_STEP_PX, EGOSGM_MAX_OFFSET_STEP_PX));
     }
     next[TERMS] = enough ? fmin(estimates + 1.0f, MAX_ESTIMATES) : estimates;
   }

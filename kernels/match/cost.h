@@ -4,8 +4,7 @@
 #define EGOSGM_KERNELS_MATCH_COST_H
 
 #include "lanes.h"
-
-#define MAX_COST 63
+#include "method.h"
 
 #if CODE_BYTES == 4
 typedef uint Code;
@@ -45,7 +44,7 @@ inline ChunkCodes load_chunk_codes(global const Code* from) { return ((global co
       sum += convert_ushort##N(abs_diff((Codes)(own[row + dx]), load(other + row - dx))); \
     }                                                                                     \
   }                                                                                       \
-  return convert_uchar##N(min(sum / (ushort)9, (ushort##N)(MAX_COST)))
+  return convert_uchar##N(min(sum / (ushort)9, (ushort##N)(EGOSGM_MAX_COST)))
 #else
 // A product would melt into the bit count, which compilers then do not know any more.
 #define MATCHING_COST(N, Codes, load)            \

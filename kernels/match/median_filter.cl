@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The median of 3x3 disparities, in both views. A neighbour outside the image or without a value votes for the centre;
-// a centre without a value gets the median (the upper of two middle ones) of its neighbours if at least `fill_from` of
-// the eight have one.
+// a centre without a value gets the median (the upper of two middle ones) of its neighbours if at least
+// EGOSGM_FILL_MIN_COUNT of the eight have one.
 #include "method.h"
 #include "pixels.h"
 
@@ -26,9 +26,9 @@ static inline Sorted sort(const Floats a, const Floats b, const Floats c) {
   return sorted;
 }
 
-// Where it does not fill, `fill_from` and `variance` are not looked at.
-static inline void filter_window(const bool fills, const ImageSize size, const int fill_from,
-                                 global const float* disparity, global float* filtered, global float* variance) {
+// Where it does not fill, `variance` is not looked at.
+static inline void filter_window(const bool fills, const ImageSize size, global const float* disparity,
+                                 global float* filtered, global float* variance) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
@@ -76,7 +76,7 @@ static inline void filter_window(const bool fills, const ImageSize size, const i
       store_pixels(is_hole ? INVALID : middle, filtered + row, x, width);
       continue;
     }
-    const Ints is_filled = is_hole & (8 - holes >= fill_from);
+    const Ints is_filled = is_hole & (8 - holes >= EGOSGM_FILL_MIN_COUNT);
     store_pixels((is_hole != is_filled) ? INVALID : middle, filtered + row, x, width);
     const Floats kept_variance = load_pixels(variance + row, x, width);
     store_pixels(is_filled ? (Floats)(EGOSGM_FILLED_VARIANCE_PX2) : kept_variance, variance + row, x, width);
@@ -84,10 +84,10 @@ static inline void filter_window(const bool fills, const ImageSize size, const i
 }
 
 KERNEL void filter(const ImageSize size, global const float* disparity, global float* filtered) {
-  filter_window(false, size, 0, disparity, filtered, 0);
+  filter_window(false, size, disparity, filtered, 0);
 }
 
-KERNEL void filter_and_fill(const ImageSize size, const int fill_from, global const float* disparity,
-                            global float* filtered, global float* variance) {
-  filter_window(true, size, fill_from, disparity, filtered, variance);
+KERNEL void filter_and_fill(const ImageSize size, global const float* disparity, global float* filtered,
+                            global float* variance) {
+  filter_window(true, size, disparity, filtered, variance);
 }

@@ -6,12 +6,12 @@
 #include "method.h"
 #include "pixels.h"
 
-// Where the right view is read off the left one's sums, a right pixel takes of the left pixels that it may be the one
-// with the least rank: this in its upper half, in the lower one how far the disparity lies behind the range's nearest
-// one, so that of what fits alike the nearer is taken. Sums are relative to a pixel's own paths and alone do not tell
-// which of two pixels fits better: of a pixel's least sum, 510 at most, three quarters do not count, and the matching
-// cost counts twelve times. What is added keeps ranks above 0, and cells outside of the band, of 65535, where they are.
-#define RANK(totals, least, costs) add_sat(totals, (costs) * (ushort)(12) + (ushort)(384 - 3 * (int)(least) / 4))
+// The rank of a left pixel for a right one (method.h) in its upper half, in the lower one how far the disparity lies
+// behind the range's nearest one, so that of what fits alike the nearer is taken. Cells outside of the band, of 65535,
+// stay where they are.
+#define RANK(totals, least, costs)                        \
+  add_sat(totals, (costs) * (ushort)(EGOSGM_RANK_COSTS) + \
+                      (ushort)(EGOSGM_RANK_ADDED - EGOSGM_RANK_LEAST_QUARTERS * (int)(least) / 4))
 #define NO_RANK 0xffff0000u  // and above: of no left pixel, or of a disparity that it does not search
 
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, whose sums lie that much

@@ -108,12 +108,11 @@ static inline Floats jump_beside(global const float* view, const ImageSize size,
   return cut(most, EGOSGM_MAX_JUMP_PX);
 }
 
-// The error^2 of a disparity on the right surface, which levels off, and the chance of a wrong one times its error^2:
-// between what clean streets have and what videos with noise and fine structures have. Keeps the order of the sums;
-// none is too small or too large for it.
+// Keeps the order of the sums; none is too small or too large for it.
 static inline Floats calibrated(const Floats sum) {
   const Floats square = sum * sum;
-  return 0.36f / (1.0f + 0.07f / square) + 2.52f * sqrt(sum) / (1.0f + 0.8f / (square * square * sum));
+  const Floats right = EGOSGM_RIGHT_SURFACE_PX2 / (1.0f + EGOSGM_RIGHT_SURFACE_HALF / square);
+  return right + EGOSGM_WRONG_SURFACE_PX2 * sqrt(sum) / (1.0f + EGOSGM_WRONG_SURFACE_HALF / (square * square * sum));
 }
 
 KERNEL void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "kernels/method.h"
+#include "tests/reference/method.h"
 #include "tests/reference/publish/output_variance.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
@@ -55,6 +55,7 @@ TEST_P(OutputVarianceTest, EqualsReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, OutputVarianceTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, OutputVarianceTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 /// What is given out for a sum of squares.
 float given_for(float sum) {
@@ -117,7 +118,8 @@ TEST(OutputVariance, TakesAHoleForRough) {
   const std::vector<float> out = output_variance(size, maps, {.scale = 0, .roughness_weight = 1, .jump_weight = 0});
   EXPECT_EQ(out[12 * 25 + 12], 0) << "the hole itself";
   EXPECT_EQ(out[12 * 25 + 7], 0) << "far from it";
-  const float mean = (2 * EGOSGM_MAX_ROUGHNESS_PX + 4 * EGOSGM_MAX_ROUGHNESS_PX) / 49;  // its own, and its neighbours'
+  const float mean =
+      (2 * reference::kMaxRoughnessPx + 4 * reference::kMaxRoughnessPx) / 49;  // its own, and its neighbours'
   EXPECT_FLOAT_EQ(out[12 * 25 + 11], given_for(mean * mean));
 }
 
@@ -147,8 +149,8 @@ TEST(OutputVariance, LooksForJumpsAboveAndBelow) {
 
 TEST(OutputVariance, CutsAVarianceThatSaysOnlyThatItIsLarge) {
   const testing::HostMaps maps = maps_of(
-      {1, 1}, [](int, int) { return 5.0f; }, [](int, int) { return EGOSGM_DOUBTFUL_VARIANCE_PX2; });
-  const float most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
+      {1, 1}, [](int, int) { return 5.0f; }, [](int, int) { return reference::kDoubtfulVariancePx2; });
+  const float most = reference::kMaxMeanVariancePx2;
   EXPECT_FLOAT_EQ(output_variance({1, 1}, maps, {.scale = 1})[0], given_for(most * std::sqrt(most)));
 }
 
@@ -162,9 +164,9 @@ TEST(OutputVariance, RestsOnTheMeasurementMoreThanOnTheFilter) {
     EXPECT_FLOAT_EQ(out[0], given_for(std::pow(mean, 1.5f))) << what;
   };
   expect_mean(0.5f, row_of(7, 1), "(1/16 * 1^3)^(1/4)");
-  const float most = EGOSGM_MAX_MEAN_VARIANCE_PX2;
+  const float most = reference::kMaxMeanVariancePx2;
   const float of_the_most = std::pow(most * most * most / 16, 0.25f);
-  expect_mean(of_the_most, row_of(7, EGOSGM_DOUBTFUL_VARIANCE_PX2), "cut");
+  expect_mean(of_the_most, row_of(7, reference::kDoubtfulVariancePx2), "cut");
   expect_mean(of_the_most, row_of(kNone, 0), "nothing measured");
 }
 
