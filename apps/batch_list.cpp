@@ -10,7 +10,7 @@
 
 #include "apps/run_outputs.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 #include "host/vision/text_rows.h"
 
 namespace egosgm::app {

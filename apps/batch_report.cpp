@@ -11,8 +11,8 @@
 #include "egosgm/named_options.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
-#include "egosgm/vision/file_io.h"
 #include "host/json_text.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

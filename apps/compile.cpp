@@ -18,7 +18,7 @@
 #include "apps/output_folder.h"
 #include "egosgm/error.h"
 #include "egosgm/programs.h"
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -111,7 +111,9 @@ int compile(const CompileArguments& arguments) {
   arguments.method.save(options);
   vision::make_folder(folder);
   for (const ProgramFile& file : files) vision::write_file(folder / file.name, file.bytes);  // the manifest last
-  const std::string whose = arguments.spirv ? "every " + device.info().type + " that takes SPIR-V" : device.info().name;
+  const std::string whose = arguments.spirv
+                                ? std::string("every ") + to_string(device.info().type) + " that takes SPIR-V"
+                                : device.info().name;
   fmt::print("{} for {}: {}\n", counted(files.size() - 1, "program"), whose, folder.string());
   return kOk;
 }

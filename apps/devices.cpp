@@ -7,6 +7,7 @@
 
 #include "apps/command.h"
 #include "apps/counted.h"
+#include "apps/run_report.h"
 #include "egosgm/device.h"
 
 namespace egosgm::app {
@@ -22,31 +23,26 @@ std::string reason_of_default(const DeviceInfo& chosen) {
   return fmt::format(
       "GPUs come before accelerators, those before CPUs, and this {} is the first; --device or EGOSGM_DEVICE chooses "
       "another",
-      chosen.type);
+      to_string(chosen.type));
 }
 
 void print_device(std::size_t index, const DeviceInfo& info, bool is_default) {
   constexpr double gibibyte = 1024.0 * 1024.0 * 1024.0;
   fmt::print("{} {}  {}\n", is_default ? '*' : ' ', index, info.name);
-  fmt::print("     {}, {}, {}, {:.1f} GiB memory, {:.1f} GiB in one buffer\n", info.type, info.vendor,
+  fmt::print("     {}, {}, {}, {:.1f} GiB memory, {:.1f} GiB in one buffer\n", to_string(info.type), info.vendor,
              counted(info.compute_units, "compute unit"), static_cast<double>(info.memory_bytes) / gibibyte,
              static_cast<double>(info.max_allocation_bytes) / gibibyte);
   fmt::print("     {}; {}; driver {}\n", info.platform, info.version, info.driver);
   if (!info.lacks.empty()) fmt::print("     does not promise: {}\n", fmt::join(info.lacks, ", "));
 }
 
-nlohmann::ordered_json json_of(const DeviceInfo& info, bool is_default) {
-  return {{"name", info.name},
-          {"type", info.type},
-          {"vendor", info.vendor},
-          {"platform", info.platform},
-          {"version", info.version},
-          {"driver", info.driver},
-          {"compute_units", info.compute_units},
-          {"memory_bytes", info.memory_bytes},
-          {"max_allocation_bytes", info.max_allocation_bytes},
-          {"lacks", info.lacks},
-          {"default", is_default}};
+nlohmann::ordered_json listed(const DeviceInfo& info, bool is_default) {
+  nlohmann::ordered_json json = json_of(info);
+  json.update({{"memory_bytes", info.memory_bytes},
+               {"max_allocation_bytes", info.max_allocation_bytes},
+               {"lacks", info.lacks},
+               {"default", is_default}});
+  return json;
 }
 
 int list_devices(bool json) {
@@ -59,7 +55,7 @@ int list_devices(bool json) {
     const bool is_default = !found && same_device(info, chosen);
     found = found || is_default;
     if (json) {
-      list.push_back(json_of(info, is_default));
+      list.push_back(listed(info, is_default));
     } else {
       print_device(i, info, is_default);
     }

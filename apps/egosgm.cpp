@@ -158,9 +158,7 @@ int exit_code_of(int argc, char** argv) {
     return fail(kBadInput, error.what() + meant_path(error));
   } catch (const InvalidArgument& error) {
     return fail(kBadInput, error.what());
-  } catch (const IoError& error) {
-    return fail(kFailed, error.what());
-  } catch (const DeviceError& error) {
+  } catch (const Error& error) {  // of a file or of the device
     return fail(kFailed, error.what());
   } catch (
       const std::filesystem::filesystem_error& error) {  // a loop of links, a name too long, a folder without rights

@@ -16,7 +16,8 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/evaluation.h"
 #include "egosgm/vision/video_evaluation.h"
-#include "egosgm/vision/video_plot.h"
+#include "host/vision/pair_with_truth.h"
+#include "host/vision/video_plot.h"
 
 namespace egosgm::app {
 namespace {

@@ -18,8 +18,8 @@
 #include "apps/truth_pairs.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/pose_evaluation.h"
-#include "egosgm/vision/pose_plot.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/vision/pose_plot.h"
 
 namespace egosgm::app {
 namespace {

@@ -12,7 +12,7 @@
 #include <system_error>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

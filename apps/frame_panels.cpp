@@ -5,6 +5,7 @@
 
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/picture_sheet.h"
 
 namespace egosgm::app {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <chrono>
 
-#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
 
 namespace egosgm::app {

@@ -10,8 +10,8 @@
 #include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

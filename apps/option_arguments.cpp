@@ -11,7 +11,7 @@
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 #include "host/vision/text_rows.h"
 
 namespace egosgm::app {

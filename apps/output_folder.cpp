@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 #include "host/json_text.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "apps/output_folder.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 

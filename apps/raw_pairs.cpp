@@ -15,8 +15,9 @@
 
 #include "apps/counted.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/file_io.h"
+#include "host/vision/image_pairs.h"
 #include "host/vision/text_rows.h"
 
 namespace egosgm::app {

@@ -15,9 +15,9 @@
 #include "apps/sequence_arguments.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/rectification.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

@@ -19,10 +19,11 @@
 #include "egosgm/named_options.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/poses_io.h"
 #include "host/json_text.h"
+#include "host/vision/file_io.h"
+#include "host/vision/pair_with_truth.h"
 
 namespace egosgm::app {
 namespace {

@@ -25,9 +25,10 @@
 #include "apps/trace.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -113,7 +114,7 @@ class Run {
   bool process_all() {
     // Reading, odometry and writing run while the device works. With a device of its own, the next frame is prepared
     // beside writing, too; on a CPU device one more thread would only take the kernels' cores.
-    const bool ahead = pipeline_.device().info().type != "CPU";
+    const bool ahead = pipeline_.device().info().type != DeviceType::kCpu;
     const auto policy = ahead ? std::launch::async : std::launch::deferred;
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
     if (!sequence_.note.empty()) progress.note(sequence_.note);

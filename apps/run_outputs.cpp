@@ -14,10 +14,11 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/point_cloud.h"
 #include "egosgm/vision/render.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -118,10 +119,10 @@ FrameOutputs RunOutputs::views() {
   outputs.disparity = vision::map_view(disparity_);
   if (!variance_.empty()) outputs.variance = vision::map_view(variance_);
   if (!right_.empty()) outputs.right_disparity = vision::map_view(right_);
-  if (!predicted_.empty()) outputs.predicted = vision::map_view(predicted_);
-  if (!measured_.empty()) outputs.measured = vision::map_view(measured_);
-  if (!search_.empty()) outputs.search_width = view_of<std::uint16_t>(search_);
-  if (!dynamic_.empty()) outputs.dynamic = view_of<std::uint8_t>(dynamic_);
+  if (!predicted_.empty()) outputs.debug.predicted = vision::map_view(predicted_);
+  if (!measured_.empty()) outputs.debug.measured = vision::map_view(measured_);
+  if (!search_.empty()) outputs.debug.search_width = view_of<std::uint16_t>(search_);
+  if (!dynamic_.empty()) outputs.debug.dynamic = view_of<std::uint8_t>(dynamic_);
   return outputs;
 }
 

@@ -22,16 +22,6 @@ Json json_of(const PipelineOptions& options) {
   return json;
 }
 
-Json json_of(const DeviceInfo& info) {
-  return {{"name", info.name},
-          {"type", info.type},
-          {"vendor", info.vendor},
-          {"platform", info.platform},
-          {"version", info.version},
-          {"driver", info.driver},
-          {"compute_units", info.compute_units}};
-}
-
 Json json_of(const Calibration& c) {
   return {
       {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}, {"baseline_m", c.baseline_m}, {"doffs_px", c.doffs_px}};
@@ -64,6 +54,16 @@ Json times_json(const FrameReport& report, const FrameMotion& motion, const Host
 
 }  // namespace
 
+Json json_of(const DeviceInfo& info) {
+  return {{"name", info.name},
+          {"type", to_string(info.type)},
+          {"vendor", info.vendor},
+          {"platform", info.platform},
+          {"version", info.version},
+          {"driver", info.driver},
+          {"compute_units", info.compute_units}};
+}
+
 nlohmann::ordered_json json_of(const Eigen::Isometry3d& motion) {
   const Eigen::Vector3d& t = motion.translation();
   Json matrix = Json::array();
@@ -76,8 +76,8 @@ nlohmann::ordered_json json_of(const Eigen::Isometry3d& motion) {
           {"current_from_previous", matrix}};
 }
 
-RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline,
-                     const std::string& motion, int width, int height, const std::string& batch_input) {
+RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& motion,
+                     int width, int height, const std::string& batch_input) {
   const DeviceInfo& device = pipeline.device().info();
   json_ = {{"program", "egosgm"},
            {"version", EGOSGM_VERSION},

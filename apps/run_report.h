@@ -17,12 +17,15 @@ struct HostTimes {
   double wall_ms = 0;  // from frame to frame
 };
 
+/// The device as reports name it.
+nlohmann::ordered_json json_of(const DeviceInfo& info);
+
 /// OUT/report.json: what ran, on what, and what every frame gave.
 class RunReport {
  public:
   /// `motion`: where the motions come from. `batch_input`: as in SequenceJob.
-  RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline,
-            const std::string& motion, int width, int height, const std::string& batch_input);
+  RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& motion, int width,
+            int height, const std::string& batch_input);
 
   /// All that the maps depend on. Two runs with equal identities give the same maps.
   nlohmann::ordered_json identity() const;

@@ -6,6 +6,7 @@
 #include "apps/counted.h"
 #include "apps/run_folder.h"
 #include "egosgm/error.h"
+#include "host/vision/pair_with_truth.h"
 
 namespace egosgm::app {
 namespace {

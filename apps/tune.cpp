@@ -14,7 +14,7 @@
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/synthetic.h"
 
 namespace egosgm::app {
@@ -143,7 +143,7 @@ int tune(const TuneArguments& arguments) {
   Tuning best;
   const std::vector<StageTime> untuned = course.run(best);
   constexpr double kGain = 0.98;  // less than 2 % is noise
-  for (const Trial& trial : trials(device.info().type == "GPU")) {
+  for (const Trial& trial : trials(device.info().type == DeviceType::kGpu)) {
     if (!arguments.stage.empty() && trial.stages.front() != arguments.stage) continue;
     double least = ms_of(untuned, trial.stages);
     print_now(fmt::format("{}: {:.3f} ms with the defaults\n", fmt::join(trial.stages, " + "), least));

@@ -8,10 +8,13 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
-#include "egosgm/vision/flow_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/odometry.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/vision/flow_io.h"
+#include "host/vision/pair_with_truth.h"
+#include "host/vision/video_order.h"
 
 namespace egosgm::app {
 namespace {

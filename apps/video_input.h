@@ -12,6 +12,7 @@
 #include "apps/truth_pairs.h"
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/video_evaluation.h"
+#include "host/vision/pair_with_truth.h"
 
 namespace egosgm::app {
 

@@ -21,8 +21,9 @@
 #include "apps/standard_output.h"
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
+#include "host/vision/file_io.h"
 #include "egosgm/vision/window.h"
 
 namespace egosgm::app {
@@ -66,8 +67,8 @@ class DrawnSequence {
     FrameOutputs outputs;
     outputs.disparity = vision::map_view(disparity_);
     outputs.variance = vision::map_view(variance_);
-    outputs.search_width = {search_width_.ptr<std::uint16_t>(), size_.width, size_.height,
-                            static_cast<std::ptrdiff_t>(search_width_.step)};
+    outputs.debug.search_width = {search_width_.ptr<std::uint16_t>(), size_.width, size_.height,
+                                  static_cast<std::ptrdiff_t>(search_width_.step)};
     report_ = pipeline_.process(vision::image_view(images.left), vision::image_view(images.right), motion, outputs);
     doubt_.add(report_.density, motion.has_value(), vision::holds_8_bits_in_16(images.left));
     return panels_.all({frame, images.left, disparity_, variance_, search_width_}, cell_width_);

@@ -14,8 +14,8 @@
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/image_io.h"
 #include "egosgm/vision/odometry.h"
+#include "egosgm/vision/opencv.h"
 #include "host/match/matcher.h"
 #include "host/ocl/device_handle.h"
 
@@ -141,8 +141,7 @@ Contender full_both(const Clip& clip, MethodOptions options, const Device& devic
           }};
 }
 
-Contender banded_frame(const std::string& name, const Clip& clip, const MethodOptions& options,
-                       const Device& device) {
+Contender banded_frame(const std::string& name, const Clip& clip, const MethodOptions& options, const Device& device) {
   const auto matcher = std::make_shared<Matcher>(clip, options, device);
   return {name, [&clip, matcher] {
             matcher->reset();

@@ -6,8 +6,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "egosgm/vision/dataset.h"
-#include "egosgm/vision/image_io.h"
 #include "egosgm/vision/odometry.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/synthetic.h"
 
 namespace egosgm::bench {

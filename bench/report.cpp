@@ -13,7 +13,7 @@
 #include <stdexcept>
 
 #include "commit.h"  // written by the build
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::bench {
 namespace {

@@ -19,8 +19,8 @@
 
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/calibration_io.h"
-#include "egosgm/vision/image_io.h"
 #include "egosgm/vision/odometry.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/render.h"
 #include "egosgm/vision/window.h"
 
@@ -114,8 +114,7 @@ void run(const std::string& source, const egosgm::Calibration& calibration, cons
   NewestFrame newest(source);
   std::optional<Pipeline> pipeline;
   std::optional<vision::StereoOdometry> odometry;
-  cv::Mat grey, disparity;
-  FrameOutputs outputs;
+  cv::Mat grey;
   Rate rate;
   int matched = 0;
   while (const std::optional<cv::Mat> both = newest.take()) {
@@ -124,12 +123,10 @@ void run(const std::string& source, const egosgm::Calibration& calibration, cons
     if (!pipeline) {
       pipeline.emplace(calibration, width, grey.rows, options);
       odometry.emplace(calibration);
-      disparity.create(grey.rows, width, CV_32FC1);
-      outputs.disparity = vision::map_view(disparity);
     }
     const cv::Mat left = grey.colRange(0, width), right = grey.colRange(width, 2 * width);  // no copies
-    const ImageView left_view = vision::image_view(left), right_view = vision::image_view(right);
-    pipeline->process(left_view, right_view, odometry->process(left_view, right_view).motion, outputs);
+    const auto motion = odometry->process(vision::image_view(left), vision::image_view(right)).motion;
+    const cv::Mat disparity = vision::process(*pipeline, left, right, motion).disparity;
     ++matched;
     const std::string text = cv::format("frame %d  %.1f frames/s  %d dropped", matched, rate.tick(), newest.dropped());
     if (!show(vision::color_disparity(disparity, {0, static_cast<double>(options.disparities)}), text, display)) break;

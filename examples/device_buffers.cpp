@@ -13,8 +13,8 @@
 #include "egosgm/opencl.h"
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/disparity_io.h"
-#include "egosgm/vision/image_io.h"
 #include "egosgm/vision/odometry.h"
+#include "egosgm/vision/opencv.h"
 
 namespace {
 

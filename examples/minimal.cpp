@@ -4,8 +4,8 @@
 #include <egosgm/pipeline.h>
 #include <egosgm/vision/dataset.h>
 #include <egosgm/vision/disparity_io.h>
-#include <egosgm/vision/image_io.h>
 #include <egosgm/vision/odometry.h>
+#include <egosgm/vision/opencv.h>
 
 #include <cstdio>
 #include <stdexcept>
@@ -17,14 +17,11 @@ void run(const char* folder) {
   const cv::Size size = vision::check_image_sizes(sequence);
   Pipeline pipeline(sequence.calibration, size.width, size.height);
   vision::StereoOdometry odometry(sequence.calibration);
-  cv::Mat disparity(size, CV_32FC1);
-  FrameOutputs outputs;
-  outputs.disparity = vision::map_view(disparity);
   for (const vision::StereoFrame& frame : sequence.frames) {
-    const vision::StereoImages images = vision::read_images(frame);
-    const ImageView left = vision::image_view(images.left), right = vision::image_view(images.right);
-    pipeline.process(left, right, odometry.process(left, right).motion, outputs);
-    vision::write_disparity(frame.name + ".png", disparity);
+    const auto [left, right] = vision::read_images(frame);
+    const auto motion = odometry.process(vision::image_view(left), vision::image_view(right)).motion;
+    const vision::FrameMaps maps = vision::process(pipeline, left, right, motion);
+    vision::write_disparity(frame.name + ".png", maps.disparity);
   }
 }
 

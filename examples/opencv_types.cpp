@@ -2,7 +2,7 @@
 // opencv_types LEFT.png RIGHT.png OUT.png: one rectified pair from and to cv::Mat, in the place of cv::StereoSGBM.
 // OUT.png is in KITTI's format: 256 steps a pixel, 0 where there is no disparity.
 #include <egosgm/pipeline.h>
-#include <egosgm/vision/image_io.h>
+#include <egosgm/vision/opencv.h>
 
 #include <cstdio>
 #include <opencv2/imgcodecs.hpp>
@@ -12,11 +12,8 @@ using namespace egosgm;
 
 /// What cv::StereoSGBM::compute gives: CV_16SC1, 16 steps a pixel, -16 where there is none.
 cv::Mat compute(Pipeline& pipeline, const cv::Mat& left, const cv::Mat& right) {
-  cv::Mat disparity(left.size(), CV_32FC1), fixed;
-  FrameOutputs outputs;
-  outputs.disparity = vision::map_view(disparity);
-  pipeline.process(vision::image_view(left), vision::image_view(right), {}, outputs);
-  cv::max(disparity, -1, disparity);
+  const cv::Mat disparity = cv::max(vision::process(pipeline, left, right, {}).disparity, -1);
+  cv::Mat fixed;
   disparity.convertTo(fixed, CV_16S, 16);
   return fixed;
 }

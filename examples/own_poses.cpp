@@ -4,7 +4,7 @@
 #include <egosgm/pipeline.h>
 #include <egosgm/vision/dataset.h>
 #include <egosgm/vision/disparity_io.h>
-#include <egosgm/vision/image_io.h>
+#include <egosgm/vision/opencv.h>
 #include <egosgm/vision/poses_io.h>
 
 #include <cstdio>
@@ -17,18 +17,15 @@ void run(const char* folder, const char* poses_file) {
   const auto world_from_camera = vision::poses_of_frames(sequence, poses_file);
   const cv::Size size = vision::check_image_sizes(sequence);
   Pipeline pipeline(sequence.calibration, size.width, size.height);
-  cv::Mat disparity(size, CV_32FC1);
-  FrameOutputs outputs;
-  outputs.disparity = vision::map_view(disparity);
   for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
     std::optional<Motion> motion;
     if (i > 0) {
       motion.emplace();
       motion->current_from_previous = vision::current_from_previous(world_from_camera[i - 1], world_from_camera[i]);
     }
-    const vision::StereoImages images = vision::read_images(sequence.frames[i]);
-    pipeline.process(vision::image_view(images.left), vision::image_view(images.right), motion, outputs);
-    vision::write_disparity(sequence.frames[i].name + ".png", disparity);
+    const auto [left, right] = vision::read_images(sequence.frames[i]);
+    const vision::FrameMaps maps = vision::process(pipeline, left, right, motion);
+    vision::write_disparity(sequence.frames[i].name + ".png", maps.disparity);
   }
 }
 

@@ -72,7 +72,7 @@ void set_tuning(Tuning& tuning, std::string_view name, std::string_view value) {
 
 Tuning with_defaults(Tuning tuning, const DeviceInfo& device) {
   const bool is_small = device.compute_units <= kFewComputeUnits;
-  const Tuning& defaults = device.type == "GPU" ? kGpuTuning : is_small ? kSmallCpuTuning : kCpuTuning;
+  const Tuning& defaults = device.type == DeviceType::kGpu ? kGpuTuning : is_small ? kSmallCpuTuning : kCpuTuning;
   for (const Size& size : kSizes) {
     if (tuning.*size.value == 0) tuning.*size.value = defaults.*size.value;
   }

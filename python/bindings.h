@@ -6,6 +6,7 @@
 namespace egosgm::python {
 
 void bind_errors(pybind11::module_& module);
+void bind_values(pybind11::module_& module);
 void bind_pipeline(pybind11::module_& module);
 void bind_odometry(pybind11::module_& module);
 void bind_rectification(pybind11::module_& module);

@@ -8,12 +8,17 @@ namespace egosgm::python {
 namespace py = pybind11;
 
 void bind_errors(py::module_& module) {
-  py::register_exception<InvalidArgument>(module, "InvalidArgument", PyExc_ValueError).doc() =
+  const auto error = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(
+      "egosgm.Error", "What all errors of this library have in common.", PyExc_Exception, nullptr));
+  if (!error) throw py::error_already_set();
+  module.attr("Error") = error;
+  const auto also = [&](PyObject* builtin) { return py::make_tuple(error, py::handle(builtin)); };
+  py::register_exception<InvalidArgument>(module, "InvalidArgument", also(PyExc_ValueError)).doc() =
       "What the caller gave cannot be used: an image, a calibration, an option, a file. The text names the value and "
       "the remedy.";
-  py::register_exception<IoError>(module, "IoError", PyExc_OSError).doc() =
+  py::register_exception<IoError>(module, "IoError", also(PyExc_OSError)).doc() =
       "The file system refused to take a result. What stood under the file's name before stands there still.";
-  auto device_error = py::register_exception<DeviceError>(module, "DeviceError", PyExc_RuntimeError);
+  auto device_error = py::register_exception<DeviceError>(module, "DeviceError", also(PyExc_RuntimeError));
   device_error.doc() = "The device or its driver refused. The text names the stage and the OpenCL status.";
   // Asked before the others, as the last to be registered.
   py::register_exception<BuildError>(module, "BuildError", device_error).doc() =
@@ -27,6 +32,7 @@ PYBIND11_MODULE(_egosgm, module) {
   module.attr("__version__") = EGOSGM_VERSION;
   module.attr("INVALID_DISPARITY") = egosgm::kInvalidDisparity;
   bind_errors(module);
+  bind_values(module);
   bind_pipeline(module);
   bind_odometry(module);
   bind_rectification(module);

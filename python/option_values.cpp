@@ -57,4 +57,10 @@ py::dict dict_of(const PipelineOptions& options) {
   return values;
 }
 
+PipelineOptions options_of_preset(const std::string& name) {
+  PipelineOptions options;
+  set_option(options, "preset", name);
+  return options;
+}
+
 }  // namespace egosgm::python

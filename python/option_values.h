@@ -15,6 +15,9 @@ namespace py = pybind11;
 /// 150.0 as 150: a number that is whole may be given for a count, whatever its type. Others as they are.
 py::object whole(const py::handle& value);
 
+/// Throws InvalidArgument for an unknown name.
+PipelineOptions options_of_preset(const std::string& name);
+
 /// Options by name with Python's values: `p2=150`; constants of the method as `constants={"coarse_match.p1": 7}`.
 /// Throws InvalidArgument, as set_option does.
 void set_options(PipelineOptions& options, const py::dict& values);

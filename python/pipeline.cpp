@@ -22,12 +22,12 @@ void for_each_output(FrameOutputs& outputs, Visit&& visit) {
   visit("variance", outputs.variance);
   visit("right_disparity", outputs.right_disparity);
   visit("right_variance", outputs.right_variance);
-  visit("predicted", outputs.predicted);
-  visit("predicted_variance", outputs.predicted_variance);
-  visit("measured", outputs.measured);
-  visit("measured_variance", outputs.measured_variance);
-  visit("search_width", outputs.search_width);
-  visit("dynamic", outputs.dynamic);
+  visit("predicted", outputs.debug.predicted);
+  visit("predicted_variance", outputs.debug.predicted_variance);
+  visit("measured", outputs.debug.measured);
+  visit("measured_variance", outputs.debug.measured_variance);
+  visit("search_width", outputs.debug.search_width);
+  visit("dynamic", outputs.debug.dynamic);
 }
 
 struct Frame {
@@ -36,12 +36,6 @@ struct Frame {
 
   py::object map(const char* name) const { return maps.contains(name) ? py::object(maps[name]) : py::none(); }
 };
-
-PipelineOptions preset_named(const std::string& name) {
-  PipelineOptions options;
-  set_option(options, "preset", name);
-  return options;
-}
 
 /// A dict of arrays to fill, or names of arrays to make.
 py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
@@ -110,26 +104,6 @@ std::optional<Motion> motion_of(const py::object& motion) {
   if (motion.is_none()) return std::nullopt;
   if (py::isinstance<Motion>(motion)) return motion.cast<Motion>();
   return Motion{.current_from_previous = transform_of(motion, "motion")};
-}
-
-Motion make_motion(const py::object& current_from_previous, const py::object& covariance) {
-  Motion motion{.current_from_previous = transform_of(current_from_previous, "current_from_previous")};
-  if (!covariance.is_none()) {
-    const auto values = py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(covariance);
-    if (!values || values.ndim() != 2 || values.shape(0) != 6 || values.shape(1) != 6) {
-      PyErr_Clear();
-      throw InvalidArgument("covariance: give a 6x6 matrix of (translation [m], rotation [rad])");
-    }
-    motion.covariance = Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(values.data());
-  }
-  motion.validate();
-  return motion;
-}
-
-py::array_t<double> array_of_covariance(const Motion& motion) {
-  py::array_t<double> array({6, 6});
-  Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(array.mutable_data()) = motion.covariance;
-  return array;
 }
 
 /// One frame after the other, also where several Python threads call.
@@ -223,85 +197,17 @@ class LockedPipeline {
 std::unique_ptr<LockedPipeline> make_pipeline(const Calibration& calibration, int width, int height,
                                               const std::string& device, const std::string& preset,
                                               const py::kwargs& values) {
-  PipelineOptions options = preset_named(preset);
+  PipelineOptions options = options_of_preset(preset);
   set_options(options, values);
   options.validate();
   const py::gil_scoped_release other_threads_run;
   return std::make_unique<LockedPipeline>(calibration, width, height, options, device);
 }
 
-Calibration make_calibration(double fx, double fy, double cx, double cy, double baseline_m, double doffs_px) {
-  const Calibration calibration{fx, fy, cx, cy, baseline_m, doffs_px};
-  calibration.validate();
-  return calibration;
-}
-
-std::string repr_of(const Calibration& c) {
-  return py::str("Calibration(fx={}, fy={}, cx={}, cy={}, baseline_m={}, doffs_px={})")
-      .format(c.fx, c.fy, c.cx, c.cy, c.baseline_m, c.doffs_px);
-}
-
-std::vector<DeviceInfo> devices() {
-  std::vector<DeviceInfo> list;
-  for (const Device& device : Device::list()) list.push_back(device.info());
-  return list;
-}
-
 py::list stages_of(const FrameReport& report) {
   py::list stages;
   for (const StageTime& stage : report.stages) stages.append(py::make_tuple(stage.stage, stage.ms));
   return stages;
-}
-
-void bind_values(py::module_& module) {
-  py::class_<Calibration>(module, "Calibration",
-                          "A rectified stereo pair. Disparity is d = x_left - x_right [px], depth is "
-                          "fx * baseline_m / (d + doffs_px) [m].")
-      .def(py::init(&make_calibration), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
-           py::arg("baseline_m"), py::arg("doffs_px") = 0.0)
-      .def_readonly("fx", &Calibration::fx, "Focal length [px].")
-      .def_readonly("fy", &Calibration::fy, "Focal length [px].")
-      .def_readonly("cx", &Calibration::cx, "Principal point of the left camera [px].")
-      .def_readonly("cy", &Calibration::cy, "Principal point of the left camera [px].")
-      .def_readonly("baseline_m", &Calibration::baseline_m, "The right camera stands at (baseline_m, 0, 0) [m].")
-      .def_readonly("doffs_px", &Calibration::doffs_px, "cx_right - cx [px].")
-      .def("__repr__", &repr_of);
-
-  py::class_<Motion>(module, "Motion",
-                     "How the left camera moved: a 4x4 matrix that takes a point from the previous left camera's frame "
-                     "(x right, y down, z forward, metres) to the current one's.")
-      .def(py::init(&make_motion), py::arg("current_from_previous"), py::arg("covariance") = py::none())
-      .def_property_readonly("current_from_previous",
-                             [](const Motion& motion) { return array_of(motion.current_from_previous); })
-      .def_property_readonly("covariance", &array_of_covariance,
-                             "6x6, of (translation [m], rotation [rad]); zero where it is not known.");
-
-  py::class_<DeviceInfo>(module, "DeviceInfo", "What an OpenCL device says of itself.")
-      .def_readonly("name", &DeviceInfo::name)
-      .def_readonly("type", &DeviceInfo::type)
-      .def_readonly("vendor", &DeviceInfo::vendor)
-      .def_readonly("platform", &DeviceInfo::platform)
-      .def_readonly("version", &DeviceInfo::version)
-      .def_readonly("driver", &DeviceInfo::driver)
-      .def_readonly("compute_units", &DeviceInfo::compute_units)
-      .def_readonly("memory_bytes", &DeviceInfo::memory_bytes)
-      .def_readonly("max_allocation_bytes", &DeviceInfo::max_allocation_bytes)
-      .def("__repr__", [](const DeviceInfo& info) { return "<DeviceInfo '" + info.name + "' (" + info.type + ")>"; });
-  module.def("devices", &devices, py::call_guard<py::gil_scoped_release>(),
-             "All OpenCL devices, in the order in which they are preferred.");
-  module.def(
-      "pipeline_options", [](const std::string& preset) { return dict_of(preset_named(preset)); },
-      py::arg("preset") = "default", "All options of Pipeline by name, with the values of a preset.");
-  module.def(
-      "_option_texts",
-      [] {
-        py::list texts;
-        for (const OptionText& t : option_texts()) {
-          texts.append(py::make_tuple(t.name, t.meaning, t.unit, t.range, t.when_to_change));
-        }
-        return texts;
-      },
-      "Name, meaning, unit, range and when to change, of every option of Pipeline.");
 }
 
 void bind_frame(py::module_& module) {
@@ -335,7 +241,6 @@ void bind_frame(py::module_& module) {
 }  // namespace
 
 void bind_pipeline(py::module_& module) {
-  bind_values(module);
   bind_frame(module);
   py::class_<LockedPipeline>(module, "Pipeline")
       .def(py::init(&make_pipeline), py::arg("calibration"), py::arg("width"), py::arg("height"), py::kw_only(),
@@ -347,7 +252,8 @@ void bind_pipeline(py::module_& module) {
            "motion: how the camera moved since the last frame, a Motion or a 4x4 matrix current_from_previous; None: "
            "the whole range is searched.\n"
            "outputs: names of the maps to make, or a dict of arrays to fill (float32; search_width: uint16, dynamic: "
-           "uint8).\n\n"
+           "uint8). Results: disparity, variance, right_disparity, right_variance. For debugging, of the left view: "
+           "predicted, predicted_variance, measured, measured_variance, search_width, dynamic.\n\n"
            "Raises InvalidArgument before anything runs, or DeviceError. A frame that raises leaves the pipeline as "
            "it was. Other Python threads run meanwhile; several that call one pipeline take turns.")
       .def("submit", &LockedPipeline::submit, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),

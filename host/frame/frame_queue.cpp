@@ -45,7 +45,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};
   release_results();
-  Wanted wanted{{}, outputs.dynamic.data != nullptr, outputs.right_disparity.data || outputs.right_variance.data};
+  Wanted wanted{{}, outputs.debug.dynamic.data != nullptr, outputs.right_disparity.data || outputs.right_variance.data};
   if (outputs.variance.data) wanted.variance = Views::kLeft;
   if (outputs.right_variance.data) wanted.variance = Views::kBoth;
   const Plan plan = plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, wanted);

@@ -130,12 +130,12 @@ void FrameTransfer::validate(const ImageView& left, const ImageView& right, cons
   validate_map("variance", outputs.variance, size_);
   validate_map("right_disparity", outputs.right_disparity, size_);
   validate_map("right_variance", outputs.right_variance, size_);
-  validate_map("predicted", outputs.predicted, size_);
-  validate_map("predicted_variance", outputs.predicted_variance, size_);
-  validate_map("measured", outputs.measured, size_);
-  validate_map("measured_variance", outputs.measured_variance, size_);
-  validate_map("search_width", outputs.search_width, size_);
-  validate_map("dynamic", outputs.dynamic, size_);
+  validate_map("predicted", outputs.debug.predicted, size_);
+  validate_map("predicted_variance", outputs.debug.predicted_variance, size_);
+  validate_map("measured", outputs.debug.measured, size_);
+  validate_map("measured_variance", outputs.debug.measured_variance, size_);
+  validate_map("search_width", outputs.debug.search_width, size_);
+  validate_map("dynamic", outputs.debug.dynamic, size_);
 }
 
 const FrameImages& FrameTransfer::upload(const ImageView& left, const ImageView& right) {
@@ -177,13 +177,13 @@ void FrameTransfer::download(const FrameOnDevice& frame, const FrameOutputs& out
   parts_ = frame.parts;
   context_.let_wait(ocl::Queue::kDownload, context_.last_kernel());
   if (frame.predicted) {
-    fetch_left(frame.predicted->disparity, outputs.predicted.data, predicted_);
-    fetch_left(frame.predicted->variance, outputs.predicted_variance.data, predicted_variance_);
+    fetch_left(frame.predicted->disparity, outputs.debug.predicted.data, predicted_);
+    fetch_left(frame.predicted->variance, outputs.debug.predicted_variance.data, predicted_variance_);
   }
-  fetch_left(frame.measured.disparity, outputs.measured.data, measured_);
-  fetch_left(frame.measured.variance, outputs.measured_variance.data, measured_variance_);
+  fetch_left(frame.measured.disparity, outputs.debug.measured.data, measured_);
+  fetch_left(frame.measured.variance, outputs.debug.measured_variance.data, measured_variance_);
   if (frame.dynamic) fetch(*frame.dynamic, pixel_count(size_), dynamic_);
-  if (outputs.search_width.data) fetch(frame.bands.bands, pixel_count(size_), bands_);
+  if (outputs.debug.search_width.data) fetch(frame.bands.bands, pixel_count(size_), bands_);
   fetch(frame.bands.row_sums, static_cast<std::size_t>(count(frame.matched)) * size_.height, row_sums_);
   fetch(frame.offset.terms, 1, vertical_offset_px_);
 
@@ -212,16 +212,16 @@ void FrameTransfer::collect(FrameReport& report) const {
   copy_rows(right_disparity_.data(), outputs_.right_disparity);
   copy_rows(right_variance_.data(), outputs_.right_variance);
   if (has_prediction_) {
-    copy_rows(predicted_.data(), outputs_.predicted);
-    copy_rows(predicted_variance_.data(), outputs_.predicted_variance);
+    copy_rows(predicted_.data(), outputs_.debug.predicted);
+    copy_rows(predicted_variance_.data(), outputs_.debug.predicted_variance);
   } else {
-    fill_rows(kInvalidDisparity, outputs_.predicted);
-    fill_rows(0.0f, outputs_.predicted_variance);
+    fill_rows(kInvalidDisparity, outputs_.debug.predicted);
+    fill_rows(0.0f, outputs_.debug.predicted_variance);
   }
-  copy_rows(measured_.data(), outputs_.measured);
-  copy_rows(measured_variance_.data(), outputs_.measured_variance);
-  copy_rows(dynamic_.data(), outputs_.dynamic);
-  copy_rows(bands_.data(), outputs_.search_width,
+  copy_rows(measured_.data(), outputs_.debug.measured);
+  copy_rows(measured_variance_.data(), outputs_.debug.measured_variance);
+  copy_rows(dynamic_.data(), outputs_.debug.dynamic);
+  copy_rows(bands_.data(), outputs_.debug.search_width,
             [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
 
   const double pixels = static_cast<double>(pixel_count(size_));

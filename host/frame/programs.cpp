@@ -45,7 +45,7 @@ std::vector<ProgramText> list_programs(const Device& device, const PipelineOptio
   return ocl::translated("compile", [&] {
     // With the sizes of devices with fewer and with more compute units, too.
     std::vector<Device> devices{device};
-    if (device.info().type != "GPU") {
+    if (device.info().type != DeviceType::kGpu) {
       for (const Tuning& tuning : {kCpuTuning, kSmallCpuTuning}) devices.push_back(device.with_tuning(tuning));
     }
     std::map<std::pair<std::string, std::string>, std::string> texts;

@@ -21,13 +21,11 @@ std::string lower(std::string text) {
   return text;
 }
 
-std::string type_name(cl_device_type type) {
-  if (type & CL_DEVICE_TYPE_GPU) return "GPU";
-  if (type & CL_DEVICE_TYPE_ACCELERATOR) return "accelerator";
-  return "CPU";
+DeviceType type_of(cl_device_type type) {
+  if (type & CL_DEVICE_TYPE_GPU) return DeviceType::kGpu;
+  if (type & CL_DEVICE_TYPE_ACCELERATOR) return DeviceType::kAccelerator;
+  return DeviceType::kCpu;
 }
-
-int preference(const std::string& type) { return type == "GPU" ? 0 : type == "accelerator" ? 1 : 2; }
 
 /// Whether the driver says so; one that does not may have no such call at all (rusticl of Mesa 22.3).
 bool divides_by_counts(const cl::Device& device) {
@@ -56,7 +54,7 @@ std::vector<std::string> lacks_of(const cl::Device& device) {
 DeviceInfo describe(const cl::Device& device) {
   const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
   return {.name = ocl::trimmed(device.getInfo<CL_DEVICE_NAME>()),
-          .type = type_name(device.getInfo<CL_DEVICE_TYPE>()),
+          .type = type_of(device.getInfo<CL_DEVICE_TYPE>()),
           .vendor = ocl::trimmed(device.getInfo<CL_DEVICE_VENDOR>()),
           .platform = ocl::trimmed(platform.getInfo<CL_PLATFORM_NAME>()),
           .version = ocl::trimmed(device.getInfo<CL_DEVICE_VERSION>()),
@@ -141,7 +139,8 @@ std::string numbered(const std::vector<Device>& devices) {
   std::string text;
   for (std::size_t i = 0; i < devices.size(); ++i) {
     const DeviceInfo& info = devices[i].info();
-    text += (i ? ", " : "") + std::to_string(i) + " = " + info.name + " (" + info.type + ", " + info.platform + ")";
+    text += (i ? ", " : "") + std::to_string(i) + " = " + info.name + " (" + to_string(info.type) + ", " +
+            info.platform + ")";
   }
   return text;
 }
@@ -171,9 +170,8 @@ Found find_devices() {
       found.devices.emplace_back(std::make_shared<const Device::Handle>(Device::Handle::of(device)));
     }
   }
-  std::stable_sort(found.devices.begin(), found.devices.end(), [](const Device& a, const Device& b) {
-    return preference(a.info().type) < preference(b.info().type);
-  });
+  std::stable_sort(found.devices.begin(), found.devices.end(),
+                   [](const Device& a, const Device& b) { return a.info().type < b.info().type; });
   return found;
 }
 
@@ -203,7 +201,7 @@ const Device* find(const std::vector<Device>& devices, const std::string& name, 
     return found == devices.end() ? nullptr : &*found;
   };
   if (name == "gpu" || name == "cpu" || name == "accelerator") {
-    return first_that([&](const Device& device) { return lower(device.info().type) == name; });
+    return first_that([&](const Device& device) { return lower(to_string(device.info().type)) == name; });
   }
   if (const Device* whole = first_that([&](const Device& device) { return lower(device.info().name) == name; })) {
     return whole;
@@ -220,6 +218,10 @@ const Device* find(const std::vector<Device>& devices, const std::string& name, 
 }
 
 }  // namespace
+
+const char* to_string(DeviceType type) {
+  return type == DeviceType::kGpu ? "GPU" : type == DeviceType::kAccelerator ? "accelerator" : "CPU";
+}
 
 Device::Handle Device::Handle::of(const cl::Device& device) { return {device, describe(device)}; }
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 #include "host/vision/text_rows.h"
 
 namespace egosgm::vision {

@@ -9,10 +9,9 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
-#include "egosgm/vision/image_io.h"
-#include "egosgm/vision/poses_io.h"
 #include "host/vision/folder_contents.h"
 #include "host/vision/frame_names.h"
+#include "host/vision/image_pairs.h"
 
 namespace egosgm::vision {
 namespace {
@@ -157,28 +156,6 @@ bool is_parent(const fs::path& file, const fs::path& folder) {
   return fs::equivalent(file.has_parent_path() ? file.parent_path() : fs::path("."), folder / "..", error) && !error;
 }
 
-void require_image(const fs::path& file) {
-  if (std::error_code none; fs::is_directory(file, none)) {
-    throw InvalidArgument(file.string() + ": is a folder; give a pattern of its images, '" + (file / "*.png").string() +
-                          "' for example");
-  }
-  if (!is_file(file)) throw MissingPath(file.string(), "no such image; give an existing PNG or JPEG file");
-}
-
-/// pair_files, where both name one image or both many.
-std::vector<NamedPair> paired(const NamePattern& left, const NamePattern& right, const std::string& left_text,
-                              const std::string& right_text, PairBy pair_by) {
-  if ((left.kind == Kind::kPlain) != (right.kind == Kind::kPlain)) {
-    throw InvalidArgument("patterns '" + left_text + "' and '" + right_text +
-                          "': both must hold a %d or a *, or neither");
-  }
-  if (left.kind == Kind::kPlain) {
-    require_image(left.folder / left.prefix);
-    require_image(right.folder / right.prefix);
-  }
-  return pair_files(left, right, pair_by);
-}
-
 /// `folder / stem` with an image's extension.
 fs::path image_named(const fs::path& folder, const std::string& stem) {
   for (const std::string& name : list_folder(folder)) {
@@ -270,7 +247,7 @@ StereoSequence open_middlebury(const fs::path& folder, FrameRange range) {
 StereoSequence open_patterns(const std::string& left, const std::string& right, const fs::path& calibration_file,
                              FrameRange range, PairBy pair_by) {
   const NamePattern left_pattern = parse_pattern(left), right_pattern = parse_pattern(right);
-  const std::vector<NamedPair> pairs = paired(left_pattern, right_pattern, left, right, pair_by);
+  const std::vector<NamedPair> pairs = pairs_of_patterns(left_pattern, right_pattern, left, right, pair_by);
   if (pairs.empty()) {
     throw InvalidArgument(left + ": holds no images; give the folder or pattern of a stereo sequence");
   }
@@ -285,20 +262,6 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   return sequence;
 }
 
-ImagePairs find_pairs(const std::string& left, const std::string& right, PairBy pair_by) {
-  ImagePairs result;
-  for (NamedPair& pair : paired(parse_pattern(left), parse_pattern(right), left, right, pair_by)) {
-    if (pair.left.empty() || pair.right.empty()) {
-      result.alone.push_back(pair.left.empty() ? pair.right : pair.left);
-    } else {
-      result.pairs.emplace_back(std::move(pair.left), std::move(pair.right));
-    }
-  }
-  return result;
-}
-
-std::vector<fs::path> find_images(const std::string& pattern) { return files_in_order(parse_pattern(pattern)); }
-
 StereoSequence open_folder(const fs::path& folder, FrameRange range) {
   require_folder(folder, "give the folder of a stereo sequence");
   if (is_folder(folder / kRawGrey.left) || is_folder(folder / kRawColor.left)) return open_kitti_raw(folder, range);
@@ -308,74 +271,6 @@ StereoSequence open_folder(const fs::path& folder, FrameRange range) {
       folder.string() + ": is no stereo sequence; " +
       found_instead(folder).value_or("give a folder with image_0 and image_1, image_00/data and image_01/data, or "
                                      "im0.png and im1.png"));
-}
-
-StereoImages read_images(const StereoFrame& frame) {
-  StereoImages images{read_grey_image(frame.left), read_grey_image(frame.right)};
-  const auto describe_image = [](const cv::Mat& image) {
-    return std::to_string(image.cols) + "x" + std::to_string(image.rows) + ", " +
-           std::to_string(8 * image.elemSize1()) + " bit";
-  };
-  if (images.left.size() != images.right.size() || images.left.type() != images.right.type()) {
-    throw InvalidArgument(frame.right.string() + ": " + describe_image(images.right) + ", but its left image " +
-                          frame.left.string() + " has " + describe_image(images.left) + "; give a rectified pair");
-  }
-  return images;
-}
-
-cv::Size check_image_sizes(const StereoSequence& sequence) {
-  std::optional<cv::Size> expected;
-  for (const StereoFrame& frame : sequence.frames) {
-    for (const fs::path& file : {frame.left, frame.right}) {
-      const cv::Size size = read_image_size(file);
-      if (!expected) expected = size;
-      if (size == *expected) continue;
-      throw InvalidArgument(file.string() + ": " + std::to_string(size.width) + "x" + std::to_string(size.height) +
-                            ", but the sequence began with " + std::to_string(expected->width) + "x" +
-                            std::to_string(expected->height) + "; select frames of one size with --frames");
-    }
-  }
-  return expected.value_or(cv::Size());
-}
-
-std::vector<std::size_t> rows_of_frames(const StereoSequence& sequence, std::size_t rows, const fs::path& file,
-                                        const std::string& what) {
-  const std::vector<StereoFrame>& frames = sequence.frames;
-  const std::vector<int>& all = sequence.numbers;
-  const auto by = [&](const auto& row_of) {
-    std::vector<std::size_t> found;
-    for (const StereoFrame& frame : frames) found.push_back(static_cast<std::size_t>(row_of(frame)));
-    return found;
-  };
-  const auto number = [](const StereoFrame& frame) { return frame.number; };
-  const auto up_to_last = static_cast<std::size_t>((all.empty() ? frames.back().number : all.back())) + 1;
-  if (rows == up_to_last) return by(number);
-  if (!all.empty() && rows == all.size()) {
-    return by(
-        [&](const StereoFrame& frame) { return std::lower_bound(all.begin(), all.end(), frame.number) - all.begin(); });
-  }
-  if (rows == frames.size()) return by([&](const StereoFrame& frame) { return &frame - frames.data(); });
-  if (all.empty() && rows > up_to_last) return by(number);
-  const auto range = [](int first, int last) {
-    return first == last ? std::to_string(first) : std::to_string(first) + ".." + std::to_string(last);
-  };
-  std::string fitting = std::to_string(up_to_last) + " (each number from 0)";
-  if (!all.empty() && all.size() != up_to_last) {
-    fitting += ", " + std::to_string(all.size()) + " (each frame of " + range(all.front(), all.back()) + ")";
-  }
-  if (frames.size() != up_to_last && frames.size() != all.size()) {
-    fitting += ", " + std::to_string(frames.size()) + " (each chosen frame, " +
-               range(frames.front().number, frames.back().number) + ")";
-  }
-  throw InvalidArgument(file.string() + ": holds " + std::to_string(rows) + " " + what +
-                        ", which belong to no choice of the frames; it may hold " + fitting);
-}
-
-std::vector<Eigen::Isometry3d> poses_of_frames(const StereoSequence& sequence, const fs::path& poses_file) {
-  const std::vector<Eigen::Isometry3d> rows = read_poses(poses_file);
-  std::vector<Eigen::Isometry3d> poses;
-  for (const std::size_t row : rows_of_frames(sequence, rows.size(), poses_file, "poses")) poses.push_back(rows[row]);
-  return poses;
 }
 
 }  // namespace egosgm::vision

@@ -12,9 +12,9 @@
 #include <string_view>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
 #include "host/cpu_clones.h"
+#include "host/vision/file_io.h"
 #include "host/vision/image_bounds.h"
 #include "host/vision/npy.h"
 #include "host/vision/png.h"

@@ -7,6 +7,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
+#include "host/vision/add_members.h"
 #include "host/vision/disparity_error.h"
 
 namespace egosgm::vision {
@@ -60,14 +61,9 @@ class Mean {
 }  // namespace
 
 DisparityCounts& DisparityCounts::operator+=(const DisparityCounts& other) {
-  truth += other.truth;
-  valid += other.valid;
-  bad += other.bad;
-  d1 += other.d1;
-  bad_interpolated += other.bad_interpolated;
-  d1_interpolated += other.d1_interpolated;
-  absolute_error_px += other.absolute_error_px;
-  return *this;
+  return add_members(*this, other, &DisparityCounts::truth, &DisparityCounts::valid, &DisparityCounts::bad,
+                     &DisparityCounts::d1, &DisparityCounts::bad_interpolated, &DisparityCounts::d1_interpolated,
+                     &DisparityCounts::absolute_error_px);
 }
 
 DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth) {

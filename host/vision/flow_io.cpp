@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "egosgm/vision/flow_io.h"
+#include "host/vision/flow_io.h"
 
 #include <bit>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <string_view>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/file_io.h"
 #include "host/vision/png.h"
 
 namespace egosgm::vision {

@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/render.h"
+#include "host/vision/file_io.h"
 #include "host/vision/image_bounds.h"
 #include "host/vision/jpeg.h"
 #include "host/vision/plain_png.h"
@@ -66,25 +66,6 @@ void write_png(const std::filesystem::path& file, const cv::Mat& image) {
                           ": only non-empty images of 8 or 16 bit grey or 8 bit BGR are written as PNG");
   }
   write_file(file, encode_plain_png(image));
-}
-
-ImageView image_view(const cv::Mat& grey) {
-  if (grey.type() != CV_8UC1 && grey.type() != CV_16UC1) {
-    throw InvalidArgument("image_view: the image must be grey, CV_8UC1 or CV_16UC1");
-  }
-  return {.data = grey.data,
-          .width = grey.cols,
-          .height = grey.rows,
-          .stride_bytes = static_cast<std::ptrdiff_t>(grey.step[0]),
-          .type = grey.depth() == CV_8U ? PixelType::kU8 : PixelType::kU16};
-}
-
-MapView<float> map_view(cv::Mat& map) {
-  if (map.type() != CV_32FC1) throw InvalidArgument("map_view: the map must be CV_32FC1");
-  return {.data = map.ptr<float>(),
-          .width = map.cols,
-          .height = map.rows,
-          .stride_bytes = static_cast<std::ptrdiff_t>(map.step[0])};
 }
 
 }  // namespace egosgm::vision

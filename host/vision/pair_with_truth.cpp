@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "host/vision/pair_with_truth.h"
+
 #include <algorithm>
 #include <charconv>
 #include <map>
@@ -6,7 +8,6 @@
 #include <system_error>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/evaluation.h"
 #include "host/vision/name_numbers.h"
 
 namespace egosgm::vision {

@@ -8,9 +8,9 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/render.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::vision {
 namespace {

@@ -7,8 +7,8 @@
 #include <string_view>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/rectification.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::vision {
 namespace {

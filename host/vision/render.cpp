@@ -14,7 +14,6 @@ namespace egosgm::vision {
 namespace {
 
 constexpr int kBarHeight = 40, kBarColors = 22;  // [px]; below the colours stands the text
-constexpr int kCaptionHeight = 24;
 constexpr int kMaxPictureSide = 32768;
 const cv::Scalar kBlack(0, 0, 0), kWhite(255, 255, 255);
 const cv::Vec3b kMissing(128, 128, 128);
@@ -89,43 +88,19 @@ cv::Vec3b error_color(float error_px) {
   return kErrorSteps.back().color;
 }
 
-void put_text(cv::Mat& picture, const std::string& text, cv::Point left_baseline, double scale = 0.4) {
-  cv::putText(picture, text, left_baseline, cv::FONT_HERSHEY_SIMPLEX, scale, kWhite, 1, cv::LINE_AA);
-}
-
-int text_width(const std::string& text, double scale = 0.4) {
-  int baseline = 0;
-  return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, 1, &baseline).width;
-}
-
 /// Text centred at x, moved so far that it stays in the picture.
 void put_label(cv::Mat& picture, const std::string& text, double center_x) {
-  const int width = text_width(text);
+  constexpr double kScale = 0.4;
+  int baseline = 0;
+  const int width = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, kScale, 1, &baseline).width;
   const int left = std::clamp(static_cast<int>(center_x) - width / 2, 1, std::max(1, picture.cols - width - 1));
-  put_text(picture, text, {left, kBarHeight - 6});
+  cv::putText(picture, text, {left, kBarHeight - 6}, cv::FONT_HERSHEY_SIMPLEX, kScale, kWhite, 1, cv::LINE_AA);
 }
 
 std::string format_value(double value) {
   char buffer[32];
   std::snprintf(buffer, sizeof buffer, "%.3g", value);
   return buffer;
-}
-
-cv::Mat scaled_to(const cv::Mat& picture, int cell_width) {
-  if (picture.cols <= cell_width) return picture;
-  cv::Mat scaled;
-  const int height = std::max(1, static_cast<int>(std::lround(1.0 * picture.rows * cell_width / picture.cols)));
-  cv::resize(picture, scaled, cv::Size(cell_width, height), 0, 0, cv::INTER_AREA);
-  return scaled;
-}
-
-cv::Mat with_caption(const CaptionedPicture& item, int cell_width) {
-  const cv::Mat picture = scaled_to(item.picture, cell_width);
-  const int top = item.caption.empty() ? 0 : kCaptionHeight;
-  cv::Mat cell(picture.rows + top, picture.cols, CV_8UC3, kBlack);
-  picture.copyTo(cell(cv::Rect(0, top, picture.cols, picture.rows)));
-  if (top > 0) put_text(cell, item.caption, {4, kCaptionHeight - 7}, 0.5);
-  return cell;
 }
 
 }  // namespace
@@ -246,40 +221,6 @@ cv::Mat color_grey(const cv::Mat& grey) {
   }
   cv::cvtColor(bytes, picture, cv::COLOR_GRAY2BGR);
   return picture;
-}
-
-cv::Mat compose(const std::vector<CaptionedPicture>& pictures, int columns, int cell_width) {
-  require_width(cell_width);
-  if (pictures.empty() || columns < 1) throw InvalidArgument("compose: at least one picture and one column are needed");
-  std::vector<cv::Mat> cells;
-  for (const CaptionedPicture& item : pictures) {
-    if (item.picture.empty() || item.picture.type() != CV_8UC3)
-      throw InvalidArgument("compose: pictures must be CV_8UC3");
-    cells.push_back(with_caption(item, cell_width));
-  }
-  constexpr int kGap = 4;
-  const int used_columns = std::min(columns, static_cast<int>(cells.size()));
-  int column_width = 0;
-  for (const cv::Mat& cell : cells) column_width = std::max(column_width, cell.cols);
-  const int width = used_columns * (column_width + kGap) - kGap;
-  require_width(width);
-  cv::Mat sheet;
-  for (std::size_t begin = 0; begin < cells.size(); begin += static_cast<std::size_t>(used_columns)) {
-    const std::size_t end = std::min(cells.size(), begin + static_cast<std::size_t>(used_columns));
-    int height = 0;
-    for (std::size_t i = begin; i < end; ++i) height = std::max(height, cells[i].rows);
-    cv::Mat row(height + (begin > 0 ? kGap : 0), width, CV_8UC3, kBlack);
-    for (std::size_t i = begin; i < end; ++i) {
-      const int left = static_cast<int>(i - begin) * (column_width + kGap);
-      cells[i].copyTo(row(cv::Rect(left, row.rows - height, cells[i].cols, cells[i].rows)));
-    }
-    if (sheet.empty()) {
-      sheet = row;
-    } else {
-      sheet.push_back(row);
-    }
-  }
-  return sheet;
 }
 
 cv::Mat depth_from_disparity(const cv::Mat& disparity, const Calibration& calibration) {

@@ -10,9 +10,9 @@
 #include "egosgm/error.h"
 #include "egosgm/image.h"
 #include "egosgm/vision/disparity_io.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/vision/file_io.h"
 #include "host/vision/synthetic_render.h"
 #include "host/vision/synthetic_scene.h"
 

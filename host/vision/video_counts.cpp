@@ -3,15 +3,11 @@
 
 #include <limits>
 
+#include "host/vision/add_members.h"
 #include "host/vision/disparity_error.h"
 
 namespace egosgm::vision {
 namespace {
-
-template <typename Array>
-void add_to(Array& sums, const Array& others) {
-  for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += others[i];
-}
 
 /// The area between two curves over the share that is kept (0 to 1), by the trapezoidal rule.
 double area_between(const DensityCounts& counts, double SparsificationPoint::*curve,
@@ -32,43 +28,26 @@ double pooled(const TemporalCounts& c) { return ratio(c.sum_px, static_cast<doub
 }  // namespace
 
 TemporalCounts& TemporalCounts::operator+=(const TemporalCounts& other) {
-  sum_px += other.sum_px;
-  pixels += other.pixels;
-  above_1px += other.above_1px;
-  above_3px += other.above_3px;
-  relative_sum += other.relative_sum;
-  relative_above_1 += other.relative_above_1;
-  sum_of_pair_means_px += other.sum_of_pair_means_px;
-  pairs += other.pairs;
-  return *this;
+  return add_members(*this, other, &TemporalCounts::sum_px, &TemporalCounts::pixels, &TemporalCounts::above_1px,
+                     &TemporalCounts::above_3px, &TemporalCounts::relative_sum, &TemporalCounts::relative_above_1,
+                     &TemporalCounts::sum_of_pair_means_px, &TemporalCounts::pairs);
 }
 
 PairMean& PairMean::operator+=(const PairMean& other) {
-  sum += other.sum;
-  pairs += other.pairs;
-  return *this;
+  return add_members(*this, other, &PairMean::sum, &PairMean::pairs);
 }
 
 double PairMean::value() const { return ratio(sum, pairs); }
 
 ChangeCounts& ChangeCounts::operator+=(const ChangeCounts& other) {
-  both += other.both;
-  changed += other.changed;
-  worse += other.worse;
-  better += other.better;
-  return *this;
+  return add_members(*this, other, &ChangeCounts::both, &ChangeCounts::changed, &ChangeCounts::worse,
+                     &ChangeCounts::better);
 }
 
 DensityCounts& DensityCounts::operator+=(const DensityCounts& other) {
-  add_to(kept, other.kept);
-  add_to(bad, other.bad);
-  add_to(oracle_bad, other.oracle_bad);
-  add_to(error_px, other.error_px);
-  add_to(oracle_error_px, other.oracle_error_px);
-  add_to(kept_of_truth, other.kept_of_truth);
-  add_to(bad_of_kept, other.bad_of_kept);
-  truth += other.truth;
-  return *this;
+  return add_members(*this, other, &DensityCounts::kept, &DensityCounts::bad, &DensityCounts::oracle_bad,
+                     &DensityCounts::error_px, &DensityCounts::oracle_error_px, &DensityCounts::kept_of_truth,
+                     &DensityCounts::bad_of_kept, &DensityCounts::truth);
 }
 
 double DensityCounts::ause_px() const {
@@ -100,24 +79,14 @@ std::vector<DensityPoint> densities_of(const DensityCounts& counts) {
 }
 
 RegionCounts& RegionCounts::operator+=(const RegionCounts& other) {
-  errors += other.errors;
-  tepe += other.tepe;
-  tepe_interpolated += other.tepe_interpolated;
-  against += other.against;
-  return *this;
+  return add_members(*this, other, &RegionCounts::errors, &RegionCounts::tepe, &RegionCounts::tepe_interpolated,
+                     &RegionCounts::against);
 }
 
 VideoCounts& VideoCounts::operator+=(const VideoCounts& other) {
-  add_to(regions, other.regions);
-  flicker += other.flicker;
-  tae_percent += other.tae_percent;
-  tepe_along_motion += other.tepe_along_motion;
-  opw_px += other.opw_px;
-  opw_m += other.opw_m;
-  rtc_1_01_percent += other.rtc_1_01_percent;
-  rtc_1_25_percent += other.rtc_1_25_percent;
-  density += other.density;
-  return *this;
+  return add_members(*this, other, &VideoCounts::regions, &VideoCounts::flicker, &VideoCounts::tae_percent,
+                     &VideoCounts::tepe_along_motion, &VideoCounts::opw_px, &VideoCounts::opw_m,
+                     &VideoCounts::rtc_1_01_percent, &VideoCounts::rtc_1_25_percent, &VideoCounts::density);
 }
 
 std::vector<NamedFigure> figures_of(const VideoCounts& counts) {

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "host/vision/video_order.h"
+
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <optional>
 #include <system_error>
 
-#include "egosgm/vision/video_evaluation.h"
 #include "host/vision/name_numbers.h"
 
 namespace egosgm::vision {

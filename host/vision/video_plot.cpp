@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "egosgm/vision/video_plot.h"
+#include "host/vision/video_plot.h"
 
 #include <algorithm>
 #include <cmath>

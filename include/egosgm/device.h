@@ -14,10 +14,14 @@ namespace egosgm {
 /// The queues that a pipeline has of its device.
 enum class DeviceQueue { kUpload, kKernels, kDownload };
 
+/// In the order in which devices are preferred. By name: "GPU", "accelerator", "CPU".
+enum class DeviceType { kGpu, kAccelerator, kCpu };
+EGOSGM_EXPORT const char* to_string(DeviceType type);
+
 /// What an OpenCL device says of itself.
 struct DeviceInfo {
   std::string name;  // "pthread-skylake-avx512-AMD EPYC"
-  std::string type;  // "CPU", "GPU", "accelerator"
+  DeviceType type = DeviceType::kCpu;
   std::string vendor;
   std::string platform;  // "Portable Computing Language"
   std::string version;   // "OpenCL 3.0 PoCL ..."
@@ -32,7 +36,7 @@ struct DeviceInfo {
 /// An OpenCL device. Copies refer to the same one. Thread-safe.
 class EGOSGM_EXPORT Device {
  public:
-  /// All devices, in the order in which they are preferred: GPUs, accelerators, CPUs; then as the platforms list them.
+  /// All devices, in the order of their types; then as the platforms list them.
   static std::vector<Device> list();
 
   /// The device that `wanted` names: an index into `list()`, a type ("gpu", "cpu", "accelerator": the first of it), or

@@ -9,11 +9,20 @@
 
 namespace egosgm {
 
+/// What all errors of this library have in common: `catch (const egosgm::Error& error)` catches each of them. Each is a
+/// std::exception, too.
+class EGOSGM_EXPORT Error {
+ public:
+  virtual ~Error() = default;
+  virtual const char* what() const noexcept = 0;
+};
+
 /// What the caller gave cannot be used: an image, a calibration, an option, a file. `what()` names the
 /// value and the remedy in one line. Nothing was enqueued and nothing was written.
-class EGOSGM_EXPORT InvalidArgument : public std::invalid_argument {
+class EGOSGM_EXPORT InvalidArgument : public std::invalid_argument, public Error {
  public:
   using std::invalid_argument::invalid_argument;
+  const char* what() const noexcept override { return std::invalid_argument::what(); }
 };
 
 /// A file or folder that was named is not there.
@@ -30,15 +39,17 @@ class EGOSGM_EXPORT MissingPath : public InvalidArgument {
 
 /// The file system refused to take a result: a full disk, a folder that cannot be written. `what()` names the file and
 /// the system's reason in one line. What stood under the file's name before stands there still.
-class EGOSGM_EXPORT IoError : public std::runtime_error {
+class EGOSGM_EXPORT IoError : public std::runtime_error, public Error {
  public:
   using std::runtime_error::runtime_error;
+  const char* what() const noexcept override { return std::runtime_error::what(); }
 };
 
 /// The device or its driver refused. `code()` is the OpenCL status, `what()` names the stage.
-class EGOSGM_EXPORT DeviceError : public std::runtime_error {
+class EGOSGM_EXPORT DeviceError : public std::runtime_error, public Error {
  public:
   DeviceError(int code, const std::string& what) : std::runtime_error(what), code_(code) {}
+  const char* what() const noexcept override { return std::runtime_error::what(); }
   int code() const { return code_; }
 
  private:

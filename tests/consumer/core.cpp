@@ -23,7 +23,7 @@ int main() try {
   const float found = disparity[kHeight / 2 * kWidth + kWidth / 2];
   try {
     egosgm::Device::select("no such device");
-  } catch (const egosgm::InvalidArgument&) {  // an exception crosses the library's edge with its type
+  } catch (const egosgm::Error&) {  // an exception crosses the library's edge with its type
     std::printf("disparity %.2f\n", found);
     return found > kShift_px - 0.5 && found < kShift_px + 0.5 ? 0 : 1;
   }

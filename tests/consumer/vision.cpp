@@ -2,6 +2,7 @@
 #include <egosgm/error.h>
 #include <egosgm/vision/disparity_io.h>
 #include <egosgm/vision/odometry.h>
+#include <egosgm/vision/opencv.h>
 #include <egosgm/vision/synthetic.h>
 
 #include <cstdio>
@@ -9,7 +10,11 @@
 int main() try {
   egosgm::vision::SyntheticSequence street({.frames = 1, .width = 64, .height = 32, .supersampling = 1});
   egosgm::vision::StereoOdometry odometry(street.calibration());
-  egosgm::vision::write_disparity("street.pfm", street.render(0).left_disparity);
+  const egosgm::vision::SyntheticFrame frame = street.render(0);
+  egosgm::Pipeline pipeline(street.calibration(), 64, 32);
+  const auto maps = egosgm::vision::process(pipeline, frame.left, frame.right, {});
+  if (maps.report.density <= 0) return 1;
+  egosgm::vision::write_disparity("street.pfm", maps.disparity);
   egosgm::vision::read_disparity("no such file.png");
   return 1;
 } catch (const egosgm::InvalidArgument& error) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Optical flow: KITTI's PNG and .flo.
-#include "egosgm/vision/flow_io.h"
+#include "host/vision/flow_io.h"
 #include "tests/fuzz/png_seed.h"
 #include "tests/fuzz/target.h"
 

@@ -88,9 +88,9 @@ void run(std::string_view input) {
   FrameOutputs outputs;
   const Rows left_rows(bytes, wide ? 2 : 1, left), right_rows(bytes, wide ? 2 : 1, right);
   const Rows disparity(bytes, 4, outputs.disparity), variance(bytes, 4, outputs.variance);
-  const Rows predicted(bytes, 4, outputs.predicted);
-  const Rows search_width(bytes, 2, outputs.search_width);
-  const Rows dynamic(bytes, 1, outputs.dynamic);
+  const Rows predicted(bytes, 4, outputs.debug.predicted);
+  const Rows search_width(bytes, 2, outputs.debug.search_width);
+  const Rows dynamic(bytes, 1, outputs.debug.dynamic);
   if (bytes.below(24) == 0) right.type = static_cast<PixelType>(bytes.below(4));
   if (bytes.below(12) == 0) pipeline().reset();
   std::optional<Motion> motion;

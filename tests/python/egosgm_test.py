@@ -287,8 +287,13 @@ def test_sequences_are_read(tmp_path, frames, street):
         egosgm.open_folder(tmp_path / "nowhere")
 
 
-def test_a_build_error_is_a_device_error():
-    assert issubclass(egosgm.BuildError, egosgm.DeviceError) and issubclass(egosgm.DeviceError, RuntimeError)
+def test_all_errors_are_errors_of_the_library_and_of_python():
+    kinds = [(egosgm.InvalidArgument, ValueError), (egosgm.IoError, OSError), (egosgm.DeviceError, RuntimeError),
+             (egosgm.BuildError, egosgm.DeviceError)]
+    for kind, builtin in kinds:
+        assert issubclass(kind, egosgm.Error) and issubclass(kind, builtin), kind
+    with pytest.raises(egosgm.Error, match="fx"):
+        egosgm.Calibration(fx=-1, fy=1, cx=0, cy=0, baseline_m=1)
 
 
 def test_the_stub_and_the_module_name_the_same():

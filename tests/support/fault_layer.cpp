@@ -349,14 +349,6 @@ extern "C" long fault_references() { return references; }
 extern "C" int fault_transfers() { return transfers; }
 extern "C" long fault_buffers_created() { return buffers_created; }
 
-extern "C" cl_int CL_API_CALL clGetLayerInfo(cl_layer_info name, size_t size, void* value, size_t* needed) {
-  if (name != CL_LAYER_API_VERSION) return CL_INVALID_VALUE;
-  if (value && size >= sizeof(cl_layer_api_version))
-    *static_cast<cl_layer_api_version*>(value) = CL_LAYER_API_VERSION_100;
-  if (needed) *needed = sizeof(cl_layer_api_version);
-  return CL_SUCCESS;
-}
-
 extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target, cl_uint* count,
                                           const cl_icd_dispatch** out) {
   next = target;

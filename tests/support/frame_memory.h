@@ -117,9 +117,12 @@ struct OutputMemory {
         dynamic(size, layout) {}
 
   FrameOutputs views() {
-    return {
-        disparity.view(),          variance.view(), right_disparity.view(),   right_variance.view(), predicted.view(),
-        predicted_variance.view(), measured.view(), measured_variance.view(), search_width.view(),   dynamic.view()};
+    return {disparity.view(),
+            variance.view(),
+            right_disparity.view(),
+            right_variance.view(),
+            {predicted.view(), predicted_variance.view(), measured.view(), measured_variance.view(),
+             search_width.view(), dynamic.view()}};
   }
   /// All that are of floats, by name.
   std::vector<std::pair<std::string, const MapMemory<float>*>> maps() const {

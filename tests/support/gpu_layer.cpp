@@ -20,14 +20,6 @@ cl_int CL_API_CALL device_info(cl_device_id device, cl_device_info what, size_t 
 
 }  // namespace
 
-extern "C" cl_int CL_API_CALL clGetLayerInfo(cl_layer_info name, size_t size, void* value, size_t* needed) {
-  if (name != CL_LAYER_API_VERSION) return CL_INVALID_VALUE;
-  if (value && size >= sizeof(cl_layer_api_version))
-    *static_cast<cl_layer_api_version*>(value) = CL_LAYER_API_VERSION_100;
-  if (needed) *needed = sizeof(cl_layer_api_version);
-  return CL_SUCCESS;
-}
-
 extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target, cl_uint* count,
                                           const cl_icd_dispatch** out) {
   next = target;

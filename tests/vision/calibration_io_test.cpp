@@ -5,7 +5,7 @@
 
 #include <ctime>
 
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
 #include "tests/vision/temporary_folder.h"
@@ -130,7 +130,7 @@ TEST_F(CalibrationIo, AsManyKeysAsFitTakeLittleTime) {
   expect_text_refused(text + "k100000:\n", {"'k100000' was given in row 1 already"});
 }
 
-TEST(CalibrationData, RealFiles) {
+TEST(RealData, Calibrations) {
   EGOSGM_REQUIRE_DATA(data);
   const Calibration grey = read_calibration(data / "kitti2012/training/calib/000151.txt");
   EXPECT_NEAR(grey.fx, 721.5377, 1e-9);

@@ -5,8 +5,9 @@
 
 #include <set>
 
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/file_io.h"
+#include "host/vision/image_pairs.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
 #include "tests/vision/temporary_folder.h"
@@ -422,7 +423,7 @@ TEST_F(DatasetTest, PosesBelongToFrameNumbersOrPositions) {
   EXPECT_EQ(rows_of_frames(part, 8, "times.txt", "times"), (std::vector<std::size_t>{2, 3, 4}));
 }
 
-TEST(DatasetData, RealSequencesOpen) {
+TEST(RealData, SequencesOpen) {
   EGOSGM_REQUIRE_DATA(data);
   const StereoSequence scene = open_kitti_multiview(data / "kitti2012", "000151", parse_frame_range("7:10"));
   EXPECT_EQ(numbers_of(scene), (std::vector<int>{7, 8, 9, 10}));

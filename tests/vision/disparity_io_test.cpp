@@ -9,8 +9,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "host/vision/file_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
 #include "tests/vision/temporary_folder.h"
@@ -210,7 +210,7 @@ TEST(DisparityIo, WrongTypesAndNamesAreRefused) {
   expect_refused<IoError>([&] { write_disparity(folder / "none/d.png", map); }, {"none/d.png", "No such file"});
 }
 
-TEST(DisparityIo, MiddleburyTruthIsRead) {
+TEST(RealData, MiddleburyTruthIsRead) {
   EGOSGM_REQUIRE_DATA(data);
   const cv::Mat truth = read_disparity(data / "middlebury/Motorcycle/disp0GT.pfm");
   ASSERT_EQ(truth.size(), cv::Size(741, 497));

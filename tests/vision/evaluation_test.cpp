@@ -6,7 +6,8 @@
 #include <cmath>
 
 #include "egosgm/vision/disparity_io.h"
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
+#include "host/vision/pair_with_truth.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
 #include "tests/vision/temporary_folder.h"
@@ -96,7 +97,7 @@ TEST(Evaluation, DropsWhatIsUncertain) {
   EXPECT_THROW(drop_uncertain(disparity, variance.colRange(0, 3)), InvalidArgument);
 }
 
-TEST(Evaluation, GoldenFiguresOfTheDevelopmentKit) {
+TEST(RealData, GoldenFiguresOfTheDevelopmentKit) {
   EGOSGM_REQUIRE_DATA(data);
   const DisparityMetrics metrics = metrics_of(compare_disparity(read_disparity(data / "devkit2012/disp_est.png"),
                                                                 read_disparity(data / "devkit2012/disp_gt.png")));

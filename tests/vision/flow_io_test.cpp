@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "egosgm/vision/flow_io.h"
+#include "host/vision/flow_io.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cstring>
 #include <opencv2/imgcodecs.hpp>
 
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 

@@ -12,7 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 
@@ -250,21 +250,6 @@ TEST(ImageIo, StoredImagesKeepTheirDepthAndChannels) {
   EXPECT_TRUE(holds_8_bits_in_16(grey));
   EXPECT_FALSE(holds_8_bits_in_16(grey + 1));
   EXPECT_FALSE(holds_8_bits_in_16(cv::Mat(1, 2, CV_8UC1, cv::Scalar(9))));
-}
-
-TEST(ImageIo, ViewsKeepTheStride) {
-  cv::Mat image(10, 20, CV_16UC1);
-  const ImageView view = image_view(image(cv::Rect(3, 2, 5, 4)));
-  EXPECT_EQ(view.data, image.ptr<std::uint16_t>(2) + 3);
-  EXPECT_EQ(view.width, 5);
-  EXPECT_EQ(view.height, 4);
-  EXPECT_EQ(view.stride_bytes, 40);
-  EXPECT_EQ(view.type, PixelType::kU16);
-  cv::Mat map(4, 5, CV_32FC1);
-  EXPECT_EQ(map_view(map).data, map.ptr<float>());
-  EXPECT_EQ(map_view(map).stride_bytes, 20);
-  expect_refused([&] { image_view(map); }, {"CV_8UC1"});
-  expect_refused([&] { map_view(image); }, {"CV_32FC1"});
 }
 
 std::string jpeg_of(const cv::Mat& image, const std::vector<int>& parameters = {}) {

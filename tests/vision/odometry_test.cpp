@@ -16,6 +16,7 @@
 
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
 #include "egosgm/vision/synthetic.h"
 #include "host/vision/odometry_geometry.h"
@@ -407,7 +408,7 @@ TEST(StereoOdometry, RefusesWhatItCannotUse) {
       << "a refused call changes nothing";
 }
 
-TEST(StereoOdometry, KittiOdometryExcerpt) {
+TEST(RealData, KittiOdometryExcerpt) {
   EGOSGM_REQUIRE_DATA(data);
   const auto folder = data / "odometry" / "sequences" / "A";
   const auto poses = read_poses(folder / "poses.txt");

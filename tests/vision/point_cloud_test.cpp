@@ -9,7 +9,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/image.h"
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 #include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {

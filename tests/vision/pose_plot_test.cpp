@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "egosgm/vision/pose_plot.h"
+#include "host/vision/pose_plot.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "egosgm/vision/file_io.h"
+#include "host/vision/file_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
 #include "tests/vision/temporary_folder.h"
@@ -78,7 +78,7 @@ TEST(PosesIo, BadRowsAreNamed) {
   expect_refused<IoError>([&] { write_poses(folder / "none/poses.txt", {}); }, {"none/poses.txt", "No such file"});
 }
 
-TEST(PosesIo, RealPoses) {
+TEST(RealData, Poses) {
   EGOSGM_REQUIRE_DATA(data);
   const auto poses = read_poses(data / "odometry/sequences/A/poses.txt");
   ASSERT_EQ(poses.size(), 51u);

@@ -7,8 +7,8 @@
 #include <opencv2/calib3d.hpp>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/synthetic.h"
+#include "host/vision/file_io.h"
 #include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "egosgm/image.h"
+#include "host/vision/picture_sheet.h"
 #include "tests/support/expect_refused.h"
 
 namespace egosgm::vision {

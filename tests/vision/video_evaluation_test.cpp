@@ -8,6 +8,7 @@
 #include <string>
 
 #include "egosgm/vision/disparity_io.h"
+#include "host/vision/video_order.h"
 #include "tests/support/expect_refused.h"
 
 namespace egosgm::vision {

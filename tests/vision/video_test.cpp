@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/synthetic.h"
 #include "host/method_options.h"
 

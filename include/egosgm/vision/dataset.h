@@ -6,7 +6,6 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "egosgm/calibration.h"
@@ -77,18 +76,6 @@ EGOSGM_EXPORT StereoSequence open_middlebury(const std::filesystem::path& folder
 EGOSGM_EXPORT StereoSequence open_patterns(const std::string& left, const std::string& right,
                                            const std::filesystem::path& calibration_file, FrameRange range = {},
                                            PairBy pair_by = PairBy::kName);
-
-struct ImagePairs {
-  std::vector<std::pair<std::filesystem::path, std::filesystem::path>> pairs;  // left and right, in order
-  std::vector<std::filesystem::path> alone;                                    // without one of the other camera
-};
-
-/// The files that belong together by open_patterns' rules, of any kind and size. Throws as it does, but for files
-/// without a partner. Thread-safe.
-EGOSGM_EXPORT ImagePairs find_pairs(const std::string& left, const std::string& right, PairBy pair_by = PairBy::kName);
-
-/// The files that one pattern names, in order. Throws as open_patterns. Thread-safe.
-EGOSGM_EXPORT std::vector<std::filesystem::path> find_images(const std::string& pattern);
 
 /// Opens `folder` as whichever of KITTI odometry, KITTI raw or Middlebury it is.
 EGOSGM_EXPORT StereoSequence open_folder(const std::filesystem::path& folder, FrameRange range = {});

@@ -41,10 +41,4 @@ EGOSGM_EXPORT cv::Size read_image_size(const std::filesystem::path& file);
 /// or an empty image. Thread-safe for different files.
 EGOSGM_EXPORT void write_png(const std::filesystem::path& file, const cv::Mat& image);
 
-/// The core's view of a cv::Mat; the Mat must outlive it. Throws InvalidArgument unless CV_8UC1 or CV_16UC1.
-EGOSGM_EXPORT ImageView image_view(const cv::Mat& grey);
-
-/// The core's view of a CV_32FC1 map that it is to fill. Throws InvalidArgument for another type.
-EGOSGM_EXPORT MapView<float> map_view(cv::Mat& map);
-
 }  // namespace egosgm::vision

@@ -3,7 +3,6 @@
 
 #include <opencv2/core.hpp>
 #include <string>
-#include <vector>
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
@@ -47,14 +46,6 @@ EGOSGM_EXPORT cv::Mat error_bar(int width);
 
 /// Grey (8 or 16 bit; 16 bit is stretched to its own maximum) as BGR.
 EGOSGM_EXPORT cv::Mat color_grey(const cv::Mat& grey);
-
-struct CaptionedPicture {
-  cv::Mat picture;      // CV_8UC3
-  std::string caption;  // ASCII; empty: none
-};
-
-/// Pictures in rows of `columns`, each scaled down to `cell_width` if wider, its caption above it.
-EGOSGM_EXPORT cv::Mat compose(const std::vector<CaptionedPicture>& pictures, int columns, int cell_width);
 
 /// Depth [m] = fx * baseline_m / (d + doffs_px), CV_32FC1; kInvalidDisparity where the disparity is invalid or d +
 /// doffs_px <= 0.

@@ -61,8 +61,4 @@ EGOSGM_EXPORT VideoEvaluation evaluate_video(const Video& video, const VideoEval
 EGOSGM_EXPORT cv::Mat move_map(const cv::Mat& disparity, const Calibration& calibration,
                                const Eigen::Isometry3d& current_from_previous);
 
-/// Whether each file name is of the frame after the one before it: only the last number in them differs, by no more
-/// than one and a half times the median of such differences (a larger one is a gap). Thread-safe.
-EGOSGM_EXPORT std::vector<bool> find_successors(const std::vector<std::string>& names);
-
 }  // namespace egosgm::vision

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+// What belongs to the frames of an opened sequence: images, rows of files, poses.
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/dataset.h"
+#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/poses_io.h"
+
+namespace egosgm::vision {
+
+namespace fs = std::filesystem;
+
+StereoImages read_images(const StereoFrame& frame) {
+  StereoImages images{read_grey_image(frame.left), read_grey_image(frame.right)};
+  const auto describe_image = [](const cv::Mat& image) {
+    return std::to_string(image.cols) + "x" + std::to_string(image.rows) + ", " +
+           std::to_string(8 * image.elemSize1()) + " bit";
+  };
+  if (images.left.size() != images.right.size() || images.left.type() != images.right.type()) {
+    throw InvalidArgument(frame.right.string() + ": " + describe_image(images.right) + ", but its left image " +
+                          frame.left.string() + " has " + describe_image(images.left) + "; give a rectified pair");
+  }
+  return images;
+}
+
+cv::Size check_image_sizes(const StereoSequence& sequence) {
+  std::optional<cv::Size> expected;
+  for (const StereoFrame& frame : sequence.frames) {
+    for (const fs::path& file : {frame.left, frame.right}) {
+      const cv::Size size = read_image_size(file);
+      if (!expected) expected = size;
+      if (size == *expected) continue;
+      throw InvalidArgument(file.string() + ": " + std::to_string(size.width) + "x" + std::to_string(size.height) +
+                            ", but the sequence began with " + std::to_string(expected->width) + "x" +
+                            std::to_string(expected->height) + "; select frames of one size with --frames");
+    }
+  }
+  return expected.value_or(cv::Size());
+}
+
+std::vector<std::size_t> rows_of_frames(const StereoSequence& sequence, std::size_t rows, const fs::path& file,
+                                        const std::string& what) {
+  const std::vector<StereoFrame>& frames = sequence.frames;
+  const std::vector<int>& all = sequence.numbers;
+  const auto by = [&](const auto& row_of) {
+    std::vector<std::size_t> found;
+    for (const StereoFrame& frame : frames) found.push_back(static_cast<std::size_t>(row_of(frame)));
+    return found;
+  };
+  const auto number = [](const StereoFrame& frame) { return frame.number; };
+  const auto up_to_last = static_cast<std::size_t>((all.empty() ? frames.back().number : all.back())) + 1;
+  if (rows == up_to_last) return by(number);
+  if (!all.empty() && rows == all.size()) {
+    return by(
+        [&](const StereoFrame& frame) { return std::lower_bound(all.begin(), all.end(), frame.number) - all.begin(); });
+  }
+  if (rows == frames.size()) return by([&](const StereoFrame& frame) { return &frame - frames.data(); });
+  if (all.empty() && rows > up_to_last) return by(number);
+  const auto range = [](int first, int last) {
+    return first == last ? std::to_string(first) : std::to_string(first) + ".." + std::to_string(last);
+  };
+  std::string fitting = std::to_string(up_to_last) + " (each number from 0)";
+  if (!all.empty() && all.size() != up_to_last) {
+    fitting += ", " + std::to_string(all.size()) + " (each frame of " + range(all.front(), all.back()) + ")";
+  }
+  if (frames.size() != up_to_last && frames.size() != all.size()) {
+    fitting += ", " + std::to_string(frames.size()) + " (each chosen frame, " +
+               range(frames.front().number, frames.back().number) + ")";
+  }
+  throw InvalidArgument(file.string() + ": holds " + std::to_string(rows) + " " + what +
+                        ", which belong to no choice of the frames; it may hold " + fitting);
+}
+
+std::vector<Eigen::Isometry3d> poses_of_frames(const StereoSequence& sequence, const fs::path& poses_file) {
+  const std::vector<Eigen::Isometry3d> rows = read_poses(poses_file);
+  std::vector<Eigen::Isometry3d> poses;
+  for (const std::size_t row : rows_of_frames(sequence, rows.size(), poses_file, "poses")) poses.push_back(rows[row]);
+  return poses;
+}
+
+}  // namespace egosgm::vision

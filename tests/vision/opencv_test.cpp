@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "egosgm/vision/opencv.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "egosgm/vision/synthetic.h"
+#include "tests/support/expect_refused.h"
+
+namespace egosgm::vision {
+namespace {
+
+using testing::expect_refused;
+
+bool same_bits(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() && a.isContinuous() && b.isContinuous() &&
+         std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
+}
+
+// A part of a larger image has rows that are not continuous.
+TEST(OpenCv, ProcessGivesTheMapsOfThePipeline) {
+  const SyntheticSequence street({.frames = 2, .width = 96, .height = 40, .supersampling = 1});
+  PipelineOptions options;
+  options.disparities = 32;
+  Pipeline pipeline(street.calibration(), 96, 40, options), expected(street.calibration(), 96, 40, options);
+  for (int k = 0; k < 2; ++k) {
+    const SyntheticFrame frame = street.render(k);
+    const std::optional<Motion> motion = k > 0 ? std::optional(street.motion(k)) : std::nullopt;
+    cv::Mat disparity(40, 96, CV_32FC1), variance(40, 96, CV_32FC1), large(50, 200, CV_8UC1);
+    FrameOutputs outputs;
+    outputs.disparity = map_view(disparity);
+    outputs.variance = map_view(variance);
+    expected.process(image_view(frame.left), image_view(frame.right), motion, outputs);
+    const cv::Mat left = large(cv::Rect(3, 4, 96, 40)), right = large(cv::Rect(101, 7, 96, 40));
+    frame.left.copyTo(left);
+    frame.right.copyTo(right);
+    const FrameMaps maps = process(pipeline, left, right, motion);
+    EXPECT_TRUE(same_bits(maps.disparity, disparity)) << "frame " << k;
+    EXPECT_TRUE(same_bits(maps.variance, variance)) << "frame " << k;
+    EXPECT_EQ(maps.report.unpredicted, k > 0 ? Unpredicted::kNo : Unpredicted::kFirstFrame);
+  }
+  expect_refused([&] { process(pipeline, cv::Mat(), cv::Mat(), {}); }, {"left image: no data"});
+  expect_refused([&] { process(pipeline, cv::Mat(40, 96, CV_8UC3), cv::Mat(40, 96, CV_8UC3), {}); }, {"CV_8UC1"});
+  expect_refused([&] { process(pipeline, cv::Mat(41, 96, CV_8UC1), cv::Mat(41, 96, CV_8UC1), {}); }, {"96x41"});
+}
+
+TEST(OpenCv, ViewsKeepTheStride) {
+  cv::Mat image(10, 20, CV_16UC1);
+  const ImageView view = image_view(image(cv::Rect(3, 2, 5, 4)));
+  EXPECT_EQ(view.data, image.ptr<std::uint16_t>(2) + 3);
+  EXPECT_EQ(view.width, 5);
+  EXPECT_EQ(view.height, 4);
+  EXPECT_EQ(view.stride_bytes, 40);
+  EXPECT_EQ(view.type, PixelType::kU16);
+  cv::Mat map(4, 5, CV_32FC1);
+  EXPECT_EQ(map_view(map).data, map.ptr<float>());
+  EXPECT_EQ(map_view(map).stride_bytes, 20);
+  expect_refused([&] { image_view(map); }, {"CV_8UC1"});
+  expect_refused([&] { map_view(image); }, {"CV_32FC1"});
+}
+
+}  // namespace
+}  // namespace egosgm::vision
