@@ -23,8 +23,8 @@
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/opencv.h"
-#include "host/vision/file_io.h"
 #include "egosgm/vision/window.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

@@ -8,10 +8,8 @@ namespace egosgm::python {
 namespace py = pybind11;
 
 void bind_errors(py::module_& module) {
-  const auto error = py::reinterpret_steal<py::object>(PyErr_NewExceptionWithDoc(
-      "egosgm.Error", "What all errors of this library have in common.", PyExc_Exception, nullptr));
-  if (!error) throw py::error_already_set();
-  module.attr("Error") = error;
+  const py::exception<Error> error(module, "Error");
+  error.doc() = "What all errors of this library have in common.";
   const auto also = [&](PyObject* builtin) { return py::make_tuple(error, py::handle(builtin)); };
   py::register_exception<InvalidArgument>(module, "InvalidArgument", also(PyExc_ValueError)).doc() =
       "What the caller gave cannot be used: an image, a calibration, an option, a file. The text names the value and "

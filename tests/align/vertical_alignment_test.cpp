@@ -165,6 +165,8 @@ INSTANTIATE_TEST_SUITE_P(Sizes, VerticalAlignmentTest,
                                             ::testing::Values(PixelType::kU8, PixelType::kU16),
                                             ::testing::Values(1, 8)),
                          name);
+INSTANTIATE_TEST_SUITE_P(Large, VerticalAlignmentTest,
+                         ::testing::Values(std::tuple{testing::kLargest, PixelType::kU8, 8}), name);
 
 constexpr shared::ImageSize kSize{320, 97};
 

@@ -96,6 +96,7 @@ TEST_P(KalmanUpdateTest, UpdatesTheLeftViewAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, KalmanUpdateTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, KalmanUpdateTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(KalmanUpdate, WeighsByTheVariances) {
   EXPECT_EQ(update_pixel({}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));

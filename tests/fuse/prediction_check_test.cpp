@@ -64,6 +64,7 @@ TEST_P(PredictionCheckTest, EqualsReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, PredictionCheckTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, PredictionCheckTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 /// 100 pixels, of a row that is looked at: `predicted` of them have a prediction of 10, `differing` of these a
 /// measurement of 12, and the first `filled` were not warped.

@@ -62,6 +62,7 @@ TEST_P(SadCheckTest, EqualsReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, SadCheckTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, SadCheckTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 /// A ramp of `step` a column, the same scene in both views with disparity 3.
 struct Scene {

@@ -62,6 +62,9 @@ INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
                                                               MatchingCost::kCensus5x5, MatchingCost::kSad3x3),
                                             ::testing::Values(1, 16)),
                          name);
+INSTANTIATE_TEST_SUITE_P(Large, CensusTest,
+                         ::testing::Values(std::tuple{testing::kLargest, PixelType::kU8, MatchingCost::kCensus13x11, 16}),
+                         name);
 
 }  // namespace
 }  // namespace egosgm

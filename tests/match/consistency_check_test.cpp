@@ -63,6 +63,7 @@ TEST_P(ConsistencyCheckTest, EqualsReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, ConsistencyCheckTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, ConsistencyCheckTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(ConsistencyCheck, KeepsWhatBothViewsSee) {
   EXPECT_EQ(check_row({kNone, kNone, 2, 2}, {2, 2, kNone, kNone}, 1),

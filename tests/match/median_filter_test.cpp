@@ -75,6 +75,7 @@ TEST_P(MedianFilterTest, FiltersTheLeftViewAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, MedianFilterTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, MedianFilterTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(MedianFilter, TakesTheMiddleOfEveryOrder) {
   std::vector<float> window{1, 2, 3, 4, 5, 6, 7, 8, 9};

@@ -72,6 +72,7 @@ TEST_P(SpeckleRemovalTest, LooksAtTheLeftViewAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, SpeckleRemovalTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, SpeckleRemovalTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 /// Both views as drawn: a digit is a disparity of ten times its value, a dot none.
 HostMaps drawn(const std::vector<std::string>& rows) {

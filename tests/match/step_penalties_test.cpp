@@ -68,6 +68,7 @@ TEST_P(StepPenaltiesTest, AreWrittenOfTheLeftViewAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, StepPenaltiesTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, StepPenaltiesTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(StepPenalties, FallWithTheStepInGrey) {
   const std::vector<std::uint8_t> steps = penalties({3, 2}, {10, 40, 240, 10, 30, 35, 0, 0, 0, 0, 0, 0}, PixelType::kU8,

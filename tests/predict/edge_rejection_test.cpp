@@ -48,6 +48,7 @@ TEST_P(EdgeRejectionTest, EqualsReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, EdgeRejectionTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, EdgeRejectionTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(EdgeRejection, DropsBothSidesOfAJump) {
   EXPECT_EQ(reject_row({10, 10, 10, 10, 30, 30, 30}, 5), (std::vector<float>{10, 10, 10, kNone, kNone, 30, 30}));

@@ -129,6 +129,7 @@ TEST_P(ForwardWarpTest, PredictsTheLeftViewAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, ForwardWarpTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, ForwardWarpTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(ForwardWarp, WithoutMotionOnlyTheVarianceGrows) {
   const testing::HostMaps belief = testing::random_maps(kSize, 0, 63, 0.2, 13);

@@ -89,6 +89,7 @@ TEST_P(HoleFillTest, OfAViewThatIsNotTrackedItFillsDisparities) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, HoleFillTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, HoleFillTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(HoleFill, FillsAGapWithTheMeanAndTheLargerVariance) {
   for (const shared::ImageSize size : {shared::ImageSize{3, 1}, shared::ImageSize{1, 3}}) {

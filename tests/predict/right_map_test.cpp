@@ -77,6 +77,7 @@ TEST_P(RightMapTest, EqualsReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, RightMapTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, RightMapTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(RightMap, LandsOnTheNearestPixelWithTheVarianceOfItsSource) {
   const testing::HostMaps right = right_row({kNone, kNone, 2, 1.25f, 0.75f, kNone}, Row(6, kNone));

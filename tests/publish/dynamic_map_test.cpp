@@ -40,6 +40,7 @@ TEST_P(DynamicMapTest, EqualsReference) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, DynamicMapTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, DynamicMapTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(DynamicMap, MarksAnObjectAndNotSingleMismatches) {
   const shared::ImageSize size{60, 40};

@@ -140,6 +140,7 @@ TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, SearchBandTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+INSTANTIATE_TEST_SUITE_P(Large, SearchBandTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 /// Two views of `size` without a prediction.
 HostMaps nothing(shared::ImageSize size) {

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm doctor: sequences that are broken in just one way. Environment as for program_case.py."""
+import pathlib
+import unittest
+
+import numpy
+
+from input_case import InputTest, read_grey, sampled, write_grey
+from program_case import DATA, FRAMES, HEIGHT, WIDTH, egosgm, png
+
+
+class Doctor(InputTest):
+    def test_a_sound_sequence_has_no_problem(self):
+        findings = self.examine(self.street)
+        self.assertEqual(list(findings), ["images", "calibration", "rows", "sides", "range", "times"])
+        self.assertLess(abs(float(findings["rows"]["text"].split()[2])), 0.1)
+        text = self.assert_works("doctor", "--odometry", self.street)
+        self.assertTrue(text.endswith("No problem was found.\n"))
+        self.assertIn("baseline 0.54 m", text)
+        self.assertIn(f" {FRAMES} pairs of ", text)
+        self.assertIn(" 1 pair of ", self.assert_works("doctor", "--odometry", self.street, "--frames", "0"))
+
+    def test_values_of_8_bits_in_16(self):
+        for factor in (1, 257):
+            street = self.broken_street()
+            for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+                rows = (read_grey(file).astype(">u2") * factor).astype(">u2")
+                file.write_bytes(png(WIDTH, HEIGHT, 16, (row.tobytes() for row in rows)))
+            said = self.assert_works("run", "--odometry", street, "--out", street.parent / "out")
+            if factor == 1:
+                self.assertIn("no value above 255", self.assert_only_problem("images", street)["text"])
+                self.assertIn("values of 8 bits in images of 16: `egosgm doctor", said)
+            else:
+                self.assertEqual(self.examine(street)["images"]["verdict"], "ok")
+                self.assertNotIn("doctor", said)
+
+    def shifted(self, shift_px):
+        street = self.broken_street()
+        for file in (street / "image_1").iterdir():
+            image = read_grey(file)
+            y, x = numpy.mgrid[0:HEIGHT, 0:WIDTH]
+            write_grey(file, sampled(image, x.astype(float), y - shift_px))
+        return street
+
+    def test_a_vertical_misalignment_is_measured(self):
+        for shift in (0.7, -3.0):
+            finding = self.assert_only_problem("rows", self.shifted(shift))
+            self.assertAlmostEqual(float(finding["text"].split()[2]), shift, delta=0.07)
+            self.assertIn(f"{abs(shift):.1f} px: rectify again", finding["remedy"])
+
+    def test_a_turned_camera_is_measured(self):
+        street = self.broken_street()
+        for file in (street / "image_1").iterdir():
+            y, x = numpy.mgrid[0:HEIGHT, 0:WIDTH]
+            write_grey(file, sampled(read_grey(file), x.astype(float), y - 8 * (x / WIDTH - 0.5)))
+        finding = self.assert_only_problem("rows", street)
+        self.assertAlmostEqual(float(finding["text"].split(" px from left to right")[0].split()[-1]), 8, delta=0.5)
+
+    def test_swapped_sides(self):
+        finding = self.assert_only_problem("sides", "--left", self.street / "image_1/%06d.png", "--right", self.street / "image_0/%06d.png",
+                                           "--calib", self.street / "calib.txt")
+        self.assertIn("swapped", finding["remedy"])
+
+    def test_wrong_sign_and_unit_of_the_baseline(self):
+        street = self.broken_street()
+        f, cx, cy, baseline = self.calibration()
+        (street / "calib.txt").write_text(f"fx = {f}\nfy = {f}\ncx = {cx}\ncy = {cy}\nbaseline_m = {-baseline}\n")
+        self.assertIn("exchange", self.assert_only_problem("calibration", street)["remedy"])
+        (street / "calib.txt").write_text(f"fx = {f}\nfy = {f}\ncx = {cx}\ncy = {cy}\nbaseline_m = {1000 * baseline}\n")
+        self.assertIn("millimetres", self.assert_only_problem("calibration", street)["remedy"])
+        (street / "calib.txt").write_text(f"fx = {2 * f}\nfy = {2 * f}\ncx = {2 * cx}\ncy = {2 * cy}\nbaseline_m = {baseline}\n")
+        self.assertIn("scale", self.assert_only_problem("calibration", street)["remedy"])
+
+    def test_a_range_that_clips_and_its_remedy(self):
+        for least, too_few in ((0, 8), (-40, 45)):
+            finding = self.assert_only_problem("range", self.street, "--min-disparity", least, "--disparities", too_few)
+            enough = int(finding["remedy"].split()[-1])
+            self.assertEqual(enough % 16, 0)
+            self.assertNotEqual(self.examine(self.street, "--min-disparity", least, "--disparities", enough)["range"]["verdict"], "problem")
+        finding = self.assert_only_problem("range", self.street, "--min-disparity", 4)
+        self.examine(self.street, "--min-disparity", finding["remedy"].split()[-1])
+        self.assertIn("faster", self.examine(self.street, "--disparities", 512)["range"]["remedy"])
+
+    def test_gaps_in_time(self):
+        street = self.broken_street()
+        (street / "times.txt").write_text("0\n0.1\n0.2\n0.7\n")
+        finding = self.assert_only_problem("times", street)
+        self.assertIn("0.5 s after frame 000002", finding["text"])
+        self.assertIn("--frames :2 and --frames 3:", finding["remedy"])
+        (street / "times.txt").write_text("0\n0.1\n0.05\n0.15\n")
+        self.assertIn("goes back", self.assert_only_problem("times", street)["text"])
+        rows = [f"2011-09-{day} {clock}" for day, clock in ((30, "23:59:59.950"), (30, "23:59:59.975"))] + ["2011-10-01 00:00:00.000", "2011-10-01 00:00:00.025"]
+        (street / "times.txt").write_text("\n".join(rows))
+        self.assertIn("0.025 s", self.examine(street)["times"]["text"])
+        (street / "times.txt").write_text("0\n0.1\n")
+        self.assertIn("times.txt: holds 2 times", self.assert_only_problem("times", street)["text"])
+        (street / "times.txt").write_text("0\n0.1\nnoon\n0.3\n")
+        self.assertIn(":3: 'noon'", self.assert_only_problem("times", street)["text"])
+        (street / "times.txt").unlink()
+        (street.parent / "times.txt").write_text("0\n0.1\n")  # another one's
+        self.assertEqual(self.examine(street)["times"]["verdict"], "note")
+
+    def test_images_of_other_moments_or_of_nothing(self):
+        street = self.broken_street()
+        for file in (street / "image_1").iterdir():
+            write_grey(file, numpy.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH)))
+        self.assert_only_problem("matches", street)
+        for file in (street / "image_1").iterdir():
+            write_grey(file, numpy.full((HEIGHT, WIDTH), 60))
+        self.assert_only_problem("matches", street)
+
+    def test_wrong_arguments(self):
+        self.assert_refused(["doctor", self.street, "--samples", 0], "--samples 0")
+        self.assert_refused(["doctor", self.street, "--disparities", 0], "disparities")
+        self.assert_refused(["doctor", self.folder / "nowhere"], "nowhere")
+
+
+@unittest.skipUnless(DATA and pathlib.Path(DATA).is_dir(), "no real data")
+class DoctorOnRealData(InputTest):
+    def test_kitti_and_middlebury_are_sound(self):
+        data = pathlib.Path(DATA)
+        for arguments in (["--odometry", data / "odometry/sequences/A"], ["--kitti", data / "kitti2012/training", "--scene", "000151"],
+                          ["--kitti", data / "kitti2015/training", "--scene", "000002"], [data / "middlebury/Motorcycle"]):
+            findings = self.examine(*arguments)
+            self.assertEqual(findings["rows"]["verdict"], "ok")
+            self.assertEqual(findings["sides"]["verdict"], "ok")
+
+
+if __name__ == "__main__":
+    unittest.main()
