@@ -24,6 +24,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("consistency.measurement_px", o.consistency.measurement_px);
   visit("consistency.update_px", o.consistency.update_px);
   visit("consistency.read_off_px", o.consistency.read_off_px);
+  visit("consistency.keep_unseen", o.consistency.keep_unseen);
   visit("coarse_match.enabled", o.coarse_match.enabled);
   visit("coarse_match.p1", o.coarse_match.p1);
   visit("coarse_match.p2", o.coarse_match.p2);
@@ -48,6 +49,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("banded_sgm.variance_floor_px2", o.banded_sgm.variance_floor_px2);
   visit("banded_sgm.variance_per_step_px2", o.banded_sgm.variance_per_step_px2);
   visit("banded_sgm.variance_per_square_px2", o.banded_sgm.variance_per_square_px2);
+  visit("banded_sgm.doubts_band_ends", o.banded_sgm.doubts_band_ends);
   visit("banded_sgm.scheduling", o.banded_sgm.scheduling);
   visit("banded_sgm.max_memory_mib", o.banded_sgm.max_memory_mib);
   visit("median_filter.enabled", o.median_filter.enabled);
@@ -89,12 +91,23 @@ void for_each_chosen(Options& o, Method& m, Visit&& visit) {
   visit(o.gate_px, m.kalman_update.gate_px);
 }
 
-/// What the paper's preset chooses that users do not.
+/// What the paper's preset chooses that users do not (docs/paper.md).
 void choose_as_the_paper(MethodOptions& method) {
   method.forward_warp.motion_noise = 0.0f;
   method.edge_rejection.max_jump_px = 3.0f;
+  method.consistency.keep_unseen = false;
   method.search_band.from_neighbours = false;
+  method.banded_sgm.p2_slope = 0;
+  // r = n_l + n_r.
+  method.banded_sgm.s_max = 10;
+  method.banded_sgm.variance_floor_px2 = 1e-6f;
+  method.banded_sgm.variance_per_step_px2 = 1.0f;
+  method.banded_sgm.variance_per_square_px2 = 0.0f;
+  method.banded_sgm.doubts_band_ends = false;
+  method.median_filter.enabled = false;
   method.kalman_update.ask_neighbours = false;
+  method.kalman_update.min_variance_px2 = 0.0f;
+  method.sad_check.max_difference = 20.0f;
   method.prediction_check.enabled = false;
   method.output_variance.enabled = false;
 }

@@ -28,6 +28,7 @@ struct HoleFillOptions {
 struct ConsistencyCheckOptions {
   float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
   float read_off_px = 1.45f;  // of the measurement, where the right view is read off, unless predictions were wrong
+  bool keep_unseen = true;    // of prediction and update: what the other camera cannot see stays
 };
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
@@ -56,6 +57,7 @@ struct BandedSgmOptions {
   int s_max = 80;
   float variance_floor_px2 = 0.15f;
   float variance_per_step_px2 = 0.1f, variance_per_square_px2 = 0.045f;
+  bool doubts_band_ends = true;  // where the sums fall on beyond the end of a band, r is that of what is doubtful
   Scheduling scheduling = Scheduling::kAutomatic;
   // Memory for the path sums. An image that needs more is matched in horizontal stripes that overlap by 32 rows, almost
   // as well (docs/reliability.md). 0: what the device has.
@@ -77,7 +79,7 @@ struct SpeckleRemovalOptions {
   float max_difference_px = 2.0f;  // neighbours within this belong to one region
 };
 struct KalmanUpdateOptions {
-  float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: no gate
+  float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: never
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   bool ask_neighbours = true;  // which of the two they speak for, instead; and whether all of them move
   float min_variance_px2 = 0.02f;

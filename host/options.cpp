@@ -170,6 +170,10 @@ PipelineOptions PipelineOptions::paper() {
   options.min_half_width_px = 0.0f;
   options.coarse_match = false;
   options.gate_px = 0.0f;
+  options.vertical_alignment = false;
+  options.max_speckle_px = 0;
+  options.cost = MatchingCost::kSad3x3;
+  options.p2 = 120;
   return options;
 }
 

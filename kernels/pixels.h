@@ -59,15 +59,17 @@ static inline Floats load_pixels(global const float* row, const int x, const int
 #endif
 }
 
-// Lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of loads that may be joined.
-static inline Floats gather(volatile global const float* row, const Ints x) {
+// Values of a row at places x, lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of
+// loads that may be joined.
 #if PIXELS == 1
-  return row[x];
+#define GATHERED(Values, row, x) ((Values)((row)[x]))
 #else
-  return (float16)(row[x.s0], row[x.s1], row[x.s2], row[x.s3], row[x.s4], row[x.s5], row[x.s6], row[x.s7], row[x.s8],
-                   row[x.s9], row[x.sa], row[x.sb], row[x.sc], row[x.sd], row[x.se], row[x.sf]);
+#define GATHERED(Values, row, x)                                                                                   \
+  ((Values)((row)[(x).s0], (row)[(x).s1], (row)[(x).s2], (row)[(x).s3], (row)[(x).s4], (row)[(x).s5], (row)[(x).s6], \
+            (row)[(x).s7], (row)[(x).s8], (row)[(x).s9], (row)[(x).sa], (row)[(x).sb], (row)[(x).sc], (row)[(x).sd], \
+            (row)[(x).se], (row)[(x).sf]))
 #endif
-}
+static inline Floats gather(volatile global const float* row, const Ints x) { return GATHERED(Floats, row, x); }
 
 // Writes pixels x .. x + PIXELS - 1, as far as the row goes. REQUIRES: x lies in it.
 static inline void store_pixels(const Floats pixels, global float* row, const int x, const int width) {

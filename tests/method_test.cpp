@@ -40,6 +40,11 @@ TEST(Method, BuildsWhatItsOptionsNeed) {
   EXPECT_TRUE(Built().has("output_variance.cl"));
   EXPECT_FALSE(Built([](auto& o) { o.output_variance.enabled = false; }).has("output_variance.cl"));
   EXPECT_TRUE(Built().has("dynamic_map.cl"));
+  const Built paper([](auto& o) { o = MethodOptions(PipelineOptions::paper()); });
+  EXPECT_TRUE(paper.has("sad_check.cl"));
+  for (const char* file : {"coarse_match.cl", "median_filter.cl", "vertical_alignment.cl", "output_variance.cl"}) {
+    EXPECT_FALSE(paper.has(file)) << file;
+  }
   const Built alone([](auto& o) { o.temporal = false; });
   for (const char* file : {"dynamic_map.cl", "forward_warp.cl", "kalman_update.cl", "coarse_match.cl"}) {
     EXPECT_FALSE(alone.has(file)) << file;

@@ -28,8 +28,15 @@ Texts parameters(const MethodOptions& method) { return texts(list_parameters(met
 
 /// Another value that an option whose value is `text` can take; by way of what it is.
 std::string another_value(const std::string& text) {
-  static const Texts kOthers{{"true", "false"},      {"false", "true"},    {"band", "full"}, {"census9x7", "census5x5"},
-                             {"automatic", "paths"}, {"default", "paper"}, {"8", "4"},       {"4", "8"}};
+  static const Texts kOthers{{"true", "false"},
+                             {"false", "true"},
+                             {"band", "full"},
+                             {"census9x7", "census5x5"},
+                             {"sad3x3", "census5x5"},
+                             {"automatic", "paths"},
+                             {"default", "paper"},
+                             {"8", "4"},
+                             {"4", "8"}};
   if (const auto found = kOthers.find(text); found != kOthers.end()) return found->second;
   return text.find('.') == std::string::npos ? std::to_string(std::stoi(text) + 3) : text + "5";
 }
@@ -212,17 +219,39 @@ TEST(Options, PresetsAreValid) {
 
 TEST(Options, PaperChoosesAsThePaperDoes) {
   const MethodOptions paper = PipelineOptions::paper();
-  EXPECT_FALSE(paper.search_band.from_neighbours) << "unpredicted pixels search everything";
-  EXPECT_EQ(paper.search_band.sigmas, 3);
-  EXPECT_EQ(paper.search_band.min_half_width_px, 0);
+  EXPECT_TRUE(paper.temporal);
+  EXPECT_TRUE(paper.track_right) << "both views are predicted,";
+  EXPECT_FALSE(paper.consistency.keep_unseen) << "and what one camera alone can see is dropped";
   EXPECT_GT(paper.forward_warp.process_noise_px2, 0) << "a constant q,";
   EXPECT_EQ(paper.forward_warp.motion_noise, 0) << "and nothing else";
-  EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged,";
-  EXPECT_FALSE(paper.output_variance.enabled) << "the variance is the filter's";
-  EXPECT_EQ(paper.banded_sgm.paths, 8);
+  EXPECT_GT(paper.edge_rejection.max_jump_px, 0) << "predictions beside jumps are dropped";
+  EXPECT_GT(paper.hole_fill.max_difference_px, 0) << "and gaps filled";
+
   EXPECT_EQ(paper.search, SearchMode::kBand);
-  EXPECT_TRUE(paper.temporal);
-  EXPECT_TRUE(paper.track_right);
+  EXPECT_EQ(paper.search_band.sigmas, 3);
+  EXPECT_EQ(paper.search_band.min_half_width_px, 0);
+  EXPECT_FALSE(paper.search_band.from_neighbours) << "unpredicted pixels search everything";
+  EXPECT_FALSE(paper.coarse_match.enabled);
+
+  EXPECT_EQ(paper.banded_sgm.cost, MatchingCost::kSad3x3) << "a window of 3x3";
+  EXPECT_EQ(paper.banded_sgm.paths, 8);
+  EXPECT_EQ(paper.banded_sgm.p2_slope, 0) << "one P2";
+  EXPECT_EQ(paper.banded_sgm.s_max, 10);
+  EXPECT_LT(paper.banded_sgm.variance_floor_px2, 1e-5f) << "r = n_l + n_r,";
+  EXPECT_EQ(paper.banded_sgm.variance_per_step_px2, 1);
+  EXPECT_EQ(paper.banded_sgm.variance_per_square_px2, 0);
+  EXPECT_FALSE(paper.banded_sgm.doubts_band_ends) << "at the end of a band too";
+  EXPECT_FALSE(paper.median_filter.enabled);
+  EXPECT_EQ(paper.speckle_removal.max_size_px, 0);
+  EXPECT_FALSE(paper.vertical_alignment.enabled);
+
+  EXPECT_EQ(paper.kalman_update.gate_px, 0) << "all is averaged,";
+  EXPECT_FALSE(paper.kalman_update.ask_neighbours) << "whatever is around";
+  EXPECT_EQ(paper.kalman_update.min_variance_px2, 0);
+  EXPECT_TRUE(paper.kalman_update.keep_predicted);
+  EXPECT_FALSE(paper.prediction_check.enabled);
+  EXPECT_GT(paper.sad_check.max_difference, 0) << "and what the images do not confirm is dropped";
+  EXPECT_FALSE(paper.output_variance.enabled) << "the variance is the filter's";
 }
 
 TEST(Options, RangesEndWhereTheyAreSaidTo) {

@@ -6,8 +6,9 @@
   python3 bench/accuracy --ego-motion         the table of stereo odometry alone: drift, error, time, and what it is worth to the disparities
   python3 bench/accuracy --ablation           every correction on and off, on four kinds of input apart
   python3 bench/accuracy --video              over time: beside the single frame, OpenCV and its maps averaged in time; wrong motions, dropped frames
-  python3 bench/accuracy --kitti2015 DIR --scenes 84,87,130,146,148 --frames 0:10
-                                      the table of Fucek et al. (IFAC 2017) on KITTI 2015's multi-view data
+  python3 bench/accuracy --paper      the table of Fucek et al. (IFAC 2017) on all scenes at hand, and its figure of a frame's stages
+  python3 bench/accuracy --paper --kitti2015 DIR --scenes 84,87,130,146,148 --frames 0:10
+                                      and on scenes of KITTI 2015's multi-view data
 Plots and markdown from the JSON: bench/plot.py.
 """
 import argparse
@@ -18,9 +19,10 @@ import re
 import subprocess
 import sys
 
-from ablation import ablation, paper_table
+from ablation import ablation
 from ego_motion import ego_motion_table
-from inputs import PROJECT, Bench
+from inputs import PROJECT, Bench, Missing
+from paper import paper_figure, paper_table
 from rows import main_table
 from video import video_tables
 
@@ -50,20 +52,29 @@ def parse_arguments():
     parser.add_argument("--ego-motion", action="store_true", help="stereo odometry alone, and nothing else")
     parser.add_argument("--ablation", action="store_true", help="every correction on and off, on four kinds of input apart, and nothing else")
     parser.add_argument("--inputs", metavar="REGEX", default="", help="only these inputs of --ablation, by title")
-    parser.add_argument("--kitti2015", metavar="DIR", help="KITTI 2015 multi-view data: the paper's table, and nothing else")
+    parser.add_argument("--paper", action="store_true", help="the paper's table and its figure of a frame's stages, and nothing else")
+    parser.add_argument("--kitti2015", metavar="DIR", help="more scenes for --paper: KITTI 2015 multi-view data")
     parser.add_argument("--scenes", metavar="LIST", default="84,87,130,146,148", help="of --kitti2015")
     parser.add_argument("--frames", metavar="FIRST:LAST", default="0:10", help="of --kitti2015")
     return parser.parse_args()
+
+
+def figure_or_reason(bench):
+    try:
+        return paper_figure(bench)
+    except Missing as reason:
+        return f"skipped: {reason}"
 
 
 def main():
     arguments = parse_arguments()
     bench = Bench(arguments)
     content = {"commit": commit(), "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")}
-    if arguments.kitti2015:
-        content["kitti2015"] = paper_table(bench, arguments)
-        skipped = [row for row in content["kitti2015"] if "skipped" in row]
-        code = 3 if skipped else 0
+    if arguments.paper:
+        content["paper"], table = paper_table(bench, arguments)
+        skipped = [row for row in content["paper"] if "skipped" in row]
+        code = table.exit_code() or (3 if skipped else 0)
+        print("the stages of a frame: " + figure_or_reason(bench))
     elif arguments.ablation:
         content["ablation"] = ablation(bench, arguments.inputs)
         skipped, code = [], 0

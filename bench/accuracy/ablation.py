@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every correction on and off, on four kinds of input apart, with bootstrap intervals; and the paper's own table."""
+"""Every correction on and off, on four kinds of input apart, with bootstrap intervals."""
 import re
 
-from inputs import SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect
+from inputs import STEADY_FROM, Missing, expect
 
 # What is switched, and why it is there.
 ABLATION = [
@@ -158,29 +158,3 @@ def print_ablation_row(row):
         cells = [f"{figure} {at['value']:.2f} ({at['above']:+.2f}, {at['low']:+.2f} to {at['high']:+.2f}){'*' if at['low'] * at['high'] > 0 else ''}"
                  for figure, at in by_figure.items()]
         print(f"  {kind:<14} " + "  ".join(cells), flush=True)
-
-
-def scenes_of(text):
-    return [f"{int(scene):06d}" for scene in text.split(",")]
-
-
-def paper_table(bench, arguments):
-    """The paper's own table: single frame, this method, this method interpolated, search fraction."""
-    folder = pathlib.Path(arguments.kitti2015)
-    folder = folder / "training" if (folder / "training").is_dir() else folder
-    rows = []
-    print(f"{'scene':<8} {'preset':<8} {'search':>8} {'single frame':>14} {'method':>10} {'interpolated':>14} {'D1':>8} {'D1 interp.':>12}")
-    for scene in scenes_of(arguments.scenes):
-        for preset in ("paper", "default"):
-            try:
-                source = bench.multiview(2015, scene, arguments.frames, folder)
-                single = bench.run(source, ("--preset", preset, *SINGLE_FRAME))["frames"][source.scored]
-                method = bench.run(source, ("--preset", preset))["frames"][source.scored]
-            except (Missing, Failed) as reason:
-                rows.append({"scene": scene, "preset": preset, "skipped": str(reason)})
-                print(f"{scene:<8} {preset:<8} skipped: {reason}")
-                continue
-            rows.append({"scene": scene, "preset": preset, "single_frame": single, "method": method})
-            print(f"{scene:<8} {preset:<8} {method['search']:>6.1f} % {single['bad_or_missing']:>12.2f} % {method['bad_or_missing']:>8.2f} % "
-                  f"{method['interpolated']:>12.2f} % {method['d1']:>6.2f} % {method['d1_interpolated']:>10.2f} %")
-    return rows

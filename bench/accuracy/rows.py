@@ -29,9 +29,9 @@ def kitti2012(bench, table):
     def paper():
         frame = bench.run(source, PAPER)["frames"][10]
         own = bench.run(source, PAPER + SINGLE_FRAME)["frames"][10]
-        table.add(name + ", paper", "search", frame["search"], limit="kitti2012 paper search")
+        table.add(name + ", paper", "search", frame["search"], limit="paper, search")
         table.add(name + ", paper", "bad_or_missing", frame["bad_or_missing"], single=own["bad_or_missing"])
-        table.add(name + ", paper", "bad_or_missing / its single frame's", frame["bad_or_missing"] / own["bad_or_missing"], "", limit="kitti2012 paper")
+        table.add(name + ", paper", "bad_or_missing / its single frame's", frame["bad_or_missing"] / own["bad_or_missing"], "", limit="paper, bad or missing")
         default = bench.run(source, SINGLE_FRAME)["frames"][10]
         table.add(name + ", paper", "bad_or_missing / default single frame's", frame["bad_or_missing"] / default["bad_or_missing"], "")
 

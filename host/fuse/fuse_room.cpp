@@ -5,6 +5,7 @@ namespace egosgm {
 
 FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning)
     : left_right_px_(options.consistency.update_px),
+      outside_(outside_view(options.consistency)),
       prediction_check_(context, size, options.prediction_check, tuning.row_group),
       kalman_update_(context, size, options.kalman_update),
       right_map_(context, size, range_of(options)),
@@ -38,9 +39,9 @@ void FuseRoom::fuse(const Plan& plan, const FrameImages& images, const Predictio
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (plan.tracked == Views::kLeft) right_map_(measured, left_right_px_, smoothed);
-  consistency_(smoothed.disparity, left_right_px_, OutsideView::kKeep, belief.disparity, belief.variance,
-               plan.wanted.right ? Views::kBoth : plan.tracked);
-  if (sad_check_) (*sad_check_)[images.type](images.pixels, belief);
+  const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
+  consistency_(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
+  if (sad_check_) (*sad_check_)[images.type](images.pixels, belief, checked);
 }
 
 }  // namespace egosgm

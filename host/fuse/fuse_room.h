@@ -38,6 +38,7 @@ class FuseRoom {
 
  private:
   const float left_right_px_;
+  const OutsideView outside_;
   PredictionCheck prediction_check_;
   KalmanUpdate kalman_update_;
   std::optional<MedianFilter> median_filter_;

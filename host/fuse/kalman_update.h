@@ -9,7 +9,8 @@ namespace egosgm {
 
 /// Fuses prediction and measurement, pixel by pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the
 /// two differ by more than the gate, or as most around do (something moves by itself), or only the measurement is
-/// there, the measurement is taken.
+/// there, the measurement is taken. Without a gate, as in the paper, all that is predicted and measured is averaged, and
+/// nothing hides it.
 class KalmanUpdate {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.

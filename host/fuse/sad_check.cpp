@@ -6,19 +6,26 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, PixelType type) {
+const cl::Program& build(ocl::Context& context, PixelType type, int pixels) {
   context.enter("SadCheck");
-  return context.program("sad_check.cl", ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU16 ? 2 : 1));
+  return context.program("sad_check.cl",
+                         ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU16 ? 2 : 1).set("PIXELS", pixels));
 }
 
 }  // namespace
 
-SadCheck::SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type, const SadCheckOptions& options)
-    : context_(context), size_(size), max_difference_(options.max_difference), check_(build(context, type), "check") {}
+SadCheck::SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type, const SadCheckOptions& options,
+                   int pixels)
+    : context_(context),
+      size_(size),
+      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
+      max_difference_(options.max_difference),
+      check_(build(context, type, pixels_), "check") {}
 
-void SadCheck::operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps) {
+void SadCheck::operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps, Views views) {
   context_.enter("SadCheck");
-  check_(context_, ocl::every_pixel(context_, size_), size_, max_difference_, images, maps.disparity, maps.variance);
+  check_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_difference_, images,
+         maps.disparity, maps.variance);
 }
 
 }  // namespace egosgm

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "egosgm/image.h"
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {
@@ -11,14 +11,17 @@ namespace egosgm {
 /// Drops disparities whose 3x3 windows in the two images differ by more than `max_difference` a pixel.
 class SadCheck {
  public:
-  SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type, const SadCheckOptions& options);
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type, const SadCheckOptions& options,
+           int pixels = 0);
 
   /// In place. `images`: the pixels of both views without padding, the left view first, one or two bytes each.
-  void operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps);
+  void operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps, Views views = Views::kBoth);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
+  const int pixels_;
   const float max_difference_;
   ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<cl_uchar>, Map, Map> check_;
 };

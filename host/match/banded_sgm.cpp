@@ -129,6 +129,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.variance_floor_px2,
                   options.variance_per_step_px2,
                   options.variance_per_square_px2,
+                  options.doubts_band_ends,
                   /*reads_off=*/0},
       launches_(launches),
       read_off_(context, size_, code_padding(range)) {

@@ -8,6 +8,9 @@ namespace egosgm {
 
 /// What becomes of a disparity that points to a place outside of the other image, where nothing can contradict it.
 enum class OutsideView { kDrop, kKeep };
+inline OutsideView outside_view(const ConsistencyCheckOptions& options) {
+  return options.keep_unseen ? OutsideView::kKeep : OutsideView::kDrop;
+}
 
 /// Keeps what both views agree on: the pixel that a disparity points to in the other view must be valid and within a
 /// tolerance. Each view is checked against the other as it came in.

@@ -6,6 +6,7 @@ namespace egosgm {
 PredictRoom::PredictRoom(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
                          const MethodOptions& options, const Tuning& tuning)
     : left_right_px_(options.consistency.prediction_px),
+      outside_(outside_view(options.consistency)),
       forward_warp_(context, size, calibration, options.forward_warp, range_of(options), 0, tuning.warp_band_rows),
       right_map_(context, size, range_of(options)),
       edge_rejection_(context, size, options.edge_rejection),
@@ -19,7 +20,7 @@ void PredictRoom::operator()(const Plan& plan, const StereoMaps& belief, Predict
   edge_rejection_(warped.disparity, rejected, warped.variance);
   StereoMaps holes_filled{filled, maps.variance};
   hole_fill_({rejected, warped.variance}, warped_hidden, holes_filled, hidden, plan.tracked);
-  consistency_(filled, left_right_px_, OutsideView::kKeep, maps.disparity, maps.variance, plan.tracked);
+  consistency_(filled, left_right_px_, outside_, maps.disparity, maps.variance, plan.tracked);
 }
 
 }  // namespace egosgm

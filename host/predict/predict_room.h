@@ -41,6 +41,7 @@ class PredictRoom {
 
  private:
   const float left_right_px_;
+  const OutsideView outside_;
   ForwardWarp forward_warp_;
   RightMap right_map_;
   EdgeRejection edge_rejection_;

@@ -17,7 +17,7 @@ namespace egosgm {
 enum class MatchingCost { kCensus13x11, kCensus9x7, kCensus5x5, kSad3x3 };
 
 /// Where the options start from, and what chooses the constants of the method.
-/// kPaper: prediction, search and fusion as in Fućek et al. (IFAC 2017), with this library's matcher.
+/// kPaper: the method of Fućek et al. (IFAC 2017), docs/paper.md.
 enum class Preset { kDefault, kPaper };
 
 /// What a user can choose. Meaning, unit, range and when to change each: list_options, `egosgm run --help` and
@@ -51,8 +51,8 @@ struct EGOSGM_EXPORT PipelineOptions {
 
   /// The default preset.
   PipelineOptions();
-  /// Fućek et al. (IFAC 2017): both views tracked, constant q, three sigmas without a least half-width, unpredicted
-  /// pixels search everything, no gate, the filter's variance. The matcher is this library's.
+  /// Fućek et al. (IFAC 2017), and nothing that goes beyond them. docs/paper.md goes through it step by step, and says
+  /// what they leave open.
   static PipelineOptions paper();
 
   /// Throws InvalidArgument, naming the option, its value and what is allowed.

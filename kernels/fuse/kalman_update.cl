@@ -3,7 +3,7 @@
 // other, by more than the gate or because the measurement is doubtful, or where most pixels around are off to the same
 // side, as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide.
 // What is hidden by a surface nearer than the range (ForwardWarp) has no disparity: whatever is measured there is a
-// mismatch.
+// mismatch. Without a gate nothing contradicts anything.
 #include "method.h"
 #include "pixels.h"
 
@@ -41,7 +41,8 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
 
 // `check`: of this frame; after wrong predictions all are off, so that nobody is asked.
 // `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
-// is taken that differs as those of EGOSGM_MOVING_COUNT around do.
+// is taken that differs as those of EGOSGM_MOVING_COUNT around do. gate: FLT_MAX for none: all that is predicted and
+// measured is averaged, and nothing is hidden.
 KERNEL void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
                    const float min_variance, global const PredictionState* check, global const uchar* hidden,
                    global const float* predicted, global const float* predicted_variance, global const float* measured,
@@ -51,6 +52,7 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
   const size_t view = (size_t)get_global_id(2) * size.height * width;
   const size_t row = view + (size_t)y * width;
   const int asks = ask_neighbours & (check->is_wrong == 0) & (check->was_wrong == 0);
+  const Ints is_plain = (Ints)(gate >= FLT_MAX ? -1 : 0);
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(predicted + row, x, width);
@@ -58,10 +60,10 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
     const Floats p = load_pixels(predicted_variance + row, x, width);
     const Floats r = load_pixels(measured_variance + row, x, width);
     const Ints has_prediction = d > INVALID;
-    const Ints has_measurement = (z > INVALID) & (load_bytes(hidden + row, x, width) == 0);
+    const Ints has_measurement = (z > INVALID) & (is_plain | (load_bytes(hidden + row, x, width) == 0));
     const Floats doubtful = EGOSGM_DOUBTFUL_VARIANCE_PX2;
     const Ints has_both = has_prediction & has_measurement;
-    const Ints fuses = has_both & (fabs(z - d) <= gate) & (r < doubtful);
+    const Ints fuses = has_both & (is_plain | ((fabs(z - d) <= gate) & (r < doubtful)));
     const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
 
     const Floats zero = 0.0f;

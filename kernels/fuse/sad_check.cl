@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Drops disparities whose 3x3 windows in the two images differ too much: mean absolute difference, on the 8-bit scale.
+// Drops disparities whose 3x3 windows in the two images differ too much: mean absolute difference, on the 8-bit scale,
+// of the pixels that lie in both images.
 #include "grey.h"
+#include "pixels.h"
 
-// lint: PIXEL_BYTES=1
-// lint: PIXEL_BYTES=2
+// lint: PIXEL_BYTES=1 PIXELS=1
+// lint: PIXEL_BYTES=1 PIXELS=16
+// lint: PIXEL_BYTES=2 PIXELS=1
+// lint: PIXEL_BYTES=2 PIXELS=16
 
 #if PIXEL_BYTES == 1
 #define STEPS_PER_GREY 1
@@ -13,35 +17,40 @@
 
 KERNEL void check(const ImageSize size, const float max_difference, global const uchar* images,
                   global float* disparity, global float* variance) {
-  const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= size.width) return;
-
-  const size_t pixels = (size_t)size.width * size.height;
-  const size_t pixel = view * pixels + (size_t)y * size.width + x;
-  const float d = disparity[pixel];
+  const int width = size.width;
+  const size_t pixels = (size_t)width * size.height;
+  const size_t row = view * pixels + (size_t)y * width;
+  global const Pixel* here = (global const Pixel*)images + row;
+  global const Pixel* there = (global const Pixel*)images + (1 - view) * pixels + (size_t)y * width;
+  const int top = y > 0 ? -1 : 0, bottom = y + 1 < size.height ? 1 : 0;
+  const Ints zero = 0;
+  const Ints last = width - 1;
   // A disparity that leads out of the image has no window; clamped, it converts safely.
-  const float shift = fmin(fmax(view == EGOSGM_LEFT ? -d : d, -2.0f * size.width), 2.0f * size.width);
-  const int match = x + convert_int_rte(shift);
-  global const Pixel* here = (global const Pixel*)images + view * pixels;
-  global const Pixel* there = (global const Pixel*)images + (1 - view) * pixels;
+  const Floats farthest = 2.0f * width;
 
-  const int left = max(-1, -min(x, match));
-  const int right = min(1, size.width - 1 - max(x, match));
-  const int top = max(-1, -y);
-  const int bottom = min(1, size.height - 1 - y);
-  uint sum = 0;
-  const bool inside = match >= 0 && match < size.width && d > EGOSGM_INVALID_DISPARITY;
-  if (inside) {
-    for (int v = top; v <= bottom; ++v) {
-      const size_t row = (size_t)(y + v) * size.width;
-      for (int u = left; u <= right; ++u) sum += abs((int)here[row + x + u] - (int)there[row + match + u]);
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Floats shift = min(max(view == EGOSGM_LEFT ? -d : d, -farthest), farthest);
+    const Ints column = x + LANE_INDICES;
+    const Ints match = column + INTS_OF_FLOATS(nearest(shift));
+    Ints sum = 0;
+    Ints count = 0;
+    for (int u = -1; u <= 1; ++u) {
+      const Ints own = min(max(column + u, zero), last), other = min(max(match + u, zero), last);
+      const Ints is_in_both = (own == column + u) & (other == match + u);
+      for (int v = top; v <= bottom; ++v) {
+        const Ints own_grey = GATHERED(Ints, here + (long)v * width, own);
+        const Ints other_grey = GATHERED(Ints, there + (long)v * width, other);
+        sum += is_in_both ? max(own_grey - other_grey, other_grey - own_grey) : zero;
+        count += is_in_both ? (Ints)(STEPS_PER_GREY) : zero;
+      }
     }
+    const Ints is_inside = (d > INVALID) & (match >= zero) & (match <= last);
+    const Ints is_alike = FLOATS_OF_INTS(sum) <= (Floats)(max_difference)*FLOATS_OF_INTS(count);
+    const Ints drops = (is_inside & is_alike) != 0 ? (Ints)(0) : (Ints)(-1);
+    store_pixels(drops ? INVALID : d, disparity + row, x, width);
+    clear_dropped(drops, variance + row, x, width);
   }
-  const int count = (right - left + 1) * (bottom - top + 1) * STEPS_PER_GREY;
-  const bool keeps = inside && sum <= max_difference * count;
-  if (keeps) return;
-  disparity[pixel] = EGOSGM_INVALID_DISPARITY;
-  variance[pixel] = 0.0f;
 }

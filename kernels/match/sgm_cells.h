@@ -29,7 +29,8 @@ inline Floats matching_variance(const SgmParameters q, const Ints steps, const I
                                 const Ints rise_after) {
   const Floats n = FLOATS_OF_INTS(steps);
   const Floats counted = q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n);
-  return ((rise_before < 0) | (rise_after < 0)) ? (Floats)(EGOSGM_DOUBTFUL_VARIANCE_PX2) : counted;
+  const Ints is_doubtful = ((rise_before < 0) | (rise_after < 0)) & ((Ints)(q.doubts_band_ends) != 0);
+  return is_doubtful ? (Floats)(EGOSGM_DOUBTFUL_VARIANCE_PX2) : counted;
 }
 
 #endif

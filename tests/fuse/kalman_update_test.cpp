@@ -112,13 +112,20 @@ TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   const KalmanUpdateOptions alone{.gate_px = 2, .ask_neighbours = false};
   EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 1}), (Estimate{7.75f, wide}));
   EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 2 * wide}), (Estimate{7.75f, 2 * wide}));
-  EXPECT_EQ(update_pixel({.gate_px = 0}, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
 }
 
 TEST(KalmanUpdate, TakesAMeasurementThatEscapedItsBand) {
   const float escaped = EGOSGM_DOUBTFUL_VARIANCE_PX2;
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, escaped}), (Estimate{11, escaped}));
-  EXPECT_EQ(update_pixel({.gate_px = 0}, {10, 1}, {11, escaped}), (Estimate{11, escaped}));
+}
+
+// The paper's update knows of no escape and of nothing that hides.
+TEST(KalmanUpdate, AveragesAllWithoutAGate) {
+  const KalmanUpdateOptions plain{.gate_px = 0, .ask_neighbours = false};
+  EXPECT_EQ(update_pixel(plain, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
+  EXPECT_EQ(update_pixel(plain, {10, 16}, {14, 48}), (Estimate{11, 12}));
+  EXPECT_EQ(update_pixel(plain, kNothing, {12, 3}, /*is_hidden=*/1), (Estimate{12, 3}));
+  EXPECT_EQ(update_pixel(plain, kNothing, kNothing, /*is_hidden=*/1), kNothing);
 }
 
 TEST(KalmanUpdate, TakesWhatIsThere) {

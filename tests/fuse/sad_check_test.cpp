@@ -28,9 +28,9 @@ std::vector<cl_uchar> bytes_of(const std::vector<int>& images, PixelType type) {
 }
 
 HostMaps run(shared::ImageSize size, PixelType type, const SadCheckOptions& options, const std::vector<int>& images,
-             const HostMaps& maps) {
+             const HostMaps& maps, int pixels = 0) {
   ocl::Context context(testing::any_device());
-  SadCheck stage(context, size, type, options);
+  SadCheck stage(context, size, type, options, pixels);
   const auto bytes = bytes_of(images, type);
   ocl::Buffer<cl_uchar> device_images(context, bytes.size());
   device_images.write(context, bytes);
@@ -55,9 +55,11 @@ TEST_P(SadCheckTest, EqualsReference) {
     std::generate(images.begin(), images.end(), [&] { return static_cast<int>(random() % (255 * steps + 1)); });
     const SadCheckOptions options{.max_difference = 80};
     const HostMaps expected = reference::sad_check(size, options, images, steps, maps);
-    const HostMaps actual = run(size, type, options, images, maps);
-    EXPECT_TRUE(same_bits(actual.disparity, expected.disparity, size));
-    EXPECT_TRUE(same_bits(actual.variance, expected.variance, size));
+    for (const int pixels : {1, 16}) {
+      const HostMaps actual = run(size, type, options, images, maps, pixels);
+      EXPECT_TRUE(same_bits(actual.disparity, expected.disparity, size)) << "by " << pixels;
+      EXPECT_TRUE(same_bits(actual.variance, expected.variance, size)) << "by " << pixels;
+    }
   }
 }
 

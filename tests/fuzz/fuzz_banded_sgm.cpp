@@ -105,10 +105,18 @@ void run(std::string_view input) {
   reads_off ? m.sgm.reading_off(inputs, m.measured) : m.sgm(inputs, m.measured, Views::kBoth);
 
   const BandedSgmOptions& o = m.options;
-  const shared::SgmParameters parameters{
-      m.size.width, m.size.height, m.range.min,          m.range.count,           BandedSgm::code_padding(m.range),
-      o.p1,         o.s_max,       o.variance_floor_px2, o.variance_per_step_px2, o.variance_per_square_px2,
-      reads_off};
+  const shared::SgmParameters parameters{m.size.width,
+                                         m.size.height,
+                                         m.range.min,
+                                         m.range.count,
+                                         BandedSgm::code_padding(m.range),
+                                         o.p1,
+                                         o.s_max,
+                                         o.variance_floor_px2,
+                                         o.variance_per_step_px2,
+                                         o.variance_per_square_px2,
+                                         o.doubts_band_ends,
+                                         reads_off};
   const testing::HostMaps expected = reference::banded_sgm(parameters, o, codes, grey, bands);
   const testing::HostMaps actual = testing::download(m.context, m.measured);
   for (const auto& same : {testing::same_bits(actual.disparity, expected.disparity, m.size),

@@ -91,6 +91,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
   ocl::Context context(testing::any_device());
   const int padding = BandedSgm::code_padding(c.range);
   m.options = {.cost = c.cost, .paths = c.paths, .scheduling = c.scheduling, .max_memory_mib = max_memory_mib};
+  if (c.cost == MatchingCost::kSad3x3) m.options.doubts_band_ends = false;  // as the preset `paper` has both
   SearchBands bands(context, c.size, c.range);
   BandedSgm sgm(context, c.size, c.range, m.options, c.group, c.tile, c.launches);
   const auto padded = reference::padded_codes(c.size, m.codes[0], m.codes[1], padding, c.cost);
@@ -119,6 +120,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
                   m.options.variance_floor_px2,
                   m.options.variance_per_step_px2,
                   m.options.variance_per_square_px2,
+                  m.options.doubts_band_ends,
                   c.reads_off};
   m.bands = bands.bands.read(context);
   m.measured = {measured.disparity.read(context), measured.variance.read(context)};

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "kernels/method.h"
+#include "tests/reference/predict/disparity_space.h"
 #include "tests/reference/predict/forward_warp.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
@@ -260,25 +261,9 @@ TEST(ForwardWarp, SurvivesWildMotions) {
   }
 }
 
-// What a point in space looks like: an independent way to the same numbers, without H.
-struct Observation {
-  double x_left, x_right, y, disparity;
-};
-
-Observation observe(const Calibration& c, const Eigen::Vector3d& point) {
-  const double x_left = c.cx + c.fx * point.x() / point.z();
-  const double x_right = c.cx + c.doffs_px + c.fx * (point.x() - c.baseline_m) / point.z();
-  return {x_left, x_right, c.cy + c.fy * point.y() / point.z(), x_left - x_right};
-}
-
-Eigen::Vector3d point_at(const Calibration& c, double x, double y, double disparity) {
-  const double z = c.fx * c.baseline_m / (disparity + c.doffs_px);
-  return {(x - c.cx) * z / c.fx, (y - c.cy) * z / c.fy, z};
-}
-
 const Calibration kUneven{.fx = 120, .fy = 95, .cx = 47.25, .cy = 31.5, .baseline_m = 0.4, .doffs_px = 2};
 
-// One point in both maps: each view's prediction lies where the moved point is seen.
+// One point in both maps: each view's prediction lies where the moved point is seen (eqs. 1-4).
 TEST(ForwardWarp, BothViewsFollowThePointInSpace) {
   std::mt19937 random(16);
   std::uniform_int_distribution<int> xs(30, 70), ys(15, 45), disparities(5, 25);
@@ -290,13 +275,14 @@ TEST(ForwardWarp, BothViewsFollowThePointInSpace) {
     belief.disparity[at(kSize, EGOSGM_RIGHT, x - d, y)] = static_cast<float>(d);
 
     const testing::HostMaps predicted = warp(kSize, kUneven, kRange, 0, belief, motion);
-    const Observation seen = observe(kUneven, motion.current_from_previous * point_at(kUneven, x, y, d));
     for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
-      const double seen_x = view == EGOSGM_LEFT ? seen.x_left : seen.x_right;
-      if (std::nearbyint(seen_x) < 0 || std::nearbyint(seen_x) >= kSize.width) continue;
+      const reference::DisparityPoint from{static_cast<double>(view == EGOSGM_LEFT ? x : x - d), static_cast<double>(y),
+                                           static_cast<double>(d)};
+      const reference::DisparityPoint seen = reference::moved(kUneven, motion, view, from);
+      if (std::nearbyint(seen.x) < 0 || std::nearbyint(seen.x) >= kSize.width) continue;
       if (std::nearbyint(seen.y) < 0 || std::nearbyint(seen.y) >= kSize.height) continue;
       const std::size_t target =
-          at(kSize, view, static_cast<int>(std::nearbyint(seen_x)), static_cast<int>(std::nearbyint(seen.y)));
+          at(kSize, view, static_cast<int>(std::nearbyint(seen.x)), static_cast<int>(std::nearbyint(seen.y)));
       EXPECT_NEAR(predicted.disparity[target], seen.disparity, 1e-4) << "view " << view << ", " << repetition;
       EXPECT_EQ(count_valid(predicted.disparity, view), 1u);
     }
@@ -304,16 +290,16 @@ TEST(ForwardWarp, BothViewsFollowThePointInSpace) {
 }
 
 // q = J Sigma J^T, with J from finite differences of a perturbed motion.
-double variance_by_differences(const Motion& motion, const Eigen::Vector3d& point) {
+double variance_by_differences(const Motion& motion, const reference::DisparityPoint& point) {
   constexpr double kStep = 1e-6;
-  const Eigen::Vector3d moved = motion.current_from_previous * point;
   Eigen::Matrix<double, 1, 6> jacobian;
   for (int i = 0; i < 6; ++i) {
     const auto disparity_after = [&](double step) {
-      Eigen::Vector3d perturbed = moved;
-      if (i < 3) perturbed[i] += step;
-      if (i >= 3) perturbed = Eigen::AngleAxisd(step, Eigen::Vector3d::Unit(i - 3)) * moved;
-      return observe(kUneven, perturbed).disparity;
+      Motion perturbed;
+      if (i < 3) perturbed.current_from_previous.translation()[i] = step;
+      if (i >= 3) perturbed = rotation(Eigen::Vector3d::Unit(i - 3), step);
+      perturbed.current_from_previous = perturbed.current_from_previous * motion.current_from_previous;
+      return reference::moved(kUneven, perturbed, EGOSGM_LEFT, point).disparity;
     };
     jacobian[i] = (disparity_after(kStep) - disparity_after(-kStep)) / (2 * kStep);
   }
@@ -331,7 +317,8 @@ TEST(ForwardWarp, VarianceFollowsFromTheMotionsCovariance) {
     belief.disparity[at(kSize, EGOSGM_LEFT, x, y)] = static_cast<float>(d);
     belief.disparity[at(kSize, EGOSGM_RIGHT, x - d, y)] = static_cast<float>(d);
     const testing::HostMaps predicted = warp(kSize, kUneven, kRange, 0, belief, motion);
-    const double expected = variance_by_differences(motion, point_at(kUneven, x, y, d));
+    const double expected =
+        variance_by_differences(motion, {static_cast<double>(x), static_cast<double>(y), static_cast<double>(d)});
     for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
       if (count_valid(predicted.disparity, view) == 0) continue;
       const auto first = predicted.variance.begin() + view * static_cast<std::ptrdiff_t>(predicted.variance.size() / 2);

@@ -74,7 +74,8 @@ void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
   }
   frame.without_edges = edge_rejection(size_, options_.edge_rejection.max_jump_px, frame.warped);
   frame.filled = hole_fill(size_, options_.hole_fill.max_difference_px, frame.without_edges);
-  frame.predicted = consistency_check(size_, options_.consistency.prediction_px, true, frame.filled);
+  frame.predicted =
+      consistency_check(size_, options_.consistency.prediction_px, options_.consistency.keep_unseen, frame.filled);
 }
 
 Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOffset& known) const {
@@ -108,6 +109,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
                                          sgm.variance_floor_px2,
                                          sgm.variance_per_step_px2,
                                          sgm.variance_per_square_px2,
+                                         sgm.doubts_band_ends,
                                          reads_off};
   const std::vector<std::uint16_t> values(pass.images.begin(), pass.images.end());
   pass.penalties = step_penalties(size_, values, images.bits, sgm);
@@ -145,7 +147,8 @@ void Pipeline::update(const Images& images, Frame& frame) const {
     frame.fused_smoothed =
         right_map(size_, range_.min, options_.consistency.update_px, pass.measured, frame.fused_smoothed);
   }
-  frame.fused_consistent = consistency_check(size_, options_.consistency.update_px, true, frame.fused_smoothed);
+  frame.fused_consistent =
+      consistency_check(size_, options_.consistency.update_px, options_.consistency.keep_unseen, frame.fused_smoothed);
   frame.updated = options_.sad_check.max_difference > 0 ? sad_check(size_, options_.sad_check, pass.images,
                                                                     images.bits == 8 ? 1 : 257, frame.fused_consistent)
                                                         : frame.fused_consistent;

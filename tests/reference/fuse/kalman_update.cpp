@@ -68,10 +68,11 @@ bool contradict(float gate_px, float a, float b) { return gate_px > 0 && std::ab
 Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int y, const Estimate& predicted,
                 const Estimate& measured) {
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
+  const bool is_plain = options.gate_px <= 0;  // the paper's: all that is predicted and measured is averaged
   const float z = measured.disparity, doubtful = kDoubtfulVariancePx2;
   if (!is_valid(predicted)) return measured;
   const float innovation = z - predicted.disparity;
-  if (!contradict(options.gate_px, z, predicted.disparity) && measured.variance < doubtful) {
+  if (!contradict(options.gate_px, z, predicted.disparity) && (is_plain || measured.variance < doubtful)) {
     const bool moves = options.ask_neighbours && std::abs(innovation) > 1 &&
                        view.is_between_moving(x, y, innovation > 0 ? 1.0f : -1.0f) &&
                        view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 15;
@@ -89,7 +90,7 @@ testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOption
   for (int i = 0; i < 2 * pixels; ++i) {
     const int first = i / pixels * pixels;
     const View view(size, &predicted.disparity[first], &measured.disparity[first]);
-    const bool is_hidden = !predicted.hidden.empty() && predicted.hidden[i] != 0;
+    const bool is_hidden = options.gate_px > 0 && !predicted.hidden.empty() && predicted.hidden[i] != 0;
     const Estimate estimate = is_hidden ? kNone
                                         : update(options, view, (i - first) % size.width, (i - first) / size.width,
                                                  {predicted.disparity[i], predicted.variance[i]},

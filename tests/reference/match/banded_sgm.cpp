@@ -174,8 +174,9 @@ testing::HostMaps banded_sgm(const shared::SgmParameters& q, const BandedSgmOpti
       const float n = static_cast<float>(steps);
       const bool has_both = sums.has(p, winner - 1) && sums.has(p, winner + 1);
       const bool escaped = has_both && std::min(sums.at(p, winner - 1), sums.at(p, winner + 1)) < sums.at(p, winner);
-      maps.variance.push_back(escaped ? kDoubtfulVariancePx2
-                                      : q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n));
+      maps.variance.push_back(escaped && q.doubts_band_ends
+                                  ? kDoubtfulVariancePx2
+                                  : q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n));
     }
     if (q.reads_off) {
       read_off(v, band, sums, maps);
