@@ -147,7 +147,7 @@ int report_shard(const Shard& shard, const std::vector<BatchEntry>& failed) {
 int batch(const BatchArguments& arguments) {
   const std::vector<BatchEntry> entries = read_batch_list(arguments.list);
   const PipelineOptions options = arguments.method.options();
-  arguments.method.expect_saves();
+  arguments.method.expect_saves(arguments.out);
   const Json settings = batch_settings(options, arguments.odometry, parse_write_list(arguments.write));
   const BatchFolder folder(arguments.out, settings, arguments.overwrite && !arguments.merge);
   if (arguments.merge) return report_all(arguments, entries, folder);
@@ -158,7 +158,10 @@ int batch(const BatchArguments& arguments) {
   for (const BatchEntry& entry : part) parse_input(entry);
   expect_own_json(timing_file(arguments, shard));
   const std::vector<BatchEntry> left = not_done(part, folder);
-  for (const BatchEntry& entry : left) job_of(arguments, options, folder, entry);
+  for (const BatchEntry& entry : left) {
+    const SequenceJob job = job_of(arguments, options, folder, entry);
+    if (!job.poses_file.empty()) vision::poses_of_frames(job.sequence, job.poses_file);
+  }
   const std::vector<Device> devices = select_devices(arguments);
 
   arguments.method.save(options);

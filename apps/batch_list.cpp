@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "apps/file_record.h"
 #include "apps/run_outputs.h"
 #include "egosgm/error.h"
 #include "host/vision/file_io.h"
@@ -20,7 +21,7 @@ constexpr std::size_t kMaxListBytes = std::size_t{1} << 30;  // a million sequen
 constexpr const char* kBlanks = " \t\r";
 
 std::string stripped(std::string line) {
-  line = line.substr(0, line.find('#'));
+  line = vision::without_comment(line);
   line.erase(0, std::min(line.find_first_not_of(kBlanks), line.size()));
   line.erase(line.find_last_not_of(kBlanks) + 1);
   return line;
@@ -47,7 +48,7 @@ std::string reserved_part(const std::string& name) {
   const std::vector<std::string> folders = output_folders();
   std::istringstream parts(lowered(name));
   for (std::string part; std::getline(parts, part, '/');) {
-    const bool is_file = part.ends_with(".json") || part == "report.html" || part == "poses.txt";
+    const bool is_file = part.ends_with(".json") || part == "report.html" || part == "poses.txt" || part == kFileRecord;
     if (is_file || std::find(folders.begin(), folders.end(), part) != folders.end()) return part;
   }
   return {};

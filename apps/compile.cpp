@@ -101,7 +101,7 @@ std::vector<ProgramFile> compile_to_spirv(const Device& device, const PipelineOp
 
 int compile(const CompileArguments& arguments) {
   const PipelineOptions options = arguments.method.options();
-  arguments.method.expect_saves();
+  arguments.method.expect_saves(arguments.out);
   Inputs inputs;
   inputs.add_file(arguments.method.config);
   const std::filesystem::path folder = new_folder("--out", arguments.out, inputs);

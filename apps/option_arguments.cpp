@@ -160,7 +160,8 @@ PipelineOptions OptionArguments::options() const {
   return options;
 }
 
-void OptionArguments::expect_saves() const {
+void OptionArguments::expect_saves(const std::string& out) const {
+  if (!out.empty()) expect_outside("--save-config", save_config, out);
   if (!save_config.empty()) expect_new_file("--save-config", save_config);
 }
 

@@ -19,8 +19,9 @@ struct OptionArguments {
   void add_to(CLI::App& command);
   /// Reads --config. Throws InvalidArgument, naming the option (and the file).
   PipelineOptions options() const;
-  /// Throws InvalidArgument where --save-config names a file that is there, and IoError where it cannot be written.
-  void expect_saves() const;
+  /// Throws InvalidArgument where --save-config names a file that is there or lies in `out`, and IoError where it
+  /// cannot be written.
+  void expect_saves(const std::string& out) const;
   /// Writes --save-config. Throws IoError.
   void save(const PipelineOptions& options) const;
 };

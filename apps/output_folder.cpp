@@ -169,6 +169,12 @@ void expect_new_file(const std::string& option, const std::string& file) {
   vision::expect_writable(file);
 }
 
+void expect_outside(const std::string& option, const std::string& file, const fs::path& folder) {
+  if (file.empty() || !is_within(place_of(fs::absolute(file).parent_path()), place_of(folder))) return;
+  throw InvalidArgument(
+      fmt::format("{} {}: lies in {}, where this command writes: give another folder", option, file, folder.string()));
+}
+
 std::string signed_text(const std::string& text, const std::string& begin, const std::string& end) {
   return text + begin + digest_of(text) + end;
 }

@@ -47,6 +47,10 @@ std::filesystem::path new_folder(const std::string& option, const std::string& f
 /// can be written there. Pipes and devices are written through. An empty name is none.
 void expect_new_file(const std::string& option, const std::string& file);
 
+/// Throws InvalidArgument where `file`, which `option` names, lies in `folder`: what a command writes there it does not
+/// know of.
+void expect_outside(const std::string& option, const std::string& file, const std::filesystem::path& folder);
+
 /// `text` and a last line that holds its digest, between `begin` and `end`.
 std::string signed_text(const std::string& text, const std::string& begin, const std::string& end);
 /// Whether the text is one of these, and as it was written.

@@ -204,7 +204,7 @@ std::unique_ptr<RawPairs> open_list(const fs::path& file) {
   const std::string text = vision::read_file(file, kMaxListBytes);
   std::vector<ListedPair> pairs;
   for (const vision::TextRow& row : vision::split_rows(text, file)) {
-    std::istringstream words(std::string(row.text.substr(0, row.text.find('#'))));
+    std::istringstream words(std::string(vision::without_comment(row.text)));
     std::string left, right, time, more;
     if (!(words >> left)) continue;
     words >> right >> time;

@@ -243,7 +243,7 @@ int view(const ViewArguments& arguments) {
   if (window) require_display();
   vision::StereoSequence sequence = arguments.input.open();
   const PipelineOptions options = arguments.method.options();
-  arguments.method.expect_saves();
+  arguments.method.expect_saves(arguments.pictures);
   if (!arguments.pictures.empty()) new_folder("--pictures", arguments.pictures, Inputs(arguments.input, sequence));
   if (!arguments.video.empty()) expect_video(arguments.video);
   DrawnSequence drawn(arguments, std::move(sequence), options);

@@ -280,10 +280,28 @@ class BatchFiles(FilesTest):
                              ([f"a {self.street}", f"a/disparity {self.street}"], "disparity"), ([f"a {self.street}", f"a/b {self.street}"], "a/b"),
                              ([f"a/b {self.street}", f"A {self.street}"], "a/b"), ([f"a {self.street}", f"A {self.street}"], "twice"),
                              ([f"a {self.street}", f"b {folder}/nowhere"], "nowhere"), ([f"x/cloud {self.street}"], "cloud"),
-                             ([f"a {self.street}", f"b {self.street} --poses {folder}/out/poses.txt"], "poses.txt")):
+                             ([f"a {self.street}", f"b {self.street} --poses {folder}/out/poses.txt"], "poses.txt"),
+                             ([f"a {self.street}", f"b {self.street} --poses {folder}/nowhere.txt"], "nowhere.txt"), ([f"a/Files.part {self.street}"], "files.part")):
             with self.subTest(lines=lines):
                 self.assert_refused([*self.batch(folder, *lines), "--out", folder / "out"], named)
                 self.assertFalse((folder / "out").exists())
+
+    def test_a_comment_begins_after_a_blank(self):
+        folder = self.new_folder()
+        shutil.copytree(self.street, folder / "drive#2")
+        self.assert_works(*self.batch(folder, "# drives", f"a {folder}/drive#2 --frames 0 # the second"), "--out", folder / "out")
+        (folder / "pairs").write_text("drive#2/image_0/000000.png drive#2/image_1/000000.png # the first\n")
+        self.assert_works("rectify", "--list", folder / "pairs", "--calib", self.street / "calib.txt", "--out", self.new_folder() / "out", "--quiet")
+
+    def test_the_configuration_is_saved_elsewhere(self):
+        folder = self.new_folder()
+        out = folder / "out"
+        out.mkdir()
+        for name in ("settings.json", "a", "new.toml", "../out/b"):
+            self.assert_refused_and_untouched(folder, [*self.batch(folder, f"a {self.street}"), "--out", out, "--save-config", f"{out}/{name}"],
+                                              "--save-config", "lies in")
+        self.assert_refused_and_untouched(folder, ["compile", "--out", out, "--save-config", out / "manifest.json"], "lies in")
+        self.assert_refused_and_untouched(folder, ["view", self.street, "--pictures", out, "--save-config", out / "000000.png"], "lies in")
 
     def test_what_others_left_is_replaced_only_when_told(self):
         folder = self.new_folder()
