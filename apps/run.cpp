@@ -9,6 +9,7 @@
 #include <future>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "apps/command.h"
 #include "apps/counted.h"
@@ -206,19 +207,22 @@ class Run {
   void finish(bool finished, const std::string& why_not) {
     report_.set_doubt(doubt_.text());
     if (!poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
-    if (trace_) trace_->write();
     write_report(finished, why_not);
+    if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace, finished, why_not);
     folder_.end();
-    if (trace_ && !trace_->has_device_times() && !quiet_) {
-      fmt::print("{} gives no times of commands: the trace has those of the host only\n",
-                 pipeline_.device().info().name);
-    }
     if (!finished || quiet_) return;
     fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
                pipeline_.device().info().name);
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
                100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.path().string());
     if (const std::string advice = advice_of(doubt_.text(), input_); !advice.empty()) fmt::print("{}\n", advice);
+  }
+
+  void write_trace(const Trace& trace, bool finished, const std::string& why_not) {
+    trace.write();
+    write_report(finished, why_not);  // which lists the trace where it lies in OUT
+    if (trace.has_device_times() || quiet_) return;
+    fmt::print("{} gives no times of commands: the trace has those of the host only\n", pipeline_.device().info().name);
   }
 
   void write_report(bool finished, const std::string& why_not) {

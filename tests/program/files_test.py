@@ -339,6 +339,15 @@ class Streams(FilesTest):
         self.assertTrue(stat.S_ISFIFO(pipe.lstat().st_mode))
         self.assertIn("traceEvents", json.loads(read[0]))
 
+    def test_a_pipe_that_nobody_reads_costs_the_trace_alone(self):
+        pipe, out = self.new_folder() / "pipe", self.new_folder()
+        os.mkfifo(pipe)
+        self.assert_refused(["run", "--odometry", self.street, "--out", out, *METHOD, "--trace", pipe], pipe, "nobody reads", code=1)
+        report = self.report(out)
+        self.assertIn("nobody reads", report["stopped_by"])
+        self.assertEqual(len(report["frames"]), self.assert_whole(out))
+        self.assertEqual([file.name for file in sorted(out.iterdir())], ["disparity", "poses.txt", "report.json"])
+
     def test_standard_output_takes_the_bytes(self):
         out = self.new_folder()
         for target in ("/dev/stdout", "/dev/fd/1"):
