@@ -285,7 +285,7 @@ void OutputFolder::expect_unchanged() const {
     if (!is_there(file)) continue;
     if (is_regular(file) && digest == digest_of(vision::read_file(file, kAnySize))) continue;
     throw InvalidArgument(
-        fmt::format("{}: was changed after the run wrote it: move it away, or choose another --out", file.string()));
+        fmt::format("{}: is not as the run wrote it: move it away, or choose another --out", file.string()));
   }
 }
 
