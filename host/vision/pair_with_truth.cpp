@@ -75,13 +75,15 @@ bool is_below(const std::string& number, int bound) {
   return number.size() != other.size() ? number.size() < other.size() : number < other;
 }
 
-void keep_frames(Maps& maps, const FrameRange& frames) {
+/// Throws InvalidArgument, naming what `maps` is of, where none is left.
+void keep_frames(Maps& maps, const FrameRange& frames, const fs::path& path) {
   if (!frames.first && !frames.last) return;
   std::erase_if(maps, [&](const auto& map) {
     const Numbers numbers = numbers_in(map.first);
     return numbers.empty() || (frames.first && is_below(numbers.back(), *frames.first)) ||
            (frames.last && !is_below(numbers.back(), *frames.last) && numbers.back() != std::to_string(*frames.last));
   });
+  if (maps.empty()) throw InvalidArgument(path.string() + ": holds no map of the chosen frames");
 }
 
 class Pairing {
@@ -178,8 +180,8 @@ EvaluationPairs pair_with_truth(const fs::path& estimate, const fs::path& truth,
   }
   Maps estimates = maps_of(is_folder(estimate / "disparity") ? estimate / "disparity" : estimate);
   Maps truths = maps_of(truth_of(truth));
-  keep_frames(estimates, options.frames);
-  keep_frames(truths, options.frames);
+  keep_frames(estimates, options.frames, estimate);
+  keep_frames(truths, options.frames, truth);
   EvaluationPairs result = Pairing(estimates, truths, options.image_names)();
   if (result.pairs.empty()) {
     throw InvalidArgument(estimate.string() + ": nothing there belongs to " + truth.string() +
@@ -197,8 +199,7 @@ std::vector<fs::path> list_maps(const fs::path& estimate, const FrameRange& fram
                       "no such file or folder; give a disparity map (.png, .pfm, .npy) or a folder of them");
   }
   Maps maps = maps_of(is_folder(estimate / "disparity") ? estimate / "disparity" : estimate);
-  keep_frames(maps, frames);
-  if (maps.empty()) throw InvalidArgument(estimate.string() + ": holds no map of the chosen frames");
+  keep_frames(maps, frames, estimate);
   std::vector<fs::path> files;
   for (const auto& [name, file] : maps) files.push_back(file);
   return files;

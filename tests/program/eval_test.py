@@ -58,6 +58,10 @@ class Eval(ProgramTest):
         (small / "000000.png").write_bytes(grey_png(20, 10))
         self.assert_refused([*arguments, small], "20x10")
 
+    def test_frames_that_are_not_there(self):
+        truth = self.street / "truth/left_disp_noc"
+        self.assert_refused(["eval", "--estimate", truth, "--truth", truth, "--frames", "7:9"], truth, "holds no map of the chosen frames")
+
     def test_refuses_what_cannot_be_compared(self):
         truth = self.street / "truth/left_disp_occ"
         small = self.new_folder() / "000000.png"
