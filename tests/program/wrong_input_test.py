@@ -63,7 +63,7 @@ class WrongArguments(ProgramTest):
                     ["report", self.street, "--picture-width"], ["view", self.street, "--pictures", self.folder / "never", "--fps"],
                     ["rectify", "--alpha"], ["doctor", self.street, "--disparities"])
         for command in commands:
-            for value in ("0x10", "010", " 16", "16 ", "+16", "nan", "inf", "1e999", "1,5", "1e", "0x1p3"):
+            for value in ("0x10", "010", " 16", "16 ", "+16", "nan", "inf", "1e999", "1,5", "1e", "0x1p3") if command is commands[0] else ("0x10", "010"):
                 with self.subTest(command=command, value=value):
                     self.assert_refused([*command, value])
 
