@@ -67,6 +67,9 @@ std::vector<Layer> FramePanels::layers(const ShownFrame& shown) {
   layers.push_back(disparity_layer(shown));
   if (!shown.variance.empty()) layers.push_back(variance_layer(shown));
   if (!shown.search_width.empty()) layers.push_back(search_layer(shown));
+  if (!shown.reasons.empty()) {
+    layers.push_back({"reason", vision::color_reasons(shown.reasons), vision::reason_bar(shown.reasons.cols)});
+  }
   if (!shown.frame.truth_noc.empty()) layers.push_back(error_layer(shown));
   return layers;
 }

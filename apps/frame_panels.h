@@ -11,12 +11,13 @@
 
 namespace egosgm::app {
 
-/// A frame and what the pipeline made of it: disparity, variance CV_32FC1, search width CV_16UC1. `frame.truth_noc` may
-/// be empty.
+/// A frame and what the pipeline made of it: disparity, variance CV_32FC1, search width CV_16UC1, reasons CV_8UC1.
+/// `frame.truth_noc` and `reasons` may be empty.
 struct ShownFrame {
   const vision::StereoFrame& frame;
   const cv::Mat& left;
   const cv::Mat &disparity, &variance, &search_width;
+  const cv::Mat reasons = {};
 };
 
 /// A map as a picture, and its colour scale of the same width (none for an image).
@@ -36,8 +37,8 @@ class FramePanels {
   cv::Mat disparity(const cv::Mat& disparity);
   /// Left image, disparity, search width, and the error where there is truth, else the variance.
   cv::Mat overview(const ShownFrame& shown);
-  /// Left image in its colours, disparity, variance, search width, and the error: those for which there is a file or a
-  /// map (an empty one is none).
+  /// Left image in its colours, disparity, variance, search width, reasons, and the error: those for which there is a
+  /// file or a map (an empty one is none).
   std::vector<Layer> layers(const ShownFrame& shown);
   /// All of them, two a row, each at most `cell_width` px wide.
   cv::Mat all(const ShownFrame& shown, int cell_width);

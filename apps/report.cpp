@@ -220,7 +220,8 @@ class Page {
       const vision::StereoFrame& frame = sequence_.frames[i];
       Json layers = Json::array();
       for (const Layer& layer : layers_of(frame)) {
-        const char* kind = layer.name.starts_with("error") ? "png" : "jpeg";  // ten colours, with sharp edges
+        const bool has_edges = layer.name.starts_with("error") || layer.name == "reason";  // ten colours
+        const char* kind = has_edges ? "png" : "jpeg";
         layers.push_back(
             {{"name", layer.name}, {"picture", data_uri(narrowed(layer.picture, arguments_.picture_width), kind)}});
         if (!layer.bar.empty()) data["bars"][layer.name] = data_uri(layer.bar, "png");
@@ -243,10 +244,11 @@ class Page {
     };
     const fs::path exact = file("pfm", ".pfm");  // keeps negative disparities, which the PNG has no room for
     const cv::Mat disparity = vision::read_disparity(fs::exists(exact) ? exact : file("disparity", ".png"));
-    cv::Mat variance, search;
+    cv::Mat variance, search, reasons;
     if (const fs::path path = file("variance", ".pfm"); fs::exists(path)) variance = vision::read_pfm(path);
     if (const fs::path path = file("search", ".png"); fs::exists(path)) search = vision::read_grey_image(path);
-    return panels_.layers({frame, {}, disparity, variance, search});
+    if (const fs::path path = file("reason", ".png"); fs::exists(path)) reasons = vision::read_grey_image(path);
+    return panels_.layers({frame, {}, disparity, variance, search, reasons});
   }
 
   void add_paths(Json& data) const {

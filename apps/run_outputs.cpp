@@ -24,8 +24,8 @@ namespace egosgm::app {
 namespace {
 
 const std::vector<std::string> kKinds{
-    "variance", "color",   "predicted", "measured", "right", "interpolated", "interpolated_certain",
-    "search",   "dynamic", "pfm",       "overview", "cloud", "depth",        "depth_m"};
+    "variance", "color", "predicted", "measured", "right", "interpolated", "interpolated_certain", "search", "dynamic",
+    "reason",   "pfm",   "overview",  "cloud",    "depth", "depth_m"};
 
 const char* extension_of(const std::string& kind) {
   if (kind == "variance" || kind == "pfm" || kind == "depth_m") return ".pfm";
@@ -51,6 +51,7 @@ const char* const kWriteListHelp =
     "  search         disparities searched at each pixel, 16-bit PNG\n"
     "  dynamic        255 where prediction and measurement contradict each other, as on what moves by itself, 8-bit "
     "PNG\n"
+    "  reason         why a pixel has no value, or a doubtful one: a number each, 8-bit PNG (docs/formats.md)\n"
     "  color          disparity in colours, PNG\n"
     "  overview       image, disparity, search width and error (or variance) in one PNG\n"
     "  cloud          points with colours [m], PLY, without those whose depth is uncertain by more than 5 %\n"
@@ -112,6 +113,7 @@ RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds
   if (wants("measured")) measured_.create(size, CV_32FC1);
   if (wants("search") || wants("overview")) search_.create(size, CV_16UC1);
   if (wants("dynamic")) dynamic_.create(size, CV_8UC1);
+  if (wants("reason")) reason_.create(size, CV_8UC1);
 }
 
 FrameOutputs RunOutputs::views() {
@@ -123,6 +125,7 @@ FrameOutputs RunOutputs::views() {
   if (!measured_.empty()) outputs.debug.measured = vision::map_view(measured_);
   if (!search_.empty()) outputs.debug.search_width = view_of<std::uint16_t>(search_);
   if (!dynamic_.empty()) outputs.debug.dynamic = view_of<std::uint8_t>(dynamic_);
+  if (!reason_.empty()) outputs.reason = view_of<std::uint8_t>(reason_);
   return outputs;
 }
 
@@ -144,6 +147,7 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
       {"right", [&](const Path& path) { vision::write_disparity_png(path, right_); }},
       {"search", [&](const Path& path) { vision::write_png(path, search_); }},
       {"dynamic", [&](const Path& path) { vision::write_png(path, dynamic_); }},
+      {"reason", [&](const Path& path) { vision::write_png(path, reason_); }},
       {"overview",
        [&](const Path& path) {
          vision::write_png(path, panels_.overview({frame, left, disparity_, variance_, search_}));

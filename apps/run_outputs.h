@@ -50,7 +50,7 @@ class RunOutputs {
   const std::filesystem::path folder_;
   const std::set<std::string> kinds_;
   const Calibration calibration_;
-  cv::Mat disparity_, variance_, right_, predicted_, measured_, search_, dynamic_;
+  cv::Mat disparity_, variance_, right_, predicted_, measured_, search_, dynamic_, reason_;
   FramePanels panels_;
 };
 

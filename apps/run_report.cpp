@@ -126,6 +126,12 @@ void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report,
                              {"ms", times_json(report, motion, times)}});
 }
 
+void RunReport::add_reasons() {
+  for (int reason = 0; reason < kReasonCount; ++reason) {
+    json_["reasons"].push_back(to_string(static_cast<Reason>(reason)));
+  }
+}
+
 void RunReport::set_doubt(const std::string& doubt) {
   if (!doubt.empty()) json_["doubt"] = doubt;
 }

@@ -33,6 +33,9 @@ class RunReport {
   void add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
            const HostTimes& times, std::int64_t unstorable);
 
+  /// Names the numbers of `run --write reason`.
+  void add_reasons();
+
   /// What speaks against the input, see Doubt; empty: nothing.
   void set_doubt(const std::string& doubt);
 

@@ -37,7 +37,7 @@ void draw(const std::string& file) {
     const vision::SyntheticFrame images = street.render(k);
     FrameOutputs outputs;
     outputs.disparity = vision::map_view(updated);
-    outputs.measured = vision::map_view(measured);
+    outputs.debug.measured = vision::map_view(measured);
     frames.submit(vision::image_view(images.left), vision::image_view(images.right), street.motion(k), outputs);
     frames.collect();
   }

@@ -22,7 +22,11 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
   }
   in(Room::kCompare, [&] { compare(plan, w.prediction, measured, before.agreement, after.agreement); });
   in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, after.agreement, w.fusion, after); });
-  in(Room::kPublish, [&] { publish_(plan, w.prediction, measured, after.maps, variance, w.dynamic); });
+  in(Room::kPublish, [&] {
+    const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
+    publish_(plan, {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), after.maps},
+             {variance, w.dynamic, w.reasons});
+  });
   return {measured, offset, images};
 }
 
@@ -63,7 +67,8 @@ Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const Method
       matching(context, size),
       measured(context, size),
       fusion(context, size),
-      dynamic(context, pixel_count(size)) {}
+      dynamic(context, pixel_count(size)),
+      reasons(context, pixel_count(size)) {}
 
 Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
                const MethodOptions& options, const Tuning& tuning)
@@ -82,11 +87,12 @@ Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration&
   fuse_.emplace(context, size, options, tuning);
 }
 
-void Method::prepare(PixelType type) {
+void Method::prepare(PixelType type, const Wanted& wanted) {
   if (options_.vertical_alignment.enabled) alignment_.prepare(type);
   search_.prepare(type);
   match_.prepare(type);
   if (fuse_) fuse_->prepare(type);
+  publish_.prepare(type, wanted);
 }
 
 }  // namespace egosgm

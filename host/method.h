@@ -25,7 +25,7 @@ struct Workspace {
   Matching matching;
   StereoMaps measured;  // where there is a prediction to fuse it with; else the belief's memory
   Fusion fusion;
-  ocl::Buffer<cl_uchar> dynamic;
+  ocl::Buffer<cl_uchar> dynamic, reasons;
 
   Workspace(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
 };
@@ -43,11 +43,11 @@ class Method {
   Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration, const MethodOptions& options,
          const Tuning& tuning);
 
-  /// Builds what images of `type` need. Enqueues nothing.
-  void prepare(PixelType type);
+  /// Builds what images of `type` need, and what is wanted of them. Enqueues nothing.
+  void prepare(PixelType type, const Wanted& wanted = {});
 
   /// Enqueues a frame. Writes `after` and `variance` (see PublishRoom), which share no memory with `before`.
-  /// REQUIRES: the images' type was prepared.
+  /// REQUIRES: the images' type was prepared, with what the plan wants.
   FrameResults frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after, Map& variance);
 
   /// Called after each room of each frame; null: nobody looks on.

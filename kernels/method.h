@@ -56,6 +56,19 @@
 #define EGOSGM_DYNAMIC_RADIUS 4
 #define EGOSGM_DYNAMIC_MIN_COUNT 27
 
+// Reasons looks this many pixels to all sides for texture: it is flat where grey values two columns apart differ by
+// less than this in the mean, on the 8-bit scale.
+#define EGOSGM_TEXTURE_RADIUS 4
+#define EGOSGM_LEAST_CHANGE 2.0f
+// A pixel that nothing was warped to was uncovered where what was warped this near in its row lies that far apart.
+#define EGOSGM_UNCOVERED_RADIUS 8
+#define EGOSGM_UNCOVERED_JUMP_PX 3.0f
+// A texture repeats where the census code of a pixel, and in the mean the nine of a grid with this step, are found
+// again at least so many pixels off, but for so many bits.
+#define EGOSGM_REPEAT_STEP 4
+#define EGOSGM_LEAST_REPEAT_PX 4
+#define EGOSGM_REPEAT_BITS 3
+
 // The disparities of RightMap are whole numbers of such steps.
 #define EGOSGM_RIGHT_MAP_STEPS_PER_PX 65536.0f
 

@@ -54,6 +54,18 @@ typedef float f32;
 // VerticalAlignment's quadratic: 1, u, v, u v, u^2, v^2.
 #define EGOSGM_OFFSET_TERMS 6
 
+// What Reasons says of a pixel: include/egosgm/reason.h.
+#define EGOSGM_REASON_TRUSTED 0
+#define EGOSGM_REASON_UNCONFIRMED 1
+#define EGOSGM_REASON_UNCOVERED 2
+#define EGOSGM_REASON_CONTRADICTED 3
+#define EGOSGM_REASON_NEARER 4
+#define EGOSGM_REASON_AMBIGUOUS 5
+#define EGOSGM_REASON_FLAT 6
+#define EGOSGM_REASON_SATURATED 7
+#define EGOSGM_REASON_SPECKLE 8
+#define EGOSGM_REASON_PREDICTED 9
+
 typedef struct {
   i32 width, height;
 } ImageSize;

@@ -20,6 +20,7 @@ template <typename Visit>
 void for_each_output(FrameOutputs& outputs, Visit&& visit) {
   visit("disparity", outputs.disparity);
   visit("variance", outputs.variance);
+  visit("reason", outputs.reason);
   visit("right_disparity", outputs.right_disparity);
   visit("right_variance", outputs.right_variance);
   visit("predicted", outputs.debug.predicted);
@@ -49,7 +50,7 @@ py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
     const auto name = item.cast<std::string>();
     if (name == "search_width") {
       arrays[item] = py::array_t<std::uint16_t>({height, width});
-    } else if (name == "dynamic") {
+    } else if (name == "dynamic" || name == "reason") {
       arrays[item] = py::array_t<std::uint8_t>({height, width});
     } else {
       arrays[item] = py::array_t<float>({height, width});
@@ -236,6 +237,10 @@ void bind_frame(py::module_& module) {
     frame.def_property_readonly(name, [name](const Frame& f) { return f.map(name); });
   });
   frame.def_readonly("report", &Frame::report);
+
+  py::tuple reasons(kReasonCount);
+  for (int reason = 0; reason < kReasonCount; ++reason) reasons[reason] = to_string(static_cast<Reason>(reason));
+  module.attr("REASONS") = reasons;  // by the values of Frame.reason
 }
 
 }  // namespace
@@ -245,17 +250,19 @@ void bind_pipeline(py::module_& module) {
   py::class_<LockedPipeline>(module, "Pipeline")
       .def(py::init(&make_pipeline), py::arg("calibration"), py::arg("width"), py::arg("height"), py::kw_only(),
            py::arg("device") = "", py::arg("preset") = "default")
-      .def("process", &LockedPipeline::process, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
-           py::arg("outputs") = py::make_tuple("disparity", "variance"),
-           "Matches one rectified pair.\n\n"
-           "left, right: H x W of uint8 or uint16, both alike; rows at any stride are read where they are.\n"
-           "motion: how the camera moved since the last frame, a Motion or a 4x4 matrix current_from_previous; None: "
-           "the whole range is searched.\n"
-           "outputs: names of the maps to make, or a dict of arrays to fill (float32; search_width: uint16, dynamic: "
-           "uint8). Results: disparity, variance, right_disparity, right_variance. For debugging, of the left view: "
-           "predicted, predicted_variance, measured, measured_variance, search_width, dynamic.\n\n"
-           "Raises InvalidArgument before anything runs, or DeviceError. A frame that raises leaves the pipeline as "
-           "it was. Other Python threads run meanwhile; several that call one pipeline take turns.")
+      .def(
+          "process", &LockedPipeline::process, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
+          py::arg("outputs") = py::make_tuple("disparity", "variance"),
+          "Matches one rectified pair.\n\n"
+          "left, right: H x W of uint8 or uint16, both alike; rows at any stride are read where they are.\n"
+          "motion: how the camera moved since the last frame, a Motion or a 4x4 matrix current_from_previous; None: "
+          "the whole range is searched.\n"
+          "outputs: names of the maps to make, or a dict of arrays to fill (float32; search_width: uint16, dynamic and "
+          "reason: uint8). Results: disparity, variance, reason, right_disparity, right_variance. For debugging, of "
+          "the "
+          "left view: predicted, predicted_variance, measured, measured_variance, search_width, dynamic.\n\n"
+          "Raises InvalidArgument before anything runs, or DeviceError. A frame that raises leaves the pipeline as "
+          "it was. Other Python threads run meanwhile; several that call one pipeline take turns.")
       .def("submit", &LockedPipeline::submit, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
            py::arg("outputs") = py::make_tuple("disparity", "variance"),
            "The first half of process: copies the images, starts the frame and returns, so that Python may read and "

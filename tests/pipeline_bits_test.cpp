@@ -173,10 +173,12 @@ TEST(Pipeline, FillsOnlyWhatIsAskedFor) {
     FrameOutputs wanted;
     if (index == 2) wanted.right_variance = outputs.right_variance.view();
     if (index == 1) wanted.debug.dynamic = outputs.dynamic.view();
+    if (index == 3) wanted.reason = outputs.reason.view();
     const FrameReport report = silent.process(left.view(), right.view(), video.motion(index), wanted);
     OutputMemory only(setting.size);
     if (index == 2) only.right_variance = expected.outputs.right_variance;
     if (index == 1) only.dynamic = expected.outputs.dynamic;
+    if (index == 3) only.reason = expected.outputs.reason;
     EXPECT_TRUE(same_outputs(outputs, only, setting.size)) << "frame " << index;
     EXPECT_EQ(report.density, expected.report.density) << "frame " << index;
     EXPECT_LT(report.launches, expected.report.launches) << "what is not asked for is computed, frame " << index;

@@ -99,6 +99,7 @@ std::vector<BadFrame> bad_frames() {
       {"output measured_variance: ", [](Frame& f) { f.outputs.debug.measured_variance.width = 128; }},
       {"output dynamic: a stride of 126 bytes is shorter than a row of 127",
        [](Frame& f) { f.outputs.debug.dynamic.stride_bytes = 126; }},
+      {"output reason: 127x62", [](Frame& f) { f.outputs.reason.height = 62; }},
       {"output search_width: a stride of 253 bytes is shorter than a row of 254",
        [](Frame& f) { f.outputs.debug.search_width.stride_bytes = 253; }},
       {"motion: not all values are finite", [](Frame& f) { f.motion->current_from_previous.translation().x() = kNan; }},

@@ -78,6 +78,7 @@ void expect_same(const reference::Frame& actual, const reference::Frame& expecte
   expect_same("updated", actual.updated, expected.updated, setting.size);
   expect_same("result", actual.result, expected.result, setting.size);
   EXPECT_TRUE(same_bits(actual.dynamic, expected.dynamic, setting.size)) << "dynamic map";
+  EXPECT_TRUE(same_bits(actual.reasons, expected.reasons, setting.size)) << "reasons";
   EXPECT_TRUE(same_bits(actual.output_variance, expected.output_variance, setting.size)) << "output_variance";
 }
 
@@ -105,6 +106,7 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
   }
   EXPECT_TRUE(same_bits(outputs.search_width.values(), widths, size)) << "output search_width";
   EXPECT_TRUE(same_bits(outputs.dynamic.values(), expected.dynamic, size)) << "output dynamic";
+  EXPECT_TRUE(same_bits(outputs.reason.values(), expected.reasons, size)) << "output reason";
   EXPECT_TRUE(outputs.padding_is_untouched());
 }
 

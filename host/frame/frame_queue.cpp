@@ -41,13 +41,15 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
                         const FrameOutputs& outputs) {
   expect_device_frame_not_failed();
   expect_none_failed();
-  method_.prepare(left.type);
+  Wanted wanted{.dynamic = outputs.debug.dynamic.data != nullptr,
+                .right = outputs.right_disparity.data || outputs.right_variance.data,
+                .reasons = outputs.reason.data != nullptr};
+  if (outputs.variance.data) wanted.variance = Views::kLeft;
+  if (outputs.right_variance.data) wanted.variance = Views::kBoth;
+  method_.prepare(left.type, wanted);
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};
   release_results();
-  Wanted wanted{{}, outputs.debug.dynamic.data != nullptr, outputs.right_disparity.data || outputs.right_variance.data};
-  if (outputs.variance.data) wanted.variance = Views::kLeft;
-  if (outputs.right_variance.data) wanted.variance = Views::kBoth;
   const Plan plan = plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, wanted);
   const FrameImages& images = frame.transfer->upload(left, right);
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
@@ -63,7 +65,8 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
                             .parts = {plan.matches, &method_.matcher().banded_sgm().stripes(),
                                       plan.has_coarse_match ? method_.search().coarse_cells() : 0},
                             .offset = results.offset,
-                            .dynamic = plan.wanted.dynamic ? &workspace.dynamic : nullptr},
+                            .dynamic = plan.wanted.dynamic ? &workspace.dynamic : nullptr,
+                            .reasons = plan.wanted.reasons ? &workspace.reasons : nullptr},
                            outputs);
 
   drain.is_dismissed = true;

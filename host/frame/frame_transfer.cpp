@@ -136,6 +136,7 @@ void FrameTransfer::validate(const ImageView& left, const ImageView& right, cons
   validate_map("measured_variance", outputs.debug.measured_variance, size_);
   validate_map("search_width", outputs.debug.search_width, size_);
   validate_map("dynamic", outputs.debug.dynamic, size_);
+  validate_map("reason", outputs.reason, size_);
 }
 
 const FrameImages& FrameTransfer::upload(const ImageView& left, const ImageView& right) {
@@ -183,6 +184,7 @@ void FrameTransfer::download(const FrameOnDevice& frame, const FrameOutputs& out
   fetch_left(frame.measured.disparity, outputs.debug.measured.data, measured_);
   fetch_left(frame.measured.variance, outputs.debug.measured_variance.data, measured_variance_);
   if (frame.dynamic) fetch(*frame.dynamic, pixel_count(size_), dynamic_);
+  if (frame.reasons) fetch(*frame.reasons, pixel_count(size_), reasons_);
   if (outputs.debug.search_width.data) fetch(frame.bands.bands, pixel_count(size_), bands_);
   fetch(frame.bands.row_sums, static_cast<std::size_t>(count(frame.matched)) * size_.height, row_sums_);
   fetch(frame.offset.terms, 1, vertical_offset_px_);
@@ -221,6 +223,7 @@ void FrameTransfer::collect(FrameReport& report) const {
   copy_rows(measured_.data(), outputs_.debug.measured);
   copy_rows(measured_variance_.data(), outputs_.debug.measured_variance);
   copy_rows(dynamic_.data(), outputs_.debug.dynamic);
+  copy_rows(reasons_.data(), outputs_.reason);
   copy_rows(bands_.data(), outputs_.debug.search_width,
             [](const shared::Band& b) { return static_cast<std::uint16_t>(b.last - b.first + 1); });
 

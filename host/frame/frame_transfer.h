@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "egosgm/pipeline.h"
+#include "host/align/vertical_alignment.h"
 #include "host/maps.h"
+#include "host/match/stripes.h"
 #include "host/ocl/host_memory.h"
 #include "host/search/search_band.h"
-#include "host/match/stripes.h"
-#include "host/align/vertical_alignment.h"
 
 namespace egosgm {
 
@@ -31,7 +31,8 @@ struct FrameOnDevice {
   Views matched;  // they are of these
   MatchedParts parts;
   const VerticalOffset& offset;
-  const ocl::Buffer<cl_uchar>* dynamic;  // null where it was not asked for
+  const ocl::Buffer<cl_uchar>* dynamic;            // null where it was not asked for
+  const ocl::Buffer<cl_uchar>* reasons = nullptr;  // the same
 };
 
 /// Checks what the caller gave, brings a frame's images to the device and its results back: one for each frame that may
@@ -85,7 +86,7 @@ class FrameTransfer {
   MapReadback disparity_, variance_, right_disparity_, right_variance_;
   Scratch predicted_, predicted_variance_, measured_, measured_variance_, vertical_offset_px_;
   std::vector<shared::Band> bands_;
-  std::vector<cl_uchar> dynamic_;
+  std::vector<cl_uchar> dynamic_, reasons_;
   std::vector<shared::RowSum> row_sums_;  // of the views that were searched
   MatchedParts parts_{};
   cl::Event scratch_fetched_;

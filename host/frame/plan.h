@@ -14,9 +14,10 @@ enum class Search { kBands, kEverything };
 
 /// What is wanted of a frame that no later one rests on.
 struct Wanted {
-  std::optional<Views> variance;  // the one that is given out
+  std::optional<Views> variance = {};  // the one that is given out
   bool dynamic = false;
   bool right = true;  // the right view's maps, too; where that is not tracked, no later frame needs them
+  bool reasons = false;
 };
 
 /// All that is decided before a frame.

@@ -28,7 +28,7 @@ std::vector<std::pair<ocl::ProgramSource, cl::Program>> programs_of(const Device
                                                                     const PipelineOptions& options) {
   const Calibration any{.fx = 1, .fy = 1, .cx = 0, .cy = 0, .baseline_m = 1};
   FrameQueue frames(any, shared::ImageSize{1, 1}, all_stages(options), device, PixelType::kU8);
-  frames.method().prepare(PixelType::kU16);
+  for (const PixelType type : {PixelType::kU8, PixelType::kU16}) frames.method().prepare(type, {.reasons = true});
   return frames.context().programs();
 }
 

@@ -16,7 +16,8 @@ MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const Method
       matcher_(context, size, range_of(options), options.banded_sgm,
                {path_group(tuning), {tuning.tile_width, tuning.tile_height, tuning.block_lanes}}),
       consistency_(context, size),
-      speckle_removal_(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group) {
+      speckle_removal_(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
+      removes_speckles_(options.speckle_removal.max_size_px > 0) {
   if (options.median_filter.enabled) median_filter_.emplace(context, size);
 }
 

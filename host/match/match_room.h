@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/match/consistency_check.h"
 #include "host/frame/plan.h"
+#include "host/fuse/prediction_check.h"
+#include "host/match/consistency_check.h"
 #include "host/match/matcher.h"
 #include "host/match/median_filter.h"
-#include "host/fuse/prediction_check.h"
 #include "host/match/speckle_removal.h"
 
 namespace egosgm {
@@ -31,6 +31,8 @@ class MatchRoom {
                   const PredictionCheck::State& agreement, Matching& matching, StereoMaps& measured);
 
   const Matcher& matcher() const { return matcher_; }
+  /// Null where nothing is dropped as a speckle.
+  const SpeckleRemoval::Runs* speckle_runs() const { return removes_speckles_ ? &speckle_removal_.runs() : nullptr; }
 
  private:
   const ConsistencyCheckOptions left_right_;
@@ -38,6 +40,7 @@ class MatchRoom {
   std::optional<MedianFilter> median_filter_;
   ConsistencyCheck consistency_;
   SpeckleRemoval speckle_removal_;
+  const bool removes_speckles_;
 };
 
 }  // namespace egosgm

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 #include "host/tuning_defaults.h"
 
@@ -14,6 +14,8 @@ namespace egosgm {
 /// Regions are found by union-find over runs of connected pixels in a row; the root of a region is its first run.
 class SpeckleRemoval {
  public:
+  using Runs = ocl::Buffer<cl_ushort>;
+
   /// `strip_rows`: rows that one work-item joins on its own before strips are joined by atomics; 0: by the device (many
   /// on a CPU, one elsewhere). `row_group`: work-items that share a row in search of its runs; 0: by the device. Same
   /// bits.
@@ -23,10 +25,12 @@ class SpeckleRemoval {
   /// In place. With `max_size_px` 0 nothing is launched. `views`: 1 looks at the left view only.
   void operator()(StereoMaps& maps, Views views);
 
+  /// Of the last maps, before anything was dropped: where each pixel's run of connected ones begins, 65535 without one.
+  const Runs& runs() const { return runs_; }
+
  private:
   using Disparities = const ocl::Buffer<float>;
   using Indices = ocl::Buffer<cl_uint>;
-  using Runs = ocl::Buffer<cl_ushort>;
 
   ocl::Context& context_;
   const shared::ImageSize size_;

@@ -4,20 +4,27 @@
 namespace egosgm {
 
 PublishRoom::PublishRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
-    : context_(context) {
+    : context_(context),
+      reasons_([&context, size, options](PixelType type) { return Reasons(context, size, type, options); }) {
   if (options.output_variance.enabled) output_variance_.emplace(context, size, options.output_variance);
   if (options.temporal) dynamic_map_.emplace(context, size, options.dynamic_map);
 }
 
-void PublishRoom::operator()(const Plan& plan, const Prediction& prediction, const StereoMaps& measured,
-                             const StereoMaps& belief, Map& variance, ocl::Buffer<cl_uchar>& dynamic) {
-  if (plan.wanted.variance) (*output_variance_)(belief, measured, variance, *plan.wanted.variance);
+void PublishRoom::prepare(PixelType type, const Wanted& wanted) {
+  if (wanted.reasons) reasons_.prepare(type);
+}
+
+void PublishRoom::operator()(const Plan& plan, const Reasons::Inputs& inputs, const Outputs& outputs) {
+  if (plan.wanted.variance) {
+    (*output_variance_)(inputs.belief, inputs.measured, outputs.variance, *plan.wanted.variance);
+  }
+  if (plan.wanted.reasons) reasons_[inputs.images.type](inputs, outputs.reasons);
   if (!plan.wanted.dynamic) return;
-  if (plan.predicts()) {
-    (*dynamic_map_)(prediction.maps.disparity, measured.disparity, dynamic);
+  if (inputs.prediction) {
+    (*dynamic_map_)(inputs.prediction->maps.disparity, inputs.measured.disparity, outputs.dynamic);
   } else {
     context_.enter("DynamicMap");
-    dynamic.fill(context_, 0);
+    outputs.dynamic.fill(context_, 0);
   }
 }
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/publish/dynamic_map.h"
 #include "host/frame/plan.h"
-#include "host/publish/output_variance.h"
 #include "host/predict/predict_room.h"
+#include "host/publish/dynamic_map.h"
+#include "host/publish/output_variance.h"
+#include "host/publish/reasons.h"
 
 namespace egosgm {
 
@@ -13,15 +14,23 @@ class PublishRoom {
  public:
   PublishRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
 
-  /// Writes the variance [px^2] of the `belief` and the marks of what contradicts a static world, as the plan wants
-  /// them.
-  void operator()(const Plan& plan, const Prediction& prediction, const StereoMaps& measured, const StereoMaps& belief,
-                  Map& variance, ocl::Buffer<cl_uchar>& dynamic);
+  /// Builds what is wanted of images of `type`.
+  void prepare(PixelType type, const Wanted& wanted);
+
+  struct Outputs {
+    Map& variance;                   // [px^2] of the belief
+    ocl::Buffer<cl_uchar>& dynamic;  // marks of what contradicts a static world
+    ocl::Buffer<cl_uchar>& reasons;
+  };
+
+  /// Writes what the plan wants.
+  void operator()(const Plan& plan, const Reasons::Inputs& inputs, const Outputs& outputs);
 
  private:
   ocl::Context& context_;
   std::optional<OutputVariance> output_variance_;
   std::optional<DynamicMap> dynamic_map_;
+  OfEachType<Reasons> reasons_;
 };
 
 }  // namespace egosgm

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "egosgm/error.h"
+#include "egosgm/reason.h"
 #include "egosgm/vision/disparity_io.h"
 
 namespace egosgm::vision {
@@ -34,6 +35,18 @@ const std::array<ErrorStep, 10> kErrorSteps = {{{0.1875f, "0.19", {149, 54, 49}}
                                                 {24.0f, "24", {67, 109, 244}},
                                                 {48.0f, "48", {39, 48, 215}},
                                                 {INFINITY, "", {38, 0, 165}}}};
+
+/// By Reason, BGR.
+const std::array<cv::Vec3b, kReasonCount> kReasonColors = {{{0, 0, 0},         // trusted
+                                                            {160, 90, 40},     // unconfirmed
+                                                            {230, 200, 60},    // uncovered
+                                                            {60, 60, 240},     // contradicted
+                                                            {250, 130, 200},   // nearer
+                                                            {0, 140, 255},     // ambiguous
+                                                            {110, 110, 110},   // flat
+                                                            {255, 255, 255},   // saturated
+                                                            {90, 160, 60},     // speckle
+                                                            {80, 230, 250}}};  // predicted
 
 void require_map(const cv::Mat& map, const char* name) {
   if (map.empty() || map.type() != CV_32FC1) {
@@ -206,6 +219,41 @@ cv::Mat error_bar(int width) {
     put_label(bar, kErrorSteps[i].label, static_cast<double>(i + 1) * width / kFields);
   }
   put_label(bar, "none", (kFields - 0.5) * width / kFields);
+  return bar;
+}
+
+cv::Mat color_reasons(const cv::Mat& reasons) {
+  if (reasons.empty() || reasons.type() != CV_8UC1) {
+    throw InvalidArgument("color_reasons: the map must be CV_8UC1 and not empty");
+  }
+  cv::Mat picture(reasons.size(), CV_8UC3);
+  for (int y = 0; y < reasons.rows; ++y) {
+    for (int x = 0; x < reasons.cols; ++x) {
+      const std::uint8_t reason = reasons.at<std::uint8_t>(y, x);
+      if (reason >= kReasonCount) {
+        throw InvalidArgument("color_reasons: " + std::to_string(reason) + " is no reason: they are 0 to " +
+                              std::to_string(kReasonCount - 1));
+      }
+      picture.at<cv::Vec3b>(y, x) = kReasonColors[reason];
+    }
+  }
+  return picture;
+}
+
+cv::Mat reason_bar(int width) {
+  require_width(width);
+  constexpr int kFields = kReasonCount / 2;
+  cv::Mat rows[2];
+  for (int row = 0; row < 2; ++row) {
+    rows[row] = cv::Mat(kBarHeight, width, CV_8UC3, kBlack);
+    for (int field = 0; field < kFields; ++field) {
+      const int reason = row * kFields + field, left = field * width / kFields, end = (field + 1) * width / kFields;
+      rows[row](cv::Rect(left, 0, end - left, kBarColors)).setTo(cv::Scalar(kReasonColors[reason]));
+      put_label(rows[row], to_string(static_cast<Reason>(reason)), (field + 0.5) * width / kFields);
+    }
+  }
+  cv::Mat bar;
+  cv::vconcat(rows[0], rows[1], bar);
   return bar;
 }
 

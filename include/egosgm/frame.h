@@ -8,6 +8,7 @@
 #include "egosgm/device.h"
 #include "egosgm/export.h"
 #include "egosgm/image.h"
+#include "egosgm/reason.h"
 
 namespace egosgm {
 
@@ -27,6 +28,7 @@ struct DebugMaps {
 /// no value.
 struct FrameOutputs {
   MapView<float> disparity, variance;              // the left view's result
+  MapView<std::uint8_t> reason;                    // of each of its pixels, a Reason
   MapView<float> right_disparity, right_variance;  // the right view's
   DebugMaps debug;
 };

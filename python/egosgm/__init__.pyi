@@ -20,6 +20,7 @@ from .video_evaluation import evaluate_video as evaluate_video
 
 __version__: str
 INVALID_DISPARITY: float
+REASONS: tuple[str, ...]
 
 _Path = Union[str, os.PathLike[str]]
 _Map = NDArray[np.float32]
@@ -103,6 +104,8 @@ class Frame:
     def disparity(self) -> Optional[_Map]: ...
     @property
     def variance(self) -> Optional[_Map]: ...
+    @property
+    def reason(self) -> Optional[NDArray[np.uint8]]: ...
     @property
     def right_disparity(self) -> Optional[_Map]: ...
     @property

@@ -14,7 +14,7 @@ import unittest
 from program_case import FRAMES, HEIGHT, WIDTH, ProgramTest
 
 CHROMIUM = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
-LAYERS = ["left image", "disparity", "variance", "disparities searched", "error [px]"]
+LAYERS = ["left image", "disparity", "variance", "disparities searched", "reason", "error [px]"]
 
 
 class Elements(html.parser.HTMLParser):
@@ -42,7 +42,7 @@ class ReportTest(ProgramTest):
     def setUpClass(cls):
         super().setUpClass()
         cls.out = cls.folder / "out"
-        cls.works("run", "--odometry", cls.street, "--out", cls.out, "--write", "variance,search", "--quiet", "--set", "p2=150",
+        cls.works("run", "--odometry", cls.street, "--out", cls.out, "--write", "variance,search,reason", "--quiet", "--set", "p2=150",
                   "--disparities", 64)
         cls.works("report", cls.out, "--truth", cls.street / "truth/left_disp_noc", "--poses", cls.street / "poses.txt")
         cls.page = cls.out / "report.html"

@@ -63,7 +63,7 @@ class Run(ProgramTest):
 
     def test_writes_what_is_asked_for(self):
         out = self.new_folder()
-        kinds = "variance,color,predicted,measured,right,interpolated,interpolated_certain,search,dynamic,pfm,overview,cloud,depth,depth_m"
+        kinds = "variance,color,predicted,measured,right,interpolated,interpolated_certain,search,dynamic,reason,pfm,overview,cloud,depth,depth_m"
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", kinds, "--frames", "1:2", "--quiet")
         for kind in kinds.split(","):
             extension = "pfm" if kind in ("variance", "pfm", "depth_m") else "ply" if kind == "cloud" else "png"
@@ -71,6 +71,8 @@ class Run(ProgramTest):
         text = json.loads(self.assert_works("eval", "--estimate", out / "interpolated", "--truth",
                                             self.street / "truth/left_disp_occ", "--json"))
         self.assertEqual(text["pooled"]["density"], 100)
+        reasons = self.report(out)["reasons"]
+        self.assertEqual((reasons[0], reasons[9], len(reasons)), ("trusted", "predicted", 10))
 
     def assert_doubted(self, arguments, *named):
         """The last line of run names doctor, which finds a problem with the very arguments."""

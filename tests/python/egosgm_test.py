@@ -332,6 +332,19 @@ def test_the_example_runs(tmp_path):
         assert "pip install matplotlib" in done.stderr
 
 
+def test_a_reason_tells_why_a_pixel_has_no_value():
+    street = egosgm.SyntheticSequence(frames=3)
+    pipeline = egosgm.Pipeline(street.calibration, 640, 240)
+    for k in range(3):
+        frame = street.render(k)
+        result = pipeline.process(frame.left, frame.right, street.motion(k) if k else None, outputs=["disparity", "reason"])
+    assert result.reason.dtype == np.uint8 and result.reason.max() < len(egosgm.REASONS)
+    missing = result.disparity == egosgm.INVALID_DISPARITY
+    trusted, unconfirmed = (result.reason == egosgm.REASONS.index(name) for name in ("trusted", "unconfirmed"))
+    assert trusted.mean() > 0.4 and not trusted[missing].any()
+    assert missing[unconfirmed].all()
+
+
 def test_the_dynamic_map_finds_what_moves():
     street = egosgm.SyntheticSequence(frames=4, moving_object=True)
     pipeline = egosgm.Pipeline(street.calibration, 640, 240)

@@ -15,6 +15,7 @@
 #include "tests/reference/fuse/kalman_update.h"
 #include "tests/reference/match/median_filter.h"
 #include "tests/reference/publish/output_variance.h"
+#include "tests/reference/publish/reasons.h"
 #include "tests/reference/fuse/prediction_check.h"
 #include "tests/reference/predict/right_map.h"
 #include "tests/reference/fuse/sad_check.h"
@@ -60,10 +61,25 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   frame.output_variance = options_.output_variance.enabled ? output_variance(size_, options_.output_variance,
                                                                              frame.result, frame.passes.back().measured)
                                                            : frame.result.variance;
+  frame.reasons = explain(images, frame);
   offset_ = frame.passes.back().offset;
   has_offset_ = true;
   if (options_.temporal) belief_ = frame.result;
   return frame;
+}
+
+std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& frame) const {
+  const Pass& pass = frame.passes.back();
+  return reasons(size_, options_,
+                 {.images = pass.images,
+                  .white = images.bits == 8 ? 255 : 65535,
+                  .codes = pass.codes,
+                  .code_padding = code_padding_,
+                  .warped = frame.warped.disparity,
+                  .hidden = frame.predicted.hidden,
+                  .consistent = pass.consistent.disparity,
+                  .measured = pass.measured.disparity,
+                  .belief = frame.result});
 }
 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {

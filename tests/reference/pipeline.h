@@ -43,7 +43,7 @@ struct Frame {
   std::vector<Pass> passes;  // two where nothing was known of the vertical offset
   testing::HostMaps fused, fused_smoothed, fused_consistent, updated;
   testing::HostMaps result;  // on which the next frame rests
-  std::vector<std::uint8_t> dynamic;
+  std::vector<std::uint8_t> dynamic, reasons;
   std::vector<float> output_variance;  // given out in place of the result's
   float vertical_offset_px = 0;        // that the last pass was resampled by in the middle
 };
@@ -61,6 +61,7 @@ class Pipeline {
   void predict(const ViewMotions& motions, Frame& frame) const;
   Pass match(const Images& images, const Frame& frame, const VerticalOffset& known) const;
   void update(const Images& images, Frame& frame) const;
+  std::vector<std::uint8_t> explain(const Images& images, const Frame& frame) const;
 
   shared::ImageSize size_;
   shared::DisparityRange range_;

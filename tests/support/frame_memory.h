@@ -102,7 +102,7 @@ struct OutputMemory {
   MapMemory<float> disparity, variance, right_disparity, right_variance, predicted, predicted_variance, measured,
       measured_variance;
   MapMemory<std::uint16_t> search_width;
-  MapMemory<std::uint8_t> dynamic;
+  MapMemory<std::uint8_t> dynamic, reason;
 
   explicit OutputMemory(shared::ImageSize size, Layout layout = {})
       : disparity(size, layout),
@@ -114,11 +114,13 @@ struct OutputMemory {
         measured(size, layout),
         measured_variance(size, layout),
         search_width(size, layout),
-        dynamic(size, layout) {}
+        dynamic(size, layout),
+        reason(size, layout) {}
 
   FrameOutputs views() {
     return {disparity.view(),
             variance.view(),
+            reason.view(),
             right_disparity.view(),
             right_variance.view(),
             {predicted.view(), predicted_variance.view(), measured.view(), measured_variance.view(),
@@ -138,7 +140,7 @@ struct OutputMemory {
   bool padding_is_untouched() const {
     const auto all = maps();
     return std::all_of(all.begin(), all.end(), [](const auto& map) { return map.second->padding_is_untouched(); }) &&
-           search_width.padding_is_untouched() && dynamic.padding_is_untouched();
+           search_width.padding_is_untouched() && dynamic.padding_is_untouched() && reason.padding_is_untouched();
   }
 };
 
@@ -153,7 +155,9 @@ inline ::testing::AssertionResult same_outputs(const OutputMemory& actual, const
   const auto same = same_bits(actual.search_width.values(), expected.search_width.values(), size);
   if (!same) return ::testing::AssertionFailure() << "search_width: " << same.message();
   const auto same_marks = same_bits(actual.dynamic.values(), expected.dynamic.values(), size);
-  return same_marks ? same_marks : ::testing::AssertionFailure() << "dynamic: " << same_marks.message();
+  if (!same_marks) return ::testing::AssertionFailure() << "dynamic: " << same_marks.message();
+  const auto same_reasons = same_bits(actual.reason.values(), expected.reason.values(), size);
+  return same_reasons ? same_reasons : ::testing::AssertionFailure() << "reason: " << same_reasons.message();
 }
 
 /// Of all frames of two runs.

@@ -22,12 +22,13 @@ class StageChain {
         transfer_(context_, size, range_of(options)),
         before_(context_, size),
         after_(context_, size) {
-    method_.prepare(type);
+    method_.prepare(type, {.reasons = true});
   }
 
   reference::Frame process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion) {
     reference::Frame frame;
-    const Plan plan = plan_of(options_, before_.missing, before_.offset.is_known, motion, {Views::kBoth, true});
+    const Plan plan =
+        plan_of(options_, before_.missing, before_.offset.is_known, motion, {Views::kBoth, true, true, true});
     const FrameImages& uploaded = transfer_.upload(left, right);
     method_.observer = [&](Room room) { look(room, plan, uploaded, frame); };
     method_.frame(plan, uploaded, before_, after_, transfer_.output_variance());
@@ -59,6 +60,7 @@ class StageChain {
         return;
       case Room::kPublish:
         frame.dynamic = work.dynamic.read(context_);
+        frame.reasons = work.reasons.read(context_);
         return;
       case Room::kRefineAlignment:
       case Room::kCompare:

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "egosgm/image.h"
+#include "egosgm/reason.h"
 #include "host/vision/picture_sheet.h"
 #include "tests/support/expect_refused.h"
 
@@ -83,6 +84,20 @@ TEST(Render, BarsShowTheColorsInUse) {
     EXPECT_EQ(color_bar(width, {}, "px").cols, width);
     EXPECT_EQ(error_bar(width).cols, width);
   }
+}
+
+TEST(Render, EachReasonHasAColorOfItsOwnWhichTheBarNames) {
+  cv::Mat reasons(1, kReasonCount, CV_8UC1);
+  for (int i = 0; i < kReasonCount; ++i) reasons.at<std::uint8_t>(i) = static_cast<std::uint8_t>(i);
+  const cv::Mat colors = color_reasons(reasons), bar = reason_bar(500);
+  EXPECT_EQ(bar.size(), cv::Size(500, 80));
+  for (int i = 0; i < kReasonCount; ++i) {
+    EXPECT_EQ(bar.at<cv::Vec3b>(40 * (i / 5) + 10, 100 * (i % 5) + 50), colors.at<cv::Vec3b>(i)) << i;
+    for (int other = 0; other < i; ++other) EXPECT_NE(colors.at<cv::Vec3b>(i), colors.at<cv::Vec3b>(other)) << i;
+  }
+  reasons.at<std::uint8_t>(3) = kReasonCount;
+  EXPECT_THROW(color_reasons(reasons), InvalidArgument);
+  EXPECT_THROW(color_reasons(colors), InvalidArgument);
 }
 
 TEST(Render, GreyBecomesColor) {

@@ -44,6 +44,13 @@ EGOSGM_EXPORT cv::Mat color_bar(int width, ColorRange range, const std::string& 
 /// The ten steps of color_error with their limits in px, and its grey, `width` x 40 pixels.
 EGOSGM_EXPORT cv::Mat error_bar(int width);
 
+/// Bytes of egosgm::Reason (`FrameOutputs::reason`), a colour each: black is trusted, what has no value is bluish or
+/// grey, what has a doubtful one yellowish or red. Other bytes throw InvalidArgument.
+EGOSGM_EXPORT cv::Mat color_reasons(const cv::Mat& reasons);
+
+/// Their colours and names in two rows, `width` x 80 pixels.
+EGOSGM_EXPORT cv::Mat reason_bar(int width);
+
 /// Grey (8 or 16 bit; 16 bit is stretched to its own maximum) as BGR.
 EGOSGM_EXPORT cv::Mat color_grey(const cv::Mat& grey);
 

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/publish/reasons.h"
+
+#include "host/match/banded_sgm.h"
+#include "host/match/census.h"
+
+namespace egosgm {
+namespace {
+
+static_assert(static_cast<int>(Reason::kTrusted) == EGOSGM_REASON_TRUSTED &&
+              static_cast<int>(Reason::kUnconfirmed) == EGOSGM_REASON_UNCONFIRMED &&
+              static_cast<int>(Reason::kUncovered) == EGOSGM_REASON_UNCOVERED &&
+              static_cast<int>(Reason::kContradicted) == EGOSGM_REASON_CONTRADICTED &&
+              static_cast<int>(Reason::kNearer) == EGOSGM_REASON_NEARER &&
+              static_cast<int>(Reason::kAmbiguous) == EGOSGM_REASON_AMBIGUOUS &&
+              static_cast<int>(Reason::kFlat) == EGOSGM_REASON_FLAT &&
+              static_cast<int>(Reason::kSaturated) == EGOSGM_REASON_SATURATED &&
+              static_cast<int>(Reason::kSpeckle) == EGOSGM_REASON_SPECKLE &&
+              static_cast<int>(Reason::kPredicted) == EGOSGM_REASON_PREDICTED &&
+              static_cast<int>(Reason::kPredicted) + 1 == kReasonCount);
+
+const cl::Program& build(ocl::Context& context, PixelType type, const BandedSgmOptions& options, int pixels) {
+  context.enter("Reasons");
+  return context.program("reasons.cl", ocl::Defines()
+                                           .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
+                                           .set("CODE_BYTES", 4 * Census::words(options.cost))
+                                           .set("PIXELS", pixels));
+}
+
+}  // namespace
+
+const char* to_string(Reason reason) {
+  switch (reason) {
+    case Reason::kTrusted:
+      return "trusted";
+    case Reason::kUnconfirmed:
+      return "unconfirmed";
+    case Reason::kUncovered:
+      return "uncovered";
+    case Reason::kContradicted:
+      return "contradicted";
+    case Reason::kNearer:
+      return "nearer";
+    case Reason::kAmbiguous:
+      return "ambiguous";
+    case Reason::kFlat:
+      return "flat";
+    case Reason::kSaturated:
+      return "saturated";
+    case Reason::kSpeckle:
+      return "speckle";
+    case Reason::kPredicted:
+      return "predicted";
+  }
+  return "";
+}
+
+Reasons::Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, const MethodOptions& options,
+                 int pixels)
+    : context_((context.enter("Reasons"), context)),
+      size_(size),
+      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
+      disparities_(options.disparities),
+      has_census_(options.banded_sgm.cost != MatchingCost::kSad3x3),
+      padding_(BandedSgm::code_padding(range_of(options))),
+      explain_(build(context, type, options.banded_sgm, pixels_), "explain") {}
+
+void Reasons::operator()(const Inputs& inputs, Bytes& reasons) {
+  context_.enter("Reasons");
+  const cl_int has_prediction = inputs.prediction ? 1 : 0, has_runs = inputs.runs ? 1 : 0;
+  const Bytes& bytes = inputs.images.pixels;  // in place of what there is not
+  const ocl::Buffer<cl_ushort> no_runs(bytes.get(), 1);
+  explain_(context_, ocl::every_pixels(context_, size_, pixels_, /*views=*/1), size_, disparities_, bytes, has_census_,
+           padding_, inputs.codes, has_prediction,
+           inputs.prediction ? inputs.prediction->warped.disparity : inputs.measured.disparity,
+           inputs.prediction ? inputs.prediction->hidden : bytes, inputs.measured.disparity, has_runs,
+           inputs.runs ? *inputs.runs : no_runs, inputs.belief.disparity, inputs.belief.variance, reasons);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/reason.h"
+#include "host/maps.h"
+#include "host/method_options.h"
+#include "host/ocl/kernel.h"
+#include "host/predict/predict_room.h"
+
+namespace egosgm {
+
+/// Says of each left pixel why it has no value, or a doubtful one (egosgm/reason.h).
+class Reasons {
+ public:
+  using Bytes = ocl::Buffer<cl_uchar>;
+
+  /// What the other stages left.
+  struct Inputs {
+    const FrameImages& images;          // that were matched
+    const ocl::Buffer<cl_uint>& codes;  // of both views (Census)
+    const Prediction* prediction;       // null: there is none
+    const StereoMaps& measured;
+    const ocl::Buffer<cl_ushort>* runs;  // of SpeckleRemoval; null: it is off
+    const StereoMaps& belief;
+  };
+
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, const MethodOptions& options, int pixels = 0);
+
+  void operator()(const Inputs& inputs, Bytes& reasons);
+
+ private:
+  using In = const ocl::Buffer<float>;
+
+  ocl::Context& context_;
+  const shared::ImageSize size_;
+  const int pixels_;
+  const cl_int disparities_, has_census_, padding_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const Bytes, const cl_int, const cl_int,
+              const ocl::Buffer<cl_uint>, const cl_int, In, const HiddenMap, In, const cl_int,
+              const ocl::Buffer<cl_ushort>, In, In, Bytes>
+      explain_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/publish/reasons.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "host/match/banded_sgm.h"
+#include "host/match/census.h"
+#include "kernels/method.h"
+#include "tests/reference/publish/reasons.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+
+PixelType type_of(const reference::ReasonInputs& inputs) {
+  return inputs.white == 255 ? PixelType::kU8 : PixelType::kU16;
+}
+
+/// Of both views, the right one being black.
+FrameImages upload_images(ocl::Context& context, shared::ImageSize size, const reference::ReasonInputs& inputs) {
+  FrameImages images{ocl::Buffer<cl_uchar>(context, 4 * pixel_count(size)), type_of(inputs)};
+  std::vector<cl_uchar> bytes;
+  for (const int grey : inputs.images) {
+    bytes.push_back(static_cast<cl_uchar>(grey & 255));
+    if (images.type == PixelType::kU16) bytes.push_back(static_cast<cl_uchar>(grey >> 8));
+  }
+  bytes.resize(4 * pixel_count(size));
+  images.pixels.write(context, bytes);
+  return images;
+}
+
+/// Fills in the codes of the inputs.
+std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& options, reference::ReasonInputs& inputs,
+                                 int pixels = 0) {
+  ocl::Context context(testing::any_device());
+  const FrameImages images = upload_images(context, size, inputs);
+  inputs.code_padding = BandedSgm::code_padding(range_of(options));
+  Census census(context, size, images.type, options.banded_sgm.cost, inputs.code_padding);
+  ocl::Buffer<cl_uint> codes(context, Census::words(options.banded_sgm.cost, size, inputs.code_padding));
+  census(images.pixels, codes);
+  const std::vector<cl_uint> made = codes.read(context);
+  inputs.codes.assign(made.begin(), made.end());
+
+  Prediction prediction(context, size);
+  if (!inputs.warped.empty()) prediction.warped.disparity.write(context, inputs.warped);
+  if (!inputs.hidden.empty()) prediction.hidden.write(context, inputs.hidden);
+  const StereoMaps belief = testing::upload(context, size, inputs.belief);
+  const StereoMaps measured = testing::upload(context, size, {inputs.measured, inputs.measured});
+  std::vector<cl_ushort> begins;
+  for (const float d : inputs.consistent) begins.push_back(d == kNone ? 0xffff : 0);
+  ocl::Buffer<cl_ushort> runs(context, begins.size());
+  runs.write(context, begins);
+  ocl::Buffer<cl_uchar> found(context, pixel_count(size));
+  found.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
+  Reasons reasons(context, size, images.type, options, pixels);
+  reasons({images, codes, inputs.warped.empty() ? nullptr : &prediction, measured,
+           options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief},
+          found);
+  return found.read(context);
+}
+
+/// A picture with texture, a part that repeats, one that is flat and one that is white; and maps that often agree.
+reference::ReasonInputs random_inputs(shared::ImageSize size, int white, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<int> grey(1, white - 1), tenth(0, 9), little(0, 2);
+  reference::ReasonInputs inputs;
+  inputs.white = white;
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const int part = 5 * x / size.width;
+      inputs.images.push_back(part == 0   ? (x * 37 + y * 53) % 7 * white / 8
+                              : part == 1 ? white / 2 + little(random) * white / 255
+                              : part == 2 ? (tenth(random) < 7 ? white : grey(random))
+                              : part == 3 ? (tenth(random) < 5 ? 0 : grey(random))
+                                          : grey(random));
+    }
+  }
+  inputs.belief = testing::random_maps(size, 0, 30, 0.3, seed + 1);
+  inputs.warped = testing::random_maps(size, 0, 30, 0.3, seed + 2).disparity;
+  inputs.consistent = testing::random_maps(size, 0, 30, 0.3, seed + 3).disparity;
+  inputs.measured = inputs.consistent;
+  for (std::size_t i = 0; i < inputs.measured.size(); ++i) {
+    if (tenth(random) < 2) inputs.measured[i] = kNone;
+    if (tenth(random) < 6 && inputs.belief.disparity[i] != kNone) inputs.warped[i] = inputs.belief.disparity[i];
+    if (tenth(random) < 2 && inputs.belief.disparity[i] != kNone) {
+      inputs.belief.variance[i] += EGOSGM_DOUBTFUL_VARIANCE_PX2;
+    }
+    inputs.hidden.push_back(inputs.belief.disparity[i] == kNone && tenth(random) < 2);
+  }
+  return inputs;
+}
+
+class ReasonsTest : public ::testing::TestWithParam<shared::ImageSize> {};
+
+TEST_P(ReasonsTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const int white : {255, 65535}) {
+    for (const MatchingCost cost : {MatchingCost::kCensus13x11, MatchingCost::kCensus9x7, MatchingCost::kSad3x3}) {
+      for (const bool has_prediction : {false, true}) {
+        MethodOptions options;
+        options.disparities = 21;
+        options.banded_sgm.cost = cost;
+        reference::ReasonInputs inputs = random_inputs(size, white, 31);
+        if (!has_prediction) inputs.warped.clear(), inputs.hidden.clear();
+        for (const int pixels : {1, 16}) {
+          const std::vector<cl_uchar> actual = reasons_of(size, options, inputs, pixels);
+          EXPECT_TRUE(testing::same_bits(actual, reference::reasons(size, options, inputs), size))
+              << white << ", cost " << static_cast<int>(cost) << ", by " << pixels;
+        }
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, ReasonsTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
+
+/// 64x40 pixels of strong texture, all of them measured, predicted and believed to be 10.
+struct Scene {
+  static constexpr shared::ImageSize kSize{64, 40};
+  static constexpr std::size_t kMiddle = 20 * 64 + 32;
+  reference::ReasonInputs inputs;
+  MethodOptions options;
+
+  Scene() {
+    std::mt19937 random(5);
+    std::uniform_int_distribution<int> grey(1, 254);
+    const std::size_t pixels = 64 * 40;
+    for (std::size_t i = 0; i < pixels; ++i) inputs.images.push_back(grey(random));
+    const std::vector<float> ten(2 * pixels, 10.0f);
+    inputs.warped = inputs.consistent = inputs.measured = ten;
+    inputs.belief = {ten, std::vector<float>(2 * pixels, 0.5f)};
+    inputs.hidden.assign(2 * pixels, 0);
+    options.disparities = 32;
+  }
+
+  void paint(int grey_of_column(int x, int y)) {
+    for (int i = 0; i < 64 * 40; ++i) inputs.images[i] = grey_of_column(i % 64, i / 64);
+  }
+  Reason in_the_middle() {
+    const std::vector<cl_uchar> found = reasons_of(kSize, options, inputs);
+    EXPECT_EQ(reference::reasons(kSize, options, inputs), found);
+    return static_cast<Reason>(found[kMiddle]);
+  }
+};
+
+TEST(Reasons, TrustsWhatIsMeasuredAsPredicted) { EXPECT_EQ(Scene().in_the_middle(), Reason::kTrusted); }
+
+TEST(Reasons, TellsAValueThatIsPredictedOnly) {
+  Scene scene;
+  scene.inputs.measured[Scene::kMiddle] = scene.inputs.consistent[Scene::kMiddle] = kNone;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kPredicted);
+  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed);
+  scene.inputs.consistent[Scene::kMiddle] = 10;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kSpeckle);
+  scene.options.speckle_removal.max_size_px = 0;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "nothing is dropped as a speckle";
+}
+
+TEST(Reasons, TellsAContradiction) {
+  Scene scene;
+  scene.inputs.belief.variance[Scene::kMiddle] = EGOSGM_DOUBTFUL_VARIANCE_PX2;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kContradicted);
+  scene.inputs.warped[Scene::kMiddle] = kNone;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "nothing was predicted that could contradict";
+  scene.inputs.warped[Scene::kMiddle] = 12;
+  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kContradicted);
+  scene.inputs.warped[Scene::kMiddle] = 11;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed);
+}
+
+TEST(Reasons, TellsWhatCameIntoViewBesideSomethingNearer) {
+  Scene scene;
+  for (int x = 28; x <= 36; ++x) scene.inputs.warped[20 * 64 + x] = kNone;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "a hole in a surface";
+  scene.inputs.warped[20 * 64 + 40] = 13.5f;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kUncovered);
+  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kUncovered);
+  scene.inputs.warped[20 * 64 + 40] = kNone;
+  scene.inputs.warped[20 * 64 + 41] = 13.5f;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "too far off";
+}
+
+TEST(Reasons, TellsWhatIsHiddenByWhatIsNearerThanTheRange) {
+  Scene scene;
+  scene.inputs.hidden[Scene::kMiddle] = 1;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kNearer);
+}
+
+TEST(Reasons, TellsWhatTheImageCannotTell) {
+  Scene scene;
+  scene.paint([](int x, int) { return 100 + x % 2; });
+  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat);
+  scene.paint([](int, int) { return 255; });
+  EXPECT_EQ(scene.in_the_middle(), Reason::kSaturated);
+  scene.paint([](int, int) { return 0; });
+  EXPECT_EQ(scene.in_the_middle(), Reason::kSaturated);
+  scene.paint([](int x, int y) { return 60 + (x % 12 * 37 + y * 17) % 101; });  // every 12 columns
+  EXPECT_EQ(scene.in_the_middle(), Reason::kAmbiguous);
+  scene.options.disparities = 12;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "no disparity of the range takes one for the other";
+}
+
+}  // namespace
+}  // namespace egosgm

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "host/method_options.h"
+#include "kernels/shared.h"
+#include "tests/support/random_maps.h"
+
+namespace egosgm::reference {
+
+/// What Reasons reads. Without a prediction `warped` and `hidden` are empty.
+struct ReasonInputs {
+  std::vector<int> images;
+  int white = 255;                   // the largest grey value
+  std::vector<std::uint32_t> codes;  // as kernels/match/census.cl lays them out, with `code_padding`
+  int code_padding = 0;
+  std::vector<float> warped;
+  std::vector<std::uint8_t> hidden;
+  std::vector<float> consistent, measured;  // before and after speckles were dropped
+  testing::HostMaps belief;
+};
+
+std::vector<std::uint8_t> reasons(shared::ImageSize size, const MethodOptions& options, const ReasonInputs& inputs);
+
+}  // namespace egosgm::reference
