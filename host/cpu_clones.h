@@ -3,9 +3,11 @@
 // same bits: contraction is off, and no compiler reorders sums.
 #pragma once
 
-// Sanitizers instrument what chooses the version, which runs before they are ready.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
+#include <cstddef>  // __GLIBC__
+
+// The C library's loader chooses the version. Sanitizers instrument what it asks, which runs before they are ready.
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__) && \
+    !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define EGOSGM_CPU_CLONES [[gnu::target_clones("avx2", "default")]]
 #else
 #define EGOSGM_CPU_CLONES

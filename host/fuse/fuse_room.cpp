@@ -38,7 +38,7 @@ void FuseRoom::fuse(const Plan& plan, const FrameImages& images, const Predictio
                  plan.tracked);
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
-  if (plan.tracked == Views::kLeft) right_map_(measured, left_right_px_, smoothed);
+  if (plan.tracked == Views::kLeft) right_map_(measured, left_right_px_, smoothed, plan.wanted.right);
   const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
   consistency_(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
   if (sad_check_) (*sad_check_)[images.type](images.pixels, belief, checked);

@@ -17,11 +17,12 @@ class RightMap {
   /// From the left half of `maps` alone, or from that and the right one of `measured` to the right half of `maps`. What
   /// differs by more than `max_difference_px` contradicts. REQUIRES: no disparity lies more than half a pixel below the
   /// range.
-  void operator()(float max_difference_px, StereoMaps& maps);
-  void operator()(const StereoMaps& measured, float max_difference_px, StereoMaps& maps);
+  /// The variances only where `makes_variance`.
+  void operator()(float max_difference_px, StereoMaps& maps, bool makes_variance);
+  void operator()(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance);
 
  private:
-  void make(const StereoMaps* measured, float max_difference_px, StereoMaps& maps);
+  void make(const StereoMaps* measured, float max_difference_px, StereoMaps& maps, bool makes_variance);
 
   ocl::Context& context_;
   const shared::ImageSize size_;
@@ -29,7 +30,7 @@ class RightMap {
   const int pixels_;
   ocl::Buffer<cl_int> keys_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<cl_int>> splat_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const ocl::Buffer<cl_int>,
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const cl_int, const ocl::Buffer<cl_int>,
               const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       decode_;
 };

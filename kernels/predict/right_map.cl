@@ -63,10 +63,10 @@ KERNEL void splat(const ImageSize size, const int min_disparity, global const fl
   }
 }
 
-// REQUIRES: unless is_measured, any maps as `measured`.
+// REQUIRES: unless is_measured, any maps as `measured`. makes_variance: else disparities only.
 KERNEL void decode(const ImageSize size, const int min_disparity, const float max_difference, const int is_measured,
-                   global const int* keys, global const float* measured, global const float* measured_variance,
-                   global float* disparity, global float* variance) {
+                   const int makes_variance, global const int* keys, global const float* measured,
+                   global const float* measured_variance, global float* disparity, global float* variance) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -84,9 +84,11 @@ KERNEL void decode(const ImageSize size, const int min_disparity, const float ma
     const Ints left = INTS_OF_FLOATS(inside ? at : zero);
     const Floats seen = gather(disparity + row, left);
     const Ints agrees = inside & (seen > INVALID) & (fabs(seen - d) <= max_difference);
-    const Floats p = gather(variance + row, left), r = load_pixels(measured_variance + right_row, x, width);
-    const Floats otherwise = z > INVALID ? z : INVALID, its_variance = z > INVALID ? r : zero;
+    const Floats otherwise = z > INVALID ? z : INVALID;
     store_pixels(agrees ? seen : otherwise, disparity + right_row, x, width);
+    if (!makes_variance) continue;
+    const Floats p = gather(variance + row, left), r = load_pixels(measured_variance + right_row, x, width);
+    const Floats its_variance = z > INVALID ? r : zero;
     store_pixels(agrees ? p : its_variance, variance + right_row, x, width);
   }
 }

@@ -18,17 +18,18 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 using Row = std::vector<float>;
 
 testing::HostMaps right_map(shared::ImageSize size, shared::DisparityRange range, float max_difference_px,
-                            const testing::HostMaps& measured, const testing::HostMaps& maps, int pixels) {
+                            const testing::HostMaps& measured, const testing::HostMaps& maps, int pixels,
+                            bool makes_variance = true) {
   ocl::Context context(testing::any_device());
   RightMap right_map(context, size, range, pixels);
   // What an earlier frame had must not shine through.
   StereoMaps earlier = testing::upload(context, size, testing::random_maps(size, 0, 12, 0, 99));
-  right_map(testing::upload(context, size, testing::random_maps(size, 0, 12, 0, 99)), 1, earlier);
+  right_map(testing::upload(context, size, testing::random_maps(size, 0, 12, 0, 99)), 1, earlier, true);
   StereoMaps on_device = testing::upload(context, size, maps);
   if (measured.disparity.empty()) {
-    right_map(max_difference_px, on_device);
+    right_map(max_difference_px, on_device, makes_variance);
   } else {
-    right_map(testing::upload(context, size, measured), max_difference_px, on_device);
+    right_map(testing::upload(context, size, measured), max_difference_px, on_device, makes_variance);
   }
   return testing::download(context, on_device);
 }
@@ -67,6 +68,9 @@ TEST_P(RightMapTest, EqualsReference) {
       const testing::HostMaps expected = reference::right_map(size, -4, max_difference_px, z, maps);
       for (const int pixels : {1, 16}) {
         const testing::HostMaps actual = right_map(size, {-4, 160}, max_difference_px, z, maps, pixels);
+        const testing::HostMaps bare = right_map(size, {-4, 160}, max_difference_px, z, maps, pixels, false);
+        EXPECT_EQ(bare.disparity, expected.disparity);
+        EXPECT_EQ(bare.variance, maps.variance);
         EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
             << max_difference_px << " px, by " << pixels << (is_measured ? ", measured" : "");
         EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
