@@ -32,13 +32,16 @@ void load(const GreyImage& image, int x0, int y0, int rows, int columns, float* 
   }
 }
 
-float bilinear(const GreyImage& image, float x, float y) {
-  x = std::clamp(x, 0.0f, static_cast<float>(image.width - 1));
-  y = std::clamp(y, 0.0f, static_cast<float>(image.height - 1));
-  const int x0 = std::min(static_cast<int>(x), image.width - 2), y0 = std::min(static_cast<int>(y), image.height - 2);
-  const float a = x - x0, b = y - y0;
-  const std::uint8_t *upper = image.row(y0) + x0, *lower = image.row(y0 + 1) + x0;
-  return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
+// The pixel before a place among `count`, the border repeated, and how far behind it that lies.
+struct Between {
+  int first;
+  float share;
+};
+
+Between between(float at, int count) {
+  at = std::clamp(at, 0.0f, static_cast<float>(count - 1));
+  const int first = std::min(static_cast<int>(at), count - 2);
+  return {first, at - first};
 }
 
 void sample(const GreyImage& image, float x, float y, float scale, float source[kSource][kSource]) {
@@ -48,9 +51,15 @@ void sample(const GreyImage& image, float x, float y, float scale, float source[
     load(image, static_cast<int>(x) - reach, static_cast<int>(y) - reach, kSource, kSource, source[0], kSource);
     return;
   }
+  Between columns[kSource];
+  for (int j = 0; j < kSource; ++j) columns[j] = between(x + (j - kPatchRadius - 1) * step, image.width);
   for (int i = 0; i < kSource; ++i) {
+    const auto [y0, b] = between(y + (i - kPatchRadius - 1) * step, image.height);
+    const std::uint8_t *upper = image.row(y0), *lower = image.row(y0 + 1);
     for (int j = 0; j < kSource; ++j) {
-      source[i][j] = bilinear(image, x + (j - kPatchRadius - 1) * step, y + (i - kPatchRadius - 1) * step);
+      const auto [x0, a] = columns[j];
+      source[i][j] =
+          (1 - b) * ((1 - a) * upper[x0] + a * upper[x0 + 1]) + b * ((1 - a) * lower[x0] + a * lower[x0 + 1]);
     }
   }
 }
