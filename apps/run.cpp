@@ -81,7 +81,7 @@ class Run {
         report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height, job.batch_input),
         doubt_(sequence_.calibration) {
     folder_.begin(report_.identity());
-    if (kinds_.contains("reason")) report_.add_reasons();
+    if (job.kinds.contains("reason")) report_.add_reasons();
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options.disparities, sequence_.calibration);
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
