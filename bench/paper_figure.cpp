@@ -5,11 +5,13 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
-#include "egosgm/vision/file_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/render.h"
 #include "egosgm/vision/synthetic.h"
 #include "host/frame/frame_queue.h"
+#include "host/vision/file_io.h"
+#include "host/vision/picture_sheet.h"
 
 namespace egosgm::bench {
 namespace {

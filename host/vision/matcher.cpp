@@ -7,7 +7,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 
 namespace egosgm::vision {
 namespace {

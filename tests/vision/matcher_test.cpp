@@ -8,7 +8,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/synthetic.h"
 
 namespace egosgm::vision {
