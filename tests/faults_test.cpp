@@ -52,6 +52,7 @@ struct Images {
 struct Maps {
   std::vector<std::vector<float>> maps{8, std::vector<float>(kWidth* kHeight, kUntouched)};
   std::vector<std::uint16_t> search_width = std::vector<std::uint16_t>(kWidth * kHeight, 7);
+  std::vector<std::uint8_t> reason = std::vector<std::uint8_t>(kWidth * kHeight, 7);
   std::vector<std::uint8_t> dynamic = std::vector<std::uint8_t>(kWidth * kHeight, 7);
 
   bool operator==(const Maps&) const = default;
@@ -60,6 +61,7 @@ struct Maps {
     const auto view = [&](int i) { return MapView<float>{maps[i].data(), kWidth, kHeight, kWidth * sizeof(float)}; };
     return {view(0),
             view(1),
+            {reason.data(), kWidth, kHeight, kWidth},
             view(2),
             view(3),
             {view(4),
