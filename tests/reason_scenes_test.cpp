@@ -191,10 +191,11 @@ std::vector<Case> cases() {
   const Board ground{.depth_m = 2, .top_m = -0.4, .texture = texture_at(2)};
   all.push_back({"flat", Reason::kFlat, 1000, {{ground, sky(180)}}});
   all.push_back({"saturated", Reason::kSaturated, 1000, {{ground, sky(400)}}});
-  all.push_back(
-      {"speckle", Reason::kSpeckle, 50, {{board(1, -0.09, 0.09, -0.09, 0.09), kWall}, 1}, [](PipelineOptions& options) {
-         options.max_speckle_px = 1000;
-       }});
+  all.push_back({"speckle",
+                 Reason::kSpeckle,
+                 300,
+                 {{board(1, -0.15, 0.15, -0.15, 0.15), kWall}, 1},
+                 [](PipelineOptions& options) { options.max_speckle_px = 4000; }});
   // A board goes away while the cameras are blind.
   Board leaving = board(0.8, -0.5, 0.5, -0.4, 0.4);
   leaving.away_a_frame_m = 0.4;
