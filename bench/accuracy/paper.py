@@ -5,7 +5,7 @@ import pathlib
 import re
 import statistics
 
-from inputs import PAPER, SINGLE_FRAME, Failed, Missing, expect, mean_figures, program_at, scored_frames, settings
+from inputs import PAPER, SINGLE_FRAME, Failed, Missing, expect, program_at, scored_frames, settings
 from tables import Table, shown
 
 HOST_TIMES = {"total", "odometry", "read", "write", "wall"}  # in a report; all others are stages'
@@ -35,6 +35,13 @@ def scenes(bench, arguments):
 def rendered(bench, name):
     folder = expect(bench.data / "rendered" / name)
     return bench.odometry_layout(f"rendered {name}", folder, truth=folder / "truth/left_disp_noc")
+
+
+def mean_figures(source, result):
+    """The mean of each figure over the frames that count."""
+    frames = [result["frames"][number] for number in scored_frames(source, result) if number in result["frames"]]
+    return {name: statistics.mean(frame[name] for frame in frames) for name in frames[0]
+            if all(frame.get(name) is not None for frame in frames)}
 
 
 def device_ms(bench, source, arguments):
