@@ -34,7 +34,8 @@ constexpr const char* kHelp =
     "  --benchmark_filter=REGEX and what else Google Benchmark knows\n"
     "opencv_*: left view, blockSize 5, P1 = 8*25, P2 = 32*25, disp12MaxDiff 1, nothing padded.\n"
     "egosgm_full_left: left view on the full range, eight paths, not checked, images up, disparity down.\n"
-    "egosgm_full_both: both views on the full range, checked, upload to download. egosgm_banded_frame: a steady frame "
+    "egosgm_full_both: both views on the full range by the default options, checked, upload to download. "
+    "egosgm_banded_frame: a steady frame "
     "of the method, both\n"
     "views, upload to download, motion given. egosgm_video_frame: the same as a stream, with odometry. The last two "
     "play KITTI 2012\n"
@@ -234,7 +235,8 @@ class LeftMatcher {
   std::vector<float> disparity_;
 };
 
-Contender full_left(const Clip& clip, const MethodOptions& options, const Device& device) {
+Contender full_left(const Clip& clip, MethodOptions options, const Device& device) {
+  options.banded_sgm.paths = 8;
   const auto matcher = std::make_shared<LeftMatcher>(clip, options, device);
   return {"egosgm_full_left", [matcher] {
             const Stopwatch watch;

@@ -231,11 +231,11 @@ Device Device::select(const std::string& wanted) {
   const Found found = find_devices();
   const std::string without = of_platforms_without(found.platforms_without);
   if (found.devices.empty()) {
-    throw InvalidArgument(
-        "no OpenCL device: " +
-        (without.empty() ? "install one, for the CPU `apt install pocl-opencl-icd` (Debian, Ubuntu) or, beside the "
-                           "wheel, `pip install \"egosgm[cpu]\"`"
-                         : without));
+    throw InvalidArgument("no OpenCL device: " +
+                          (without.empty()
+                               ? "install one, for the CPU `apt install pocl-opencl-icd` (Debian, Ubuntu) or, for "
+                                 "Python alone, `pip install intel-opencl-rt`"
+                               : without));
   }
   const char* from_environment = std::getenv("EGOSGM_DEVICE");
   const std::string given = !wanted.empty() ? wanted : from_environment ? from_environment : "";
