@@ -89,7 +89,7 @@ TEST(Evaluation, HolesAreFilledFromTheBackground) {
 
 TEST(Evaluation, DropsWhatIsUncertain) {
   const cv::Mat disparity = (cv::Mat_<float>(1, 4) << 5, 6, kNo, 8);
-  const cv::Mat variance = (cv::Mat_<float>(1, 4) << 3, 3.25f, 0, 0.1f);
+  const cv::Mat variance = (cv::Mat_<float>(1, 4) << 6, 6.25f, 0, 0.1f);
   const cv::Mat certain = (cv::Mat_<float>(1, 4) << 5, kNo, kNo, 8);
   EXPECT_EQ(cv::norm(drop_uncertain(disparity, variance), certain, cv::NORM_INF), 0);
   EXPECT_EQ(cv::norm(drop_uncertain(disparity, variance, 9), disparity, cv::NORM_INF), 0);
