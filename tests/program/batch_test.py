@@ -73,7 +73,7 @@ class Compile(ProgramTest):
         self.assert_works(*run, loaded, "--programs", programs)
         for file in compiled.glob("disparity/*"):
             self.assertEqual(file.read_bytes(), (loaded / "disparity" / file.name).read_bytes(), file.name)
-        self.assert_refused([*run, self.new_folder(), "--programs", programs, "--paths", 4], "manifest.json", "-DPATHS=4", "egosgm compile")
+        self.assert_refused([*run, self.new_folder(), "--programs", programs, "--paths", 8], "manifest.json", "-DPATHS=8", "egosgm compile")
         self.assert_refused([*run, self.new_folder(), "--programs", self.new_folder()], "manifest.json", "egosgm compile")
         (programs / "manifest.json").write_text(json.dumps(dict(manifest, driver="0.0")))
         self.assert_refused([*run, self.new_folder(), "--programs", programs], "driver", "0.0", manifest["driver"], "egosgm compile")
