@@ -235,10 +235,10 @@ class Run(ProgramTest):
         (folder / "calib.toml").write_text("fx = 100\nfy = 100\ncx = 32\ncy = 15\nbaseline_m = 0.5\n")
         out = self.new_folder()
         self.assert_works("run", "--left", folder / "left_%d.png", "--right", folder / "right_%d.png", "--calib",
-                          folder / "calib.toml", "--out", out, "--disparities", 19, "--min-disparity", "-3", "--paths", 4)
+                          folder / "calib.toml", "--out", out, "--disparities", 19, "--min-disparity", "-3", "--paths", 8)
         self.assertEqual(self.assert_whole(out), 2)
         options = self.report(out)["options"]
-        self.assertEqual((options["disparities"], options["min_disparity"], options["paths"]), (19, -3, 4))
+        self.assertEqual((options["disparities"], options["min_disparity"], options["paths"]), (19, -3, 8))
 
     def test_a_saved_configuration_gives_the_same_bits(self):
         first, second = self.new_folder(), self.new_folder()
