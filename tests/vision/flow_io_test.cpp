@@ -20,7 +20,7 @@ std::string flo(std::int32_t width, std::int32_t height, const std::vector<float
   std::string bytes = "PIEH" + std::string(8 + 4 * values.size(), '\0');
   std::memcpy(bytes.data() + 4, &width, 4);
   std::memcpy(bytes.data() + 8, &height, 4);
-  std::memcpy(bytes.data() + 12, values.data(), 4 * values.size());
+  if (!values.empty()) std::memcpy(bytes.data() + 12, values.data(), 4 * values.size());
   return bytes;
 }
 
