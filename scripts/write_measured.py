@@ -45,6 +45,9 @@ def read(folder):
     missing = [name for name in FILES if not (folder / f"{name}.json").exists()]
     if missing:
         raise FileNotFoundError(", ".join(f"{folder / name}.json" for name in missing))
+    others = sorted(file.name for file in folder.iterdir() if file.stem not in FILES)
+    if others:
+        raise Refused(f"{folder}: the page is not made from {', '.join(others)}: remove what is left of other runs")
     return {name: json.loads((folder / f"{name}.json").read_text()) for name in FILES}
 
 

@@ -126,6 +126,12 @@ class Page(unittest.TestCase):
         self.assertEqual(self.write(), 1)
         self.assertFalse((self.docs / "measured.md").exists())
 
+    def test_nothing_lies_there_that_the_page_is_not_made_from(self):
+        self.put()
+        (self.docs / "measured" / "accuracy2.json").write_text("{}")
+        self.assertEqual(self.write(), 1)
+        self.assertFalse((self.docs / "measured.md").exists())
+
 
 if __name__ == "__main__":
     unittest.main()
