@@ -230,7 +230,7 @@ class LeftMatcher {
   egosgm::Matcher matcher_;
   const SearchBands everything_;
   FrameImages images_;
-  StereoMaps measured_;
+  Measurement measured_;
   std::vector<cl_uchar> pixels_;
   std::vector<float> disparity_;
 };

@@ -57,8 +57,17 @@ struct StereoMaps {
       : disparity(context, 2 * pixel_count(size)), variance(context, 2 * pixel_count(size)) {}
 };
 
-/// A map of both views of bytes: not 0 where a surface that came nearer than the range hides what is behind.
-using HiddenMap = ocl::Buffer<cl_uchar>;
+/// A map of both views of bytes: 1 where something holds, else 0.
+using FlagMap = ocl::Buffer<cl_uchar>;
+
+/// What was matched within bands.
+struct Measurement : StereoMaps {
+  FlagMap doubtful;  // 1 where the path sums fall on beyond the end of the band
+
+  Measurement(StereoMaps maps, FlagMap doubts) : StereoMaps(std::move(maps)), doubtful(std::move(doubts)) {}
+  Measurement(ocl::Context& context, shared::ImageSize size)
+      : StereoMaps(context, size), doubtful(context, 2 * pixel_count(size)) {}
+};
 
 /// Of which views something is made. The values are their number.
 enum class Views { kLeft = 1, kBoth = 2 };

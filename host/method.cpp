@@ -7,7 +7,7 @@ namespace egosgm {
 FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
                            Map& variance) {
   Workspace& w = work_;
-  StereoMaps measured = plan.predicts() ? w.measured : after.maps;
+  Measurement measured{plan.predicts() ? w.measured : after.maps, w.matching.doubtful};
   VerticalOffset offset = before.offset.is_known ? before.offset : unknown_;
   FrameImages images = uploaded;
 
@@ -24,8 +24,10 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
   in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, after.agreement, w.fusion, after); });
   in(Room::kPublish, [&] {
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
-    publish_(plan, {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), after.maps},
-             {variance, w.dynamic, w.reasons});
+    publish_(
+        plan,
+        {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), after.maps, w.fusion.doubtful},
+        {variance, w.dynamic, w.reasons});
   });
   return {measured, offset, images};
 }
@@ -52,8 +54,9 @@ void Method::compare(const Plan& plan, const Prediction& prediction, const Stere
   if (fuse_) fuse_->compare(plan, prediction, measured, before, agreement);
 }
 
-void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
-                  const PredictionCheck::State& agreement, Fusion& fusion, Belief& belief) {
+void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction,
+                  const Measurement& measured, const PredictionCheck::State& agreement, Fusion& fusion,
+                  Belief& belief) {
   if (plan.predicts()) fuse_->fuse(plan, images, prediction, measured, agreement, fusion, belief.maps);
   belief.missing = fuse_ ? Unpredicted::kNo : Unpredicted::kNotTemporal;
 }

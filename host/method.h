@@ -20,7 +20,7 @@ struct Workspace {
   Prediction prediction;
   FrameImages aligned;
   VerticalOffset first_offset;  // found by the first of two matches
-  StereoMaps coarse;            // what CoarseMatch found
+  Measurement coarse;           // what CoarseMatch found
   SearchBands bands;
   Matching matching;
   StereoMaps measured;  // where there is a prediction to fuse it with; else the belief's memory
@@ -69,7 +69,7 @@ class Method {
               VerticalOffset& refined);
   void compare(const Plan& plan, const Prediction& prediction, const StereoMaps& measured,
                const PredictionCheck::State& before, PredictionCheck::State& agreement);
-  void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
+  void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
             const PredictionCheck::State& agreement, Fusion& fusion, Belief& belief);
 
   const MethodOptions options_;

@@ -14,10 +14,8 @@
 // Of these, so many of the least and of the largest are taken for mismatches. REQUIRES: less than half of the count.
 #define EGOSGM_COARSE_OUTLIERS 2
 
-// A deviation of 4 px: what is known no better is doubtful. KalmanUpdate takes such a measurement instead of fusing it.
-// This is the matching variance where the path sums fall on beyond
-// the end of a band, as the true disparity rather lies outside, and the least variance where measurement and prediction
-// contradict each other: so the next frame searches wide.
+// What is doubtful is known to 4 px, so that the next frame searches wide: the matching variance where the path sums
+// fall on beyond the end of a band, and the least variance where measurement and prediction contradict each other.
 #define EGOSGM_DOUBTFUL_VARIANCE_PX2 16.0f
 
 // OutputVariance: the filter's and the measurement's variance, each cut, at every fourth pixel around; the sum of two

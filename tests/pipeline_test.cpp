@@ -35,6 +35,10 @@ void expect_same(const std::string& stage, const HostMaps& actual, const HostMap
     EXPECT_TRUE(same_bits(of_views(actual.variance, views), of_views(expected.variance, views), size))
         << "variance of " << stage;
   }
+  if (!actual.doubtful.empty()) {
+    EXPECT_TRUE(same_bits(of_views(actual.doubtful, views), of_views(expected.doubtful, views), size))
+        << "doubts of " << stage;
+  }
 }
 
 /// `views`: that are matched.

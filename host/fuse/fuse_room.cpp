@@ -31,10 +31,10 @@ void FuseRoom::compare(const Plan& plan, const Prediction& prediction, const Ste
 }
 
 void FuseRoom::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                    const StereoMaps& measured, const PredictionCheck::State& agreement, Fusion& fusion,
+                    const Measurement& measured, const PredictionCheck::State& agreement, Fusion& fusion,
                     StereoMaps& belief) {
   StereoMaps fused{fusion.fused, belief.variance};
-  kalman_update_(agreement, prediction.hidden, prediction.maps, measured, fused, plan.tracked);
+  kalman_update_(agreement, prediction.hidden, prediction.maps, measured, fused, fusion.doubtful, plan.tracked);
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (plan.tracked == Views::kLeft) right_map_(measured, left_right_px_, smoothed, plan.wanted.right);

@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/match/consistency_check.h"
 #include "host/frame/plan.h"
 #include "host/fuse/kalman_update.h"
+#include "host/fuse/prediction_check.h"
+#include "host/fuse/sad_check.h"
+#include "host/match/consistency_check.h"
 #include "host/match/median_filter.h"
 #include "host/predict/predict_room.h"
-#include "host/fuse/prediction_check.h"
 #include "host/predict/right_map.h"
-#include "host/fuse/sad_check.h"
 
 namespace egosgm {
 
 /// What fusion leaves, beside the belief.
 struct Fusion {
   Map fused, smoothed;  // disparities; the latter where the median filter is on
+  FlagMap doubtful;     // 1 where the measurement was taken although the prediction or its own sums speak against it
 
   Fusion(ocl::Context& context, shared::ImageSize size)
-      : fused(context, 2 * pixel_count(size)), smoothed(context, 2 * pixel_count(size)) {}
+      : fused(context, 2 * pixel_count(size)),
+        smoothed(context, 2 * pixel_count(size)),
+        doubtful(context, 2 * pixel_count(size)) {}
 };
 
 /// Compares prediction and measurement, and makes one map of the two.
@@ -33,7 +36,7 @@ class FuseRoom {
                const PredictionCheck::State& before, PredictionCheck::State& agreement);
 
   /// REQUIRES: the plan predicts.
-  void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
+  void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
             const PredictionCheck::State& agreement, Fusion& fusion, StereoMaps& belief);
 
  private:

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/fuse/kalman_update.h"
 
-#include <limits>
-
 namespace egosgm {
 namespace {
 
@@ -18,19 +16,20 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
     : context_((context.enter("KalmanUpdate"), context)),
       size_(size),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
-      gate_px_(options.gate_px > 0 ? options.gate_px : std::numeric_limits<float>::max()),
+      has_gate_(options.gate_px > 0),
+      gate_px_(options.gate_px),
       keep_predicted_(options.keep_predicted),
       ask_neighbours_(options.ask_neighbours),
       min_variance_px2_(options.min_variance_px2),
       update_(build(context, pixels_), "update") {}
 
-void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check, const HiddenMap& hidden,
-                              const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated,
-                              Views views) {
+void KalmanUpdate::operator()(const ocl::Buffer<shared::PredictionState>& check, const FlagMap& hidden,
+                              const StereoMaps& predicted, const Measurement& measured, StereoMaps& updated,
+                              FlagMap& doubtful, Views views) {
   context_.enter("KalmanUpdate");
-  update_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, gate_px_, keep_predicted_,
-          ask_neighbours_, min_variance_px2_, check, hidden, predicted.disparity, predicted.variance,
-          measured.disparity, measured.variance, updated.disparity, updated.variance);
+  update_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, has_gate_, gate_px_,
+          keep_predicted_, ask_neighbours_, min_variance_px2_, check, hidden, predicted.disparity, predicted.variance,
+          measured.disparity, measured.variance, measured.doubtful, updated.disparity, updated.variance, doubtful);
 }
 
 }  // namespace egosgm

@@ -9,29 +9,30 @@ namespace egosgm {
 
 /// Fuses prediction and measurement, pixel by pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the
 /// two differ by more than the gate, or as most around do (something moves by itself), or only the measurement is
-/// there, the measurement is taken. Without a gate, as in the paper, all that is predicted and measured is averaged, and
-/// nothing hides it.
+/// there, the measurement is taken. Without a gate, as in the paper, all that is predicted and measured is averaged,
+/// and nothing hides it.
 class KalmanUpdate {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
 
-  /// `check`: what PredictionCheck says of this frame. Nothing is believed of what is `hidden`.
+  /// `check`: what PredictionCheck says of this frame. Nothing is believed of what is `hidden`. `doubtful`: 1 where the
+  /// measurement was taken although the prediction, or its own path sums, speak against it.
   /// REQUIRES: `updated` is neither `predicted` nor `measured`.
-  void operator()(const ocl::Buffer<shared::PredictionState>& check, const HiddenMap& hidden,
-                  const StereoMaps& predicted, const StereoMaps& measured, StereoMaps& updated, Views views);
+  void operator()(const ocl::Buffer<shared::PredictionState>& check, const FlagMap& hidden, const StereoMaps& predicted,
+                  const Measurement& measured, StereoMaps& updated, FlagMap& doubtful, Views views);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
+  const cl_int has_gate_;
   const float gate_px_;
   const cl_int keep_predicted_, ask_neighbours_;
   const float min_variance_px2_;
-  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const cl_int, const float,
-              const ocl::Buffer<shared::PredictionState>, const HiddenMap, const ocl::Buffer<float>,
-              const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>,
-              ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const cl_int, const float,
+              const ocl::Buffer<shared::PredictionState>, const FlagMap, const Map, const Map, const Map, const Map,
+              const FlagMap, Map, Map, FlagMap>
       update_;
 };
 

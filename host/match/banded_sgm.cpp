@@ -143,15 +143,15 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
   }
 }
 
-void BandedSgm::operator()(const MatchInputs& image, StereoMaps& measured, Views views) {
+void BandedSgm::operator()(const MatchInputs& image, Measurement& measured, Views views) {
   match_stripes(image, measured, views, /*reads_off=*/false);
 }
 
-void BandedSgm::reading_off(const MatchInputs& image, StereoMaps& measured) {
+void BandedSgm::reading_off(const MatchInputs& image, Measurement& measured) {
   match_stripes(image, measured, Views::kLeft, /*reads_off=*/true);
 }
 
-void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off) {
+void BandedSgm::match_stripes(const MatchInputs& image, Measurement& measured, Views views, bool reads_off) {
   context_.enter("BandedSgm");
   if (!stripe_memory_) return match(image, measured, views, reads_off);
   for (const Stripe& stripe : stripes_) {
@@ -161,7 +161,7 @@ void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Vi
   }
 }
 
-void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off) {
+void BandedSgm::match(const MatchInputs& inputs, Measurement& measured, Views views, bool reads_off) {
   shared::SgmParameters parameters = parameters_;
   parameters.reads_off = reads_off;
   if (reads_off) read_off_.clear();
@@ -173,7 +173,7 @@ void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views vie
   if (reads_off) read_off_(parameters, measured);
 }
 
-void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
+void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
                       Views views) {
   Wavefront& wavefront = *wavefront_;
   const Tile tile = wavefront.tile;
@@ -187,15 +187,16 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
   wavefront.slots.fill(context_, 255, wavefront.slots.size() / 2 * count(views));
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.to_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
-                        inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots, wavefront.sums);
+                        inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
+                        wavefront.sums);
   }
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
-                          inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots, wavefront.sums,
-                          wavefront.winners, read_off_.ranks());
+                          inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
+                          wavefront.sums, wavefront.winners, read_off_.ranks());
   }
   wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), count(views)),
-                   parameters, wavefront.winners, measured.disparity, measured.variance);
+                   parameters, wavefront.winners, measured.disparity, measured.variance, measured.doubtful);
 }
 
 bool BandedSgm::takes_whole_sweeps(Views views) const {

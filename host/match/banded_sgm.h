@@ -52,22 +52,21 @@ class BandedSgm {
 
   /// Matches `views`. Of the inputs' codes, which Census makes with a padding of `code_padding(range)`, both views' are
   /// read; of penalties and bands, theirs.
-  void operator()(const MatchInputs& image, StereoMaps& measured, Views views);
+  void operator()(const MatchInputs& image, Measurement& measured, Views views);
   /// Matches the left view, and reads the right one's disparities off its sums: half of the work, whole disparities.
-  void reading_off(const MatchInputs& image, StereoMaps& measured);
+  void reading_off(const MatchInputs& image, Measurement& measured);
 
   static int code_padding(shared::DisparityRange range);
 
-  using ToMiddle = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
-                               const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>,
-                               const ocl::Buffer<shared::RowSum>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>,
-                               ocl::Buffer<cl_uchar>>;
-  using FromMiddle =
+  using ToMiddle =
       ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
                   const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>, const ocl::Buffer<shared::RowSum>,
-                  const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>, ocl::Buffer<cl_uint>>;
-  using Refine =
-      ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, ocl::Buffer<float>, ocl::Buffer<float>>;
+                  const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>;
+  using FromMiddle = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
+                                 const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>,
+                                 const ocl::Buffer<shared::RowSum>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>,
+                                 const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>, ocl::Buffer<cl_uint>>;
+  using Refine = ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, Map, Map, FlagMap>;
 
  private:
   struct Wavefront {
@@ -83,9 +82,9 @@ class BandedSgm {
     Refine refine;
   };
 
-  void match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off);
-  void match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off);
-  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured, Views views);
+  void match_stripes(const MatchInputs& image, Measurement& measured, Views views, bool reads_off);
+  void match(const MatchInputs& inputs, Measurement& measured, Views views, bool reads_off);
+  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured, Views views);
   bool takes_whole_sweeps(Views views) const;
 
   ocl::Context& context_;

@@ -73,7 +73,7 @@ void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, 
 }
 
 void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs,
-                                StereoMaps& measured, ocl::Buffer<cl_uint>& ranks, Views views) {
+                                Measurement& measured, ocl::Buffer<cl_uint>& ranks, Views views) {
   follow(kStraight, parameters, inputs, views);
   if (paths_ == 8) {
     for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);
@@ -84,7 +84,7 @@ void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const M
                           cl::NDRange(work_items, 1, 1)};
   find_winners_(context_, pixels, parameters, inputs.codes, inputs.bands.bands, inputs.bands.cell_offsets,
                 forward_first_, forward_second_, backward_first_, backward_second_, measured.disparity,
-                measured.variance, ranks);
+                measured.variance, measured.doubtful, ranks);
 }
 
 }  // namespace egosgm

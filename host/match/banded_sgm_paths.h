@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/method_options.h"
 #include "host/maps.h"
 #include "host/match/stripes.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {
@@ -21,7 +21,7 @@ class BandedSgmPaths {
                  const BandedSgmOptions& options, Group group);
 
   /// As BandedSgm.
-  void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
+  void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
                   ocl::Buffer<cl_uint>& ranks, Views views);
 
   /// A quad of disparities a lane on GPUs, else a few, and a group that fills a GPU's smallest unit, as far as the
@@ -48,7 +48,7 @@ class BandedSgmPaths {
   Sums forward_first_, forward_second_, backward_first_, backward_second_;  // partial sums of paths
   ocl::Kernel<Parameters, const cl_int, const cl_int, Codes, Penalties, Bands, Offsets, Sums, Sums, Sums, Sums>
       follow_paths_;
-  ocl::Kernel<Parameters, Codes, Bands, Offsets, const Sums, const Sums, const Sums, const Sums, Maps, Maps,
+  ocl::Kernel<Parameters, Codes, Bands, Offsets, const Sums, const Sums, const Sums, const Sums, Maps, Maps, FlagMap,
               ocl::Buffer<cl_uint>>
       find_winners_;
 };

@@ -22,9 +22,9 @@ MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const Method
 }
 
 void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands,
-                           const PredictionCheck::State& agreement, Matching& matching, StereoMaps& measured) {
+                           const PredictionCheck::State& agreement, Matching& matching, Measurement& measured) {
   const bool reads_off = plan.matched == Views::kLeft;
-  StereoMaps matched{matching.matched, measured.variance};
+  Measurement matched{{matching.matched, measured.variance}, measured.doubtful};
   if (reads_off) {
     matcher_.reading_off(images, bands, matched);
   } else {

@@ -13,9 +13,12 @@ namespace egosgm {
 /// What matching leaves, beside what it measured.
 struct Matching {
   Map matched, smoothed;  // disparities before any was dropped; the latter where the median filter is on
+  FlagMap doubtful;       // of the measurement
 
   Matching(ocl::Context& context, shared::ImageSize size)
-      : matched(context, 2 * pixel_count(size)), smoothed(context, 2 * pixel_count(size)) {}
+      : matched(context, 2 * pixel_count(size)),
+        smoothed(context, 2 * pixel_count(size)),
+        doubtful(context, 2 * pixel_count(size)) {}
 };
 
 /// Measures disparities and variances within bands, and drops what is doubtful.
@@ -28,7 +31,7 @@ class MatchRoom {
 
   /// `agreement`: of the frame before, read where the right view is read off.
   void operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands,
-                  const PredictionCheck::State& agreement, Matching& matching, StereoMaps& measured);
+                  const PredictionCheck::State& agreement, Matching& matching, Measurement& measured);
 
   const Matcher& matcher() const { return matcher_; }
   /// Null where nothing is dropped as a speckle.

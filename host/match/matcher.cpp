@@ -18,11 +18,11 @@ void Matcher::prepare(PixelType type) {
   step_penalties_.prepare(type);
 }
 
-void Matcher::operator()(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views) {
+void Matcher::operator()(const FrameImages& images, const SearchBands& bands, Measurement& matched, Views views) {
   banded_sgm_(inputs(images, bands, views), matched, views);
 }
 
-void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched) {
+void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, Measurement& matched) {
   banded_sgm_.reading_off(inputs(images, bands, Views::kLeft), matched);
 }
 

@@ -23,8 +23,8 @@ class Matcher {
   void prepare(PixelType type);
 
   /// As BandedSgm. REQUIRES: the images' type was prepared.
-  void operator()(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views);
-  void reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched);
+  void operator()(const FrameImages& images, const SearchBands& bands, Measurement& matched, Views views);
+  void reading_off(const FrameImages& images, const SearchBands& bands, Measurement& matched);
 
   const BandedSgm& banded_sgm() const { return banded_sgm_; }
   const ocl::Buffer<cl_uint>& codes() const { return codes_; }

@@ -20,14 +20,13 @@ class ReadOff {
   ocl::Buffer<cl_uint>& ranks() { return ranks_; }
 
   /// Writes the right half of both maps.
-  void operator()(const shared::SgmParameters& parameters, StereoMaps& measured);
+  void operator()(const shared::SgmParameters& parameters, Measurement& measured);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   ocl::Buffer<cl_uint> ranks_;
-  ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_uint>, ocl::Buffer<float>, ocl::Buffer<float>>
-      read_off_;
+  ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_uint>, Map, Map, FlagMap> read_off_;
 };
 
 }  // namespace egosgm

@@ -34,10 +34,10 @@ class StripeMemory {
   /// Brings a stripe of both views here.
   void load(const MatchInputs& image, const Stripe& stripe);
   /// Brings what is kept of the stripe's `measured` maps to the image's.
-  void store(const Stripe& stripe, StereoMaps& image);
+  void store(const Stripe& stripe, Measurement& image);
 
   MatchInputs inputs() const { return {codes_, penalties_, bands_}; }
-  StereoMaps& measured() { return measured_; }
+  Measurement& measured() { return measured_; }
 
   /// What this takes on the device.
   static std::uint64_t bytes(int width, int rows, std::size_t words_a_row);
@@ -53,7 +53,7 @@ class StripeMemory {
   ocl::Buffer<cl_uint> codes_;
   ocl::Buffer<cl_uchar> penalties_;
   SearchBands bands_;
-  StereoMaps measured_;
+  Measurement measured_;
 };
 
 }  // namespace egosgm

@@ -101,7 +101,7 @@ ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Ca
 }
 
 void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted,
-                             HiddenMap& hidden, Views views) {
+                             FlagMap& hidden, Views views) {
   context_.enter("ForwardWarp");
   Motion motion = current_from_previous;
   motion.covariance *= static_cast<double>(options_.motion_noise);

@@ -28,8 +28,8 @@ class ForwardWarp {
               int band_rows = kCpuTuning.warp_band_rows);
 
   /// REQUIRES: `motion` is valid; `predicted` is not `belief`.
-  void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted,
-                  HiddenMap& hidden, Views views);
+  void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted, FlagMap& hidden,
+                  Views views);
 
  private:
   using Size = const shared::ImageSize;
@@ -45,7 +45,7 @@ class ForwardWarp {
     ocl::Kernel<Size, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uint>> splat_disparity;
     ocl::Kernel<Size, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, In, const ocl::Buffer<cl_uint>, Out>
         splat_variance;
-    ocl::Kernel<Size, Range, const ocl::Buffer<cl_uint>, Out, Out, HiddenMap> decode;
+    ocl::Kernel<Size, Range, const ocl::Buffer<cl_uint>, Out, Out, FlagMap> decode;
     ocl::Buffer<cl_int> landed;
     ocl::Buffer<cl_uint> moved_key;
     ocl::Buffer<float> moved_variance;
@@ -55,7 +55,7 @@ class ForwardWarp {
   struct Bands {
     ocl::Kernel<Size, ViewMotion, ViewMotion, In, ocl::Buffer<cl_int>> find_spans;
     ocl::Kernel<Size, Range, ViewMotion, ViewMotion, const float, const cl_int, const ocl::Buffer<cl_int>, In, In, Out,
-                Out, HiddenMap>
+                Out, FlagMap>
         splat_bands;
     ocl::Buffer<cl_int> spans;
     Bands(ocl::Context& context, shared::ImageSize size);

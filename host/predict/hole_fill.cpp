@@ -21,7 +21,7 @@ HoleFill::HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFill
       rows_filled_(context, size),
       rows_hidden_(context, 2 * pixel_count(size)) {}
 
-void HoleFill::operator()(const StereoMaps& in, const HiddenMap& hidden, StereoMaps& out, HiddenMap& out_hidden,
+void HoleFill::operator()(const StereoMaps& in, const FlagMap& hidden, StereoMaps& out, FlagMap& out_hidden,
                           Views views) {
   context_.enter("HoleFill");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_);

@@ -17,7 +17,7 @@ class HoleFill {
 
   /// Disparities of both views; variances of `views`, and what is hidden there. REQUIRES: the outputs are not the
   /// inputs.
-  void operator()(const StereoMaps& in, const HiddenMap& hidden, StereoMaps& out, HiddenMap& out_hidden, Views views);
+  void operator()(const StereoMaps& in, const FlagMap& hidden, StereoMaps& out, FlagMap& out_hidden, Views views);
 
  private:
   ocl::Context& context_;
@@ -26,10 +26,10 @@ class HoleFill {
   const float max_difference_px_;
   using FillKernel =
       ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>,
-                  const ocl::Buffer<float>, const HiddenMap, ocl::Buffer<float>, ocl::Buffer<float>, HiddenMap>;
+                  const ocl::Buffer<float>, const FlagMap, ocl::Buffer<float>, ocl::Buffer<float>, FlagMap>;
   FillKernel fill_rows_, fill_columns_;
   StereoMaps rows_filled_;
-  HiddenMap rows_hidden_;
+  FlagMap rows_hidden_;
 };
 
 }  // namespace egosgm

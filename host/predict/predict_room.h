@@ -16,7 +16,8 @@ struct Prediction {
   StereoMaps warped;     // before anything was dropped; of what EdgeRejection dropped, the variances are gone
   Map rejected, filled;  // disparities after those stages
   StereoMaps maps;
-  HiddenMap warped_hidden, hidden;  // before and after holes were filled
+  // Where a surface that came nearer than the range hides what is behind, before and after holes were filled.
+  FlagMap warped_hidden, hidden;
 
   Prediction(ocl::Context& context, shared::ImageSize size)
       : warped(context, size),
@@ -26,7 +27,7 @@ struct Prediction {
         warped_hidden(context, 2 * pixel_count(size)),
         hidden(context, 2 * pixel_count(size)) {
     // A view that is not tracked stays so.
-    for (HiddenMap* map : {&warped_hidden, &hidden}) map->write(context, std::vector<cl_uchar>(map->size()));
+    for (FlagMap* map : {&warped_hidden, &hidden}) map->write(context, std::vector<cl_uchar>(map->size()));
   }
 };
 

@@ -22,6 +22,7 @@ class Reasons {
     const StereoMaps& measured;
     const ocl::Buffer<cl_ushort>* runs;  // of SpeckleRemoval; null: it is off
     const StereoMaps& belief;
+    const FlagMap& doubtful;  // what KalmanUpdate says; not read without a prediction
   };
 
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
@@ -37,8 +38,8 @@ class Reasons {
   const int pixels_;
   const cl_int disparities_, has_census_, padding_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const Bytes, const cl_int, const cl_int,
-              const ocl::Buffer<cl_uint>, const cl_int, In, const HiddenMap, In, const cl_int,
-              const ocl::Buffer<cl_ushort>, In, In, Bytes>
+              const ocl::Buffer<cl_uint>, const cl_int, In, const FlagMap, In, const cl_int,
+              const ocl::Buffer<cl_ushort>, In, const FlagMap, Bytes>
       explain_;
 };
 

@@ -61,10 +61,10 @@ CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const Me
   matcher_.prepare(PixelType::kU16);
 }
 
-void CoarseMatch::operator()(const FrameImages& images, StereoMaps& found) {
+void CoarseMatch::operator()(const FrameImages& images, Measurement& found) {
   const ocl::Context::Within within(context_, "CoarseMatch");
   shrink_[images.type](images, images_);
-  StereoMaps matched{matched_, found.variance};
+  Measurement matched{{matched_, found.variance}, found.doubtful};
   matcher_(images_, everything_, matched, Views::kBoth);
   consistency_(matched_, max_difference_px_, OutsideView::kDrop, found.disparity, found.variance, Views::kBoth);
 }

@@ -34,7 +34,7 @@ class CoarseMatch {
 
   /// Writes the left-right consistent disparities of both views, `coarse_size` of the images' each. REQUIRES: the
   /// images' type was prepared.
-  void operator()(const FrameImages& images, StereoMaps& found);
+  void operator()(const FrameImages& images, Measurement& found);
 
   /// Cells that a call matches, of both views.
   std::uint64_t matched_cells() const;

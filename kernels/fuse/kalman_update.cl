@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two contradict each
 // other, by more than the gate or because the measurement is doubtful, or where most pixels around are off to the same
-// side, as on what moves by itself, the measurement is taken, with a variance for which the next frame searches wide.
+// side, as on what moves by itself, the measurement is taken. It then is doubtful, and its variance is so large that the
+// next frame searches wide.
 // What is hidden by a surface nearer than the range (ForwardWarp) has no disparity: whatever is measured there is a
 // mismatch. Without a gate nothing contradicts anything.
 #include "method.h"
@@ -41,18 +42,19 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
 
 // `check`: of this frame; after wrong predictions all are off, so that nobody is asked.
 // `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
-// is taken that differs as those of EGOSGM_MOVING_COUNT around do. gate: FLT_MAX for none: all that is predicted and
-// measured is averaged, and nothing is hidden.
-KERNEL void update(const ImageSize size, const float gate, const int keep_predicted, const int ask_neighbours,
+// is taken that differs as those of EGOSGM_MOVING_COUNT around do. has_gate: else all that is predicted and measured is
+// averaged, and nothing is hidden or doubtful.
+KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted, const int ask_neighbours,
                    const float min_variance, global const PredictionState* check, global const uchar* hidden,
                    global const float* predicted, global const float* predicted_variance, global const float* measured,
-                   global const float* measured_variance, global float* updated, global float* updated_variance) {
+                   global const float* measured_variance, global const uchar* measured_doubtful, global float* updated,
+                   global float* updated_variance, global uchar* updated_doubtful) {
   const int width = size.width;
   const int y = get_global_id(1);
   const size_t view = (size_t)get_global_id(2) * size.height * width;
   const size_t row = view + (size_t)y * width;
   const int asks = ask_neighbours & (check->is_wrong == 0) & (check->was_wrong == 0);
-  const Ints is_plain = (Ints)(gate >= FLT_MAX ? -1 : 0);
+  const Ints is_plain = (Ints)(has_gate ? 0 : -1);
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(predicted + row, x, width);
@@ -61,9 +63,9 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
     const Floats r = load_pixels(measured_variance + row, x, width);
     const Ints has_prediction = d > INVALID;
     const Ints has_measurement = (z > INVALID) & (is_plain | (load_bytes(hidden + row, x, width) == 0));
-    const Floats doubtful = EGOSGM_DOUBTFUL_VARIANCE_PX2;
+    const Ints is_doubtful = load_bytes(measured_doubtful + row, x, width) != 0;
     const Ints has_both = has_prediction & has_measurement;
-    const Ints fuses = has_both & (is_plain | ((fabs(z - d) <= gate) & (r < doubtful)));
+    const Ints fuses = has_both & (is_plain | ((fabs(z - d) <= gate) & !is_doubtful));
     const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
 
     const Floats zero = 0.0f;
@@ -73,21 +75,24 @@ KERNEL void update(const ImageSize size, const float gate, const int keep_predic
     const Floats fused = d + gain * innovation;
     const Floats fused_variance = (1.0f - gain) * p;
 
-    const Floats contradicted = r < doubtful ? doubtful : r;
+    const Floats wide = EGOSGM_DOUBTFUL_VARIANCE_PX2;
+    const Floats contradicting = r < wide ? wide : r;
     Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
-    Floats variance = fuses ? fused_variance : has_both ? contradicted : has_measurement ? r : p;
+    Floats variance = fuses ? fused_variance : has_both ? contradicting : has_measurement ? r : p;
 
     const Floats moving = EGOSGM_MOVING_PX;
-    Ints moves = fuses & (fabs(innovation) > moving);
-    if (asks && any_of(moves)) {
+    Ints moves = fuses & (fabs(innovation) > moving) & (Ints)(asks ? -1 : 0);
+    if (any_of(moves)) {
       const Floats side = innovation > zero ? (Floats)(1.0f) : (Floats)(-1.0f);
       moves = move_together(size, x, y, side, moves, predicted + view, measured + view);
       value = moves ? z : value;
-      variance = moves ? doubtful : variance;
+      variance = moves ? wide : variance;
     }
     const Floats least = min_variance;
     const Floats bounded = variance < least ? least : variance;
     store_pixels(value, updated + row, x, width);
     store_pixels(value > INVALID ? bounded : zero, updated_variance + row, x, width);
+    const Ints contradicted = (has_both & !fuses) | (moves != 0) | (has_measurement & !has_prediction & is_doubtful);
+    store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
   }
 }

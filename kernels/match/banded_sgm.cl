@@ -300,10 +300,10 @@ KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int t
               offsets, penalties, slots, (global uchar*)sums, winners, ranks);
 }
 
-// Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, and the matching variance
-// (options.h).
+// Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, the matching variance
+// (options.h), and whether the disparity is doubtful.
 KERNEL void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
-                   global float* variances) {
+                   global float* variances, global uchar* doubtful) {
   const int width = q.width;
   const size_t row = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width;
   FOR_PIXELS(x, width) {
@@ -311,6 +311,8 @@ KERNEL void refine(const SgmParameters q, global const ulong* winners, global fl
     const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
     const Ints steps = FIELD(winner, 48);
     store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities + row, x, width);
-    store_pixels(matching_variance(q, steps, rise_before, rise_after), variances + row, x, width);
+    const Ints is_doubtful = falls_on(q, rise_before, rise_after);
+    store_pixels(matching_variance(q, steps, is_doubtful), variances + row, x, width);
+    store_bytes(is_doubtful & (Ints)(1), doubtful + row, x, width);
   }
 }

@@ -7,9 +7,8 @@
 // neighbours only the first and the last of each, and asks the others for nothing but the minimum. Costs come from the
 // codes; there is no cost volume.
 //
-// Three launches one after another: horizontal and vertical paths, one diagonal, the other; forward and backward paths
-// in the same launch. What a launch does to a cell's two partial sums: first = L0, second = L1; first = mean(first,
-// second), second = L2; first += mean(second, L3).
+// Three launches: horizontal and vertical paths, one diagonal, the other; forward and backward ones together. They do
+// to a cell's partial sums: first = L0, second = L1; first = mean(first, second), second = L2; first += mean(second, L3).
 #include "sgm_cells.h"
 
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 LANES=8 LINES=4 PIXELS=1
@@ -44,7 +43,6 @@
 #define QUADS (MAX_CHUNKS * EGOSGM_LANES / QUAD)
 #define QUADS_A_LANE ((QUADS + LANES - 1) / LANES)
 #define SLOT (QUADS_A_LANE * LANES + 2)
-#define MAX_COST 63
 #define MAX_STEPS 8
 // A cost that is absent: less the largest minimum (254), it still exceeds the largest P2 (190) and what 8 bits hold.
 #define ABSENT 511
@@ -101,7 +99,7 @@ inline uint difference(global const Code* own, global const Code* other, const l
     sum += abs_diff(own[above + dx], other[above - dx]) + abs_diff(own[dx], other[-dx]) +
            abs_diff(own[below + dx], other[below - dx]);
   }
-  return min(sum / 9, (uint)MAX_COST);
+  return min(sum / 9, (uint)EGOSGM_MAX_COST);
 }
 #endif
 
@@ -309,7 +307,8 @@ inline void offer(const SgmParameters q, const int x, const int y, const int lan
 KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winners(
     const SgmParameters q, global const uint* codes, global const Band* bands, global const uint* offsets,
     global const uchar* forward_first, global const uchar* forward_second, global const uchar* backward_first,
-    global const uchar* backward_second, global float* disparities, global float* variances, global uint* ranks) {
+    global const uchar* backward_second, global float* disparities, global float* variances,
+    global uchar* doubtful, global uint* ranks) {
   local uint minima[LINES][2 * LANES];
   const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
   const int x = get_group_id(0) * LINES + line;
@@ -345,6 +344,7 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winn
               rise_after = fits ? total_of(cells, winner + 1) - total : 0;
     const int steps = count_steps(cells, winner, total, -1, q.s_max) + count_steps(cells, winner, total, 1, q.s_max);
     disparities[pixel] = refined(cells_origin + winner, rise_before, rise_after);
-    variances[pixel] = matching_variance(q, steps, rise_before, rise_after);
+    doubtful[pixel] = falls_on(q, rise_before, rise_after);
+    variances[pixel] = matching_variance(q, steps, doubtful[pixel]);
   }
 }

@@ -14,9 +14,9 @@ inline Uints load_ranks(global const uint* row, const int x) {
 #endif
 }
 
-// Writes the right half of both maps.
+// Writes the right half of the maps. Nothing is doubtful.
 KERNEL void read_off(const SgmParameters q, global const uint* ranks, global float* disparities,
-                     global float* variances) {
+                     global float* variances, global uchar* doubtful) {
   const int y = get_global_id(1);
   const size_t row = ((size_t)q.height + y) * q.width;
   global const uint* seen = ranks + (size_t)y * ((size_t)q.width + 2 * (size_t)q.padding) + q.padding;
@@ -26,5 +26,6 @@ KERNEL void read_off(const SgmParameters q, global const uint* ranks, global flo
     const Ints disparity = q.min_disparity + q.disparities - 1 - INTS_OF_UINTS(rank & 0xffffu);
     store_pixels(is_seen ? FLOATS_OF_INTS(disparity) : INVALID, disparities + row, x, q.width);
     store_pixels(is_seen ? (Floats)(q.variance_floor) : (Floats)(0.0f), variances + row, x, q.width);
+    store_bytes((Ints)(0), doubtful + row, x, q.width);
   }
 }

@@ -24,12 +24,15 @@ inline Floats refined(const Ints winner, const Ints rise_before, const Ints rise
   return FLOATS_OF_INTS(winner) + (is_risen ? clamp(offset, -0.5f, 0.5f) : (Floats)(0.0f));
 }
 
-// The matching variance (options.h), or that of a winner beyond which the sums fall on.
-inline Floats matching_variance(const SgmParameters q, const Ints steps, const Ints rise_before,
-                                const Ints rise_after) {
+// Where the sums fall on beyond the end of a band, the true disparity rather lies outside.
+inline Ints falls_on(const SgmParameters q, const Ints rise_before, const Ints rise_after) {
+  return ((rise_before < 0) | (rise_after < 0)) & ((Ints)(q.doubts_band_ends) != 0);
+}
+
+// The matching variance (options.h).
+inline Floats matching_variance(const SgmParameters q, const Ints steps, const Ints is_doubtful) {
   const Floats n = FLOATS_OF_INTS(steps);
   const Floats counted = q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n);
-  const Ints is_doubtful = ((rise_before < 0) | (rise_after < 0)) & ((Ints)(q.doubts_band_ends) != 0);
   return is_doubtful ? (Floats)(EGOSGM_DOUBTFUL_VARIANCE_PX2) : counted;
 }
 

@@ -142,13 +142,13 @@ static inline Ints has_run(global const ushort* runs, const int x, const int wid
 #endif
 }
 
-// `all_codes`: Census's, read where they are a census and no grey values. `runs`: SpeckleRemoval's. `variance`: the
-// filter's. What there is not (has_prediction, has_runs) may be any buffer.
+// `all_codes`: Census's, read where they are a census and no grey values. `runs`: SpeckleRemoval's.
+// `doubtful`: KalmanUpdate's. What there is not (has_prediction, has_runs) may be any buffer.
 KERNEL void explain(const ImageSize size, const int disparities, global const uchar* images, const int has_census,
                     const int padding, global const uint* all_codes, const int has_prediction,
                     global const float* warped, global const uchar* hidden, global const float* measured,
                     const int has_runs, global const ushort* runs, global const float* disparity,
-                    global const float* variance, global uchar* reasons) {
+                    global const uchar* doubtful, global uchar* reasons) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -156,20 +156,19 @@ KERNEL void explain(const ImageSize size, const int disparities, global const uc
   global const Code* codes = (global const Code*)all_codes + y * stride + padding;
   const long above = y >= EGOSGM_REPEAT_STEP ? -EGOSGM_REPEAT_STEP * stride : 0;
   const long below = y + EGOSGM_REPEAT_STEP < size.height ? EGOSGM_REPEAT_STEP * stride : 0;
-  const Floats doubtful = EGOSGM_DOUBTFUL_VARIANCE_PX2;
   const Floats jump = EGOSGM_UNCOVERED_JUMP_PX;
   const Floats off = EGOSGM_MOVING_PX;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
-    const Floats p = load_pixels(variance + row, x, width);
     const Floats z = load_pixels(measured + row, x, width);
     const Floats w = has_prediction ? load_pixels(warped + row, x, width) : INVALID;
     const Ints has_value = d > INVALID;
     const Ints is_measured = z > INVALID;
     const Ints is_warped = w > INVALID;
     const Ints is_hidden = has_prediction ? load_bytes(hidden + row, x, width) != 0 : (Ints)(0);
-    const Ints differs = has_value ? p >= doubtful : fabs(z - w) > off;
+    const Ints is_doubtful = has_prediction ? load_bytes(doubtful + row, x, width) != 0 : (Ints)(0);
+    const Ints differs = has_value ? is_doubtful : fabs(z - w) > off;
     const Ints contradicts = is_measured & is_warped & differs;
     const Ints is_speckle = has_runs ? has_run(runs + row, x, width) & !is_measured : (Ints)(0);
     const Ints is_uncovered = has_prediction ? (jump_beside(warped + row, x, width) > jump) & !is_warped : (Ints)(0);

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "kernels/method.h"
 #include "tests/reference/fuse/kalman_update.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
@@ -23,31 +22,36 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
   ocl::Context context(testing::any_device());
   KalmanUpdate update(context, size, options, pixels);
   const StereoMaps prediction = testing::upload(context, size, predicted);
-  const StereoMaps measurement = testing::upload(context, size, measured);
+  const Measurement measurement = testing::upload_measurement(context, size, measured);
   StereoMaps out = testing::upload(context, size, before_update(size));
   ocl::Buffer<shared::PredictionState> checked(context, 1);
   checked.write(context, {check});
-  HiddenMap hidden(context, predicted.disparity.size());
+  FlagMap hidden(context, predicted.disparity.size());
   hidden.write(context, predicted.hidden.empty() ? std::vector<cl_uchar>(hidden.size()) : predicted.hidden);
-  update(checked, hidden, prediction, measurement, out, views);
-  return testing::download(context, out);
+  FlagMap doubtful(context, predicted.disparity.size());
+  doubtful.write(context, std::vector<cl_uchar>(doubtful.size(), 9));
+  update(checked, hidden, prediction, measurement, out, doubtful, views);
+  return testing::download(context, Measurement{out, doubtful});
 }
 
 struct Estimate {
   float disparity, variance;
+  bool doubtful = false;
   bool operator==(const Estimate&) const = default;
 };
 
 constexpr Estimate kNothing{kNone, 0};
+constexpr float kWide = 16;  // the variance of what is doubtful
 
 Estimate update_pixel(const KalmanUpdateOptions& options, Estimate predicted, Estimate measured, int is_hidden = 0) {
-  const testing::HostMaps updated =
-      update({1, 1}, options,
-             {{predicted.disparity, kNone}, {predicted.variance, 0}, {static_cast<std::uint8_t>(is_hidden), 0}},
-             {{measured.disparity, kNone}, {measured.variance, 0}});
+  const testing::HostMaps updated = update(
+      {1, 1}, options,
+      {{predicted.disparity, kNone}, {predicted.variance, 0}, {static_cast<std::uint8_t>(is_hidden), 0}},
+      {{measured.disparity, kNone}, {measured.variance, 0}, {}, {static_cast<std::uint8_t>(measured.doubtful), 0}});
   EXPECT_EQ(updated.disparity[1], kNone);
   EXPECT_EQ(updated.variance[1], 0);
-  return {updated.disparity[0], updated.variance[0]};
+  EXPECT_EQ(updated.doubtful[1], 0);
+  return {updated.disparity[0], updated.variance[0], updated.doubtful[0] != 0};
 }
 
 class KalmanUpdateTest : public ::testing::TestWithParam<shared::ImageSize> {};
@@ -59,8 +63,8 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
   testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 7);
   for (std::size_t i = 0; i < measured.disparity.size(); ++i) {
     predicted.hidden.push_back(predicted.disparity[i] == kNone && i % 13 < 4);
-    if (i % 7 == 0 && predicted.disparity[i] != kNone) predicted.variance[i] += EGOSGM_DOUBTFUL_VARIANCE_PX2;
-    if (i % 11 == 0) measured.variance[i] += EGOSGM_DOUBTFUL_VARIANCE_PX2;
+    if (i % 7 == 0 && predicted.disparity[i] != kNone) predicted.variance[i] += 16;
+    measured.doubtful.push_back(i % 11 == 0);
     if (i % 5 == 0 && measured.disparity[i] != kNone) measured.disparity[i] -= 6;
     if (static_cast<int>(i) % size.width < size.width / 2 && i % 23 != 0) {
       predicted.hidden[i] = 0;
@@ -78,6 +82,7 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
           << "gate " << options.gate_px << ", by " << pixels;
       EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
           << "gate " << options.gate_px << ", by " << pixels;
+      EXPECT_EQ(actual.doubtful, expected.doubtful) << "gate " << options.gate_px << ", by " << pixels;
     }
   }
 }
@@ -107,23 +112,23 @@ TEST(KalmanUpdate, WeighsByTheVariances) {
 TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));
   // With a variance for which the next frame searches wide.
-  const float wide = EGOSGM_DOUBTFUL_VARIANCE_PX2;
-  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12.25f, 1}), (Estimate{12.25f, wide}));
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12.25f, 1}), (Estimate{12.25f, kWide, true}));
   const KalmanUpdateOptions alone{.gate_px = 2, .ask_neighbours = false};
-  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 1}), (Estimate{7.75f, wide}));
-  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 2 * wide}), (Estimate{7.75f, 2 * wide}));
+  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 1}), (Estimate{7.75f, kWide, true}));
+  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 2 * kWide}), (Estimate{7.75f, 2 * kWide, true}));
 }
 
 TEST(KalmanUpdate, TakesAMeasurementThatEscapedItsBand) {
-  const float escaped = EGOSGM_DOUBTFUL_VARIANCE_PX2;
-  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, escaped}), (Estimate{11, escaped}));
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, 1, true}), (Estimate{11, kWide, true}));
+  EXPECT_EQ(update_pixel({.gate_px = 2}, kNothing, {11, kWide, true}), (Estimate{11, kWide, true}));
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, kWide}).doubtful, false) << "uncertain, but where it belongs";
 }
 
 // The paper's update knows of no escape and of nothing that hides.
 TEST(KalmanUpdate, AveragesAllWithoutAGate) {
   const KalmanUpdateOptions plain{.gate_px = 0, .ask_neighbours = false};
   EXPECT_EQ(update_pixel(plain, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
-  EXPECT_EQ(update_pixel(plain, {10, 16}, {14, 48}), (Estimate{11, 12}));
+  EXPECT_EQ(update_pixel(plain, {10, 16}, {14, 48, true}), (Estimate{11, 12}));
   EXPECT_EQ(update_pixel(plain, kNothing, {12, 3}, /*is_hidden=*/1), (Estimate{12, 3}));
   EXPECT_EQ(update_pixel(plain, kNothing, kNothing, /*is_hidden=*/1), kNothing);
 }
@@ -158,11 +163,9 @@ struct Surroundings {
   Estimate updated_in_the_middle(const KalmanUpdateOptions& options = {},
                                  const shared::PredictionState& check = {}) const {
     const testing::HostMaps updated = update(kSize, options, predicted, measured, 0, check);
-    return {updated.disparity[kMiddle], updated.variance[kMiddle]};
+    return {updated.disparity[kMiddle], updated.variance[kMiddle], updated.doubtful[kMiddle] != 0};
   }
 };
-
-constexpr float kDoubtful = EGOSGM_DOUBTFUL_VARIANCE_PX2;
 
 /// All are measured `off` nearer than predicted, the pixel in the middle `innovation`.
 Surroundings shifted(float off, float innovation) {
@@ -174,7 +177,7 @@ Surroundings shifted(float off, float innovation) {
 
 TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
   for (const float sign : {1.0f, -1.0f}) {
-    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kDoubtful}));
+    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kWide, true}));
     const Estimate fused{20 + sign * 0.625f, 0.5f};
     EXPECT_EQ(shifted(sign * 0.75f, sign * 1.25f).updated_in_the_middle(), fused) << "the others not far enough";
     EXPECT_EQ(shifted(sign * -0.875f, sign * 1.25f).updated_in_the_middle(), fused) << "to the other side";
@@ -187,7 +190,7 @@ TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
   for (const int still : {2, 6, 10, 14, 18}) {
     maps.measured.disparity[2 * 21 + still] = maps.measured.disparity[18 * 21 + still] = 20;
   }
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kDoubtful})) << "15 of 25";
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kWide, true})) << "15 of 25";
   maps.measured.disparity[6 * 21 + 2] = 20;
   EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "14 of 25";
   for (const int beside : {6, 14}) {

@@ -63,7 +63,7 @@ void run(std::string_view input) {
   for (const int pixels : {1, 16}) {
     ForwardWarp warp(context, kSize, calibration, {.process_noise_px2 = kProcessNoisePx2}, range, pixels);
     StereoMaps predicted(context, kSize);
-    HiddenMap hidden(context, predicted.disparity.size());
+    FlagMap hidden(context, predicted.disparity.size());
     warp(on_device, motion, predicted, hidden, Views::kBoth);
     const testing::HostMaps actual = testing::download(context, predicted);
     if (hidden.read(context) != expected.hidden) throw std::logic_error("by " + std::to_string(pixels) + ": hidden");

@@ -13,6 +13,7 @@
 #include "tests/reference/match/step_penalties.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
+#include "tests/support/device_maps.h"
 
 namespace egosgm {
 namespace {
@@ -97,7 +98,8 @@ Match match(const Case& c, int max_memory_mib = 0) {
   const auto padded = reference::padded_codes(c.size, m.codes[0], m.codes[1], padding, c.cost);
   ocl::Buffer<cl_uint> device_codes(context, padded.size());
   device_codes.write(context, {padded.begin(), padded.end()});
-  StereoMaps predicted(context, c.size), measured(context, c.size);
+  StereoMaps predicted(context, c.size);
+  Measurement measured(context, c.size);
   if (c.banded) {
     const testing::HostMaps maps = predictions(c);
     predicted.disparity.write(context, maps.disparity);
@@ -123,9 +125,15 @@ Match match(const Case& c, int max_memory_mib = 0) {
                   m.options.doubts_band_ends,
                   c.reads_off};
   m.bands = bands.bands.read(context);
-  m.measured = {measured.disparity.read(context), measured.variance.read(context)};
+  m.measured = testing::download(context, measured);
   m.stripes = sgm.stripes();
   return m;
+}
+
+void expect_same(const testing::HostMaps& actual, const testing::HostMaps& expected, shared::ImageSize size) {
+  EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size));
+  EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size));
+  EXPECT_TRUE(testing::same_bits(actual.doubtful, expected.doubtful, size));
 }
 
 class BandedSgmTest : public ::testing::TestWithParam<Case> {};
@@ -135,8 +143,7 @@ TEST_P(BandedSgmTest, EqualsReference) {
   const Match m = match(c);
   ASSERT_EQ(m.stripes.size(), 1u);
   const auto expected = reference::banded_sgm(m.parameters, m.options, m.codes, m.grey, m.bands);
-  EXPECT_TRUE(testing::same_bits(m.measured.disparity, expected.disparity, c.size));
-  EXPECT_TRUE(testing::same_bits(m.measured.variance, expected.variance, c.size));
+  expect_same(m.measured, expected, c.size);
 }
 
 /// `rows` rows of every one of `planes` planes, from `first` on.
@@ -168,6 +175,7 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
           (static_cast<std::ptrdiff_t>(view) * stripe.rows + stripe.kept_begin - stripe.first_row) * size.width;
       std::copy_n(maps.disparity.begin() + from, kept, expected.disparity.begin() + to);
       std::copy_n(maps.variance.begin() + from, kept, expected.variance.begin() + to);
+      std::copy_n(maps.doubtful.begin() + from, kept, expected.doubtful.begin() + to);
     }
   }
   return expected;
@@ -184,8 +192,7 @@ TEST(BandedSgmStripes, EqualTheTwinOfEach) {
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
       const auto expected = stripe_by_stripe(m, c.size);
-      EXPECT_TRUE(testing::same_bits(m.measured.disparity, expected.disparity, c.size));
-      EXPECT_TRUE(testing::same_bits(m.measured.variance, expected.variance, c.size));
+      expect_same(m.measured, expected, c.size);
     }
   }
 }

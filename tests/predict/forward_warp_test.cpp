@@ -33,7 +33,7 @@ testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, s
   ForwardWarp warp(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
   StereoMaps out = testing::upload(context, size, before(size));
-  HiddenMap hidden(context, out.disparity.size());
+  FlagMap hidden(context, out.disparity.size());
   hidden.write(context, std::vector<cl_uchar>(hidden.size(), kWasHidden));
   warp(in, motion, out, hidden, views);
   testing::HostMaps predicted = testing::download(context, out);

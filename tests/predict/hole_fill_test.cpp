@@ -21,7 +21,7 @@ testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const te
   HoleFill fill(context, size, {.max_difference_px = max_difference_px}, pixels);
   const StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  HiddenMap hidden(context, in.disparity.size()), still_hidden(context, in.disparity.size());
+  FlagMap hidden(context, in.disparity.size()), still_hidden(context, in.disparity.size());
   hidden.write(context, maps.hidden);
   still_hidden.write(context, std::vector<cl_uchar>(maps.hidden.size(), 9));
   fill(in, hidden, out, still_hidden, views);

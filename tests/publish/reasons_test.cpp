@@ -53,6 +53,8 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   if (!inputs.hidden.empty()) prediction.hidden.write(context, inputs.hidden);
   const StereoMaps belief = testing::upload(context, size, inputs.belief);
   const StereoMaps measured = testing::upload(context, size, {inputs.measured, inputs.measured});
+  FlagMap doubtful(context, 2 * pixel_count(size));
+  doubtful.write(context, inputs.doubtful);
   std::vector<cl_ushort> begins;
   for (const float d : inputs.consistent) begins.push_back(d == kNone ? 0xffff : 0);
   ocl::Buffer<cl_ushort> runs(context, begins.size());
@@ -61,7 +63,7 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   found.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
   Reasons reasons(context, size, images.type, options, pixels);
   reasons({images, codes, inputs.warped.empty() ? nullptr : &prediction, measured,
-           options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief},
+           options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief, doubtful},
           found);
   return found.read(context);
 }
@@ -86,11 +88,12 @@ reference::ReasonInputs random_inputs(shared::ImageSize size, int white, unsigne
   inputs.warped = testing::random_maps(size, 0, 30, 0.3, seed + 2).disparity;
   inputs.consistent = testing::random_maps(size, 0, 30, 0.3, seed + 3).disparity;
   inputs.measured = inputs.consistent;
+  inputs.doubtful.assign(inputs.measured.size(), 0);
   for (std::size_t i = 0; i < inputs.measured.size(); ++i) {
     if (tenth(random) < 2) inputs.measured[i] = kNone;
     if (tenth(random) < 6 && inputs.belief.disparity[i] != kNone) inputs.warped[i] = inputs.belief.disparity[i];
     if (tenth(random) < 2 && inputs.belief.disparity[i] != kNone) {
-      inputs.belief.variance[i] += EGOSGM_DOUBTFUL_VARIANCE_PX2;
+      inputs.doubtful[i] = 1;
     }
     inputs.hidden.push_back(inputs.belief.disparity[i] == kNone && tenth(random) < 2);
   }
@@ -137,6 +140,7 @@ struct Scene {
     inputs.warped = inputs.consistent = inputs.measured = ten;
     inputs.belief = {ten, std::vector<float>(2 * pixels, 0.5f)};
     inputs.hidden.assign(2 * pixels, 0);
+    inputs.doubtful = inputs.hidden;
     options.disparities = 32;
   }
 
@@ -166,7 +170,7 @@ TEST(Reasons, TellsAValueThatIsPredictedOnly) {
 
 TEST(Reasons, TellsAContradiction) {
   Scene scene;
-  scene.inputs.belief.variance[Scene::kMiddle] = EGOSGM_DOUBTFUL_VARIANCE_PX2;
+  scene.inputs.doubtful[Scene::kMiddle] = 1;
   EXPECT_EQ(scene.in_the_middle(), Reason::kContradicted);
   scene.inputs.warped[Scene::kMiddle] = kNone;
   EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "nothing was predicted that could contradict";

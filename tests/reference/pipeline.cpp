@@ -1,26 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/method_options.h"
 #include "tests/reference/pipeline.h"
 
 #include <algorithm>
 
+#include "host/method_options.h"
+#include "tests/reference/fuse/kalman_update.h"
+#include "tests/reference/fuse/prediction_check.h"
+#include "tests/reference/fuse/sad_check.h"
 #include "tests/reference/match/banded_sgm.h"
 #include "tests/reference/match/census.h"
-#include "tests/reference/search/coarse_match.h"
 #include "tests/reference/match/consistency_check.h"
-#include "tests/reference/publish/dynamic_map.h"
+#include "tests/reference/match/median_filter.h"
+#include "tests/reference/match/speckle_removal.h"
+#include "tests/reference/match/step_penalties.h"
 #include "tests/reference/predict/edge_rejection.h"
 #include "tests/reference/predict/forward_warp.h"
 #include "tests/reference/predict/hole_fill.h"
-#include "tests/reference/fuse/kalman_update.h"
-#include "tests/reference/match/median_filter.h"
+#include "tests/reference/predict/right_map.h"
+#include "tests/reference/publish/dynamic_map.h"
 #include "tests/reference/publish/output_variance.h"
 #include "tests/reference/publish/reasons.h"
-#include "tests/reference/fuse/prediction_check.h"
-#include "tests/reference/predict/right_map.h"
-#include "tests/reference/fuse/sad_check.h"
-#include "tests/reference/match/speckle_removal.h"
-#include "tests/reference/match/step_penalties.h"
+#include "tests/reference/search/coarse_match.h"
 
 namespace egosgm::reference {
 
@@ -79,7 +79,8 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
                   .hidden = frame.predicted.hidden,
                   .consistent = pass.consistent.disparity,
                   .measured = pass.measured.disparity,
-                  .belief = frame.result});
+                  .belief = frame.result,
+                  .doubtful = frame.fused.doubtful});
 }
 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
@@ -145,6 +146,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
     std::copy(pass.consistent.variance.begin() + right, pass.consistent.variance.end(),
               pass.measured.variance.begin() + right);
   }
+  pass.measured.doubtful = pass.matched.doubtful;
   pass.offset = known;
   if (options_.vertical_alignment.enabled) {
     pass.offset = estimate_offset(size_, options_.vertical_alignment.gain, pass.images, images.bits == 8 ? 1 : 256,

@@ -40,7 +40,7 @@ std::vector<float> run(shared::ImageSize size, const MethodOptions& options, con
   }
   FrameImages on_device{ocl::Buffer<cl_uchar>(context, bytes.size()), type};
   on_device.pixels.write(context, bytes);
-  StereoMaps found(context, CoarseMatch::coarse_size(size));
+  Measurement found(context, CoarseMatch::coarse_size(size));
   stage.prepare(type);
   stage(on_device, found);
   return found.disparity.read(context);

@@ -92,11 +92,12 @@ class StageChain {
     pass.penalties.assign(penalties.begin(), penalties.end());
     pass.matched.disparity = matching.matched.read(context_);
     if (options_.median_filter.enabled) pass.smoothed.disparity = matching.smoothed.read(context_);
-    pass.measured = download(context_, measured);
+    pass.measured = download(context_, Measurement{measured, matching.doubtful});
   }
 
   void look(const Fusion& fusion, reference::Frame& frame) {
     frame.fused.disparity = fusion.fused.read(context_);
+    frame.fused.doubtful = fusion.doubtful.read(context_);
     if (options_.median_filter.enabled) frame.fused_smoothed.disparity = fusion.smoothed.read(context_);
     frame.updated = download(context_, after_.maps);
   }

@@ -11,16 +11,18 @@ namespace {
 
 struct Estimate {
   float disparity, variance;
+  bool doubtful;
 };
 
-constexpr Estimate kNone{EGOSGM_INVALID_DISPARITY, 0};
+constexpr Estimate kNone{EGOSGM_INVALID_DISPARITY, 0, false};
 
 bool is_valid(const Estimate& estimate) { return estimate.disparity != EGOSGM_INVALID_DISPARITY; }
 
 Estimate fuse(const Estimate& predicted, const Estimate& measured) {
   const float sum = predicted.variance + measured.variance;
   const float gain = sum > 0 ? predicted.variance / sum : 0;
-  return {predicted.disparity + gain * (measured.disparity - predicted.disparity), (1 - gain) * predicted.variance};
+  return {predicted.disparity + gain * (measured.disparity - predicted.disparity), (1 - gain) * predicted.variance,
+          false};
 }
 
 /// One view, and what the pixels of it say.
@@ -69,16 +71,16 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
                 const Estimate& measured) {
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
   const bool is_plain = options.gate_px <= 0;  // the paper's: all that is predicted and measured is averaged
-  const float z = measured.disparity, doubtful = kDoubtfulVariancePx2;
+  const float z = measured.disparity, wide = kDoubtfulVariancePx2;
   if (!is_valid(predicted)) return measured;
   const float innovation = z - predicted.disparity;
-  if (!contradict(options.gate_px, z, predicted.disparity) && (is_plain || measured.variance < doubtful)) {
+  if (!contradict(options.gate_px, z, predicted.disparity) && (is_plain || !measured.doubtful)) {
     const bool moves = options.ask_neighbours && std::abs(innovation) > 1 &&
                        view.is_between_moving(x, y, innovation > 0 ? 1.0f : -1.0f) &&
                        view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 15;
-    return moves ? Estimate{z, doubtful} : fuse(predicted, measured);
+    return moves ? Estimate{z, wide, true} : fuse(predicted, measured);
   }
-  return {z, std::max(measured.variance, doubtful)};
+  return {z, std::max(measured.variance, wide), true};
 }
 
 }  // namespace
@@ -93,9 +95,11 @@ testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOption
     const bool is_hidden = options.gate_px > 0 && !predicted.hidden.empty() && predicted.hidden[i] != 0;
     const Estimate estimate = is_hidden ? kNone
                                         : update(options, view, (i - first) % size.width, (i - first) / size.width,
-                                                 {predicted.disparity[i], predicted.variance[i]},
-                                                 {measured.disparity[i], measured.variance[i]});
+                                                 {predicted.disparity[i], predicted.variance[i], false},
+                                                 {measured.disparity[i], measured.variance[i],
+                                                  !measured.doubtful.empty() && measured.doubtful[i] != 0});
     out.disparity[i] = estimate.disparity;
+    out.doubtful.push_back(estimate.doubtful);
     out.variance[i] = is_valid(estimate) ? std::max(estimate.variance, options.min_variance_px2) : 0;
   }
   return out;

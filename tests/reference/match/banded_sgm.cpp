@@ -148,6 +148,7 @@ void read_off(const View& left, const shared::Band* bands, Cells& sums, testing:
     const int disparity = q.min_disparity + q.disparities - 1 - behind;
     maps.disparity.push_back(rank == kNone ? EGOSGM_INVALID_DISPARITY : static_cast<float>(disparity));
     maps.variance.push_back(rank == kNone ? 0 : q.variance_floor);
+    maps.doubtful.push_back(0);
   }
 }
 
@@ -174,7 +175,8 @@ testing::HostMaps banded_sgm(const shared::SgmParameters& q, const BandedSgmOpti
       const float n = static_cast<float>(steps);
       const bool has_both = sums.has(p, winner - 1) && sums.has(p, winner + 1);
       const bool escaped = has_both && std::min(sums.at(p, winner - 1), sums.at(p, winner + 1)) < sums.at(p, winner);
-      maps.variance.push_back(escaped && q.doubts_band_ends
+      maps.doubtful.push_back(escaped && q.doubts_band_ends);
+      maps.variance.push_back(maps.doubtful.back()
                                   ? kDoubtfulVariancePx2
                                   : q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n));
     }

@@ -24,7 +24,7 @@ class Pixels {
     const float d = in_.belief.disparity[i], z = in_.measured[i], w = in_.warped.empty() ? kNone : in_.warped[i];
     if (!in_.hidden.empty() && in_.hidden[i]) return Reason::kNearer;
     if (z != kNone && w != kNone) {
-      const bool differs = d == kNone ? std::abs(z - w) > 1 : in_.belief.variance[i] >= kDoubtfulVariancePx2;
+      const bool differs = d == kNone ? std::abs(z - w) > 1 : in_.doubtful[i] != 0;
       if (differs) return Reason::kContradicted;
     }
     const Window window = around(x, y);
