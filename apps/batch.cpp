@@ -19,6 +19,7 @@
 #include "apps/run_outputs.h"
 #include "apps/shard.h"
 #include "apps/standard_output.h"
+#include "apps/suggestion.h"
 #include "egosgm/error.h"
 
 namespace egosgm::app {
@@ -144,12 +145,24 @@ int report_shard(const Shard& shard, const std::vector<BatchEntry>& failed) {
   return kFailed;
 }
 
+/// What is wrong with the input of a line names the line.
+template <typename Look>
+void naming_line(const BatchEntry& entry, Look&& look) {
+  try {
+    look();
+  } catch (const MissingPath& error) {
+    throw InvalidArgument(entry.place + ": " + error.what() + meant_path(error));
+  } catch (const InvalidArgument& error) {
+    throw InvalidArgument(entry.place + ": " + error.what());
+  }
+}
+
 int batch(const BatchArguments& arguments) {
   const std::vector<BatchEntry> entries = read_batch_list(arguments.list);
   const PipelineOptions options = arguments.method.options();
   arguments.method.expect_saves(arguments.out);
   const Json settings = batch_settings(options, arguments.odometry, parse_write_list(arguments.write));
-  const BatchFolder folder(arguments.out, settings, arguments.overwrite && !arguments.merge);
+  BatchFolder folder(arguments.out, settings, arguments.overwrite && !arguments.merge);
   if (arguments.merge) return report_all(arguments, entries, folder);
 
   // All mistakes in the arguments now, before anything is written.
@@ -159,13 +172,15 @@ int batch(const BatchArguments& arguments) {
   expect_own_json(timing_file(arguments, shard));
   const std::vector<BatchEntry> left = not_done(part, folder);
   for (const BatchEntry& entry : left) {
-    const SequenceJob job = job_of(arguments, options, folder, entry);
-    if (!job.poses_file.empty()) vision::poses_of_frames(job.sequence, job.poses_file);
+    naming_line(entry, [&] {
+      const SequenceJob job = job_of(arguments, options, folder, entry);
+      if (!job.poses_file.empty()) vision::poses_of_frames(job.sequence, job.poses_file);
+    });
   }
   const std::vector<Device> devices = select_devices(arguments);
 
   arguments.method.save(options);
-  folder.begin();
+  folder.begin(shard.count > 1);
   if (!left.empty()) {
     catch_interrupts();
     BatchRun batch(arguments, left, folder, options, devices);

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/batch_report.h"
 
+#include <fcntl.h>
 #include <fmt/core.h>
+#include <sys/file.h>
 
 #include <utility>
 
@@ -108,8 +110,9 @@ BatchFolder::BatchFolder(const std::string& folder, Json settings, bool overwrit
                                     difference(there, settings_)));
 }
 
-void BatchFolder::begin() const {
+void BatchFolder::begin(bool is_shard) {
   vision::make_folder(folder_);
+  lock_ = std::make_unique<LockedFile>(folder_ / ".", O_RDONLY | O_DIRECTORY, is_shard ? LOCK_SH : LOCK_EX);
   write_own_json(folder_ / "settings.json", settings_);
 }
 

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "apps/batch_list.h"
+#include "apps/file_record.h"
 #include "apps/run.h"
 
 namespace egosgm::app {
@@ -23,8 +25,9 @@ class BatchFolder {
   /// Looks at the folder, and changes nothing. `overwrite`: what was done there is done again. Throws InvalidArgument
   /// where it was made with other settings, and is not to be overwritten, or holds files of others in a batch's names.
   BatchFolder(const std::string& folder, nlohmann::ordered_json settings, bool overwrite);
-  /// Makes the folder and settings.json. Throws IoError.
-  void begin() const;
+  /// Makes the folder and settings.json, and has the folder from then on: no other batch gets it, but other shards do
+  /// where this is one. Throws IoError, and FolderInUse where another batch has it.
+  void begin(bool is_shard);
 
   std::filesystem::path folder_of(const BatchEntry& entry) const { return folder_ / entry.name; }
 
@@ -50,6 +53,7 @@ class BatchFolder {
   const std::filesystem::path folder_;
   const nlohmann::ordered_json settings_;
   const bool overwrite_;
+  std::unique_ptr<LockedFile> lock_;
 };
 
 /// What all sequences of a batch share.

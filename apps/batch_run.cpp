@@ -103,7 +103,7 @@ void BatchRun::add_energy(Json& json, int frames) const {
 void BatchRun::work(int device) {
   try {
     while (const auto job = queue_.next(device)) run(*job, device);
-  } catch (...) {  // the output folder cannot be written: no sequence can be completed
+  } catch (...) {  // the output folder cannot be written, or is another's: no sequence can be completed
     const std::lock_guard lock(mutex_);
     stopped_by_ = std::current_exception();
     queue_.stop();
@@ -125,6 +125,8 @@ void BatchRun::run(int number, int device) {
   } catch (const DeviceError& error) {
     hand_over(number, device, error.what());
   } catch (const IoError&) {
+    throw;
+  } catch (const FolderInUse&) {  // what becomes of the sequence is the other's to say
     throw;
   } catch (const std::exception& error) {
     queue_.failed();

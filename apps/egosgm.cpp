@@ -55,7 +55,7 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
   if (unknown.empty()) {
     std::string what = error.what();
     if (const std::string prefix = "Could not convert: "; what.starts_with(prefix))
-      what = what.substr(prefix.size()) + " is not a number";
+      what = what.substr(prefix.size()) + " is no value for it";
     return fail(kBadInput, fmt::format("{}: see `{}`", what, help_hint(command)));
   }
   if (std::error_code error; is_regular_file(std::filesystem::path(unknown.front()), error)) {
@@ -68,12 +68,6 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
   return fail(kBadInput,
               fmt::format("{} \"{}\": {}see `{}`", typed.starts_with("-") ? "unknown option" : "unexpected argument",
                           typed, nearest.empty() ? "" : "did you mean " + nearest + "? ", help_hint(command)));
-}
-
-/// A question that names the path that one which is not there was meant to be.
-std::string meant_path(const MissingPath& error) {
-  const std::string path = path_suggestion(error.path());
-  return path.empty() ? "" : "; did you mean " + path + "?";
 }
 
 /// Whether what --help calls the value is a number.
@@ -91,11 +85,15 @@ bool is_decimal(const std::string& text) {
   return number && std::isfinite(*number) && !has_leading_zero && text[0] != '+';
 }
 
-/// An empty value is a variable of the shell that was not set.
+/// An empty value is a variable of the shell that was not set; the name of an option is where a value was forgotten.
 void refuse_odd_values(const CLI::App& command) {
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& value : option->results()) {
       if (value.empty()) throw InvalidArgument(option->get_name() + " \"\": is empty: give a value, or leave it out");
+      if (value.starts_with('-') && command.get_option_no_throw(value)) {
+        throw InvalidArgument(fmt::format("{0}: its value is missing, as {1} is an option; write ./{1} if it is a name",
+                                          option->get_name(), value));
+      }
       if (!takes_number(*option) || is_decimal(value)) continue;
       throw InvalidArgument(fmt::format("{} \"{}\": write a decimal number without blanks, plus or leading zeros",
                                         option->get_name(), value));

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <memory>
@@ -67,8 +68,9 @@ void print(const vision::PoseEvaluation& e) {
   fmt::print("frame to frame   {:.4f} m  {:.4f} deg (mean), {:.4f} m  {:.4f} deg (root mean square)\n",
              e.translation_mean_m, e.rotation_mean_rad * kDegrees, e.translation_rmse_m,
              e.rotation_rmse_rad * kDegrees);
-  fmt::print("at the end       {:.3f} m = {:.3f} %  {:.3f} deg\n", e.end_drift_m, e.end_drift_percent,
-             e.rotation_end_drift_deg);
+  const bool moved = std::isfinite(e.end_drift_percent);
+  fmt::print("at the end       {:.3f} m = {} %  {:.3f} deg\n", e.end_drift_m,
+             moved ? fmt::format("{:.3f}", e.end_drift_percent) : "-", e.rotation_end_drift_deg);
   if (e.segments.empty()) return;
   fmt::print("segments         {:.3f} %  {:.5f} deg/m{}\n", e.segment_translation_percent, e.segment_rotation_deg_per_m,
              e.short_segments ? " (of 5 to 50 m: not comparable with KITTI's of 100 to 800 m)" : "");

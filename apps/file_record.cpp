@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <system_error>
 
-#include "egosgm/error.h"
 #include "host/vision/file_io.h"
 
 namespace egosgm::app {
@@ -79,8 +78,8 @@ LockedFile::LockedFile(const fs::path& file, int flags, int lock)
   // Where a file system has no locks, there is none.
   if (descriptor_ < 0 || ::flock(descriptor_, lock | LOCK_NB) == 0 || errno != EWOULDBLOCK) return;
   ::close(descriptor_);
-  throw InvalidArgument(fmt::format("--out {}: another egosgm is writing there: wait for its end, or choose another",
-                                    file.parent_path().string()));
+  throw FolderInUse(fmt::format("--out {}: another egosgm is writing there: wait for its end, or choose another",
+                                file.parent_path().string()));
 }
 
 LockedFile::~LockedFile() {

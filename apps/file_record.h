@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "egosgm/error.h"
+
 namespace egosgm::app {
 
 /// Of a file's bytes.
@@ -21,10 +23,16 @@ constexpr const char* kFileRecord = "files.part";
 /// where the record is not as it was written, or where a run is still writing to it.
 std::map<std::string, std::string> recorded_files(const std::filesystem::path& folder);
 
-/// A file that no other process has, with a lock that goes with the process.
+/// Another process is writing to the folder.
+class FolderInUse : public InvalidArgument {
+ public:
+  using InvalidArgument::InvalidArgument;
+};
+
+/// A file or a folder that no other process has, with a lock that goes with the process.
 class LockedFile {
  public:
-  /// Throws InvalidArgument where another has it.
+  /// Throws FolderInUse, naming the folder that `file` is in, where another has it.
   LockedFile(const std::filesystem::path& file, int flags, int lock);
   ~LockedFile();
   LockedFile(const LockedFile&) = delete;

@@ -21,9 +21,10 @@ constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
 constexpr std::size_t kAnySize = std::numeric_limits<std::size_t>::max() - 1;
 constexpr const char *kJsonDigestBegin = ",\n  \"digest\": \"", *kJsonDigestEnd = "\"\n}\n";
 
-/// Where a path leads, also one that is not there yet.
+/// Where a path leads, also one that is not there yet. A pipe of this process is in no folder: it keeps its name.
 fs::path place_of(const fs::path& path) {
   std::error_code error;
+  if (fs::is_fifo(path, error)) return fs::absolute(path);
   fs::path result = fs::weakly_canonical(fs::absolute(path), error);
   if (error) throw InvalidArgument(fmt::format("{}: {}: give another path", path.string(), error.message()));
   return result.has_filename() ? result : result.parent_path();
@@ -353,6 +354,9 @@ void OutputFolder::remove_earlier() {
 void OutputFolder::record(const fs::path& file, std::string_view bytes) {
   const std::string name = file.lexically_relative(path_).string();
   if (!is_plain_name(name) || name == "report.json") return;
+  if (!files_.contains(name) && is_there(file)) {
+    throw IoError(file.string() + ": has come there while the run wrote, and stays: choose another --out");
+  }
   const std::string digest = digest_of(bytes);
   record_->add(name, digest);
   files_[name] = digest;

@@ -8,12 +8,12 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 #include <sstream>
 
 #include "apps/counted.h"
+#include "apps/open_video.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/image_io.h"
 #include "host/vision/file_io.h"
@@ -71,9 +71,8 @@ class Files : public ImageSource {
 class Video : public ImageSource {
  public:
   explicit Video(const std::string& file) : file_(file) {
-    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);  // what is wrong is said once, below
     expect_file(file);
-    if (!video_.open(file)) throw InvalidArgument(file + ": neither an image nor a video that OpenCV can read");
+    if (!open_video(video_, file)) throw InvalidArgument(file + ": neither an image nor a video that OpenCV can read");
   }
   cv::Mat next() override {
     cv::Mat image;

@@ -45,13 +45,15 @@ Json read_run(const fs::path& folder) {
     throw MissingPath(file.string(), "no such file: give the folder that `egosgm run --out` wrote");
   }
   Json run = parse_json(vision::read_file(file, kMaxReportBytes), file);
+  if (run.is_discarded()) throw InvalidArgument(file.string() + ": is no JSON: it was cut or edited; run it again");
   const auto has = [&](const char* key) { return run.is_object() && run.contains(key); };
   for (const char* key : {"input", "version", "device", "calibration", "options", "frames"}) {
     if (!has(key)) throw InvalidArgument(file.string() + ": not the report of a run: it has no \"" + key + "\"");
   }
   if (run["frames"].empty()) {
-    throw InvalidArgument(file.string() + ": lists no frame, as the run was killed, is under way, or was stopped before "
-                                          "its first: let it end, or run it again with --resume");
+    throw InvalidArgument(file.string() +
+                          ": lists no frame, as the run was killed, is under way, or was stopped before "
+                          "its first: let it end, or run it again with --resume");
   }
   return run;
 }

@@ -230,11 +230,15 @@ class Run {
     report_.write(folder_.path() / "report.json", folder_.files(), finished, why_not);
   }
 
-  /// The first error counts; that the report cannot be written either adds nothing.
+  /// The first error counts; that something cannot be written either adds nothing.
   void finish_after(const std::exception& error) {
     try {
       finish(false, error.what());
     } catch (const std::exception&) {
+      try {
+        write_report(false, error.what());
+      } catch (const std::exception&) {
+      }
     }
   }
 

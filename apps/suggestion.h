@@ -5,12 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "egosgm/error.h"
+
 namespace egosgm::app {
 
 /// The known name that `typed` was probably meant to be, or empty where none is close.
 std::string suggestion(const std::string& typed, const std::vector<std::string>& known);
 
-/// The path that is there and that `typed`, which is not, was probably meant to be; else empty.
-std::string path_suggestion(const std::filesystem::path& typed);
+/// A question that names the path that is there and that the missing one was probably meant to be; else empty.
+std::string meant_path(const MissingPath& error);
 
 }  // namespace egosgm::app

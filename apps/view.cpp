@@ -8,12 +8,14 @@
 #include <opencv2/videoio.hpp>
 
 #include "apps/command.h"
+#include "apps/counted.h"
 #include "apps/device_arguments.h"
 #include "apps/doubt.h"
 #include "apps/frame_panels.h"
 #include "apps/interrupt.h"
 #include "apps/last_ones.h"
 #include "apps/motion_source.h"
+#include "apps/open_video.h"
 #include "apps/option_arguments.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
@@ -113,6 +115,7 @@ class VideoFile {
  public:
   VideoFile(std::filesystem::path file, double frames_per_second)
       : file_(std::move(file)), frames_per_second_(frames_per_second) {
+    quiet_opencv();
     std::string folder = (std::filesystem::absolute(file_).parent_path() / ".egosgm-XXXXXX").string();
     if (!::mkdtemp(folder.data())) {
       throw IoError(file_.string() + ": cannot be written: " + std::generic_category().message(errno));
@@ -139,19 +142,34 @@ class VideoFile {
       }
     }
     writer_.write(even);
+    ++written_;
   }
 
   void finish() {
     if (!writer_.isOpened()) return;
     writer_.release();
+    expect_whole();
     vision::move_file(unfinished_, file_);
   }
 
  private:
+  /// OpenCV's writer does not say where the disk is full.
+  void expect_whole() const {
+    int found = 0;
+    if (cv::VideoCapture video; open_video(video, unfinished_.string())) {
+      while (video.grab()) ++found;
+    }
+    if (found == written_) return;
+    throw IoError(
+        fmt::format("{}: cannot be written: of {} only {} could be read back; free some space, or use --pictures",
+                    file_.string(), counted(static_cast<std::size_t>(written_), "frame"), found));
+  }
+
   const std::filesystem::path file_;
   const double frames_per_second_;
   std::filesystem::path unfinished_;
   cv::VideoWriter writer_;
+  int written_ = 0;
 };
 
 int write_files(DrawnSequence& drawn, const ViewArguments& arguments) {
@@ -238,6 +256,8 @@ void require_display() {
 int view(const ViewArguments& arguments) {
   if (!(arguments.frames_per_second > 0 && arguments.frames_per_second <= 1000))
     throw InvalidArgument(fmt::format("--fps {}: choose a number above 0, up to 1000", arguments.frames_per_second));
+  if (arguments.cell_width < 1 || arguments.cell_width > vision::kMaxImageSide)
+    throw InvalidArgument(fmt::format("--cell-width {}: choose 1 to {}", arguments.cell_width, vision::kMaxImageSide));
   const bool window = arguments.video.empty() && arguments.pictures.empty();
   catch_interrupts();
   if (window) require_display();

@@ -128,6 +128,8 @@ void add_multiview_truth(const fs::path& folder, const std::string& scene, Stere
 fs::path find_file(const std::vector<fs::path>& candidates, const std::string& remedy) {
   for (const fs::path& candidate : candidates) {
     if (is_file(candidate)) return candidate;
+    std::error_code none;
+    if (fs::exists(candidate, none)) throw InvalidArgument(candidate.string() + ": is no file; " + remedy);
   }
   throw MissingPath(candidates.front().string(), "no such calibration file; " + remedy);
 }

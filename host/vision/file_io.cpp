@@ -43,6 +43,10 @@ class Descriptor {
 
 [[noreturn]] void fail_reading(const std::filesystem::path& file, int error) {
   const std::string what = "cannot be read: " + reason(error) + "; give an existing, readable file";
+  std::error_code none;
+  if (error == ENOENT && std::filesystem::is_symlink(file, none)) {
+    throw InvalidArgument(file.string() + ": is a link to what is not there; give an existing, readable file");
+  }
   if (error == ENOENT || error == ENOTDIR) throw MissingPath(file.string(), what);
   throw InvalidArgument(file.string() + ": " + what);
 }

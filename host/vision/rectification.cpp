@@ -38,6 +38,11 @@ void check_distortion(const char* name, const cv::Mat& matrix, bool is_fisheye) 
                         " finite numbers (CV_64F)");
 }
 
+void check_lens(const char* name, const cv::Mat& matrix) {
+  if (matrix.at<double>(0, 0) > 0 && matrix.at<double>(1, 1) > 0 && matrix.at<double>(2, 2) == 1) return;
+  throw InvalidArgument(std::string(name) + " is no camera matrix: fx and fy are above 0, its last row is 0 0 1");
+}
+
 void check_shapes(const StereoRig& rig) {
   check_shape("M1", rig.left.matrix, 3, 3);
   check_shape("M2", rig.right.matrix, 3, 3);
@@ -67,6 +72,9 @@ void check_rotation(const char* name, const cv::Mat& R) {
 void check_stance(const cv::Mat& T) {
   const double x = T.at<double>(0), y = T.at<double>(1), z = T.at<double>(2);
   const std::string text = "T = (" + short_text(x) + ", " + short_text(y) + ", " + short_text(z) + ") m: ";
+  if (x == 0 && y == 0 && z == 0) {
+    throw InvalidArgument(text + "the cameras stand in one place; give the calibration of two");
+  }
   if (std::abs(x) < std::abs(y) || std::abs(x) < std::abs(z)) {
     throw InvalidArgument(text + "the cameras do not stand side by side; turn the images by 90 degrees");
   }
@@ -121,12 +129,16 @@ Rectification rectification_of(const StereoRig& rig, cv::Size size, double alpha
   cv::Mat R1, R2, P1, P2, Q;
   if (rig.given[0]) {
     R1 = *rig.given[0], R2 = *rig.given[1], P1 = *rig.given[2], P2 = *rig.given[3];
-  } else if (rig.is_fisheye) {
-    cv::fisheye::stereoRectify(rig.left.matrix, rig.left.distortion, rig.right.matrix, rig.right.distortion, size,
-                               rig.R, rig.T, R1, R2, P1, P2, Q, cv::CALIB_ZERO_DISPARITY, size, alpha);
   } else {
-    cv::stereoRectify(rig.left.matrix, rig.left.distortion, rig.right.matrix, rig.right.distortion, size, rig.R, rig.T,
-                      R1, R2, P1, P2, Q, cv::CALIB_ZERO_DISPARITY, alpha, size);
+    check_lens("M1", rig.left.matrix);
+    check_lens("M2", rig.right.matrix);
+    if (rig.is_fisheye) {
+      cv::fisheye::stereoRectify(rig.left.matrix, rig.left.distortion, rig.right.matrix, rig.right.distortion, size,
+                                 rig.R, rig.T, R1, R2, P1, P2, Q, cv::CALIB_ZERO_DISPARITY, size, alpha);
+    } else {
+      cv::stereoRectify(rig.left.matrix, rig.left.distortion, rig.right.matrix, rig.right.distortion, size, rig.R,
+                        rig.T, R1, R2, P1, P2, Q, cv::CALIB_ZERO_DISPARITY, alpha, size);
+    }
   }
   Rectification result;
   result.calibration = {.fx = P1.at<double>(0, 0),
@@ -149,6 +161,11 @@ Rectification rectification_of(const StereoRig& rig, cv::Size size, double alpha
   result.valid = map(rig.left, R1, P1, result.left_map);
   result.valid_left = largest_rectangle(result.valid);
   result.valid_right = largest_rectangle(map(rig.right, R2, P2, result.right_map));
+  for (const auto& [side, valid] : {std::pair{"left", result.valid_left}, std::pair{"right", result.valid_right}}) {
+    if (!valid.empty()) continue;
+    throw InvalidArgument(std::string("after rectification none of the ") + side +
+                          " image's pixels are left: give the calibration of these cameras");
+  }
   return result;
 }
 

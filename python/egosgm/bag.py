@@ -4,10 +4,11 @@ import argparse
 import collections
 import contextlib
 import dataclasses
+import math
 import os
 import pathlib
 import sys
-from typing import Any, Callable, Deque, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Deque, Dict, Iterator, List, NoReturn, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +54,10 @@ class Gaps:
 
 
 class Pairing:
-    """Left and right by their stamps, each with the nearest one, no further than `bound_ns` away."""
+    """Left and right by their stamps, each with the nearest one, no further than `bound_ns` away. Of a side whose partner is silent
+    the last MOST_WAITING stay."""
+
+    MOST_WAITING = 64
 
     def __init__(self, bound_ns: int) -> None:
         self.bound_ns = bound_ns
@@ -65,6 +69,8 @@ class Pairing:
         if waiting and stamp < waiting[-1][0]:  # a recording that starts over
             yield from self.end()
         waiting.append((stamp, message))
+        if len(waiting) > self.MOST_WAITING:
+            self._drop(side)
         yield from self._pairs(False)
 
     def end(self) -> Iterator[Tuple[Tuple[int, Any], Tuple[int, Any]]]:
@@ -123,11 +129,11 @@ class Bag:
                  pose_topic: str = "", max_skew_ms: float = 0.0, rectify: Optional[bool] = None, pose_axes: str = "body") -> None:
         highlevel = _needs("rosbags.highlevel")
         self.path = pathlib.Path(path)
-        if not self.path.exists():
+        if not (self.path.is_file() or self.path.is_dir()):
             raise _egosgm.InvalidArgument(f"{self.path}: no such file or folder: give a .mcap, a .bag, or a bag's folder")
         if len(info_topics) not in (0, 2):
             raise _egosgm.InvalidArgument(f"info topics: give two, left and right, not {len(info_topics)}")
-        if not max_skew_ms >= 0:
+        if not (max_skew_ms >= 0 and math.isfinite(max_skew_ms)):
             raise _egosgm.InvalidArgument(f"max skew {max_skew_ms} ms: give 0 for equal stamps, or how far they may differ")
         if pose_axes not in ("body", "optical"):
             raise _egosgm.InvalidArgument(f"pose axes \"{pose_axes}\": choose body (x forward, z up) or optical (z forward, y down)")
@@ -149,12 +155,11 @@ class Bag:
         try:
             with self._highlevel.AnyReader([self.path], default_typestore=stores.get_typestore(stores.Stores.LATEST)) as reader:
                 yield reader
-        except _egosgm.InvalidArgument:
+        except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError):
             raise
-        except Exception as error:
-            if type(error).__module__.startswith("rosbags") or isinstance(error, FileNotFoundError):
-                raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {error}") from None
-            raise
+        except Exception as error:  # whatever a decoder of what is broken may raise
+            reason = str(error).strip().partition("\n")[0] or type(error).__name__
+            raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {reason}") from error
 
     def _check_topics(self, reader: Any) -> None:
         types = {connection.topic: connection.msgtype for connection in reader.connections}
@@ -196,6 +201,8 @@ class Bag:
             def frame_of(pair: Any) -> BagFrame:
                 nonlocal number, last, interval
                 (stamp, left), (_, right) = pair
+                if not 0 <= stamp < 2**31 * 10**9:
+                    raise _egosgm.InvalidArgument(f"{self.images[0]}: a stamp of {stamp / 1e9:.0f} s, which is not from 1970 to 2038")
                 steps_back = last is not None and stamp <= last
                 if steps_back:
                     pairing.gaps.steps_back += 1
@@ -235,6 +242,8 @@ class Bag:
             world_from_body = np.eye(4)
             world_from_body[:3, :3] = rotation_of(pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w)
             world_from_body[:3, 3] = pose.position.x, pose.position.y, pose.position.z
+            if not np.isfinite(world_from_body).all():
+                raise _egosgm.InvalidArgument(f"{self._pose_topic}: pose {len(poses)} is not finite")
             poses.append((stamp_ns(message), world_from_body @ BODY_FROM_OPTICAL if self._pose_axes == "body" else world_from_body))
         return sorted(poses, key=lambda item: item[0])
 
@@ -273,18 +282,23 @@ class McapOutput:
         typesys = _needs("rosbags.typesys")
         if not file.parent.is_dir():
             raise _egosgm.InvalidArgument(f"{file}: {file.parent}: no such folder")
-        if file.exists():
-            raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name")
         self._file, self._disparities = file, disparities
+        self._part = file.with_name(file.name + ".part")
+        for there in (self._file, self._part):
+            self._expect_free(there)
         self._store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
         self._types = self._store.types
-        self._part = file.with_name(file.name + ".part")
         self._stream = open(self._part, "xb")
         self._writer = writer.Writer(self._stream)
         self._writer.start(profile="ros2", library="egosgm")
         self._schemas: Dict[str, int] = {}
         self._channels: Dict[str, int] = {}
         self._world_from_camera = np.eye(4)
+
+    @staticmethod
+    def _expect_free(file: pathlib.Path) -> None:
+        if os.path.lexists(file):
+            raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name, or remove it first")
 
     def _write(self, topic: str, kind: str, message: Any, time: int) -> None:
         if kind not in self._schemas:
@@ -346,11 +360,13 @@ class McapOutput:
     def finish(self) -> None:
         self._writer.finish()
         self._stream.close()
+        self._expect_free(self._file)  # others may have been quicker
         os.replace(self._part, self._file)
 
     def give_up(self) -> None:
-        self._stream.close()
         self._part.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # of a full disk
+            self._stream.close()
 
 
 class FolderOutput:
@@ -358,6 +374,8 @@ class FolderOutput:
 
     def __init__(self, folder: pathlib.Path) -> None:
         self._folder = folder
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise _egosgm.InvalidArgument(f"{folder}: is no folder: give a new one, or a name that ends in .mcap")
         if folder.exists() and any(folder.iterdir()):
             raise _egosgm.InvalidArgument(f"{folder}: holds files already: give a new folder")
         (folder / "disparity").mkdir(parents=True, exist_ok=True)
@@ -371,7 +389,10 @@ class FolderOutput:
         pass
 
     def give_up(self) -> None:
-        pass
+        """What was written is whole, and stays."""
+        for folder in (self._folder / "disparity", self._folder):
+            with contextlib.suppress(OSError):  # it is not empty
+                folder.rmdir()
 
 
 def run(bag: Bag, output: Optional[Any] = None, progress: Optional[bool] = None,
@@ -411,8 +432,13 @@ def _value(text: str) -> Any:
     return {"true": True, "false": False}.get(text, text)
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise _egosgm.InvalidArgument(f"{message}: see `egosgm run --bag --help`")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="egosgm run --bag", description=__doc__, allow_abbrev=False)
+    parser = _Parser(prog="egosgm run --bag", description=__doc__, allow_abbrev=False)
     add = parser.add_argument
     add("--bag", required=True, metavar="FILE.mcap|FILE.bag|FOLDER", help="ROS 2 (MCAP, SQLite) or ROS 1")
     add("--left-topic", required=True, metavar="TOPIC", help="raw or compressed images")
@@ -449,25 +475,35 @@ def _main(given: argparse.Namespace) -> int:
         name, equals, value = text.partition("=")
         if not equals:
             raise _egosgm.InvalidArgument(f"--set {text}: give NAME=VALUE")
+        if name in ("device", "preset"):
+            raise _egosgm.InvalidArgument(f"--set {text}: give --{name} {value}")
+        if name in ("bag", "output", "progress", "on_frame", "calibration", "width", "height"):  # what Python's run and Pipeline call theirs
+            raise _egosgm.InvalidArgument(f"--set {text}: no option is named {name}")
         options[name.replace(".", "__")] = _value(value)
+    if given.out == "":
+        raise _egosgm.InvalidArgument("--out \"\": give a name, or leave it out")
     bag = Bag(given.bag, given.left_topic, given.right_topic, given.info_topics, given.pose_topic, given.max_skew_ms,
               {"auto": None, "on": True, "off": False}[given.rectify], given.pose_axes)
     output = None
     if given.out:
         out = pathlib.Path(given.out)
+        if bag.path.is_dir() and bag.path.resolve() in (out.resolve(), *out.resolve().parents):
+            raise _egosgm.InvalidArgument(f"--out {out}: lies in the bag {bag.path}, which is read: give another name")
         if out.suffix == ".mcap":
             disparities = options.get("disparities", _egosgm.pipeline_options(given.preset)["disparities"])
-            output = McapOutput(out, int(disparities))
+            if not isinstance(disparities, int):
+                raise _egosgm.InvalidArgument(f"--set disparities={disparities}: give a whole number")
+            output = McapOutput(out, disparities)
         else:
             output = FolderOutput(out)
     try:
         told = run(bag, output, progress=False if given.quiet else None, device=given.device, preset=given.preset, **options)
+        if output:
+            output.finish()
     except BaseException:
         if output:
             output.give_up()
         raise
-    if output:
-        output.finish()
     print(f"{bag.path.name}: {told['frames']} frames, {bag.cameras.size[0]}x{bag.cameras.size[1]}{', rectified here' if told['rectified'] else ''}, "
           f"on {told['device']}; {told['motions']} motions; density {told['density']:.1%} in the mean" + (f": {given.out}" if given.out else ""))
     if told["gaps"].text():

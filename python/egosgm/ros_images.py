@@ -21,12 +21,12 @@ def grey_of(message: Any) -> NDArray[Any]:
     if hasattr(message, "format"):
         return _decompressed(bytes(message.data), message.format)
     height, width, step, encoding = message.height, message.width, message.step, message.encoding
-    data = np.frombuffer(message.data, np.uint8)
+    data = np.frombuffer(message.data, np.uint8) if len(message.data) > 0 else np.empty(0, np.uint8)
     pixel_bytes = _GREY8.get(encoding, (0,))[0] or _COLOURS.get(encoding, (0,))[0] or (2 if encoding in _GREY16 else 0)
     if not pixel_bytes:
         known = ", ".join((*_GREY8, *_COLOURS, *_GREY16))
         raise _egosgm.InvalidArgument(f"images of encoding \"{encoding}\" are not read: convert them to one of {known}")
-    if step < width * pixel_bytes or data.size < height * step:
+    if width == 0 or height == 0 or step < width * pixel_bytes or data.size < height * step:
         raise _egosgm.InvalidArgument(f"an image of {width}x{height} px of {encoding} with rows of {step} bytes has {data.size} bytes")
     rows = data[:height * step].reshape(height, step)
     if encoding in _GREY16:

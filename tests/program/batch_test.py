@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm compile and egosgm batch from outside: devices, shards, failures, kills. Environment as for program_case.py, and
 EGOSGM_FAULT_LAYER: the OpenCL layer that fails."""
+import fcntl
 import json
 import math
 import os
@@ -224,6 +225,41 @@ class Batch(BatchTest):
             self.assert_works(*self.batch(out, "--devices", "0"))
             self.assert_same(out)
 
+    def flocked(self, path, how):
+        """Whether another process lets it be locked now; it stays so until the descriptor is closed."""
+        descriptor = os.open(path, os.O_RDONLY)
+        self.addCleanup(os.close, descriptor)
+        try:
+            fcntl.flock(descriptor, how | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            return False
+
+    def test_one_batch_at_a_time_has_the_folder(self):
+        out = self.new_folder()
+        shutil.copytree(self.expected, out, dirs_exist_ok=True)
+        self.assertTrue(self.flocked(out, fcntl.LOCK_SH))  # as another shard
+        self.assert_refused(self.batch(out), f"--out {out}", "another egosgm is writing there")
+        self.assert_works(*self.batch(out, "--shard", "0/2"))
+        self.assertTrue(self.flocked(out, fcntl.LOCK_UN))
+
+        out = self.new_folder()
+        with subprocess.Popen([PROGRAM, *map(str, self.batch(out, "--devices", "0"))], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+            while not (out / "street-0/done.json").exists():
+                self.assertIsNone(process.poll())
+                time.sleep(0.002)
+            process.send_signal(signal.SIGSTOP)
+            self.assertFalse((out / "more/street-3/done.json").exists())
+            self.assertFalse(self.flocked(out, fcntl.LOCK_SH))
+            (out / "more/street-3").mkdir(parents=True, exist_ok=True)
+            (out / "more/street-3/files.part").touch()
+            self.assertTrue(self.flocked(out / "more/street-3/files.part", fcntl.LOCK_EX))  # as the same shard once more
+            process.send_signal(signal.SIGCONT)
+            errors = process.stderr.read()
+        self.assertEqual(process.returncode, 2, errors)
+        self.assertIn(f"{out}/more/street-3: another egosgm is writing there", errors)
+        self.assertEqual(list(out.rglob("failed.json")), [])
+
     def test_a_device_that_fails_hands_its_sequence_to_another(self):
         out = self.new_folder()
         devices = self.two_devices()
@@ -288,7 +324,9 @@ class Batch(BatchTest):
         self.assert_refused(self.batch(out), "--shards N", env=alone)
         broken = self.new_folder() / "list.txt"
         for text, named in (("", ["names no sequence"]), ("a//b x\n", ["line 1", "a//b"]), ("a/../b x\n", ["line 1", "a/../b"]), ("/a x\n", ["line 1"]), ("a x\n\na y\n", ["line 3", "twice"]),
-                            ("a --odometri x\n", ["line 1", "--odometri"]), (".a x\n", [".a"])):
+                            ("a --odometri x\n", ["line 1", "--odometri"]), (".a x\n", [".a"]), (f"a {self.folder}/s0\nb\n", ["line 2: no input"]),
+                            (f"a {self.folder}/s0 --frames 9\n", ["line 1", "000009.png"]), (f"# a\nb {self.folder}/s9\n", ["line 2", "did you mean"]),
+                            (f"a {self.folder}/s0 --poses {self.folder}/s0/pose.txt\n", ["line 1", "did you mean"])):
             broken.write_text(text)
             self.assert_refused(["batch", broken, "--out", out], "list.txt", *named)
         self.assert_refused(["batch", self.folder / "nowhere", "--out", out], "nowhere")

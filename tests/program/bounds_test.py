@@ -38,6 +38,9 @@ class Bounds(ProgramTest):
         side = 16384
         file.write_bytes(png(side, side, 1, [bytes(side // 8)] * side, palette=bytes(6)))
         self.assert_bounded(file, "eval", "--estimate", file, "--truth", file, says="too short")
+        plain = file.parent / "plain.png"  # as most are: another reader's
+        plain.write_bytes(png(side, side, 8, [bytes(side)] * 64))
+        self.assert_bounded(plain, "eval", "--estimate", plain, "--truth", plain, says="too short")
         calib = self.street / "calib.txt"
         self.assert_bounded(file, "run", "--left", file, "--right", file, "--calib", calib, "--out", self.folder / "never", says="bomb.png")
 

@@ -85,6 +85,11 @@ class EvalPoses(ProgramTest):
         result = json.loads(self.assert_works("eval-poses", *arguments, "--json"))
         return result["frames"], result["end_drift_m"]
 
+    def test_a_camera_that_stands_has_no_drift_in_percent(self):
+        poses = self.new_folder() / "poses.txt"
+        poses.write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
+        self.assertIn("0.000 m = - %", self.assert_works("eval-poses", poses, poses))
+
     def test_a_part_of_the_sequence_against_the_whole_truth(self):
         truth, out = self.street / "poses.txt", self.new_folder() / "out"
         self.assert_works("run", self.street, "--frames", "1:3", "--poses", truth, "--disparities", 48, "--out", out, "--quiet")

@@ -90,6 +90,19 @@ class InputFiles(FilesTest):
         self.assert_refused_and_untouched(street, ["odometry", street, "--out", street / "poses.txt"], "poses.txt", "is there already")
         self.assert_refused_and_untouched(street, ["odometry", street, "--out", street / "image_0/000000.png"], "is there already")
 
+    def test_what_comes_through_a_pipe_is_read(self):
+        user = self.user_folder()
+        (user / "list").write_text(f"a {self.street} --frames 0:1\n")
+        run = ["run", *self.pair(user), "--out"]
+        for arguments, name in (([*run, user.parent / "a", "--poses"], "poses.txt"), ([*run, user.parent / "b", "--config"], "config.toml"),
+                                (["batch", "--out", user.parent / "c", *METHOD], "list")):
+            reading, writing = os.pipe()
+            os.write(writing, (user / name).read_bytes())
+            os.close(writing)
+            self.assert_works(*arguments, f"/dev/fd/{reading}", pass_fds=[reading])
+            os.close(reading)
+        self.assertEqual(self.report(user.parent / "a")["motion"].split("/")[0], "poses of ")
+
     def test_links_that_images_are_count_as_what_they_lead_to(self):
         user, linked = self.user_folder(), self.new_folder()
         for side in ("left", "right"):

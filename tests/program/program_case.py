@@ -5,6 +5,7 @@ EGOSGM_PROGRAM names the program, EGOSGM_FORKING_PROGRAM the one that is loaded 
 starts EGOSGM_PROGRAM), EGOSGM_EXAMPLES the folder of the examples; EGOSGM_DATA the folder of real data (tests that need it are skipped without).
 """
 import atexit
+import fcntl
 import json
 import os
 import pathlib
@@ -21,6 +22,7 @@ EXAMPLES = pathlib.Path(os.environ.get("EGOSGM_EXAMPLES", ""))
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = os.environ.get("EGOSGM_DATA", "")
 WIDTH, HEIGHT, FRAMES = 320, 96, 4
+F_SETPIPE_SZ = 1031  # fcntl has it since Python 3.10
 
 
 class LoadedProgram:
@@ -93,6 +95,17 @@ class ProgramTest(unittest.TestCase):
         copy = self.new_folder() / "street"
         shutil.copytree(self.street, copy)
         return copy
+
+    def started(self, *words, lines=1):
+        """A command that has printed so many lines and waits to be read before it goes on, however busy the machine is."""
+        reading, writing = os.pipe2(os.O_CLOEXEC | os.O_DIRECT)
+        fcntl.fcntl(writing, F_SETPIPE_SZ, 4096)  # room for one line: with O_DIRECT, each takes a page
+        process = subprocess.Popen([PROGRAM, *map(str, words)], stdout=writing, stderr=subprocess.PIPE, text=True)
+        os.close(writing)
+        process.stdout = os.fdopen(reading)
+        for _ in range(lines):
+            process.stdout.readline()
+        return process
 
     def assert_works(self, *arguments, **options):
         done = egosgm(*arguments, **options)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm rectify: raw images of a known rig. Environment as for program_case.py."""
 import csv
+import math
+import re
 import shutil
 import unittest
 
@@ -235,6 +237,9 @@ class Rectify(RectifyTest):
         refused(good.replace("data: [ ", "data: [ .Nan, ", 1), file)
         refused(self.opencv_yaml(unit_m=-1, given=False), "exchange left and right")
         refused(self.opencv_yaml(unit_m=1e-3, given=False), "--unit mm")
+        refused(self.opencv_yaml(unit_m=math.inf, given=False), "stand in one place")
+        for focal, named in {"0": "M1 is no camera matrix", "-300": "M1 is no camera matrix", "1e300": "none of the left image's pixels"}.items():
+            refused(re.sub(r"(M1:.*?data: \[ ?)[^,]*", rf"\g<1>{focal}", good, flags=re.DOTALL), named)
         refused(good + "image_width: 640\nimage_height: 480\n", "640x480 were calibrated")
         refused(good, "both must hold", arguments=[*self.PAIRS[:2], "--right", self.raw_folder / "cam1/9.png"])
         refused(good, "no right image has the name", "--pair-by order", arguments=[*self.PAIRS[:2], "--right", self.raw_folder / "cam1/9*.png"][:2] +
@@ -249,6 +254,9 @@ class Rectify(RectifyTest):
             broken = self.raw_folder / name
             broken.write_bytes(cut.read_bytes()[:-2000] if cut else b"\xff\xd8\xff\xe0" + bytes(200))
             refused(good, name, "not a readable image", arguments=["--side-by-side", broken])
+        for name in ("empty.mp4", "empty.avi"):
+            (self.raw_folder / name).write_bytes(b"")
+            refused(good, name, "neither an image nor a video", arguments=["--side-by-side", self.raw_folder / name])
         (self.raw_folder / "bad.txt").write_text("cam0/9.png\n")
         refused(good, "bad.txt:1", arguments=["--list", self.raw_folder / "bad.txt"])
         self.assertFalse(out.exists())

@@ -190,6 +190,9 @@ class Report(ReportTest):
         for text in ("[]", "{", json.dumps({**report, "frames": []}), json.dumps({**report, "frames": [7]}), json.dumps({**report, "options": 3})):
             (copy / "report.json").write_text(text)
             self.assert_refused(["report", copy], copy / "report.json")
+        for text in ("", "{", json.dumps(report)[:-9], json.dumps(report).replace('"density": 0', '"density": 1e400')):
+            (copy / "report.json").write_text(text)
+            self.assert_refused(["report", copy], copy / "report.json", "is no JSON")
         (copy / "report.json").write_text(json.dumps(report))
         (copy / "disparity/000003.png").unlink()
         self.assert_refused(["report", copy], "disparity/000003.png")

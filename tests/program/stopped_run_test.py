@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs that end early: full disks, interrupts, kills; and runs that go on or are replaced."""
-import fcntl
 import json
 import os
 import resource
@@ -10,8 +9,6 @@ import subprocess
 import unittest
 
 from program_case import FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png
-
-F_SETPIPE_SZ = 1031  # fcntl has it since Python 3.10
 
 
 class LongRuns(ProgramTest):
@@ -33,16 +30,8 @@ class LongRuns(ProgramTest):
         return self.street_of(self.LONG)
 
     def start(self, street, out, *arguments, lines=1):
-        """A run that has reported `lines` frames and waits to be read before it goes on, however busy the machine is."""
-        reading, writing = os.pipe2(os.O_CLOEXEC | os.O_DIRECT)
-        fcntl.fcntl(writing, F_SETPIPE_SZ, 4096)  # room for one line: with O_DIRECT, each takes a page
-        process = subprocess.Popen([PROGRAM, "run", "--odometry", street, "--out", out, *arguments], stdout=writing,
-                                   stderr=subprocess.PIPE, text=True)
-        os.close(writing)
-        process.stdout = os.fdopen(reading)
-        for _ in range(lines):
-            process.stdout.readline()
-        return process
+        """A run that has reported `lines` frames."""
+        return self.started("run", "--odometry", street, "--out", out, *arguments, lines=lines)
 
 
 class Disk(LongRuns):
@@ -98,6 +87,22 @@ class Disk(LongRuns):
         report = self.report(out)
         self.assertFalse(report["finished"])
         self.assertEqual(self.assert_whole(out, at_least=frames), len(report["frames"]))
+
+    def test_what_others_put_there_while_it_runs_stays(self):
+        street = self.long_street()
+        for name in ("poses.txt", f"disparity/{self.LONG - 1:06d}.png"):
+            out = self.new_folder()
+            process = self.start(street, out)
+            (out / name).write_text("mine")
+            _, errors = process.communicate(timeout=600)
+            self.assertEqual(process.returncode, 1, errors)
+            self.assertIn(f"{name}: has come there while the run wrote, and stays", errors)
+            self.assertEqual((out / name).read_text(), "mine")
+            report = self.report(out)
+            self.assertIn(name, report["stopped_by"])
+            self.assertNotIn(name, [file for file, _ in report["files"]])
+            self.assert_refused(["run", "--odometry", street, "--out", out, "--overwrite"], name)
+            self.assertEqual((out / name).read_text(), "mine")
 
     def test_a_file_that_vanishes(self):
         last = f"image_1/{self.LONG - 1:06d}.png"

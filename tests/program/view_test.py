@@ -2,6 +2,7 @@
 """egosgm view: pictures, videos, the window."""
 import os
 import pathlib
+import resource
 import shutil
 import signal
 import struct
@@ -34,6 +35,16 @@ class View(ProgramTest):
         content = (out / "street.avi").read_bytes()
         self.assertEqual((content[:4], content[8:12]), (b"RIFF", b"AVI "))
         self.assertEqual(content.count(b"00dc") // 2, FRAMES)  # each frame stands in the stream and in the index
+
+    def test_a_full_disk_under_a_video_is_an_error(self):
+        folder = self.new_folder()
+        for name in ("street.avi", "street.mp4"):
+            process = self.started("view", self.street, "--video", folder / name)
+            resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (4096, 4096))
+            _, errors = process.communicate(timeout=600)
+            self.assertEqual(process.returncode, 1, errors)
+            self.assertRegex(errors, rf"^egosgm: error: .*/{name}: cannot be written: of 4 frames only \d could be read back.*\n$")
+        self.assertEqual(list(folder.iterdir()), [])
 
     def street_with_a_gap(self):
         street = self.broken_street()
@@ -69,7 +80,8 @@ class View(ProgramTest):
             self.assert_refused(view, f":77777 ({name})", "--video", "--pictures", env={**headless, name: ":77777"})
         self.assert_refused([*view, "--video", self.folder / "street.mkv"], ".mp4 or .avi")
         self.assert_refused([*view, "--pictures", self.folder / "p", "--fps", 0], "--fps 0")
-        self.assert_refused([*view, "--pictures", self.folder / "p", "--cell-width", 0], "1..32768")
+        for width in (0, 16385):
+            self.assert_refused([*view, "--pictures", self.folder / "p", "--cell-width", width], f"--cell-width {width}", "1 to 16384")
         file = self.new_folder() / "file"
         file.touch()
         self.assert_refused([*view, "--pictures", file / "p"], file, code=1)

@@ -75,6 +75,18 @@ class WrongArguments(ProgramTest):
             self.assert_refused(["run", "--odometry", self.street, "--out", self.folder / "never", option, ""], option, "is empty")
         self.assert_refused(["run", "--odometry", self.street, "--out", ""], "--out", "is empty", cwd=self.new_folder())
 
+    def test_an_option_is_no_value(self):
+        out = self.new_folder()
+        self.assert_refused(["run", self.street, "--out", "--quiet"], "--out: its value is missing", "--quiet is an option", cwd=out)
+        self.assert_refused(["run", self.street, "--poses", "--out", "never"], "never", cwd=out)
+        self.assert_refused(["synth", "--out", "-h"], "--out: its value is missing", cwd=out)
+        self.assertEqual(list(out.iterdir()), [])
+
+    def test_values_of_another_kind(self):
+        self.assert_refused(self.run_with("--quiet=maybe"), "maybe is no value for it")
+        for seed in (-1, 10**20):
+            self.assert_refused(["synth", "--out", self.folder / "never", "--seed", seed], f"{seed} is no value for it")
+
     def test_no_is_off_and_blanks_in_a_list_are_none(self):
         out = self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0:1", "--temporal", "no", "--write", "color, overview ",
@@ -211,6 +223,16 @@ class BrokenInput(ProgramTest):
         (street / "image_1/000002.png").unlink()
         self.assert_sequence_refused(street, "000002.png", "--frames", options=["--frames", 2])
         self.assert_sequence_refused(street, "000004.png", "--frames", options=["--frames", "1:4"])
+
+    def test_what_is_there_but_no_file(self):
+        street = self.broken_street()
+        (street / "image_0/000001.png").unlink()
+        (street / "image_0/000001.png").symlink_to("nowhere.png")
+        self.assert_sequence_refused(street, "image_0/000001.png: is a link to what is not there; give an existing, readable file")
+        self.assertNotIn("did you mean", egosgm("run", street, "--out", street.parent / "out").stderr)
+        (street / "calib.txt").unlink()
+        (street / "calib.txt").mkdir()
+        self.assert_sequence_refused(street, "calib.txt: is no file")
 
     def test_missing_right_image(self):
         street = self.broken_street()

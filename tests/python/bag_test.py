@@ -323,3 +323,146 @@ def test_wrong_files_and_options_leave_nothing(tmp_path, street, frames):
         assert told.returncode == 2 and told.stderr.startswith("egosgm: error: ") and told.stderr.count("\n") == 1, told.stderr
         assert named in told.stderr
         assert sorted(os.listdir(tmp_path)) == ["broken.mcap", "drive"]
+
+
+def refused(capsys, arguments, *named, code=2):
+    """One line on the standard error."""
+    assert bags.main([str(argument) for argument in arguments]) == code
+    told = capsys.readouterr()
+    assert told.err.startswith("egosgm: error: ") and told.err.count("\n") == 1, told.err
+    for text in named:
+        assert str(text) in told.err
+
+
+def changed(**fields):
+    return lambda message: [setattr(message, name, value) for name, value in fields.items()]
+
+
+def of_pose(**fields):
+    return lambda message: [setattr(message.pose.orientation if name in "xyzw" else message.pose.position, name.removeprefix("at_"), value)
+                            for name, value in fields.items()]
+
+
+@pytest.mark.parametrize("topic, change, named", [
+    ("/left/image_rect", changed(step=WIDTH - 1), "rows of"), ("/right/image_rect", changed(data=np.zeros(10, np.uint8)), "has 10 bytes"),
+    ("/right/image_rect", changed(data=np.zeros(0, np.uint8)), "has 0 bytes"), ("/left/image_rect", changed(height=2**32 - 1), "4294967295"),
+    ("/left/image_rect", changed(width=2**32 - 1, step=2**32 - 1), "4294967295"), ("/left/image_rect", changed(width=0), "an image of 0x96 px"),
+    ("/left/image_rect", changed(height=0), "x0 px"), ("/left/image_rect", changed(height=HEIGHT - 1), "320x95 px, while the camera info is of 320x96"),
+    ("/left/image_rect", changed(encoding="bayer_rggb8"), "bayer_rggb8"), ("/left/image_rect", changed(encoding="mono16", width=WIDTH // 2), "160x96"),
+    ("/left/camera_info", changed(p=np.zeros(12)), "not calibrated"), ("/right/camera_info", changed(p=np.full(12, np.nan)), "not calibrated"),
+    ("/left/camera_info", changed(width=0, height=0), "is of 0x0"), ("/left/camera_info", changed(d=np.full(5, np.nan)), "D1"),
+    ("/odom", of_pose(x=0.0, y=0.0, z=0.0, w=0.0), "no rotation"), ("/odom", of_pose(at_x=np.nan), "pose 0 is not finite"), ("/odom", of_pose(w=np.inf), "pose 0 is not finite")])
+def test_a_message_that_is_wrong_is_one_line(topic, change, named, tmp_path, street, frames, capsys):
+    recording = Recording("mcap")
+    types = recording.types
+    for side, name in enumerate(("left", "right")):
+        recording.info(f"/{name}/camera_info", street.calibration, side)
+        recording.image(f"/{name}/image_rect", START, (frames[0].left, frames[0].right)[side])
+    recording.add("/odom", "geometry_msgs/msg/PoseStamped", START, pose=types["geometry_msgs/msg/Pose"](
+        position=types["geometry_msgs/msg/Point"](x=0.0, y=0.0, z=0.0), orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)))
+    message, = (item[3] for item in recording.messages if item[1] == topic)
+    change(message)
+    bag = recording.write(tmp_path / "drive")
+    for out in (tmp_path / "out.mcap", tmp_path / "out"):
+        refused(capsys, ["--bag", bag, *TOPICS, "--pose-topic", "/odom", "--rectify", "on" if named == "D1" else "auto", "--out", out, *SET], named)
+    assert os.listdir(tmp_path) == ["drive"]
+
+
+def test_stamps_before_1970(tmp_path, street, frames, capsys):
+    recording = Recording("mcap")
+    for side, name in enumerate(("left", "right")):
+        recording.info(f"/{name}/camera_info", street.calibration, side)
+        recording.image(f"/{name}/image_rect", -5 * 10**9, (frames[0].left, frames[0].right)[side])
+    refused(capsys, ["--bag", recording.write(tmp_path / "drive"), *TOPICS, "--out", tmp_path / "out.mcap", *SET], "a stamp of -5 s")
+    assert os.listdir(tmp_path) == ["drive"]
+
+
+def test_files_that_are_no_bags(tmp_path, street, frames, capsys):
+    whole = record("mcap", tmp_path / "drive", street, frames[:1]).read_bytes()
+    sqlite, ros1 = record("sqlite", tmp_path / "sqlite", street, frames[:1]), record("ros1", tmp_path / "drive.bag", street, frames[:1])
+    database = next(sqlite.glob("*.db3"))
+    pages, old = database.read_bytes(), ros1.read_bytes()
+    for name, data in (("empty.mcap", b""), ("empty.bag", b""), ("noise.mcap", bytes(range(256)) * 9), ("cut.mcap", whole[:len(whole) // 2]),
+                       ("cut.bag", old[:len(old) // 2]), ("torn.bag", old[:5000] + b"\xff" * 3000 + old[8000:])):
+        (tmp_path / name).write_bytes(data)
+        refused(capsys, ["--bag", tmp_path / name, *TOPICS, *SET], name)
+    for data in (pages[:len(pages) // 2], b"", pages[:4096] + b"\xff" * (len(pages) - 4096)):
+        database.write_bytes(data)
+        refused(capsys, ["--bag", sqlite, *TOPICS, *SET], "sqlite")
+    (sqlite / "metadata.yaml").write_text("rosbag2_bagfile_information: [")
+    refused(capsys, ["--bag", sqlite, *TOPICS, *SET], "sqlite")
+    os.mkfifo(tmp_path / "pipe.mcap")
+    for name in (tmp_path / "pipe.mcap", "/dev/zero", tmp_path / "none", ""):
+        refused(capsys, ["--bag", name, *TOPICS, *SET], name)
+
+
+def test_what_is_the_users_stays(tmp_path, street, frames, capsys):
+    """Whatever --out names that is there, and the bag itself."""
+    bag = record("mcap", tmp_path / "drive", street, frames[:1])
+    (tmp_path / "mine.mcap").write_text("mine")
+    (tmp_path / "half.mcap.part").write_text("mine")
+    (tmp_path / "link.mcap").symlink_to("nowhere.mcap")
+    (tmp_path / "folder.mcap").mkdir()
+    (tmp_path / "file.txt").write_text("mine")
+    (tmp_path / "link").symlink_to(tmp_path / "drive")
+
+    def state():
+        return {path: path.read_bytes() if path.is_file() else os.path.islink(path) for path in tmp_path.rglob("*")}
+
+    before = state()
+    for name in ("mine.mcap", "half.mcap", "link.mcap", "folder.mcap", "file.txt", "drive", "link", "drive/metadata.yaml", bag):
+        refused(capsys, ["--bag", bag, *TOPICS, *SET, "--out", tmp_path / name])
+    for name in ("drive", "drive/out", "drive/out.mcap", "link/out", "drive/../drive/out.mcap"):
+        refused(capsys, ["--bag", tmp_path / "drive", *TOPICS, *SET, "--out", tmp_path / name], "in the bag")
+    refused(capsys, ["--bag", bag, *TOPICS, *SET, "--out", ""], "--out")
+    assert state() == before
+
+
+def test_a_file_that_comes_while_it_is_written_stays(tmp_path, street, frames):
+    out = tmp_path / "out.mcap"
+    with pytest.raises(egosgm.InvalidArgument, match="is there already"):
+        bag = bags.Bag(record("mcap", tmp_path / "drive", street, frames[:1]), "/left/image_rect", "/right/image_rect")
+        output = bags.McapOutput(out, 48)
+        bags.run(bag, output, False, lambda frame, maps: out.write_text("mine"), **OPTIONS)
+        output.finish()
+    output.give_up()
+    assert out.read_text() == "mine" and sorted(os.listdir(tmp_path)) == ["drive", "out.mcap"]
+
+
+def test_a_full_disk_is_one_line(tmp_path, street, frames):
+    """From the fourth frame on: by then the driver has written its kernel cache."""
+    bag = record("mcap", tmp_path / "drive", street, [frames[i % FRAMES] for i in range(8)])
+    limited = """import resource, sys
+from egosgm import bag
+plain = bag.Bag.frames
+def limited(self):
+    for frame in plain(self):
+        if frame.number == 3:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+        yield frame
+bag.Bag.frames = limited
+sys.exit(bag.main(sys.argv[1:]))"""
+    for out, left in (("out.mcap", ["drive"]), ("out", ["drive", "out"])):
+        told = subprocess.run([sys.executable, "-B", "-c", limited, "--bag", bag, *TOPICS, *SET, "--out", tmp_path / out], capture_output=True, text=True, timeout=300)
+        assert told.returncode == 1 and told.stderr.startswith("egosgm: error: ") and told.stderr.count("\n") == 1, told.stderr
+        assert sorted(os.listdir(tmp_path)) == left
+    assert sorted(os.listdir(tmp_path / "out/disparity")) == ["000000.png", "000001.png", "000002.png"]
+
+
+@pytest.mark.parametrize("arguments, named", [
+    (["--set", "device=0"], "give --device 0"), (["--set", "preset=paper"], "give --preset paper"), (["--set", "bag=1"], "no option is named bag"),
+    (["--set", "width=1"], "no option is named width"), (["--set", "disparities=many"], "disparities"), (["--set", "disparities=1.5"], "disparities"),
+    (["--max-skew-ms", "inf"], "max skew inf"), (["--max-skew-ms", "x"], "--max-skew-ms"), (["--skew", "1"], "--skew"), (["--preset", "papr"], "papr"),
+    (["--left-topic"], "--left-topic"), (["--rectify", "maybe"], "maybe"), (["--device", "abacus"], "abacus"), (["--set", "constants.none=1"], "none")])
+def test_wrong_arguments_of_the_program_are_one_line(arguments, named, tmp_path, street, frames, capsys):
+    bag = record("mcap", tmp_path / "drive", street, frames[:1])
+    refused(capsys, ["--bag", bag, *TOPICS, "--out", tmp_path / "out.mcap", *SET, *arguments], named)
+    assert os.listdir(tmp_path) == ["drive"]
+
+
+def test_a_silent_camera_costs_no_memory():
+    pairing = bags.Pairing(5)
+    for stamp in range(1000):
+        assert list(pairing.add(0, 10 * stamp, None)) == []
+    assert pairing.gaps.unpaired_left == 1000 - bags.Pairing.MOST_WAITING
+    assert [(left[0], right[0]) for left, right in pairing.add(1, 9990, None)] == [(9990, 9990)]

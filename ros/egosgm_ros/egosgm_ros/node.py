@@ -112,7 +112,7 @@ class EgosgmNode(LifecycleNode):
 
     def _on_info(self, side: str, info: CameraInfo) -> None:
         before = self._infos.get(side)
-        if before is not None and (before.p != info.p).any():
+        if before is not None and ((before.p != info.p).any() or (before.width, before.height) != (info.width, info.height)):
             self._cameras = None  # another calibration: all that was made for the old one is dropped with the next frame
         self._infos[side] = info
 
@@ -137,7 +137,7 @@ class EgosgmNode(LifecycleNode):
             try:
                 self._process(left, right)
                 self._problem = ""
-            except (ValueError, RuntimeError) as error:
+            except Exception as error:  # whatever a message held: the next one may be whole
                 if str(error) != self._problem:
                     self.get_logger().error(str(error))
                 self._problem = str(error)
@@ -147,10 +147,14 @@ class EgosgmNode(LifecycleNode):
             raise ValueError(f"no camera info yet on {' and '.join(f'{side}/camera_info' for side in SIDES if side not in self._infos)}")
         if self._cameras is None:
             self._cameras = Cameras(self._infos["left"], self._infos["right"], False)
-            self._pipeline = egosgm.Pipeline(self._cameras.calibration, left.width, left.height, device=self._value("device"), **self._options())
+            self._pipeline = egosgm.Pipeline(self._cameras.calibration, *self._cameras.size, device=self._value("device"), **self._options())
             self._odometry = egosgm.StereoOdometry(self._cameras.calibration)
             self._last_stamp = None
         images = grey_of(left), grey_of(right)
+        for side, image in zip(SIDES, images):
+            if image.shape != (self._cameras.size[1], self._cameras.size[0]):
+                raise ValueError(f"{side}/image_rect: an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
+                                 f"{self._cameras.size[0]}x{self._cameras.size[1]}")
         stamp = stamp_ns(left)
         if self._last_stamp is not None and stamp <= self._last_stamp:  # a bag that starts over
             self._pipeline.reset()
