@@ -14,6 +14,6 @@ lines = ["# Generated from the library's own list of options. Do not edit.", "fr
 for name, options in (("PipelineOptions", module.pipeline_options()), ("StereoOdometryOptions", module.odometry_options()),
                       ("SyntheticOptions", module.synthetic_options())):
     lines.append(f"class {name}(TypedDict, total=False):")
-    lines += [f"    {key}: {type(value).__name__}  # {value}" for key, value in options.items()]
+    lines += [f"    {key}: {type(value).__name__}  # {value}" for key, value in options.items() if key != "preset"]  # an argument of its own
     lines.append("")
 (folder / "_options.pyi").write_text("\n".join(lines))

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ROS node as a robot has it: a publisher, the node and a subscriber are three processes. Needs rclpy (scripts/install-dependencies --ros).
-EGOSGM_ROS_FRAMES [100] frames of 640x480 at EGOSGM_ROS_RATE [5] Hz."""
+EGOSGM_ROS_FRAMES [100] frames of 640x480 at EGOSGM_ROS_RATE [5] Hz. What concerns tf needs tf2_ros, what concerns the launch file launch_ros."""
 import array
+import importlib.util
 import json
 import os
 import pathlib
@@ -14,26 +15,37 @@ import numpy as np
 
 WIDTH, HEIGHT, RENDERED = 640, 480, 6
 FRAMES, RATE = int(os.environ.get("EGOSGM_ROS_FRAMES", "100")), float(os.environ.get("EGOSGM_ROS_RATE", "5"))
-NODE = pathlib.Path(__file__).resolve().parents[2] / "ros/egosgm_ros/egosgm_ros/node.py"
+PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "ros/egosgm_ros"
+HAS_TF = importlib.util.find_spec("tf2_ros") is not None
+TOPICS = ("disparity", "depth", "variance", "reason", "points2", "odom")
 STREET = dict(frames=RENDERED, width=WIDTH, height=HEIGHT, seed=1, speed_m=0.1, turn_deg=0, supersampling=1)
 
 
-def publish(frames, rate, right_width):
-    """Forwards and backwards through the street."""
+def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False):
+    """Forwards and backwards through the street, once the node has its listeners. tf: where the camera truly is, in the frame odom."""
     import egosgm
     import rclpy
-    from rclpy.qos import QoSProfile
+    from diagnostic_msgs.msg import DiagnosticArray
+    from rclpy.qos import QoSProfile, qos_profile_sensor_data
     from sensor_msgs.msg import CameraInfo, Image
     street = egosgm.SyntheticSequence(**STREET)
     rendered = [street.render(i) for i in range(RENDERED)]
     c = street.calibration
     rclpy.init()
     node = rclpy.create_node("publisher")
-    qos = QoSProfile(depth=100)
+    qos = QoSProfile(depth=100) if reliable else qos_profile_sensor_data
     images = [node.create_publisher(Image, f"{side}/image_rect", qos) for side in ("left", "right")]
     infos = [node.create_publisher(CameraInfo, f"{side}/camera_info", qos) for side in ("left", "right")]
-    while any(publisher.get_subscription_count() == 0 for publisher in images + infos):
-        time.sleep(0.1)
+    if tf:
+        from egosgm_ros.messages import transform_of
+        from tf2_ros import TransformBroadcaster
+        broadcaster = TransformBroadcaster(node)
+    ready = []
+    listened_to = " ".join(sorted(TOPICS))
+    node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: ready.extend(
+        True for status in message.status for value in status.values if value.key == "listened_to" and value.value == listened_to), 10)
+    while not ready or any(publisher.get_subscription_count() == 0 for publisher in images + infos):
+        rclpy.spin_once(node, timeout_sec=0.1)
     turn = 2 * (RENDERED - 1)
     for i in range(-2, frames):  # camera infos alone at first
         stamp = node.get_clock().now().to_msg()
@@ -49,25 +61,27 @@ def publish(frames, rate, right_width):
             pixels = frame.right[:, :right_width] if side else frame.left
             image = Image(height=HEIGHT, width=pixels.shape[1], step=pixels.shape[1], encoding="mono8", data=array.array("B", pixels.tobytes()))
             image.header.stamp, image.header.frame_id = stamp, "left_optical"
+            if tf and side == 0:
+                broadcaster.sendTransform(transform_of(image.header, "odom", frame.world_from_camera))
             images[side].publish(image)
         time.sleep(1 / rate)
     time.sleep(2)
 
 
-def subscribe(frames, seconds):
+def subscribe(frames, seconds, reliable=True, tf=False):
     """Prints what came."""
     import egosgm
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
     from nav_msgs.msg import Odometry
-    from rclpy.qos import QoSProfile
+    from rclpy.qos import QoSProfile, qos_profile_sensor_data
     from sensor_msgs.msg import Image, PointCloud2
     from stereo_msgs.msg import DisparityImage
     street = egosgm.SyntheticSequence(**STREET)
     truth = street.render(0).left_disparity
     rclpy.init()
     node = rclpy.create_node("subscriber")
-    told = dict(stamps=[], latencies_ms=[], depth=0, variance=0, points=0, odom=0, bad=[], depth_error=[], diagnostics=[])
+    told = dict(stamps=[], latencies_ms=[], depth=0, variance=0, reason=[], points2=0, odom=[], tf=[], bad=[], diagnostics=[])
 
     def on_disparity(message):
         now = node.get_clock().now().nanoseconds
@@ -83,10 +97,27 @@ def subscribe(frames, seconds):
     def count(name):
         return lambda message: told.__setitem__(name, told[name] + 1)
 
-    qos = QoSProfile(depth=100)
+    def on_odom(message):
+        position = message.pose.pose.position
+        told["odom"].append([position.x, position.y, position.z])
+
+    def on_reason(message):
+        told["reason"].append([message.encoding, int(np.frombuffer(message.data, np.uint8).max())])
+
+    def on_tf(message):
+        for transform in message.transforms:
+            position = transform.transform.translation
+            told["tf"].append([transform.header.frame_id, transform.child_frame_id, position.x, position.y, position.z])
+
+    qos = QoSProfile(depth=100) if reliable else qos_profile_sensor_data
     node.create_subscription(DisparityImage, "disparity", on_disparity, qos)
-    for name, kind, topic in (("depth", Image, "depth"), ("variance", Image, "variance"), ("points", PointCloud2, "points2"), ("odom", Odometry, "odom")):
-        node.create_subscription(kind, topic, count(name), qos)
+    for kind, topic in ((Image, "depth"), (Image, "variance"), (PointCloud2, "points2")):
+        node.create_subscription(kind, topic, count(topic), qos)
+    node.create_subscription(Image, "reason", on_reason, qos)
+    node.create_subscription(Odometry, "odom", on_odom, QoSProfile(depth=100))
+    if tf:
+        from tf2_msgs.msg import TFMessage
+        node.create_subscription(TFMessage, "/tf", on_tf, 100)
 
     def on_diagnostics(message):
         for status in message.status:
@@ -94,7 +125,7 @@ def subscribe(frames, seconds):
 
     node.create_subscription(DiagnosticArray, "/diagnostics", on_diagnostics, 10)
     end = time.monotonic() + seconds
-    while time.monotonic() < end and (len(told["stamps"]) < frames or told["odom"] < frames):
+    while time.monotonic() < end and (len(told["stamps"]) < frames or len(told["odom"]) < frames):
         rclpy.spin_once(node, timeout_sec=0.2)
     end = time.monotonic() + 3
     while time.monotonic() < end:
@@ -105,48 +136,143 @@ def subscribe(frames, seconds):
 
 
 class Node(unittest.TestCase):
-    def run_three(self, frames, rate, right_width=WIDTH, seconds=None, parameters=()):
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    def run_three(self, frames, rate, seconds=None, parameters=(), reliable=True, right_width=WIDTH, tf=False, listens_to_tf=False):
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+                       "PYTHONPATH": f"{PACKAGE}:{os.environ.get('PYTHONPATH', '')}"}
         seconds = seconds or 60 + 2 * frames / rate
+        ros = ["-p", "reliable:=true", "-p", "queue_size:=100"] if reliable else []
+        ros += [word for p in parameters for word in ("-p", p)]
         start = [sys.executable, "-B", __file__]
-        ros = ["--ros-args", "-p", "reliable:=true", "-p", "queue_size:=100", *(word for p in parameters for word in ("-p", p))]
-        node = subprocess.Popen([sys.executable, "-B", str(NODE), *ros], env=environment)
-        subscriber = subprocess.Popen([*start, "subscribe", str(frames), str(seconds)], env=environment, stdout=subprocess.PIPE, text=True)
-        publisher = subprocess.Popen([*start, "publish", str(frames), str(rate), str(right_width)], env=environment)
+        node = subprocess.Popen([sys.executable, "-B", "-m", "egosgm_ros.node", *(["--ros-args", *ros] if ros else [])], env=environment)
+        subscriber = subprocess.Popen([*start, "subscribe", json.dumps(dict(frames=frames, seconds=seconds, reliable=reliable, tf=listens_to_tf))],
+                                      env=environment, stdout=subprocess.PIPE, text=True)
+        publisher = subprocess.Popen([*start, "publish", json.dumps(dict(frames=frames, rate=rate, right_width=right_width, reliable=reliable, tf=tf))],
+                                     env=environment)
         try:
             output, _ = subscriber.communicate(timeout=seconds + 60)
         finally:
             for process in (publisher, node, subscriber):
                 process.terminate()
                 process.wait(10)
-        return json.loads(output.splitlines()[-1])
+        told = json.loads(output.splitlines()[-1])
+        told["active"] = [values for _, _, values in told["diagnostics"] if "device" in values]
+        return told
 
     def test_nothing_is_lost_and_the_maps_are_right(self):
         told = self.run_three(FRAMES, RATE)
-        latencies = np.array(told["latencies_ms"])
-        active = [values for level, _, values in told["diagnostics"] if "device" in values]
+        latencies, last = np.array(told["latencies_ms"]), told["active"][-1]
         print(f"{len(told['stamps'])} of {FRAMES} frames at {RATE} Hz; latency: median {np.median(latencies):.1f} ms, 95 % {np.percentile(latencies, 95):.1f} ms; "
-              f"last diagnostics: {active[-1]}")
+              f"last diagnostics: {last}")
         self.assertEqual(len(told["stamps"]), FRAMES)
         self.assertEqual(told["stamps"], sorted(set(told["stamps"])))
-        for name in ("depth", "variance", "points", "odom"):
+        for name in ("depth", "variance", "points2"):
             self.assertEqual(told[name], FRAMES, name)
+        self.assertEqual([len(told["odom"]), len(told["reason"])], [FRAMES, FRAMES])
+        self.assertEqual({encoding for encoding, _ in told["reason"]}, {"mono8"})
+        self.assertGreater(max(largest for _, largest in told["reason"]), 0)
         self.assertLess(max(told["bad"]), 0.1)
         self.assertAlmostEqual(told["f_t"] / told["expected_f_t"], 1, places=5)
-        self.assertEqual(active[-1]["lost_in_queue"], "0")
-        self.assertEqual([active[-1]["unpaired_left"], active[-1]["unpaired_right"]], ["0", "0"])
-        self.assertLess(abs(float(active[-1]["vertical_offset_px"])), 0.5)
+        self.assertEqual([last[name] for name in ("lost_in_queue", "lost_on_the_way", "unpaired_left", "unpaired_right")], ["0"] * 4)
+        self.assertLess(abs(float(last["vertical_offset_px"])), 0.5)
+
+    def test_what_is_too_fast_is_dropped_and_told(self):
+        frames = 150
+        told = self.run_three(frames, 100.0, reliable=False, parameters=("queue_size:=2",), seconds=40)
+        last = told["active"][-1]
+        lost = int(last["lost_in_queue"]) + int(last["lost_on_the_way"]) + int(last["unpaired_left"]) + int(last["unpaired_right"])
+        print(f"of {frames} frames at once: {last}")
+        self.assertGreater(int(last["frames"]), 0)
+        self.assertLess(int(last["frames"]), frames)
+        self.assertGreaterEqual(int(last["frames"]) + lost, frames)  # nothing goes untold
+        self.assertTrue(any(level == 1 and "dropped" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
 
     def test_wrong_images_are_told_on_diagnostics(self):
-        told = self.run_three(5, 5.0, right_width=WIDTH - 8, seconds=15)
+        told = self.run_three(5, 5.0, right_width=WIDTH - 8, seconds=30)
         self.assertEqual(told["stamps"], [])
         self.assertTrue(any(level == 2 and "632" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
+
+    @unittest.skipUnless(HAS_TF, "no tf2_ros")
+    def test_motion_of_tf_is_taken(self):
+        import egosgm
+        from egosgm.ros_images import BODY_FROM_OPTICAL
+        street = egosgm.SyntheticSequence(**STREET)
+        told = self.run_three(RENDERED, RATE, parameters=("motion_frame:=odom",), tf=True)
+        poses = [street.render(i).world_from_camera for i in range(RENDERED)]
+        truth = [(BODY_FROM_OPTICAL @ np.linalg.inv(poses[0]) @ pose)[:3, 3] for pose in poses]
+        self.assertGreater(np.linalg.norm(truth[-1]), 0.4)
+        np.testing.assert_allclose(told["odom"], truth, atol=1e-6)  # far nearer than what images tell
+        self.assertLess(float(told["active"][-1]["search_fraction"]), 0.5)
+
+    @unittest.skipUnless(HAS_TF, "no tf2_ros")
+    def test_frames_without_tf_are_searched_whole_and_told(self):
+        told = self.run_three(5, RATE, parameters=("motion_frame:=odom",))
+        self.assertEqual(len(told["stamps"]), 5)
+        self.assertEqual(told["active"][-1]["search_fraction"], "1.0000")
+        self.assertTrue(any(level == 1 and "no motion of left_optical in odom" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
+
+    @unittest.skipUnless(HAS_TF, "no tf2_ros")
+    def test_tf_is_published_where_asked_for(self):
+        told = self.run_three(5, RATE, parameters=("publish_tf:=true", "odom_frame:=map"), listens_to_tf=True)
+        self.assertEqual([transform[:2] for transform in told["tf"]], [["map", "left_optical"]] * 5)
+        np.testing.assert_allclose([transform[2:] for transform in told["tf"]], told["odom"], atol=1e-9)
+        self.assertGreater(np.linalg.norm(told["odom"][-1]), 0.1)
+
+    @unittest.skipIf(HAS_TF, "tf2_ros is there")
+    def test_without_tf_the_package_is_named(self):
+        environment = {**os.environ, "PYTHONPATH": f"{PACKAGE}:{os.environ.get('PYTHONPATH', '')}"}
+        node = subprocess.Popen([sys.executable, "-B", "-m", "egosgm_ros.node", "--ros-args", "-p", "motion_frame:=odom"], env=environment,
+                                stderr=subprocess.PIPE, text=True)
+        try:
+            self.assertIn("tf2-ros-py", node.stderr.readline())
+        finally:
+            node.terminate()
+            node.wait(10)
+            node.stderr.close()
+
+
+class Files(unittest.TestCase):
+    def test_rviz_shows_topics_that_there_are(self):
+        import yaml
+        displays = yaml.safe_load((PACKAGE / "rviz/egosgm.rviz").read_text())["Visualization Manager"]["Displays"]
+        self.assertEqual({display["Topic"]["Value"] for display in displays}, {"points2", "depth", "odom"})
+        self.assertLessEqual({display["Topic"]["Value"] for display in displays}, set(TOPICS))
+
+    @unittest.skipUnless(importlib.util.find_spec("launch_ros"), "no launch_ros")
+    def test_the_launch_file_gives_the_node_its_parameters_by_their_types(self):
+        """By launch itself, which is told where the package is; the node's process is not started."""
+        import tempfile
+
+        import launch
+        import launch_ros.actions
+        from rclpy.parameter import Parameter
+        with tempfile.TemporaryDirectory() as prefix:
+            share = pathlib.Path(prefix) / "share"
+            (share / "ament_index/resource_index/packages").mkdir(parents=True)
+            (share / "ament_index/resource_index/packages/egosgm_ros").touch()
+            (share / "egosgm_ros").symlink_to(PACKAGE)
+            os.environ["AMENT_PREFIX_PATH"] = f"{prefix}:{os.environ.get('AMENT_PREFIX_PATH', '')}"
+            source = launch.launch_description_sources.PythonLaunchDescriptionSource(str(PACKAGE / "launch/egosgm.launch.py"))
+            context = launch.LaunchContext()
+            description = source.get_launch_description(context)
+        given = dict(device="0", max_skew_ms="3", queue_size="7", reliable="true", motion_frame="odom", namespace="/stereo")
+        context.launch_configurations.update(given)
+        for entity in description.entities:
+            if isinstance(entity, launch.actions.DeclareLaunchArgument):
+                entity.execute(context)
+        node, viewer = (entity for entity in description.entities if isinstance(entity, launch_ros.actions.Node))
+        self.assertFalse(viewer.condition.evaluate(context))
+        parameters = launch_ros.utilities.evaluate_parameters(context, node._Node__parameters)[0]
+        self.assertEqual(parameters, dict(device="0", preset="default", max_skew_ms=3.0, queue_size=7, reliable=True, motion_frame="odom", publish_tf=False))
+        sys.path.insert(0, str(PACKAGE))
+        from egosgm_ros.node import OWN
+        for name, value in parameters.items():
+            self.assertEqual(Parameter(name, value=value).type_, Parameter(name, value=OWN[name]).type_, name)
 
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["publish"]:
-        publish(int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4]))
+        publish(**json.loads(sys.argv[2]))
     elif sys.argv[1:2] == ["subscribe"]:
-        subscribe(int(sys.argv[2]), float(sys.argv[3]))
+        subscribe(**json.loads(sys.argv[2]))
     else:
         unittest.main()

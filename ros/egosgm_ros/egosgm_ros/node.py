@@ -1,28 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node egosgm: rectified pairs in, disparity, depth, its variance, points and odometry out, by stereo_image_proc's names."""
-import array
 import collections
 import threading
 import time
-from typing import Any, Deque, Dict, Optional, Tuple
+from typing import Any, Deque, Dict, Optional, Set, Tuple
 
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.msg import Odometry
+from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
 from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from stereo_msgs.msg import DisparityImage
 
 import egosgm
 from egosgm.bag import Pairing
-from egosgm.ros_images import BODY_FROM_OPTICAL, Cameras, depth_maps, grey_of, quaternion_of, ros_disparity, stamp_ns
+from egosgm.ros_images import Cameras, depth_maps, grey_of, stamp_ns
+from egosgm_ros.messages import disparity_of, image_of, odometry_of, points_of, transform_of
+from egosgm_ros.tf_motion import TfMotion, tf2_ros
 
 SIDES = ("left", "right")
-OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "points2": PointCloud2}
-OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "queue_size": 4, "reliable": False, "auto_start": True, "odom_frame": "odom"}
+OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2}
+OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "queue_size": 4, "reliable": False, "auto_start": True, "odom_frame": "odom",
+       "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1}
 
 
 class EgosgmNode(LifecycleNode):
@@ -46,8 +49,10 @@ class EgosgmNode(LifecycleNode):
         self._queue: Deque[Tuple[Any, Any]] = collections.deque()
         self._wake = threading.Condition()
         self._is_active = False
-        self._count = self._lost = self._frames_told = 0
-        self._problem = ""
+        self._count = self._lost = self._lost_on_the_way = self._frames_told = self._lost_told = 0
+        self._problem = self._doubt = ""
+        self._tf: Optional[TfMotion] = None
+        self._broadcaster: Any = None
         self._last_stamp: Optional[int] = None
         self._report: Optional[egosgm.FrameReport] = None
         self._latency_ms = 0.0
@@ -65,6 +70,12 @@ class EgosgmNode(LifecycleNode):
     def on_configure(self, state: Any) -> TransitionCallbackReturn:
         self._clear()
         try:
+            if self._value("publish_tf") and self._value("motion_frame"):
+                raise ValueError("publish_tf and motion_frame: a motion that comes from tf is not published there again: unset one of them")
+            if self._value("motion_frame"):
+                self._tf = TfMotion(self, self._value("motion_frame"), self._value("tf_wait_s"))
+            if self._value("publish_tf"):
+                self._broadcaster = tf2_ros().TransformBroadcaster(self)
             egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 32, 0.1), 64, 64, device=self._value("device"), **self._options())
         except (ValueError, RuntimeError) as error:
             self._problem = str(error)
@@ -77,11 +88,20 @@ class EgosgmNode(LifecycleNode):
         self._inputs = []
         for index, side in enumerate(SIDES):
             self._inputs.append(self.create_subscription(CameraInfo, f"{side}/camera_info", lambda info, side=side: self._on_info(side, info), qos))
-            self._inputs.append(self.create_subscription(Image, f"{side}/image_rect", lambda image, index=index: self._on_image(index, image), qos))
+            self._inputs.append(self._image_subscription(index, qos))
         return TransitionCallbackReturn.SUCCESS
+
+    def _image_subscription(self, index: int, qos: QoSProfile) -> Any:
+        """Whose middleware tells what it dropped, where it can."""
+        for events in (SubscriptionEventCallbacks(message_lost=self._on_lost), None):
+            try:
+                return self.create_subscription(Image, f"{SIDES[index]}/image_rect", lambda image: self._on_image(index, image), qos, event_callbacks=events)
+            except UnsupportedEventTypeError:
+                continue
 
     def on_activate(self, state: Any) -> TransitionCallbackReturn:
         self._is_active = True
+        self._queue.clear()
         self._worker = threading.Thread(target=self._work, daemon=True)
         self._worker.start()
         return super().on_activate(state)
@@ -95,6 +115,8 @@ class EgosgmNode(LifecycleNode):
             self.destroy_subscription(subscription)
         for publisher in self._outputs.values():
             self.destroy_publisher(publisher)
+        if self._tf:
+            self._tf.close()
         self._clear()
         return TransitionCallbackReturn.SUCCESS
 
@@ -115,6 +137,9 @@ class EgosgmNode(LifecycleNode):
         if before is not None and ((before.p != info.p).any() or (before.width, before.height) != (info.width, info.height)):
             self._cameras = None  # another calibration: all that was made for the old one is dropped with the next frame
         self._infos[side] = info
+
+    def _on_lost(self, event: Any) -> None:
+        self._lost_on_the_way += event.total_count_change
 
     def _on_image(self, index: int, image: Image) -> None:
         if not self._is_active:
@@ -155,53 +180,59 @@ class EgosgmNode(LifecycleNode):
             if image.shape != (self._cameras.size[1], self._cameras.size[0]):
                 raise ValueError(f"{side}/image_rect: an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
                                  f"{self._cameras.size[0]}x{self._cameras.size[1]}")
-        stamp = stamp_ns(left)
-        if self._last_stamp is not None and stamp <= self._last_stamp:  # a bag that starts over
+        stamp, previous = stamp_ns(left), self._last_stamp
+        if previous is not None and stamp <= previous:  # a bag that starts over
             self._pipeline.reset()
             self._odometry.reset()
+            previous = None
         self._last_stamp = stamp
-        found = self._odometry.process(*images)
-        maps = self._pipeline.process(*images, found.motion)
-        if found.motion:
-            self._world_from_camera = self._world_from_camera @ np.linalg.inv(found.motion.current_from_previous)
-        self._publish(left, images[0], maps)
+        motion = self._motion(left.header.frame_id, images, previous, stamp)
+        if motion:
+            self._world_from_camera = self._world_from_camera @ np.linalg.inv(motion.current_from_previous)
+        wanted = self._listened_to()
+        maps = self._pipeline.process(*images, motion, ("disparity", "variance", "reason") if "reason" in wanted else ("disparity", "variance"))
+        self._publish(wanted, left.header, images[0], maps)
         self._report, self._count = maps.report, self._count + 1
         self._latency_ms = self.get_clock().now().nanoseconds / 1e6 - stamp / 1e6
 
-    def _publish(self, left: Image, grey: Any, maps: egosgm.Frame) -> None:
-        calibration, header = self._cameras.calibration, left.header
-        wanted = {name for name, publisher in self._outputs.items() if publisher.get_subscription_count() > 0}
+    def _motion(self, frame_id: str, images: Any, previous: Optional[int], stamp: int) -> Optional[egosgm.Motion]:
+        if self._tf is None:
+            return self._odometry.process(*images).motion
+        self._doubt = ""
+        try:
+            return self._tf.between(frame_id, previous, stamp) if previous is not None else None
+        except LookupError as error:
+            self._doubt = f"{error}; such frames are searched whole"
+            return None
+
+    def _listened_to(self) -> Set[str]:
+        return {name for name, publisher in self._outputs.items() if publisher.get_subscription_count() > 0}
+
+    def _publish(self, wanted: Set[str], header: Any, grey: Any, maps: egosgm.Frame) -> None:
+        calibration = self._cameras.calibration
         if "disparity" in wanted:
-            message = DisparityImage(header=header, image=_image_of(header, ros_disparity(maps.disparity, calibration)), f=calibration.fx,
-                                     t=calibration.baseline_m)
-            message.valid_window.width, message.valid_window.height = left.width, left.height
-            message.min_disparity = max(0.0, calibration.doffs_px)
-            message.max_disparity = self._pipeline.options["disparities"] - 1 + calibration.doffs_px
-            self._outputs["disparity"].publish(message)
+            self._outputs["disparity"].publish(disparity_of(header, maps.disparity, calibration, self._pipeline.options["disparities"]))
+        if "reason" in wanted:
+            self._outputs["reason"].publish(image_of(header, maps.reason))
         if wanted & {"depth", "variance", "points2"}:
             depth, variance = depth_maps(maps.disparity, maps.variance, calibration)
             if "depth" in wanted:
-                self._outputs["depth"].publish(_image_of(header, depth))
+                self._outputs["depth"].publish(image_of(header, depth))
             if "variance" in wanted:
-                self._outputs["variance"].publish(_image_of(header, variance))
+                self._outputs["variance"].publish(image_of(header, variance))
             if "points2" in wanted:
-                self._outputs["points2"].publish(_points_of(header, depth, grey, calibration))
+                self._outputs["points2"].publish(points_of(header, depth, grey, calibration))
         if "odom" in wanted:
-            self._outputs["odom"].publish(self._odometry_message(header))
-
-    def _odometry_message(self, header: Any) -> Odometry:
-        message = Odometry(child_frame_id="egosgm_camera")
-        message.header.stamp, message.header.frame_id = header.stamp, self._value("odom_frame")
-        pose = BODY_FROM_OPTICAL @ self._world_from_camera @ BODY_FROM_OPTICAL.T
-        position, orientation = message.pose.pose.position, message.pose.pose.orientation
-        position.x, position.y, position.z = (float(value) for value in pose[:3, 3])
-        orientation.x, orientation.y, orientation.z, orientation.w = (float(value) for value in quaternion_of(pose[:3, :3]))
-        return message
+            self._outputs["odom"].publish(odometry_of(header, self._value("odom_frame"), self._world_from_camera))
+        if self._broadcaster:
+            self._broadcaster.sendTransform(transform_of(header, self._value("odom_frame"), self._world_from_camera))
 
     def _tell(self) -> None:
         now = time.monotonic()
         rate = (self._count - self._frames_told) / max(1e-3, now - self._told_at)
-        self._told_at, self._frames_told = now, self._count
+        lost = self._lost + self._lost_on_the_way
+        newly_lost = lost - self._lost_told
+        self._told_at, self._frames_told, self._lost_told = now, self._count, lost
         status = DiagnosticStatus(name=f"{self.get_fully_qualified_name()}: stereo", hardware_id="", level=DiagnosticStatus.OK, message="matching")
         gaps = self._pairing.gaps if hasattr(self, "_pairing") else None
         if self._problem:
@@ -213,7 +244,13 @@ class EgosgmNode(LifecycleNode):
                 status.message += f": the nearest stamps differ by {gaps.nearest_ms:.3f} ms, max_skew_ms is {self._value('max_skew_ms')}"
         elif not self._is_active:
             status.message = "not active"
-        values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "lost_in_queue": str(self._lost)}
+        elif newly_lost:
+            status.level, status.message = DiagnosticStatus.WARN, f"{newly_lost} dropped: more images come than are matched in time"
+        elif self._doubt:
+            status.level, status.message = DiagnosticStatus.WARN, self._doubt
+        values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "lost_in_queue": str(self._lost), "lost_on_the_way": str(self._lost_on_the_way)}
+        if self._is_active:
+            values["listened_to"] = " ".join(sorted(self._listened_to()))
         if gaps:
             values.update(unpaired_left=str(gaps.unpaired_left), unpaired_right=str(gaps.unpaired_right))
         if self._report:
@@ -224,25 +261,6 @@ class EgosgmNode(LifecycleNode):
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
-
-
-def _image_of(header: Any, values: Any) -> Image:
-    height, width = values.shape
-    return Image(header=header, height=height, width=width, encoding="32FC1", is_bigendian=0, step=4 * width,
-                 data=array.array("B", np.ascontiguousarray(values, np.float32).tobytes()))
-
-
-def _points_of(header: Any, depth: Any, grey: Any, calibration: egosgm.Calibration) -> PointCloud2:
-    """In rows and columns as the image, NaN where there is no depth."""
-    height, width = depth.shape
-    points = np.empty((height, width, 4), np.float32)
-    points[..., 0] = (np.arange(width, dtype=np.float32) - np.float32(calibration.cx)) / np.float32(calibration.fx) * depth
-    points[..., 1] = (np.arange(height, dtype=np.float32)[:, None] - np.float32(calibration.cy)) / np.float32(calibration.fy) * depth
-    points[..., 2] = depth
-    points[..., 3] = grey
-    fields = [PointField(name=name, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, name in enumerate(("x", "y", "z", "intensity"))]
-    return PointCloud2(header=header, height=height, width=width, fields=fields, is_bigendian=False, point_step=16, row_step=16 * width,
-                       data=array.array("B", points.tobytes()), is_dense=False)
 
 
 def main() -> None:

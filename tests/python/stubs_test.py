@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The stubs are what runs, by mypy's stubtest; parameters of the C++ module are compared in drive_test.py. Needs mypy (scripts/install-dependencies --python)."""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+import egosgm
+
+RUNNING = pathlib.Path(egosgm.__file__).parents[1]
+# What stubtest need not find in the stubs: how pybind11 makes classes, and what the package's own Python adds for people to read.
+KNOWN = re.compile(r"is inconsistent, metaclass differs$|\.__init__ is inconsistent, stub does not have \*args parameter \"args\"$"
+                   r"|\.(__match_args__|__signature__|__all__) is not present in stub$|^egosgm\._options failed to import\.")
+CONFIGURATION = """[mypy]
+[mypy-egosgm.bag,egosgm.cpu_driver,egosgm.drive,egosgm.matcher,egosgm.program,egosgm.ros_images,egosgm.values,egosgm.video_evaluation]
+ignore_errors = True
+[mypy-tqdm.*]
+ignore_missing_imports = True
+"""
+
+
+def differences(stubs, tmp_path):
+    """Lines of stubtest about the package that runs and the stubs in a folder."""
+    (tmp_path / "mypy.ini").write_text(CONFIGURATION)
+    done = subprocess.run([sys.executable, "-B", "-m", "mypy.stubtest", "--concise", "--mypy-config-file", tmp_path / "mypy.ini", "egosgm"],
+                          cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(RUNNING), "MYPYPATH": str(stubs)},
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    lines = done.stdout.splitlines()
+    assert any("metaclass differs" in line for line in lines), done.stdout  # it did run
+    return [line for line in lines if not KNOWN.search(line)]
+
+
+def test_the_stubs_are_what_runs(tmp_path):
+    assert differences(RUNNING, tmp_path) == []
+
+
+def test_what_a_stub_has_too_much_or_wrong_is_found(tmp_path):
+    shutil.copytree(RUNNING / "egosgm", tmp_path / "stubs/egosgm", ignore=shutil.ignore_patterns("*.so"))
+    stub = tmp_path / "stubs/egosgm/__init__.pyi"
+    text = stub.read_text()
+    assert "    def under_way(self)" in text
+    stub.write_text(text.replace("    def under_way(self)", "    def underway(self)"))
+    found = "\n".join(differences(tmp_path / "stubs", tmp_path))
+    assert "egosgm.Pipeline.underway is not present at runtime" in found and "egosgm.Pipeline.under_way is not present in stub" in found
