@@ -133,6 +133,9 @@ TEST(House, TwinsShareNothingWithTheKernelsButTheirLayouts) {
   for (const fs::path& file : files({".h", ".cpp"}, {"tests/reference"})) {
     EXPECT_FALSE(std::regex_search(text_of(file), foreign)) << file;
   }
+  for (const fs::path& file : files({".h", ".cpp"}, {"tests"})) {
+    EXPECT_EQ(text_of(file).find("include \"kernels/method"), std::string::npos) << file;
+  }
 }
 
 TEST(House, LinksOfTheDocumentationLeadSomewhere) {

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <random>
 
-#include "kernels/method.h"
 #include "tests/reference/predict/disparity_space.h"
 #include "tests/reference/predict/forward_warp.h"
 #include "tests/support/compare.h"

@@ -8,7 +8,6 @@
 
 #include "host/match/banded_sgm.h"
 #include "host/match/census.h"
-#include "kernels/method.h"
 #include "tests/reference/publish/reasons.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
