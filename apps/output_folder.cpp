@@ -351,15 +351,24 @@ void OutputFolder::remove_earlier() {
   record_->clear();
 }
 
-void OutputFolder::record(const fs::path& file, std::string_view bytes) {
+bool OutputFolder::record(const fs::path& file, std::string_view bytes) {
   const std::string name = file.lexically_relative(path_).string();
-  if (!is_plain_name(name) || name == "report.json") return;
-  if (!files_.contains(name) && is_there(file)) {
-    throw IoError(file.string() + ": has come there while the run wrote, and stays: choose another --out");
-  }
+  if (!is_plain_name(name) || name == "report.json") return true;
   const std::string digest = digest_of(bytes);
+  if (is_there(file)) {
+    const auto earlier = files_.find(name);
+    if (earlier == files_.end()) {
+      throw IoError(file.string() + ": has come there while the run wrote, and stays: choose another --out");
+    }
+    if (earlier->second == digest) return false;
+    throw InvalidArgument(
+        fmt::format("--resume: {} is not what this run makes of the frame, so what it reads is not "
+                    "what it was: give --overwrite to start anew",
+                    file.string()));
+  }
   record_->add(name, digest);
   files_[name] = digest;
+  return true;
 }
 
 void OutputFolder::end() { record_->remove(); }
