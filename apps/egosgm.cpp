@@ -23,8 +23,10 @@
 namespace egosgm::app {
 namespace {
 
+/// On one line, whatever a name in it holds.
 int fail(int code, std::string message) {
-  std::replace(message.begin(), message.end(), '\n', ' ');
+  std::replace_if(
+      message.begin(), message.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, ' ');
   std::fputs(("egosgm: error: " + message + '\n').c_str(), stderr);
   return code;
 }

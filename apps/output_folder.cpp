@@ -171,9 +171,13 @@ void expect_new_file(const std::string& option, const std::string& file) {
 }
 
 void expect_outside(const std::string& option, const std::string& file, const fs::path& folder) {
-  if (file.empty() || !is_within(place_of(fs::absolute(file).parent_path()), place_of(folder))) return;
+  if (file.empty()) return;
+  const fs::path place = place_of(folder),
+                 path = place_of(fs::absolute(file).parent_path()) / fs::path(file).filename();
+  if (!is_within(path, place) && !is_within(place, path)) return;
   throw InvalidArgument(
-      fmt::format("{} {}: lies in {}, where this command writes: give another folder", option, file, folder.string()));
+      fmt::format("{} {}: lies in {}, where this command writes, or is that folder: give another name", option, file,
+                  folder.string()));
 }
 
 std::string signed_text(const std::string& text, const std::string& begin, const std::string& end) {
@@ -243,6 +247,7 @@ fs::path OutputFolder::named_file(const std::string& option, const std::string& 
   if (file.empty()) return {};
   const fs::path path = place_of(fs::absolute(file).parent_path()) / fs::path(file).filename();
   std::error_code none;
+  if (is_within(path_, path)) throw InvalidArgument(option + " " + file + ": is a folder: give the name of a file");
   const std::string name = path.lexically_relative(path_).string();
   if (!is_plain_name(name) || fs::is_symlink(path, none) || vision::is_stream(path)) {
     expect_new_file(option, file);
@@ -351,15 +356,24 @@ void OutputFolder::remove_earlier() {
   record_->clear();
 }
 
-void OutputFolder::record(const fs::path& file, std::string_view bytes) {
+bool OutputFolder::record(const fs::path& file, std::string_view bytes) {
   const std::string name = file.lexically_relative(path_).string();
-  if (!is_plain_name(name) || name == "report.json") return;
-  if (!files_.contains(name) && is_there(file)) {
-    throw IoError(file.string() + ": has come there while the run wrote, and stays: choose another --out");
-  }
+  if (!is_plain_name(name) || name == "report.json") return true;
   const std::string digest = digest_of(bytes);
+  if (is_there(file)) {
+    const auto earlier = files_.find(name);
+    if (earlier == files_.end()) {
+      throw IoError(file.string() + ": has come there while the run wrote, and stays: choose another --out");
+    }
+    if (earlier->second == digest) return false;
+    throw InvalidArgument(
+        fmt::format("--resume: {} is not what this run makes of the frame, so what it reads is not "
+                    "what it was: give --overwrite to start anew",
+                    file.string()));
+  }
   record_->add(name, digest);
   files_[name] = digest;
+  return true;
 }
 
 void OutputFolder::end() { record_->remove(); }

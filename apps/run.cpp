@@ -89,7 +89,7 @@ class Run {
   }
 
   bool operator()() {
-    const vision::BeforeWrite recording([this](const auto& file, auto bytes) { folder_.record(file, bytes); });
+    const vision::BeforeWrite recording([this](const auto& file, auto bytes) { return folder_.record(file, bytes); });
     write_report(false, kKilled);
     try {
       if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
@@ -122,17 +122,17 @@ class Run {
     if (!sequence_.note.empty()) progress.note(sequence_.note);
     const auto prepare_later = [&](std::size_t i) { return std::async(policy, [this, i] { return prepare(i); }); };
     auto next = prepare_later(0);
-    try {
-      for (std::size_t i = 0; i < sequence_.frames.size() && !interrupted(); ++i) {
+    for (std::size_t i = 0; i < sequence_.frames.size() && !interrupted(); ++i) {
+      try {
         submit(next.get());
         if (i + 1 < sequence_.frames.size()) next = prepare_later(i + 1);
-        if (under_way_.size() > 1) collect(progress);
+      } catch (const DeviceError&) {
+        throw;
+      } catch (const std::exception&) {  // what is under way does not suffer from a next frame that cannot be read
+        while (!under_way_.empty()) collect(progress);
+        throw;
       }
-    } catch (const DeviceError&) {
-      throw;
-    } catch (const std::exception&) {  // what is under way does not suffer from a next frame that cannot be read
-      while (!under_way_.empty()) collect(progress);
-      throw;
+      if (under_way_.size() > 1) collect(progress);
     }
     while (!under_way_.empty()) collect(progress);
     if (!quiet_) summary_ = fmt::format("{:.1f} frames/s", progress.frames_per_second());
@@ -169,7 +169,7 @@ class Run {
     under_way_.pop_front();
     const vision::StereoFrame& frame = sequence_.frames[prepared.index];
     const auto before_write = Clock::now();
-    const std::int64_t unstorable = outputs_->write(frame, prepared.images.left, folder_.resumes());
+    const std::int64_t unstorable = outputs_->write(frame, prepared.images.left);
     const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);

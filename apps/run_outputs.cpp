@@ -129,14 +129,7 @@ FrameOutputs RunOutputs::views() {
   return outputs;
 }
 
-template <typename Write>
-void RunOutputs::write_file(const char* kind, const vision::StereoFrame& frame, bool keep, Write&& write) const {
-  const std::filesystem::path path = file(kind, frame, extension_of(kind));
-  if (!(keep && std::filesystem::exists(path))) write(path);
-}
-
-std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& left, bool keep) {
-  panels_.disparity_range(disparity_);  // the first frame fixes it, also where its pictures are there already
+std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& left) {
   using Path = std::filesystem::path;
   const auto depth_m = [&] { return vision::depth_from_disparity(disparity_, calibration_); };
   const std::pair<const char*, std::function<void(const Path&)>> writers[] = {
@@ -168,10 +161,10 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
       {"depth", [&](const Path& path) { vision::write_depth_png(path, depth_m()); }},
       {"depth_m", [&](const Path& path) { vision::write_pfm(path, depth_m()); }}};
   for (const auto& [kind, write] : writers) {
-    if (wants(kind)) write_file(kind, frame, keep, write);
+    if (wants(kind)) write(file(kind, frame, extension_of(kind)));
   }
   // Last: a frame with it is complete.
-  write_file("disparity", frame, keep, [&](const Path& path) { vision::write_disparity_png(path, disparity_); });
+  vision::write_disparity_png(file("disparity", frame, extension_of("disparity")), disparity_);
   return vision::count_outside_png(disparity_);
 }
 

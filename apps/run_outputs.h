@@ -35,17 +35,13 @@ class RunOutputs {
   /// Where the pipeline is to write; valid as long as this object lives.
   FrameOutputs views();
 
-  /// Writes the frame that the views hold; `left` is its left image. `keep`: what stands in the folder already stays.
-  /// Returns how many disparities KITTI's PNG has no room for.
-  std::int64_t write(const vision::StereoFrame& frame, const cv::Mat& left, bool keep);
+  /// Writes the frame that the views hold; `left` is its left image. Returns how many disparities KITTI's PNG has no
+  /// room for.
+  std::int64_t write(const vision::StereoFrame& frame, const cv::Mat& left);
 
  private:
   bool wants(const char* kind) const { return kinds_.contains(kind); }
   std::filesystem::path file(const char* kind, const vision::StereoFrame& frame, const char* extension = ".png") const;
-
-  /// Calls `write` with the file's path, unless the file is to stay.
-  template <typename Write>
-  void write_file(const char* kind, const vision::StereoFrame& frame, bool keep, Write&& write) const;
 
   const std::filesystem::path folder_;
   const std::set<std::string> kinds_;

@@ -40,7 +40,8 @@ constexpr const char* kHelp =
     "views, upload to download, motion given. egosgm_video_frame: the same as a stream, with odometry. The last two "
     "play KITTI 2012\n"
     "000151, frames 07..11, from the start in each turn and give the mean of the last two frames.\n"
-    "cpus: processor time of all threads by wall time, how many threads were at work in the mean; on a CPU only.\n";
+    "threads: how many a row may have. cpus: processor time of all threads by wall time, how many threads were at work "
+    "in the mean; on a CPU only.\n";
 
 using Clock = std::chrono::steady_clock;
 
@@ -128,7 +129,7 @@ Contender opencv(const OpencvMode& mode, const Clip& clip, int disparities, int 
             cv::setNumThreads(threads);
             const Stopwatch watch;
             matcher->compute(frame.left, frame.right, *disparity);
-            return watch.turn({});
+            return watch.turn({{"threads", cv::getNumThreads()}});
           }};
 }
 
@@ -267,7 +268,14 @@ std::vector<Contender> contenders(const Clip& clip, int disparities, const std::
     list.push_back(banded_frame("egosgm_banded_frame " + setting, clip, with(options, setting), device));
   }
   list.push_back(video_frame(clip, options, device));
-  for (Contender& contender : list) contender.name += place.suffix;
+  for (Contender& contender : list) {
+    contender.name += place.suffix;
+    contender.turn = [turn = contender.turn, units = device.info().compute_units] {
+      Turn result = turn();
+      result.more.try_emplace("threads", units);  // of ours
+      return result;
+    };
+  }
   return list;
 }
 

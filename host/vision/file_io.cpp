@@ -291,7 +291,7 @@ std::string read_file_start(const std::filesystem::path& file, std::size_t bytes
 bool is_stream(const std::filesystem::path& file) { return target_of(file).is_stream(); }
 
 void write_file(const std::filesystem::path& file, std::string_view bytes) {
-  if (before_write) before_write->before_(file, bytes);
+  if (before_write && !before_write->before_(file, bytes)) return;
   const Target target = target_of(file);
   if (target.is_stream()) return write_through(target, file, bytes);
   Unfinished unfinished(target);

@@ -26,11 +26,11 @@ EGOSGM_EXPORT std::string read_file_start(const std::filesystem::path& file, std
 EGOSGM_EXPORT void write_file(const std::filesystem::path& file, std::string_view bytes);
 
 /// While it lives, `before` is called by each write_file of its thread with the file and its bytes, before the file has
-/// them: for a record of files that is never behind them. What `before` throws ends the write. The last one made
-/// counts.
+/// them: for a record of files that is never behind them. It returns whether the file is to be written; what it throws
+/// ends the write. The last one made counts.
 class EGOSGM_EXPORT BeforeWrite {
  public:
-  using Function = std::function<void(const std::filesystem::path& file, std::string_view bytes)>;
+  using Function = std::function<bool(const std::filesystem::path& file, std::string_view bytes)>;
   explicit BeforeWrite(Function before);
   ~BeforeWrite();
   BeforeWrite(const BeforeWrite&) = delete;

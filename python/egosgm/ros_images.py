@@ -26,7 +26,7 @@ def grey_of(message: Any) -> NDArray[Any]:
     if not pixel_bytes:
         known = ", ".join((*_GREY8, *_COLOURS, *_GREY16))
         raise _egosgm.InvalidArgument(f"images of encoding \"{encoding}\" are not read: convert them to one of {known}")
-    if width == 0 or height == 0 or step < width * pixel_bytes or data.size < height * step:
+    if step < width * pixel_bytes or data.size < height * step:
         raise _egosgm.InvalidArgument(f"an image of {width}x{height} px of {encoding} with rows of {step} bytes has {data.size} bytes")
     rows = data[:height * step].reshape(height, step)
     if encoding in _GREY16:

@@ -257,6 +257,14 @@ class OwnFiles(FilesTest):
                 out = self.new_folder()
                 with self.subTest(name=name, option=option):
                     self.assert_refused_and_untouched(out, ["run", "--odometry", self.street, *METHOD, "--out", out, option, out / name], option)
+        folder = self.new_folder()
+        for option in ("--trace", "--save-config"):
+            for name in ("new", "new/out", "new/./out", "new/out/../out"):
+                self.assert_refused_and_untouched(folder, ["run", "--odometry", self.street, *METHOD, "--out", folder / "new/out", option, f"{folder}/{name}"], "is a folder")
+        for command in (["compile", "--out"], ["view", self.street, "--pictures"], [*BatchFiles.batch(self, folder, f"a {self.street}"), "--out"]):
+            for name in ("new", "new/out"):
+                self.assert_refused_and_untouched(folder, [*command, folder / "new/out", "--save-config", folder / name], "or is that folder")
+        self.assertFalse((folder / "new").exists())
         out = self.new_folder()
         self.assert_refused_and_untouched(out, ["run", "--odometry", self.street, *METHOD, "--out", out, "--trace", out / "a", "--save-config", f"{out}/./a"],
                                           "another option")

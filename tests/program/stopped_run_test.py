@@ -299,6 +299,26 @@ class Resume(LongRuns):
             for file, inode in kept.items():
                 self.assertEqual(file.stat().st_ino, inode, f"{file} was there and was written again")
 
+    def test_goes_on_only_with_what_it_would_make_itself(self):
+        """Another image, or other poses in the same file, would make one sequence of two."""
+        street = self.broken_street()
+        poses = street.parent / "mine.txt"
+        rows = (street / "poses.txt").read_text().splitlines()
+        poses.write_text("\n".join(rows) + "\n")
+        run = ["run", "--odometry", street, "--poses", poses, "--quiet", "--resume", "--out"]
+
+        def broken(what):
+            out = self.new_folder() / "out"
+            self.assert_works(*run, out)
+            (out / f"disparity/{FRAMES - 1:06d}.png").unlink()
+            what()
+            before = {file: file.read_bytes() for file in out.rglob("0*.*")}
+            self.assert_refused([*run, out], "--resume", "disparity/000001.png", "--overwrite")
+            self.assertEqual({file: file.read_bytes() for file in out.rglob("0*.*")}, before)
+
+        broken(lambda: poses.write_text("\n".join([rows[0], rows[2], rows[1], rows[3]]) + "\n"))
+        broken(lambda: shutil.copy(street / "image_0/000002.png", street / "image_0/000001.png"))
+
     def test_an_earlier_run_is_in_the_way(self):
         out = self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "color")

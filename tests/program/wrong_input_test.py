@@ -82,6 +82,9 @@ class WrongArguments(ProgramTest):
         self.assert_refused(["synth", "--out", "-h"], "--out: its value is missing", cwd=out)
         self.assertEqual(list(out.iterdir()), [])
 
+    def test_a_name_of_several_lines_is_told_on_one(self):
+        self.assert_refused(["run", "no\nway\x1b[31m\r", "--out", self.folder / "never"], "no way [31m : no such folder")
+
     def test_values_of_another_kind(self):
         self.assert_refused(self.run_with("--quiet=maybe"), "maybe is no value for it")
         for seed in (-1, 10**20):

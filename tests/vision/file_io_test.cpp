@@ -218,20 +218,26 @@ TEST(FileIo, TellsOfAFileBeforeItIsThere) {
   const TemporaryFolder folder;
   std::string told;
   {
-    const BeforeWrite outer([&](const auto&, std::string_view) { told += "outer "; });
+    const BeforeWrite outer([&](const auto&, std::string_view bytes) {
+      told += "outer ";
+      return bytes != "no";
+    });
     {
       const BeforeWrite inner([&](const std::filesystem::path& file, std::string_view bytes) {
         told += file.filename().string() + "=" + std::string(bytes) + (std::filesystem::exists(file) ? " late " : " ");
+        return true;
       });
       write_file(folder / "a", "1");
     }
     write_file(folder / "b", "2");
-    const BeforeWrite none([](const auto&, std::string_view) { throw IoError("no record"); });
+    write_file(folder / "e", "no");
+    const BeforeWrite none([](const auto&, std::string_view) -> bool { throw IoError("no record"); });
     expect_refused<IoError>([&] { write_file(folder / "c", "3"); }, {"no record"});
   }
   write_file(folder / "d", "4");
-  EXPECT_EQ(told, "a=1 outer ");
-  EXPECT_FALSE(std::filesystem::exists(folder / "c"));
+  EXPECT_EQ(told, "a=1 outer outer ");
+  EXPECT_TRUE(std::filesystem::exists(folder / "b"));
+  for (const char* name : {"c", "e"}) EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
 }
 
 TEST(FileIo, LooksWithoutATraceAndMovesAsItWrites) {
