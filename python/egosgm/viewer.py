@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Frames to Rerun, to look at: images, depth, variance, reasons and where the camera was. Needs rerun-sdk (pip install "egosgm[rerun]")."""
+import pathlib
+from typing import Any, Optional
+
+import numpy as np
+
+from . import _egosgm
+from .ros_images import depth_maps
+
+
+class RerunOutput:
+    """Starts the viewer, or writes a recording into a new file."""
+
+    def __init__(self, file: Optional[pathlib.Path] = None) -> None:
+        try:
+            import rerun
+        except ImportError:
+            raise _egosgm.InvalidArgument('the viewer Rerun is a package of its own: pip install "egosgm[rerun]"') from None
+        if file is not None and file.exists():
+            raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name")
+        if file is not None and not file.parent.is_dir():
+            raise _egosgm.InvalidArgument(f"{file}: {file.parent}: no such folder")
+        self._rerun, self._file = rerun, file
+        self._recording = rerun.RecordingStream("egosgm")
+        if file is None:
+            self._recording.spawn()
+        else:
+            self._recording.save(file)
+        self._world_from_camera = np.eye(4)
+        self._log("camera", rerun.ViewCoordinates.RDF, static=True)
+        self._log("camera/image/reason", rerun.AnnotationContext([(i, name) for i, name in enumerate(_egosgm.REASONS)]), static=True)
+
+    def _log(self, name: str, what: Any, static: bool = False) -> None:
+        self._recording.log(name, what, static=static)
+
+    def add(self, frame: Any, maps: _egosgm.Frame, motion: Any, calibration: _egosgm.Calibration) -> None:
+        """frame: of a bag or of run(). motion: from the frame before, a Motion or its matrix, or None."""
+        rerun = self._rerun
+        self._recording.set_time("frame", sequence=frame.number)
+        if hasattr(frame, "stamp_ns"):
+            self._recording.set_time("time", timestamp=np.datetime64(frame.stamp_ns, "ns"))
+        if motion is not None:
+            self._world_from_camera = self._world_from_camera @ np.linalg.inv(getattr(motion, "current_from_previous", motion))
+        height, width = frame.left.shape
+        depth, variance = depth_maps(maps.disparity, maps.variance, calibration)
+        self._log("camera", rerun.Transform3D(translation=self._world_from_camera[:3, 3], mat3x3=self._world_from_camera[:3, :3]))
+        self._log("camera/image", rerun.Pinhole(focal_length=(calibration.fx, calibration.fy), principal_point=(calibration.cx, calibration.cy),
+                                                resolution=(width, height)))
+        self._log("camera/image/left", rerun.Image(frame.left, "L"))
+        self._log("camera/image/depth", rerun.DepthImage(np.nan_to_num(depth), meter=1.0))  # 0: none
+        self._log("maps/variance", rerun.DepthImage(np.nan_to_num(variance)))
+        if maps.reason is not None:
+            self._log("camera/image/reason", rerun.SegmentationImage(maps.reason))
+        self._log("figures/density", rerun.Scalars(maps.report.density))
+        self._log("figures/search_fraction", rerun.Scalars(maps.report.search_fraction))
+
+    def finish(self) -> None:
+        self._recording.flush()
+        self._recording.disconnect()
+
+    def give_up(self) -> None:
+        self.finish()
+        if self._file is not None:
+            self._file.unlink(missing_ok=True)
