@@ -8,7 +8,8 @@
 // a pixel, and none where a lane has a path to itself. Costs come from the codes; there is no cost volume.
 //
 // Three launches: horizontal and vertical paths, one diagonal, the other; forward and backward ones together. They do
-// to a cell's partial sums: first = L0, second = L1; first = mean(first, second), second = L2; first += mean(second, L3).
+// to a cell's partial sums: first = L0, second = L1; first = mean(first, second), second = L2; first += mean(second,
+// L3).
 #include "sgm_cells.h"
 
 // lint: MAX_CHUNKS=8 PATHS=4 CODE_BYTES=8 COST_SCALE=1 COST_SAD=0 LANES=8 LINES=4 VECTOR=16 PIXELS=1
@@ -253,8 +254,8 @@ inline void find_winner(const SgmParameters q, const int x, const int lane, loca
                         global const uint* codes, global const Band* bands, global const uint* offsets,
                         global const uchar* forward_first, global const uchar* forward_second,
                         global const uchar* backward_first, global const uchar* backward_second,
-                        global float* disparities, global float* variances,
-                         global uchar* doubtful, global uint* ranks) {
+                        global float* disparities, global float* variances, global uchar* doubtful,
+                        global uint* ranks) {
   const size_t row_start = ((size_t)get_group_id(2) * q.height + get_group_id(1)) * q.width;
   const bool is_inside = x < q.width;
   const size_t pixel = row_start + (is_inside ? x : 0);
@@ -295,8 +296,8 @@ inline void find_winner(const SgmParameters q, const int x, const int lane, loca
 KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winners(
     const SgmParameters q, global const uint* codes, global const Band* bands, global const uint* offsets,
     global const uchar* forward_first, global const uchar* forward_second, global const uchar* backward_first,
-    global const uchar* backward_second, global float* disparities, global float* variances,
-    global uchar* doubtful, global uint* ranks) {
+    global const uchar* backward_second, global float* disparities, global float* variances, global uchar* doubtful,
+    global uint* ranks) {
   local uint minima[LINES][2 * LANES];
   const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
   const int begin = get_group_id(0) * LINES + line, end = ONE_A_ROW ? q.width : begin + 1;
