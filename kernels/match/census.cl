@@ -67,6 +67,7 @@ inline Code code_at(const int width, const Rows* rows, const int x) {
   return to_8_bit(AT(0, 0));
 #elif COMPARISONS == 1
   Code code = 0;
+#pragma unroll
   for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) {
     for (int dx = -RADIUS_X; dx <= RADIUS_X; ++dx) {
       if (dx != 0 || dy != 0) code = code << 1 | (AT(dx, dy) < AT(0, 0) ? 1 : 0);
