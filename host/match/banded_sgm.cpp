@@ -56,8 +56,8 @@ struct Demand {
   std::uint64_t largest_buffer, total;
 };
 
-Demand demand(shared::ImageSize size, shared::DisparityRange range, bool paths) {
-  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(size, range) : sum_bytes(size, range);
+Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, bool paths) {
+  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, range);
   const std::uint64_t ranks = ReadOff::bytes(size, BandedSgm::code_padding(range));
   if (paths) return {sums, 4 * sums + ranks};
   const std::uint64_t slots = slot_bytes(size, range), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
@@ -77,7 +77,7 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
   const std::uint64_t chosen = static_cast<std::uint64_t>(options.max_memory_mib) << 20;
   const std::uint64_t total_limit = chosen > 0 ? std::min(chosen, device_limit) : device_limit;
   const auto fits = [&](int rows, std::uint64_t copies) {
-    const Demand needs = demand({size.width, rows}, range, paths);
+    const Demand needs = demand(context, {size.width, rows}, range, paths);
     return needs.largest_buffer <= context.max_allocation_bytes() && needs.total + copies <= total_limit;
   };
   if (fits(size.height, 0)) return size.height;
@@ -86,7 +86,7 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
   while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
   const int least = 3 * BandedSgm::kStripeOverlap;
   if (rows >= least) return rows;
-  const std::uint64_t needed = demand({size.width, std::min(size.height, least)}, range, paths).total;
+  const std::uint64_t needed = demand(context, {size.width, std::min(size.height, least)}, range, paths).total;
   throw DeviceError(
       CL_MEM_OBJECT_ALLOCATION_FAILURE,
       "BandedSgm: a stripe of " + std::to_string(std::min(size.height, least)) + " rows needs " +

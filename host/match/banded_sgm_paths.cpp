@@ -13,39 +13,48 @@ namespace {
 constexpr int kStraight = 0;
 constexpr int kDiagonals[] = {1, 2};
 
-constexpr int kQuad = 4;
+// Disparities of a work-item at once: where work-items are lanes of a GPU, and where they hold vectors.
+constexpr int kQuad = 4, kVector = 16;
 constexpr int kGroupSize = 32;
 
 int groups_of(int lines, int lines_a_group) { return (lines + lines_a_group - 1) / lines_a_group; }
 
+bool is_gpu(const ocl::Context& context) { return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU; }
+
+int vector_of(const ocl::Context& context) { return is_gpu(context) ? kQuad : kVector; }
+
+/// A pixel's vectors hold so many cells more than its band, which may begin and end within one.
+int spare_cells(int vector) { return vector == kQuad ? kQuad : vector + EGOSGM_LANES; }
+
 const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
                          BandedSgmPaths::Group group) {
-  return context.program("banded_sgm_paths.cl", ocl::Defines()
-                                                    .set("MAX_CHUNKS", SearchBand::max_chunks(range))
-                                                    .set("PATHS", options.paths)
-                                                    .set("CODE_BYTES", 4 * Census::words(options.cost))
-                                                    .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
-                                                    .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
-                                                    .set("LANES", group.lanes)
-                                                    .set("LINES", group.lines)
-                                                    .set("PIXELS", 1));
+  ocl::Defines defines;
+  defines.set("MAX_CHUNKS", SearchBand::max_chunks(range))
+      .set("PATHS", options.paths)
+      .set("CODE_BYTES", 4 * Census::words(options.cost))
+      .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
+      .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
+      .set("LANES", group.lanes)
+      .set("LINES", group.lines)
+      .set("VECTOR", vector_of(context))
+      .set("PIXELS", 1);
+  return context.program("banded_sgm_paths.cl", defines);
 }
 
 }  // namespace
 
 BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range) {
-  // A GPU holds more work-items than an image's paths have with a few quads each.
-  const bool is_gpu = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU;
-  const int quads_a_lane = is_gpu ? 1 : 4;
-  const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), is_gpu ? kGroupSize : 256));
+  if (!is_gpu(context)) return {1, 1};
+  const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), kGroupSize));
   const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / kQuad;
   int lanes = 1;
-  while (lanes * quads_a_lane < quads && 2 * lanes <= limit) lanes *= 2;
-  return {lanes, std::max(1, std::min(limit, kGroupSize) / lanes)};
+  while (lanes < quads && 2 * lanes <= limit) lanes *= 2;
+  return {lanes, limit / lanes};
 }
 
-std::size_t BandedSgmPaths::sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
-  return 2 * pixel_count(size) * (SearchBand::max_chunks(range) * EGOSGM_LANES + kQuad);
+std::size_t BandedSgmPaths::sum_bytes(const ocl::Context& context, shared::ImageSize size,
+                                      shared::DisparityRange range) {
+  return 2 * pixel_count(size) * (SearchBand::max_chunks(range) * EGOSGM_LANES + spare_cells(vector_of(context)));
 }
 
 BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
@@ -54,10 +63,10 @@ BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, sh
       size_(size),
       paths_(options.paths),
       group_(group),
-      forward_first_(context, sum_bytes(size, range)),
-      forward_second_(context, sum_bytes(size, range)),
-      backward_first_(context, sum_bytes(size, range)),
-      backward_second_(context, sum_bytes(size, range)),
+      forward_first_(context, sum_bytes(context, size, range)),
+      forward_second_(context, sum_bytes(context, size, range)),
+      backward_first_(context, sum_bytes(context, size, range)),
+      backward_second_(context, sum_bytes(context, size, range)),
       follow_paths_(build(context, range, options, group), "follow_paths"),
       find_winners_(build(context, range, options, group), "find_winners") {}
 
@@ -79,8 +88,8 @@ void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const M
     for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);
   }
   const int work_items = group_.lanes * group_.lines;
-  const ocl::Range pixels{cl::NDRange(static_cast<std::size_t>(groups_of(size_.width, group_.lines)) * work_items,
-                                      size_.height, count(views)),
+  const int groups_a_row = work_items == 1 ? 1 : groups_of(size_.width, group_.lines);
+  const ocl::Range pixels{cl::NDRange(static_cast<std::size_t>(groups_a_row) * work_items, size_.height, count(views)),
                           cl::NDRange(work_items, 1, 1)};
   find_winners_(context_, pixels, parameters, inputs.codes, inputs.bands.bands, inputs.bands.cell_offsets,
                 forward_first_, forward_second_, backward_first_, backward_second_, measured.disparity,

@@ -24,11 +24,12 @@ class BandedSgmPaths {
   void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
                   ocl::Buffer<cl_uint>& ranks, Views views);
 
-  /// A quad of disparities a lane on GPUs, else a few, and a group that fills a GPU's smallest unit, as far as the
-  /// device allows it.
+  /// On GPUs four disparities a lane, and a group that fills the smallest unit, as far as the device allows it;
+  /// elsewhere work-items of their own, which wait for nobody.
   static Group default_group(const ocl::Context& context, shared::DisparityRange range);
-  /// Of one of the four buffers of partial sums: a byte a cell, and a quad a pixel, whose band may begin within one.
-  static std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range);
+  /// Of one of the four buffers of partial sums: a byte a cell, and what the last vector of a pixel holds beyond its
+  /// band.
+  static std::size_t sum_bytes(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
 
  private:
   using Parameters = const shared::SgmParameters;

@@ -3,6 +3,7 @@
 #ifndef EGOSGM_KERNELS_MATCH_COST_H
 #define EGOSGM_KERNELS_MATCH_COST_H
 
+#include "bit_count.h"
 #include "lanes.h"
 #include "method.h"
 
@@ -25,14 +26,6 @@ typedef struct __attribute__((packed)) {
 inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
 inline ChunkCodes load_chunk_codes(global const Code* from) { return ((global const PackedChunkCodes*)from)->codes; }
 
-// Bits set in each code; compilers know this form and use what the device has.
-#define REPEATED(Codes, byte) ((Codes)(~(Code)0 / 255 * (byte)))
-#define BIT_COUNT(Codes, x)                                                    \
-  x -= x >> (Codes)(1) & REPEATED(Codes, 0x55);                                \
-  x = (x & REPEATED(Codes, 0x33)) + (x >> (Codes)(2) & REPEATED(Codes, 0x33)); \
-  x = (x + (x >> (Codes)(4))) & REPEATED(Codes, 0x0f);                         \
-  x = x * REPEATED(Codes, 0x01) >> (Codes)(8 * CODE_BYTES - 8)
-
 // Matching cost of 16 disparities, or 8. `own` and `other` point at the pixel's code and at the first disparity's in
 // their padded rows, which run in opposite directions.
 #if COST_SAD
@@ -46,7 +39,6 @@ inline ChunkCodes load_chunk_codes(global const Code* from) { return ((global co
   }                                                                                       \
   return convert_uchar##N(min(sum / (ushort)9, (ushort##N)(EGOSGM_MAX_COST)))
 #else
-// A product would melt into the bit count, which compilers then do not know any more.
 #define MATCHING_COST(N, Codes, load)            \
   Codes x = (Codes)(own[0]) ^ load(other);       \
   BIT_COUNT(Codes, x);                           \

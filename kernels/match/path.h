@@ -3,6 +3,8 @@
 #ifndef EGOSGM_KERNELS_MATCH_PATH_H
 #define EGOSGM_KERNELS_MATCH_PATH_H
 
+#include "vector.h"
+
 // A way across the image: first pixel and number of pixels, seen in the direction of a forward sweep.
 typedef struct {
   int x, y, length;
@@ -24,7 +26,7 @@ typedef struct {
 } Path;
 
 // A pixel on it: P2 of the step to it, which lanes of the range its band holds, [first, end), none beyond the end of
-// the path, and the place of the cells of the quads that they lie in.
+// the path, and the place of the cells of the vectors that they lie in.
 typedef struct {
   int p2;
   int first, end;
@@ -34,7 +36,7 @@ typedef struct {
 // A pixel's code and those of what it may match; with COST_SAD, the costs themselves in `others`.
 typedef struct {
   Code own;
-  Codes others[QUADS_A_LANE];
+  Codes others[VECTORS_A_LANE];
 } Matches;
 
 // Directions: 0 from the left, 1 from above, 2 from the upper left, 3 from the upper right.

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the paths leave of a pixel, and what is read off it (banded_sgm_paths.cl). OpenCL C only.
+#ifndef EGOSGM_KERNELS_MATCH_PATH_SUMS_H
+#define EGOSGM_KERNELS_MATCH_PATH_SUMS_H
+
+#include "vector.h"
+
+#define MAX_STEPS 8
+#define NO_WINNER 0xffffffffu
+
+// The partial sums of a pixel's cells, and which of them exist, [first, end).
+typedef struct {
+  global const uchar *forward_first, *forward_second, *backward_first, *backward_second;
+  int first, end;
+} Cells;
+
+// Half the sums over all paths, of a vector of cells.
+inline Totals totals_of(const Cells cells, const int at) {
+  Bytes forward = load(cells.forward_first + at), backward = load(cells.backward_first + at);
+#if PATHS == 4
+  forward = add_sat(forward, load(cells.forward_second + at));
+  backward = add_sat(backward, load(cells.backward_second + at));
+#endif
+  return TOTALS_OF(forward) + TOTALS_OF(backward);
+}
+
+// The same in the upper halves, the index in the lower ones, so that the smallest disparity wins a tie; NO_WINNER
+// outside of the band.
+inline Ranks allowed_of(const Cells cells, const int at, const int first, const int last) {
+  const Ranks index = (Ranks)((uint)at) + (Ranks)(INDEX);
+  const Ranks ranked = RANKS_OF(totals_of(cells, at)) << (Ranks)(16) | index;
+  return index < (Ranks)((uint)first) || index > (Ranks)((uint)last) ? (Ranks)(NO_WINNER) : ranked;
+}
+
+// The total of one.
+inline int total_of(const Cells cells, const int at) {
+  uchar forward = cells.forward_first[at], backward = cells.backward_first[at];
+#if PATHS == 4
+  forward = add_sat(forward, cells.forward_second[at]);
+  backward = add_sat(backward, cells.backward_second[at]);
+#endif
+  return (int)forward + backward;
+}
+
+// Steps to one side of the winner until the sums above its own add up to `limit`.
+inline int count_steps(const Cells cells, const int winner, const int total, const int step, const int limit) {
+  int sum = 0, steps = 0;
+  for (int at = winner + step; steps < MAX_STEPS && at >= cells.first && at < cells.end; at += step) {
+    sum += max(0, total_of(cells, at) - total);
+    if (sum >= limit) break;
+    ++steps;
+  }
+  return steps;
+}
+
+#endif

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a work-item of banded_sgm_paths.cl computes at once: VECTOR neighbouring disparities of a pixel, 4 where
+// work-items are lanes themselves, 16 for CPUs. OpenCL C only.
+#ifndef EGOSGM_KERNELS_MATCH_VECTOR_H
+#define EGOSGM_KERNELS_MATCH_VECTOR_H
+
+#include "bit_count.h"
+#include "method.h"
+
+#if CODE_BYTES == 4
+typedef uint Code;
+#define CODE uint
+#else
+typedef ulong Code;
+#define CODE ulong
+#endif
+
+#define JOINED(type, number) type##number
+#define OF(type, number) JOINED(type, number)
+typedef OF(CODE, VECTOR) Codes;
+typedef OF(uchar, VECTOR) Bytes;
+typedef OF(ushort, VECTOR) Totals;
+typedef OF(uint, VECTOR) Ranks;
+#define BYTES_OF OF(convert_uchar, VECTOR)
+#define TOTALS_OF OF(convert_ushort, VECTOR)
+#define RANKS_OF OF(convert_uint, VECTOR)
+
+#if VECTOR == 4
+// Path costs in 32 bits, which a work-item of a GPU computes in.
+typedef int4 Costs;
+#define COSTS_OF convert_int4
+#define INDEX 0, 1, 2, 3
+#define BEHIND(edge, v) (Costs)(edge, (v).xyz)
+#define AHEAD(v, edge) (Costs)((v).yzw, edge)
+#define LAST(v) (v).w
+#define BACKWARD(v) (v).wzyx
+inline uint least_rank(const Ranks v) { return min(min(v.x, v.y), min(v.z, v.w)); }
+inline int least_cost(const Costs v) { return min(min(v.x, v.y), min(v.z, v.w)); }
+
+inline Codes load_codes(global const Code* from) { return vload4(0, from); }
+inline Bytes load(global const uchar* from) { return *(global const Bytes*)from; }
+inline void store(const Bytes bytes, global uchar* to) { *(global Bytes*)to = bytes; }
+#else
+typedef short16 Costs;
+#define COSTS_OF convert_short16
+#define INDEX 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15
+#define BEHIND(edge, v) (Costs)(edge, (v).s0123, (v).s4567, (v).s89ab, (v).scd, (v).se)
+#define AHEAD(v, edge) (Costs)((v).s1234, (v).s5678, (v).s9abc, (v).sde, (v).sf, edge)
+#define LAST(v) (v).sf
+#define BACKWARD(v) (v).sfedcba9876543210
+inline uint least_rank(const Ranks v) {
+  const uint8 a = min(v.lo, v.hi);
+  const uint4 b = min(a.lo, a.hi);
+  return min(min(b.x, b.y), min(b.z, b.w));
+}
+inline int least_cost(const Costs v) {
+  const short8 a = min(v.lo, v.hi);
+  const short4 b = min(a.lo, a.hi);
+  return min(min(b.x, b.y), min(b.z, b.w));
+}
+
+// vload16 and vstore16 go byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access.
+typedef struct __attribute__((packed)) {
+  Codes codes;
+} PackedCodes;
+typedef struct __attribute__((packed)) {
+  Bytes bytes;
+} PackedVector;
+inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
+inline Bytes load(global const uchar* from) { return ((global const PackedVector*)from)->bytes; }
+inline void store(const Bytes bytes, global uchar* to) { ((global PackedVector*)to)->bytes = bytes; }
+#endif
+
+typedef struct __attribute__((packed)) {
+  Ranks ranks;
+} PackedRanks;
+
+// (a + b + 1) / 2; rhadd goes a longer way on some compilers (PoCL 3.1).
+inline Bytes mean(const Bytes a, const Bytes b) {
+  return BYTES_OF((TOTALS_OF(a) + TOTALS_OF(b) + (Totals)(1)) >> (Totals)(1));
+}
+
+// The matching costs of a pixel whose code is `own` with those whose codes are `others`; with COST_SAD these are the
+// costs.
+inline Costs cost_of(const Code own, const Codes others) {
+#if COST_SAD
+  return COSTS_OF(others);
+#elif VECTOR == 4
+  return COSTS_OF(popcount((Codes)(own) ^ others)) * COST_SCALE;
+#else
+  Codes x = (Codes)(own) ^ others;
+  BIT_COUNT(Codes, x);
+  return COSTS_OF(x) * (Costs)(COST_SCALE);
+#endif
+}
+
+// The codes of a vector of matches from `other` on; with COST_SAD their costs. `y`: the pixel's row.
+inline Codes fetch_vector(const SgmParameters q, global const Code* own, global const Code* other, const int y) {
+#if COST_SAD
+  const long stride = (long)q.width + 2 * (long)q.padding;
+  const long above = y > 0 ? -stride : 0, below = y + 1 < q.height ? stride : 0;
+  Codes sum = 0;
+  for (int dx = -1; dx <= 1; ++dx) {
+    sum += abs_diff((Codes)(own[above + dx]), load_codes(other + above - dx)) +
+           abs_diff((Codes)(own[dx]), load_codes(other - dx)) +
+           abs_diff((Codes)(own[below + dx]), load_codes(other + below - dx));
+  }
+  return min(sum / (Codes)(9), (Codes)(EGOSGM_MAX_COST));
+#else
+  return load_codes(other);
+#endif
+}
+
+#endif
