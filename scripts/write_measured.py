@@ -5,7 +5,8 @@ could change.
 
   scripts/write_measured.py           writes the page
   scripts/write_measured.py --check   exit code 1 where the page is not what would be written, 77 where there is nothing to write it from
-scripts/measure runs the benches. All of one page must come from one commit without changes, or it is refused.
+scripts/measure runs the benches. All of one page must come from one commit without changes, or it is refused. The table of scripts/drivers
+(build/lanes/drivers.json, to be put beside the others) names its own.
 """
 import argparse
 import json
@@ -14,6 +15,7 @@ import sys
 
 DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs"
 FILES = ("accuracy", "video", "compare", "stages")
+DRIVERS = "drivers"  # of scripts/drivers, which runs apart: of a commit of its own, and it may be missing
 CONTENDERS = {
     "opencv_hh": "OpenCV MODE_HH, 8 paths, left view",
     "opencv_hh4": "OpenCV MODE_HH4, 4 paths, left view",
@@ -45,15 +47,23 @@ def read(folder):
     missing = [name for name in FILES if not (folder / f"{name}.json").exists()]
     if missing:
         raise FileNotFoundError(", ".join(f"{folder / name}.json" for name in missing))
-    others = sorted(file.name for file in folder.iterdir() if file.stem not in FILES)
+    others = sorted(file.name for file in folder.iterdir() if file.stem not in (*FILES, DRIVERS))
     if others:
         raise Refused(f"{folder}: the page is not made from {', '.join(others)}: remove what is left of other runs")
-    return {name: json.loads((folder / f"{name}.json").read_text()) for name in FILES}
+    present = [name for name in (*FILES, DRIVERS) if (folder / f"{name}.json").exists()]
+    return {name: json.loads((folder / f"{name}.json").read_text()) for name in present}
+
+
+def is_clean(commit):
+    return not commit.endswith("-dirty") and commit != "unknown"
 
 
 def expect_one_commit(found):
+    if DRIVERS in found and not is_clean(found[DRIVERS]["commit"]):
+        raise Refused(f"{DRIVERS}.json: not of a commit without changes: run scripts/drivers on a clean checkout")
+    found = {name: found[name] for name in FILES}
     commits = {name: content["commit"] for name, content in found.items()}
-    if len(set(commits.values())) != 1 or any(commit.endswith("-dirty") or commit == "unknown" for commit in commits.values()):
+    if len(set(commits.values())) != 1 or not all(map(is_clean, commits.values())):
         raise Refused(f"not of one commit without changes: {commits}: run scripts/measure on a clean checkout")
     devices = {(content["device"], content["driver"]) for content in found.values()}
     if len(devices) != 1:
@@ -128,6 +138,15 @@ def stages(content):
     return "## Stages\n\nOf a steady frame, stage by stage, and by rooms.\n\n" + table(["stage", "size, D", "time", "on the device", "GB/s"], rows)
 
 
+def drivers(content):
+    text = (f"## Other drivers\n\n`scripts/drivers`, commit {content['commit']}, {content['date'][:10]}. Maps are those of whole runs. A run is that of a "
+            "short street, its time that of the clock; the first one compiles. The ratio is that of the stages of a steady frame, of turns: the median, and the "
+            "least and the largest.\n\n")
+    rule = "| " + " | ".join("---" for _ in content["headings"]) + " |"
+    lines = ["| " + " | ".join(row) + " |" for row in [content["headings"], *content["rows"]]]
+    return text + "\n".join([lines[0], rule, *lines[1:]]) + "\n"
+
+
 def page(found):
     expect_one_commit(found)
     machine = found["compare"]
@@ -135,7 +154,8 @@ def page(found):
             f"{machine['device']}, {machine['compute_units']} compute units, {machine['version']}, driver {machine['driver']}; commit {machine['commit']}; "
             f"{machine['date'][:10]}. Speed on {machine['input']}.\n`scripts/measure` runs all of it again. \"Search\" counts every cell that is matched "
             "([how much is searched](how-it-works.md#how-much-is-searched)).\n")
-    return "\n".join([head, accuracy(found["accuracy"]), video(found["video"]), speed(found["compare"]), stages(found["stages"])])
+    parts = [head, accuracy(found["accuracy"]), video(found["video"]), speed(found["compare"]), stages(found["stages"])]
+    return "\n".join(parts + ([drivers(found[DRIVERS])] if DRIVERS in found else []))
 
 
 def results(found):
