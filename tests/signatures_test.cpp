@@ -50,6 +50,14 @@ TEST_F(Signatures, RefusesAnotherConst) {
   EXPECT_THROW((ocl::Kernel<Size, const cl_uint, In, const Out>(program_, "add")), std::logic_error);
 }
 
+TEST_F(Signatures, AreThoseOfSourcesAlone) {
+  const cl::Program::Binaries binaries = program_.getInfo<CL_PROGRAM_BINARIES>();
+  cl::Program compiled(context_.get(), {context_.device()}, binaries);
+  compiled.build({context_.device()}, "-cl-std=CL1.2 -cl-kernel-arg-info");
+  EXPECT_NO_THROW((ocl::Kernel<Size, const cl_int, ocl::Buffer<cl_uchar>, Out>(compiled, "add")));
+  EXPECT_THROW((ocl::Kernel<Size, const cl_int, Out>(compiled, "add")), std::logic_error) << "another count";
+}
+
 TEST_F(Signatures, RefusesAnotherCount) {
   EXPECT_THROW((ocl::Kernel<Size, const cl_uint, In>(program_, "add")), std::logic_error);
 }
