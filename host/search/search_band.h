@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {
@@ -22,8 +22,8 @@ struct SearchBands {
 /// A predicted pixel searches d +- max(min_half_width_px, sigmas * sqrt(p)), another one the range that the predictions
 /// around it span, one with none near everything. Where CoarseMatch found disparities beyond that by more than
 /// coarse_tolerance_px, as on an object that moves by itself, the band reaches there too. Bands hold one chunk of
-/// EGOSGM_LANES lanes, or an even number of chunks; lanes outside of the disparity range, which there may be at its end,
-/// do not exist for BandedSgm.
+/// EGOSGM_LANES lanes, or an even number of chunks; lanes outside of the disparity range, which there may be at its
+/// end, do not exist for BandedSgm.
 class SearchBand {
  public:
   /// `row_group`: work-items that share a row when chunks are summed up; 0: one on a CPU, many elsewhere. Same bits.
@@ -54,6 +54,7 @@ class SearchBand {
 
   using Disparities = const ocl::Buffer<float>;
   using Ranges = ocl::Buffer<shared::BlockRange>;
+  using States = ocl::Buffer<shared::PredictionState>;
 
   ocl::Context& context_;
   const shared::ImageSize size_, blocks_;
@@ -62,17 +63,16 @@ class SearchBand {
   const int row_group_;
   Ranges block_ranges_, coarse_ranges_, none_, found_;
   ocl::Buffer<shared::Band> block_bands_;
+  States not_wrong_;  // in place of the state of the frame before
   ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_blocks_;
   ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_coarse_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const cl_int, const float, const cl_int,
-              const float, const Ranges, const Ranges, Ranges, ocl::Buffer<shared::Band>>
+              const float, const States, const Ranges, const Ranges, Ranges, ocl::Buffer<shared::Band>>
       bands_of_blocks_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
-              const float, const float, const Ranges, const ocl::Buffer<shared::Band>, ocl::Buffer<shared::Band>>
-      bands_of_pixels_;
-  ocl::Kernel<const shared::ImageSize, const shared::Band, const ocl::Buffer<shared::PredictionState>,
+              const float, const float, const States, const Ranges, const ocl::Buffer<shared::Band>,
               ocl::Buffer<shared::Band>>
-      widen_;
+      bands_of_pixels_;
   ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
               ocl::Buffer<shared::RowSum>>
       sum_rows_;

@@ -82,10 +82,12 @@ KERNEL void gather_coarse(const ImageSize size, global const float* coarse, glob
 
 // The band of a block's unpredicted pixels: what the predictions in the 3x3 blocks around it and the coarse match span.
 // `found`: what the block's own predictions and the coarse match span, for the predicted ones: beside a jump a
-// prediction may lie on the wrong side of it. A work-item a block and view.
+// prediction may lie on the wrong side of it. `before`: of the frame before; after wrong predictions every pixel searches
+// everything. A work-item a block and view.
 KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
                             const float margin, const int min_count, const float coarse_margin,
-                            global const BlockRange* ranges, global const BlockRange* coarse_ranges,
+                            global const PredictionState* before, global const BlockRange* ranges,
+                            global const BlockRange* coarse_ranges,
                             global BlockRange* found, global Band* bands) {
   const ImageSize blocks = blocks_of(size);
   const int x = get_global_id(0);
@@ -112,7 +114,7 @@ KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, co
   if (has_coarse) both = coarse;
   found[here] = joined(both, ranges[here]);
 
-  const bool has_any = from_neighbours && (has_around || has_coarse);
+  const bool has_any = from_neighbours && (has_around || has_coarse) && !before->is_wrong;
   float from = has_any ? INFINITY : -INFINITY;
   float to = -from;
   if (has_any && has_around) {
@@ -129,8 +131,8 @@ KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, co
 // A work-item a block's row of pixels and view.
 KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
-                            const float coarse_tolerance, const float coarse_margin, global const BlockRange* found,
-                            global const Band* block_bands, global Band* bands) {
+                            const float coarse_tolerance, const float coarse_margin, global const PredictionState* before,
+                            global const BlockRange* found, global const Band* block_bands, global Band* bands) {
   const ImageSize blocks = blocks_of(size);
   const int block = get_global_id(0);
   const int y = get_global_id(1);
@@ -141,7 +143,7 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   const size_t row = ((size_t)view * size.height + y) * size.width;
   const float8 d = eight(disparity + row, x, size.width);
   const float8 deviation = sigmas * sqrt(eight(variance + row, x, size.width));
-  const int8 predicted = d > EGOSGM_INVALID_DISPARITY;
+  const int8 predicted = (d > EGOSGM_INVALID_DISPARITY) & (before->is_wrong ? (int8)0 : (int8)-1);
   // A variance that is not a number searches everything.
   const float8 half_width = deviation <= min_half_width ? (float8)min_half_width : deviation;
   const float8 reach = half_width <= (float)range.count ? half_width : (float8)range.count;
@@ -262,13 +264,6 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
 }
 
 #endif
-
-// Every pixel searches everything after predictions that were wrong. A work-item a row.
-KERNEL void widen(const ImageSize size, const Band band, global const PredictionState* last, global Band* bands) {
-  const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width;
-  const int count = last->is_wrong ? size.width : 0;
-  for (int x = 0; x < count; ++x) bands[row + x] = band;
-}
 
 // `band`: the one of every pixel.
 KERNEL void full_range(const ImageSize size, const Band band, global Band* bands, global uint* cell_offsets,
