@@ -1,31 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded drives of robots: `egosgm run --bag`, or python -m egosgm.bag. ROS 2's MCAP and SQLite, and ROS 1's bags, by rosbags."""
-import argparse
+"""Recorded drives of robots: ROS 2's MCAP and SQLite, and ROS 1's bags, by rosbags."""
 import collections
 import contextlib
 import dataclasses
 import math
 import os
 import pathlib
-import sys
-from typing import Any, Callable, Deque, Dict, Iterator, List, NoReturn, Optional, Sequence, Tuple
+from typing import Any, Callable, Deque, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
-from .ros_images import (BODY_FROM_OPTICAL, Cameras, are_raw, depth_maps, grey_of, quaternion_of, ros_disparity, rotation_of, stamp_ns)
+from .ros_images import BODY_FROM_OPTICAL, Cameras, are_raw, grey_of, needs, quaternion_of, rotation_of, stamp_ns
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
-
-
-def _needs(module: str) -> Any:
-    import importlib
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        raise _egosgm.InvalidArgument('bags need the packages rosbags and mcap: pip install "egosgm[bag]"') from None
 
 
 @dataclasses.dataclass
@@ -127,7 +117,7 @@ class Bag:
 
     def __init__(self, path: "str | os.PathLike[str]", left_topic: str, right_topic: str, info_topics: Sequence[str] = (),
                  pose_topic: str = "", max_skew_ms: float = 0.0, rectify: Optional[bool] = None, pose_axes: str = "body") -> None:
-        highlevel = _needs("rosbags.highlevel")
+        highlevel = needs("rosbags.highlevel")
         self.path = pathlib.Path(path)
         if not (self.path.is_file() or self.path.is_dir()):
             raise _egosgm.InvalidArgument(f"{self.path}: no such file or folder: give a .mcap, a .bag, or a bag's folder")
@@ -138,7 +128,7 @@ class Bag:
         if pose_axes not in ("body", "optical"):
             raise _egosgm.InvalidArgument(f"pose axes \"{pose_axes}\": choose body (x forward, z up) or optical (z forward, y down)")
         self._highlevel = highlevel
-        self._default_types = _needs("rosbags.typesys")
+        self._default_types = needs("rosbags.typesys")
         self.images = left_topic, right_topic
         self.infos = tuple(info_topics) or tuple(_info_topic(topic) for topic in self.images)
         self._pose_topic, self._bound_ns, self._rectify, self._pose_axes = pose_topic, int(max_skew_ms * 1e6), rectify, pose_axes
@@ -274,130 +264,9 @@ def _pose_at(poses: List[Tuple[int, NDArray[np.float64]]], stamp: int) -> Option
     return result
 
 
-class McapOutput:
-    """Depth, disparity, variance, odometry and camera infos as a ROS 2 MCAP file, which appears when all of it is there."""
-
-    def __init__(self, file: pathlib.Path, disparities: int) -> None:
-        writer = _needs("mcap.writer")
-        typesys = _needs("rosbags.typesys")
-        if not file.parent.is_dir():
-            raise _egosgm.InvalidArgument(f"{file}: {file.parent}: no such folder")
-        self._file, self._disparities = file, disparities
-        self._part = file.with_name(file.name + ".part")
-        for there in (self._file, self._part):
-            self._expect_free(there)
-        self._store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-        self._types = self._store.types
-        self._stream = open(self._part, "xb")
-        self._writer = writer.Writer(self._stream)
-        self._writer.start(profile="ros2", library="egosgm")
-        self._schemas: Dict[str, int] = {}
-        self._channels: Dict[str, int] = {}
-        self._world_from_camera = np.eye(4)
-
-    @staticmethod
-    def _expect_free(file: pathlib.Path) -> None:
-        if os.path.lexists(file):
-            raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name, or remove it first")
-
-    def _write(self, topic: str, kind: str, message: Any, time: int) -> None:
-        if kind not in self._schemas:
-            text = self._store.generate_msgdef(kind, ros_version=2)[0]
-            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text.encode())
-        if topic not in self._channels:
-            self._channels[topic] = self._writer.register_channel(topic, "cdr", self._schemas[kind])
-        self._writer.add_message(self._channels[topic], time, bytes(self._store.serialize_cdr(message, kind)), time)
-
-    def _header(self, time: int, frame_id: str) -> Any:
-        stamp = self._types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
-        return self._types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame_id)
-
-    def _image(self, header: Any, map_: NDArray[Any], encoding: str) -> Any:
-        height, width = map_.shape
-        return self._types["sensor_msgs/msg/Image"](header=header, height=height, width=width, encoding=encoding, is_bigendian=0,
-                                                    step=width * map_.itemsize, data=np.ascontiguousarray(map_).view(np.uint8).reshape(-1))
-
-    def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
-        time, types = frame.stamp_ns, self._types
-        header = self._header(time, frame.frame_id)
-        depth, variance = depth_maps(maps.disparity, maps.variance, calibration)
-        self._write("/egosgm/depth", "sensor_msgs/msg/Image", self._image(header, depth, "32FC1"), time)
-        self._write("/egosgm/variance", "sensor_msgs/msg/Image", self._image(header, variance, "32FC1"), time)
-        height, width = depth.shape
-        region = types["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=height, width=width, do_rectify=False)
-        self._write("/egosgm/disparity", "stereo_msgs/msg/DisparityImage", types["stereo_msgs/msg/DisparityImage"](
-            header=header, image=self._image(header, ros_disparity(maps.disparity, calibration), "32FC1"), f=calibration.fx,
-            t=calibration.baseline_m, valid_window=region, min_disparity=max(0.0, calibration.doffs_px),
-            max_disparity=self._disparities - 1 + calibration.doffs_px, delta_d=0.0), time)
-        reason = getattr(maps, "reason", None)
-        if reason is not None:
-            self._write("/egosgm/reason", "sensor_msgs/msg/Image", self._image(header, reason, "mono8"), time)
-        for side, shift in (("left", 0.0), ("right", -calibration.fx * calibration.baseline_m)):
-            self._write(f"/egosgm/{side}/camera_info", "sensor_msgs/msg/CameraInfo", self._info(header, calibration, shift, width, height, region), time)
-        if motion is not None:
-            self._world_from_camera = self._world_from_camera @ np.linalg.inv(motion)
-        self._write("/egosgm/odom", "nav_msgs/msg/Odometry", self._odometry(header), time)
-
-    def _info(self, header: Any, c: _egosgm.Calibration, shift: float, width: int, height: int, region: Any) -> Any:
-        cx = c.cx + (c.doffs_px if shift else 0.0)
-        return self._types["sensor_msgs/msg/CameraInfo"](
-            header=header, height=height, width=width, distortion_model="plumb_bob", d=np.zeros(5), k=np.array([c.fx, 0, cx, 0, c.fy, c.cy, 0, 0, 1.0]),
-            r=np.eye(3).reshape(-1), p=np.array([c.fx, 0, cx, shift, 0, c.fy, c.cy, 0, 0, 0, 1.0, 0]), binning_x=0, binning_y=0, roi=region)
-
-    def _odometry(self, header: Any) -> Any:
-        types = self._types
-        pose = BODY_FROM_OPTICAL @ self._world_from_camera @ BODY_FROM_OPTICAL.T
-        x, y, z, w = quaternion_of(pose[:3, :3])
-        vector, zero = types["geometry_msgs/msg/Vector3"], np.zeros(36)
-        return types["nav_msgs/msg/Odometry"](
-            header=types["std_msgs/msg/Header"](stamp=header.stamp, frame_id="odom"), child_frame_id="egosgm_camera",
-            pose=types["geometry_msgs/msg/PoseWithCovariance"](pose=types["geometry_msgs/msg/Pose"](
-                position=types["geometry_msgs/msg/Point"](x=pose[0, 3], y=pose[1, 3], z=pose[2, 3]),
-                orientation=types["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w)), covariance=zero),
-            twist=types["geometry_msgs/msg/TwistWithCovariance"](twist=types["geometry_msgs/msg/Twist"](
-                linear=vector(x=0.0, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=0.0)), covariance=zero))
-
-    def finish(self) -> None:
-        self._writer.finish()
-        self._stream.close()
-        self._expect_free(self._file)  # others may have been quicker
-        os.replace(self._part, self._file)
-
-    def give_up(self) -> None:
-        self._part.unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # of a full disk
-            self._stream.close()
-
-
-class FolderOutput:
-    """disparity/NUMBER.png as the program writes them, and the calibration of the rectified images."""
-
-    def __init__(self, folder: pathlib.Path) -> None:
-        self._folder = folder
-        if os.path.lexists(folder) and not folder.is_dir():
-            raise _egosgm.InvalidArgument(f"{folder}: is no folder: give a new one, or a name that ends in .mcap")
-        if folder.exists() and any(folder.iterdir()):
-            raise _egosgm.InvalidArgument(f"{folder}: holds files already: give a new folder")
-        (folder / "disparity").mkdir(parents=True, exist_ok=True)
-
-    def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
-        if frame.number == 0:
-            _egosgm.write_calibration(self._folder / "calibration.txt", calibration)
-        _egosgm.write_disparity(self._folder / "disparity" / f"{frame.number:06d}.png", maps.disparity)
-
-    def finish(self) -> None:
-        pass
-
-    def give_up(self) -> None:
-        """What was written is whole, and stays."""
-        for folder in (self._folder / "disparity", self._folder):
-            with contextlib.suppress(OSError):  # it is not empty
-                folder.rmdir()
-
-
-def run(bag: Bag, output: Optional[Any] = None, progress: Optional[bool] = None,
+def run(bag: Bag, outputs: Sequence[Any] = (), progress: Optional[bool] = None,
         on_frame: Optional[Callable[[BagFrame, Any], None]] = None, **options: Any) -> Dict[str, Any]:
-    """Matches all frames of a bag, and writes them. options: those of Pipeline. Returns what happened."""
+    """Matches all frames of a bag. outputs: of bag_outputs or of viewer. options: those of Pipeline. Returns what happened."""
     from .drive import _bar
     pipeline = odometry = previous = None
     density = 0.0
@@ -415,101 +284,11 @@ def run(bag: Bag, output: Optional[Any] = None, progress: Optional[bool] = None,
         if frame.world_from_camera is not None and previous is not None:
             motion = _egosgm.Motion(np.linalg.inv(frame.world_from_camera) @ previous)
         previous = frame.world_from_camera
-        maps = pipeline.process(frame.left, frame.right, motion)
-        if output:
+        maps = pipeline.process(frame.left, frame.right, motion, ("disparity", "variance", "reason"))
+        for output in outputs:
             output.add(frame, maps, motion.current_from_previous if motion else None, calibration)
         if on_frame:
             on_frame(frame, maps)
         frames, moved, density = frames + 1, moved + (motion is not None), density + maps.report.density
     return {"frames": frames, "density": density / max(1, frames), "motions": moved, "calibration": bag.cameras.calibration,
             "rectified": bag.is_rectified_here, "device": pipeline.device.name, "gaps": bag.gaps}
-
-
-def _value(text: str) -> Any:
-    for kind in (int, float):
-        with contextlib.suppress(ValueError):
-            return kind(text)
-    return {"true": True, "false": False}.get(text, text)
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise _egosgm.InvalidArgument(f"{message}: see `egosgm run --bag --help`")
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="egosgm run --bag", description=__doc__, allow_abbrev=False)
-    add = parser.add_argument
-    add("--bag", required=True, metavar="FILE.mcap|FILE.bag|FOLDER", help="ROS 2 (MCAP, SQLite) or ROS 1")
-    add("--left-topic", required=True, metavar="TOPIC", help="raw or compressed images")
-    add("--right-topic", required=True, metavar="TOPIC")
-    add("--info-topics", nargs=2, default=(), metavar=("LEFT", "RIGHT"), help="camera infos [camera_info beside the images]")
-    add("--pose-topic", default="", metavar="TOPIC", help="motion from there (Odometry, PoseStamped) in place of stereo odometry")
-    add("--pose-axes", default="body", metavar="body|optical", help="of the poses: x forward, z up, or z forward, y down [body]")
-    add("--max-skew-ms", type=float, default=0.0, metavar="MS", help="how far the stamps of a pair may differ [0]")
-    add("--rectify", default="auto", choices=("auto", "on", "off"), help="images by their infos [auto: where the infos have a distortion and "
-        "the topic is not named rect]")
-    add("--out", metavar="FILE.mcap|FOLDER", help="depth, disparity, variance, odometry and camera infos; or disparity maps as PNG")
-    add("--device", default="", metavar="DEVICE")
-    add("--preset", default="default", metavar="PRESET")
-    add("--set", action="append", default=[], metavar="NAME=VALUE", help="an option, as egosgm run has it")
-    add("--quiet", action="store_true", help="no progress")
-    return parser
-
-
-def main(arguments: Optional[Sequence[str]] = None) -> int:
-    """What the program prints and returns."""
-    try:
-        return _main(_parser().parse_args(arguments))
-    except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError, OSError) as error:
-        print(f"egosgm: error: {error}", file=sys.stderr)
-        return 2 if isinstance(error, _egosgm.InvalidArgument) else 1
-    except KeyboardInterrupt:
-        print("egosgm: interrupted", file=sys.stderr)
-        return 130
-
-
-def _main(given: argparse.Namespace) -> int:
-    options = {}
-    for text in given.set:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise _egosgm.InvalidArgument(f"--set {text}: give NAME=VALUE")
-        if name in ("device", "preset"):
-            raise _egosgm.InvalidArgument(f"--set {text}: give --{name} {value}")
-        if name in ("bag", "output", "progress", "on_frame", "calibration", "width", "height"):  # what Python's run and Pipeline call theirs
-            raise _egosgm.InvalidArgument(f"--set {text}: no option is named {name}")
-        options[name.replace(".", "__")] = _value(value)
-    if given.out == "":
-        raise _egosgm.InvalidArgument("--out \"\": give a name, or leave it out")
-    bag = Bag(given.bag, given.left_topic, given.right_topic, given.info_topics, given.pose_topic, given.max_skew_ms,
-              {"auto": None, "on": True, "off": False}[given.rectify], given.pose_axes)
-    output = None
-    if given.out:
-        out = pathlib.Path(given.out)
-        if bag.path.is_dir() and bag.path.resolve() in (out.resolve(), *out.resolve().parents):
-            raise _egosgm.InvalidArgument(f"--out {out}: lies in the bag {bag.path}, which is read: give another name")
-        if out.suffix == ".mcap":
-            disparities = options.get("disparities", _egosgm.pipeline_options(given.preset)["disparities"])
-            if not isinstance(disparities, int):
-                raise _egosgm.InvalidArgument(f"--set disparities={disparities}: give a whole number")
-            output = McapOutput(out, disparities)
-        else:
-            output = FolderOutput(out)
-    try:
-        told = run(bag, output, progress=False if given.quiet else None, device=given.device, preset=given.preset, **options)
-        if output:
-            output.finish()
-    except BaseException:
-        if output:
-            output.give_up()
-        raise
-    print(f"{bag.path.name}: {told['frames']} frames, {bag.cameras.size[0]}x{bag.cameras.size[1]}{', rectified here' if told['rectified'] else ''}, "
-          f"on {told['device']}; {told['motions']} motions; density {told['density']:.1%} in the mean" + (f": {given.out}" if given.out else ""))
-    if told["gaps"].text():
-        print(told["gaps"].text())
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

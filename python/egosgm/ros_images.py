@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS's images and camera infos as the library's, and its maps as ROS wants them. Messages of rclpy and of rosbags, ROS 1 and 2."""
+import importlib
 import pathlib
 import tempfile
 from typing import Any, Optional, Tuple
@@ -14,6 +15,13 @@ _GREY8 = {"mono8": (1, 0), "8UC1": (1, 0), "yuv422": (2, 1), "uyvy": (2, 1), "yu
           "nv21": (1, 0)}
 _COLOURS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)), "bgra8": (4, (2, 1, 0)), "8UC3": (3, (2, 1, 0))}
 _GREY16 = ("mono16", "16UC1")
+
+
+def needs(module: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise _egosgm.InvalidArgument('bags need the packages rosbags and mcap: pip install "egosgm[bag]"') from None
 
 
 def grey_of(message: Any) -> NDArray[Any]:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames to Rerun, to look at: images, depth, variance, reasons and where the camera was. Needs rerun-sdk (pip install "egosgm[rerun]")."""
+import os
 import pathlib
 from typing import Any, Optional
 
@@ -17,10 +18,12 @@ class RerunOutput:
             import rerun
         except ImportError:
             raise _egosgm.InvalidArgument('the viewer Rerun is a package of its own: pip install "egosgm[rerun]"') from None
-        if file is not None and file.exists():
-            raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name")
-        if file is not None and not file.parent.is_dir():
-            raise _egosgm.InvalidArgument(f"{file}: {file.parent}: no such folder")
+        if file is not None:
+            if os.path.lexists(file):
+                raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name")
+            if not file.parent.is_dir():
+                raise _egosgm.InvalidArgument(f"{file}: {file.parent}: no such folder")
+            open(file, "xb").close()  # an error names what is wrong with it
         self._rerun, self._file = rerun, file
         self._recording = rerun.RecordingStream("egosgm")
         if file is None:

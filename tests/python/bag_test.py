@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 import egosgm
 
 from egosgm import bag as bags
+from egosgm import bag_outputs, bag_program
 from egosgm import ros_images
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
@@ -88,7 +89,7 @@ def record(kind, path, street, frames, skew_ns=0, left_out=(), times=None, **inf
 
 
 def program(*arguments):
-    return subprocess.run([sys.executable, "-B", "-m", "egosgm.bag", *map(str, arguments)], capture_output=True, text=True, timeout=300)
+    return subprocess.run([sys.executable, "-B", "-m", "egosgm.bag_program", *map(str, arguments)], capture_output=True, text=True, timeout=300)
 
 
 @pytest.mark.parametrize("kind, name", [("mcap", "drive"), ("sqlite", "drive"), ("ros1", "drive.bag")])
@@ -117,7 +118,8 @@ def test_the_written_bag_says_where_things_are(tmp_path, street, frames, shared_
     assert sorted(file.name for file in tmp_path.iterdir()) == ["drive", "result.mcap"]
     odometry = egosgm.StereoOdometry(street.calibration)
     shared_pipeline.reset()
-    expected = [shared_pipeline.process(f.left, f.right, odometry.process(f.left, f.right).motion) for f in frames]
+    expected = [shared_pipeline.process(f.left, f.right, odometry.process(f.left, f.right).motion, ("disparity", "variance", "reason"))
+                for f in frames]
     found = {}
     with AnyReader([out]) as reader:
         for connection, time, raw in reader.messages():
@@ -125,7 +127,7 @@ def test_the_written_bag_says_where_things_are(tmp_path, street, frames, shared_
             assert time == ros_images.stamp_ns(message)
             found.setdefault(connection.topic, []).append(message)
     assert {topic: len(messages) for topic, messages in found.items()} == dict.fromkeys(
-        [f"/egosgm/{name}" for name in ("depth", "variance", "disparity", "odom", "left/camera_info", "right/camera_info")], FRAMES)
+        [f"/egosgm/{name}" for name in ("depth", "variance", "disparity", "reason", "odom", "left/camera_info", "right/camera_info")], FRAMES)
     c = street.calibration
     for i, result in enumerate(expected):
         message = found["/egosgm/disparity"][i]
@@ -141,6 +143,9 @@ def test_the_written_bag_says_where_things_are(tmp_path, street, frames, shared_
         np.testing.assert_allclose(depth[seen], message.f * message.t / disparity[seen], rtol=1e-5)
         assert np.isnan(depth[~seen]).all() and found["/egosgm/depth"][i].encoding == "32FC1"
         variance = found["/egosgm/variance"][i].data.view(np.float32).reshape(HEIGHT, WIDTH)
+        reason = found["/egosgm/reason"][i]
+        assert reason.encoding == "mono8"
+        np.testing.assert_array_equal(reason.data.reshape(HEIGHT, WIDTH), result.reason)
         near = seen & (disparity > 5)
         step = message.f * message.t / (disparity[near] - 0.01) - depth[near]  # a hundredth of a pixel, in metres
         np.testing.assert_allclose(variance[near], (100 * step) ** 2 * result.variance[near], rtol=0.01)
@@ -152,6 +157,34 @@ def test_the_written_bag_says_where_things_are(tmp_path, street, frames, shared_
     assert refused.returncode == 2 and "is there already" in refused.stderr
     again = bags.Bag(out, "/egosgm/depth", "/egosgm/depth", ["/egosgm/left/camera_info", "/egosgm/right/camera_info"])
     assert again.count == FRAMES  # a bag as any other
+
+
+def test_a_viewer_gets_what_a_file_gets(tmp_path, street, frames, monkeypatch):
+    bag = record("mcap", tmp_path / "drive", street, frames)
+    outputs = []
+
+    class Viewer:
+        def __init__(self, file=None):
+            self.calls = [file]
+            outputs.append(self)
+
+        def add(self, frame, maps, motion, calibration):
+            assert maps.reason is not None and calibration.fx == pytest.approx(street.calibration.fx)
+            self.calls.append((frame.number, motion is not None))
+
+        def finish(self):
+            self.calls.append("finish")
+
+        def give_up(self):
+            self.calls.append("give up")
+
+    monkeypatch.setattr(bag_program, "RerunOutput", Viewer)
+    given = ["--bag", str(bag), *TOPICS, *SET, "--out", str(tmp_path / "out.rrd"), "--rerun"]
+    assert bag_program.main(given) == 0
+    assert [output.calls for output in outputs] == [[file, *((i, i > 0) for i in range(FRAMES)), "finish"] for file in (tmp_path / "out.rrd", None)]
+    outputs.clear()
+    assert bag_program.main([*given, "--set", "disparities=-1"]) == 2
+    assert [output.calls[-1] for output in outputs] == ["give up"] * 2
 
 
 def test_a_folder_of_maps_is_what_the_program_writes(tmp_path, street, frames):
@@ -327,7 +360,7 @@ def test_wrong_files_and_options_leave_nothing(tmp_path, street, frames):
 
 def refused(capsys, arguments, *named, code=2):
     """One line on the standard error."""
-    assert bags.main([str(argument) for argument in arguments]) == code
+    assert bag_program.main([str(argument) for argument in arguments]) == code
     told = capsys.readouterr()
     assert told.err.startswith("egosgm: error: ") and told.err.count("\n") == 1, told.err
     for text in named:
@@ -422,8 +455,8 @@ def test_a_file_that_comes_while_it_is_written_stays(tmp_path, street, frames):
     out = tmp_path / "out.mcap"
     with pytest.raises(egosgm.InvalidArgument, match="is there already"):
         bag = bags.Bag(record("mcap", tmp_path / "drive", street, frames[:1]), "/left/image_rect", "/right/image_rect")
-        output = bags.McapOutput(out, 48)
-        bags.run(bag, output, False, lambda frame, maps: out.write_text("mine"), **OPTIONS)
+        output = bag_outputs.McapOutput(out, 48)
+        bags.run(bag, [output], False, lambda frame, maps: out.write_text("mine"), **OPTIONS)
         output.finish()
     output.give_up()
     assert out.read_text() == "mine" and sorted(os.listdir(tmp_path)) == ["drive", "out.mcap"]
@@ -433,7 +466,7 @@ def test_a_full_disk_is_one_line(tmp_path, street, frames):
     """From the fourth frame on: by then the driver has written its kernel cache."""
     bag = record("mcap", tmp_path / "drive", street, [frames[i % FRAMES] for i in range(8)])
     limited = """import resource, sys
-from egosgm import bag
+from egosgm import bag, bag_program
 plain = bag.Bag.frames
 def limited(self):
     for frame in plain(self):
@@ -441,7 +474,7 @@ def limited(self):
             resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
         yield frame
 bag.Bag.frames = limited
-sys.exit(bag.main(sys.argv[1:]))"""
+sys.exit(bag_program.main(sys.argv[1:]))"""
     for out, left in (("out.mcap", ["drive"]), ("out", ["drive", "out"])):
         told = subprocess.run([sys.executable, "-B", "-c", limited, "--bag", bag, *TOPICS, *SET, "--out", tmp_path / out], capture_output=True, text=True, timeout=300)
         assert told.returncode == 1 and told.stderr.startswith("egosgm: error: ") and told.stderr.count("\n") == 1, told.stderr

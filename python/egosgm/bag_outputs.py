@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is made of a bag: a ROS 2 MCAP file, or a folder of maps. egosgm.viewer has a third one."""
+import contextlib
+import os
+import pathlib
+from typing import Any, Dict, Optional
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _egosgm
+from .bag import BagFrame
+from .ros_images import BODY_FROM_OPTICAL, depth_maps, needs, quaternion_of, ros_disparity
+
+
+class McapOutput:
+    """Depth, disparity, variance, odometry and camera infos as a ROS 2 MCAP file, which appears when all of it is there."""
+
+    def __init__(self, file: pathlib.Path, disparities: int) -> None:
+        writer = needs("mcap.writer")
+        typesys = needs("rosbags.typesys")
+        if not file.parent.is_dir():
+            raise _egosgm.InvalidArgument(f"{file}: {file.parent}: no such folder")
+        self._file, self._disparities = file, disparities
+        self._part = file.with_name(file.name + ".part")
+        for there in (self._file, self._part):
+            self._expect_free(there)
+        self._store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+        self._types = self._store.types
+        self._stream = open(self._part, "xb")
+        self._writer = writer.Writer(self._stream)
+        self._writer.start(profile="ros2", library="egosgm")
+        self._schemas: Dict[str, int] = {}
+        self._channels: Dict[str, int] = {}
+        self._world_from_camera = np.eye(4)
+
+    @staticmethod
+    def _expect_free(file: pathlib.Path) -> None:
+        if os.path.lexists(file):
+            raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name, or remove it first")
+
+    def _write(self, topic: str, kind: str, message: Any, time: int) -> None:
+        if kind not in self._schemas:
+            text = self._store.generate_msgdef(kind, ros_version=2)[0]
+            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", text.encode())
+        if topic not in self._channels:
+            self._channels[topic] = self._writer.register_channel(topic, "cdr", self._schemas[kind])
+        self._writer.add_message(self._channels[topic], time, bytes(self._store.serialize_cdr(message, kind)), time)
+
+    def _header(self, time: int, frame_id: str) -> Any:
+        stamp = self._types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
+        return self._types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame_id)
+
+    def _image(self, header: Any, map_: NDArray[Any], encoding: str) -> Any:
+        height, width = map_.shape
+        return self._types["sensor_msgs/msg/Image"](header=header, height=height, width=width, encoding=encoding, is_bigendian=0,
+                                                    step=width * map_.itemsize, data=np.ascontiguousarray(map_).view(np.uint8).reshape(-1))
+
+    def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
+        time, types = frame.stamp_ns, self._types
+        header = self._header(time, frame.frame_id)
+        depth, variance = depth_maps(maps.disparity, maps.variance, calibration)
+        self._write("/egosgm/depth", "sensor_msgs/msg/Image", self._image(header, depth, "32FC1"), time)
+        self._write("/egosgm/variance", "sensor_msgs/msg/Image", self._image(header, variance, "32FC1"), time)
+        height, width = depth.shape
+        region = types["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=height, width=width, do_rectify=False)
+        self._write("/egosgm/disparity", "stereo_msgs/msg/DisparityImage", types["stereo_msgs/msg/DisparityImage"](
+            header=header, image=self._image(header, ros_disparity(maps.disparity, calibration), "32FC1"), f=calibration.fx,
+            t=calibration.baseline_m, valid_window=region, min_disparity=max(0.0, calibration.doffs_px),
+            max_disparity=self._disparities - 1 + calibration.doffs_px, delta_d=0.0), time)
+        reason = getattr(maps, "reason", None)
+        if reason is not None:
+            self._write("/egosgm/reason", "sensor_msgs/msg/Image", self._image(header, reason, "mono8"), time)
+        for side, shift in (("left", 0.0), ("right", -calibration.fx * calibration.baseline_m)):
+            self._write(f"/egosgm/{side}/camera_info", "sensor_msgs/msg/CameraInfo", self._info(header, calibration, shift, width, height, region), time)
+        if motion is not None:
+            self._world_from_camera = self._world_from_camera @ np.linalg.inv(motion)
+        self._write("/egosgm/odom", "nav_msgs/msg/Odometry", self._odometry(header), time)
+
+    def _info(self, header: Any, c: _egosgm.Calibration, shift: float, width: int, height: int, region: Any) -> Any:
+        cx = c.cx + (c.doffs_px if shift else 0.0)
+        return self._types["sensor_msgs/msg/CameraInfo"](
+            header=header, height=height, width=width, distortion_model="plumb_bob", d=np.zeros(5), k=np.array([c.fx, 0, cx, 0, c.fy, c.cy, 0, 0, 1.0]),
+            r=np.eye(3).reshape(-1), p=np.array([c.fx, 0, cx, shift, 0, c.fy, c.cy, 0, 0, 0, 1.0, 0]), binning_x=0, binning_y=0, roi=region)
+
+    def _odometry(self, header: Any) -> Any:
+        types = self._types
+        pose = BODY_FROM_OPTICAL @ self._world_from_camera @ BODY_FROM_OPTICAL.T
+        x, y, z, w = quaternion_of(pose[:3, :3])
+        vector, zero = types["geometry_msgs/msg/Vector3"], np.zeros(36)
+        return types["nav_msgs/msg/Odometry"](
+            header=types["std_msgs/msg/Header"](stamp=header.stamp, frame_id="odom"), child_frame_id="egosgm_camera",
+            pose=types["geometry_msgs/msg/PoseWithCovariance"](pose=types["geometry_msgs/msg/Pose"](
+                position=types["geometry_msgs/msg/Point"](x=pose[0, 3], y=pose[1, 3], z=pose[2, 3]),
+                orientation=types["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w)), covariance=zero),
+            twist=types["geometry_msgs/msg/TwistWithCovariance"](twist=types["geometry_msgs/msg/Twist"](
+                linear=vector(x=0.0, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=0.0)), covariance=zero))
+
+    def finish(self) -> None:
+        self._writer.finish()
+        self._stream.close()
+        self._expect_free(self._file)  # others may have been quicker
+        os.replace(self._part, self._file)
+
+    def give_up(self) -> None:
+        self._part.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # of a full disk
+            self._stream.close()
+
+
+class FolderOutput:
+    """disparity/NUMBER.png as the program writes them, and the calibration of the rectified images."""
+
+    def __init__(self, folder: pathlib.Path) -> None:
+        self._folder = folder
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise _egosgm.InvalidArgument(f"{folder}: is no folder: give a new one, or a name that ends in .mcap")
+        if folder.exists() and any(folder.iterdir()):
+            raise _egosgm.InvalidArgument(f"{folder}: holds files already: give a new folder")
+        (folder / "disparity").mkdir(parents=True, exist_ok=True)
+
+    def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
+        if frame.number == 0:
+            _egosgm.write_calibration(self._folder / "calibration.txt", calibration)
+        _egosgm.write_disparity(self._folder / "disparity" / f"{frame.number:06d}.png", maps.disparity)
+
+    def finish(self) -> None:
+        pass
+
+    def give_up(self) -> None:
+        """What was written is whole, and stays."""
+        for folder in (self._folder / "disparity", self._folder):
+            with contextlib.suppress(OSError):  # it is not empty
+                folder.rmdir()
