@@ -123,6 +123,7 @@ void BatchRun::run(int number, int device) {
       queue_.stop();
     }
   } catch (const DeviceError& error) {
+    if (interrupted()) return queue_.stop();  // by which a driver's compiler fails
     hand_over(number, device, error.what());
   } catch (const IoError&) {
     throw;

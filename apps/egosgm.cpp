@@ -15,6 +15,7 @@
 #include <set>
 
 #include "apps/command.h"
+#include "apps/interrupt.h"
 #include "apps/standard_output.h"
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
@@ -159,6 +160,8 @@ int exit_code_of(int argc, char** argv) {
   } catch (const InvalidArgument& error) {
     return fail(kBadInput, error.what());
   } catch (const Error& error) {  // of a file or of the device
+    // PoCL's compiler takes an interrupt for itself, too, and then fails.
+    if (interrupted()) return std::fputs("egosgm: interrupted\n", stderr), kInterrupted;
     return fail(kFailed, error.what());
   } catch (
       const std::filesystem::filesystem_error& error) {  // a loop of links, a name too long, a folder without rights

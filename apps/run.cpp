@@ -36,7 +36,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kKilled = "a kill, or it is still running";
+constexpr const char *kKilled = "a kill, or it is still running", *kInterrupt = "an interrupt";
 
 using Clock = std::chrono::steady_clock;
 std::string note_of(const FrameReport& report) {
@@ -94,14 +94,14 @@ class Run {
     try {
       if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
       const bool finished = process_all();
-      finish(finished, finished ? "" : "an interrupt");
+      finish(finished, finished ? "" : kInterrupt);
       if (!finished) {
         fmt::print(stderr, "egosgm: interrupted after {} of {} frames: what is in {} is whole\n", poses_.size(),
                    sequence_.frames.size(), folder_.path().string());
       }
       return finished;
     } catch (const std::exception& error) {
-      finish_after(error);
+      finish_after(interrupted() ? kInterrupt : error.what());
       throw;
     }
   }
@@ -231,12 +231,12 @@ class Run {
   }
 
   /// The first error counts; that something cannot be written either adds nothing.
-  void finish_after(const std::exception& error) {
+  void finish_after(const std::string& why) {
     try {
-      finish(false, error.what());
+      finish(false, why);
     } catch (const std::exception&) {
       try {
-        write_report(false, error.what());
+        write_report(false, why);
       } catch (const std::exception&) {
       }
     }

@@ -270,6 +270,26 @@ class Batch(BatchTest):
         self.assertEqual(sorted(d["retired"] for d in self.timing(out)["devices"]), [False, True])
         self.assertEqual(list(out.rglob("failed.json")), [])
 
+    def test_an_interrupt_is_no_failure_of_the_device(self):
+        """PoCL's compiler takes the signal for itself, too, and fails by it; here the fault layer fails after it."""
+        street, out = self.broken_street(), self.new_folder()
+        pipe = street / "image_0/000003.png"
+        image = pipe.read_bytes()
+        pipe.unlink()
+        os.mkfifo(pipe)
+        (out / "list").write_text(f"a {street}\n")
+        lost = dict(os.environ, OPENCL_LAYERS=LAYER, EGOSGM_FAILING_CONTEXT="0/0")
+        for command in (["run", street, "--out", out / "run"], ["batch", out / "list", "--devices", "0", "--out", out / "batch"]):
+            with subprocess.Popen([PROGRAM, *command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=lost) as process:
+                writing = os.open(pipe, os.O_WRONLY)  # once it looks at the images' sizes
+                process.send_signal(signal.SIGTERM)
+                os.write(writing, image)
+                os.close(writing)
+                errors = process.stderr.read()
+            self.assertEqual(process.returncode, 130, errors)
+            self.assertNotIn("egosgm: error", errors)
+        self.assertEqual(list(out.rglob("failed.json")), [])
+
     def test_where_the_only_device_fails_the_others_sequences_go_on(self):
         out = self.new_folder()
         lost = dict(os.environ, OPENCL_LAYERS=LAYER, EGOSGM_FAILING_CONTEXT="1/0")

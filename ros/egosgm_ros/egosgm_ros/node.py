@@ -240,7 +240,9 @@ class EgosgmNode(LifecycleNode):
         elif rate == 0 and self._is_active:
             status.level = DiagnosticStatus.WARN
             status.message = "no pairs of images"
-            if gaps and gaps.unpaired_left + gaps.unpaired_right > 0:
+            if gaps and gaps.nearest_ms is None and gaps.unpaired_left + gaps.unpaired_right > 0:
+                status.message += f": {SIDES[gaps.unpaired_left > 0]}/image_rect is silent"
+            elif gaps and gaps.unpaired_left + gaps.unpaired_right > 0:
                 status.message += f": the nearest stamps differ by {gaps.nearest_ms:.3f} ms, max_skew_ms is {self._value('max_skew_ms')}"
         elif not self._is_active:
             status.message = "not active"
