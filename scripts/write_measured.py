@@ -6,7 +6,7 @@ could change.
   scripts/write_measured.py           writes the page
   scripts/write_measured.py --check   exit code 1 where the page is not what would be written, 77 where there is nothing to write it from
 scripts/measure runs the benches. All of one page must come from one commit without changes, or it is refused. The table of scripts/drivers
-(build/lanes/drivers.json, to be put beside the others) names its own.
+(build/lanes/drivers.json, to be put beside the others) names its own, row by row.
 """
 import argparse
 import json
@@ -15,7 +15,7 @@ import sys
 
 DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs"
 FILES = ("accuracy", "video", "compare", "stages")
-DRIVERS = "drivers"  # of scripts/drivers, which runs apart: of a commit of its own, and it may be missing
+DRIVERS = "drivers"  # of scripts/drivers, which runs apart: each row has a commit of its own, and all may be missing
 CONTENDERS = {
     "opencv_hh": "OpenCV MODE_HH, 8 paths, left view",
     "opencv_hh4": "OpenCV MODE_HH4, 4 paths, left view",
@@ -59,7 +59,7 @@ def is_clean(commit):
 
 
 def expect_one_commit(found):
-    if DRIVERS in found and not is_clean(found[DRIVERS]["commit"]):
+    if DRIVERS in found and not all(is_clean(row[-1]) for row in found[DRIVERS]["rows"]):
         raise Refused(f"{DRIVERS}.json: not of a commit without changes: run scripts/drivers on a clean checkout")
     found = {name: found[name] for name in FILES}
     commits = {name: content["commit"] for name, content in found.items()}
@@ -139,9 +139,8 @@ def stages(content):
 
 
 def drivers(content):
-    text = (f"## Other drivers\n\n`scripts/drivers`, commit {content['commit']}, {content['date'][:10]}. Maps are those of whole runs. A run is that of a "
-            "short street, its time that of the clock; the first one compiles. The ratio is that of the stages of a steady frame, of turns: the median, and the "
-            "least and the largest.\n\n")
+    text = ("## Other drivers\n\nBy `scripts/drivers`. Maps are those of whole runs. A run is that of a short street, its time that of the clock; the first "
+            "one compiles. The ratio is that of the stages of a steady frame, of turns: the median, and the least and the largest.\n\n")
     rule = "| " + " | ".join("---" for _ in content["headings"]) + " |"
     lines = ["| " + " | ".join(row) + " |" for row in [content["headings"], *content["rows"]]]
     return text + "\n".join([lines[0], rule, *lines[1:]]) + "\n"

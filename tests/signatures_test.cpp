@@ -55,6 +55,7 @@ TEST_F(Signatures, AreThoseOfSourcesAlone) {
   cl::Program compiled(context_.get(), {context_.device()}, binaries);
   compiled.build({context_.device()}, "-cl-std=CL1.2 -cl-kernel-arg-info");
   EXPECT_NO_THROW((ocl::Kernel<Size, const cl_int, ocl::Buffer<cl_uchar>, Out>(compiled, "add")));
+  if (ocl::compiled_signature(cl::Kernel(compiled, "add")).empty()) return;  // as some drivers tell nothing of binaries
   EXPECT_THROW((ocl::Kernel<Size, const cl_int, Out>(compiled, "add")), std::logic_error) << "another count";
 }
 
