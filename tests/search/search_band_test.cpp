@@ -148,6 +148,28 @@ HostMaps nothing(shared::ImageSize size) {
   return {std::vector(pixels, EGOSGM_INVALID_DISPARITY), std::vector(pixels, 0.0f)};
 }
 
+TEST(SearchBand, SearchesEverythingAfterWrongPredictions) {
+  constexpr shared::ImageSize kSize{65, 19};
+  for (const shared::DisparityRange range : kRanges) {
+    const auto maps = testing::random_maps(kSize, 0, static_cast<float>(range.count), 0.5, 41);
+    ocl::Context context(testing::any_device());
+    SearchBand stage(context, kSize, range, {});
+    const StereoMaps predicted = testing::upload(context, kSize, maps);
+    ocl::Buffer<shared::PredictionState> last(context, 1);
+    for (const cl_int is_wrong : {0, 1}) {
+      shared::PredictionState state{};
+      state.is_wrong = is_wrong;
+      last.write(context, {state});
+      SearchBands bands(context, kSize, range);
+      stage(predicted, {nullptr, nullptr, &last}, bands, Views::kBoth);
+      expect_same(read(context, bands),
+                  is_wrong ? reference::full_range(kSize, range, maps.disparity)
+                           : reference::search_band(kSize, range, {}, maps),
+                  kSize);
+    }
+  }
+}
+
 TEST(SearchBand, CoversWhatItSearchesWithTheFewestChunks) {
   std::mt19937 random(34);
   for (const shared::DisparityRange range : kRanges) {
