@@ -31,13 +31,8 @@ std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
 
 const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
                          BandedSgm::Tile tile) {
-  ocl::Defines defines;
-  defines.set("MAX_CHUNKS", SearchBand::max_chunks(range))
-      .set("PATHS", options.paths)
-      .set("CODE_BYTES", 4 * Census::words(options.cost))
-      .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
-      .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
-      .set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
+  ocl::Defines defines = sgm_defines(range, options);
+  defines.set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
       .set("TILE_WIDTH", tile.width)
       .set("TILE_HEIGHT", tile.height)
       .set("PIXELS", ocl::pixels_a_work_item(context));

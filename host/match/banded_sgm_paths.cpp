@@ -28,16 +28,8 @@ int spare_cells(int vector) { return vector == kQuad ? kQuad : vector + EGOSGM_L
 
 const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
                          BandedSgmPaths::Group group) {
-  ocl::Defines defines;
-  defines.set("MAX_CHUNKS", SearchBand::max_chunks(range))
-      .set("PATHS", options.paths)
-      .set("CODE_BYTES", 4 * Census::words(options.cost))
-      .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
-      .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2)
-      .set("LANES", group.lanes)
-      .set("LINES", group.lines)
-      .set("VECTOR", vector_of(context))
-      .set("PIXELS", 1);
+  ocl::Defines defines = sgm_defines(range, options);
+  defines.set("LANES", group.lanes).set("LINES", group.lines).set("VECTOR", vector_of(context)).set("PIXELS", 1);
   return context.program("banded_sgm_paths.cl", defines);
 }
 
@@ -55,6 +47,16 @@ BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context,
 std::size_t BandedSgmPaths::sum_bytes(const ocl::Context& context, shared::ImageSize size,
                                       shared::DisparityRange range) {
   return 2 * pixel_count(size) * (SearchBand::max_chunks(range) * EGOSGM_LANES + spare_cells(vector_of(context)));
+}
+
+ocl::Defines sgm_defines(shared::DisparityRange range, const BandedSgmOptions& options) {
+  ocl::Defines defines;
+  defines.set("MAX_CHUNKS", SearchBand::max_chunks(range))
+      .set("PATHS", options.paths)
+      .set("CODE_BYTES", 4 * Census::words(options.cost))
+      .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
+      .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2);
+  return defines;
 }
 
 BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,

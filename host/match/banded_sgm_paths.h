@@ -4,9 +4,13 @@
 #include "host/maps.h"
 #include "host/match/stripes.h"
 #include "host/method_options.h"
+#include "host/ocl/defines.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {
+
+/// What the programs of both ways of BandedSgm are told.
+ocl::Defines sgm_defines(shared::DisparityRange range, const BandedSgmOptions& options);
 
 /// How BandedSgm runs on GPUs: a few work-items follow each path across the image (see
 /// kernels/match/banded_sgm_paths.cl).
