@@ -105,16 +105,10 @@ ALWAYS_INLINE void match_pixel(const bool meets, const bool backward, const SgmP
   } else {
     match_wide(meets, q, row, extent, steps, place);
   }
-  // The next one's: what was to the upper right is above it.
-  if (meets) ++place->candidate;
   if (!backward) place->cells += EGOSGM_LANES * chunks_of(extent);
   place->wiped[0] = extent;
-  place->wiped[2] = place->wiped[1];
-  place->wiped[1] = place->wiped[3];
-  place->own += row->code_step;
-  place->other -= row->code_step;
-  place->k += row->step;
   place->moved += SLOT;
+  go_on(meets, row, place);
 }
 
 ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmParameters q,

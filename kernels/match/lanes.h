@@ -70,12 +70,18 @@ inline void minima(const uchar16* v, uchar16* least) {
 
 // The same of vectors that hold two paths, a chunk of each.
 inline void minima_of_chunks(const uchar16* v, uchar16* least) {
+#if PATHS == 8
   uchar16 of_four = min((uchar16)(v[0].s0123, v[0].s89ab, v[1].s0123, v[1].s89ab),
                         (uchar16)(v[0].s4567, v[0].scdef, v[1].s4567, v[1].scdef));
   of_four = min(of_four, of_four.s23016745ab89efcd);
   of_four = min(of_four, of_four.s1032547698badcfe);
   least[0] = of_four.s0000000044444444;
   least[1] = of_four.s88888888cccccccc;
+#else
+  least[0] = min(v[0], v[0].s45670123cdef89ab);
+  least[0] = min(least[0], least[0].s23016745ab89efcd);
+  least[0] = min(least[0], least[0].s1032547698badcfe);
+#endif
 }
 
 // 255 in the lanes from `first` on, 0 in those before it.

@@ -3,6 +3,7 @@
 #ifndef EGOSGM_KERNELS_MATCH_ROW_H
 #define EGOSGM_KERNELS_MATCH_ROW_H
 
+#include "compiler.h"
 #include "cost.h"
 #include "slots.h"
 #include "winner.h"
@@ -33,5 +34,15 @@ typedef struct {
   uchar16 last;   // the path costs of the one to the left, where its band is narrow
   uint moved;     // how far the slots have moved on, less the least disparity
 } Place;
+
+// Goes on to the next pixel, but for its sums and `moved`. What was to the upper right is above it.
+ALWAYS_INLINE void go_on(const bool meets, const Row* row, Place* place) {
+  if (meets) ++place->candidate;
+  place->wiped[2] = place->wiped[1];
+  place->wiped[1] = place->wiped[3];
+  place->own += row->code_step;
+  place->other -= row->code_step;
+  place->k += row->step;
+}
 
 #endif

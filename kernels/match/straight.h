@@ -7,24 +7,96 @@
 #include "recurrence.h"
 #include "row.h"
 
-// Whether a pixel has one chunk, all of it in the disparity range, and those before it on all paths have the same: as
-// most pixels in bands. Then a path's costs stay in their places, and nothing else is in a slot to look at or to wipe.
+// Vectors that hold the paths of a sweep, a chunk of two paths each: of path v, and of path v + PATH_PAIRS.
+#define PATH_PAIRS (DIRECTIONS / 2)
+
+// Whether a pixel has one chunk, all of it in the disparity range, as the one to its left, and those above it fit a
+// vector, as most pixels in bands. Then the path from the left stays in its place and in a register.
 inline bool goes_straight(const SgmParameters q, const uint extent, const uint* before, const int lane) {
-#if PATHS == 8
   if (!is_chunk(extent)) return false;
 #if PARTIAL_CHUNKS
   if (lane + EGOSGM_LANES > q.disparities) return false;
 #endif
-  return ((extent ^ before[0]) | (extent ^ before[1]) | (extent ^ before[2]) | (extent ^ before[3])) == 0;
+  bool fit = extent == before[0];
+#pragma unroll
+  for (int n = 1; n < DIRECTIONS; ++n) fit &= is_narrow(before[n]);
+  return fit;
+}
+
+// A chunk of path n's predecessor in the lower half, one of path n + PATH_PAIRS's in the upper half.
+inline uchar16 load_pair(global uchar* const* at, const int n, const uint along, const int beside) {
+  return (uchar16)(load_chunk(at[n] + along + beside), load_chunk(at[n + PATH_PAIRS] + along + beside));
+}
+inline uchar16 load_upper(const ulong2 lower, global const uchar* upper) {
+  return (uchar16)(as_uchar16(lower).lo, load_chunk(upper));
+}
+
+// The path costs of a pixel that goes straight, which it leaves in the slots in place of those before it, and half of
+// their sum.
+ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, const uchar16 p1, global uchar* const* at,
+                                  global uchar* const* wiped_at, const uint along, ulong2* last) {
+  const uchar16 cost = (uchar16)(chunk_cost, chunk_cost);
+  const uchar4 p2 = as_uchar4(steps);
+#if PATHS == 8
+  const uchar16 p2_of[PATH_PAIRS] = {p2.s0000000022222222, p2.s1111111133333333};
 #else
-  return false;
+  const uchar16 p2_of[PATH_PAIRS] = {p2.s0000000011111111};
 #endif
+  uchar16 r[PATH_PAIRS], least[PATH_PAIRS];
+  global const uchar* upper = at[PATH_PAIRS] + along;
+  r[0] = path_cost(cost, load_upper(*last, upper), load_upper(*last << (ulong2)(8) | (ulong2)(ABSENT), upper - 1),
+                   load_upper(*last >> (ulong2)(8) | (ulong2)((ulong)ABSENT << 56), upper + 1), p1, p2_of[0]);
+#if PATHS == 8
+  r[1] = path_cost(cost, load_pair(at, 1, along, 0), load_pair(at, 1, along, -1), load_pair(at, 1, along, 1), p1,
+                   p2_of[1]);
+#endif
+#pragma unroll
+  for (int n = 1; n < DIRECTIONS; ++n) store((uchar16)(ABSENT), wiped_at[n] + along);
+  minima_of_chunks(r, least);
+#pragma unroll
+  for (int n = 0; n < PATH_PAIRS; ++n) {
+    r[n] -= least[n];
+    store_chunk(r[n].lo, n > 0 ? at[n] + along : at[n]);
+    store_chunk(r[n].hi, at[n + PATH_PAIRS] + along);
+  }
+  *last = as_ulong2(r[0]);
+#if PATHS == 8
+  r[0] = mean(r[0], r[1]);
+#endif
+  return add_sat(r[0].lo, r[0].hi);
+}
+
+// The ranks of the right pixels that a left pixel of one chunk may be, in a run: its neighbour's are the same but for
+// one. What was just written must not be read again in other pieces, which stalls.
+typedef struct {
+  global uint* at;  // the first one's place
+  uint8 ranks;
+} Seen;
+
+inline Seen seen_from(global uint* first) {
+  Seen seen = {first, 0};
+  if (first) seen.ranks = load_ranks(first);
+  return seen;
+}
+inline void leave_seen(const Seen* seen) {
+  if (seen->at) store_ranks(seen->ranks, seen->at);
+}
+inline void move_seen(const bool backward, Seen* seen) {
+  if (!seen->at) return;
+  if (backward) {
+    seen->at[EGOSGM_LANES - 1] = seen->ranks.s7;
+    --seen->at;
+    seen->ranks = (uint8)(seen->at[0], seen->ranks.s0123, seen->ranks.s456);
+  } else {
+    seen->at[0] = seen->ranks.s0;
+    ++seen->at;
+    seen->ranks = (uint8)(seen->ranks.s1234, seen->ranks.s567, seen->at[EGOSGM_LANES - 1]);
+  }
 }
 
 // The sum of a pixel's chunk, and with the other sweep's its winner.
-ALWAYS_INLINE void leave_chunk(const bool meets, const SgmParameters q, const Row* row,
-                                                       const Place* place, const int origin, const uchar8 cost,
-                                                       const uchar8 sum) {
+ALWAYS_INLINE void leave_chunk(const bool meets, const SgmParameters q, const Row* row, const Place* place,
+                               const int origin, const uchar8 cost, const uchar8 sum, Seen* seen) {
   if (!meets) {
     store_chunk(sum, place->cells);
     return;
@@ -34,53 +106,45 @@ ALWAYS_INLINE void leave_chunk(const bool meets, const SgmParameters q, const Ro
   const int first = row->bands[place->k].first - origin, last_of_band = row->bands[place->k].last - origin;
   candidate->totals = (ulong8)(~0ul, ~0ul, as_ulong2(total), ~0ul, ~0ul, ~0ul, ~0ul);
   const ushort8 allowed = total | barred_of_chunk(first, last_of_band);
-  candidate->rank = ranked_in_chunk(allowed);
-  if (row->seen) {
-    const int least = candidate->rank >> 4, behind = q.disparities - 1 - (origin - q.min_disparity);
-    offer_chunk(allowed, least, cost, behind, row->seen + place->k - origin);
+  const int rank = ranked_in_chunk(allowed);
+  if (seen->at) {
+    seen->ranks =
+        min(seen->ranks, offered_by_chunk(allowed, rank >> 4, cost, q.disparities - 1 - (origin - q.min_disparity)));
   }
-  candidate->disparity = origin + (candidate->rank & 15);
+  candidate->rank = rank;
+  candidate->disparity = origin + (rank & 15);
 }
 
 // Matches a pixel that goes straight and those after it, as long as they do. `steps`: the penalties to it.
-ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const SgmParameters q,
-                                                          const Row* row, const uint extent, uint steps, Place* place) {
+ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const SgmParameters q, const Row* row,
+                                  const uint extent, uint steps, Place* place) {
   const int origin = origin_of(extent);
   const uint lane = (uint)origin - (uint)q.min_disparity, moved_lane = place->moved + (uint)origin;
-  global uchar* at[4] = {row->slot[0] + lane, row->slot[1] + moved_lane, row->slot[2] + moved_lane,
-                         row->slot[3] + moved_lane};
+  global uchar* at[DIRECTIONS];
+  global uchar* wiped_at[DIRECTIONS];
+#pragma unroll
+  for (int n = 0; n < DIRECTIONS; ++n) at[n] = row->slot[n] + (n > 0 ? moved_lane : lane);
+  Seen seen = seen_from(row->seen ? row->seen + place->k - origin - (EGOSGM_LANES - 1) : 0);
+  ulong2 last = as_ulong2(place->last);
   uint along = 0;
-  while (place->k != row->end) {
+  while (true) {
+#pragma unroll
+    for (int n = 1; n < DIRECTIONS; ++n) wiped_at[n] = row->slot[n] + (place->moved + (uint)origin_of(place->wiped[n]));
     if (backward) place->cells -= EGOSGM_LANES;
-    const uchar8 chunk_cost = matching_cost_of_chunk(place->own, place->other + origin, row->row_above, row->row_below);
-    const uchar16 cost = (uchar16)(chunk_cost, chunk_cost);
-    const uchar4 p2 = as_uchar4(steps);
-    const uchar16 before[2] = {(uchar16)(place->last.lo, load_chunk(at[2] + along)),
-                               (uchar16)(load_chunk(at[1] + along), load_chunk(at[3] + along))};
-    uchar16 r[2] = {path_cost_of_chunks(before[0], cost, row->p1, p2.s0000000022222222),
-                    path_cost_of_chunks(before[1], cost, row->p1, p2.s1111111133333333)};
-    uchar16 least[2];
-    minima_of_chunks(r, least);
-    r[0] -= least[0];
-    r[1] -= least[1];
-    store_chunk(r[0].lo, at[0]);
-    store_chunk(r[1].lo, at[1] + along);
-    store_chunk(r[0].hi, at[2] + along);
-    store_chunk(r[1].hi, at[3] + along);
-    place->last = (uchar16)(r[0].lo, (uchar8)(ABSENT));
-    const uchar16 means = mean(r[0], r[1]);
-    leave_chunk(meets, q, row, place, origin, chunk_cost, add_sat(means.lo, means.hi));
-    if (meets) ++place->candidate;
+    const uchar8 cost = matching_cost_of_chunk(place->own, place->other + origin, row->row_above, row->row_below);
+    const uchar8 sum = follow_chunk(cost, steps, row->p1, at, wiped_at, along, &last);
+    leave_chunk(meets, q, row, place, origin, cost, sum, &seen);
+    go_on(meets, row, place);
     if (!backward) place->cells += EGOSGM_LANES;
-    place->own += row->code_step;
-    place->other -= row->code_step;
-    place->k += row->step;
     along += SLOT;
-    const long k = place->k;
-    if (k == row->end || extent_at(row->bands + k) != extent || extent_at(row->bands + k + row->above_right) != extent)
-      break;
-    steps = penalties_to(backward, &place->around, row->penalties + k, row->above_right);
+    if (place->k == row->end || extent_at(row->bands + place->k) != extent) break;
+    place->wiped[3] = extent_at(row->bands + place->k + row->above_right);
+    if (!goes_straight(q, extent, place->wiped, (int)lane)) break;
+    steps = penalties_to(backward, &place->around, row->penalties + place->k, row->above_right);
+    move_seen(backward, &seen);
   }
+  leave_seen(&seen);
+  place->last = (uchar16)(as_uchar16(last).lo, (uchar8)(ABSENT));
   place->moved += along;
 }
 

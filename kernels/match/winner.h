@@ -74,12 +74,15 @@ inline void offer(const ushort16 totals, const int least, const uchar16 cost, co
   global Ranks* at = (global Ranks*)(seen - (VECTOR - 1));
   at->ranks = min(at->ranks, ranks.sfedcba9876543210);
 }
-inline void offer_chunk(const ushort8 totals, const int least, const uchar8 cost, const int behind, global uint* seen) {
+
+// The same of 8 lanes, what is offered alone: the last lane's first.
+inline uint8 offered_by_chunk(const ushort8 totals, const int least, const uchar8 cost, const int behind) {
   const ushort8 each = (ushort8)((ushort)behind) - convert_ushort8(kLane.lo);
   const uint8 ranks = convert_uint8(RANK(totals, least, convert_ushort8(cost))) << (uint8)(16) | convert_uint8(each);
-  global ChunkRanks* at = (global ChunkRanks*)(seen - (EGOSGM_LANES - 1));
-  at->ranks = min(at->ranks, ranks.s76543210);
+  return ranks.s76543210;
 }
+inline uint8 load_ranks(global const uint* from) { return ((global const ChunkRanks*)from)->ranks; }
+inline void store_ranks(const uint8 ranks, global uint* to) { ((global ChunkRanks*)to)->ranks = ranks; }
 
 // Winners of PIXELS pixels, and a field of each.
 #if PIXELS == 1
