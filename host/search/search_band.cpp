@@ -76,10 +76,12 @@ void SearchBand::operator()(const StereoMaps& predicted, const Hints& hints, Sea
   bands_of_blocks_(context_, blocks, size_, range_, options_.from_neighbours, options_.neighbour_margin_px,
                    options_.neighbour_min_count, options_.coarse_margin_px, last, block_ranges_,
                    hints.coarse ? coarse_ranges_ : none_, found_, block_bands_);
-  bands_of_pixels_(context_, ocl::every_pixel(context_, {blocks_.width, size_.height}, count(views)), size_, range_,
-                   options_.sigmas, options_.min_half_width_px, predicted.disparity, predicted.variance,
-                   options_.coarse_tolerance_px, options_.coarse_margin_px, last, found_, block_bands_, bands.bands);
-  sum_rows(predicted.disparity, bands, views);
+  const int pixels = row_group_ == 1 ? 2 * EGOSGM_BLOCK : 1;
+  bands_of_pixels_(context_, ocl::every_pixels(context_, size_, pixels, count(views)), size_, range_, options_.sigmas,
+                   options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
+                   options_.coarse_margin_px, last, found_, block_bands_, bands.bands, bands.cell_offsets,
+                   bands.row_sums);
+  if (pixels == 1) sum_rows(predicted.disparity, bands, views);
 }
 
 void SearchBand::full_range(SearchBands& bands, Views views) {

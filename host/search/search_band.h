@@ -71,7 +71,7 @@ class SearchBand {
       bands_of_blocks_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
               const float, const float, const States, const Ranges, const ocl::Buffer<shared::Band>,
-              ocl::Buffer<shared::Band>>
+              ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>, ocl::Buffer<shared::RowSum>>
       bands_of_pixels_;
   ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
               ocl::Buffer<shared::RowSum>>

@@ -43,8 +43,18 @@ typedef uint Code;
 typedef ulong Code;
 #endif
 
+// The comparisons, and the place of each beside the centre.
 #if COMPARISONS == 2
 constant char kSparse[32][2] = EGOSGM_CENSUS13X11;
+#define COUNT 32
+#define DX(i) kSparse[i][0]
+#define DY(i) kSparse[i][1]
+#else
+#define WINDOW_WIDTH (2 * RADIUS_X + 1)
+#define COUNT (WINDOW_WIDTH * (2 * RADIUS_Y + 1) - 1)
+#define PLACE(i) ((i) < COUNT / 2 ? (i) : (i) + 1)
+#define DX(i) (PLACE(i) % WINDOW_WIDTH - RADIUS_X)
+#define DY(i) (PLACE(i) / WINDOW_WIDTH - RADIUS_Y)
 #endif
 
 // The rows of the window around a pixel; outside the image its border's.
@@ -65,21 +75,10 @@ inline Code code_at(const int width, const Rows* rows, const int x) {
 #define AT(dx, dy) rows->at[RADIUS_Y + (dy)][clamp(x + (dx), 0, width - 1)]
 #if COMPARISONS == 0
   return to_8_bit(AT(0, 0));
-#elif COMPARISONS == 1
-  Code code = 0;
-#pragma unroll
-  for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) {
-    for (int dx = -RADIUS_X; dx <= RADIUS_X; ++dx) {
-      if (dx != 0 || dy != 0) code = code << 1 | (AT(dx, dy) < AT(0, 0) ? 1 : 0);
-    }
-  }
-  return code;
 #else
   Code code = 0;
 #pragma unroll
-  for (int i = 0; i < 32; ++i) {
-    code = code << 1 | (AT(kSparse[i][0], kSparse[i][1]) < AT(0, 0) ? 1 : 0);
-  }
+  for (int i = 0; i < COUNT; ++i) code = code << 1 | (AT(DX(i), DY(i)) < AT(0, 0) ? 1 : 0);
   return code;
 #endif
 }
@@ -114,81 +113,65 @@ typedef struct __attribute__((packed)) {
   Codes codes;
 } PackedCodes;
 
-#if COMPARISONS == 2 && PIXEL_BYTES == 1
+#if COMPARISONS == 0
 
-// A block of pixels at once.
+#define AT_ONCE 16
+inline void codes_at(const Rows* rows, const int x, Codes* codes) {
+  *codes = convert_codes(to_8_bit(load_grey(rows->at[RADIUS_Y] + x)));
+}
+
+#else
+
+// A block of 8-bit pixels at once, or 16 of 16 bits.
+#if PIXEL_BYTES == 1
 #define AT_ONCE BLOCK
+typedef Block Greys;
+typedef Block Bytes;
 typedef struct __attribute__((packed)) {
   Block greys;
 } PackedBlock;
-inline Block load_block(global const Pixel* from) { return ((global const PackedBlock*)from)->greys; }
+inline Greys load_greys(global const Pixel* from) { return ((global const PackedBlock*)from)->greys; }
+inline Bytes one_where_less(const Greys a, const Greys b) { return a < b ? (Block)(1) : (Block)(0); }
+#else
+#define AT_ONCE 16
+typedef Pixels Greys;
+typedef uchar16 Bytes;
+inline Greys load_greys(global const Pixel* from) { return load_grey(from); }
+inline Bytes one_where_less(const Greys a, const Greys b) { return as_uchar16(-convert_char16(a < b)); }
+#endif
 
-inline Codes joined(const uchar16 first, const uchar16 second, const uchar16 third, const uchar16 fourth) {
-  const ushort16 upper = convert_ushort16(first) << (ushort16)(8) | convert_ushort16(second);
-  const ushort16 lower = convert_ushort16(third) << (ushort16)(8) | convert_ushort16(fourth);
+// Codes of their bytes, the lowest first.
+inline uint16 joined(const uchar16 b0, const uchar16 b1, const uchar16 b2, const uchar16 b3) {
+  const ushort16 upper = convert_ushort16(b3) << (ushort16)(8) | convert_ushort16(b2);
+  const ushort16 lower = convert_ushort16(b1) << (ushort16)(8) | convert_ushort16(b0);
   return convert_uint16(upper) << (uint16)(16) | convert_uint16(lower);
 }
+#if CODE_BYTES == 4
+#define JOINED(HALF, bytes) joined(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))
+#else
+#define JOINED(HALF, bytes)                                                                                   \
+  (convert_ulong16(joined(HALF(bytes[4]), HALF(bytes[5]), HALF(bytes[6]), HALF(bytes[7]))) << (ulong16)(32) | \
+   convert_ulong16(joined(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))))
+#endif
+#define WHOLE(bytes) (bytes)
 
 // Where no column needs clamping. Bits are appended to bytes: compilers keep these in narrow vectors.
 inline void codes_at(const Rows* rows, const int x, Codes* codes) {
-  const Block centre = load_block(rows->at[RADIUS_Y] + x);
-  Block bytes[4];
+  const Greys centre = load_greys(rows->at[RADIUS_Y] + x);
+  Bytes bytes[CODE_BYTES];
 #pragma unroll
-  for (int byte = 0; byte < 4; ++byte) {
-    Block bits = 0;
+  for (int byte = 0; byte < CODE_BYTES; ++byte) bytes[byte] = 0;
 #pragma unroll
-    for (int i = 8 * byte; i < 8 * byte + 8; ++i) {
-      const Block other = load_block(rows->at[RADIUS_Y + kSparse[i][1]] + x + kSparse[i][0]);
-      bits = bits + bits + (other < centre ? (Block)(1) : (Block)(0));
-    }
-    bytes[byte] = bits;
+  for (int i = 0; i < COUNT; ++i) {
+    const Bytes bits = bytes[(COUNT - 1 - i) / 8];
+    bytes[(COUNT - 1 - i) / 8] =
+        bits + bits + one_where_less(load_greys(rows->at[RADIUS_Y + DY(i)] + x + DX(i)), centre);
   }
-  codes[0] = joined(FIRST_VECTOR(bytes[0]), FIRST_VECTOR(bytes[1]), FIRST_VECTOR(bytes[2]), FIRST_VECTOR(bytes[3]));
-#if BLOCK == 32
-  codes[1] = joined(SECOND_VECTOR(bytes[0]), SECOND_VECTOR(bytes[1]), SECOND_VECTOR(bytes[2]), SECOND_VECTOR(bytes[3]));
-#endif
-}
-
+#if AT_ONCE == 32
+  codes[0] = JOINED(FIRST_VECTOR, bytes);
+  codes[1] = JOINED(SECOND_VECTOR, bytes);
 #else
-
-#define AT_ONCE 16
-
-// Appends a bit to codes of 8 bits: compilers keep these in narrow vectors.
-inline uchar16 append(const uchar16 bits, const Pixels first, const Pixels second) {
-  return bits + bits - as_uchar16(convert_char16(first < second));
-}
-
-// 16 pixels at once, where no column needs clamping.
-inline void codes_at(const Rows* rows, const int x, Codes* codes) {
-#if COMPARISONS == 0
-  *codes = convert_codes(to_8_bit(load_grey(rows->at[RADIUS_Y] + x)));
-#elif COMPARISONS == 1
-  const Pixels centre = load_grey(rows->at[RADIUS_Y] + x);
-  uchar16 bits = 0;
-  int count = 0;
-  *codes = 0;
-#pragma unroll
-  for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) {
-#pragma unroll
-    for (int dx = -RADIUS_X; dx <= RADIUS_X; ++dx) {
-      if (dx == 0 && dy == 0) continue;
-      bits = append(bits, load_grey(rows->at[RADIUS_Y + dy] + x + dx), centre);
-      if (++count % 8 == 0) *codes = (*codes << (Codes)(8)) | convert_codes(bits);
-    }
-  }
-  *codes = (*codes << (Codes)(count % 8)) | (convert_codes(bits) & (Codes)((1 << count % 8) - 1));
-#else
-  const Pixels centre = load_grey(rows->at[RADIUS_Y] + x);
-  *codes = 0;
-#pragma unroll
-  for (int byte = 0; byte < 4; ++byte) {
-    uchar16 bits = 0;
-#pragma unroll
-    for (int i = 8 * byte; i < 8 * byte + 8; ++i) {
-      bits = append(bits, load_grey(rows->at[RADIUS_Y + kSparse[i][1]] + x + kSparse[i][0]), centre);
-    }
-    *codes = (*codes << (Codes)(8)) | convert_codes(bits);
-  }
+  codes[0] = JOINED(WHOLE, bytes);
 #endif
 }
 

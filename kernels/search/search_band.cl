@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span; and
 // what its block's predictions span and CoarseMatch found there, where that lies elsewhere.
-#include "bands.h"
-#include "spans.h"
 
 // lint: ROW_GROUP=1
 // lint: ROW_GROUP=64
@@ -10,6 +8,10 @@
 #ifndef ROW_GROUP
 #error "ROW_GROUP: work-items that share a row"
 #endif
+#define PIXELS (ROW_GROUP == 1 ? 16 : 1)
+
+#include "bands.h"
+#include "spans.h"
 
 #ifndef __ENDIAN_LITTLE__
 #error "bands are written as words: a little-endian device"
@@ -128,93 +130,112 @@ KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, co
   bands[here] = first_of(bands_of(range, from, to));
 }
 
-// A work-item a block's row of pixels and view.
+#if ROW_GROUP == 1
+
+// Of a row up to a pixel.
+typedef struct {
+  int chunks;
+  Ints predicted;
+} Sums;
+
+// Leaves where the cells of PIXELS pixels begin, which have so many chunks, and sums them up.
+static inline Sums with_offsets(Sums sums, const Ints chunks, const Floats d, global uchar* offsets, const int x,
+                                const int width) {
+  Ints scan = chunks;  // inclusive, in steps of 1, 2, 4 and 8
+  scan += (Ints)(0, scan.s0123, scan.s4567, scan.s89ab, scan.scd, scan.se);
+  scan += (Ints)(0, 0, scan.s0123, scan.s4567, scan.s89ab, scan.scd);
+  scan += (Ints)(0, 0, 0, 0, scan.s0123, scan.s4567, scan.s89ab);
+  scan += (Ints)((int8)(0), scan.s01234567);
+  store_words(sums.chunks + scan - chunks, offsets, x, width);
+  sums.chunks += scan.sf;
+  sums.predicted -= d > INVALID;
+  return sums;
+}
+
+static inline RowSum row_sum_of(const Sums sums) {
+  const int8 halves = sums.predicted.lo + sums.predicted.hi;
+  const int4 quarters = halves.lo + halves.hi;
+  RowSum sum;
+  sum.cells = sums.chunks * EGOSGM_LANES;
+  sum.predicted = quarters.x + quarters.y + quarters.z + quarters.w;
+  return sum;
+}
+
+#endif
+
+// What PIXELS predictions and what was found in their blocks search.
+static inline Bands bands_of_predictions(const DisparityRange range, const float sigmas, const float min_half_width,
+                                         const float coarse_tolerance, const float coarse_margin, const Floats d,
+                                         const Floats variance, const Floats found_min, const Floats found_max,
+                                         const Ints found_count) {
+  const Floats deviation = sigmas * sqrt(variance);
+  // A variance that is not a number searches everything.
+  const Floats half_width = deviation <= min_half_width ? (Floats)(min_half_width) : deviation;
+  const Floats reach = half_width <= (float)range.count ? half_width : (Floats)(range.count);
+  const Floats low = d - reach, high = d + reach;
+  const Ints contradicted = (found_count > 0) & ((found_min < low - coarse_tolerance) | (found_max > high + coarse_tolerance));
+  const Floats found_low = found_min - coarse_margin, found_high = found_max + coarse_margin;
+  const Floats from = (contradicted & (found_low < low)) ? found_low : low;
+  const Floats to = (contradicted & (found_high > high)) ? found_high : high;
+  return bands_of(range, from, to);
+}
+
+// Work-items that have a row alone sum it up, too. A work-item PIXELS pixels and view, or a row and view.
 KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
                             const float coarse_tolerance, const float coarse_margin, global const PredictionState* before,
-                            global const BlockRange* found, global const Band* block_bands, global Band* bands) {
+                            global const BlockRange* found, global const Band* block_bands, global Band* bands,
+                            global uint* cell_offsets, global RowSum* row_sums) {
   const ImageSize blocks = blocks_of(size);
-  const int block = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (block >= blocks.width) return;
-
-  const int x = block * EGOSGM_BLOCK;
-  const size_t row = ((size_t)view * size.height + y) * size.width;
-  const float8 d = eight(disparity + row, x, size.width);
-  const float8 deviation = sigmas * sqrt(eight(variance + row, x, size.width));
-  const int8 predicted = (d > EGOSGM_INVALID_DISPARITY) & (before->is_wrong ? (int8)0 : (int8)-1);
-  // A variance that is not a number searches everything.
-  const float8 half_width = deviation <= min_half_width ? (float8)min_half_width : deviation;
-  const float8 reach = half_width <= (float)range.count ? half_width : (float8)range.count;
-  const size_t own_block = index_of(blocks, view, block, y / EGOSGM_BLOCK);
-  const BlockRange coarse = found[own_block];
-  const int8 believed = coarse.count > 0 ? -1 : 0;
-  const float8 low = d - reach;
-  const float8 high = d + reach;
-  const int8 contradicted = believed & ((coarse.min < low - coarse_tolerance) | (coarse.max > high + coarse_tolerance));
-  const float8 found_low = coarse.min - coarse_margin;
-  const float8 found_high = coarse.max + coarse_margin;
-  const float8 from = (contradicted & (found_low < low)) ? found_low : low;
-  const float8 to = (contradicted & (found_high > high)) ? found_high : high;
-  const Bands own = bands_of(range, predicted ? from : 0.0f, predicted ? to : 0.0f);
-  const Band around = block_bands[own_block];
-
-  const uint8 origin = as_uint8(predicted ? own.origin : around.origin) & 0xffff;
-  const uint8 chunks = as_uint8(predicted ? own.chunks : around.chunks);
-  const uint8 first = as_uint8(predicted ? own.first : around.first) & 0xffff;
-  const uint8 last = as_uint8(predicted ? own.last : around.last);
-  const uint8 first_words = origin | chunks << 16;
-  const uint8 second_words = first | last << 16;
-  uint16 words;
-  words.even = first_words;
-  words.odd = second_words;
-  store_eight(bands + row, x, size.width, words);
+  const int width = size.width;
+  const size_t row = ((size_t)view * size.height + y) * width;
+  const size_t row_of_blocks = index_of(blocks, view, 0, y / EGOSGM_BLOCK);
+  const Ints believed = before->is_wrong ? (Ints)(0) : (Ints)(-1);
+#if ROW_GROUP == 1
+  Sums sums = {0, 0};
+#endif
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(disparity + row, x, width);
+    const Ints predicted = (d > INVALID) & believed;
+    global const BlockRange* left = found + row_of_blocks + x / EGOSGM_BLOCK;
+    global const BlockRange* right = x / EGOSGM_BLOCK + 1 < blocks.width ? left + 1 : left;
+    const Bands own = bands_of_predictions(
+        range, sigmas, min_half_width, coarse_tolerance, coarse_margin, predicted ? d : (Floats)(0.0f),
+        load_pixels(variance + row, x, width), OF_BLOCKS(Floats, float8, left->min, right->min),
+        OF_BLOCKS(Floats, float8, left->max, right->max), OF_BLOCKS(Ints, int8, left->count, right->count));
+    Bands all = bands_at(block_bands + row_of_blocks, x, blocks.width);
+    all.origin = predicted ? own.origin : all.origin;
+    all.chunks = predicted ? own.chunks : all.chunks;
+    all.first = predicted ? own.first : all.first;
+    all.last = predicted ? own.last : all.last;
+    store_bands(all, bands + row, x, width);
+#if ROW_GROUP == 1
+    const Ints chunks = x + LANE_INDICES < width ? all.chunks : (Ints)(0);
+    sums = with_offsets(sums, chunks, d, (global uchar*)(cell_offsets + row), x, width);
+  }
+  row_sums[(size_t)view * size.height + y] = row_sum_of(sums);
+#else
+  }
+#endif
 }
 
 #if ROW_GROUP == 1
 
-uint sum_of(uint8 v) {
-  const uint4 halves = v.lo + v.hi;
-  return halves.x + halves.y + halves.z + halves.w;
-}
-
-// The chunks of the pixels from x on; what lies beyond the row has none.
-uint8 load_chunks(global const Band* row, int x, int width) {
-  if (x + EGOSGM_BLOCK <= width) return vload16(0, (global const uint*)(row + x)).even >> 16;
-  uint chunks[EGOSGM_BLOCK];
-  for (int i = 0; i < EGOSGM_BLOCK; ++i) chunks[i] = x + i < width ? row[x + i].chunks : 0;
-  return vload8(0, chunks);
-}
-
-// Sums up each row, eight pixels at a time. A work-item a row and view.
-KERNEL __attribute__((reqd_work_group_size(1, 1, 1))) void sum_rows(const ImageSize size, global const float* disparity,
-                                                                    global const Band* bands, global uint* cell_offsets,
-                                                                    global RowSum* row_sums) {
+// Sums up each row of what was not banded pixel by pixel. A work-item a row and view.
+KERNEL void sum_rows(const ImageSize size, global const float* disparity, global const Band* bands,
+                     global uint* cell_offsets, global RowSum* row_sums) {
+  const int width = size.width;
   const size_t row = (size_t)get_global_id(2) * size.height + get_global_id(1);
-  global const float* disparities = disparity + row * size.width;
-  global uint* offsets = cell_offsets + row * size.width;
-  uint chunks_before = 0;
-  int8 predicted = 0;
-  for (int x = 0; x < size.width; x += EGOSGM_BLOCK) {
-    const uint8 chunks = load_chunks(bands + row * size.width, x, size.width);
-    predicted -= eight(disparities, x, size.width) > EGOSGM_INVALID_DISPARITY;
-    uint8 scan = chunks;  // inclusive, in steps of 1, 2 and 4
-    scan += (uint8)(0, scan.s0123, scan.s456);
-    scan += (uint8)(0, 0, scan.s0123, scan.s45);
-    scan += (uint8)(0, 0, 0, 0, scan.s0123);
-    const uint8 before = chunks_before + scan - chunks;
-    chunks_before += scan.s7;
-    if (x + EGOSGM_BLOCK <= size.width) {
-      vstore8(before, 0, offsets + x);
-    } else {
-      uint values[EGOSGM_BLOCK];
-      vstore8(before, 0, values);
-      for (int i = 0; i < size.width - x; ++i) offsets[x + i] = values[i];
-    }
+  Sums sums = {0, 0};
+  FOR_PIXELS(x, width) {
+    int chunks[PIXELS];
+    for (int i = 0; i < PIXELS; ++i) chunks[i] = x + i < width ? bands[row * width + x + i].chunks : 0;
+    sums = with_offsets(sums, vload16(0, chunks), load_pixels(disparity + row * width, x, width),
+                        (global uchar*)(cell_offsets + row * width), x, width);
   }
-  row_sums[row].cells = chunks_before * EGOSGM_LANES;
-  row_sums[row].predicted = sum_of(as_uint8(predicted));
+  row_sums[row] = row_sum_of(sums);
 }
 
 #else

@@ -6,6 +6,24 @@
 #include "method.h"
 #include "shared.h"
 
+// Eight disparities of a row from x on; what lies before or beyond the row is invalid.
+float8 eight(global const float* row, int x, int width) {
+  if (x >= 0 && x + EGOSGM_BLOCK <= width) return vload8(0, row + x);
+  float values[EGOSGM_BLOCK];
+  for (int i = 0; i < EGOSGM_BLOCK; ++i) {
+    values[i] = x + i >= 0 && x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
+  }
+  return vload8(0, values);
+}
+
+// Four disparities of a row from x on; what lies before or beyond the row is invalid.
+float4 four(global const float* row, int x, int width) {
+  if (x >= 0 && x + 4 <= width) return vload4(0, row + x);
+  float values[4];
+  for (int i = 0; i < 4; ++i) values[i] = x + i >= 0 && x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
+  return vload4(0, values);
+}
+
 // What pixels that are looked through one after another span, lane by lane.
 typedef struct {
   float8 least, most;
