@@ -31,10 +31,19 @@ inline uchar16 load_upper(const ulong2 lower, global const uchar* upper) {
   return (uchar16)(as_uchar16(lower).lo, load_chunk(upper));
 }
 
-// The path costs of a pixel that goes straight, which it leaves in the slots in place of those before it, and half of
-// their sum.
+// The path from the left along a run, before its minimum is taken off: t(d) and, in all lanes, min t. So the next pixel
+// need not wait for t - min t, as min(L(q, d), L(q, d +- 1) + P1, P2) = min(t, t(d +- 1) + P1, min t + P2) - min t. The
+// upper halves are not used, and 0 in `least`.
+typedef struct {
+  uchar16 t, least;
+} FromLeft;
+
+inline uchar8 path_costs_of(const FromLeft left) { return left.t.lo - left.least.lo; }
+
+// The path costs of a pixel that goes straight, but for those from the left left in the slots in place of those before
+// it, and half of their sum.
 ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, const uchar16 p1, global uchar* const* at,
-                                  global uchar* const* wiped_at, const uint along, ulong2* last) {
+                                  global uchar* const* wiped_at, const uint along, FromLeft* left) {
   const uchar16 cost = (uchar16)(chunk_cost, chunk_cost);
   const uchar4 p2 = as_uchar4(steps);
 #if PATHS == 8
@@ -42,28 +51,32 @@ ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, con
 #else
   const uchar16 p2_of[PATH_PAIRS] = {p2.s0000000011111111};
 #endif
-  uchar16 r[PATH_PAIRS], least[PATH_PAIRS];
+  uchar16 t[PATH_PAIRS], least[PATH_PAIRS];
   global const uchar* upper = at[PATH_PAIRS] + along;
-  r[0] = path_cost(cost, load_upper(*last, upper), load_upper(*last << (ulong2)(8) | (ulong2)(ABSENT), upper - 1),
-                   load_upper(*last >> (ulong2)(8) | (ulong2)((ulong)ABSENT << 56), upper + 1), p1, p2_of[0]);
+  const ulong2 before = as_ulong2(left->t);
+  const uchar16 beside = add_sat(min(load_upper(before << (ulong2)(8) | (ulong2)(ABSENT), upper - 1),
+                                     load_upper(before >> (ulong2)(8) | (ulong2)((ulong)ABSENT << 56), upper + 1)),
+                                 p1);
+  t[0] = add_sat(cost, min(min(load_upper(before, upper), beside), add_sat(left->least, p2_of[0])) - left->least);
 #if PATHS == 8
-  r[1] = path_cost(cost, load_pair(at, 1, along, 0), load_pair(at, 1, along, -1), load_pair(at, 1, along, 1), p1,
+  t[1] = path_cost(cost, load_pair(at, 1, along, 0), load_pair(at, 1, along, -1), load_pair(at, 1, along, 1), p1,
                    p2_of[1]);
 #endif
 #pragma unroll
   for (int n = 1; n < DIRECTIONS; ++n) store((uchar16)(ABSENT), wiped_at[n] + along);
-  minima_of_chunks(r, least);
+  minima_of_chunks(t, least);
+  left->t = t[0];
+  left->least = (uchar16)(least[0].lo, (uchar8)(0));
 #pragma unroll
   for (int n = 0; n < PATH_PAIRS; ++n) {
-    r[n] -= least[n];
-    store_chunk(r[n].lo, n > 0 ? at[n] + along : at[n]);
-    store_chunk(r[n].hi, at[n + PATH_PAIRS] + along);
+    t[n] -= least[n];
+    if (n > 0) store_chunk(t[n].lo, at[n] + along);
+    store_chunk(t[n].hi, at[n + PATH_PAIRS] + along);
   }
-  *last = as_ulong2(r[0]);
 #if PATHS == 8
-  r[0] = mean(r[0], r[1]);
+  t[0] = mean(t[0], t[1]);
 #endif
-  return add_sat(r[0].lo, r[0].hi);
+  return add_sat(t[0].lo, t[0].hi);
 }
 
 // The ranks of the right pixels that a left pixel of one chunk may be, in a run: its neighbour's are the same but for
@@ -125,14 +138,14 @@ ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const S
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) at[n] = row->slot[n] + (n > 0 ? moved_lane : lane);
   Seen seen = seen_from(row->seen ? row->seen + place->k - origin - (EGOSGM_LANES - 1) : 0);
-  ulong2 last = as_ulong2(place->last);
+  FromLeft left = {place->last, (uchar16)(0)};
   uint along = 0;
   while (true) {
 #pragma unroll
     for (int n = 1; n < DIRECTIONS; ++n) wiped_at[n] = row->slot[n] + (place->moved + (uint)origin_of(place->wiped[n]));
     if (backward) place->cells -= EGOSGM_LANES;
     const uchar8 cost = matching_cost_of_chunk(place->own, place->other + origin, row->row_above, row->row_below);
-    const uchar8 sum = follow_chunk(cost, steps, row->p1, at, wiped_at, along, &last);
+    const uchar8 sum = follow_chunk(cost, steps, row->p1, at, wiped_at, along, &left);
     leave_chunk(meets, q, row, place, origin, cost, sum, &seen);
     go_on(meets, row, place);
     if (!backward) place->cells += EGOSGM_LANES;
@@ -144,7 +157,9 @@ ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const S
     move_seen(backward, &seen);
   }
   leave_seen(&seen);
-  place->last = (uchar16)(as_uchar16(last).lo, (uchar8)(ABSENT));
+  const uchar8 last = path_costs_of(left);
+  store_chunk(last, at[0]);
+  place->last = (uchar16)(last, (uchar8)(ABSENT));
   place->moved += along;
 }
 
