@@ -64,6 +64,7 @@
 
 #include "compiler.h"
 #include "narrow.h"
+#include "one_block.h"
 #include "straight.h"
 #include "wide.h"
 
@@ -102,6 +103,10 @@ ALWAYS_INLINE void match_pixel(const bool meets, const bool backward, const SgmP
   if (backward) place->cells -= EGOSGM_LANES * chunks_of(extent);
   if (is_narrow(extent)) {
     match_narrow(meets, q, row, extent, steps, place);
+#if BLOCK_VECTORS == 2
+  } else if (is_block(extent)) {
+    match_block(meets, q, row, extent, steps, place);
+#endif
   } else {
     match_wide(meets, q, row, extent, steps, place);
   }
@@ -188,6 +193,12 @@ ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const R
   if (from > 0 && is_narrow(place.wiped[0])) {
     place.last = load(row->slot[0] + (origin_of(place.wiped[0]) - q.min_disparity));
   }
+#if BLOCK_VECTORS == 2
+  place.last_block = (Block)(ABSENT);
+  if (from > 0 && is_block(place.wiped[0])) {
+    place.last_block = load_block(row->slot[0] + (origin_of(place.wiped[0]) - q.min_disparity));
+  }
+#endif
   place.moved = -(uint)q.min_disparity;
   return place;
 }

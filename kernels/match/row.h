@@ -32,6 +32,9 @@ typedef struct {
   Penalties around;
   uint wiped[4];  // the extents of those before it on the four paths
   uchar16 last;   // the path costs of the one to the left, where its band is narrow
+#if BLOCK_VECTORS == 2
+  Block last_block;  // the same where it takes a block
+#endif
   uint moved;     // how far the slots have moved on, less the least disparity
 } Place;
 

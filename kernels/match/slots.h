@@ -9,8 +9,9 @@
 inline uint extent_at(global const Band* band) { return *(global const uint*)band; }
 inline int origin_of(const uint extent) { return (short)extent; }
 inline int chunks_of(const uint extent) { return extent >> 16; }
-// Bands that fit one vector.
+// Bands that fit one vector, one block of several, one chunk.
 inline bool is_narrow(const uint extent) { return extent < 3u << 16; }
+inline bool is_block(const uint extent) { return extent >> 16 == BLOCK / EGOSGM_LANES; }
 inline bool is_chunk(const uint extent) { return extent < 2u << 16; }
 
 // Makes what a predecessor with `extent` left in a slot absent, `at` being its first disparity's place.

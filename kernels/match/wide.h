@@ -92,11 +92,7 @@ inline void find_winner(const Pixel* pixel, const int vectors, const PathCosts* 
   const ushort winner_total = minimum_of_totals(best->total);
   const ushort16 lanes = best->vector * (ushort16)(VECTOR) + convert_ushort16(kLane);
   const int best_lane = minimum_of_totals(lanes | as_ushort16(best->total != (ushort16)(winner_total)));
-  // The winner's neighbourhood, with the winner in lane 0.
-  ushort* window = (ushort*)&candidate->totals;
-  store_totals(((const Totals*)(totals + best_lane - MAX_STEPS))->totals, window);
-  window[2 * MAX_STEPS] = totals[best_lane + MAX_STEPS];
-  candidate->rank = winner_total << 4;
+  put_window(totals + best_lane, winner_total, candidate);
   candidate->disparity = pixel->origin + best_lane;
   for (int v = 0; pixel->seen && v < vectors; ++v) {
     const int at = VECTOR * v;

@@ -35,6 +35,14 @@ typedef struct {
   int disparity;
 } Candidate;
 
+// A winner with its neighbourhood in lane 0. `totals`: at the winner's, of MAX_STEPS on both sides.
+inline void put_window(const ushort* totals, const int winner_total, Candidate* candidate) {
+  ushort* window = (ushort*)&candidate->totals;
+  store_totals(((const Totals*)(totals - MAX_STEPS))->totals, window);
+  window[2 * MAX_STEPS] = totals[MAX_STEPS];
+  candidate->rank = winner_total << 4;
+}
+
 // What `refine` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one is
 // missing), steps; 16 bits each.
 inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
