@@ -59,6 +59,15 @@ static inline Floats load_pixels(global const float* row, const int x, const int
 #endif
 }
 
+// Values that were put side by side.
+static inline Floats load_pixels_of(const float* values) {
+#if PIXELS == 1
+  return values[0];
+#else
+  return vload16(0, values);
+#endif
+}
+
 // Values of a row at places x, lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of
 // loads that may be joined.
 #if PIXELS == 1

@@ -67,16 +67,17 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
 
 void SearchBand::operator()(const StereoMaps& predicted, const Hints& hints, SearchBands& bands, Views views) {
   context_.enter("SearchBand");
-  const ocl::Range blocks = ocl::every_pixel(context_, blocks_, count(views));
+  const int pixels = row_group_ == 1 ? 2 * EGOSGM_BLOCK : 1;
+  const ocl::Range blocks = ocl::every_pixels(context_, blocks_, pixels, count(views));
   const States& last = hints.last ? *hints.last : not_wrong_;
-  if (hints.coarse) gather_coarse_(context_, blocks, size_, *hints.coarse, coarse_ranges_);
+  if (hints.coarse)
+    gather_coarse_(context_, ocl::every_pixel(context_, blocks_, count(views)), size_, *hints.coarse, coarse_ranges_);
   if (options_.from_neighbours) {
     gather_blocks_(context_, blocks, size_, hints.warped ? *hints.warped : predicted.disparity, block_ranges_);
   }
   bands_of_blocks_(context_, blocks, size_, range_, options_.from_neighbours, options_.neighbour_margin_px,
                    options_.neighbour_min_count, options_.coarse_margin_px, last, block_ranges_,
                    hints.coarse ? coarse_ranges_ : none_, found_, block_bands_);
-  const int pixels = row_group_ == 1 ? 2 * EGOSGM_BLOCK : 1;
   bands_of_pixels_(context_, ocl::every_pixels(context_, size_, pixels, count(views)), size_, range_, options_.sigmas,
                    options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
                    options_.coarse_margin_px, last, found_, block_bands_, bands.bands, bands.cell_offsets,

@@ -9,12 +9,6 @@ typedef struct {
   Ints origin, chunks, first, last;
 } Bands;
 
-#if PIXELS == 1
-#define FIRST_LANE(values) (values)
-#else
-#define FIRST_LANE(values) ((values).s0)
-#endif
-
 static inline Ints floor_to(const Ints step, const Ints lane) { return lane & ~(step - 1); }
 static inline Ints ceil_to(const Ints step, const Ints lane) { return floor_to(step, lane + (step - 1)); }
 
@@ -57,15 +51,6 @@ static inline Bands bands_of(const DisparityRange range, Floats from, Floats to)
   bands.first = range.min + begin;
   bands.last = range.min + end - 1;
   return bands;
-}
-
-static inline Band first_of(const Bands bands) {
-  Band band;
-  band.origin = FIRST_LANE(bands.origin);
-  band.chunks = FIRST_LANE(bands.chunks);
-  band.first = FIRST_LANE(bands.first);
-  band.last = FIRST_LANE(bands.last);
-  return band;
 }
 
 // What two neighbouring blocks say, each pixel of a row what its own does.

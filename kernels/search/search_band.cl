@@ -17,21 +17,26 @@
 #error "bands are written as words: a little-endian device"
 #endif
 
-// A work-item a block and view.
+// A work-item BLOCKS blocks and view, or a row of blocks and view.
 KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
-  const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  if (x >= blocks.width || y >= blocks.height) return;
-
-  Spans spans = no_spans();
   const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
-  for (int row = y * EGOSGM_BLOCK; row < end; ++row) {
-    const float8 d = eight(disparity + ((size_t)view * size.height + row) * size.width, x * EGOSGM_BLOCK, size.width);
-    spans = with(spans, d, d > EGOSGM_INVALID_DISPARITY);
+  for (int x = get_global_id(0) * BLOCKS; x < blocks.width; x += (int)get_global_size(0) * BLOCKS) {
+    Spans spans = no_spans();
+    for (int row = y * EGOSGM_BLOCK; row < end; ++row) {
+      spans = with(spans, load_across(disparity + ((size_t)view * size.height + row) * size.width, x * EGOSGM_BLOCK,
+                                      size.width));
+    }
+    global BlockRange* to = ranges + index_of(blocks, view, x, y);
+#if BLOCKS == 1
+    to[0] = range_of(spans.least, spans.most, spans.count);
+#else
+    to[0] = range_of(spans.least.lo, spans.most.lo, spans.count.lo);
+    if (x + 1 < blocks.width) to[1] = range_of(spans.least.hi, spans.most.hi, spans.count.hi);
+#endif
   }
-  ranges[index_of(blocks, view, x, y)] = range_of(spans);
 }
 
 // What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at
@@ -82,21 +87,17 @@ KERNEL void gather_coarse(const ImageSize size, global const float* coarse, glob
   ranges[index_of(blocks, view, x, y)] = range;
 }
 
-// The band of a block's unpredicted pixels: what the predictions in the 3x3 blocks around it and the coarse match span.
-// `found`: what the block's own predictions and the coarse match span, for the predicted ones: beside a jump a
-// prediction may lie on the wrong side of it. `before`: of the frame before; after wrong predictions every pixel searches
-// everything. A work-item a block and view.
-KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
-                            const float margin, const int min_count, const float coarse_margin,
-                            global const PredictionState* before, global const BlockRange* ranges,
-                            global const BlockRange* coarse_ranges,
-                            global BlockRange* found, global Band* bands) {
-  const ImageSize blocks = blocks_of(size);
-  const int x = get_global_id(0);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
-  if (x >= blocks.width || y >= blocks.height) return;
+// From what to what the unpredicted pixels of a block search.
+typedef struct {
+  float from, to;
+} Span;
 
+// What the predictions in the 3x3 blocks around it and the coarse match span. `found`: what the block's own predictions
+// and the coarse match span.
+static inline Span span_around(const ImageSize blocks, const int view, const int x, const int y,
+                               const int from_neighbours, const float margin, const int min_count,
+                               const float coarse_margin, global const BlockRange* ranges,
+                               global const BlockRange* coarse_ranges, global BlockRange* found) {
   float least = INFINITY;
   float most = -INFINITY;
   uint count = 0;
@@ -109,25 +110,49 @@ KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, co
     }
   }
   const size_t here = index_of(blocks, view, x, y);
-  const bool has_around = count > 0 && count >= (uint)max(min_count, 0);
-  const bool has_coarse = coarse_ranges[here].count >= EGOSGM_COARSE_MIN_COUNT;
   const BlockRange coarse = coarse_ranges[here];
+  const bool has_around = count > 0 && count >= (uint)max(min_count, 0);
+  const bool has_coarse = coarse.count >= EGOSGM_COARSE_MIN_COUNT;
   BlockRange both = {INFINITY, -INFINITY, 0};
   if (has_coarse) both = coarse;
   found[here] = joined(both, ranges[here]);
 
-  const bool has_any = from_neighbours && (has_around || has_coarse) && !before->is_wrong;
-  float from = has_any ? INFINITY : -INFINITY;
-  float to = -from;
+  const bool has_any = from_neighbours && (has_around || has_coarse);
+  Span span = {has_any ? INFINITY : -INFINITY, has_any ? -INFINITY : INFINITY};
   if (has_any && has_around) {
-    from = least - margin;
-    to = most + margin;
+    span.from = least - margin;
+    span.to = most + margin;
   }
   if (has_any && has_coarse) {
-    from = fmin(from, coarse.min - coarse_margin);
-    to = fmax(to, coarse.max + coarse_margin);
+    span.from = fmin(span.from, coarse.min - coarse_margin);
+    span.to = fmax(span.to, coarse.max + coarse_margin);
   }
-  bands[here] = first_of(bands_of(range, from, to));
+  return span;
+}
+
+// The band of a block's unpredicted pixels; `found` is for the predicted ones: beside a jump a prediction may lie on the
+// wrong side of it. `before`: of the frame before; after wrong predictions every pixel searches everything. A work-item
+// PIXELS blocks and view, or a row of blocks and view.
+KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
+                            const float margin, const int min_count, const float coarse_margin,
+                            global const PredictionState* before, global const BlockRange* ranges,
+                            global const BlockRange* coarse_ranges,
+                            global BlockRange* found, global Band* bands) {
+  const ImageSize blocks = blocks_of(size);
+  const int y = get_global_id(1);
+  const int view = get_global_id(2);
+  const int asks = from_neighbours && !before->is_wrong;
+  FOR_PIXELS(x, blocks.width) {
+    float from[PIXELS], to[PIXELS];
+    for (int i = 0; i < PIXELS; ++i) {
+      const Span span = span_around(blocks, view, min(x + i, blocks.width - 1), y, asks, margin, min_count,
+                                    coarse_margin, ranges, coarse_ranges, found);
+      from[i] = span.from;
+      to[i] = span.to;
+    }
+    store_bands(bands_of(range, load_pixels_of(from), load_pixels_of(to)), bands + index_of(blocks, view, 0, y), x,
+                blocks.width);
+  }
 }
 
 #if ROW_GROUP == 1

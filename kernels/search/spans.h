@@ -24,10 +24,21 @@ float4 four(global const float* row, int x, int width) {
   return vload4(0, values);
 }
 
-// What pixels that are looked through one after another span, lane by lane.
+// The blocks of a work-item, a row of pixels of theirs, and what such rows span, lane by lane.
+#if PIXELS == 1
+#define BLOCKS 1
+typedef float8 Across;
+typedef int8 AcrossInts;
+#define load_across eight
+#else
+#define BLOCKS 2
+typedef float16 Across;
+typedef int16 AcrossInts;
+#define load_across load_pixels
+#endif
 typedef struct {
-  float8 least, most;
-  int8 count;
+  Across least, most;
+  AcrossInts count;
 } Spans;
 
 Spans no_spans() {
@@ -38,18 +49,19 @@ Spans no_spans() {
   return spans;
 }
 
-Spans with(Spans spans, const float8 d, const int8 counts) {
-  spans.least = select(spans.least, d, counts & (d < spans.least));
-  spans.most = select(spans.most, d, counts & (d > spans.most));
-  spans.count -= counts;
+Spans with(Spans spans, const Across d) {
+  const AcrossInts valid = d > EGOSGM_INVALID_DISPARITY;
+  spans.least = (valid & (d < spans.least)) ? d : spans.least;
+  spans.most = (valid & (d > spans.most)) ? d : spans.most;
+  spans.count -= valid;
   return spans;
 }
 
-BlockRange range_of(const Spans spans) {
+BlockRange range_of(const float8 least, const float8 most, const int8 count) {
   BlockRange range;
-  const float4 least4 = fmin(spans.least.lo, spans.least.hi);
-  const float4 most4 = fmax(spans.most.lo, spans.most.hi);
-  const int4 count4 = spans.count.lo + spans.count.hi;
+  const float4 least4 = fmin(least.lo, least.hi);
+  const float4 most4 = fmax(most.lo, most.hi);
+  const int4 count4 = count.lo + count.hi;
   range.min = fmin(fmin(least4.x, least4.y), fmin(least4.z, least4.w));
   range.max = fmax(fmax(most4.x, most4.y), fmax(most4.z, most4.w));
   range.count = count4.x + count4.y + count4.z + count4.w;
