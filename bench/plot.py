@@ -20,7 +20,8 @@ CONTENDERS = {
     "opencv_3way": "OpenCV MODE_SGBM_3WAY, 3 paths, left view",
     "egosgm_full_left": "EgoSGM, full range, 8 paths, left view",
     "egosgm_full_both": "EgoSGM, full range, both views, checked",
-    "egosgm_banded_frame": "EgoSGM, steady frame, both views, motion given",
+    "egosgm_banded_frame": "EgoSGM, steady frame, motion given",
+    "egosgm_banded_left": "EgoSGM, the same with the left view tracked alone",
     "egosgm_video_frame": "EgoSGM, steady frame with odometry",
 }
 SCALING_LABELS = {"full_both": "full range", "banded_frame": "steady frame"}

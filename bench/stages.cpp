@@ -78,25 +78,24 @@ class Frame {
   std::map<std::string, double> bytes() const {
     const double pixels = static_cast<double>(pixel_count(size_));  // of a view; a map of both has two times as many
     const double map = 4 * pixels, maps = 2 * map, band = 12 * pixels, codes = 8 * pixels, grey = 2 * pixels;
-    return {{"ForwardWarp", 2 * maps},
+    return {{"ForwardWarp", 4 * maps},
             {"EdgeRejection", 4 * maps},
-            {"HoleFill", 4 * maps},
+            {"HoleFill", 8 * maps},
             {"ConsistencyCheck", 3 * 4 * maps},
             {"CoarseMatch", grey},
-            {"SearchBand", maps + band},
+            {"SearchBand", 2 * (maps + band)},
             // Resampling both images, and the estimate on every fourth row of the left view.
             {"VerticalAlignment", 2 * grey + (grey + map) / 4},
             {"Census", grey + codes},
-            {"StepPenalties", grey / 2 + 4 * pixels},
-            {"BandedSgm", 2 * (codes + band) + maps + 2 * cells(Views::kLeft)},
-            {"MedianFilter", 2 * maps + 2 * map},
-            {"SpeckleRemoval", map},
-            {"KalmanUpdate", 3 * maps},
+            {"StepPenalties", grey + 8 * pixels},
+            {"BandedSgm", 2 * (2 * (codes + band) + maps + cells(Views::kBoth))},
+            {"MedianFilter", 4 * maps},
+            {"SpeckleRemoval", 2 * map},
+            {"KalmanUpdate", 6 * maps},
             {"PredictionCheck", 3 * map / 4},
-            {"OutputVariance", 11 * map},
-            {"RightMap", 2 * 5 * map / 2}};
+            {"OutputVariance", 11 * map}};
   }
-  double steady_cells() const { return cells(Views::kLeft); }
+  double steady_cells() const { return cells(Views::kBoth); }
   double full_range_cells() const { return full_range_cells_; }
   double full_range_bytes() const {
     return (2 * (8 + 2 * 12) + 16) * static_cast<double>(pixel_count(size_)) + 2 * full_range_cells_;

@@ -24,6 +24,7 @@ CONTENDERS = {
     "egosgm_full_left": "EgoSGM, full range, 8 paths, left view",
     "egosgm_full_both": "EgoSGM, full range, both views, checked",
     "egosgm_banded_frame": "EgoSGM, steady frame, motion given",
+    "egosgm_banded_left": "EgoSGM, the same with the left view tracked alone",
     "egosgm_video_frame": "EgoSGM, steady frame with odometry",
 }
 # Rows of the README's table: the name there, and the input and figure of a row of bench/accuracy.

@@ -84,9 +84,9 @@ inline std::vector<Setting> settings() {
                    o.banded_sgm.p2_at_edges = 25;
                    o.banded_sgm.p2_slope = 9;
                  })});
-  const auto track_both = [](MethodOptions& o) { o.track_right = true; };
-  all.push_back({"both_tracked", kSize, options(32, -10, track_both), PixelType::kU16, {}, 12.25});
-  all.push_back({"both_tracked_7x5", {7, 5}, options(16, 0, track_both)});
+  const auto track_left = [](MethodOptions& o) { o.track_right = false; };
+  all.push_back({"left_tracked", kSize, options(32, -10, track_left), PixelType::kU16, {}, 12.25});
+  all.push_back({"left_tracked_7x5", {7, 5}, options(16, 0, track_left)});
   all.push_back({"along_paths_full_search", kSize, options(24, 0, [](MethodOptions& o) {
                    o.search = SearchMode::kFull;
                    o.banded_sgm.scheduling = Scheduling::kPaths;
