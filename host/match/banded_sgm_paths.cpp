@@ -15,7 +15,7 @@ constexpr int kDiagonals[] = {1, 2};
 
 // Disparities of a work-item at once: where work-items are lanes of a GPU, and where they hold vectors.
 constexpr int kQuad = 4, kVector = 16;
-constexpr int kGroupSize = 32;
+constexpr int kGroupSize = 32, kQuadsALane = 2;
 
 int groups_of(int lines, int lines_a_group) { return (lines + lines_a_group - 1) / lines_a_group; }
 
@@ -39,8 +39,8 @@ BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context,
   if (!is_gpu(context)) return {1, 1};
   const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), kGroupSize));
   const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / kQuad;
-  int lanes = 1;
-  while (lanes < quads && 2 * lanes <= limit) lanes *= 2;
+  int lanes = std::min(2, limit);
+  while (kQuadsALane * lanes < quads && 2 * lanes <= limit) lanes *= 2;
   return {lanes, limit / lanes};
 }
 

@@ -28,7 +28,7 @@ class BandedSgmPaths {
   void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
                   ocl::Buffer<cl_uint>& ranks, Views views);
 
-  /// On GPUs four disparities a lane, and a group that fills the smallest unit, as far as the device allows it;
+  /// On GPUs two quads of disparities a lane, and a group that fills the smallest unit, as far as the device allows it;
   /// elsewhere work-items of their own, which wait for nobody.
   static Group default_group(const ocl::Context& context, shared::DisparityRange range);
   /// Of one of the four buffers of partial sums: a byte a cell, and what the last vector of a pixel holds beyond its

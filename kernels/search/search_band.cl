@@ -143,7 +143,7 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   const size_t row = ((size_t)view * size.height + y) * size.width;
   const float8 d = eight(disparity + row, x, size.width);
   const float8 deviation = sigmas * sqrt(eight(variance + row, x, size.width));
-  const int8 predicted = (d > EGOSGM_INVALID_DISPARITY) & (before->is_wrong ? (int8)0 : (int8)-1);
+  const int8 predicted = (d > EGOSGM_INVALID_DISPARITY) & (int8)(before->is_wrong ? 0 : -1);
   // A variance that is not a number searches everything.
   const float8 half_width = deviation <= min_half_width ? (float8)min_half_width : deviation;
   const float8 reach = half_width <= (float)range.count ? half_width : (float8)range.count;
