@@ -15,7 +15,7 @@ constexpr int kDiagonals[] = {1, 2};
 
 // Disparities of a work-item at once: where work-items are lanes of a GPU, and where they hold vectors.
 constexpr int kQuad = 4, kVector = 16;
-constexpr int kGroupSize = 32, kQuadsALane = 2;
+constexpr int kGroupSize = 32;
 
 int groups_of(int lines, int lines_a_group) { return (lines + lines_a_group - 1) / lines_a_group; }
 
@@ -35,12 +35,14 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
 
 }  // namespace
 
-BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range) {
+BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range,
+                                                    MatchingCost cost) {
   if (!is_gpu(context)) return {1, 1};
   const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), kGroupSize));
   const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / kQuad;
+  const int quads_a_lane = Census::words(cost) == 1 ? 2 : 1;
   int lanes = std::min(2, limit);
-  while (kQuadsALane * lanes < quads && 2 * lanes <= limit) lanes *= 2;
+  while (quads_a_lane * lanes < quads && 2 * lanes <= limit) lanes *= 2;
   return {lanes, limit / lanes};
 }
 
