@@ -138,6 +138,8 @@ Arguments parse_arguments(int argc, char** argv, const char* help, int default_r
       arguments.threads = positive("--threads", *threads);
     } else if (const auto json = value_of("--json", argc, argv, i)) {
       arguments.json = *json;
+    } else if (const auto bits = value_of("--bits", argc, argv, i)) {
+      arguments.bits = *bits;
     } else if (const auto sweep = value_of("--sweep", argc, argv, i)) {
       arguments.sweep = *sweep;
     } else if (const auto setting = value_of("--set", argc, argv, i)) {

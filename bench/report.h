@@ -20,6 +20,7 @@ struct Arguments {
   int rounds = 0;                         // --rounds N: a figure is the median of so many
   int threads = 2;                        // --threads N: compute units of PoCL and threads of OpenCV
   std::string json;                       // --json FILE
+  std::string bits;                       // --bits FILE (egosgm_stages)
   std::string sweep;                      // --sweep NAME (egosgm_scaling)
   std::vector<std::string> settings;      // --set NAME=VALUE, repeated (egosgm_compare)
 };

@@ -1,6 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The stages of a steady frame as it runs: device time, bytes moved, and their share of what a copy reaches.
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
 #include <functional>
 #include <map>
 #include <numeric>
@@ -9,6 +15,7 @@
 #include "bench/device_copy.h"
 #include "bench/report.h"
 #include "bench/street.h"
+#include "egosgm/error.h"
 #include "host/method.h"
 #include "host/ocl/device_handle.h"
 #include "host/ocl/errors.h"
@@ -24,8 +31,11 @@ constexpr const char* kHelp =
     "  --rounds N        median of N rounds of five frames (3)\n"
     "  --threads N       compute units of PoCL (2)\n"
     "  --json FILE       write the rows\n"
+    "  --bits FILE       hold the maps against checksums that were recorded on another device: exit code 1 where they "
+    "differ\n"
     "Rows: a stage each, room_NAME for a room (with what the host does there), BandedSgm_full of a frame of full "
-    "range.\n"
+    "range,\n"
+    "steady_frame and full_frame for all stages of one.\n"
     "Columns: ms and device_ms: of a frame, the former by the wall clock for rooms; GB_s: every map, image and band "
     "that a\n"
     "stage takes or gives counted once (no re-reads, no memory of its own but the path sums of BandedSgm: a byte a\n"
@@ -95,6 +105,22 @@ class Frame {
             {"PredictionCheck", 3 * map / 4},
             {"OutputVariance", 11 * map}};
   }
+  /// A checksum (FNV-1a) of what the last steady frame found in the left view.
+  std::string bits() const {
+    const auto pixels = static_cast<std::ptrdiff_t>(pixel_count(size_));
+    std::uint64_t hash = 14695981039346656037u;
+    for (const Map* map : {&after_.maps.disparity, &after_.maps.variance, &variance_}) {
+      const std::vector<float> values = map->read(context_);
+      std::for_each(values.begin(), values.begin() + pixels, [&](float value) {
+        for (const auto byte : std::bit_cast<std::array<unsigned char, sizeof value>>(value))
+          hash = (hash ^ byte) * 1099511628211u;
+      });
+    }
+    char text[17];
+    std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
+    return text;
+  }
+
   double steady_cells() const { return cells(Views::kBoth); }
   double full_range_cells() const { return full_range_cells_; }
   double full_range_bytes() const {
@@ -156,16 +182,45 @@ Row row_of(const std::string& name, shared::ImageSize size, int disparities, dou
   return row;
 }
 
-void run_frames(const Device& device, shared::ImageSize size, int disparities, int rounds, double copy_gb_s,
-                std::vector<Row>& rows) {
+double sum(const std::map<std::string, double>& ms) {
+  return std::accumulate(ms.begin(), ms.end(), 0.0,
+                         [](double total, const auto& stage) { return total + stage.second; });
+}
+
+/// Checksums by what they are of: "WIDTHxHEIGHT D".
+std::map<std::string, std::string> read_bits(const std::string& file) {
+  std::ifstream stream(file);
+  if (!stream) throw IoError("--bits " + file + ": cannot be read");
+  std::map<std::string, std::string> recorded;
+  for (std::string size, disparities, bits; stream >> size >> disparities >> bits;)
+    recorded[size + " " + disparities] = bits;
+  return recorded;
+}
+
+/// Whether the maps are those that were recorded, or none were.
+bool check_bits(const std::string& of, const std::string& bits, const std::map<std::string, std::string>& recorded) {
+  const auto found = recorded.find(of);
+  const bool differs = found != recorded.end() && found->second != bits;
+  std::printf("bits %s %s: %s\n", of.c_str(), bits.c_str(),
+              found == recorded.end() ? "none were recorded"
+              : differs               ? "NOT those that were recorded"
+                                      : "those that were recorded");
+  return !differs;
+}
+
+/// Whether the maps are those that were recorded.
+bool run_frames(const Device& device, shared::ImageSize size, int disparities, const Arguments& arguments,
+                double copy_gb_s, const std::map<std::string, std::string>& recorded, std::vector<Row>& rows) {
   ocl::Context context(device.handle().device);
-  ocl::translated(context, [&] {
+  return ocl::translated(context, [&] {
     Frame frame(context, make_street(size, disparities), disparities);
     std::map<std::string, std::vector<double>> device_ms, wall_ms;
-    for (int i = 0; i < rounds * kFramesARound; ++i) {
+    std::vector<double> frame_ms;
+    for (int i = 0; i < arguments.rounds * kFramesARound; ++i) {
       const Times& times = frame.steady();
       for (const auto& [stage, ms] : times.device) device_ms[stage].push_back(ms);
       for (const auto& [room, ms] : times.wall) wall_ms[room].push_back(ms);
+      frame_ms.push_back(sum(times.device));
     }
     const std::map<std::string, double> bytes = frame.bytes();
     for (const auto& [stage, all] : device_ms) {
@@ -185,11 +240,17 @@ void run_frames(const Device& device, shared::ImageSize size, int disparities, i
                  {"Gcells_s", 1e-6 * frame.full_range_cells() / full_ms}};
     add_row(std::move(full), rows);
     for (const auto& [room, all] : wall_ms) add_row(row_of("room_" + room, size, disparities, median(all)), rows);
+    add_row(row_of("full_frame", size, disparities, sum(frame.full_range().device)), rows);
+    add_row(row_of("steady_frame", size, disparities, median(frame_ms)), rows);
+    return check_bits(
+        std::to_string(size.width) + "x" + std::to_string(size.height) + " " + std::to_string(disparities),
+        frame.bits(), recorded);
   });
 }
 
 int run(int argc, char** argv) {
   const Arguments arguments = parse_arguments(argc, argv, kHelp, 3);
+  const auto recorded = arguments.bits.empty() ? std::map<std::string, std::string>() : read_bits(arguments.bits);
   const Device device = Device::select();
   Machine machine{device.info(), 0, "a synthetic street", arguments.threads};
   {
@@ -199,14 +260,15 @@ int run(int argc, char** argv) {
   print_machine(machine);
   const std::vector<shared::ImageSize> all_sizes{{640, 480}, {1242, 375}, {1920, 1080}};
   const std::vector<int> all_ranges{64, 128, 256};
+  bool is_same = true;
   std::vector<Row> rows;
   for (const shared::ImageSize size : arguments.size ? std::vector{*arguments.size} : all_sizes) {
     for (const int disparities : arguments.disparities ? std::vector{*arguments.disparities} : all_ranges) {
-      run_frames(device, size, disparities, arguments.rounds, machine.copy_gb_s, rows);
+      if (!run_frames(device, size, disparities, arguments, machine.copy_gb_s, recorded, rows)) is_same = false;
     }
   }
   if (!arguments.json.empty()) write_json(arguments.json, machine, rows);
-  return rows.empty() ? 1 : 0;
+  return rows.empty() || !is_same ? 1 : 0;
 }
 
 }  // namespace

@@ -129,7 +129,8 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
       launches_(launches),
       read_off_(context, size_, code_padding(range)) {
   if (follows_paths(context, options.scheduling)) {
-    paths_.emplace(context, size_, range, options, group ? *group : BandedSgmPaths::default_group(context, range));
+    paths_.emplace(context, size_, range, options,
+                   group ? *group : BandedSgmPaths::default_group(context, range, options.cost));
   } else {
     wavefront_.emplace(context, size_, range, options, tile);
   }

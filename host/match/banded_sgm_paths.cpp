@@ -35,12 +35,14 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
 
 }  // namespace
 
-BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range) {
+BandedSgmPaths::Group BandedSgmPaths::default_group(const ocl::Context& context, shared::DisparityRange range,
+                                                    MatchingCost cost) {
   if (!is_gpu(context)) return {1, 1};
   const int limit = static_cast<int>(std::min<std::size_t>(context.max_work_group_size(), kGroupSize));
   const int quads = SearchBand::max_chunks(range) * EGOSGM_LANES / kQuad;
-  int lanes = 1;
-  while (lanes < quads && 2 * lanes <= limit) lanes *= 2;
+  const int quads_a_lane = Census::words(cost) == 1 ? 2 : 1;
+  int lanes = std::min(2, limit);
+  while (quads_a_lane * lanes < quads && 2 * lanes <= limit) lanes *= 2;
   return {lanes, limit / lanes};
 }
 

@@ -28,9 +28,9 @@ class BandedSgmPaths {
   void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
                   ocl::Buffer<cl_uint>& ranks, Views views);
 
-  /// On GPUs four disparities a lane, and a group that fills the smallest unit, as far as the device allows it;
-  /// elsewhere work-items of their own, which wait for nobody.
-  static Group default_group(const ocl::Context& context, shared::DisparityRange range);
+  /// On GPUs two quads of disparities a lane (one, where codes of 64 bits take the registers), and a group that fills
+  /// the smallest unit, as far as the device allows it; elsewhere work-items of their own, which wait for nobody.
+  static Group default_group(const ocl::Context& context, shared::DisparityRange range, MatchingCost cost);
   /// Of one of the four buffers of partial sums: a byte a cell, and what the last vector of a pixel holds beyond its
   /// band.
   static std::size_t sum_bytes(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);

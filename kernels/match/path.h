@@ -11,33 +11,42 @@ typedef struct {
 } Line;
 
 // The same with its place in memory: first pixel (of both views), its column, its and its matches' codes, and what a
-// step adds to each.
+// step adds to each. Indices have 32 bits, as the cells of so many pixels would fit no device; a step may wrap them
+// round.
 typedef struct {
   int length;
-  size_t pixel;
-  long pixel_step;
+  uint pixel, pixel_step;
   int x, x_step;
   int y, y_step;
-  global const Code* own;
-  global const Code* other;  // at the range's first disparity
-  long own_step, other_step;
-  global const uchar* penalties;  // P2 of a step at the pixel it leads to, in a backward sweep at the one it comes from
-  long penalty_offset;
+  uint own, own_step;
+  uint other, other_step;  // at the range's first disparity
+  uint penalty_offset;     // from a pixel to that with P2 of the step to it: in a backward sweep the one it comes from
+  int direction;
 } Path;
 
+// What lies in memory of all pixels.
+typedef struct {
+  global const Code* codes;
+  global const uchar* penalties;
+  global const Band* bands;
+  global const uint* offsets;
+} Pixels;
+
+// What memory holds of a pixel on it: P2 of the step to it, where its cells lie in their row, and its band, in one
+// value (origin, chunks, first, last), as a struct in a struct goes through memory (PoCL 3.1).
+typedef struct {
+  int p2;
+  uint offset;
+  short4 band;
+} Stored;
+
 // A pixel on it: P2 of the step to it, which lanes of the range its band holds, [first, end), none beyond the end of
-// the path, and the place of the cells of the vectors that they lie in.
+// the path, and where the cell of the range's first lane would be.
 typedef struct {
   int p2;
   int first, end;
-  size_t cells;
+  long cells;
 } Pixel;
-
-// A pixel's code and those of what it may match; with COST_SAD, the costs themselves in `others`.
-typedef struct {
-  Code own;
-  Codes others[VECTORS_A_LANE];
-} Matches;
 
 // Directions: 0 from the left, 1 from above, 2 from the upper left, 3 from the upper right.
 inline Line line_of(const SgmParameters q, const int direction, const int index) {
@@ -54,27 +63,66 @@ inline Line line_of(const SgmParameters q, const int direction, const int index)
 }
 
 // Backward sweeps see the image turned by 180 degrees; codes of the right view lie mirrored.
-inline Path path_of(const SgmParameters q, const int direction, const bool backward, const int view, const Line line,
-                    global const uint* all_codes, global const uchar* penalties) {
+inline Path path_of(const SgmParameters q, const int direction, const bool backward, const int view, const Line line) {
   const int sign = backward ? -1 : 1, view_sign = view == EGOSGM_LEFT ? 1 : -1;
-  const long stride = (long)q.width + 2 * (long)q.padding;
+  const int stride = q.width + 2 * q.padding;
   Path path;
   path.length = line.length;
   path.x = backward ? q.width - 1 - line.x : line.x;
   path.y = backward ? q.height - 1 - line.y : line.y;
   path.x_step = direction == 1 ? 0 : direction == 3 ? -sign : sign;
   path.y_step = direction == 0 ? 0 : sign;
-  path.pixel = ((size_t)view * q.height + path.y) * q.width + path.x;
-  path.pixel_step = path.y_step * (long)q.width + path.x_step;
+  path.pixel = (uint)(view * q.height + path.y) * q.width + path.x;
+  path.pixel_step = path.y_step * q.width + path.x_step;
   const int along = view == EGOSGM_LEFT ? path.x : q.width - 1 - path.x;
-  global const Code* codes = (global const Code*)all_codes + q.padding;
-  path.own = codes + ((size_t)view * q.height + path.y) * stride + along;
-  path.other = codes + ((size_t)(1 - view) * q.height + path.y) * stride + (q.width - 1 - along) + q.min_disparity;
+  path.own = (uint)(view * q.height + path.y) * stride + q.padding + along;
+  path.other = (uint)((1 - view) * q.height + path.y) * stride + q.padding + (q.width - 1 - along) + q.min_disparity;
   path.own_step = path.y_step * stride + view_sign * path.x_step;
   path.other_step = path.y_step * stride - view_sign * path.x_step;
-  path.penalties = penalties + direction;
   path.penalty_offset = backward ? -path.pixel_step : 0;
+  path.direction = direction;
   return path;
+}
+
+// A pixel's vectors have so many cells more than its band, as it may begin and end within one.
+#define SPARE_CELLS (VECTOR == 4 ? 4 : VECTOR + EGOSGM_LANES)
+
+inline size_t cells_of(const size_t row_start, const size_t pixel, const uint offset) {
+  return (row_start * MAX_CHUNKS + offset) * EGOSGM_LANES + SPARE_CELLS * pixel;
+}
+
+// The lane of the range that a pixel's cells begin with, whose band begins with `first`: that of its vector, where
+// vectors are dealt out.
+inline int first_cell_of(const int first) { return LANES == 1 ? first : first & -VECTOR; }
+
+inline Stored stored_at(const Path path, const int i, const Pixels pixels) {
+  Stored stored = {0, 0, 0};
+  if (i < path.length) {
+    const uint at = path.pixel + i * path.pixel_step;
+    // Where a path begins, any P2 gives the same.
+    stored.p2 = pixels.penalties[4 * (size_t)(i > 0 ? at + path.penalty_offset : at) + path.direction];
+    stored.band = ((global const short4*)pixels.bands)[at];
+    stored.offset = pixels.offsets[at];
+  }
+  return stored;
+}
+
+inline Pixel pixel_of(const SgmParameters q, const Path path, const int i, const Stored stored) {
+  const uint at = path.pixel + i * path.pixel_step;
+  const uint row_start = at - (path.x + i * path.x_step);
+  const int first = stored.band.x - q.min_disparity;
+  const Pixel pixel = {stored.p2, first,
+                       i < path.length ? min(first + (ushort)stored.band.y * EGOSGM_LANES, q.disparities) : 0,
+                       (long)cells_of(row_start, at, stored.offset) - first_cell_of(first)};
+  return pixel;
+}
+
+// The costs of VECTOR disparities from `at` on: the matching costs and the least way from those of the pixel before
+// (`same`, `behind` by one disparity, `ahead`), which are less their least. Absent outside of the band.
+inline Costs path_costs(const SgmParameters q, const Pixel pixel, const int at, const Costs matching, const Costs same,
+                        const Costs behind, const Costs ahead) {
+  const Costs costs = matching + min(min(same, min(behind, ahead) + (Costs)(q.p1)), (Costs)(pixel.p2));
+  return are_below((Costs)(at - pixel.first) + (Costs)(INDEX), pixel.end - pixel.first) ? costs : (Costs)(ABSENT);
 }
 
 #endif

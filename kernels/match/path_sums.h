@@ -8,6 +8,39 @@
 #define MAX_STEPS 8
 #define NO_WINNER 0xffffffffu
 
+// Where a launch leaves the costs of its paths. `stage` 0: horizontal (and `vertical`) paths, 1 and 2: the diagonals.
+typedef struct {
+  int stage;
+  bool vertical;
+  global uchar *first, *second;
+} Sums;
+
+// What lies in a vector of cells already.
+typedef struct {
+  Bytes first, second;
+} Earlier;
+
+inline Earlier earlier_at(const Sums sums, const long cell) {
+  Earlier earlier = {0, 0};
+  if (sums.stage > 0) {
+    earlier.first = load(sums.first + cell);
+    earlier.second = load(sums.second + cell);
+  }
+  return earlier;
+}
+
+inline void add_path(const Sums sums, const Earlier earlier, const Costs costs, const long cell) {
+  const Bytes bytes = BYTES_OF(min(costs, (Costs)(255)));
+  if (sums.stage == 0) {
+    store(bytes, (sums.vertical ? sums.second : sums.first) + cell);
+  } else if (sums.stage == 1) {
+    store(mean(earlier.first, earlier.second), sums.first + cell);
+    store(bytes, sums.second + cell);
+  } else {
+    store(saturated_sum(earlier.first, mean(earlier.second, bytes)), sums.first + cell);
+  }
+}
+
 // The partial sums of a pixel's cells, and which of them exist, [first, end).
 typedef struct {
   global const uchar *forward_first, *forward_second, *backward_first, *backward_second;
@@ -18,8 +51,8 @@ typedef struct {
 inline Totals totals_of(const Cells cells, const int at) {
   Bytes forward = load(cells.forward_first + at), backward = load(cells.backward_first + at);
 #if PATHS == 4
-  forward = add_sat(forward, load(cells.forward_second + at));
-  backward = add_sat(backward, load(cells.backward_second + at));
+  forward = saturated_sum(forward, load(cells.forward_second + at));
+  backward = saturated_sum(backward, load(cells.backward_second + at));
 #endif
   return TOTALS_OF(forward) + TOTALS_OF(backward);
 }

@@ -21,8 +21,9 @@
 
 #include "pixels.h"
 
-// vload16 goes byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on all.
-typedef struct __attribute__((packed)) {
+// vload16 goes byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on all, but byte
+// by byte for NVIDIA's GPUs, if it is not said where values begin.
+typedef struct __attribute__((packed, aligned(sizeof(ushort)))) {
   ushort16 lanes;
 } Runs;
 

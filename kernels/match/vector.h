@@ -27,7 +27,9 @@ typedef OF(uint, VECTOR) Ranks;
 
 #if VECTOR == 4
 // Path costs in 32 bits, which a work-item of a GPU computes in.
+typedef int Cost;
 typedef int4 Costs;
+#define UNSIGNED as_uint4
 #define COSTS_OF convert_int4
 #define INDEX 0, 1, 2, 3
 #define BEHIND(edge, v) (Costs)(edge, (v).xyz)
@@ -40,8 +42,22 @@ inline int least_cost(const Costs v) { return min(min(v.x, v.y), min(v.z, v.w));
 inline Codes load_codes(global const Code* from) { return vload4(0, from); }
 inline Bytes load(global const uchar* from) { return *(global const Bytes*)from; }
 inline void store(const Bytes bytes, global uchar* to) { *(global Bytes*)to = bytes; }
+
+// (a + b + 1) / 2 and a saturated sum, of four bytes in one word: compilers for GPUs would go byte by byte.
+inline Bytes mean(const Bytes a, const Bytes b) {
+  const uint x = as_uint(a), y = as_uint(b);
+  return as_uchar4((x | y) - ((x ^ y) >> 1 & 0x7f7f7f7f));
+}
+inline Bytes saturated_sum(const Bytes a, const Bytes b) {
+  const uint x = as_uint(a), y = as_uint(b);
+  const uint sum = ((x & 0x7f7f7f7f) + (y & 0x7f7f7f7f)) ^ ((x ^ y) & 0x80808080);
+  const uint over = ((x & y) | ((x | y) & ~sum)) >> 7 & 0x01010101;
+  return as_uchar4(sum | over * 255);
+}
 #else
+typedef short Cost;
 typedef short16 Costs;
+#define UNSIGNED as_ushort16
 #define COSTS_OF convert_short16
 #define INDEX 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15
 #define BEHIND(edge, v) (Costs)(edge, (v).s0123, (v).s4567, (v).s89ab, (v).scd, (v).se)
@@ -69,16 +85,20 @@ typedef struct __attribute__((packed)) {
 inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
 inline Bytes load(global const uchar* from) { return ((global const PackedVector*)from)->bytes; }
 inline void store(const Bytes bytes, global uchar* to) { ((global PackedVector*)to)->bytes = bytes; }
+
+// (a + b + 1) / 2; rhadd goes a longer way on some compilers (PoCL 3.1).
+inline Bytes mean(const Bytes a, const Bytes b) {
+  return BYTES_OF((TOTALS_OF(a) + TOTALS_OF(b) + (Totals)(1)) >> (Totals)(1));
+}
+inline Bytes saturated_sum(const Bytes a, const Bytes b) { return add_sat(a, b); }
 #endif
 
 typedef struct __attribute__((packed)) {
   Ranks ranks;
 } PackedRanks;
 
-// (a + b + 1) / 2; rhadd goes a longer way on some compilers (PoCL 3.1).
-inline Bytes mean(const Bytes a, const Bytes b) {
-  return BYTES_OF((TOTALS_OF(a) + TOTALS_OF(b) + (Totals)(1)) >> (Totals)(1));
-}
+// Which of `values` lie in [0, end), with one comparison each.
+inline Costs are_below(const Costs values, const int end) { return UNSIGNED(values) < UNSIGNED((Costs)(end)); }
 
 // The matching costs of a pixel whose code is `own` with those whose codes are `others`; with COST_SAD these are the
 // costs.

@@ -217,7 +217,7 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t row_of_blocks = index_of(blocks, view, 0, y / EGOSGM_BLOCK);
-  const Ints believed = before->is_wrong ? (Ints)(0) : (Ints)(-1);
+  const Ints believed = (Ints)(before->is_wrong ? 0 : -1);
 #if ROW_GROUP == 1
   Sums sums = {0, 0};
 #endif
