@@ -50,7 +50,7 @@ class DriveFrame:
     def __repr__(self) -> str:
         height, width = self.left.shape
         return (f"<DriveFrame {self.name}: {width}x{height}, density {self.report.density:.1%}, "
-                f"search {self.report.search_fraction:.1%}>")
+                f"search {min(1, self.report.search_fraction):.1%}>")
 
 
 class Drive:
