@@ -39,7 +39,7 @@ class Gaps:
             parts.append("the images have no stamps: the times at which they were recorded are taken")
         if self.unpaired_left or self.unpaired_right:
             parts.append(f"{self.unpaired_left} left and {self.unpaired_right} right images have no partner")
-        if self.unpaired_left and self.unpaired_right:
+        if self.unpaired_left and self.unpaired_right and self.nearest_unpaired_ms < math.inf:
             parts[-1] += f": the nearest of them differ by {_ms(self.nearest_unpaired_ms)}, which --max-skew-ms can allow"
         if self.largest_skew_ms:
             parts.append(f"stamps of a pair differ by up to {self.largest_skew_ms:.3f} ms")
@@ -168,7 +168,8 @@ class Bag:
             raise
         except Exception as error:  # whatever a decoder of what is broken may raise
             reason = str(error).strip().partition("\n")[0] or type(error).__name__
-            raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {reason}{_remedy(self.path)}") from error
+            remedy = "; its messages are not ROS's" if reason.startswith("Profile is not") else _remedy(self.path)
+            raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {reason}{remedy}") from error
 
     def _check_topics(self, reader: Any) -> None:
         types = {connection.topic: connection.msgtype for connection in reader.connections}

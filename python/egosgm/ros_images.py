@@ -93,19 +93,20 @@ class Cameras:
         left_p, right_p = _matrix(left, "P", 3, 4), _matrix(right, "P", 3, 4)
         if not left_p[0, 0] > 0 or not right_p[0, 0] > 0:
             raise _egosgm.InvalidArgument("camera info: P is zero: the cameras are not calibrated")
-        if not right_p[0, 3] < 0:
-            raise _egosgm.InvalidArgument("camera info: P of the right camera has no baseline (Tx is not negative): is it of a stereo pair, "
-                                          "and are left and right not swapped?")
+        shift = (right_p[0, 3] - left_p[0, 3]) / right_p[0, 0]  # both may be told from where a third camera stands, as KITTI's are
+        if not shift < 0:
+            raise _egosgm.InvalidArgument("camera info: P of the right camera has no baseline (its Tx is not below the left one's): is it of a "
+                                          "stereo pair, and are left and right not swapped?")
         if abs(left_p[0, 0] - right_p[0, 0]) > 1e-3 * left_p[0, 0] or abs(left_p[1, 2] - right_p[1, 2]) > 1e-2:
             raise _egosgm.InvalidArgument("camera info: P of both cameras have different focal lengths or rows: they are not of one rectified pair")
         self.size = int(left.width), int(left.height)
         self._rectification: Optional[_egosgm.Rectification] = None
         if rectify:
-            self._rectification = _egosgm.Rectification(_rig(left, right, right_p[0, 3] / right_p[0, 0]), *self.size)
+            self._rectification = _egosgm.Rectification(_rig(left, right, shift), *self.size)
             self.calibration = self._rectification.calibration
         else:
             self.calibration = _egosgm.Calibration(left_p[0, 0], left_p[1, 1], left_p[0, 2], left_p[1, 2],
-                                                   -right_p[0, 3] / right_p[0, 0], right_p[0, 2] - left_p[0, 2])
+                                                   -shift, right_p[0, 2] - left_p[0, 2])
 
     @classmethod
     def of_calibration(cls, rig_or_calibration: "_egosgm.StereoRig | _egosgm.Calibration", width: int, height: int) -> "Cameras":

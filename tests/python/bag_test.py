@@ -212,6 +212,53 @@ def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, fram
         list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames())
 
 
+def test_messages_that_were_received_out_of_order(tmp_path, street, frames):
+    """No pair is made up, and the summary has no number that there is not."""
+    recording = Recording("mcap")
+    for side, name in enumerate(("left", "right")):
+        recording.info(f"/{name}/camera_info", street.calibration, side)
+    for i, name in ((2, "left"), (0, "left"), (0, "right"), (2, "right"), (1, "right"), (1, "left"), (3, "left"), (3, "right")):
+        recording.image(f"/{name}/image_rect", START + i * RATE_NS, getattr(frames[i % FRAMES], name))
+    path = recording.write(tmp_path / "drive")
+    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect")
+    for frame in (found := list(bag.frames())):
+        i = (frame.stamp_ns - START) // RATE_NS % FRAMES
+        np.testing.assert_array_equal(frame.left, frames[i].left)
+        np.testing.assert_array_equal(frame.right, frames[i].right)
+    assert len(found) == 3 and bag.gaps.text().startswith("1 left and 1 right images have no partner")
+
+
+def test_both_cameras_seen_from_a_third_one(tmp_path, street, frames):
+    """As KITTI's colour cameras, whose P both have a Tx."""
+    c = street.calibration
+
+    def infos(left_tx):
+        recording = Recording("mcap")
+        for side, name in enumerate(("left", "right")):
+            recording.info(f"/{name}/camera_info", c, side)
+            recording.messages[-1][3].p[3] += left_tx
+            recording.image(f"/{name}/image_rect", START, (frames[0].left, frames[0].right)[side])
+        return recording.write(tmp_path / f"drive{left_tx:.0f}")
+
+    for rectify in (False, True):
+        for left_tx in (0.1 * c.fx, -0.3 * c.fx):
+            bag = bags.Bag(infos(left_tx) if not rectify else tmp_path / f"drive{left_tx:.0f}", "/left/image_rect", "/right/image_rect", rectify=rectify)
+            next(bag.frames())
+            assert bag.cameras.calibration.baseline_m == pytest.approx(c.baseline_m)
+
+
+def test_messages_that_are_not_of_ros(tmp_path, capsys):
+    from mcap.writer import Writer as McapWriter
+    with open(tmp_path / "json.mcap", "wb") as file:
+        writer = McapWriter(file)
+        writer.start(profile="", library="")
+        schema = writer.register_schema("foxglove.RawImage", "jsonschema", b"{}")
+        for topic in ("/left/image_rect", "/right/image_rect"):
+            writer.add_message(writer.register_channel(topic, "json", schema), 1, b"{}", 1)
+        writer.finish()
+    refused(capsys, ["--bag", tmp_path / "json.mcap", *TOPICS, *SET], "its messages are not ROS's")
+
+
 def test_stamps_that_cameras_set_a_little_apart_are_told_with_the_bound_that_allows_them(tmp_path, street, frames):
     recording = Recording("mcap")
     for side, name in enumerate(("left", "right")):
