@@ -170,7 +170,7 @@ class Node(unittest.TestCase):
     def test_nothing_is_lost_and_the_maps_are_right(self):
         told = self.run_three(FRAMES, RATE)
         latencies, last = np.array(told["latencies_ms"]), told["active"][-1]
-        print(f"{len(told['stamps'])} of {FRAMES} frames at {RATE} Hz; latency: median {np.median(latencies):.1f} ms, 95 % {np.percentile(latencies, 95):.1f} ms; "
+        print(f"{len(told['stamps'])} of {FRAMES} frames at {RATE} Hz, {np.median([float(values['rate_hz']) for values in told['active']]):.1f} Hz matched; latency: median {np.median(latencies):.1f} ms, 95 % {np.percentile(latencies, 95):.1f} ms; "
               f"last diagnostics: {last}")
         self.assertEqual(len(told["stamps"]), FRAMES)
         self.assertEqual(told["stamps"], sorted(set(told["stamps"])))

@@ -36,7 +36,12 @@ using stereo_msgs::msg::DisparityImage;
 struct Matching {
   Matching(const CameraInfo& left, const CameraInfo& right, const egosgm::PipelineOptions& options,
            const egosgm::Device& device)
-      : calibration{left.p[0], left.p[5], left.p[2], left.p[6], -right.p[3] / right.p[0], right.p[2] - left.p[2]},
+      : calibration{left.p[0],
+                    left.p[5],
+                    left.p[2],
+                    left.p[6],
+                    (left.p[3] - right.p[3]) / right.p[0],
+                    right.p[2] - left.p[2]},
         width(static_cast<int>(left.width)),
         height(static_cast<int>(left.height)),
         pipeline(calibration, width, height, options, device),
