@@ -40,9 +40,12 @@ constexpr const char *kKilled = "a kill, or it is still running", *kInterrupt = 
 
 using Clock = std::chrono::steady_clock;
 std::string note_of(const FrameReport& report) {
-  if (report.unpredicted != Unpredicted::kNo)
-    return fmt::format("  (no prediction: {})", to_string(report.unpredicted));
-  return report.searched_everything ? "  (searched everything)" : "";
+  if (!report.searched_everything && report.unpredicted == Unpredicted::kNo) return "";
+  const std::string why = report.unpredicted == Unpredicted::kNo
+                              ? "searched everything"
+                              : fmt::format("no prediction: {}", to_string(report.unpredicted));
+  return report.search_fraction < 1.01 ? fmt::format("  ({})", why)
+                                       : fmt::format("  ({}; matched {:.2g} times)", why, report.search_fraction);
 }
 
 double ms_since(Clock::time_point start) {
@@ -202,7 +205,8 @@ class Run {
           frame.name, unstorable));
     }
     progress.done(fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms{}", frame.name,
-                              100 * result.search_fraction, 100 * result.density, times.wall_ms, note_of(result)));
+                              100 * std::min(1.0, result.search_fraction), 100 * result.density, times.wall_ms,
+                              note_of(result)));
   }
 
   void finish(bool finished, const std::string& why_not) {

@@ -146,7 +146,7 @@ void RunReport::write(const std::filesystem::path& file, Json files, bool finish
 
 double RunReport::mean(const char* figure) const {
   double sum = 0;
-  for (const Json& frame : json_["frames"]) sum += frame[figure].get<double>();
+  for (const Json& frame : json_["frames"]) sum += std::min(1.0, frame[figure].get<double>());
   return json_["frames"].empty() ? 0 : sum / static_cast<double>(json_["frames"].size());
 }
 

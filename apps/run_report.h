@@ -44,6 +44,7 @@ class RunReport {
   void write(const std::filesystem::path& file, nlohmann::ordered_json files, bool finished,
              const std::string& why_not = {});
 
+  /// Of a fraction of the frames. One that matched the range more than once counts as 1.
   double mean(const char* figure) const;
 
  private:

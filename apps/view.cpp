@@ -78,7 +78,7 @@ class DrawnSequence {
 
   std::string summary(std::size_t i) const {
     return fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms", name(i),
-                       100 * report_.search_fraction, 100 * report_.density, report_.total_ms);
+                       100 * std::min(1.0, report_.search_fraction), 100 * report_.density, report_.total_ms);
   }
 
   /// Names egosgm doctor where something speaks against the input; else empty.

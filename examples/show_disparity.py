@@ -40,7 +40,7 @@ pipeline = egosgm.Pipeline(calibration, width, height, disparities=128)
 odometry = egosgm.StereoOdometry(calibration)
 for left, right in frames:
     result = pipeline.process(left, right, odometry.process(left, right).motion, outputs=("disparity", "variance", "search_width"))
-    print(f"searched {100 * result.report.search_fraction:.1f} %, density {100 * result.report.density:.1f} %")
+    print(f"searched {100 * min(1, result.report.search_fraction):.1f} %, density {100 * result.report.density:.1f} %")
 
 # %% NumPy from here on: depth, and how sure it is
 valid = result.disparity != egosgm.INVALID_DISPARITY

@@ -4,11 +4,20 @@ import pathlib
 import sys
 
 try:
-    from PIL import Image, ImageDraw
+    from PIL import Image, ImageDraw, ImageOps
 except ImportError:
     sys.exit("no moving pictures without Pillow: apt install python3-pil")
 
 FRAME_MS = 200
+LABEL_PART = 8  # of a picture's height
+
+
+def label(text, height):
+    """White on black, of that height whatever font there is."""
+    drawn = Image.new("L", (8 * len(text) + 8, 14))
+    ImageDraw.Draw(drawn).text((4, 1), text, fill=255)
+    drawn = ImageOps.expand(drawn.crop(drawn.getbbox()), 3)
+    return drawn.resize((drawn.width * height // drawn.height, height), Image.LANCZOS)
 
 
 def main(sequence, left, right, out):
@@ -19,10 +28,9 @@ def main(sequence, left, right, out):
         shown = Image.new("RGB", (2 * width, 2 * height))
         shown.paste(Image.open(next((sequence / folder / file.name for folder in ("image_0", "image_2", "left") if (sequence / folder / file.name).exists()))).convert("RGB"),
                     (width // 2, 0))
-        draw = ImageDraw.Draw(shown)
         for i, (run, picture) in enumerate(zip((left, right), pictures)):
             shown.paste(picture, (i * width, height))
-            draw.text((i * width + 8, height + 6), run.name.replace("_", " "), fill="white", stroke_width=2, stroke_fill="black")
+            shown.paste(label(run.name.replace("_", " "), height // LABEL_PART), (i * width, height))
         frames.append(shown.resize((shown.width // 2, shown.height // 2)) if shown.width > 1280 else shown)
     if not frames:
         sys.exit(f"{left / 'color'}: no pictures: run with --write color")

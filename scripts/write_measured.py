@@ -72,7 +72,9 @@ def expect_one_commit(found):
 
 
 def table(header, rows):
-    lines = ["| " + " | ".join(header) + " |", "| " + " | ".join("---" if i == 0 else "---:" for i in range(len(header))) + " |"]
+    """Words to the left, numbers to the right."""
+    words = [i == 0 or any(row[i][:1].isalpha() for row in rows) for i in range(len(header))]
+    lines = ["| " + " | ".join(header) + " |", "| " + " | ".join("---" if left else "---:" for left in words) + " |"]
     return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
 
 

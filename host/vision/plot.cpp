@@ -21,16 +21,17 @@ void draw(const Label& label, cv::Mat& picture) {
   constexpr double kScale = 0.42;
   int below = 0;
   const cv::Size size = cv::getTextSize(label.text, cv::FONT_HERSHEY_SIMPLEX, kScale, 1, &below);
-  cv::Mat text(size.height + below + 2, size.width + 2, CV_8UC3, cv::Scalar::all(255));
-  cv::putText(text, label.text, {1, size.height}, cv::FONT_HERSHEY_SIMPLEX, kScale,
-              cv::Scalar(kInk[2], kInk[1], kInk[0]), 1, cv::LINE_AA);
+  const int baseline = size.height + below;  // brackets rise above what OpenCV calls the height
+  cv::Mat text(baseline + below + 2, size.width + 2, CV_8UC3, cv::Scalar::all(255));
+  cv::putText(text, label.text, {1, baseline}, cv::FONT_HERSHEY_SIMPLEX, kScale, cv::Scalar(kInk[2], kInk[1], kInk[0]),
+              1, cv::LINE_AA);
   const double before = label.anchor == Anchor::kStart    ? 0
                         : label.anchor == Anchor::kMiddle ? size.width / 2.0
                                                           : size.width;
-  cv::Point corner(cvRound(label.at.x - before), cvRound(label.at.y) - size.height);
+  cv::Point corner(cvRound(label.at.x - before), cvRound(label.at.y) - baseline);
   if (label.upwards) {
     cv::rotate(text, text, cv::ROTATE_90_COUNTERCLOCKWISE);
-    corner = {cvRound(label.at.x) - size.height, cvRound(label.at.y - before)};
+    corner = {cvRound(label.at.x) - baseline, cvRound(label.at.y - before)};
   }
   const cv::Rect inside = cv::Rect(corner, text.size()) & cv::Rect({0, 0}, picture.size());
   cv::Mat target = picture(inside);

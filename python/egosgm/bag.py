@@ -3,10 +3,11 @@
 import collections
 import contextlib
 import dataclasses
+import itertools
 import math
 import os
 import pathlib
-from typing import Any, Callable, Deque, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Collection, Deque, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,19 +26,28 @@ class Gaps:
     unpaired_left: int = 0
     unpaired_right: int = 0
     nearest_ms: Optional[float] = None
+    nearest_unpaired_ms: float = math.inf
     steps_back: int = 0
+    repeated: int = 0
+    has_no_stamps: bool = False
     gaps: List[Tuple[int, float]] = dataclasses.field(default_factory=list)
     largest_skew_ms: float = 0.0
 
     def text(self) -> str:
         parts = []
+        if self.has_no_stamps:
+            parts.append("the images have no stamps: the times at which they were recorded are taken")
         if self.unpaired_left or self.unpaired_right:
             parts.append(f"{self.unpaired_left} left and {self.unpaired_right} right images have no partner")
+        if self.unpaired_left and self.unpaired_right and self.nearest_unpaired_ms < math.inf:
+            parts[-1] += f": the nearest of them differ by {_ms(self.nearest_unpaired_ms)}, which --max-skew-ms can allow"
         if self.largest_skew_ms:
             parts.append(f"stamps of a pair differ by up to {self.largest_skew_ms:.3f} ms")
         if self.gaps:
             at, longest = max(self.gaps, key=lambda gap: gap[1])
             parts.append(f"{len(self.gaps)} gap{'s' if len(self.gaps) > 1 else ''}, the longest of {longest:.3f} s before frame {at}")
+        if self.repeated:
+            parts.append(f"{self.repeated} pairs have the stamp of the one before, and are left out")
         if self.steps_back:
             parts.append(f"time steps back {self.steps_back} times, where the method starts anew")
         return "; ".join(parts)
@@ -86,6 +96,7 @@ class Pairing:
             self.gaps.nearest_ms = min(apart / 1e6, self.gaps.nearest_ms if self.gaps.nearest_ms is not None else np.inf)
             earlier = 0 if left[0][0] < right[0][0] else 1
             if apart > self.bound_ns:
+                self.gaps.nearest_unpaired_ms = min(apart / 1e6, self.gaps.nearest_unpaired_ms)
                 self._drop(earlier)
                 continue
             if apart:  # the next one of the earlier side may be nearer
@@ -116,7 +127,8 @@ class Bag:
     """Frames of a bag, from its start each time. `cameras` and `gaps` are known when frames are read."""
 
     def __init__(self, path: "str | os.PathLike[str]", left_topic: str, right_topic: str, info_topics: Sequence[str] = (),
-                 pose_topic: str = "", max_skew_ms: float = 0.0, rectify: Optional[bool] = None, pose_axes: str = "body") -> None:
+                 pose_topic: str = "", max_skew_ms: float = 0.0, rectify: Optional[bool] = None, pose_axes: str = "body",
+                 calib: "str | os.PathLike[str]" = "") -> None:
         highlevel = needs("rosbags.highlevel")
         self.path = pathlib.Path(path)
         if not (self.path.is_file() or self.path.is_dir()):
@@ -127,15 +139,22 @@ class Bag:
             raise _egosgm.InvalidArgument(f"max skew {max_skew_ms} ms: give 0 for equal stamps, or how far they may differ")
         if pose_axes not in ("body", "optical"):
             raise _egosgm.InvalidArgument(f"pose axes \"{pose_axes}\": choose body (x forward, z up) or optical (z forward, y down)")
+        if calib and (info_topics or rectify is not None):
+            raise _egosgm.InvalidArgument(f"calibration {calib}: it says by itself whether images are rectified, and what camera infos would say: "
+                                          "give no info topics, and leave rectify out")
         self._highlevel = highlevel
         self._default_types = needs("rosbags.typesys")
         self.images = left_topic, right_topic
-        self.infos = tuple(info_topics) or tuple(_info_topic(topic) for topic in self.images)
+        self.infos = () if calib else tuple(info_topics) or tuple(_info_topic(topic) for topic in self.images)
+        self._rig_or_calibration = _read_calibration(pathlib.Path(calib)) if calib else None
         self._pose_topic, self._bound_ns, self._rectify, self._pose_axes = pose_topic, int(max_skew_ms * 1e6), rectify, pose_axes
         self.cameras: Optional[Cameras] = None
         self.is_rectified_here = False
         self.gaps = Gaps()
         with self._opened() as reader:
+            there = {connection.topic for connection in reader.connections}
+            self.images, self.infos = (tuple(_with_slash(topic, there) for topic in topics) for topics in (self.images, self.infos))
+            self._pose_topic = _with_slash(pose_topic, there)
             self._check_topics(reader)
             self.count = min(sum(c.msgcount for c in reader.connections if c.topic == topic) for topic in self.images)
 
@@ -143,13 +162,14 @@ class Bag:
     def _opened(self) -> Iterator[Any]:
         stores = self._default_types
         try:
-            with self._highlevel.AnyReader([self.path], default_typestore=stores.get_typestore(stores.Stores.LATEST)) as reader:
+            with self._highlevel.AnyReader(_files_of(self.path), default_typestore=stores.get_typestore(stores.Stores.LATEST)) as reader:
                 yield reader
         except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError):
             raise
         except Exception as error:  # whatever a decoder of what is broken may raise
             reason = str(error).strip().partition("\n")[0] or type(error).__name__
-            raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {reason}") from error
+            remedy = "; its messages are not ROS's" if reason.startswith("Profile is not") else _remedy(self.path)
+            raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {reason}{remedy}") from error
 
     def _check_topics(self, reader: Any) -> None:
         types = {connection.topic: connection.msgtype for connection in reader.connections}
@@ -159,18 +179,26 @@ class Bag:
         for topic, kinds, what in wanted:
             there = ", ".join(sorted(name for name, kind in types.items() if kind in kinds)) or "none"
             if topic not in types:
-                raise _egosgm.InvalidArgument(f"{self.path}: has no topic \"{topic}\"; its topics of {what}: {there}")
+                remedy = "; without them give --calib" if topic in self.infos and there == "none" else ""
+                raise _egosgm.InvalidArgument(f"{self.path}: has no topic \"{topic}\"; its topics of {what}: {there}{remedy}")
             if types[topic] not in kinds:
                 raise _egosgm.InvalidArgument(f"{self.path}: \"{topic}\" is of type {types[topic]}; its topics of {what}: {there}")
 
-    def _first_infos(self, reader: Any) -> Cameras:
+    def _first_messages(self, reader: Any, topic: str) -> Iterator[Any]:
+        connections = [c for c in reader.connections if c.topic == topic]
+        return (reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(connections=connections))
+
+    def _find_cameras(self, reader: Any) -> Cameras:
         found = []
-        for topic in self.infos:
-            connections = [c for c in reader.connections if c.topic == topic]
-            message = next((reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(connections=connections)), None)
+        for topic in self.infos or self.images[:1]:
+            message = next(self._first_messages(reader, topic), None)
             if message is None:
                 raise _egosgm.InvalidArgument(f"{self.path}: \"{topic}\" has no message")
             found.append(message)
+        if self._rig_or_calibration is not None:
+            self.is_rectified_here = isinstance(self._rig_or_calibration, _egosgm.StereoRig)
+            height, width = grey_of(found[0]).shape
+            return Cameras.of_calibration(self._rig_or_calibration, width, height)
         self.is_rectified_here = are_raw(found[0], self.images[0]) if self._rectify is None else self._rectify
         return Cameras(*found, self.is_rectified_here)
 
@@ -182,18 +210,22 @@ class Bag:
         self.gaps = pairing.gaps
         poses: List[Tuple[int, NDArray[np.float64]]] = []
         with self._opened() as reader:
-            self.cameras = self._first_infos(reader)
+            self.cameras = self._find_cameras(reader)
+            pairing.gaps.has_no_stamps = all(stamp_ns(m) == 0 for m in itertools.islice(self._first_messages(reader, self.images[0]), 2))
             if self._pose_topic:
                 poses = self._read_poses(reader)
             connections = [c for c in reader.connections if c.topic in self.images]
             number, last, interval = 0, None, None
 
-            def frame_of(pair: Any) -> BagFrame:
+            def frame_of(pair: Any) -> Iterator[BagFrame]:
                 nonlocal number, last, interval
                 (stamp, left), (_, right) = pair
                 if not 0 <= stamp < 2**31 * 10**9:
                     raise _egosgm.InvalidArgument(f"{self.images[0]}: a stamp of {stamp / 1e9:.0f} s, which is not from 1970 to 2038")
-                steps_back = last is not None and stamp <= last
+                if stamp == last:
+                    pairing.gaps.repeated += 1
+                    return
+                steps_back = last is not None and stamp < last
                 if steps_back:
                     pairing.gaps.steps_back += 1
                 elif last is not None:
@@ -211,18 +243,20 @@ class Bag:
                 images = self.cameras.rectified(*images)
                 frame = BagFrame(number, stamp, left.header.frame_id, *images, last is None or steps_back, _pose_at(poses, stamp))
                 number, last = number + 1, stamp
-                return frame
+                yield frame
 
-            for connection, _, raw in reader.messages(connections=connections):
+            for connection, time, raw in reader.messages(connections=connections):
                 message = reader.deserialize(raw, connection.msgtype)
-                for pair in pairing.add(self.images.index(connection.topic), stamp_ns(message), message):
-                    yield frame_of(pair)
+                stamp = time if pairing.gaps.has_no_stamps else stamp_ns(message)
+                for pair in pairing.add(self.images.index(connection.topic), stamp, message):
+                    yield from frame_of(pair)
             for pair in pairing.end():
-                yield frame_of(pair)
+                yield from frame_of(pair)
         if number == 0:
-            nearest = f"the nearest stamps differ by {pairing.gaps.nearest_ms:.3f} ms: allow that by --max-skew-ms" if pairing.gaps.nearest_ms is not None \
+            nearest = f"the nearest stamps differ by {_ms(pairing.gaps.nearest_ms)}: allow that by --max-skew-ms" if pairing.gaps.nearest_ms is not None \
                 else "one of the topics has no image"
-            raise _egosgm.InvalidArgument(f"{self.path}: no left image has a right one of its time; {nearest}")
+            unset = " (images have no stamps here: the times at which they were recorded are taken)" if pairing.gaps.has_no_stamps else ""
+            raise _egosgm.InvalidArgument(f"{self.path}: no left image has a right one of its time; {nearest}{unset}")
 
     def _read_poses(self, reader: Any) -> List[Tuple[int, NDArray[np.float64]]]:
         poses = []
@@ -236,6 +270,39 @@ class Bag:
                 raise _egosgm.InvalidArgument(f"{self._pose_topic}: pose {len(poses)} is not finite")
             poses.append((stamp_ns(message), world_from_body @ BODY_FROM_OPTICAL if self._pose_axes == "body" else world_from_body))
         return sorted(poses, key=lambda item: item[0])
+
+
+def _ms(duration: float) -> str:
+    """Rounded up: what is told, given as a bound, is enough."""
+    return f"{math.ceil(round(duration * 1000, 6)) / 1000:.3f} ms"
+
+
+def _files_of(path: pathlib.Path) -> List[pathlib.Path]:
+    """A bag's parts in a folder that nothing describes; else the bag itself."""
+    if path.is_dir() and not (path / "metadata.yaml").exists():
+        for suffix in (".mcap", ".db3", ".bag"):
+            if files := sorted(file for file in path.iterdir() if file.suffix == suffix):
+                return files
+    return [path]
+
+
+def _remedy(path: pathlib.Path) -> str:
+    if path.is_file() and (path.parent / "metadata.yaml").exists():
+        return f"; it is a part of the bag {path.parent}: give that folder"
+    tool = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "ros2 bag reindex"}.get(path.suffix)
+    return f"; if its recording was cut short, `{tool}` mends it" if tool else ""
+
+
+def _with_slash(topic: str, there: Collection[str]) -> str:
+    return f"/{topic}" if topic and topic not in there and f"/{topic}" in there else topic
+
+
+def _read_calibration(path: pathlib.Path) -> "_egosgm.StereoRig | _egosgm.Calibration":
+    """What `egosgm rectify` takes for raw images, and `egosgm run` for rectified ones."""
+    for mav0 in (path, path / "mav0"):
+        if (mav0 / "cam0/sensor.yaml").exists():
+            return _egosgm.read_euroc_rig(mav0)
+    return _egosgm.read_opencv_rig(path) or _egosgm.read_calibration(path)
 
 
 def _info_topic(image_topic: str) -> str:

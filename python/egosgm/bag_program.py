@@ -31,6 +31,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--left-topic", required=True, metavar="TOPIC", help="raw or compressed images")
     add("--right-topic", required=True, metavar="TOPIC")
     add("--info-topics", nargs=2, default=(), metavar=("LEFT", "RIGHT"), help="camera infos [camera_info beside the images]")
+    add("--calib", default="", metavar="FILE|FOLDER", help="without camera infos: OpenCV's stereo calibration (T in metres) or EuRoC's mav0, of raw "
+        "images; or what egosgm run --calib reads, of rectified ones")
     add("--pose-topic", default="", metavar="TOPIC", help="motion from there (Odometry, PoseStamped) in place of stereo odometry")
     add("--pose-axes", default="body", metavar="body|optical", help="of the poses: x forward, z up, or z forward, y down [body]")
     add("--max-skew-ms", type=float, default=0.0, metavar="MS", help="how far the stamps of a pair may differ [0]")
@@ -85,7 +87,7 @@ def _main(given: argparse.Namespace) -> int:
     if given.out == "":
         raise _egosgm.InvalidArgument("--out \"\": give a name, or leave it out")
     bag = Bag(given.bag, given.left_topic, given.right_topic, given.info_topics, given.pose_topic, given.max_skew_ms,
-              {"auto": None, "on": True, "off": False}[given.rectify], given.pose_axes)
+              {"auto": None, "on": True, "off": False}[given.rectify], given.pose_axes, given.calib)
     outputs: List[Any] = []
     try:
         if given.out:

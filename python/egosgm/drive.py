@@ -50,7 +50,7 @@ class DriveFrame:
     def __repr__(self) -> str:
         height, width = self.left.shape
         return (f"<DriveFrame {self.name}: {width}x{height}, density {self.report.density:.1%}, "
-                f"search {self.report.search_fraction:.1%}>")
+                f"search {min(1, self.report.search_fraction):.1%}>")
 
 
 class Drive:
@@ -69,6 +69,8 @@ class Drive:
             if self.sequence is None:
                 raise _egosgm.InvalidArgument("calibration: pairs of images come without one, give it")
             calibration = self.sequence.calibration
+        if not isinstance(calibration, _egosgm.Calibration):
+            raise _egosgm.InvalidArgument(f"calibration: is a {type(calibration).__name__}: give an egosgm.Calibration; read_calibration reads a file")
         self.calibration = calibration
         self._source, self._outputs, self._options = source, outputs, options
         self._bar = _bar(progress)
@@ -91,8 +93,10 @@ class Drive:
             for frame in self.sequence.frames:
                 yield (frame.number, frame.name, *frame.read())
         else:
-            for number, (left, right) in enumerate(self._source):
-                yield number, f"{number:06d}", left, right
+            for number, pair in enumerate(self._source):
+                if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+                    raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}: give (left, right), each an image")
+                yield (number, f"{number:06d}", *pair)
 
     def _frames(self) -> Iterator[DriveFrame]:
         """The device matches a frame while the next one is read and its motion is found."""

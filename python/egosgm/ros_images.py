@@ -2,6 +2,7 @@
 """ROS's images and camera infos as the library's, and its maps as ROS wants them. Messages of rclpy and of rosbags, ROS 1 and 2."""
 import importlib
 import pathlib
+import re
 import tempfile
 from typing import Any, Optional, Tuple
 
@@ -13,8 +14,10 @@ from . import _egosgm
 # Bytes between neighbouring pixels of an encoding, and where the brightness lies in them, or red, green and blue.
 _GREY8 = {"mono8": (1, 0), "8UC1": (1, 0), "yuv422": (2, 1), "uyvy": (2, 1), "yuv422_yuy2": (2, 0), "yuyv": (2, 0), "nv12": (1, 0),
           "nv21": (1, 0)}
-_COLOURS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)), "bgra8": (4, (2, 1, 0)), "8UC3": (3, (2, 1, 0))}
+_COLOURS = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2)), "bgra8": (4, (2, 1, 0)), "8UC3": (3, (2, 1, 0)),
+            "8UC4": (4, (2, 1, 0))}
 _GREY16 = ("mono16", "16UC1")
+_BAYER = tuple(f"bayer_{order}{bits}" for bits in (8, 16) for order in ("rggb", "bggr", "gbrg", "grbg"))
 
 
 def needs(module: str) -> Any:
@@ -30,21 +33,34 @@ def grey_of(message: Any) -> NDArray[Any]:
         return _decompressed(bytes(message.data), message.format)
     height, width, step, encoding = message.height, message.width, message.step, message.encoding
     data = np.frombuffer(message.data, np.uint8) if len(message.data) > 0 else np.empty(0, np.uint8)
-    pixel_bytes = _GREY8.get(encoding, (0,))[0] or _COLOURS.get(encoding, (0,))[0] or (2 if encoding in _GREY16 else 0)
+    is_16_bit = encoding in _GREY16 or encoding in _BAYER[4:]
+    pixel_bytes = _GREY8.get(encoding, (0,))[0] or _COLOURS.get(encoding, (0,))[0] or (2 if is_16_bit else int(encoding in _BAYER))
     if not pixel_bytes:
-        known = ", ".join((*_GREY8, *_COLOURS, *_GREY16))
+        known = ", ".join((*_GREY8, *_COLOURS, *_GREY16, *_BAYER))
         raise _egosgm.InvalidArgument(f"images of encoding \"{encoding}\" are not read: convert them to one of {known}")
     if step < width * pixel_bytes or data.size < height * step:
         raise _egosgm.InvalidArgument(f"an image of {width}x{height} px of {encoding} with rows of {step} bytes has {data.size} bytes")
     rows = data[:height * step].reshape(height, step)
-    if encoding in _GREY16:
-        order = ">u2" if message.is_bigendian else "<u2"
-        return rows[:, :2 * width].copy().view(order).astype(np.uint16)
+    if is_16_bit:
+        grey = rows[:, :2 * width].copy().view(">u2" if message.is_bigendian else "<u2").astype(np.uint16)
+        return _of_bayer(grey) if encoding in _BAYER else grey
+    if encoding in _BAYER:
+        return _of_bayer(rows[:, :width])
     pixels = rows[:, :width * pixel_bytes].reshape(height, width, pixel_bytes)
     if encoding in _GREY8:
         return np.ascontiguousarray(pixels[:, :, _GREY8[encoding][1]])
     red, green, blue = (pixels[:, :, channel].astype(np.uint32) for channel in _COLOURS[encoding][1])
     return ((9798 * red + 19235 * green + 3735 * blue + (1 << 14)) >> 15).astype(np.uint8)  # as OpenCV weighs and rounds
+
+
+def _of_bayer(pixels: NDArray[Any]) -> NDArray[Any]:
+    """The mean of the 3x3 neighbourhood weighed by 1 2 1 has a quarter of red, half of green and a quarter of blue at each pixel, whatever
+    the order of the colours."""
+    if 0 in pixels.shape:
+        return pixels
+    padded = np.pad(pixels.astype(np.uint32), 1, mode="reflect")  # which goes on with the order
+    rows = padded[:-2] + 2 * padded[1:-1] + padded[2:]
+    return ((rows[:, :-2] + 2 * rows[:, 1:-1] + rows[:, 2:] + 8) >> 4).astype(pixels.dtype)
 
 
 def _decompressed(data: bytes, kind: str) -> NDArray[Any]:
@@ -77,19 +93,32 @@ class Cameras:
         left_p, right_p = _matrix(left, "P", 3, 4), _matrix(right, "P", 3, 4)
         if not left_p[0, 0] > 0 or not right_p[0, 0] > 0:
             raise _egosgm.InvalidArgument("camera info: P is zero: the cameras are not calibrated")
-        if not right_p[0, 3] < 0:
-            raise _egosgm.InvalidArgument("camera info: P of the right camera has no baseline (Tx is not negative): is it of a stereo pair, "
-                                          "and are left and right not swapped?")
+        shift = (right_p[0, 3] - left_p[0, 3]) / right_p[0, 0]  # both may be told from where a third camera stands, as KITTI's are
+        if not shift < 0:
+            raise _egosgm.InvalidArgument("camera info: P of the right camera has no baseline (its Tx is not below the left one's): is it of a "
+                                          "stereo pair, and are left and right not swapped?")
         if abs(left_p[0, 0] - right_p[0, 0]) > 1e-3 * left_p[0, 0] or abs(left_p[1, 2] - right_p[1, 2]) > 1e-2:
             raise _egosgm.InvalidArgument("camera info: P of both cameras have different focal lengths or rows: they are not of one rectified pair")
         self.size = int(left.width), int(left.height)
         self._rectification: Optional[_egosgm.Rectification] = None
         if rectify:
-            self._rectification = _egosgm.Rectification(_rig(left, right, right_p[0, 3] / right_p[0, 0]), *self.size)
+            self._rectification = _egosgm.Rectification(_rig(left, right, shift), *self.size)
             self.calibration = self._rectification.calibration
         else:
             self.calibration = _egosgm.Calibration(left_p[0, 0], left_p[1, 1], left_p[0, 2], left_p[1, 2],
-                                                   -right_p[0, 3] / right_p[0, 0], right_p[0, 2] - left_p[0, 2])
+                                                   -shift, right_p[0, 2] - left_p[0, 2])
+
+    @classmethod
+    def of_calibration(cls, rig_or_calibration: "_egosgm.StereoRig | _egosgm.Calibration", width: int, height: int) -> "Cameras":
+        """Without infos: of raw images by a rig, of rectified ones by their calibration."""
+        cameras = cls.__new__(cls)
+        cameras.size, cameras._rectification = (width, height), None
+        if isinstance(rig_or_calibration, _egosgm.StereoRig):
+            cameras._rectification = _egosgm.Rectification(rig_or_calibration, width, height)
+            cameras.calibration = cameras._rectification.calibration
+        else:
+            cameras.calibration = rig_or_calibration
+        return cameras
 
     def rectified(self, left: NDArray[Any], right: NDArray[Any]) -> Tuple[NDArray[Any], NDArray[Any]]:
         return self._rectification.rectify(left, right) if self._rectification else (left, right)
@@ -97,7 +126,7 @@ class Cameras:
 
 def are_raw(info: Any, topic: str) -> bool:
     """Whether images of this camera need rectifying, by its name and its distortion."""
-    if any("rect" in part for part in topic.split("/")[-2:]):
+    if any(re.search("(^|_)rect", part) for part in topic.split("/")[-2:]):
         return False
     distortion = np.array(getattr(info, "d", None) if hasattr(info, "d") else info.D, dtype=float)
     return bool(np.any(distortion != 0)) or not np.allclose(_matrix(info, "R", 3, 3), np.eye(3), atol=1e-9)
@@ -105,13 +134,16 @@ def are_raw(info: Any, topic: str) -> bool:
 
 def _rig(left: Any, right: Any, shift: float) -> _egosgm.StereoRig:
     """From where both cameras look after rectification: a point's x differs by `shift` there."""
-    models = {getattr(info, "distortion_model") for info in (left, right)}
+    names = {"fisheye": "equidistant", "radtan": "plumb_bob"}  # of Kalibr and some drivers
+    models = {names.get(info.distortion_model, info.distortion_model) for info in (left, right)}
     fisheye = models == {"equidistant"}
     if not fisheye and not models <= {"plumb_bob", "rational_polynomial", ""}:
         raise _egosgm.InvalidArgument(f"camera info: distortion of the model {' and '.join(sorted(models))} is not known: "
                                       "plumb_bob, rational_polynomial or equidistant is; or give rectified images")
     left_r, right_r = _matrix(left, "R", 3, 3), _matrix(right, "R", 3, 3)
     distortions = [np.array(getattr(info, "d", None) if hasattr(info, "d") else info.D, dtype=float) for info in (left, right)]
+    if fisheye:  # some drivers fill up with zeros
+        distortions = [d[:4] if not np.any(d[4:]) else d for d in distortions]
     return _egosgm.StereoRig(_matrix(left, "K", 3, 3), distortions[0], _matrix(right, "K", 3, 3), distortions[1],
                              right_r.T @ left_r, right_r.T @ np.array([shift, 0, 0]), fisheye, (int(left.width), int(left.height)))
 

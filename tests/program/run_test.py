@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 import pty
+import re
 import shlex
 import shutil
 import subprocess
@@ -211,6 +212,14 @@ class Run(ProgramTest):
         for frame in self.report(out)["frames"]:
             matches = 2 if frame["frame"] == 0 else 1
             self.assertEqual((frame["search_fraction"], frame["searched_everything"], frame["predicted_fraction"]), (matches, True, 0))
+
+    def test_no_more_than_everything_is_told(self):
+        """A first frame is matched twice: its report has 2, and the text says so in words."""
+        told = self.assert_works("run", "--odometry", self.street, "--out", self.new_folder(), "--temporal", "off")
+        shares = [float(share) for share in re.findall(r"search +([0-9.]+) %", told)]
+        self.assertEqual(shares, [100] * (FRAMES + 1), told)
+        self.assertEqual(told.count("(no prediction: not temporal; matched 2 times)"), 1, told)
+        self.assertEqual(told.count("times)"), 1, told)
 
     def test_search_full_still_predicts(self):
         out = self.new_folder()

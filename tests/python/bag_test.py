@@ -212,6 +212,158 @@ def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, fram
         list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames())
 
 
+def test_messages_that_were_received_out_of_order(tmp_path, street, frames):
+    """No pair is made up, and the summary has no number that there is not."""
+    recording = Recording("mcap")
+    for side, name in enumerate(("left", "right")):
+        recording.info(f"/{name}/camera_info", street.calibration, side)
+    for i, name in ((2, "left"), (0, "left"), (0, "right"), (2, "right"), (1, "right"), (1, "left"), (3, "left"), (3, "right")):
+        recording.image(f"/{name}/image_rect", START + i * RATE_NS, getattr(frames[i % FRAMES], name))
+    path = recording.write(tmp_path / "drive")
+    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect")
+    for frame in (found := list(bag.frames())):
+        i = (frame.stamp_ns - START) // RATE_NS % FRAMES
+        np.testing.assert_array_equal(frame.left, frames[i].left)
+        np.testing.assert_array_equal(frame.right, frames[i].right)
+    assert len(found) == 3 and bag.gaps.text().startswith("1 left and 1 right images have no partner")
+
+
+def test_both_cameras_seen_from_a_third_one(tmp_path, street, frames):
+    """As KITTI's colour cameras, whose P both have a Tx."""
+    c = street.calibration
+
+    def infos(left_tx):
+        recording = Recording("mcap")
+        for side, name in enumerate(("left", "right")):
+            recording.info(f"/{name}/camera_info", c, side)
+            recording.messages[-1][3].p[3] += left_tx
+            recording.image(f"/{name}/image_rect", START, (frames[0].left, frames[0].right)[side])
+        return recording.write(tmp_path / f"drive{left_tx:.0f}")
+
+    for rectify in (False, True):
+        for left_tx in (0.1 * c.fx, -0.3 * c.fx):
+            bag = bags.Bag(infos(left_tx) if not rectify else tmp_path / f"drive{left_tx:.0f}", "/left/image_rect", "/right/image_rect", rectify=rectify)
+            next(bag.frames())
+            assert bag.cameras.calibration.baseline_m == pytest.approx(c.baseline_m)
+
+
+def test_messages_that_are_not_of_ros(tmp_path, capsys):
+    from mcap.writer import Writer as McapWriter
+    with open(tmp_path / "json.mcap", "wb") as file:
+        writer = McapWriter(file)
+        writer.start(profile="", library="")
+        schema = writer.register_schema("foxglove.RawImage", "jsonschema", b"{}")
+        for topic in ("/left/image_rect", "/right/image_rect"):
+            writer.add_message(writer.register_channel(topic, "json", schema), 1, b"{}", 1)
+        writer.finish()
+    refused(capsys, ["--bag", tmp_path / "json.mcap", *TOPICS, *SET], "its messages are not ROS's")
+
+
+def test_stamps_that_cameras_set_a_little_apart_are_told_with_the_bound_that_allows_them(tmp_path, street, frames):
+    recording = Recording("mcap")
+    for side, name in enumerate(("left", "right")):
+        recording.info(f"/{name}/camera_info", street.calibration, side)
+        for i in range(FRAMES):
+            recording.image(f"/{name}/image_rect", START + i * RATE_NS + (side and i and 30_400), (frames[i].left, frames[i].right)[side])
+    path = recording.write(tmp_path / "drive")
+    bag = bags.Bag(path, "left/image_rect", "right/image_rect")  # a leading slash is not missed
+    assert len(list(bag.frames())) == 1
+    assert "2 left and 2 right images have no partner: the nearest of them differ by 0.031 ms, which --max-skew-ms can allow" in bag.gaps.text()
+    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", max_skew_ms=0.031)
+    assert len(list(bag.frames())) == FRAMES and "no partner" not in bag.gaps.text()
+
+
+def test_a_pair_that_comes_twice_is_left_out(tmp_path, street, frames):
+    times = [START, START + RATE_NS, START + RATE_NS, START + 2 * RATE_NS]
+    path = record("mcap", tmp_path / "drive", street, [frames[i] for i in (0, 1, 1, 2)], times=times)
+    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect")
+    found = list(bag.frames())
+    assert [(frame.stamp_ns - START) // RATE_NS for frame in found] == [0, 1, 2] and [frame.starts_anew for frame in found] == [True, False, False]
+    assert bag.gaps.text() == "1 pairs have the stamp of the one before, and are left out"
+
+
+def test_without_stamps_the_times_of_the_recording_are_taken(tmp_path, street, frames):
+    recording = Recording("mcap")
+    for side, name in enumerate(("left", "right")):
+        recording.info(f"/{name}/camera_info", street.calibration, side)
+        for i in range(FRAMES):
+            recording.image(f"/{name}/image_rect", 0, (frames[i].left, frames[i].right)[side], received=START + i * RATE_NS + 1_000_000 * side)
+    path = recording.write(tmp_path / "drive")
+    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", max_skew_ms=1)
+    found = list(bag.frames())
+    assert [frame.stamp_ns for frame in found] == [START + i * RATE_NS for i in range(FRAMES)] and not found[1].starts_anew
+    assert "the images have no stamps: the times at which they were recorded are taken" in bag.gaps.text()
+    with pytest.raises(egosgm.InvalidArgument, match=r"differ by 1.000 ms: allow that by --max-skew-ms \(images have no stamps here"):
+        list(bags.Bag(path, "/left/image_rect", "/right/image_rect").frames())
+
+
+@pytest.mark.parametrize("kind, suffix", [("mcap", ".mcap"), ("sqlite", ".db3"), ("ros1", ".bag")])
+def test_the_parts_of_a_bag_in_a_folder_that_nothing_describes(kind, suffix, tmp_path, street, frames):
+    (tmp_path / "parts").mkdir()
+    for part in (1, 0):
+        recording = Recording(kind)
+        for side, name in enumerate(("left", "right")):
+            if part == 0:
+                recording.info(f"/{name}/camera_info", street.calibration, side)
+            time = START + part * RATE_NS
+            recording.image(f"/{name}/image_rect", time, (frames[part].left, frames[part].right)[side], received=time + side)
+        written = recording.write(tmp_path / f"part_{part}{suffix if kind == 'ros1' else ''}")
+        written = next(written.glob("*.db3")) if kind == "sqlite" else written
+        written.rename(tmp_path / "parts" / f"part_{part}{suffix}")
+    (tmp_path / "parts/notes.txt").write_text("not a bag")
+    bag = bags.Bag(tmp_path / "parts", "/left/image_rect", "/right/image_rect")
+    assert [(frame.stamp_ns - START) // RATE_NS for frame in bag.frames()] == [0, 1] and len(bag) == 2
+    with pytest.raises(egosgm.InvalidArgument, match='no topic "/left/camera_info"; its topics of camera infos: none; without them give --calib'):
+        bags.Bag(tmp_path / "parts" / f"part_1{suffix}", "/left/image_rect", "/right/image_rect")
+
+
+def test_a_calibration_takes_the_place_of_camera_infos(tmp_path, street, frames, capsys):
+    recording = Recording("mcap")
+    recording.image("/left/image_rect", START, frames[0].left)
+    recording.image("/right/image_rect", START, frames[0].right)
+    path = recording.write(tmp_path / "drive")
+    topics = "/left/image_rect", "/right/image_rect"
+    plain = tmp_path / "calib.txt"
+    egosgm.write_calibration(plain, street.calibration)
+    bag = bags.Bag(path, *topics, calib=plain)
+    frame, = bag.frames()
+    np.testing.assert_array_equal(frame.left, frames[0].left)
+    c = bag.cameras.calibration
+    assert (c.fx, c.baseline_m) == pytest.approx((street.calibration.fx, street.calibration.baseline_m)) and not bag.is_rectified_here
+
+    for camera in (0, 1):  # of EuRoC, turned by a little
+        folder = tmp_path / f"mav0/cam{camera}"
+        folder.mkdir(parents=True)
+        (folder / "sensor.yaml").write_text(
+            f"sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: [1.0, 0.0, 0.0, {c.baseline_m * camera}, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]\n"
+            f"rate_hz: 20\nresolution: [{WIDTH}, {HEIGHT}]\ncamera_model: pinhole\nintrinsics: [{c.fx}, {c.fy}, {c.cx}, {c.cy}]\n"
+            "distortion_model: radial-tangential\ndistortion_coefficients: [0.01, 0.0, 0.0, 0.0]\n")
+    for folder in (tmp_path / "mav0", tmp_path):
+        bag = bags.Bag(path, *topics, calib=folder)
+        frame, = bag.frames()
+        assert bag.is_rectified_here and bag.cameras.calibration.baseline_m == pytest.approx(c.baseline_m) and (frame.left != frames[0].left).any()
+    told = program("--bag", path, *TOPICS, *SET, "--calib", tmp_path / "mav0", "--out", tmp_path / "out.mcap")
+    assert told.returncode == 0 and "rectified here" in told.stdout, told.stderr
+    for arguments, named in ((["--calib", tmp_path / "none.txt"], "none.txt"), (["--calib", tmp_path / "drive"], "drive"),
+                             (["--calib", plain, "--rectify", "on"], "leave rectify out"), (["--calib", plain, "--info-topics", "/a", "/b"], "no info topics")):
+        refused(capsys, ["--bag", path, *TOPICS, *SET, *arguments], named)
+
+
+@pytest.mark.parametrize("model, distortion", [("radtan", [0.01, 0, 0, 0]), ("fisheye", [0.01, 0, 0, 0]), ("equidistant", [0.01, 0, 0, 0, 0])])
+def test_distortions_by_the_names_that_drivers_give_them(model, distortion, street, frames):
+    recording = Recording("mcap")
+    recording.info("/left/camera_info", street.calibration, 0, distortion=distortion)
+    recording.info("/right/camera_info", street.calibration, 1, distortion=distortion)
+    infos = [item[3] for item in recording.messages]
+    for info in infos:
+        info.distortion_model = model
+    named = ros_images.Cameras(*infos, True).rectified(frames[0].left, frames[0].right)
+    for info in infos:
+        info.distortion_model, info.d = ("plumb_bob", info.d) if model == "radtan" else ("equidistant", info.d[:4])
+    for image, expected in zip(named, ros_images.Cameras(*infos, True).rectified(frames[0].left, frames[0].right)):
+        np.testing.assert_array_equal(image, expected)
+
+
 def test_the_nearest_partner_is_taken():
     pairing = bags.Pairing(5)
     pairs = []
@@ -247,11 +399,26 @@ def test_encodings_give_the_same_grey(street, frames):
     yuv = np.stack([grey, np.full_like(grey, 128)], axis=2)
     np.testing.assert_array_equal(read(yuv, "yuyv"), grey)
     np.testing.assert_array_equal(read(yuv[:, :, ::-1], "uyvy"), grey)
-    with pytest.raises(egosgm.InvalidArgument, match="bayer_rggb8"):
-        read(grey, "bayer_rggb8")
+    np.testing.assert_array_equal(read(np.repeat(grey[:, :, None], 4, axis=2), "8UC4"), grey)
+    with pytest.raises(egosgm.InvalidArgument, match="32FC1"):
+        read(grey.astype(np.float32), "32FC1")
     message.step = WIDTH - 1
     with pytest.raises(egosgm.InvalidArgument, match="rows of"):
         ros_images.grey_of(message)
+
+
+@pytest.mark.parametrize("order", ["rggb", "bggr", "gbrg", "grbg"])
+def test_bayer_images_are_grey_to_their_border(order):
+    recording = Recording("mcap")
+    values = dict(r=200, g=100, b=40)
+    mosaic = np.empty((8, 10), np.uint8)
+    for i, colour in enumerate(order):
+        mosaic[i // 2::2, i % 2::2] = values[colour]
+    for scale, bits, dtype in ((1, 8, np.uint8), (256, 16, np.uint16)):
+        recording.messages.clear()
+        recording.image("/x", START, mosaic.astype(dtype) * scale, f"bayer_{order}{bits}")
+        grey = ros_images.grey_of(recording.messages[0][3])
+        assert grey.dtype == dtype and (grey == (200 + 2 * 100 + 40) // 4 * scale).all()
 
 
 def test_compressed_images_are_read(tmp_path, street, frames):
@@ -278,6 +445,7 @@ def test_raw_images_are_rectified_by_their_infos(street):
     recording.info("/right/camera_info", street.calibration, 1, rotation=turn)
     left, right = (item[3] for item in recording.messages)
     assert ros_images.are_raw(left, "/left/image_raw") and not ros_images.are_raw(left, "/left/image_rect")
+    assert ros_images.are_raw(right, "/direct/image_raw") and not ros_images.are_raw(left, "/left/rectified/compressed")
     assert ros_images.are_raw(right, "/right/image") and not ros_images.are_raw(right, "/camera/infra1/image_rect_raw")
     cameras = ros_images.Cameras(left, right, True)
     assert cameras.calibration.baseline_m == pytest.approx(street.calibration.baseline_m)
@@ -381,7 +549,7 @@ def of_pose(**fields):
     ("/right/image_rect", changed(data=np.zeros(0, np.uint8)), "has 0 bytes"), ("/left/image_rect", changed(height=2**32 - 1), "4294967295"),
     ("/left/image_rect", changed(width=2**32 - 1, step=2**32 - 1), "4294967295"), ("/left/image_rect", changed(width=0), "an image of 0x96 px"),
     ("/left/image_rect", changed(height=0), "x0 px"), ("/left/image_rect", changed(height=HEIGHT - 1), "320x95 px, while the camera info is of 320x96"),
-    ("/left/image_rect", changed(encoding="bayer_rggb8"), "bayer_rggb8"), ("/left/image_rect", changed(encoding="mono16", width=WIDTH // 2), "160x96"),
+    ("/left/image_rect", changed(encoding="bayer_rgbg8"), "bayer_rgbg8"), ("/left/image_rect", changed(encoding="mono16", width=WIDTH // 2), "160x96"),
     ("/left/camera_info", changed(p=np.zeros(12)), "not calibrated"), ("/right/camera_info", changed(p=np.full(12, np.nan)), "not calibrated"),
     ("/left/camera_info", changed(width=0, height=0), "is of 0x0"), ("/left/camera_info", changed(d=np.full(5, np.nan)), "D1"),
     ("/odom", of_pose(x=0.0, y=0.0, z=0.0, w=0.0), "no rotation"), ("/odom", of_pose(at_x=np.nan), "pose 0 is not finite"), ("/odom", of_pose(w=np.inf), "pose 0 is not finite")])
@@ -418,7 +586,9 @@ def test_files_that_are_no_bags(tmp_path, street, frames, capsys):
     for name, data in (("empty.mcap", b""), ("empty.bag", b""), ("noise.mcap", bytes(range(256)) * 9), ("cut.mcap", whole[:len(whole) // 2]),
                        ("cut.bag", old[:len(old) // 2]), ("torn.bag", old[:5000] + b"\xff" * 3000 + old[8000:])):
         (tmp_path / name).write_bytes(data)
-        refused(capsys, ["--bag", tmp_path / name, *TOPICS, *SET], name)
+        refused(capsys, ["--bag", tmp_path / name, *TOPICS, *SET], name, "mcap recover" if name.endswith("mcap") else "rosbag reindex")
+    database.write_bytes(b"")
+    refused(capsys, ["--bag", database, *TOPICS, *SET], f"it is a part of the bag {sqlite}: give that folder")
     for data in (pages[:len(pages) // 2], b"", pages[:4096] + b"\xff" * (len(pages) - 4096)):
         database.write_bytes(data)
         refused(capsys, ["--bag", sqlite, *TOPICS, *SET], "sqlite")

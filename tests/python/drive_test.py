@@ -61,6 +61,14 @@ def test_what_is_wrong_is_said_before_a_frame_is_read(street_folder):
         egosgm.run(street_folder / "missing")
 
 
+def test_what_is_no_pair_and_no_calibration_is_said(street, frames):
+    with pytest.raises(egosgm.InvalidArgument, match="calibration: is a tuple: give an egosgm.Calibration"):
+        egosgm.run([], (700, 700, 320, 240, 0.1))
+    for source, named in (([frames[0].left], "pair 0: is a ndarray"), ([(frames[0].left, frames[0].right), (frames[0].left,)], "pair 1: is a tuple")):
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            list(egosgm.run(source, street.calibration, **OPTIONS))
+
+
 def test_a_bar_is_shown_where_it_is_asked_for(street_folder, monkeypatch, capfd):
     monkeypatch.setitem(sys.modules, "tqdm.auto", None)
     with pytest.raises(egosgm.InvalidArgument, match="pip install tqdm"):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ROS node as a robot has it: a publisher, the node and a subscriber are three processes. Needs rclpy (scripts/install-dependencies --ros).
-EGOSGM_ROS_FRAMES [100] frames of 640x480 at EGOSGM_ROS_RATE [5] Hz. What concerns tf needs tf2_ros, what concerns the launch file launch_ros."""
+EGOSGM_ROS_FRAMES [100] frames of 640x480 at EGOSGM_ROS_RATE [5] Hz. What concerns tf needs tf2_ros, what concerns the launch file launch_ros.
+EGOSGM_ROS_COMPONENT: the node that ros/egosgm_component builds, egosgm_component_node; tried where it is named."""
 import array
 import importlib.util
 import json
@@ -21,8 +22,9 @@ TOPICS = ("disparity", "depth", "variance", "reason", "points2", "odom")
 STREET = dict(frames=RENDERED, width=WIDTH, height=HEIGHT, seed=1, speed_m=0.1, turn_deg=0, supersampling=1)
 
 
-def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False):
-    """Forwards and backwards through the street, once the node has its listeners. tf: where the camera truly is, in the frame odom."""
+def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True):
+    """Forwards and backwards through the street, once the node has its listeners; tells: its diagnostics name them. tf: where the camera truly
+    is, in the frame odom."""
     import egosgm
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
@@ -40,12 +42,14 @@ def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False):
         from egosgm_ros.messages import transform_of
         from tf2_ros import TransformBroadcaster
         broadcaster = TransformBroadcaster(node)
-    ready = []
+    ready = [] if tells else [True]
     listened_to = " ".join(sorted(TOPICS))
     node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: ready.extend(
         True for status in message.status for value in status.values if value.key == "listened_to" and value.value == listened_to), 10)
     while not ready or any(publisher.get_subscription_count() == 0 for publisher in images + infos):
         rclpy.spin_once(node, timeout_sec=0.1)
+    if not tells:
+        time.sleep(5)  # for its listeners
     turn = 2 * (RENDERED - 1)
     for i in range(-2, frames):  # camera infos alone at first
         stamp = node.get_clock().now().to_msg()
@@ -138,17 +142,20 @@ def subscribe(frames, seconds, reliable=True, tf=False):
 
 
 class Node(unittest.TestCase):
-    def run_three(self, frames, rate, seconds=None, parameters=(), reliable=True, right_width=WIDTH, tf=False, listens_to_tf=False):
+    def run_three(self, frames, rate, seconds=None, parameters=(), reliable=True, right_width=WIDTH, tf=False, listens_to_tf=False,
+                  component=None):
         environment = {**os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
                        "PYTHONPATH": f"{PACKAGE}:{os.environ.get('PYTHONPATH', '')}"}
         seconds = seconds or 60 + 2 * frames / rate
         ros = ["-p", "reliable:=true", "-p", "queue_size:=100"] if reliable else []
         ros += [word for p in parameters for word in ("-p", p)]
         start = [sys.executable, "-B", __file__]
-        node = subprocess.Popen([sys.executable, "-B", "-m", "egosgm_ros.node", *(["--ros-args", *ros] if ros else [])], env=environment)
+        program = [component] if component else [sys.executable, "-B", "-m", "egosgm_ros.node"]
+        node = subprocess.Popen([*program, *(["--ros-args", *ros] if ros else [])], env=environment)
         subscriber = subprocess.Popen([*start, "subscribe", json.dumps(dict(frames=frames, seconds=seconds, reliable=reliable, tf=listens_to_tf))],
                                       env=environment, stdout=subprocess.PIPE, text=True)
-        publisher = subprocess.Popen([*start, "publish", json.dumps(dict(frames=frames, rate=rate, right_width=right_width, reliable=reliable, tf=tf))],
+        publisher = subprocess.Popen([*start, "publish", json.dumps(dict(frames=frames, rate=rate, right_width=right_width, reliable=reliable, tf=tf,
+                                                                          tells=not component))],
                                      env=environment)
         try:
             output, _ = subscriber.communicate(timeout=seconds + 60)
@@ -163,7 +170,7 @@ class Node(unittest.TestCase):
     def test_nothing_is_lost_and_the_maps_are_right(self):
         told = self.run_three(FRAMES, RATE)
         latencies, last = np.array(told["latencies_ms"]), told["active"][-1]
-        print(f"{len(told['stamps'])} of {FRAMES} frames at {RATE} Hz; latency: median {np.median(latencies):.1f} ms, 95 % {np.percentile(latencies, 95):.1f} ms; "
+        print(f"{len(told['stamps'])} of {FRAMES} frames at {RATE} Hz, {np.median([float(values['rate_hz']) for values in told['active']]):.1f} Hz matched; latency: median {np.median(latencies):.1f} ms, 95 % {np.percentile(latencies, 95):.1f} ms; "
               f"last diagnostics: {last}")
         self.assertEqual(len(told["stamps"]), FRAMES)
         self.assertEqual(told["stamps"], sorted(set(told["stamps"])))
@@ -176,6 +183,14 @@ class Node(unittest.TestCase):
         self.assertAlmostEqual(told["f_t"] / told["expected_f_t"], 1, places=5)
         self.assertEqual([last[name] for name in ("lost_in_queue", "lost_on_the_way", "unpaired_left", "unpaired_right")], ["0"] * 4)
         self.assertLess(abs(float(last["vertical_offset_px"])), 0.5)
+
+    @unittest.skipUnless("EGOSGM_ROS_COMPONENT" in os.environ, "no component is named")
+    def test_the_component_gives_disparity_and_depth(self):
+        told = self.run_three(20, RATE, seconds=40, parameters=("disparities:=128", "cost:=census9x7"), component=os.environ["EGOSGM_ROS_COMPONENT"])
+        print(f"component: {len(told['stamps'])} of 20 frames at {RATE} Hz; latency: median {np.median(told['latencies_ms']):.1f} ms")
+        self.assertEqual((len(told["stamps"]), told["depth"]), (20, 20))
+        self.assertLess(max(told["bad"]), 0.1)
+        self.assertAlmostEqual(told["f_t"] / told["expected_f_t"], 1, places=5)
 
     def test_what_is_too_fast_is_dropped_and_told(self):
         frames = 150
@@ -239,11 +254,30 @@ class Node(unittest.TestCase):
 
 
 class Files(unittest.TestCase):
-    def test_rviz_shows_topics_that_there_are(self):
+    def test_rviz_shows_what_the_node_publishes(self):
+        """By its topics, of the types that the displays take, as reliably as it is published, in a frame that the node knows."""
+        import rclpy
         import yaml
-        displays = yaml.safe_load((PACKAGE / "rviz/egosgm.rviz").read_text())["Visualization Manager"]["Displays"]
-        self.assertEqual({display["Topic"]["Value"] for display in displays}, {"points2", "depth", "odom"})
-        self.assertLessEqual({display["Topic"]["Value"] for display in displays}, set(TOPICS))
+        from rclpy.qos import ReliabilityPolicy
+        sys.path.insert(0, str(PACKAGE))
+        from egosgm_ros.node import OWN, EgosgmNode
+        shown = yaml.safe_load((PACKAGE / "rviz/egosgm.rviz").read_text())["Visualization Manager"]
+        displays = {display["Topic"]["Value"]: display for display in shown["Displays"]}
+        self.assertEqual(set(displays), {"points2", "depth", "odom"})
+        rclpy.init(domain_id=os.getpid() % 100)
+        node = EgosgmNode()
+        try:
+            node.trigger_configure()
+            published = {topic: (publisher.msg_type.__name__, publisher.qos_profile.reliability) for topic, publisher in node._outputs.items()}
+        finally:
+            node.destroy_node()
+            rclpy.shutdown()
+        for topic, display in displays.items():
+            kind, reliability = published[topic]
+            self.assertEqual(display["Class"], f"rviz_default_plugins/{kind}")
+            best_effort = display["Topic"].get("Reliability Policy") == "Best Effort"  # rviz's own default is reliable
+            self.assertEqual(best_effort, reliability == ReliabilityPolicy.BEST_EFFORT, topic)
+        self.assertEqual(shown["Global Options"]["Fixed Frame"], OWN["odom_frame"])
 
     @unittest.skipUnless(importlib.util.find_spec("launch_ros"), "no launch_ros")
     def test_the_launch_file_gives_the_node_its_parameters_by_their_types(self):

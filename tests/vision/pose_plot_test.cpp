@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <regex>
 #include <sstream>
 
+#include "host/vision/plot.h"
 #include "tests/support/expect_refused.h"
 
 namespace egosgm::vision {
@@ -82,6 +84,19 @@ TEST(PosePlot, PictureShowsTheSameLines) {
   };
   expect_ink("#d62728", {40, 39, 214}, {5, 20, 55});
   expect_ink("#1f77b4", {180, 119, 31}, {55});  // before the corner, below the estimate
+}
+
+TEST(PosePlot, LettersAreWhole) {
+  const auto ink = [](bool upwards, const char* text) {
+    const cv::Mat picture =
+        draw_plot({.size = {80, 80}, .lines = {}, .labels = {{{40, 40}, text, Anchor::kMiddle, upwards}}});
+    cv::Mat grey;
+    cv::extractChannel(picture, grey, 0);
+    return cv::boundingRect(grey < 200).size();
+  };
+  // A bracket is taller than a letter, above and below the line.
+  EXPECT_GE(ink(false, "[").height, ink(false, "x").height + 8);
+  EXPECT_EQ(ink(true, "[").width, ink(false, "[").height);
 }
 
 TEST(PosePlot, StandingStillHasAPicture) {

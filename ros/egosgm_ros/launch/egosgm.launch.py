@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ros2 launch egosgm_ros egosgm.launch.py namespace:=/stereo device:=gpu rviz:=true"""
+"""ros2 launch egosgm_ros egosgm.launch.py namespace:=/stereo device:=gpu rviz:=true publish_tf:=true"""
 import os
 
 from ament_index_python.packages import get_package_share_directory

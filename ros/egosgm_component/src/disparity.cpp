@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: Apache-2.0
+// The node as a component, which shares its process with the camera's driver: images come without a copy. It has less
+// than egosgm_ros: mono8 images of equal stamps in, disparity and depth out, motion by stereo odometry.
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <rclcpp/rclcpp.hpp>
+#include <rclcpp_components/register_node_macro.hpp>
+#include <sensor_msgs/msg/camera_info.hpp>
+#include <sensor_msgs/msg/image.hpp>
+#include <stdexcept>
+#include <stereo_msgs/msg/disparity_image.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "egosgm/calibration.h"
+#include "egosgm/device.h"
+#include "egosgm/frame.h"
+#include "egosgm/named_options.h"
+#include "egosgm/options.h"
+#include "egosgm/pipeline.h"
+#include "egosgm/vision/odometry.h"
+
+namespace egosgm_component {
+
+using sensor_msgs::msg::CameraInfo;
+using sensor_msgs::msg::Image;
+using stereo_msgs::msg::DisparityImage;
+
+/// What has to be made anew for another calibration or size.
+struct Matching {
+  Matching(const CameraInfo& left, const CameraInfo& right, const egosgm::PipelineOptions& options,
+           const egosgm::Device& device)
+      : calibration{left.p[0],
+                    left.p[5],
+                    left.p[2],
+                    left.p[6],
+                    (left.p[3] - right.p[3]) / right.p[0],
+                    right.p[2] - left.p[2]},
+        width(static_cast<int>(left.width)),
+        height(static_cast<int>(left.height)),
+        pipeline(calibration, width, height, options, device),
+        odometry(calibration) {}
+
+  egosgm::Calibration calibration;
+  int width, height;
+  egosgm::Pipeline pipeline;
+  egosgm::vision::StereoOdometry odometry;
+};
+
+class Disparity : public rclcpp::Node {
+ public:
+  /// Parameters: the options of the pipeline by their names, `device`, and `reliable` with `queue_size` for topics that
+  /// lose nothing while the queue holds.
+  explicit Disparity(const rclcpp::NodeOptions& options)
+      : Node("egosgm", options), device_(egosgm::Device::select(parameter("device", ""))) {
+    for (const auto& [name, value] : egosgm::list_options(options_)) {
+      egosgm::set_option(options_, name, parameter(name, value));
+    }
+
+    rclcpp::QoS qos = rclcpp::SensorDataQoS();
+    if (parameter("reliable", "false") == "true") qos = rclcpp::QoS(std::stoi(parameter("queue_size", "4")));
+    disparity_ = create_publisher<DisparityImage>("disparity", qos);
+    depth_ = create_publisher<Image>("depth", qos);
+    for (const int side : {0, 1}) {
+      const std::string name = side == 0 ? "left" : "right";
+      infos_in_.push_back(create_subscription<CameraInfo>(
+          name + "/camera_info", qos, [this, side](CameraInfo::ConstSharedPtr info) { on_info(side, *info); }));
+      images_in_.push_back(create_subscription<Image>(
+          name + "/image_rect", qos, [this, side](Image::ConstSharedPtr image) { on_image(side, std::move(image)); }));
+    }
+  }
+
+ private:
+  static constexpr std::size_t kMostWaiting = 8;
+
+  std::string parameter(const std::string& name, const std::string& without) {
+    rcl_interfaces::msg::ParameterDescriptor any_type;
+    any_type.dynamic_typing = true;  // disparities:=64 is a number, cost:=census9x7 a text
+    declare_parameter(name, rclcpp::ParameterValue(without), any_type);
+    return get_parameter(name).value_to_string();
+  }
+
+  void on_info(int side, const CameraInfo& info) {
+    std::optional<CameraInfo>& known = infos_[side];
+    if (!known || known->p != info.p || known->width != info.width || known->height != info.height) matching_.reset();
+    known = info;
+  }
+
+  void on_image(int side, Image::ConstSharedPtr image) {
+    const std::int64_t stamp = rclcpp::Time(image->header.stamp).nanoseconds();
+    const auto partner = waiting_[1 - side].find(stamp);
+    if (partner == waiting_[1 - side].end()) {
+      waiting_[side].emplace(stamp, std::move(image));
+      if (waiting_[side].size() > kMostWaiting) waiting_[side].erase(waiting_[side].begin());
+      return;
+    }
+    const Image::ConstSharedPtr other = partner->second;
+    for (auto& waiting : waiting_) waiting.clear();  // what is older has lost its partner
+    try {
+      side == 0 ? process(*image, *other) : process(*other, *image);
+    } catch (const std::exception& error) {  // whatever a message held: the next one may be whole
+      RCLCPP_ERROR_THROTTLE(get_logger(), *get_clock(), 1000, "%s", error.what());
+    }
+  }
+
+  egosgm::ImageView view_of(const Image& image) const {
+    if (image.encoding != "mono8") throw std::invalid_argument("images of " + image.encoding + ": give mono8");
+    if (image.step < image.width || image.data.size() < std::size_t{image.step} * image.height) {
+      throw std::invalid_argument("an image has fewer bytes than its size says");
+    }
+    return {image.data.data(), static_cast<int>(image.width), static_cast<int>(image.height), image.step};
+  }
+
+  void process(const Image& left, const Image& right) {
+    if (!infos_[0] || !infos_[1]) throw std::runtime_error("no camera info yet of both cameras");
+    if (!matching_) matching_ = std::make_unique<Matching>(*infos_[0], *infos_[1], options_, device_);
+    Matching& m = *matching_;
+
+    auto found = std::make_unique<DisparityImage>();
+    found->header = left.header;
+    found->f = static_cast<float>(m.calibration.fx);
+    found->t = static_cast<float>(m.calibration.baseline_m);
+    const double least = options_.min_disparity + m.calibration.doffs_px;
+    found->min_disparity = static_cast<float>(std::max(0.0, least));
+    found->max_disparity = static_cast<float>(least + options_.disparities - 1);
+    found->valid_window.width = m.width;
+    found->valid_window.height = m.height;
+    found->image = map_of(left, m);
+    std::vector<float> values(static_cast<std::size_t>(m.width) * m.height);
+    egosgm::FrameOutputs outputs;
+    outputs.disparity = {values.data(), m.width, m.height, static_cast<std::ptrdiff_t>(m.width * sizeof(float))};
+    m.pipeline.process(view_of(left), view_of(right), m.odometry.process(view_of(left), view_of(right)).motion,
+                       outputs);
+
+    std::vector<float> metres(values.size(), std::numeric_limits<float>::quiet_NaN());  // REP 118
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const double d = values[i] + m.calibration.doffs_px;
+      const bool is_there = values[i] > egosgm::kInvalidDisparity && d >= 0;
+      if (is_there && d > 0) metres[i] = static_cast<float>(m.calibration.fx * m.calibration.baseline_m / d);
+      values[i] = is_there ? static_cast<float>(d) : -1.0f;  // below min_disparity
+    }
+    auto depth = std::make_unique<Image>(map_of(left, m));
+    std::memcpy(found->image.data.data(), values.data(), found->image.data.size());
+    std::memcpy(depth->data.data(), metres.data(), depth->data.size());
+    disparity_->publish(std::move(found));
+    depth_->publish(std::move(depth));
+  }
+
+  static Image map_of(const Image& image, const Matching& m) {
+    Image map;
+    map.header = image.header;
+    map.width = m.width;
+    map.height = m.height;
+    map.encoding = "32FC1";
+    map.step = static_cast<std::uint32_t>(m.width * sizeof(float));
+    map.data.resize(std::size_t{map.step} * map.height);
+    return map;
+  }
+
+  egosgm::PipelineOptions options_;
+  egosgm::Device device_;
+  std::optional<CameraInfo> infos_[2];
+  std::map<std::int64_t, Image::ConstSharedPtr> waiting_[2];
+  std::unique_ptr<Matching> matching_;
+  rclcpp::Publisher<DisparityImage>::SharedPtr disparity_;
+  rclcpp::Publisher<Image>::SharedPtr depth_;
+  std::vector<rclcpp::Subscription<CameraInfo>::SharedPtr> infos_in_;
+  std::vector<rclcpp::Subscription<Image>::SharedPtr> images_in_;
+};
+
+}  // namespace egosgm_component
+
+RCLCPP_COMPONENTS_REGISTER_NODE(egosgm_component::Disparity)
