@@ -48,7 +48,7 @@ TEST(Options, HasANameForEveryMember) {
       {"disparities", [](auto& o) { o.disparities = 77; }},
       {"min_disparity", [](auto& o) { o.min_disparity = -77; }},
       {"temporal", [](auto& o) { o.temporal = false; }},
-      {"track_right", [](auto& o) { o.track_right = true; }},
+      {"track_right", [](auto& o) { o.track_right = false; }},
       {"keep_predicted", [](auto& o) { o.keep_predicted = false; }},
       {"coarse_match", [](auto& o) { o.coarse_match = false; }},
       {"vertical_alignment", [](auto& o) { o.vertical_alignment = false; }},

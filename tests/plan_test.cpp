@@ -85,7 +85,7 @@ TEST(Plan, MatchesTwiceWhereTheFirstMatchGivesTheVerticalOffset) {
 TEST(Plan, HasACoarseMatchOnlyWhereItIsOn) {
   MethodOptions options;
   options.coarse_match.enabled = false;
-  EXPECT_EQ(row(options, kNo, true, true), "- | bands | tracks left | matches left x1");
+  EXPECT_EQ(row(options, kNo, true, true), "- | bands | tracks both | matches both x1");
 }
 
 TEST(Plan, MakesTheVarianceThatIsGivenOutOnlyWhereItIsOn) {

@@ -199,7 +199,7 @@ std::vector<Case> cases() {
   // A board goes away while the cameras are blind.
   Board leaving = board(0.8, -0.5, 0.5, -0.4, 0.4);
   leaving.away_a_frame_m = 0.4;
-  all.push_back({"predicted", Reason::kPredicted, 500, {{leaving, kWall}, 3, 0, 0, Rectangle{55, 25, 130, 84}}});
+  all.push_back({"predicted", Reason::kPredicted, 400, {{leaving, kWall}, 3, 0, 0, Rectangle{55, 25, 130, 84}}});
   return all;
 }
 
@@ -213,7 +213,7 @@ TEST_P(ReasonScenes, OfAReasonsPixelsMostAreWrongOrMissingOfTheOthersFew) {
   const Shares found = shares(one.scene, options, one.reason);
   SCOPED_TRACE(found.counts);
   EXPECT_GE(found.with.pixels, one.least_pixels);
-  EXPECT_GT(found.with.part(), 0.6) << found.with.pixels << " pixels";
+  EXPECT_GT(found.with.part(), 0.5) << found.with.pixels << " pixels";
   EXPECT_LT(found.without.part(), 0.2) << found.without.pixels << " pixels";
 }
 

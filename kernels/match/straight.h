@@ -23,9 +23,14 @@ inline bool goes_straight(const SgmParameters q, const uint extent, const uint* 
   return fit;
 }
 
+// Where a pixel's costs go in the slots, and where those before it are wiped.
+typedef struct {
+  global uchar *at[DIRECTIONS], *wiped_at[DIRECTIONS];
+} Places;
+
 // A chunk of path n's predecessor in the lower half, one of path n + PATH_PAIRS's in the upper half.
-inline uchar16 load_pair(global uchar* const* at, const int n, const uint along, const int beside) {
-  return (uchar16)(load_chunk(at[n] + along + beside), load_chunk(at[n + PATH_PAIRS] + along + beside));
+inline uchar16 load_pair(const Places* to, const int n, const uint along, const int beside) {
+  return (uchar16)(load_chunk(to->at[n] + along + beside), load_chunk(to->at[n + PATH_PAIRS] + along + beside));
 }
 inline uchar16 load_upper(const ulong2 lower, global const uchar* upper) {
   return (uchar16)(as_uchar16(lower).lo, load_chunk(upper));
@@ -42,8 +47,8 @@ inline uchar8 path_costs_of(const FromLeft left) { return left.t.lo - left.least
 
 // The path costs of a pixel that goes straight, but for those from the left left in the slots in place of those before
 // it, and half of their sum.
-ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, const uchar16 p1, global uchar* const* at,
-                                  global uchar* const* wiped_at, const uint along, FromLeft* left) {
+ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, const uchar16 p1, const Places* to,
+                                  const uint along, FromLeft* left) {
   const uchar16 cost = (uchar16)(chunk_cost, chunk_cost);
   const uchar4 p2 = as_uchar4(steps);
 #if PATHS == 8
@@ -52,26 +57,26 @@ ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, con
   const uchar16 p2_of[PATH_PAIRS] = {p2.s0000000011111111};
 #endif
   uchar16 t[PATH_PAIRS], least[PATH_PAIRS];
-  global const uchar* upper = at[PATH_PAIRS] + along;
+  global const uchar* upper = to->at[PATH_PAIRS] + along;
   const ulong2 before = as_ulong2(left->t);
   const uchar16 beside = add_sat(min(load_upper(before << (ulong2)(8) | (ulong2)(ABSENT), upper - 1),
                                      load_upper(before >> (ulong2)(8) | (ulong2)((ulong)ABSENT << 56), upper + 1)),
                                  p1);
   t[0] = add_sat(cost, min(min(load_upper(before, upper), beside), add_sat(left->least, p2_of[0])) - left->least);
 #if PATHS == 8
-  t[1] = path_cost(cost, load_pair(at, 1, along, 0), load_pair(at, 1, along, -1), load_pair(at, 1, along, 1), p1,
+  t[1] = path_cost(cost, load_pair(to, 1, along, 0), load_pair(to, 1, along, -1), load_pair(to, 1, along, 1), p1,
                    p2_of[1]);
 #endif
 #pragma unroll
-  for (int n = 1; n < DIRECTIONS; ++n) store((uchar16)(ABSENT), wiped_at[n] + along);
+  for (int n = 1; n < DIRECTIONS; ++n) store((uchar16)(ABSENT), to->wiped_at[n] + along);
   minima_of_chunks(t, least);
   left->t = t[0];
   left->least = (uchar16)(least[0].lo, (uchar8)(0));
 #pragma unroll
   for (int n = 0; n < PATH_PAIRS; ++n) {
     t[n] -= least[n];
-    if (n > 0) store_chunk(t[n].lo, at[n] + along);
-    store_chunk(t[n].hi, at[n + PATH_PAIRS] + along);
+    if (n > 0) store_chunk(t[n].lo, to->at[n] + along);
+    store_chunk(t[n].hi, to->at[n + PATH_PAIRS] + along);
   }
 #if PATHS == 8
   t[0] = mean(t[0], t[1]);
@@ -133,19 +138,19 @@ ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const S
                                   const uint extent, uint steps, Place* place) {
   const int origin = origin_of(extent);
   const uint lane = (uint)origin - (uint)q.min_disparity, moved_lane = place->moved + (uint)origin;
-  global uchar* at[DIRECTIONS];
-  global uchar* wiped_at[DIRECTIONS];
+  Places to;
 #pragma unroll
-  for (int n = 0; n < DIRECTIONS; ++n) at[n] = row->slot[n] + (n > 0 ? moved_lane : lane);
+  for (int n = 0; n < DIRECTIONS; ++n) to.at[n] = row->slot[n] + (n > 0 ? moved_lane : lane);
   Seen seen = seen_from(row->seen ? row->seen + place->k - origin - (EGOSGM_LANES - 1) : 0);
   FromLeft left = {place->last, (uchar16)(0)};
   uint along = 0;
   while (true) {
 #pragma unroll
-    for (int n = 1; n < DIRECTIONS; ++n) wiped_at[n] = row->slot[n] + (place->moved + (uint)origin_of(place->wiped[n]));
+    for (int n = 1; n < DIRECTIONS; ++n)
+      to.wiped_at[n] = row->slot[n] + (place->moved + (uint)origin_of(place->wiped[n]));
     if (backward) place->cells -= EGOSGM_LANES;
     const uchar8 cost = matching_cost_of_chunk(place->own, place->other + origin, row->row_above, row->row_below);
-    const uchar8 sum = follow_chunk(cost, steps, row->p1, at, wiped_at, along, &left);
+    const uchar8 sum = follow_chunk(cost, steps, row->p1, &to, along, &left);
     leave_chunk(meets, q, row, place, origin, cost, sum, &seen);
     go_on(meets, row, place);
     if (!backward) place->cells += EGOSGM_LANES;
@@ -158,7 +163,7 @@ ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const S
   }
   leave_seen(&seen);
   const uchar8 last = path_costs_of(left);
-  store_chunk(last, at[0]);
+  store_chunk(last, to.at[0]);
   place->last = (uchar16)(last, (uchar8)(ABSENT));
   place->moved += along;
 }

@@ -53,23 +53,30 @@ static inline Bands bands_of(const DisparityRange range, Floats from, Floats to)
   return bands;
 }
 
-// What two neighbouring blocks say, each pixel of a row what its own does.
+// What the blocks of PIXELS pixels say, each pixel what its own does. `blocks`: the first one's; `next`: to that of the
+// next one, if there is any.
 #if PIXELS == 1
-#define OF_BLOCKS(Values, Half, left, right) ((Values)(left))
+#define OF_BLOCKS(Values, Half, blocks, next, member) ((Values)((blocks)->member))
 #else
 #if PIXELS != 2 * EGOSGM_BLOCK
 #error "two blocks are as wide as the pixels of a work-item"
 #endif
-#define OF_BLOCKS(Values, Half, left, right) ((Values)((Half)(left), (Half)(right)))
+#define OF_BLOCKS(Values, Half, blocks, next, member) \
+  ((Values)((Half)((blocks)->member), (Half)((blocks)[next].member)))
 #endif
+#define NEXT_BLOCK(x, blocks) ((x) / EGOSGM_BLOCK + 1 < (blocks) ? 1 : 0)
 
 static inline Bands bands_at(global const Band* of_row, const int x, const int blocks) {
-  const Band left = band_at(of_row, x / EGOSGM_BLOCK), right = band_at(of_row, min(x / EGOSGM_BLOCK + 1, blocks - 1));
+  Band at[2];
+  at[0] = band_at(of_row, x / EGOSGM_BLOCK);
+#if PIXELS > 1
+  at[1] = band_at(of_row, x / EGOSGM_BLOCK + NEXT_BLOCK(x, blocks));
+#endif
   Bands bands;
-  bands.origin = OF_BLOCKS(Ints, int8, left.origin, right.origin);
-  bands.chunks = OF_BLOCKS(Ints, int8, left.chunks, right.chunks);
-  bands.first = OF_BLOCKS(Ints, int8, left.first, right.first);
-  bands.last = OF_BLOCKS(Ints, int8, left.last, right.last);
+  bands.origin = OF_BLOCKS(Ints, int8, at, 1, origin);
+  bands.chunks = OF_BLOCKS(Ints, int8, at, 1, chunks);
+  bands.first = OF_BLOCKS(Ints, int8, at, 1, first);
+  bands.last = OF_BLOCKS(Ints, int8, at, 1, last);
   return bands;
 }
 

@@ -224,12 +224,12 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
     const Ints predicted = (d > INVALID) & believed;
-    global const BlockRange* left = found + row_of_blocks + x / EGOSGM_BLOCK;
-    global const BlockRange* right = x / EGOSGM_BLOCK + 1 < blocks.width ? left + 1 : left;
+    global const BlockRange* here = found + row_of_blocks + x / EGOSGM_BLOCK;
     const Bands own = bands_of_predictions(
         range, sigmas, min_half_width, coarse_tolerance, coarse_margin, predicted ? d : (Floats)(0.0f),
-        load_pixels(variance + row, x, width), OF_BLOCKS(Floats, float8, left->min, right->min),
-        OF_BLOCKS(Floats, float8, left->max, right->max), OF_BLOCKS(Ints, int8, left->count, right->count));
+        load_pixels(variance + row, x, width), OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), min),
+        OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), max),
+        OF_BLOCKS(Ints, int8, here, NEXT_BLOCK(x, blocks.width), count));
     Bands all = bands_at(block_bands + row_of_blocks, x, blocks.width);
     all.origin = predicted ? own.origin : all.origin;
     all.chunks = predicted ? own.chunks : all.chunks;
