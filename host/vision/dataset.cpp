@@ -269,10 +269,16 @@ StereoSequence open_folder(const fs::path& folder, FrameRange range) {
   if (is_folder(folder / kRawGrey.left) || is_folder(folder / kRawColor.left)) return open_kitti_raw(folder, range);
   if (is_folder(folder / kGrey.left) || is_folder(folder / kColor.left)) return open_kitti_odometry(folder, range);
   if (is_file(image_named(folder, "im0"))) return open_middlebury(folder, range);
+  if (const auto cameras = find_two_cameras(folder); cameras && !cameras->calibration.empty()) {
+    StereoSequence sequence = open_patterns(cameras->left, cameras->right, cameras->calibration, range);
+    sequence.title = name_of(folder);
+    sequence.poses_file = if_there(folder / "poses.txt");
+    return sequence;
+  }
   throw InvalidArgument(
       folder.string() + ": is no stereo sequence; " +
-      found_instead(folder).value_or("give a folder with image_0 and image_1, image_00/data and image_01/data, or "
-                                     "im0.png and im1.png"));
+      found_instead(folder).value_or("give a folder with image_0 and image_1, image_00/data and image_01/data, "
+                                     "im0.png and im1.png, or left, right and calib.txt"));
 }
 
 }  // namespace egosgm::vision
