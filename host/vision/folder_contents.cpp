@@ -134,6 +134,16 @@ Contents euroc(const fs::path& folder) {
   return std::nullopt;
 }
 
+Contents videos(const fs::path& folder) {
+  for (const char* type : {".mp4", ".avi", ".mkv", ".mov"}) {
+    const fs::path left = folder / ("left" + std::string(type)), right = folder / ("right" + std::string(type));
+    if (is_file(left) && is_file(right))
+      return "it holds two videos: egosgm rectify --left '" + left.string() + "' --right '" + right.string() +
+             "' --calib FILE makes a sequence of them";
+  }
+  return std::nullopt;
+}
+
 Contents result_of_a_run(const fs::path& folder) {
   if (!is_file(folder / "report.json")) return std::nullopt;
   return "it is what `egosgm run` wrote: give the run's input";
@@ -142,7 +152,7 @@ Contents result_of_a_run(const fs::path& folder) {
 }  // namespace
 
 Contents found_instead(const fs::path& folder) {
-  for (const auto& look : {multiview, sequences_below, euroc, result_of_a_run, two_cameras, one_camera}) {
+  for (const auto& look : {multiview, sequences_below, euroc, videos, result_of_a_run, two_cameras, one_camera}) {
     if (Contents found = look(folder)) return found;
   }
   return std::nullopt;

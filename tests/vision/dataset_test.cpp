@@ -350,6 +350,9 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
   EXPECT_TRUE(std::filesystem::equivalent(sequence.times_file, root_ / "a/times.txt"));
   EXPECT_EQ(numbers_of(open_folder(root_ / "a", {10, 10})), (std::vector<int>{10}));
   expect_refused([&] { open_folder(root_); }, {"it holds a: give"});
+  add_text("videos/left.mp4", "x"), add_text("videos/right.mp4", "x");
+  expect_refused([&] { open_folder(root_ / "videos"); },
+                 {"it holds two videos: egosgm rectify --left", "left.mp4' --right", "right.mp4' --calib FILE"});
 
   add_images({"b/image_left/000001_left", "b/image_right/000001_right"}),
       add_text("b/calibration.txt", kOwnCalibration);
