@@ -12,10 +12,12 @@ class Consumer(ConanFile):
         self.requires(self.tested_reference_str)
 
     def layout(self):
+        self.conf.define("tools.cmake.cmake_layout:test_folder", "$TMP")  # nothing is built among the sources
         cmake_layout(self)
 
     def generate(self):
         toolchain = CMakeToolchain(self)
+        toolchain.user_presets_path = False
         toolchain.cache_variables["VISION"] = bool(self.dependencies["egosgm"].options.vision)
         toolchain.generate()
 
