@@ -251,7 +251,9 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   const NamePattern left_pattern = parse_pattern(left), right_pattern = parse_pattern(right);
   const std::vector<NamedPair> pairs = pairs_of_patterns(left_pattern, right_pattern, left, right, pair_by);
   if (pairs.empty()) {
-    throw InvalidArgument(left + ": holds no images; give the folder or pattern of a stereo sequence");
+    throw InvalidArgument(left +
+                          ": holds no images that are PNG or JPEG; give the folder or pattern of a stereo sequence, or "
+                          "have `egosgm rectify` make one of other files");
   }
   StereoSequence sequence;
   sequence.title = left + " and " + right;

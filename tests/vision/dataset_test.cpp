@@ -363,6 +363,8 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
   expect_refused([&] { open_folder(root_ / "d"); }, {"no right image has the name of a left one"});
   add_images({"e/cam0/1", "e/cam1/1"});
   expect_refused([&] { open_folder(root_ / "e"); }, {"no calib.txt: put their calibration there", "e/cam1/*'"});
+  add_text("f/left/1.pgm", "x"), add_text("f/right/1.pgm", "x"), add_text("f/calib.txt", kOwnCalibration);
+  expect_refused([&] { open_folder(root_ / "f"); }, {"holds no images that are PNG or JPEG", "egosgm rectify"});
   add_text("e/calib.txt", "nothing\n");
   expect_refused([&] { open_folder(root_ / "e"); }, {"e/calib.txt"});
 }
