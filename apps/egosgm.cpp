@@ -67,6 +67,11 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
                                        unknown.front(), std::filesystem::path(unknown.front()).extension().string()));
   }
   const std::string typed = unknown.front().substr(0, unknown.front().find('='));
+  if (typed == "--bag") {
+    return fail(
+        kBadInput,
+        "--bag: bags are read by the Python package's program: pip install the wheel, with \"[bag]\" (docs/robots.md)");
+  }
   const std::string nearest = suggestion(typed, names_known_to(command));
   return fail(kBadInput,
               fmt::format("{} \"{}\": {}see `{}`", typed.starts_with("-") ? "unknown option" : "unexpected argument",

@@ -36,8 +36,10 @@ vision::PairBy parse_pair_by(const std::string& pair_by) {
 
 void SequenceArguments::add_to(CLI::App& command) {
   command
-      .add_option("DATASET,--dataset", folder,
-                  "folder in the layout of KITTI odometry, KITTI raw or Middlebury, whichever it is")
+      .add_option(
+          "DATASET,--dataset", folder,
+          "folder in the layout of KITTI odometry, KITTI raw or Middlebury, whichever it is, or with left, right and "
+          "calib.txt")
       ->type_name("DIR")
       ->group(kGroup);
   command

@@ -59,7 +59,8 @@ void bind_sequences(py::module_& module) {
       "open_folder",
       [](const path& folder, const std::string& frames) { return vision::open_folder(folder, range_of(frames)); },
       py::arg("folder"), py::arg("frames") = "",
-      "Opens a folder in the layout of KITTI odometry, KITTI raw or Middlebury. frames: \"7:10\", \"7:\", \":10\".");
+      "Opens a folder in the layout of KITTI odometry, KITTI raw or Middlebury, or with left, right and calib.txt. "
+      "frames: \"7:10\", \"7:\", \":10\".");
   module.def(
       "open_kitti_multiview",
       [](const path& folder, const std::string& scene, const std::string& frames) {

@@ -251,7 +251,9 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   const NamePattern left_pattern = parse_pattern(left), right_pattern = parse_pattern(right);
   const std::vector<NamedPair> pairs = pairs_of_patterns(left_pattern, right_pattern, left, right, pair_by);
   if (pairs.empty()) {
-    throw InvalidArgument(left + ": holds no images; give the folder or pattern of a stereo sequence");
+    throw InvalidArgument(left +
+                          ": holds no images that are PNG or JPEG; give the folder or pattern of a stereo sequence, or "
+                          "have `egosgm rectify` make one of other files");
   }
   StereoSequence sequence;
   sequence.title = left + " and " + right;
@@ -269,10 +271,16 @@ StereoSequence open_folder(const fs::path& folder, FrameRange range) {
   if (is_folder(folder / kRawGrey.left) || is_folder(folder / kRawColor.left)) return open_kitti_raw(folder, range);
   if (is_folder(folder / kGrey.left) || is_folder(folder / kColor.left)) return open_kitti_odometry(folder, range);
   if (is_file(image_named(folder, "im0"))) return open_middlebury(folder, range);
+  if (const auto cameras = find_two_cameras(folder); cameras && !cameras->calibration.empty()) {
+    StereoSequence sequence = open_patterns(cameras->left, cameras->right, cameras->calibration, range);
+    sequence.title = name_of(folder);
+    sequence.poses_file = if_there(folder / "poses.txt");
+    return sequence;
+  }
   throw InvalidArgument(
       folder.string() + ": is no stereo sequence; " +
-      found_instead(folder).value_or("give a folder with image_0 and image_1, image_00/data and image_01/data, or "
-                                     "im0.png and im1.png"));
+      found_instead(folder).value_or("give a folder with image_0 and image_1, image_00/data and image_01/data, "
+                                     "im0.png and im1.png, or left, right and calib.txt"));
 }
 
 }  // namespace egosgm::vision

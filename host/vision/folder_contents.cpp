@@ -47,6 +47,19 @@ std::set<std::string> scenes_in(const fs::path& folder) {
   return scenes;
 }
 
+/// The pattern of a camera's images: `*`, or what they have beside their number, which begins or ends with the camera's
+/// name.
+std::string pattern_in(const fs::path& folder, const std::string& side) {
+  for (const std::string& name : names_in(folder)) {
+    const std::string stem = fs::path(name).stem().string();
+    if (!is_image_name(name)) continue;
+    if (stem.starts_with(side + "_")) return (folder / (side + "_*")).string();
+    if (stem.ends_with("_" + side)) return (folder / ("*_" + side)).string();
+    break;
+  }
+  return (folder / "*").string();
+}
+
 bool is_sequence(const fs::path& folder) {
   if (holds_both(folder, "image_00/data", "image_01/data") || holds_both(folder, "image_02/data", "image_03/data"))
     return true;
@@ -55,7 +68,8 @@ bool is_sequence(const fs::path& folder) {
   for (const char* image : {"im0.png", "im0.jpg", "im0.jpeg"}) {
     if (is_file(folder / image)) return true;
   }
-  return false;
+  const std::optional<TwoCameras> cameras = find_two_cameras(folder);
+  return cameras && !cameras->calibration.empty();
 }
 
 Contents multiview(const fs::path& folder) {
@@ -106,18 +120,26 @@ Contents one_camera(const fs::path& folder) {
 }
 
 Contents two_cameras(const fs::path& folder) {
-  for (const auto& [left, right] : {std::pair{"left", "right"}, {"cam0", "cam1"}, {"image_left", "image_right"}}) {
-    if (!holds_both(folder, left, right)) continue;
-    return "it holds " + std::string(left) + " and " + right + ": give --left '" + (folder / left / "*").string() +
-           "' --right '" + (folder / right / "*").string() + "' --calib FILE";
-  }
-  return std::nullopt;
+  const std::optional<TwoCameras> cameras = find_two_cameras(folder);
+  if (!cameras) return std::nullopt;
+  return "it holds two cameras and no calib.txt: put their calibration there, or give --left '" + cameras->left +
+         "' --right '" + cameras->right + "' --calib FILE";
 }
 
 Contents euroc(const fs::path& folder) {
   for (const fs::path& candidate : {folder, folder / "mav0"}) {
     if (is_file(candidate / "cam0/data.csv"))
       return "it is an EuRoC recording: egosgm rectify --euroc " + folder.string() + " makes a sequence of it";
+  }
+  return std::nullopt;
+}
+
+Contents videos(const fs::path& folder) {
+  for (const char* type : {".mp4", ".avi", ".mkv", ".mov"}) {
+    const fs::path left = folder / ("left" + std::string(type)), right = folder / ("right" + std::string(type));
+    if (is_file(left) && is_file(right))
+      return "it holds two videos: egosgm rectify --left '" + left.string() + "' --right '" + right.string() +
+             "' --calib FILE makes a sequence of them";
   }
   return std::nullopt;
 }
@@ -130,8 +152,20 @@ Contents result_of_a_run(const fs::path& folder) {
 }  // namespace
 
 Contents found_instead(const fs::path& folder) {
-  for (const auto& look : {multiview, sequences_below, euroc, result_of_a_run, two_cameras, one_camera}) {
+  for (const auto& look : {multiview, sequences_below, euroc, videos, result_of_a_run, two_cameras, one_camera}) {
     if (Contents found = look(folder)) return found;
+  }
+  return std::nullopt;
+}
+
+std::optional<TwoCameras> find_two_cameras(const fs::path& folder) {
+  for (const auto& [left, right] : {std::pair{"left", "right"}, {"cam0", "cam1"}, {"image_left", "image_right"}}) {
+    if (!holds_both(folder, left, right)) continue;
+    TwoCameras cameras{pattern_in(folder / left, "left"), pattern_in(folder / right, "right"), {}};
+    for (const char* name : {"calib.txt", "calibration.txt"}) {
+      if (cameras.calibration.empty() && is_file(folder / name)) cameras.calibration = folder / name;
+    }
+    return cameras;
   }
   return std::nullopt;
 }

@@ -12,6 +12,16 @@ namespace egosgm::vision {
 /// one of them". Nothing where nothing is known. Thread-safe.
 std::optional<std::string> found_instead(const std::filesystem::path& folder);
 
+/// A folder with one folder of images for each camera, beside their calibration: calib.txt or calibration.txt.
+struct TwoCameras {
+  std::string left, right;            // their patterns
+  std::filesystem::path calibration;  // empty where there is none
+};
+
+/// left and right, cam0 and cam1, or image_left and image_right in `folder`; nothing where they are not both there.
+/// Files that say so in their names too (left_1.png, 1_left.png) are paired by the rest of them. Thread-safe.
+std::optional<TwoCameras> find_two_cameras(const std::filesystem::path& folder);
+
 /// Scenes of a multi-view folder of images: NNNNNN of NNNNNN_FF.png. Throws InvalidArgument where it cannot be listed.
 std::set<std::string> list_scenes(const std::filesystem::path& images);
 

@@ -85,12 +85,23 @@ def _matrix(info: Any, name: str, rows: int, columns: int) -> NDArray[np.float64
     return values.reshape(rows, columns)
 
 
+def _camera(info: Any, name: str, columns: int) -> NDArray[np.float64]:
+    """K or P, of the pixels that there are: a camera's binning makes one of several."""
+    matrix = _matrix(info, name, 3, columns)
+    matrix[:2] /= [[max(1, info.binning_x)], [max(1, info.binning_y)]]
+    return matrix
+
+
+def _size(info: Any) -> Tuple[int, int]:
+    return int(info.width) // max(1, info.binning_x), int(info.height) // max(1, info.binning_y)
+
+
 class Cameras:
     """Two sensor_msgs/CameraInfo: the calibration of rectified images, and how raw ones are rectified."""
 
     def __init__(self, left: Any, right: Any, rectify: bool) -> None:
         """Throws InvalidArgument where they are no calibration."""
-        left_p, right_p = _matrix(left, "P", 3, 4), _matrix(right, "P", 3, 4)
+        left_p, right_p = _camera(left, "P", 4), _camera(right, "P", 4)
         if not left_p[0, 0] > 0 or not right_p[0, 0] > 0:
             raise _egosgm.InvalidArgument("camera info: P is zero: the cameras are not calibrated")
         shift = (right_p[0, 3] - left_p[0, 3]) / right_p[0, 0]  # both may be told from where a third camera stands, as KITTI's are
@@ -99,7 +110,7 @@ class Cameras:
                                           "stereo pair, and are left and right not swapped?")
         if abs(left_p[0, 0] - right_p[0, 0]) > 1e-3 * left_p[0, 0] or abs(left_p[1, 2] - right_p[1, 2]) > 1e-2:
             raise _egosgm.InvalidArgument("camera info: P of both cameras have different focal lengths or rows: they are not of one rectified pair")
-        self.size = int(left.width), int(left.height)
+        self.size = _size(left)
         self._rectification: Optional[_egosgm.Rectification] = None
         if rectify:
             self._rectification = _egosgm.Rectification(_rig(left, right, shift), *self.size)
@@ -144,8 +155,8 @@ def _rig(left: Any, right: Any, shift: float) -> _egosgm.StereoRig:
     distortions = [np.array(getattr(info, "d", None) if hasattr(info, "d") else info.D, dtype=float) for info in (left, right)]
     if fisheye:  # some drivers fill up with zeros
         distortions = [d[:4] if not np.any(d[4:]) else d for d in distortions]
-    return _egosgm.StereoRig(_matrix(left, "K", 3, 3), distortions[0], _matrix(right, "K", 3, 3), distortions[1],
-                             right_r.T @ left_r, right_r.T @ np.array([shift, 0, 0]), fisheye, (int(left.width), int(left.height)))
+    return _egosgm.StereoRig(_camera(left, "K", 3), distortions[0], _camera(right, "K", 3), distortions[1],
+                             right_r.T @ left_r, right_r.T @ np.array([shift, 0, 0]), fisheye, _size(left))
 
 
 def depth_maps(disparity: NDArray[np.float32], variance: NDArray[np.float32],

@@ -247,6 +247,23 @@ def test_both_cameras_seen_from_a_third_one(tmp_path, street, frames):
             assert bag.cameras.calibration.baseline_m == pytest.approx(c.baseline_m)
 
 
+@pytest.mark.parametrize("rectify", (False, True))
+def test_binned_images_have_the_calibration_of_their_pixels(rectify, tmp_path, street, frames):
+    """The info is then of the sensor's pixels: here two columns and three rows make one."""
+    recording = Recording("mcap")
+    for side, name in enumerate(("left", "right")):
+        recording.info(f"/{name}/camera_info", street.calibration, side)
+        info = recording.messages[-1][3]
+        info.width, info.height, info.binning_x, info.binning_y = 2 * WIDTH, 3 * HEIGHT, 2, 3
+        info.k, info.p = (np.diag([2.0, 3, 1]) @ info.k.reshape(3, 3)).reshape(-1), (np.diag([2.0, 3, 1]) @ info.p.reshape(3, 4)).reshape(-1)
+        recording.image(f"/{name}/image_rect", START, (frames[0].left, frames[0].right)[side])
+    bag = bags.Bag(recording.write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect", rectify=rectify)
+    frame, = bag.frames()
+    for name in ("fx", "fy", "cx", "cy", "baseline_m"):
+        assert getattr(bag.cameras.calibration, name) == pytest.approx(getattr(street.calibration, name), abs=1e-4)
+    np.testing.assert_array_equal(frame.left, frames[0].left)
+
+
 def test_messages_that_are_not_of_ros(tmp_path, capsys):
     from mcap.writer import Writer as McapWriter
     with open(tmp_path / "json.mcap", "wb") as file:

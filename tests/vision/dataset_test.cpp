@@ -338,6 +338,37 @@ TEST_F(DatasetTest, AFolderOfAnotherLevelIsNamedWithWhatItHolds) {
   expect_refused([&] { open_kitti_multiview(root_ / "odo", "7"); }, {"it holds sequences/00"});
 }
 
+TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
+  add_images({"a/left/10", "a/left/9", "a/right/10", "a/right/9"}), add_text("a/calib.txt", kOwnCalibration);
+  add_text("a/times.txt", "0\n1\n"), add_text("a/poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  const StereoSequence sequence = open_folder(root_ / "a");
+  EXPECT_EQ(numbers_of(sequence), (std::vector<int>{9, 10}));
+  EXPECT_EQ(sequence.frames[0].right, root_ / "a/right/9.png");
+  EXPECT_DOUBLE_EQ(sequence.calibration.baseline_m, 0.5);
+  EXPECT_EQ(sequence.title, "a");
+  EXPECT_EQ(sequence.poses_file, root_ / "a/poses.txt");
+  EXPECT_TRUE(std::filesystem::equivalent(sequence.times_file, root_ / "a/times.txt"));
+  EXPECT_EQ(numbers_of(open_folder(root_ / "a", {10, 10})), (std::vector<int>{10}));
+  expect_refused([&] { open_folder(root_); }, {"it holds a: give"});
+  add_text("videos/left.mp4", "x"), add_text("videos/right.mp4", "x");
+  expect_refused([&] { open_folder(root_ / "videos"); },
+                 {"it holds two videos: egosgm rectify --left", "left.mp4' --right", "right.mp4' --calib FILE"});
+
+  add_images({"b/image_left/000001_left", "b/image_right/000001_right"}),
+      add_text("b/calibration.txt", kOwnCalibration);
+  EXPECT_EQ(open_folder(root_ / "b").frames[0].right, root_ / "b/image_right/000001_right.png");
+  add_images({"c/left/left_7", "c/right/right_7"}), add_text("c/calib.txt", kOwnCalibration);
+  EXPECT_EQ(numbers_of(open_folder(root_ / "c")), (std::vector<int>{7}));
+  add_images({"d/left/1", "d/right/2"}), add_text("d/calib.txt", kOwnCalibration);
+  expect_refused([&] { open_folder(root_ / "d"); }, {"no right image has the name of a left one"});
+  add_images({"e/cam0/1", "e/cam1/1"});
+  expect_refused([&] { open_folder(root_ / "e"); }, {"no calib.txt: put their calibration there", "e/cam1/*'"});
+  add_text("f/left/1.pgm", "x"), add_text("f/right/1.pgm", "x"), add_text("f/calib.txt", kOwnCalibration);
+  expect_refused([&] { open_folder(root_ / "f"); }, {"holds no images that are PNG or JPEG", "egosgm rectify"});
+  add_text("e/calib.txt", "nothing\n");
+  expect_refused([&] { open_folder(root_ / "e"); }, {"e/calib.txt"});
+}
+
 TEST_F(DatasetTest, TimesAreThoseOfTheSequencesFolder) {
   add_odometry(0, 1), add_text("c.toml", kOwnCalibration);
   const auto times = [&](const std::string& folder) {

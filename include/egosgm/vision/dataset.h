@@ -77,7 +77,9 @@ EGOSGM_EXPORT StereoSequence open_patterns(const std::string& left, const std::s
                                            const std::filesystem::path& calibration_file, FrameRange range = {},
                                            PairBy pair_by = PairBy::kName);
 
-/// Opens `folder` as whichever of KITTI odometry, KITTI raw or Middlebury it is.
+/// Opens `folder` as whichever of KITTI odometry, KITTI raw or Middlebury it is, or as two folders of images, left and
+/// right (cam0 and cam1, image_left and image_right), with their calibration, calib.txt or calibration.txt, and
+/// poses.txt if there.
 EGOSGM_EXPORT StereoSequence open_folder(const std::filesystem::path& folder, FrameRange range = {});
 
 struct StereoImages {
