@@ -133,8 +133,8 @@ ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const S
                                   const uint extent, uint steps, Place* place) {
   const int origin = origin_of(extent);
   const uint lane = (uint)origin - (uint)q.min_disparity, moved_lane = place->moved + (uint)origin;
-  global uchar* at[DIRECTIONS];
-  global uchar* wiped_at[DIRECTIONS];
+  global uchar* at[4];  // as many as a row has: made of two, SPIR-V is not valid (LLVM 19's translator)
+  global uchar* wiped_at[4];
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) at[n] = row->slot[n] + (n > 0 ? moved_lane : lane);
   Seen seen = seen_from(row->seen ? row->seen + place->k - origin - (EGOSGM_LANES - 1) : 0);

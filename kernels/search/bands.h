@@ -55,7 +55,7 @@ static inline Bands bands_of(const DisparityRange range, Floats from, Floats to)
 
 // What two neighbouring blocks say, each pixel of a row what its own does.
 #if PIXELS == 1
-#define OF_BLOCKS(Values, Half, left, right) ((Values)(left))
+#define OF_BLOCKS(Values, Half, left, right) ((void)(right), (Values)(left))
 #else
 #if PIXELS != 2 * EGOSGM_BLOCK
 #error "two blocks are as wide as the pixels of a work-item"
