@@ -30,7 +30,7 @@ void for_each(Options& o, Visit&& visit) {
                    "Set it to false if most of the scene moves, or to match single pairs."},
         o.temporal);
   visit(OptionText{"track_right", "Predict, match and filter the right view as well.", "", "true, false",
-                   "Set it to false if time counts more than errors: a frame then takes two thirds of the time."},
+                   "Set it to false if time counts more than errors."},
         o.track_right);
   visit(OptionText{"keep_predicted", "A pixel without a measurement keeps its prediction.", "", "true, false",
                    "Set it to false if you want only what this frame confirms."},
