@@ -23,9 +23,10 @@ inline bool goes_straight(const SgmParameters q, const uint extent, const uint* 
   return fit;
 }
 
-// Where a pixel's costs go in the slots, and where those before it are wiped.
+// Where a pixel's costs go in the slots, and where those before it are wiped. As many as a row has: made of two, SPIR-V
+// is not valid (LLVM 19's translator).
 typedef struct {
-  global uchar *at[DIRECTIONS], *wiped_at[DIRECTIONS];
+  global uchar *at[4], *wiped_at[4];
 } Places;
 
 // A chunk of path n's predecessor in the lower half, one of path n + PATH_PAIRS's in the upper half.
