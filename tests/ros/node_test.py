@@ -46,7 +46,7 @@ def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True
     listened_to = " ".join(sorted(TOPICS))
     node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: ready.extend(
         True for status in message.status for value in status.values if value.key == "listened_to" and value.value == listened_to), 10)
-    while not ready or any(publisher.get_subscription_count() == 0 for publisher in images + infos):
+    while not ready or any(publisher.get_subscription_count() == 0 for publisher in images + infos) or tf and node.count_subscribers("/tf") == 0:
         rclpy.spin_once(node, timeout_sec=0.1)
     if not tells:
         time.sleep(5)  # for its listeners
@@ -219,7 +219,7 @@ class Node(unittest.TestCase):
         import egosgm
         from egosgm.ros_images import BODY_FROM_OPTICAL
         street = egosgm.SyntheticSequence(**STREET)
-        told = self.run_three(RENDERED, RATE, parameters=("motion_frame:=odom",), tf=True)
+        told = self.run_three(RENDERED, RATE, parameters=("motion_frame:=odom", "tf_wait_s:=5.0"), tf=True)
         poses = [street.render(i).world_from_camera for i in range(RENDERED)]
         truth = [(BODY_FROM_OPTICAL @ np.linalg.inv(poses[0]) @ pose)[:3, 3] for pose in poses]
         self.assertGreater(np.linalg.norm(truth[-1]), 0.4)
