@@ -283,6 +283,7 @@ class Batch(BatchTest):
             with subprocess.Popen([PROGRAM, *command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=lost) as process:
                 writing = os.open(pipe, os.O_WRONLY)  # once it looks at the images' sizes
                 process.send_signal(signal.SIGTERM)
+                time.sleep(0.5)  # a thread that waits for nothing takes the signal
                 os.write(writing, image)
                 os.close(writing)
                 errors = process.stderr.read()
