@@ -29,6 +29,7 @@ struct Case {
   BandedSgm::Launches launches = BandedSgm::Launches::kWaves;
   BandedSgm::Tile tile = {};
   bool reads_off = false;
+  int patch = 1;  // pixels a side of what has one prediction
 };
 
 std::string name(const ::testing::TestParamInfo<Case>& info) {
@@ -39,6 +40,7 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   if (c.cost == MatchingCost::kSad3x3) text += "_sad";
   if (c.cost == MatchingCost::kCensus9x7) text += "_census9x7";
   text += c.banded ? "_banded" : "_full";
+  if (c.patch > 1) text += "_patches" + std::to_string(c.patch);
   if (c.tile.width != BandedSgm::Tile().width) {
     text += "_tiles" + std::to_string(c.tile.width) + "x" + std::to_string(c.tile.height);
   }
@@ -68,6 +70,12 @@ testing::HostMaps predictions(const Case& c) {
   const float min = static_cast<float>(c.range.min), max = static_cast<float>(c.range.min + c.range.count - 1);
   testing::HostMaps maps = testing::random_maps(c.size, min, max, 0.1, 5);
   for (float& p : maps.variance) p = std::min(p, 1.5f);
+  const auto width = static_cast<std::size_t>(c.size.width), patch = static_cast<std::size_t>(c.patch);
+  for (std::size_t i = 0; i < maps.disparity.size(); ++i) {
+    const std::size_t x = i % width, y = i / width, first = (y - y % patch) * width + (x - x % patch);
+    maps.disparity[i] = maps.disparity[first];
+    maps.variance[i] = maps.variance[first];
+  }
   return maps;
 }
 
@@ -255,25 +263,29 @@ TEST(BandedSgmStripes, CoverTheImageWithRowsAround) {
   }
 }
 
-const std::vector<Case> kBanded{{{1, 1}, {0, 1}},
-                                {{1, 1}, {0, 128}},
-                                {{7, 5}, {0, 16}},
-                                {{7, 5}, {-3, 37}},
-                                {{65, 3}, {0, 37}},
-                                {{3, 65}, {0, 16}},
-                                {{127, 33}, {0, 1}},
-                                {{127, 33}, {-2, 5}},
-                                {{127, 33}, {0, 8}},
-                                {{127, 33}, {0, 16}},
-                                {{127, 33}, {-20, 37}},
-                                {{127, 97}, {0, 128}},
-                                {{127, 97}, {0, 128}, MatchingCost::kCensus9x7},
-                                {{127, 33}, {0, 128}, MatchingCost::kSad3x3},
-                                {{127, 33}, {-7, 37}, MatchingCost::kCensus9x7, 4},
-                                {{127, 33}, {0, 64}, MatchingCost::kSad3x3, 4},
-                                {{320, 97}, {0, 37}},
-                                {{320, 97}, {-50, 128}},
-                                {{40, 30}, {0, 1024}}};
+const std::vector<Case> kBanded{
+    {{1, 1}, {0, 1}},
+    {{1, 1}, {0, 128}},
+    {{7, 5}, {0, 16}},
+    {{7, 5}, {-3, 37}},
+    {{65, 3}, {0, 37}},
+    {{3, 65}, {0, 16}},
+    {{127, 33}, {0, 1}},
+    {{127, 33}, {-2, 5}},
+    {{127, 33}, {0, 8}},
+    {{127, 33}, {0, 16}},
+    {{127, 33}, {-20, 37}},
+    {{127, 97}, {0, 128}},
+    {{127, 97}, {0, 128}, MatchingCost::kCensus9x7},
+    {{127, 33}, {0, 128}, MatchingCost::kSad3x3},
+    {{127, 33}, {-7, 37}, MatchingCost::kCensus9x7, 4},
+    {{127, 33}, {0, 64}, MatchingCost::kSad3x3, 4},
+    {{320, 97}, {0, 37}},
+    {{320, 97}, {-50, 128}},
+    {{40, 30}, {0, 1024}},
+    {.size = {127, 33}, .range = {0, 128}, .patch = 12},
+    {.size = {127, 33}, .range = {-9, 77}, .paths = 4, .patch = 5},
+    {.size = {127, 33}, .range = {0, 96}, .cost = MatchingCost::kCensus9x7, .paths = 4, .patch = 20}};
 
 const std::vector<Case> kFullRange{{.size = {1, 1}, .range = {0, 16}, .banded = false},
                                    {.size = {65, 3}, .range = {-9, 37}, .banded = false},
