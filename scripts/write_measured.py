@@ -35,7 +35,7 @@ RESULTS = [
     ("KITTI 2015 scene 000002, frame 10 after 11 (D1)", "2015 / 000002, frames 11, 10", "d1, frame 10"),
     ("synthetic street, seed 1", "synthetic, true poses, seed 1", "bad_or_missing, pixels from frame 3 on"),
 ]
-TIMES = ("opencv_hh", "opencv_3way", "egosgm_full_left", "egosgm_banded_frame")
+TIMES = ("opencv_hh", "opencv_3way", "egosgm_full_left", "egosgm_banded_frame", "egosgm_banded_left")
 BEGIN, END = "<!-- results: scripts/write_measured.py writes this -->\n", "<!-- end of results -->\n"
 NO_FILES, DIFFERS = 77, 1
 
