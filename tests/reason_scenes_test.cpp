@@ -162,6 +162,7 @@ struct Case {
   int least_pixels;  // that have the reason
   Scenery scene;
   std::function<void(PipelineOptions&)> change = [](PipelineOptions&) {};
+  double least_part = 0.6;  // of the reason's pixels: wrong or missing
   friend void PrintTo(const Case& one, std::ostream* to) { *to << one.name; }
 };
 
@@ -177,7 +178,11 @@ std::vector<Case> cases() {
   // The strip to the left of a board that only the left camera sees.
   all.push_back({"unconfirmed", Reason::kUnconfirmed, 300, {{board(1, -0.3, 0.5, -0.4, 0.4), kWall}, 1}});
   // To the left of a board that moves right in the image as the camera moves left.
-  all.push_back({"uncovered", Reason::kUncovered, 100, {{board(2, -0.6, 1, -0.8, 0.8), kWall}, 4, -0.08}});
+  // With both views tracked, more of what one camera alone sees is right: hardly more than half of it is wrong.
+  const auto track_left = [](PipelineOptions& options) { options.track_right = false; };
+  const Scenery uncovered{{board(2, -0.6, 1, -0.8, 0.8), kWall}, 4, -0.08};
+  all.push_back({"uncovered", Reason::kUncovered, 100, uncovered, [](PipelineOptions&) {}, 0.5});
+  all.push_back({"uncovered_left_tracked", Reason::kUncovered, 100, uncovered, track_left});
   // A pane begins to show what seems to lie behind it.
   Board pane = board(1.25, -0.5, 0.5, -0.4, 0.4);
   pane.reflects_from = 3, pane.reflected_depth_m = 4;
@@ -199,7 +204,9 @@ std::vector<Case> cases() {
   // A board goes away while the cameras are blind.
   Board leaving = board(0.8, -0.5, 0.5, -0.4, 0.4);
   leaving.away_a_frame_m = 0.4;
-  all.push_back({"predicted", Reason::kPredicted, 400, {{leaving, kWall}, 3, 0, 0, Rectangle{55, 25, 130, 84}}});
+  const Scenery blind{{leaving, kWall}, 3, 0, 0, Rectangle{55, 25, 130, 84}};
+  all.push_back({"predicted", Reason::kPredicted, 400, blind});
+  all.push_back({"predicted_left_tracked", Reason::kPredicted, 500, blind, track_left});
   return all;
 }
 
@@ -213,7 +220,7 @@ TEST_P(ReasonScenes, OfAReasonsPixelsMostAreWrongOrMissingOfTheOthersFew) {
   const Shares found = shares(one.scene, options, one.reason);
   SCOPED_TRACE(found.counts);
   EXPECT_GE(found.with.pixels, one.least_pixels);
-  EXPECT_GT(found.with.part(), 0.5) << found.with.pixels << " pixels";
+  EXPECT_GT(found.with.part(), one.least_part) << found.with.pixels << " pixels";
   EXPECT_LT(found.without.part(), 0.2) << found.without.pixels << " pixels";
 }
 
