@@ -8,7 +8,7 @@ from inputs import STEADY_FROM, Missing, expect
 ABLATION = [
     ("default", {}, "The method with everything on."),
     ("single frame", {"temporal": False}, "What the same matcher gives without the frames before."),
-    ("both views tracked", {"track_right": True}, "The right view predicted, searched and filtered as the left one is."),
+    ("left view tracked", {"track_right": False}, "The right view is matched by the left one's path sums, neither predicted nor filtered."),
     ("full range", {"constants.search": "full"}, "Fusion without the band: what the narrow search costs or gains."),
     ("half-width 4", {"min_half_width_px": 4}, "A wider least band."),
     ("eight paths", {"paths": 8}, "Twice the aggregation."),

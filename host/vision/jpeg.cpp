@@ -8,6 +8,7 @@
 
 #include <string>
 
+#include "egosgm/error.h"
 #include "host/vision/image_bounds.h"
 
 namespace egosgm::vision {
@@ -121,7 +122,10 @@ cv::Mat decode_jpeg(std::string_view bytes, const std::filesystem::path& file) {
   open(decoder, bytes, file);
   const cv::Size size = checked_image_size(decoder.jpeg.image_width, decoder.jpeg.image_height, file);
   const bool grey = decoder.jpeg.jpeg_color_space == JCS_GRAYSCALE;
-  if (!grey && decoder.jpeg.num_components != 3) refuse_image(file, "it is neither grey nor RGB");
+  if (!grey && decoder.jpeg.num_components != 3) {
+    throw InvalidArgument(file.string() + ": its pixels are neither grey nor RGB but have " +
+                          std::to_string(decoder.jpeg.num_components) + " components, like CMYK; save it as grey or RGB");
+  }
   decoder.jpeg.out_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
   const int type = grey ? CV_8UC1 : CV_8UC3;
   check_decoded_bytes(size, type, bytes.size(), file);

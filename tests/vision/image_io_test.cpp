@@ -337,12 +337,9 @@ TEST(ImageIo, AJpegWithTheSizeOfALargerOneIsRefused) {
   expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
 }
 
-/// A progressive file whose first `coefficients` coefficients come one by one, each in two scans.
-void write_scans(const std::filesystem::path& file, int coefficients) {
-  std::vector<jpeg_scan_info> scans = {{1, {0, 0, 0, 0}, 0, 0, 0, 0}};
-  for (const int low : {1, 0}) {
-    for (int i = 1; i <= coefficients; ++i) scans.push_back({1, {0, 0, 0, 0}, i, i, low ? 0 : 1, low});
-  }
+/// Written by libjpeg itself, as `colors` says, by these scans if there are any.
+void write_jpeg(const std::filesystem::path& file, const cv::Mat& image, J_COLOR_SPACE colors,
+                const std::vector<jpeg_scan_info>& scans = {}) {
   std::FILE* stream = std::fopen(file.c_str(), "wb");
   ASSERT_NE(stream, nullptr);
   jpeg_compress_struct jpeg{};
@@ -350,21 +347,41 @@ void write_scans(const std::filesystem::path& file, int coefficients) {
   jpeg.err = jpeg_std_error(&errors);
   jpeg_create_compress(&jpeg);
   jpeg_stdio_dest(&jpeg, stream);
-  jpeg.image_width = jpeg.image_height = 16;
-  jpeg.input_components = 1;
-  jpeg.in_color_space = JCS_GRAYSCALE;
+  jpeg.image_width = static_cast<JDIMENSION>(image.cols);
+  jpeg.image_height = static_cast<JDIMENSION>(image.rows);
+  jpeg.input_components = image.channels();
+  jpeg.in_color_space = colors;
   jpeg_set_defaults(&jpeg);
-  jpeg.scan_info = scans.data();
-  jpeg.num_scans = static_cast<int>(scans.size());
+  if (!scans.empty()) {
+    jpeg.scan_info = scans.data();
+    jpeg.num_scans = static_cast<int>(scans.size());
+  }
   jpeg_start_compress(&jpeg, TRUE);
-  cv::Mat image = smooth_image(16, 16, CV_8UC1);
-  for (int y = 0; y < image.rows; ++y) {
-    JSAMPROW row = image.ptr(y);
+  cv::Mat pixels = image.clone();
+  for (int y = 0; y < pixels.rows; ++y) {
+    JSAMPROW row = pixels.ptr(y);
     jpeg_write_scanlines(&jpeg, &row, 1);
   }
   jpeg_finish_compress(&jpeg);
   jpeg_destroy_compress(&jpeg);
   std::fclose(stream);
+}
+
+/// A progressive file whose first `coefficients` coefficients come one by one, each in two scans.
+void write_scans(const std::filesystem::path& file, int coefficients) {
+  std::vector<jpeg_scan_info> scans = {{1, {0, 0, 0, 0}, 0, 0, 0, 0}};
+  for (const int low : {1, 0}) {
+    for (int i = 1; i <= coefficients; ++i) scans.push_back({1, {0, 0, 0, 0}, i, i, low ? 0 : 1, low});
+  }
+  write_jpeg(file, smooth_image(16, 16, CV_8UC1), JCS_GRAYSCALE, scans);
+}
+
+TEST(ImageIo, AJpegOfFourColoursIsRefusedForThat) {
+  const TemporaryFolder folder;
+  const auto file = folder / "image.jpg";
+  write_jpeg(file, cv::Mat(8, 8, CV_8UC4, cv::Scalar::all(9)), JCS_CMYK);
+  EXPECT_EQ(read_image_size(file), cv::Size(8, 8));
+  expect_refused([&] { read_grey_image(file); }, {file.string(), "4 components, like CMYK", "save it as grey or RGB"});
 }
 
 TEST(ImageIo, AJpegOfManyScansIsRefused) {
