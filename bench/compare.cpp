@@ -50,10 +50,23 @@ struct Turn {
   std::map<std::string, double> more;
 };
 
+using TurnFunction = std::function<Turn()>;
+
 struct Contender {
   std::string name;
-  std::function<Turn()> turn;
+  TurnFunction turn;
 };
+
+/// Made, and warmed up by a turn, when its first turn comes: what --benchmark_filter leaves out takes no memory.
+TurnFunction when_needed(std::function<TurnFunction()> make) {
+  return [make = std::move(make), turn = TurnFunction()]() mutable {
+    if (!turn) {
+      turn = make();
+      turn();  // pays for what only a first turn costs
+    }
+    return turn();
+  };
+}
 
 /// Wall time, and the processor time of all threads in it.
 class Stopwatch {
@@ -120,40 +133,40 @@ class Matcher {
   cv::Mat disparity_, variance_;
 };
 
-Contender opencv(const OpencvMode& mode, const Clip& clip, int disparities, int threads) {
+TurnFunction opencv(const OpencvMode& mode, const Clip& clip, int disparities, int threads) {
   const auto matcher = make_opencv_matcher(mode.mode, disparities);
   const auto disparity = std::make_shared<cv::Mat>();
-  return {mode.name, [&clip, matcher, disparity, threads] {
-            const ClipFrame& frame = clip.frames.back();
-            cv::setNumThreads(threads);
-            const Stopwatch watch;
-            matcher->compute(frame.left, frame.right, *disparity);
-            return watch.turn({{"threads", cv::getNumThreads()}});
-          }};
+  return [&clip, matcher, disparity, threads] {
+    const ClipFrame& frame = clip.frames.back();
+    cv::setNumThreads(threads);
+    const Stopwatch watch;
+    matcher->compute(frame.left, frame.right, *disparity);
+    return watch.turn({{"threads", cv::getNumThreads()}});
+  };
 }
 
-Contender full_both(const Clip& clip, MethodOptions options, const Device& device) {
+TurnFunction full_both(const Clip& clip, MethodOptions options, const Device& device) {
   options.temporal = false;
   const auto matcher = std::make_shared<Matcher>(clip, options, device);
-  return {"egosgm_full_both", [&clip, matcher] {
-            const Stopwatch watch;
-            const FrameReport report = (*matcher)(clip.frames.back(), std::nullopt);
-            return matcher->turn(watch, report);
-          }};
+  return [&clip, matcher] {
+    const Stopwatch watch;
+    const FrameReport report = (*matcher)(clip.frames.back(), std::nullopt);
+    return matcher->turn(watch, report);
+  };
 }
 
-Contender banded_frame(const std::string& name, const Clip& clip, const MethodOptions& options, const Device& device) {
+TurnFunction banded_frame(const Clip& clip, const MethodOptions& options, const Device& device) {
   const auto matcher = std::make_shared<Matcher>(clip, options, device);
-  return {name, [&clip, matcher] {
-            matcher->reset();
-            for (std::size_t i = 0; i < Clip::kSteadyFrom; ++i) (*matcher)(clip.frames[i], clip.frames[i].motion);
-            const Stopwatch watch;
-            FrameReport report;
-            for (std::size_t i = Clip::kSteadyFrom; i < clip.frames.size(); ++i) {
-              report = (*matcher)(clip.frames[i], clip.frames[i].motion);
-            }
-            return matcher->turn(watch, report, clip.frames.size() - Clip::kSteadyFrom);
-          }};
+  return [&clip, matcher] {
+    matcher->reset();
+    for (std::size_t i = 0; i < Clip::kSteadyFrom; ++i) (*matcher)(clip.frames[i], clip.frames[i].motion);
+    const Stopwatch watch;
+    FrameReport report;
+    for (std::size_t i = Clip::kSteadyFrom; i < clip.frames.size(); ++i) {
+      report = (*matcher)(clip.frames[i], clip.frames[i].motion);
+    }
+    return matcher->turn(watch, report, clip.frames.size() - Clip::kSteadyFrom);
+  };
 }
 
 /// As `egosgm run` does it: a frame's odometry while the device is at work on the one before.
@@ -188,9 +201,9 @@ class Stream {
   vision::StereoOdometry odometry_;
 };
 
-Contender video_frame(const Clip& clip, const MethodOptions& options, const Device& device) {
+TurnFunction video_frame(const Clip& clip, const MethodOptions& options, const Device& device) {
   const auto stream = std::make_shared<Stream>(clip, options, device);
-  return {"egosgm_video_frame", [stream] { return (*stream)(); }};
+  return [stream] { return (*stream)(); };
 }
 
 /// Census to disparity of the left view over the full range, eight paths, as OpenCV's modes do it: images up, disparity
@@ -235,14 +248,14 @@ class LeftMatcher {
   std::vector<float> disparity_;
 };
 
-Contender full_left(const Clip& clip, MethodOptions options, const Device& device) {
+TurnFunction full_left(const Clip& clip, MethodOptions options, const Device& device) {
   options.banded_sgm.paths = 8;
   const auto matcher = std::make_shared<LeftMatcher>(clip, options, device);
-  return {"egosgm_full_left", [matcher] {
-            const Stopwatch watch;
-            (*matcher)();
-            return watch.turn({});
-          }};
+  return [matcher] {
+    const Stopwatch watch;
+    (*matcher)();
+    return watch.turn({});
+  };
 }
 
 MethodOptions with(MethodOptions options, const std::string& setting) {
@@ -255,27 +268,33 @@ MethodOptions with(MethodOptions options, const std::string& setting) {
 
 std::vector<Contender> contenders(const Clip& clip, int disparities, const std::vector<std::string>& settings,
                                   const Place& place) {
-  const Device& device = place.device;
   MethodOptions options;
   options.disparities = disparities;
   std::vector<Contender> list;
-  for (const OpencvMode& mode : kOpencvModes) list.push_back(opencv(mode, clip, disparities, place.threads));
-  list.push_back(full_left(clip, options, device));
-  list.push_back(full_both(clip, options, device));
-  list.push_back(banded_frame("egosgm_banded_frame", clip, options, device));
-  list.push_back(banded_frame("egosgm_banded_left", clip, with(options, "track_right=false"), device));
+  const auto add = [&](const std::string& name, std::function<TurnFunction()> make) {
+    list.push_back({name + place.suffix, when_needed(std::move(make))});
+  };
+  const auto add_ours = [&](const std::string& name, const MethodOptions& of, auto kind) {
+    add(name, [&clip, of, kind, device = place.device]() -> TurnFunction {
+      return [turn = kind(clip, of, device), units = device.info().compute_units] {
+        Turn result = turn();
+        result.more.try_emplace("threads", units);
+        return result;
+      };
+    });
+  };
+  for (const OpencvMode& mode : kOpencvModes) {
+    add(mode.name,
+        [&clip, &mode, disparities, threads = place.threads] { return opencv(mode, clip, disparities, threads); });
+  }
+  add_ours("egosgm_full_left", options, full_left);
+  add_ours("egosgm_full_both", options, full_both);
+  add_ours("egosgm_banded_frame", options, banded_frame);
+  add_ours("egosgm_banded_left", with(options, "track_right=false"), banded_frame);
   for (const std::string& setting : settings) {
-    list.push_back(banded_frame("egosgm_banded_frame " + setting, clip, with(options, setting), device));
+    add_ours("egosgm_banded_frame " + setting, with(options, setting), banded_frame);
   }
-  list.push_back(video_frame(clip, options, device));
-  for (Contender& contender : list) {
-    contender.name += place.suffix;
-    contender.turn = [turn = contender.turn, units = device.info().compute_units] {
-      Turn result = turn();
-      result.more.try_emplace("threads", units);  // of ours
-      return result;
-    };
-  }
+  add_ours("egosgm_video_frame", options, video_frame);
   return list;
 }
 
@@ -314,7 +333,6 @@ void compare(const Clip& clip, const std::vector<int>& ranges, const std::vector
   }
   for (const auto& entry : list) {
     const Contender& contender = entry.second;
-    contender.turn();  // pays for what only a first turn costs
     benchmark::RegisterBenchmark(benchmark_name(contender.name, size, entry.first).c_str(),
                                  [&contender](benchmark::State& state) { take_turn(state, contender); })
         ->UseManualTime()
