@@ -114,7 +114,8 @@ def video(content):
     found = content["video"]
     return "\n".join([
         "## Over time\n\nFrom frame 3 on, pixels that both views see; percent unless px. \"Harm\" and \"help\": of the pixels that differ from the single "
-        "frame's by more than 1 px. The filters are those of cameras: 0.4 of the new and 0.6 of the old disparity where they differ by less than the step. "
+        "frame's by more than 1 px. \"Bad at the single frame's density\": of the surest pixels by the variance, of as many as the single frame has. "
+        "\"Error² / variance\": the mean, of errors up to 3 px. The filters are those of cameras: 0.4 of the new and 0.6 of the old disparity where they differ by less than the step. "
         "[What each figure is](evaluation.md).\n", video_table(found["methods"]),
         "### A wrong motion\n\nThe true motions, each off by so much in a random direction, and believed.\n", video_table(found["pose_noise"]),
         "### Missing frames\n\nThe last frame, when the frames before it are missing.\n", video_table(found["dropped_frames"])])

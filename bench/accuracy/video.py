@@ -7,6 +7,7 @@ becomes 0.4 of the new and 0.6 of the old one; else the new one is taken. Holes 
 beside it. One filter takes the same pixel, the other the pixel that the motion leads to (the nearest surface on top; the motion is EgoSGM's odometry).
 """
 import json
+import pathlib
 import shutil
 
 from inputs import SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect
@@ -20,7 +21,7 @@ FILTERS = {"OpenCV HH, averaged at the same pixel, step 20/32 px": (False, 20 / 
 METHODS = (OURS, SINGLE, *OPENCV, *FILTERS)
 HEADINGS = ["video", "method", "bad or missing", "bad of valid", "density", "interpolated", "mean error [px]", "TEPE, same pixel [px]", "above 1 px",
             "above 3 px", "TEPE, filled [px]", "TEPE, along the motion [px]", "flicker [px]", "TAE", "uncovered: bad or missing",
-            "moving: bad or missing", "harm", "help"]
+            "moving: bad or missing", "harm", "help", "bad at the single frame's density", "error² / variance"]
 FIGURES = ("tepe_dynamicstereo_px", "tepe_dynamicstereo_above_1px_percent", "tepe_dynamicstereo_above_3px_percent", "tepe_dynamicstereo_filled_px",
            "tepe_codd_px", "flicker_px", "tae_vda_percent")
 NOISE = [(0, 0), (0.1, 0), (0.2, 0), (0.5, 0), (1, 0), (0, 0.01), (0, 0.02), (0, 0.05), (0, 0.1)]  # degrees, metres
@@ -43,6 +44,12 @@ class Video:
 
     def open(self, egosgm):
         return egosgm.open_kitti_multiview(self.folder, self.scene, self.frames) if self.scene else egosgm.open_folder(self.folder)
+
+    def truth_of(self, frame):
+        """The file, or None."""
+        file = pathlib.Path(self.folder, "truth/left_disp_noc", f"{frame.name}.png")
+        known = pathlib.Path(frame.truth_noc)
+        return known if known.is_file() else file if file.is_file() else None
 
     def eval_arguments(self, ours):
         arguments = ["--sequence", self.folder, *(["--scene", self.scene] if self.scene else []), "--frames", f"{self.first_scored}:"]
@@ -136,7 +143,24 @@ def row_of(bench, maps, method):
     bad = [regions.get(region, {}).get("bad_or_missing") for region in ("uncovered", "moving")]
     harm = [None, None] if method == SINGLE else [figures["harm_percent"], figures["help_percent"]]
     return [maps.video.title, method, *(pooled[name] for name in ("bad_or_missing", "bad_of_valid", "density", "interpolated", "mae")),
-            *(figures[name] for name in FIGURES), *bad, *harm]
+            *(figures[name] for name in FIGURES), *bad, *harm, *(certainty(maps, method) if method in (OURS, SINGLE) else [None, None])]
+
+
+def certainty(maps, method):
+    """(percent bad of each frame's surest pixels, of as many as the single frame has; mean of error^2 / variance of errors up to 3 px)."""
+    np, figures, egosgm = maps.figures.np, maps.figures, maps.egosgm
+    kept_bad, kept, ratios = 0, 0, []
+    for frame in maps.sequence.frames:
+        truth = maps.video.truth_of(frame)
+        if frame.number < maps.video.first_scored or not truth:
+            continue
+        single, disparity = (egosgm.read_disparity(maps.of(m) / f"disparity/{frame.name}.png") for m in (SINGLE, method))
+        truth, variance = egosgm.read_disparity(truth), egosgm.read_disparity(maps.of(method) / f"variance/{frame.name}.pfm")
+        errors, y, x = figures.errors_of(disparity, truth)
+        surest = np.argsort(variance[y, x], kind="stable")[:len(figures.errors_of(single, truth)[0])]
+        kept_bad, kept = kept_bad + np.sum(np.abs(errors[surest]) > figures.BAD_PX), kept + len(surest)
+        ratios.append((errors**2 / variance[y, x])[np.abs(errors) <= figures.BAD_PX])
+    return [float(100 * kept_bad / kept), float(np.mean(np.concatenate(ratios)))] if kept else [None, None]
 
 
 def compared(bench, only):
