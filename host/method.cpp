@@ -20,8 +20,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     in(Room::kMatch, [&] { match_(plan, images, w.bands, before.agreement, w.matching, measured); });
     in(Room::kRefineAlignment, [&] { refine(images, measured, offset, refined); });
   }
-  in(Room::kCompare, [&] { compare(plan, w.prediction, measured, before.agreement, after.agreement); });
-  in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, after.agreement, w.fusion, after); });
+  in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, before.agreement, w.fusion, after); });
   in(Room::kPublish, [&] {
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_(
@@ -49,15 +48,9 @@ void Method::refine(const FrameImages& images, const StereoMaps& measured, const
   }
 }
 
-void Method::compare(const Plan& plan, const Prediction& prediction, const StereoMaps& measured,
-                     const PredictionCheck::State& before, PredictionCheck::State& agreement) {
-  if (fuse_) fuse_->compare(plan, prediction, measured, before, agreement);
-}
-
 void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                  const Measurement& measured, const PredictionCheck::State& agreement, Fusion& fusion,
-                  Belief& belief) {
-  if (plan.predicts()) fuse_->fuse(plan, images, prediction, measured, agreement, fusion, belief.maps);
+                  const Measurement& measured, const Agreement& before, Fusion& fusion, Belief& belief) {
+  if (fuse_) (*fuse_)(plan, images, prediction, measured, before, fusion, belief);
   belief.missing = fuse_ ? Unpredicted::kNo : Unpredicted::kNotTemporal;
 }
 

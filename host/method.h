@@ -13,7 +13,7 @@
 namespace egosgm {
 
 /// The rooms of a frame, in its order.
-enum class Room { kPredict, kAlign, kSearch, kMatch, kRefineAlignment, kCompare, kFuse, kPublish };
+enum class Room { kPredict, kAlign, kSearch, kMatch, kRefineAlignment, kFuse, kPublish };
 
 /// What a frame makes on its way. The next one overwrites it.
 struct Workspace {
@@ -67,10 +67,8 @@ class Method {
   FrameImages align(const FrameImages& uploaded, const VerticalOffset& offset, FrameImages& aligned);
   void refine(const FrameImages& images, const StereoMaps& measured, const VerticalOffset& offset,
               VerticalOffset& refined);
-  void compare(const Plan& plan, const Prediction& prediction, const StereoMaps& measured,
-               const PredictionCheck::State& before, PredictionCheck::State& agreement);
   void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
-            const PredictionCheck::State& agreement, Fusion& fusion, Belief& belief);
+            const Agreement& before, Fusion& fusion, Belief& belief);
 
   const MethodOptions options_;
   Workspace work_;

@@ -60,12 +60,11 @@ void for_each(Options& o, Visit&& visit) {
   visit("kalman_update.keep_predicted", o.kalman_update.keep_predicted);
   visit("kalman_update.ask_neighbours", o.kalman_update.ask_neighbours);
   visit("kalman_update.min_variance_px2", o.kalman_update.min_variance_px2);
-  visit("prediction_check.enabled", o.prediction_check.enabled);
+  visit("kalman_update.check_predictions", o.kalman_update.check_predictions);
   visit("output_variance.enabled", o.output_variance.enabled);
   visit("output_variance.scale", o.output_variance.scale);
   visit("output_variance.roughness_weight", o.output_variance.roughness_weight);
   visit("output_variance.jump_weight", o.output_variance.jump_weight);
-  visit("dynamic_map.min_difference_px", o.dynamic_map.min_difference_px);
 }
 
 /// The parameters that the public options choose, one to one. Calls `visit(option, parameter)`.
@@ -107,8 +106,8 @@ void choose_as_the_paper(MethodOptions& method) {
   method.median_filter.enabled = false;
   method.kalman_update.ask_neighbours = false;
   method.kalman_update.min_variance_px2 = 0.0f;
+  method.kalman_update.check_predictions = false;
   method.sad_check.max_difference = 20.0f;
-  method.prediction_check.enabled = false;
   method.output_variance.enabled = false;
 }
 

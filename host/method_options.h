@@ -81,19 +81,14 @@ struct SpeckleRemovalOptions {
 struct KalmanUpdateOptions {
   float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: never
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
-  bool ask_neighbours = true;  // which of the two they speak for, instead; and whether all of them move
+  bool ask_neighbours = true;  // the measurement is taken, too, where most of them are off to the same side
   float min_variance_px2 = 0.02f;
-};
-struct PredictionCheckOptions {
-  bool enabled = true;  // where predictions were wrong (a gap, a wrong motion), the next frame searches everything
+  bool check_predictions = true;  // where they were wrong (a gap, a wrong motion), the next frame searches everything
 };
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
   // Of the averaged variance to the power 1.5; of the squares of the distance from a plane and of jumps beside [px^2].
   float scale = 1.3f, roughness_weight = 1.2f, jump_weight = 0.02f;
-};
-struct DynamicMapOptions {
-  float min_difference_px = 1.0f;  // of prediction and measurement, to contradict each other; changes no disparity
 };
 
 struct MethodOptions {
@@ -114,9 +109,7 @@ struct MethodOptions {
   SadCheckOptions sad_check;
   SpeckleRemovalOptions speckle_removal;
   KalmanUpdateOptions kalman_update;
-  PredictionCheckOptions prediction_check;
   OutputVarianceOptions output_variance;
-  DynamicMapOptions dynamic_map;
 
   MethodOptions() = default;
   /// What a preset and the user's options choose. Throws InvalidArgument for a constant that does not exist.

@@ -36,23 +36,20 @@
 #define EGOSGM_WRONG_SURFACE_PX2 2.52f
 #define EGOSGM_WRONG_SURFACE_HALF 0.8f
 
-// KalmanUpdate asks every fourth pixel this far to all sides: 25.
+// Prediction and measurement differ where they do by more than this.
+#define EGOSGM_DIFFERENCE_PX 1.0f
+// KalmanUpdate asks every fourth pixel this far to all sides: 25. What differs moves by itself where most of them do.
 #define EGOSGM_SUPPORT_RADIUS 8
 #define EGOSGM_SUPPORT_STEP 4
-// What is measured further off than this moves by itself, where so many of them are off to the same side by the latter.
-#define EGOSGM_MOVING_PX 1.0f
-#define EGOSGM_MOVING_AROUND_PX 0.75f
-#define EGOSGM_MOVING_COUNT 15
-
-// PredictionCheck looks at every so many rows of the left view. Prediction and measurement differ where they do by more
-// than this.
+#define EGOSGM_MOVING_COUNT 13
+// Whether predictions are wrong is told by every so many rows of the left view.
 #define EGOSGM_CHECKED_ROWS 4
-#define EGOSGM_CHECKED_DIFFERENCE_PX 1.0f
 
-// DynamicMap looks this many pixels to all sides, and believes this many of the window that have a prediction and a
-// measurement: a third of it.
+// DynamicMap looks at every second pixel this far to all sides: 25. It believes so many of them that have a prediction
+// and a measurement: a third.
 #define EGOSGM_DYNAMIC_RADIUS 4
-#define EGOSGM_DYNAMIC_MIN_COUNT 27
+#define EGOSGM_DYNAMIC_STEP 2
+#define EGOSGM_DYNAMIC_MIN_COUNT 9
 
 // Reasons looks this many pixels to all sides for texture: it is flat where grey values two columns apart differ by
 // less than this in the mean, on the 8-bit scale.

@@ -103,17 +103,17 @@ typedef struct {
   u32 count;
 } BlockRange;
 
-// Of the pixels that PredictionCheck looks at: those with a prediction, those that have a measurement too, and those
-// among them where the two differ.
+// Of rows of the left view: pixels with a prediction, those that have a measurement too, and those among them where the
+// two differ. What only fills a gap of the prediction counts for the first alone: it is a guess, by which what comes into
+// the view looks like a wrong motion.
 typedef struct {
   u32 predicted, both, differing;
 } PredictionCounts;
 
-// What PredictionCheck says of a frame's predictions: their counts, whether they were wrong, and whether those of the
-// frame before were.
+// What a frame's predictions and its measurement say of each other: counts, and whether the predictions were wrong.
 typedef struct {
   PredictionCounts counts;
-  u32 is_wrong, was_wrong;
+  u32 is_wrong;
 } PredictionState;
 
 // What a sweep of BandedSgm needs to know.
@@ -137,7 +137,7 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
-                  sizeof(BlockRange) == 12 && sizeof(PredictionState) == 20 && sizeof(SgmParameters) == 48 &&
+                  sizeof(BlockRange) == 12 && sizeof(PredictionState) == 16 && sizeof(SgmParameters) == 48 &&
                   sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "egosgm/pipeline.h"
-#include "host/fuse/prediction_check.h"
 #include "host/align/vertical_alignment.h"
+#include "host/maps.h"
 
 namespace egosgm {
 
@@ -11,7 +11,7 @@ namespace egosgm {
 struct Belief {
   StereoMaps maps;
   VerticalOffset offset;
-  PredictionCheck::State agreement;                // of the frame's predictions with its measurement
+  Agreement agreement;
   Unpredicted missing = Unpredicted::kFirstFrame;  // why there are no maps and no agreement; kNo: there are
 
   /// Of nothing.

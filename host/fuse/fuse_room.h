@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "host/frame/belief.h"
 #include "host/frame/plan.h"
 #include "host/fuse/kalman_update.h"
-#include "host/fuse/prediction_check.h"
 #include "host/fuse/sad_check.h"
 #include "host/match/consistency_check.h"
 #include "host/match/median_filter.h"
@@ -23,7 +23,7 @@ struct Fusion {
         doubtful(context, 2 * pixel_count(size)) {}
 };
 
-/// Compares prediction and measurement, and makes one map of the two.
+/// Makes one map of prediction and measurement.
 class FuseRoom {
  public:
   FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning);
@@ -31,18 +31,13 @@ class FuseRoom {
   /// Builds what images of `type` need.
   void prepare(PixelType type);
 
-  /// What prediction and measurement say of each other, by what the frame before them said.
-  void compare(const Plan& plan, const Prediction& prediction, const StereoMaps& measured,
-               const PredictionCheck::State& before, PredictionCheck::State& agreement);
-
-  /// REQUIRES: the plan predicts.
-  void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
-            const PredictionCheck::State& agreement, Fusion& fusion, StereoMaps& belief);
+  /// `before`: of the frame before. Where the plan has no prediction, the belief has its maps.
+  void operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
+                  const Measurement& measured, const Agreement& before, Fusion& fusion, Belief& belief);
 
  private:
   const float left_right_px_;
   const OutsideView outside_;
-  PredictionCheck prediction_check_;
   KalmanUpdate kalman_update_;
   std::optional<MedianFilter> median_filter_;
   RightMap right_map_;

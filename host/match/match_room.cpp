@@ -22,7 +22,7 @@ MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const Method
 }
 
 void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands,
-                           const PredictionCheck::State& agreement, Matching& matching, Measurement& measured) {
+                           const Agreement& agreement, Matching& matching, Measurement& measured) {
   const bool reads_off = plan.matched == Views::kLeft;
   Measurement matched{{matching.matched, measured.variance}, measured.doubtful};
   if (reads_off) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "host/frame/plan.h"
-#include "host/fuse/prediction_check.h"
 #include "host/match/consistency_check.h"
 #include "host/match/matcher.h"
 #include "host/match/median_filter.h"
@@ -31,7 +30,7 @@ class MatchRoom {
 
   /// `agreement`: of the frame before, read where the right view is read off.
   void operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands,
-                  const PredictionCheck::State& agreement, Matching& matching, Measurement& measured);
+                  const Agreement& agreement, Matching& matching, Measurement& measured);
 
   const Matcher& matcher() const { return matcher_; }
   /// Null where nothing is dropped as a speckle.

@@ -7,7 +7,7 @@ PublishRoom::PublishRoom(ocl::Context& context, shared::ImageSize size, const Me
     : context_(context),
       reasons_([&context, size, options](PixelType type) { return Reasons(context, size, type, options); }) {
   if (options.output_variance.enabled) output_variance_.emplace(context, size, options.output_variance);
-  if (options.temporal) dynamic_map_.emplace(context, size, options.dynamic_map);
+  if (options.temporal) dynamic_map_.emplace(context, size);
 }
 
 void PublishRoom::prepare(PixelType type, const Wanted& wanted) {

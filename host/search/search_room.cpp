@@ -16,7 +16,7 @@ void SearchRoom::prepare(PixelType type) {
 }
 
 void SearchRoom::operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                            const PredictionCheck::State& agreement, Measurement& coarse, SearchBands& bands) {
+                            const Agreement& agreement, Measurement& coarse, SearchBands& bands) {
   if (plan.search == Search::kBands) {
     if (plan.has_coarse_match) (*coarse_match_)(images, coarse);
     const Map* found = plan.has_coarse_match ? &coarse.disparity : nullptr;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/fuse/prediction_check.h"
 #include "host/predict/predict_room.h"
 #include "host/search/coarse_match.h"
 #include "host/search/search_band.h"
@@ -19,7 +18,7 @@ class SearchRoom {
   /// `agreement`: of the frame before. Writes `coarse`, what CoarseMatch finds in the images, where the plan has one.
   /// Prediction and agreement are read where the plan predicts.
   void operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                  const PredictionCheck::State& agreement, Measurement& coarse, SearchBands& bands);
+                  const Agreement& agreement, Measurement& coarse, SearchBands& bands);
 
   /// Cells that a coarse match matches, of both views.
   std::uint64_t coarse_cells() const { return coarse_match_ ? coarse_match_->matched_cells() : 0; }

@@ -157,7 +157,7 @@ KERNEL void explain(const ImageSize size, const int disparities, global const uc
   const long above = y >= EGOSGM_REPEAT_STEP ? -EGOSGM_REPEAT_STEP * stride : 0;
   const long below = y + EGOSGM_REPEAT_STEP < size.height ? EGOSGM_REPEAT_STEP * stride : 0;
   const Floats jump = EGOSGM_UNCOVERED_JUMP_PX;
-  const Floats off = EGOSGM_MOVING_PX;
+  const Floats off = EGOSGM_DIFFERENCE_PX;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);

@@ -97,7 +97,7 @@ TEST(ConsistencyCheck, HasAnotherToleranceWhereTheLastPredictionsWereWrong) {
   ocl::Buffer<shared::PredictionState> last(context, 1);
   for (const cl_uint is_wrong : {0u, 1u}) {
     for (const auto& [usual_px, in_doubt_px] : {std::pair{0.4375f, 0.5f}, {0.5f, 0.4375f}}) {
-      last.write(context, {{.counts = {}, .is_wrong = is_wrong, .was_wrong = 0}});
+      last.write(context, {{.counts = {}, .is_wrong = is_wrong}});
       StereoMaps in = testing::upload(context, size, maps);
       check(in.disparity, usual_px, in_doubt_px, last, OutsideView::kDrop, out.disparity, in.variance, Views::kBoth);
       EXPECT_EQ(out.disparity.read(context)[1], (is_wrong ? in_doubt_px : usual_px) == 0.5f ? 1.25f : kNone);

@@ -13,10 +13,10 @@ namespace {
 
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
-std::vector<cl_uchar> marks_of(shared::ImageSize size, float min_difference_px, const testing::HostMaps& predicted,
+std::vector<cl_uchar> marks_of(shared::ImageSize size, const testing::HostMaps& predicted,
                                const testing::HostMaps& measured, int pixels = 0) {
   ocl::Context context(testing::any_device());
-  DynamicMap dynamic_map(context, size, {.min_difference_px = min_difference_px}, pixels);
+  DynamicMap dynamic_map(context, size, pixels);
   const StereoMaps first = testing::upload(context, size, predicted), second = testing::upload(context, size, measured);
   ocl::Buffer<cl_uchar> marks(context, pixel_count(size));
   marks.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
@@ -31,9 +31,9 @@ TEST_P(DynamicMapTest, EqualsReference) {
   for (const double holes : {0.0, 0.4}) {
     const testing::HostMaps predicted = testing::random_maps(size, 0, 3, holes, 21);
     const testing::HostMaps measured = testing::random_maps(size, 0, 3, holes, 22);
-    const std::vector<std::uint8_t> expected = reference::dynamic_map(size, 0.9f, predicted, measured);
+    const std::vector<std::uint8_t> expected = reference::dynamic_map(size, predicted, measured);
     for (const int pixels : {1, 16}) {
-      EXPECT_TRUE(testing::same_bits(marks_of(size, 0.9f, predicted, measured, pixels), expected, size))
+      EXPECT_TRUE(testing::same_bits(marks_of(size, predicted, measured, pixels), expected, size))
           << holes << " holes, by " << pixels;
     }
   }
@@ -52,7 +52,7 @@ TEST(DynamicMap, MarksAnObjectAndNotSingleMismatches) {
   }
   set(5, 5, 90);
   set(30, 20, kNone);
-  const std::vector<cl_uchar> marks = marks_of(size, 1, predicted, measured);
+  const std::vector<cl_uchar> marks = marks_of(size, predicted, measured);
   const auto mark = [&](int x, int y) { return marks[static_cast<std::size_t>(y) * 60 + x]; };
   EXPECT_EQ(mark(25, 15), 255);
   EXPECT_EQ(mark(20, 20), 255);

@@ -4,12 +4,13 @@
 
 namespace egosgm::reference {
 
-inline constexpr float kCheckedDifferencePx = 1.0f;
-inline constexpr int kCheckedRows = 4;
 inline constexpr int kCoarseMinCount = 8;
 inline constexpr int kCoarseOutliers = 2;
-inline constexpr int kDynamicMinCount = 27;
+inline constexpr int kCheckedRows = 4;
+inline constexpr float kDifferencePx = 1.0f;
+inline constexpr int kDynamicMinCount = 9;
 inline constexpr int kDynamicRadius = 4;
+inline constexpr int kDynamicStep = 2;
 inline constexpr float kDoubtfulVariancePx2 = 16.0f;
 inline constexpr float kFilledVariancePx2 = 1.0f;
 inline constexpr int kJumpDistance = 2;

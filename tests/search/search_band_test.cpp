@@ -112,7 +112,7 @@ TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
   const StereoMaps coarse = testing::upload(context, quarter, testing::random_maps(quarter, -1, 30, 0.3, 42));
   const StereoMaps earlier = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.6, 43));
   ocl::Buffer<shared::PredictionState> wrong(context, 1);
-  wrong.write(context, {{.counts = {}, .is_wrong = 1, .was_wrong = 0}});
+  wrong.write(context, {{.counts = {}, .is_wrong = 1}});
   for (const int row_group : {1, 64}) {
     SearchBand stage(context, size, {-5, 128}, {}, row_group);
     SearchBands bands(context, size, {-5, 128});

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/reference/publish/dynamic_map.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "tests/reference/method.h"
 
 namespace egosgm::reference {
 
-std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, float min_difference_px,
-                                      const testing::HostMaps& predicted, const testing::HostMaps& measured) {
+std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, const testing::HostMaps& predicted,
+                                      const testing::HostMaps& measured) {
   std::vector<std::uint8_t> marks(static_cast<std::size_t>(size.width) * size.height, 0);
   const int radius = kDynamicRadius;
   const auto index = [&](int x, int y) { return static_cast<std::size_t>(y) * size.width + x; };
@@ -20,12 +19,13 @@ std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, float min_differen
     for (int x = 0; x < size.width; ++x) {
       if (!has_both(index(x, y))) continue;
       int both = 0, different = 0;
-      for (int v = std::max(y - radius, 0); v <= std::min(y + radius, size.height - 1); ++v) {
-        for (int u = std::max(x - radius, 0); u <= std::min(x + radius, size.width - 1); ++u) {
+      for (int v = y - radius; v <= y + radius; v += kDynamicStep) {
+        for (int u = x - radius; u <= x + radius; u += kDynamicStep) {
+          if (u < 0 || u >= size.width || v < 0 || v >= size.height) continue;
           const std::size_t i = index(u, v);
           if (!has_both(i)) continue;
           ++both;
-          different += std::abs(measured.disparity[i] - predicted.disparity[i]) > min_difference_px;
+          different += std::abs(measured.disparity[i] - predicted.disparity[i]) > kDifferencePx;
         }
       }
       if (both >= kDynamicMinCount && 2 * different >= both) marks[index(x, y)] = 255;

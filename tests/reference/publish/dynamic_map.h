@@ -10,7 +10,7 @@
 namespace egosgm::reference {
 
 /// Of the left view.
-std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, float min_difference_px,
-                                      const testing::HostMaps& predicted, const testing::HostMaps& measured);
+std::vector<std::uint8_t> dynamic_map(shared::ImageSize size, const testing::HostMaps& predicted,
+                                      const testing::HostMaps& measured);
 
 }  // namespace egosgm::reference
