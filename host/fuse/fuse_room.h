@@ -14,12 +14,12 @@ namespace egosgm {
 
 /// What fusion leaves, beside the belief.
 struct Fusion {
-  Map fused, smoothed;  // disparities; the latter where the median filter is on
+  Map fused, smoothed;  // disparities, until the room ends; the latter where the median filter is on
   FlagMap doubtful;     // 1 where the measurement was taken although the prediction or its own sums speak against it
 
   Fusion(ocl::Context& context, shared::ImageSize size)
-      : fused(context, 2 * pixel_count(size)),
-        smoothed(context, 2 * pixel_count(size)),
+      : fused(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
+        smoothed(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
         doubtful(context, 2 * pixel_count(size)) {}
 };
 

@@ -12,12 +12,13 @@ namespace egosgm {
 
 /// What matching leaves, beside what it measured.
 struct Matching {
-  Map matched, smoothed;  // disparities before any was dropped; the latter where the median filter is on
-  FlagMap doubtful;       // of the measurement
+  // Disparities before any was dropped, until the room ends; the latter where the median filter is on.
+  Map matched, smoothed;
+  FlagMap doubtful;  // of the measurement
 
   Matching(ocl::Context& context, shared::ImageSize size)
-      : matched(context, 2 * pixel_count(size)),
-        smoothed(context, 2 * pixel_count(size)),
+      : matched(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
+        smoothed(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
         doubtful(context, 2 * pixel_count(size)) {}
 };
 

@@ -75,10 +75,10 @@ ForwardWarp::Atomics::Atomics(ocl::Context& context, shared::ImageSize size)
       splat_disparity(build(context, 1), "splat_disparity"),
       splat_variance(build(context, 1), "splat_variance"),
       decode(build(context, 1), "decode"),
-      landed(context, 2 * pixel_count(size)),
-      moved_key(context, 2 * pixel_count(size)),
-      moved_variance(context, 2 * pixel_count(size)),
-      zbuffer(context, 2 * pixel_count(size)) {}
+      landed(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
+      moved_key(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size)),
+      moved_variance(context, ocl::Scratch::kOfStage2, 2 * pixel_count(size)),
+      zbuffer(context, ocl::Scratch::kOfStage3, 2 * pixel_count(size)) {}
 
 ForwardWarp::Bands::Bands(ocl::Context& context, shared::ImageSize size)
     : find_spans(build(context, 16), "find_spans"),

@@ -18,8 +18,9 @@ HoleFill::HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFill
       max_difference_px_(options.max_difference_px),
       fill_rows_(build(context, pixels_), "fill_rows"),
       fill_columns_(build(context, pixels_), "fill_columns"),
-      rows_filled_(context, size),
-      rows_hidden_(context, 2 * pixel_count(size)) {}
+      rows_filled_(Map(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
+                   Map(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size))),
+      rows_hidden_(context, ocl::Scratch::kOfStage2, 2 * pixel_count(size)) {}
 
 void HoleFill::operator()(const StereoMaps& in, const FlagMap& hidden, StereoMaps& out, FlagMap& out_hidden,
                           Views views) {

@@ -14,15 +14,15 @@ namespace egosgm {
 /// by: its disparities but for the last check, and no variances.
 struct Prediction {
   StereoMaps warped;     // before anything was dropped; of what EdgeRejection dropped, the variances are gone
-  Map rejected, filled;  // disparities after those stages
+  Map rejected, filled;  // disparities after those stages; until the room ends
   StereoMaps maps;
   // Where a surface that came nearer than the range hides what is behind, before and after holes were filled.
   FlagMap warped_hidden, hidden;
 
   Prediction(ocl::Context& context, shared::ImageSize size)
       : warped(context, size),
-        rejected(context, 2 * pixel_count(size)),
-        filled(context, 2 * pixel_count(size)),
+        rejected(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
+        filled(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
         maps(context, size),
         warped_hidden(context, 2 * pixel_count(size)),
         hidden(context, 2 * pixel_count(size)) {
