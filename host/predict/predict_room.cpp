@@ -14,12 +14,12 @@ PredictRoom::PredictRoom(ocl::Context& context, shared::ImageSize size, const Ca
       consistency_(context, size) {}
 
 void PredictRoom::operator()(const Plan& plan, const StereoMaps& belief, Prediction& prediction) {
-  auto& [warped, rejected, filled, maps, warped_hidden, hidden] = prediction;
-  forward_warp_(belief, *plan.motion, warped, warped_hidden, plan.tracked);
+  auto& [warped, rejected, filled, maps, hidden] = prediction;
+  forward_warp_(belief, *plan.motion, warped, plan.tracked);
   if (plan.tracked == Views::kLeft) right_map_(left_right_px_, warped, /*makes_variance=*/false);
   edge_rejection_(warped.disparity, rejected, warped.variance);
   StereoMaps holes_filled{filled, maps.variance};
-  hole_fill_({rejected, warped.variance}, warped_hidden, holes_filled, hidden, plan.tracked);
+  hole_fill_({rejected, warped.variance}, holes_filled, hidden, plan.tracked);
   consistency_(filled, left_right_px_, outside_, maps.disparity, maps.variance, plan.tracked);
 }
 

@@ -16,18 +16,15 @@ struct Prediction {
   StereoMaps warped;     // before anything was dropped; of what EdgeRejection dropped, the variances are gone
   Map rejected, filled;  // disparities after those stages; until the room ends
   StereoMaps maps;
-  // Where a surface that came nearer than the range hides what is behind, before and after holes were filled.
-  FlagMap warped_hidden, hidden;
+  FlagMap hidden;  // where a surface that came nearer than the range hides what is behind it
 
   Prediction(ocl::Context& context, shared::ImageSize size)
       : warped(context, size),
         rejected(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
         filled(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
         maps(context, size),
-        warped_hidden(context, 2 * pixel_count(size)),
         hidden(context, 2 * pixel_count(size)) {
-    // A view that is not tracked stays so.
-    for (FlagMap* map : {&warped_hidden, &hidden}) map->write(context, std::vector<cl_uchar>(map->size()));
+    hidden.write(context, std::vector<cl_uchar>(hidden.size()));  // a view that is not tracked stays so
   }
 };
 

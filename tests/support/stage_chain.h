@@ -80,7 +80,8 @@ class StageChain {
 
   void look(const Prediction& prediction, reference::Frame& frame) {
     frame.warped.disparity = prediction.warped.disparity.read(context_);
-    frame.without_edges = {prediction.rejected.read(context_), prediction.warped.variance.read(context_)};
+    frame.without_edges =
+        without_marks({prediction.rejected.read(context_), prediction.warped.variance.read(context_)});
     frame.filled.disparity = prediction.filled.read(context_);
     frame.predicted = download(context_, prediction.maps);
     frame.predicted.hidden = prediction.hidden.read(context_);
