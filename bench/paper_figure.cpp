@@ -33,6 +33,10 @@ void draw(const std::string& file) {
   PipelineOptions options = PipelineOptions::paper();
   options.disparities = 64;
   FrameQueue frames(street.calibration(), size, options, Device::select(), PixelType::kU8);
+  cv::Mat filled;
+  frames.method().observer = [&](Room room) {
+    if (room == Room::kPredict) filled = left_of(frames, frames.method().workspace().prediction.filled);
+  };
   cv::Mat previous, measured(size.height, size.width, CV_32FC1), updated = measured.clone();
   for (int k = 0; k < kFrames; ++k) {
     previous = updated.clone();
@@ -51,7 +55,7 @@ void draw(const std::string& file) {
   };
   add("1. map of the frame before", previous);
   add("2. prediction: moved by the camera's motion", left_of(frames, prediction.warped.disparity));
-  add("3. beside jumps dropped, holes filled", left_of(frames, prediction.filled));
+  add("3. beside jumps dropped, holes filled", filled);
   add("4. left and right agree", left_of(frames, prediction.maps.disparity));
   add("5. matched around the prediction", measured);
   add("6. updated, and checked by the images", updated);

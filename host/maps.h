@@ -60,9 +60,6 @@ struct StereoMaps {
 /// A map of both views of bytes: 1 where something holds, else 0.
 using FlagMap = ocl::Buffer<cl_uchar>;
 
-/// What a frame's predictions and its measurement say of each other: one element.
-using Agreement = ocl::Buffer<shared::PredictionState>;
-
 /// What was matched within bands.
 struct Measurement : StereoMaps {
   FlagMap doubtful;  // 1 where the path sums fall on beyond the end of the band

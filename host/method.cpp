@@ -16,11 +16,11 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     if (match > 1) offset = w.first_offset;
     VerticalOffset& refined = match < plan.matches ? w.first_offset : after.offset;
     in(Room::kAlign, [&] { images = align(uploaded, offset, w.aligned); });
-    in(Room::kSearch, [&] { search_(plan, images, w.prediction, before.agreement, w.coarse, w.bands); });
-    in(Room::kMatch, [&] { match_(plan, images, w.bands, before.agreement, w.matching, measured); });
+    in(Room::kSearch, [&] { search_(plan, images, w.prediction, w.coarse, w.bands); });
+    in(Room::kMatch, [&] { match_(plan, images, w.bands, w.matching, measured); });
     in(Room::kRefineAlignment, [&] { refine(images, measured, offset, refined); });
   }
-  in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, before.agreement, w.fusion, after); });
+  in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, w.fusion, after); });
   in(Room::kPublish, [&] {
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_(
@@ -49,8 +49,8 @@ void Method::refine(const FrameImages& images, const StereoMaps& measured, const
 }
 
 void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                  const Measurement& measured, const Agreement& before, Fusion& fusion, Belief& belief) {
-  if (fuse_) (*fuse_)(plan, images, prediction, measured, before, fusion, belief);
+                  const Measurement& measured, Fusion& fusion, Belief& belief) {
+  if (plan.predicts()) (*fuse_)(plan, images, prediction, measured, fusion, belief.maps);
   belief.missing = fuse_ ? Unpredicted::kNo : Unpredicted::kNotTemporal;
 }
 

@@ -68,7 +68,7 @@ class Method {
   void refine(const FrameImages& images, const StereoMaps& measured, const VerticalOffset& offset,
               VerticalOffset& refined);
   void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
-            const Agreement& before, Fusion& fusion, Belief& belief);
+            Fusion& fusion, Belief& belief);
 
   const MethodOptions options_;
   Workspace work_;

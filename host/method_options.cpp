@@ -60,7 +60,6 @@ void for_each(Options& o, Visit&& visit) {
   visit("kalman_update.keep_predicted", o.kalman_update.keep_predicted);
   visit("kalman_update.ask_neighbours", o.kalman_update.ask_neighbours);
   visit("kalman_update.min_variance_px2", o.kalman_update.min_variance_px2);
-  visit("kalman_update.check_predictions", o.kalman_update.check_predictions);
   visit("output_variance.enabled", o.output_variance.enabled);
   visit("output_variance.scale", o.output_variance.scale);
   visit("output_variance.roughness_weight", o.output_variance.roughness_weight);
@@ -94,6 +93,7 @@ void for_each_chosen(Options& o, Method& m, Visit&& visit) {
 void choose_as_the_paper(MethodOptions& method) {
   method.forward_warp.motion_noise = 0.0f;
   method.edge_rejection.max_jump_px = 3.0f;
+  method.consistency.prediction_px = 3.0f;
   method.consistency.keep_unseen = false;
   method.search_band.from_neighbours = false;
   method.banded_sgm.p2_slope = 0;
@@ -106,7 +106,6 @@ void choose_as_the_paper(MethodOptions& method) {
   method.median_filter.enabled = false;
   method.kalman_update.ask_neighbours = false;
   method.kalman_update.min_variance_px2 = 0.0f;
-  method.kalman_update.check_predictions = false;
   method.sad_check.max_difference = 20.0f;
   method.output_variance.enabled = false;
 }
@@ -120,7 +119,8 @@ void MethodOptions::give_options(PipelineOptions& options) const {
 MethodOptions::MethodOptions(const PipelineOptions& options) {
   if (options.preset == Preset::kPaper) choose_as_the_paper(*this);
   for_each_chosen(options, *this, [](const auto& option, auto& parameter) { parameter = option; });
-  consistency.prediction_px = consistency.update_px = options.left_right_px;
+  consistency.update_px = options.left_right_px;
+  if (consistency.prediction_px > 0) consistency.prediction_px = options.left_right_px;
   for (const auto& [name, value] : options.constants) set_parameter(*this, name, value);
 }
 

@@ -20,14 +20,15 @@ struct ForwardWarpOptions {
   float motion_noise = 1.0f;        // factor of the other part, J Sigma J^T by the motion's covariance Sigma
 };
 struct EdgeRejectionOptions {
-  float max_jump_px = 5.0f;  // a larger step to a neighbour drops the prediction on both sides; 0 keeps all
+  float max_jump_px = 0.0f;  // a larger step to a neighbour drops the prediction on both sides; 0: none does
 };
 struct HoleFillOptions {
   float max_difference_px = 1.0f;  // gamma (eqs. 7-8): neighbours that differ by less fill the gap between them
 };
 struct ConsistencyCheckOptions {
-  float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
-  float read_off_px = 1.45f;  // of the measurement, where the right view is read off, unless predictions were wrong
+  float measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the two
+  float prediction_px = 0.0f;                     // of the prediction, where both views are tracked; 0: no check
+  float read_off_px = 1.45f;                      // of the measurement, where the right view is read off
   bool keep_unseen = true;    // of prediction and update: what the other camera cannot see stays
 };
 struct CoarseMatchOptions {
@@ -83,7 +84,6 @@ struct KalmanUpdateOptions {
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
   bool ask_neighbours = true;  // the measurement is taken, too, where most of them are off to the same side
   float min_variance_px2 = 0.02f;
-  bool check_predictions = true;  // where they were wrong (a gap, a wrong motion), the next frame searches everything
 };
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface

@@ -42,8 +42,6 @@
 #define EGOSGM_SUPPORT_RADIUS 8
 #define EGOSGM_SUPPORT_STEP 4
 #define EGOSGM_MOVING_COUNT 13
-// Whether predictions are wrong is told by every so many rows of the left view.
-#define EGOSGM_CHECKED_ROWS 4
 
 // DynamicMap looks at every second pixel this far to all sides: 25. It believes so many of them that have a prediction
 // and a measurement: a third.

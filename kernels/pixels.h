@@ -80,13 +80,18 @@ static inline Floats load_pixels_of(const float* values) {
 #endif
 static inline Floats gather(volatile global const float* row, const Ints x) { return GATHERED(Floats, row, x); }
 
-// Writes pixels x .. x + PIXELS - 1, as far as the row goes. REQUIRES: x lies in it.
+typedef struct __attribute__((packed)) {
+  Floats lanes;
+} PackedFloats;
+
+// Writes pixels x .. x + PIXELS - 1, as far as the row goes. REQUIRES: x lies in it. Not by vstore16, which some compilers
+// (PoCL 3.1) take to four pieces.
 static inline void store_pixels(const Floats pixels, global float* row, const int x, const int width) {
 #if PIXELS == 1
   row[x] = pixels;
 #else
   if (x + PIXELS <= width) {
-    vstore16(pixels, 0, row + x);
+    ((global PackedFloats*)(row + x))->lanes = pixels;
     return;
   }
   float lanes[PIXELS];

@@ -32,6 +32,8 @@ typedef float f32;
 
 // A pixel without a disparity; include/egosgm/image.h says the same to users.
 #define EGOSGM_INVALID_DISPARITY (-32768.0f)
+// In place of the variance of a prediction: a surface that came nearer than the range hides what is there (ForwardWarp).
+#define EGOSGM_HIDDEN (-1.0f)
 
 // Maps and images of a stereo pair lie in one buffer, the left view first: index view * width * height + y * width + x.
 #define EGOSGM_LEFT 0
@@ -103,19 +105,6 @@ typedef struct {
   u32 count;
 } BlockRange;
 
-// Of rows of the left view: pixels with a prediction, those that have a measurement too, and those among them where the
-// two differ. What only fills a gap of the prediction counts for the first alone: it is a guess, by which what comes into
-// the view looks like a wrong motion.
-typedef struct {
-  u32 predicted, both, differing;
-} PredictionCounts;
-
-// What a frame's predictions and its measurement say of each other: counts, and whether the predictions were wrong.
-typedef struct {
-  PredictionCounts counts;
-  u32 is_wrong;
-} PredictionState;
-
 // What a sweep of BandedSgm needs to know.
 typedef struct {
   i32 width, height;
@@ -125,6 +114,7 @@ typedef struct {
   f32 variance_floor, variance_per_step, variance_per_square;
   i32 doubts_band_ends;  // whether the variance is that of what is doubtful where the sums fall on beyond a band
   i32 reads_off;         // whether the left view leaves ranks for the right one (sgm_cells.h)
+  i32 first_view;        // of those that are matched, which lie one behind the other in what only a match needs
 } SgmParameters;
 
 // How a view's disparity space moves (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
@@ -137,8 +127,7 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
-                  sizeof(BlockRange) == 12 && sizeof(PredictionState) == 16 && sizeof(SgmParameters) == 48 &&
-                  sizeof(DisparityMotion) == 84,
+                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 52 && sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

@@ -249,7 +249,6 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
   EXPECT_FALSE(paper.kalman_update.ask_neighbours) << "whatever is around";
   EXPECT_EQ(paper.kalman_update.min_variance_px2, 0);
   EXPECT_TRUE(paper.kalman_update.keep_predicted);
-  EXPECT_FALSE(paper.prediction_check.enabled);
   EXPECT_GT(paper.sad_check.max_difference, 0) << "and what the images do not confirm is dropped";
   EXPECT_FALSE(paper.output_variance.enabled) << "the variance is the filter's";
 }

@@ -11,11 +11,10 @@ namespace egosgm {
 struct Belief {
   StereoMaps maps;
   VerticalOffset offset;
-  Agreement agreement;
-  Unpredicted missing = Unpredicted::kFirstFrame;  // why there are no maps and no agreement; kNo: there are
+  Unpredicted missing = Unpredicted::kFirstFrame;  // why there are no maps; kNo: there are
 
   /// Of nothing.
-  Belief(ocl::Context& context, shared::ImageSize size) : maps(context, size), offset(context), agreement(context, 1) {}
+  Belief(ocl::Context& context, shared::ImageSize size) : maps(context, size), offset(context) {}
 
   /// Forgets all.
   void forget(Unpredicted why) {

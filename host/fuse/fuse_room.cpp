@@ -6,7 +6,7 @@ namespace egosgm {
 FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning)
     : left_right_px_(options.consistency.update_px),
       outside_(outside_view(options.consistency)),
-      kalman_update_(context, size, options.kalman_update, tuning.row_group),
+      kalman_update_(context, size, options.kalman_update),
       right_map_(context, size, range_of(options)),
       consistency_(context, size) {
   if (options.median_filter.enabled) median_filter_.emplace(context, size);
@@ -21,17 +21,15 @@ void FuseRoom::prepare(PixelType type) {
 }
 
 void FuseRoom::operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                          const Measurement& measured, const Agreement& before, Fusion& fusion, Belief& belief) {
-  if (!plan.predicts()) return kalman_update_.begin(belief.agreement);
-  Map& variance = belief.maps.variance;
-  StereoMaps fused{fusion.fused, variance};
-  kalman_update_(prediction, measured, before, fused, fusion.doubtful, belief.agreement, plan.tracked);
-  if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, variance, plan.tracked);
-  StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, variance};
+                          const Measurement& measured, Fusion& fusion, StereoMaps& belief) {
+  StereoMaps fused{fusion.fused, belief.variance};
+  kalman_update_(prediction.hidden, prediction.maps, measured, fused, fusion.doubtful, plan.tracked);
+  if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
+  StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (plan.tracked == Views::kLeft) right_map_(measured, left_right_px_, smoothed, plan.wanted.right);
   const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
-  consistency_(smoothed.disparity, left_right_px_, outside_, belief.maps.disparity, variance, checked);
-  if (sad_check_) (*sad_check_)[images.type](images.pixels, belief.maps, checked);
+  consistency_(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
+  if (sad_check_) (*sad_check_)[images.type](images.pixels, belief, checked);
 }
 
 }  // namespace egosgm

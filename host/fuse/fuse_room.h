@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/frame/belief.h"
 #include "host/frame/plan.h"
 #include "host/fuse/kalman_update.h"
 #include "host/fuse/sad_check.h"
@@ -14,12 +13,12 @@ namespace egosgm {
 
 /// What fusion leaves, beside the belief.
 struct Fusion {
-  Map fused, smoothed;  // disparities; the latter where the median filter is on
+  Map fused, smoothed;  // disparities, until the room ends; the latter where the median filter is on
   FlagMap doubtful;     // 1 where the measurement was taken although the prediction or its own sums speak against it
 
   Fusion(ocl::Context& context, shared::ImageSize size)
-      : fused(context, 2 * pixel_count(size)),
-        smoothed(context, 2 * pixel_count(size)),
+      : fused(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
+        smoothed(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
         doubtful(context, 2 * pixel_count(size)) {}
 };
 
@@ -31,9 +30,9 @@ class FuseRoom {
   /// Builds what images of `type` need.
   void prepare(PixelType type);
 
-  /// `before`: of the frame before. Where the plan has no prediction, the belief has its maps.
+  /// REQUIRES: the plan predicts.
   void operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                  const Measurement& measured, const Agreement& before, Fusion& fusion, Belief& belief);
+                  const Measurement& measured, Fusion& fusion, StereoMaps& belief);
 
  private:
   const float left_right_px_;

@@ -17,15 +17,17 @@ int ceil_div(int a, int b) { return (a + b - 1) / b; }
 /// ends.
 constexpr int kBlockVectors = 2;
 
-std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range) {
+constexpr int kViews = 2;
+
+std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range, int views) {
   const int vectors = (SearchBand::max_chunks(range) + 1) / 2;
   const std::size_t slot = static_cast<std::size_t>(vectors + kBlockVectors * 2) * 2 * EGOSGM_LANES;
-  return 2 * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
+  return static_cast<std::size_t>(views) * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
 }
 
 /// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind a chunk, as two are read at once.
-std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
-  const std::size_t pixels = 2 * pixel_count(size) + size.width;
+std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range, int views) {
+  const std::size_t pixels = views * pixel_count(size) + size.width;
   return (pixels * SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
 }
 
@@ -46,16 +48,29 @@ bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
   return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
 }
 
+/// Whether the device has no more compute units than sweeps of `views`, each of a work-item.
+bool has_few_units(const ocl::Context& context, int views) {
+  return context.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(2 * views);
+}
+
+/// How many views wavefronts match at once.
+int views_at_once(const ocl::Context& context, BandedSgm::Launches launches) {
+  const bool is_automatic = launches == BandedSgm::Launches::kAutomatic;
+  return (is_automatic ? has_few_units(context, 1) : launches == BandedSgm::Launches::kSweepsOfAView) ? 1 : kViews;
+}
+
 /// What a match takes on the device.
 struct Demand {
   std::uint64_t largest_buffer, total;
 };
 
+/// Of both views at once, whatever the device has of compute units: stripes, and with them bits, do not depend on that.
 Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, bool paths) {
-  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, range);
+  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, range, kViews);
   const std::uint64_t ranks = ReadOff::bytes(size, BandedSgm::code_padding(range));
   if (paths) return {sums, 4 * sums + ranks};
-  const std::uint64_t slots = slot_bytes(size, range), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
+  const std::uint64_t slots = slot_bytes(size, range, kViews),
+                      winners = kViews * pixel_count(size) * sizeof(cl_ulong);
   return {std::max({sums, slots, winners}), sums + slots + winners + ranks};
 }
 
@@ -95,11 +110,12 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
 }  // namespace
 
 BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-                                const BandedSgmOptions& options, Tile chosen)
+                                const BandedSgmOptions& options, Tile chosen, int at_once)
     : tile(chosen),
-      slots(context, slot_bytes(size, range)),
-      sums(context, sum_bytes(size, range)),
-      winners(context, 2 * pixel_count(size)),
+      views(at_once),
+      slots(context, slot_bytes(size, range, views)),
+      sums(context, sum_bytes(size, range, views)),
+      winners(context, ocl::Scratch::kOfStage0, views * pixel_count(size)),
       to_middle(build(context, range, options, tile), "sweep_to_middle"),
       from_middle(build(context, range, options, tile), "sweep_from_middle"),
       refine(build(context, range, options, tile), "refine") {}
@@ -125,14 +141,15 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.variance_per_step_px2,
                   options.variance_per_square_px2,
                   options.doubts_band_ends,
-                  /*reads_off=*/0},
+                  /*reads_off=*/0,
+                  /*first_view=*/0},
       launches_(launches),
       read_off_(context, size_, code_padding(range)) {
   if (follows_paths(context, options.scheduling)) {
     paths_.emplace(context, size_, range, options,
                    group ? *group : BandedSgmPaths::default_group(context, range, options.cost));
   } else {
-    wavefront_.emplace(context, size_, range, options, tile);
+    wavefront_.emplace(context, size_, range, options, tile, views_at_once(context, launches));
   }
   if (stripes_.size() > 1) {
     stripe_memory_.emplace(context, size, range, size_.height, code_words_a_row(size.width, range, options.cost));
@@ -164,23 +181,27 @@ void BandedSgm::match(const MatchInputs& inputs, Measurement& measured, Views vi
   if (paths_) {
     (*paths_)(parameters, inputs, measured, read_off_.ranks(), views);
   } else {
-    sweep(parameters, inputs, measured, views);
+    const int at_once = std::min(wavefront_->views, count(views));
+    for (parameters.first_view = 0; parameters.first_view < count(views); parameters.first_view += at_once) {
+      sweep(parameters, inputs, measured, at_once);
+    }
   }
   if (reads_off) read_off_(parameters, measured);
 }
 
 void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
-                      Views views) {
+                      int views) {
   Wavefront& wavefront = *wavefront_;
   const Tile tile = wavefront.tile;
   const int tile_rows = ceil_div(ceil_div(size_.height, 2), tile.height);
   const int tile_columns = ceil_div(size_.width + tile.height, tile.width) + 1;
-  const bool is_whole = takes_whole_sweeps(views);
-  const ocl::Range tiles{cl::NDRange(is_whole ? 1 : tile_rows, count(views), 2), cl::NDRange(1, 1, 1)};
+  const bool is_whole =
+      launches_ == Launches::kAutomatic ? has_few_units(context_, views) : launches_ != Launches::kWaves;
+  const ocl::Range tiles{cl::NDRange(is_whole ? 1 : tile_rows, views, 2), cl::NDRange(1, 1, 1)};
   const int first_wave = is_whole ? EGOSGM_ALL_TILES : 0;
   const int end_wave = is_whole ? EGOSGM_ALL_TILES + 1 : tile_columns + 2 * (tile_rows - 1);
 
-  wavefront.slots.fill(context_, 255, wavefront.slots.size() / 2 * count(views));
+  wavefront.slots.fill(context_, 255, wavefront.slots.size() / wavefront.views * views);
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.to_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
                         inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
@@ -191,13 +212,8 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
                           inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
                           wavefront.sums, wavefront.winners, read_off_.ranks());
   }
-  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), count(views)),
+  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views),
                    parameters, wavefront.winners, measured.disparity, measured.variance, measured.doubtful);
-}
-
-bool BandedSgm::takes_whole_sweeps(Views views) const {
-  if (launches_ != Launches::kAutomatic) return launches_ == Launches::kSweeps;
-  return context_.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(2 * count(views));
 }
 
 int BandedSgm::matched_rows() const {

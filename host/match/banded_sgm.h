@@ -31,9 +31,9 @@ class BandedSgm {
   };
 
   /// Of the wavefronts, two sweeps a view, to the middle of the image and from there: one for every wave of tiles, or
-  /// one for each half of the way, whose work-items take a sweep each and wait for nobody. Automatic: the latter where
-  /// the device has no more compute units than there are sweeps.
-  enum class Launches { kAutomatic, kWaves, kSweeps };
+  /// one for each half of the way, whose work-items take a sweep each and wait for nobody; or the latter of one view
+  /// after the other, in the memory of one. Automatic: the last that leaves no compute unit without a sweep.
+  enum class Launches { kAutomatic, kWaves, kSweeps, kSweepsOfAView };
 
   /// `group`: how paths share work-groups, where they do; by default what suits the device. `tile`, `launches`: where
   /// they do not. Same bits.
@@ -71,9 +71,10 @@ class BandedSgm {
  private:
   struct Wavefront {
     Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-              const BandedSgmOptions& options, Tile tile);
+              const BandedSgmOptions& options, Tile tile, int views);
 
     Tile tile;
+    int views;                    // at once
     ocl::Buffer<cl_uchar> slots;  // path costs under way, one row of disparities a path, sweep and view
     ocl::Buffer<cl_uchar> sums;   // of the sweep that comes first, 8 bits a cell
     ocl::Buffer<cl_ulong> winners;
@@ -84,8 +85,7 @@ class BandedSgm {
 
   void match_stripes(const MatchInputs& image, Measurement& measured, Views views, bool reads_off);
   void match(const MatchInputs& inputs, Measurement& measured, Views views, bool reads_off);
-  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured, Views views);
-  bool takes_whole_sweeps(Views views) const;
+  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured, int views);
 
   ocl::Context& context_;
   const shared::ImageSize size_;  // of what is matched at once: the image, or a stripe

@@ -23,18 +23,13 @@ class ConsistencyCheck {
   /// `variance`. Of `disparity`, both views are read.
   void operator()(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept, Map& variance,
                   Views views);
-  /// With another tolerance where the predictions of the `last` frame were wrong.
-  void operator()(const Map& disparity, float max_difference_px, float in_doubt_px,
-                  const ocl::Buffer<shared::PredictionState>& last, OutsideView outside, Map& kept, Map& variance,
-                  Views views);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
-  ocl::Buffer<shared::PredictionState> no_doubt_;
-  ocl::Kernel<const shared::ImageSize, const float, const float, const ocl::Buffer<shared::PredictionState>,
-              const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>,
+              ocl::Buffer<float>>
       check_;
 };
 

@@ -22,7 +22,7 @@ MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const Method
 }
 
 void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands,
-                           const Agreement& agreement, Matching& matching, Measurement& measured) {
+                           Matching& matching, Measurement& measured) {
   const bool reads_off = plan.matched == Views::kLeft;
   Measurement matched{{matching.matched, measured.variance}, measured.doubtful};
   if (reads_off) {
@@ -32,13 +32,8 @@ void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const Se
   }
   if (median_filter_) (*median_filter_)(matching.matched, matching.smoothed, Views::kBoth);
   const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;
-  if (reads_off) {
-    consistency_(smoothed, left_right_.read_off_px, left_right_.measurement_px, agreement, OutsideView::kDrop,
-                 measured.disparity, measured.variance, Views::kBoth);
-  } else {
-    consistency_(smoothed, left_right_.measurement_px, OutsideView::kDrop, measured.disparity, measured.variance,
-                 Views::kBoth);
-  }
+  consistency_(smoothed, reads_off ? left_right_.read_off_px : left_right_.measurement_px, OutsideView::kDrop,
+               measured.disparity, measured.variance, Views::kBoth);
   speckle_removal_(measured, plan.matched);
 }
 

@@ -11,12 +11,13 @@ namespace egosgm {
 
 /// What matching leaves, beside what it measured.
 struct Matching {
-  Map matched, smoothed;  // disparities before any was dropped; the latter where the median filter is on
-  FlagMap doubtful;       // of the measurement
+  // Disparities before any was dropped, until the room ends; the latter where the median filter is on.
+  Map matched, smoothed;
+  FlagMap doubtful;  // of the measurement
 
   Matching(ocl::Context& context, shared::ImageSize size)
-      : matched(context, 2 * pixel_count(size)),
-        smoothed(context, 2 * pixel_count(size)),
+      : matched(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
+        smoothed(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
         doubtful(context, 2 * pixel_count(size)) {}
 };
 
@@ -28,9 +29,8 @@ class MatchRoom {
   /// Builds what images of `type` need.
   void prepare(PixelType type) { matcher_.prepare(type); }
 
-  /// `agreement`: of the frame before, read where the right view is read off.
-  void operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands,
-                  const Agreement& agreement, Matching& matching, Measurement& measured);
+  void operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
+                  Measurement& measured);
 
   const Matcher& matcher() const { return matcher_; }
   /// Null where nothing is dropped as a speckle.

@@ -22,9 +22,9 @@ SpeckleRemoval::SpeckleRemoval(ocl::Context& context, shared::ImageSize size, co
                   : row_group_ > 1 ? 1
                                    : kCpuTuning.speckle_strip_rows),
       runs_(context, 2 * pixel_count(size)),
-      parents_(context, 2 * pixel_count(size)),
-      roots_(context, 2 * pixel_count(size)),
-      sizes_(context, 2 * pixel_count(size)),
+      parents_(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
+      roots_(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size)),
+      sizes_(context, ocl::Scratch::kOfStage2, 2 * pixel_count(size)),
       find_runs_(build(context, row_group_), "find_runs"),
       join_strips_(build(context, row_group_), "join_strips"),
       join_seams_(build(context, row_group_), "join_seams"),

@@ -15,11 +15,12 @@ class Buffer {
 
  public:
   Buffer(Context& context, std::size_t size) : size_(std::max<std::size_t>(size, 1)) {
-    context.expect_allocatable(size_ * sizeof(T));
-    // Where host and device share memory, most drivers map only what they allocated as host memory without a copy.
-    const cl_mem_flags place = context.shares_host_memory() ? CL_MEM_ALLOC_HOST_PTR : 0;
-    buffer_ = cl::Buffer(context.get(), CL_MEM_READ_WRITE | place, size_ * sizeof(T));
-    context.count_allocation(size_ * sizeof(T));
+    buffer_ = context.allocate(size_ * sizeof(T));
+  }
+
+  /// Shared with all that have the same place. REQUIRES: what is written here is read no later than it says.
+  Buffer(Context& context, Scratch place, std::size_t size) : size_(std::max<std::size_t>(size, 1)) {
+    buffer_ = context.scratch(place, size_ * sizeof(T));
   }
 
   /// The caller's memory.

@@ -176,12 +176,25 @@ void Context::drain() noexcept {
   commands_.clear();
 }
 
-void Context::expect_allocatable(std::uint64_t bytes) const {
-  if (bytes <= max_allocation_bytes_) return;
-  throw DeviceError(CL_MEM_OBJECT_ALLOCATION_FAILURE,
-                    std::string(stage_) + ": needs a buffer of " + std::to_string(bytes >> 20) +
-                        " MiB, the device allows " + std::to_string(max_allocation_bytes_ >> 20) +
-                        " MiB: choose fewer disparities, a smaller image or another device");
+cl::Buffer Context::allocate(std::uint64_t bytes) {
+  if (bytes > max_allocation_bytes_) {
+    throw DeviceError(CL_MEM_OBJECT_ALLOCATION_FAILURE,
+                      std::string(stage_) + ": needs a buffer of " + std::to_string(bytes >> 20) +
+                          " MiB, the device allows " + std::to_string(max_allocation_bytes_ >> 20) +
+                          " MiB: choose fewer disparities, a smaller image or another device");
+  }
+  // Where host and device share memory, most drivers map only what they allocated as host memory without a copy.
+  const cl_mem_flags place = shares_host_memory_ ? CL_MEM_ALLOC_HOST_PTR : 0;
+  cl::Buffer buffer(context_, CL_MEM_READ_WRITE | place, bytes);
+  allocated_bytes_ += bytes;
+  return buffer;
+}
+
+cl::Buffer Context::scratch(Scratch place, std::uint64_t bytes) {
+  const auto [first, end] = scratch_.equal_range(place);
+  const auto found =
+      std::find_if(first, end, [&](const auto& of) { return of.second.template getInfo<CL_MEM_SIZE>() >= bytes; });
+  return found != end ? found->second : scratch_.emplace(place, allocate(bytes))->second;
 }
 
 const cl::Program& Context::program(const std::string& file, const Defines& defines) {

@@ -20,6 +20,10 @@ namespace egosgm::ocl {
 /// The device's in-order queues. Transfers have their own, so that they run beside the kernels of another frame.
 using Queue = DeviceQueue;
 
+/// Memory that is needed for a while and shared by all who need it at other times: kernels run one after another. Of a
+/// stage: within a call of it. Of a room: from one of its stages to another of them.
+enum class Scratch { kOfStage0, kOfStage1, kOfStage2, kOfStage3, kOfRoom0, kOfRoom1 };
+
 /// A command that was enqueued. The names are string literals.
 struct Command {
   const char* stage;
@@ -108,8 +112,11 @@ class Context {
   void drain() noexcept;
 
   /// Throws DeviceError, naming the stage and the limit, for a buffer that this device cannot hold.
-  void expect_allocatable(std::uint64_t bytes) const;
-  void count_allocation(std::uint64_t bytes) { allocated_bytes_ += bytes; }
+  cl::Buffer allocate(std::uint64_t bytes);
+  /// What the place has of at least so many bytes, or what is allocated for it now.
+  cl::Buffer scratch(Scratch place, std::uint64_t bytes);
+  /// For tests: all of it.
+  const std::multimap<Scratch, cl::Buffer>& scratch() const { return scratch_; }
   std::uint64_t allocated_bytes() const { return allocated_bytes_; }
   /// The largest buffer that the device allows.
   std::uint64_t max_allocation_bytes() const { return max_allocation_bytes_; }
@@ -142,6 +149,7 @@ class Context {
   const char* whole_ = nullptr;
   std::shared_ptr<const ProgramFolder> folder_;
   std::map<std::pair<std::string, std::string>, std::pair<ProgramSource, cl::Program>> programs_;
+  std::multimap<Scratch, cl::Buffer> scratch_;
   std::vector<Command> commands_;
   std::int64_t clock_offset_ns_ = std::numeric_limits<std::int64_t>::max();  // steady clock - device's clock, at most
 };

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/predict/edge_rejection.h"
 
-#include <limits>
 #include <utility>
 
 namespace egosgm {
@@ -19,12 +18,12 @@ EdgeRejection::EdgeRejection(ocl::Context& context, shared::ImageSize size, cons
     : context_((context.enter("EdgeRejection"), context)),
       size_(size),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
-      max_jump_px_(options.max_jump_px > 0 ? options.max_jump_px : std::numeric_limits<float>::max()),
+      max_jump_px_(options.max_jump_px),
       reject_(build(context, pixels_), "reject") {}
 
-void EdgeRejection::operator()(const Map& disparity, Map& kept, Map& variance) {
+void EdgeRejection::operator()(const Map& disparity, Map& kept, Map& variance, Views views) {
   context_.enter("EdgeRejection");
-  reject_(context_, ocl::every_pixels(context_, size_, pixels_), size_, max_jump_px_, disparity, kept, variance);
+  reject_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_jump_px_, disparity, kept, variance);
 }
 
 }  // namespace egosgm

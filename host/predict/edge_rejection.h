@@ -12,11 +12,11 @@ namespace egosgm {
 /// above and below.
 class EdgeRejection {
  public:
-  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits. REQUIRES: a largest jump above 0.
   EdgeRejection(ocl::Context& context, shared::ImageSize size, const EdgeRejectionOptions& options, int pixels = 0);
 
   /// Writes what is kept of `disparity` to `kept`; what is dropped loses its `variance`.
-  void operator()(const Map& disparity, Map& kept, Map& variance);
+  void operator()(const Map& disparity, Map& kept, Map& variance, Views views);
 
  private:
   ocl::Context& context_;

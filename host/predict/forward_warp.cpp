@@ -75,10 +75,10 @@ ForwardWarp::Atomics::Atomics(ocl::Context& context, shared::ImageSize size)
       splat_disparity(build(context, 1), "splat_disparity"),
       splat_variance(build(context, 1), "splat_variance"),
       decode(build(context, 1), "decode"),
-      landed(context, 2 * pixel_count(size)),
-      moved_key(context, 2 * pixel_count(size)),
-      moved_variance(context, 2 * pixel_count(size)),
-      zbuffer(context, 2 * pixel_count(size)) {}
+      landed(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
+      moved_key(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size)),
+      moved_variance(context, ocl::Scratch::kOfStage2, 2 * pixel_count(size)),
+      zbuffer(context, ocl::Scratch::kOfStage3, 2 * pixel_count(size)) {}
 
 ForwardWarp::Bands::Bands(ocl::Context& context, shared::ImageSize size)
     : find_spans(build(context, 16), "find_spans"),
@@ -101,7 +101,7 @@ ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Ca
 }
 
 void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted,
-                             FlagMap& hidden, Views views) {
+                             Views views) {
   context_.enter("ForwardWarp");
   Motion motion = current_from_previous;
   motion.covariance *= static_cast<double>(options_.motion_noise);
@@ -113,7 +113,7 @@ void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_fro
     find_spans(context_, ocl::every_row(context_, size_, count(views)), size_, left, right, belief.disparity, spans);
     splat_bands(context_, ocl::every_row(context_, {1, bands}, count(views)), size_, range_, left, right,
                 options_.process_noise_px2, band_rows_, spans, belief.disparity, belief.variance, predicted.disparity,
-                predicted.variance, hidden);
+                predicted.variance);
     return;
   }
   const ocl::Range pixels = ocl::every_pixel(context_, size_, count(views));
@@ -122,7 +122,7 @@ void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_fro
        landed, moved_key, moved_variance, zbuffer, predicted.variance);
   splat_disparity(context_, pixels, size_, landed, moved_key, zbuffer);
   splat_variance(context_, pixels, size_, landed, moved_key, moved_variance, zbuffer, predicted.variance);
-  decode(context_, pixels, size_, range_, zbuffer, predicted.disparity, predicted.variance, hidden);
+  decode(context_, pixels, size_, range_, zbuffer, predicted.disparity, predicted.variance);
 }
 
 }  // namespace egosgm

@@ -19,7 +19,8 @@ shared::DisparityMotion disparity_motion(const Calibration& calibration, const M
 /// Predicts the maps of both views by the camera's motion (eqs. 1-6): every disparity lands on the pixel nearest to
 /// where its point is seen next, with the variance p' = Phi^2 p + q. The nearest surface wins; of equal disparities the
 /// one that is known least. What falls behind the camera, outside of the image or outside of the disparity range is
-/// dropped; what came nearer than the range still hides what is behind it, and leaves no disparity there, but a mark.
+/// dropped; what came nearer than the range still hides what is behind it, and leaves no disparity there, but a mark in
+/// place of its variance (EGOSGM_HIDDEN).
 class ForwardWarp {
  public:
   /// `pixels` of a work-item: 1 (and atomics) or 16 (and bands of `band_rows` rows); 0: by the device. Same bits.
@@ -28,8 +29,7 @@ class ForwardWarp {
               int band_rows = kCpuTuning.warp_band_rows);
 
   /// REQUIRES: `motion` is valid; `predicted` is not `belief`.
-  void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted, FlagMap& hidden,
-                  Views views);
+  void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted, Views views);
 
  private:
   using Size = const shared::ImageSize;
@@ -45,7 +45,7 @@ class ForwardWarp {
     ocl::Kernel<Size, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uint>> splat_disparity;
     ocl::Kernel<Size, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, In, const ocl::Buffer<cl_uint>, Out>
         splat_variance;
-    ocl::Kernel<Size, Range, const ocl::Buffer<cl_uint>, Out, Out, FlagMap> decode;
+    ocl::Kernel<Size, Range, const ocl::Buffer<cl_uint>, Out, Out> decode;
     ocl::Buffer<cl_int> landed;
     ocl::Buffer<cl_uint> moved_key;
     ocl::Buffer<float> moved_variance;
@@ -55,7 +55,7 @@ class ForwardWarp {
   struct Bands {
     ocl::Kernel<Size, ViewMotion, ViewMotion, In, ocl::Buffer<cl_int>> find_spans;
     ocl::Kernel<Size, Range, ViewMotion, ViewMotion, const float, const cl_int, const ocl::Buffer<cl_int>, In, In, Out,
-                Out, FlagMap>
+                Out>
         splat_bands;
     ocl::Buffer<cl_int> spans;
     Bands(ocl::Context& context, shared::ImageSize size);

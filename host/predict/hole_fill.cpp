@@ -18,18 +18,16 @@ HoleFill::HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFill
       max_difference_px_(options.max_difference_px),
       fill_rows_(build(context, pixels_), "fill_rows"),
       fill_columns_(build(context, pixels_), "fill_columns"),
-      rows_filled_(context, size),
-      rows_hidden_(context, 2 * pixel_count(size)) {}
+      rows_filled_(Map(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
+                   Map(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size))) {}
 
-void HoleFill::operator()(const StereoMaps& in, const FlagMap& hidden, StereoMaps& out, FlagMap& out_hidden,
-                          Views views) {
+void HoleFill::operator()(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views) {
   context_.enter("HoleFill");
-  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_);
-  const cl_int whole_views = count(views);
-  fill_rows_(context_, pixels, size_, max_difference_px_, whole_views, in.disparity, in.variance, hidden,
-             rows_filled_.disparity, rows_filled_.variance, rows_hidden_);
-  fill_columns_(context_, pixels, size_, max_difference_px_, whole_views, rows_filled_.disparity, rows_filled_.variance,
-                rows_hidden_, out.disparity, out.variance, out_hidden);
+  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, count(views));
+  fill_rows_(context_, pixels, size_, max_difference_px_, in.disparity, in.variance,
+             rows_filled_.disparity, rows_filled_.variance);
+  fill_columns_(context_, pixels, size_, max_difference_px_, rows_filled_.disparity, rows_filled_.variance,
+                out.disparity, out.variance, hidden);
 }
 
 }  // namespace egosgm

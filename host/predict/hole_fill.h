@@ -9,27 +9,27 @@ namespace egosgm {
 
 /// Closes the gaps of a pixel that forward motion tears into a map: an invalid pixel between two horizontal neighbours
 /// that differ by less than gamma gets their mean and the larger of their variances; then the same vertically (eqs.
-/// 7-8). A pixel between two hidden ones (ForwardWarp) is hidden too.
+/// 7-8). A pixel between two hidden ones (EGOSGM_HIDDEN) is hidden too.
 class HoleFill {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFillOptions& options, int pixels = 0);
 
-  /// Disparities of both views; variances of `views`, and what is hidden there. REQUIRES: the outputs are not the
-  /// inputs.
-  void operator()(const StereoMaps& in, const FlagMap& hidden, StereoMaps& out, FlagMap& out_hidden, Views views);
+  /// Of `views`; what is hidden, in a map of its own. REQUIRES: the outputs are not the inputs.
+  void operator()(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
   const float max_difference_px_;
-  using FillKernel =
-      ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>,
-                  const ocl::Buffer<float>, const FlagMap, ocl::Buffer<float>, ocl::Buffer<float>, FlagMap>;
-  FillKernel fill_rows_, fill_columns_;
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<float>, ocl::Buffer<float>>
+      fill_rows_;
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
+              ocl::Buffer<float>, ocl::Buffer<float>, FlagMap>
+      fill_columns_;
   StereoMaps rows_filled_;
-  FlagMap rows_hidden_;
 };
 
 }  // namespace egosgm

@@ -6,29 +6,22 @@
 #include "host/predict/edge_rejection.h"
 #include "host/predict/forward_warp.h"
 #include "host/predict/hole_fill.h"
-#include "host/predict/right_map.h"
 
 namespace egosgm {
 
-/// What the last frame's maps say of this one. Where the left view alone is tracked, the right one is there to check it
-/// by: its disparities but for the last check, and no variances.
+/// What the last frame's maps say of this one, of the views that are tracked.
 struct Prediction {
   StereoMaps warped;     // before anything was dropped; of what EdgeRejection dropped, the variances are gone
-  Map rejected, filled;  // disparities after those stages
+  Map rejected, filled;  // disparities after those stages, where others follow; until the room ends
   StereoMaps maps;
-  // Where a surface that came nearer than the range hides what is behind, before and after holes were filled.
-  FlagMap warped_hidden, hidden;
+  FlagMap hidden;  // where a surface that came nearer than the range hides what is behind it
 
   Prediction(ocl::Context& context, shared::ImageSize size)
       : warped(context, size),
-        rejected(context, 2 * pixel_count(size)),
-        filled(context, 2 * pixel_count(size)),
+        rejected(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
+        filled(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
         maps(context, size),
-        warped_hidden(context, 2 * pixel_count(size)),
-        hidden(context, 2 * pixel_count(size)) {
-    // A view that is not tracked stays so.
-    for (FlagMap* map : {&warped_hidden, &hidden}) map->write(context, std::vector<cl_uchar>(map->size()));
-  }
+        hidden(context, 2 * pixel_count(size)) {}
 };
 
 /// Moves the maps of the last frame into this one, and drops what is doubtful.
@@ -44,10 +37,9 @@ class PredictRoom {
   const float left_right_px_;
   const OutsideView outside_;
   ForwardWarp forward_warp_;
-  RightMap right_map_;
-  EdgeRejection edge_rejection_;
+  std::optional<EdgeRejection> edge_rejection_;
   HoleFill hole_fill_;
-  ConsistencyCheck consistency_;
+  std::optional<ConsistencyCheck> consistency_;  // of both views, where they are tracked
 };
 
 }  // namespace egosgm

@@ -25,23 +25,14 @@ RightMap::RightMap(ocl::Context& context, shared::ImageSize size, shared::Dispar
       splat_(build(context, pixels_), "splat"),
       decode_(build(context, pixels_), "decode") {}
 
-void RightMap::operator()(float max_difference_px, StereoMaps& maps, bool makes_variance) {
-  make(nullptr, max_difference_px, maps, makes_variance);
-}
-
 void RightMap::operator()(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance) {
-  make(&measured, max_difference_px, maps, makes_variance);
-}
-
-void RightMap::make(const StereoMaps* measured, float max_difference_px, StereoMaps& maps, bool makes_variance) {
   context_.enter("RightMap");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, /*views=*/1);
   if (pixels_ == 1) keys_.fill(context_, 0);
   splat_(context_, pixels, size_, min_disparity_, maps.disparity, keys_);
-  const cl_int is_measured = measured ? 1 : 0, with_variance = makes_variance ? 1 : 0;
-  const StereoMaps& of_right = measured ? *measured : maps;
-  decode_(context_, pixels, size_, min_disparity_, max_difference_px, is_measured, with_variance, keys_,
-          of_right.disparity, of_right.variance, maps.disparity, maps.variance);
+  const cl_int with_variance = makes_variance ? 1 : 0;
+  decode_(context_, pixels, size_, min_disparity_, max_difference_px, with_variance, keys_, measured.disparity,
+          measured.variance, maps.disparity, maps.variance);
 }
 
 }  // namespace egosgm

@@ -14,23 +14,19 @@ class RightMap {
   /// `pixels` of a work-item: 1 (and atomics) or 16 (a row); 0: by the device. Same bits.
   RightMap(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, int pixels = 0);
 
-  /// From the left half of `maps` alone, or from that and the right one of `measured` to the right half of `maps`. What
-  /// differs by more than `max_difference_px` contradicts. REQUIRES: no disparity lies more than half a pixel below the
-  /// range.
-  /// The variances only where `makes_variance`.
-  void operator()(float max_difference_px, StereoMaps& maps, bool makes_variance);
+  /// From the left half of `maps` and the right one of `measured` to the right half of `maps`. What differs by more than
+  /// `max_difference_px` contradicts. The variances only where `makes_variance`. REQUIRES: no disparity lies more than
+  /// half a pixel below the range.
   void operator()(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance);
 
  private:
-  void make(const StereoMaps* measured, float max_difference_px, StereoMaps& maps, bool makes_variance);
-
   ocl::Context& context_;
   const shared::ImageSize size_;
   const cl_int min_disparity_;
   const int pixels_;
   ocl::Buffer<cl_int> keys_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<cl_int>> splat_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const cl_int, const ocl::Buffer<cl_int>,
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const ocl::Buffer<cl_int>,
               const ocl::Buffer<float>, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       decode_;
 };

@@ -17,9 +17,9 @@ OutputVariance::OutputVariance(ocl::Context& context, shared::ImageSize size, co
       size_(size),
       options_(options),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
-      roughness_(context, 2 * pixel_count(size)),
-      mean_variance_(context, 2 * pixel_count(size)),
-      mean_roughness_(context, 2 * pixel_count(size)),
+      roughness_(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
+      mean_variance_(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size)),
+      mean_roughness_(context, ocl::Scratch::kOfStage2, 2 * pixel_count(size)),
       of_each_pixel_(build(context, pixels_), "of_each_pixel"),
       row_means_(build(context, pixels_), "row_means"),
       combine_(build(context, pixels_), "combine") {}

@@ -52,7 +52,6 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
       none_(context, 2 * pixel_count(blocks_)),
       found_(context, 2 * pixel_count(blocks_)),
       block_bands_(context, 2 * pixel_count(blocks_)),
-      not_wrong_(context, 1),
       gather_blocks_(build(context, row_group_), "gather_blocks"),
       gather_coarse_(build(context, row_group_), "gather_coarse"),
       bands_of_blocks_(build(context, row_group_), "bands_of_blocks"),
@@ -62,25 +61,20 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
   for (ocl::Buffer<shared::BlockRange>* ranges : {&block_ranges_, &none_}) {
     ranges->write(context, std::vector(ranges->size(), shared::BlockRange{}));
   }
-  not_wrong_.write(context, {shared::PredictionState{}});
 }
 
-void SearchBand::operator()(const StereoMaps& predicted, const Hints& hints, SearchBands& bands, Views views) {
+void SearchBand::operator()(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views) {
   context_.enter("SearchBand");
   const int pixels = row_group_ == 1 ? 2 * EGOSGM_BLOCK : 1;
   const ocl::Range blocks = ocl::every_pixels(context_, blocks_, pixels, count(views));
-  const States& last = hints.last ? *hints.last : not_wrong_;
-  if (hints.coarse)
-    gather_coarse_(context_, ocl::every_pixel(context_, blocks_, count(views)), size_, *hints.coarse, coarse_ranges_);
-  if (options_.from_neighbours) {
-    gather_blocks_(context_, blocks, size_, hints.warped ? *hints.warped : predicted.disparity, block_ranges_);
-  }
+  if (coarse) gather_coarse_(context_, ocl::every_pixel(context_, blocks_, count(views)), size_, *coarse, coarse_ranges_);
+  if (options_.from_neighbours) gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
   bands_of_blocks_(context_, blocks, size_, range_, options_.from_neighbours, options_.neighbour_margin_px,
-                   options_.neighbour_min_count, options_.coarse_margin_px, last, block_ranges_,
-                   hints.coarse ? coarse_ranges_ : none_, found_, block_bands_);
+                   options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_,
+                   coarse ? coarse_ranges_ : none_, found_, block_bands_);
   bands_of_pixels_(context_, ocl::every_pixels(context_, size_, pixels, count(views)), size_, range_, options_.sigmas,
                    options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
-                   options_.coarse_margin_px, last, found_, block_bands_, bands.bands, bands.cell_offsets,
+                   options_.coarse_margin_px, found_, block_bands_, bands.bands, bands.cell_offsets,
                    bands.row_sums);
   if (pixels == 1) sum_rows(predicted.disparity, bands, views);
 }

@@ -30,15 +30,8 @@ class SearchBand {
   SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
              const SearchBandOptions& options, int row_group = 0);
 
-  /// What bands rest on beside the prediction, where there is such a thing.
-  struct Hints {
-    const Map* warped = nullptr;  // predicted disparities before any was dropped: what blocks span
-    const Map* coarse = nullptr;  // the disparities that CoarseMatch found
-    const ocl::Buffer<shared::PredictionState>* last = nullptr;  // of the frame before: were its predictions wrong?
-  };
-
-  /// Bands from the prediction and the hints; the whole range where the last predictions were wrong.
-  void operator()(const StereoMaps& predicted, const Hints& hints, SearchBands& bands, Views views);
+  /// Bands from the prediction and, unless null, the disparities that CoarseMatch found.
+  void operator()(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views);
   /// Every pixel searches everything.
   void full_range(SearchBands& bands, Views views);
   /// The same where there are predicted disparities that are not searched by: `row_sums` counts them.
@@ -54,7 +47,6 @@ class SearchBand {
 
   using Disparities = const ocl::Buffer<float>;
   using Ranges = ocl::Buffer<shared::BlockRange>;
-  using States = ocl::Buffer<shared::PredictionState>;
 
   ocl::Context& context_;
   const shared::ImageSize size_, blocks_;
@@ -63,14 +55,13 @@ class SearchBand {
   const int row_group_;
   Ranges block_ranges_, coarse_ranges_, none_, found_;
   ocl::Buffer<shared::Band> block_bands_;
-  States not_wrong_;  // in place of the state of the frame before
   ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_blocks_;
   ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_coarse_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const cl_int, const float, const cl_int,
-              const float, const States, const Ranges, const Ranges, Ranges, ocl::Buffer<shared::Band>>
+              const float, const Ranges, const Ranges, Ranges, ocl::Buffer<shared::Band>>
       bands_of_blocks_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
-              const float, const float, const States, const Ranges, const ocl::Buffer<shared::Band>,
+              const float, const float, const Ranges, const ocl::Buffer<shared::Band>,
               ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>, ocl::Buffer<shared::RowSum>>
       bands_of_pixels_;
   ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,

@@ -16,11 +16,11 @@ void SearchRoom::prepare(PixelType type) {
 }
 
 void SearchRoom::operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                            const Agreement& agreement, Measurement& coarse, SearchBands& bands) {
+                            Measurement& coarse, SearchBands& bands) {
   if (plan.search == Search::kBands) {
     if (plan.has_coarse_match) (*coarse_match_)(images, coarse);
     const Map* found = plan.has_coarse_match ? &coarse.disparity : nullptr;
-    search_band_(prediction.maps, {&prediction.warped.disparity, found, &agreement}, bands, plan.matched);
+    search_band_(prediction.maps, found, bands, plan.matched);
   } else if (plan.predicts()) {
     search_band_.full_range(prediction.maps.disparity, bands, plan.matched);
   } else {

@@ -15,10 +15,10 @@ class SearchRoom {
   /// Builds what images of `type` need.
   void prepare(PixelType type);
 
-  /// `agreement`: of the frame before. Writes `coarse`, what CoarseMatch finds in the images, where the plan has one.
-  /// Prediction and agreement are read where the plan predicts.
-  void operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                  const Agreement& agreement, Measurement& coarse, SearchBands& bands);
+  /// Writes `coarse`, what CoarseMatch finds in the images, where the plan has one. The prediction is read where the
+  /// plan predicts.
+  void operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction, Measurement& coarse,
+                  SearchBands& bands);
 
   /// Cells that a coarse match matches, of both views.
   std::uint64_t coarse_cells() const { return coarse_match_ ? coarse_match_->matched_cells() : 0; }

@@ -18,6 +18,9 @@
 #error "ROW_GROUP: work-items that share a row"
 #endif
 
+#define PIXELS 1
+#include "pixels.h"
+
 #if PIXEL_BYTES == 1
 #define load_wide(from) convert_ushort16(load_grey(from))
 #define convert_pixels convert_uchar16
@@ -51,7 +54,7 @@ inline int clamp_row(const int y, const int height) { return clamp(y, 0, height 
 
 // Where among `count` rows or columns, in `steps` from the middle to either end.
 inline int place(const int at, const int count, const int steps) {
-  return convert_int_rte((float)(2 * at + 1 - count) * ((float)steps / (float)count));
+  return (int)nearest((float)(2 * at + 1 - count) * ((float)steps / (float)count));
 }
 
 // Copies the left image, and resamples the right one by the quadratic state[0] + state[1] u + state[2] v + state[3] u v
@@ -75,7 +78,7 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
   for (int x = get_local_id(0) * AT_ONCE; x < size.width; x += ROW_GROUP * AT_ONCE) {
     const float u = (float)place(x / BLOCK * BLOCK + BLOCK / 2, size.width, PLACES) / PLACES;
     const float dy = bounded(constant_term + (linear_term + square_term * u) * u);
-    const int offset = is_moved ? convert_int_rte(dy * ROW_STEPS) : 0;
+    const int offset = is_moved ? (int)nearest(dy * ROW_STEPS) : 0;
     const int above = y + (offset >> 8);
     const Weight weight = offset & (ROW_STEPS - 1);
     global const Pixel* upper = from + (size_t)clamp_row(above, size.height) * size.width;
@@ -112,6 +115,12 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
 #define COUNT (GR_SUMS + GG_SUMS)
 #define SUMS (COUNT + 1)
 
+// Adds to them what the pixels at a place have together.
+inline void add_at(const int place_u, long gr, long gg, long sums[SUMS]) {
+  for (int n = 0; n < GR_SUMS; ++n, gr *= place_u) sums[n] += gr;
+  for (int n = 0; n < GG_SUMS; ++n, gg *= place_u) sums[GR_SUMS + n] += gg;
+}
+
 KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
                                                                             global const uchar* images,
                                                                             global const float* disparity,
@@ -122,6 +131,8 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
   const size_t width = size.width;
   const float last = (float)(COLUMN_STEPS * (size.width - 2));
   long sums[SUMS] = {0};
+  long gr_here = 0, gg_here = 0;  // of the last pixels, which have one place
+  int here = 0;
   if (y + EGOSGM_ALIGNED_BORDER_ROWS < size.height) {
     const size_t row = (size_t)y * width;
     global const Pixel* left = (global const Pixel*)images + row;
@@ -132,7 +143,7 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
       // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
       const int inside = (d > EGOSGM_INVALID_DISPARITY) & (at >= 0.0f) & (at <= last);
       if (!inside) continue;
-      const uint position = convert_uint_rte(at);
+      const uint position = (uint)nearest(at);
       const size_t u = position / COLUMN_STEPS;
       const int after = position % COLUMN_STEPS;
       const int before = COLUMN_STEPS - after;
@@ -148,13 +159,18 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(cons
       const int is_textured = abs(g) >= MIN_GRADIENT;
       const int is_inlier = is_textured & (abs(r) < MAX_RESIDUAL);
       const int place_u = place((int)u, size.width, COARSE_PLACES);
-      long gr = is_textured ? g * clamp(r, -MAX_RESIDUAL, MAX_RESIDUAL) : 0;
-      long gg = is_inlier ? 4 * g_left * g_right : 0;  // each is half of what g is
-      for (int n = 0; n < GR_SUMS; ++n, gr *= place_u) sums[n] += gr;
-      for (int n = 0; n < GG_SUMS; ++n, gg *= place_u) sums[GR_SUMS + n] += gg;
+      if (place_u != here) {
+        add_at(here, gr_here, gg_here, sums);
+        gr_here = 0;
+        gg_here = 0;
+        here = place_u;
+      }
+      gr_here += is_textured ? g * clamp(r, -MAX_RESIDUAL, MAX_RESIDUAL) : 0;
+      gg_here += is_inlier ? 4 * g_left * g_right : 0;  // each is half of what g is
       sums[COUNT] += is_inlier;
     }
   }
+  add_at(here, gr_here, gg_here, sums);
 #if ROW_GROUP > 1
   local long totals[SUMS][ROW_GROUP];
   for (int n = 0; n < SUMS; ++n) totals[n][lane] = sums[n];

@@ -2,19 +2,14 @@
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two contradict each
 // other, by more than the gate or because the measurement is doubtful, or where they differ to the same side as most
 // pixels around, as on what moves by itself, the measurement is taken. It then is doubtful, and its variance is so large
-// that the next frame searches wide. Where far more pixels contradict each other than a frame before, or far fewer are
-// predicted, the predictions were wrong.
+// that the next frame searches wide.
 // What is hidden by a surface nearer than the range (ForwardWarp) has no disparity: whatever is measured there is a
 // mismatch. Without a gate nothing contradicts anything.
 #include "method.h"
 #include "pixels.h"
 
-#ifndef ROW_GROUP
-#error "ROW_GROUP: work-items that share a row"
-#endif
-
-// lint: PIXELS=1 ROW_GROUP=64
-// lint: PIXELS=16 ROW_GROUP=1
+// lint: PIXELS=1
+// lint: PIXELS=16
 
 static Ints is_off_to(const Floats side, const Floats d, const Floats z) {
   return (d > INVALID) & (z > INVALID) & ((z - d) * side > (Floats)(EGOSGM_DIFFERENCE_PX));
@@ -45,52 +40,19 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
   return moves;
 }
 
-static inline PredictionCounts sum_of(const PredictionCounts a, const PredictionCounts b) {
-  const PredictionCounts sum = {a.predicted + b.predicted, a.both + b.both, a.differing + b.differing};
-  return sum;
-}
-
-// Of a group's lanes, by a barrier for all of them; right in the first one.
-static inline PredictionCounts sum_of_lanes(local PredictionCounts* lanes, const PredictionCounts own) {
-  const int lane = get_local_id(0);
-  lanes[lane] = own;
-  barrier(CLK_LOCAL_MEM_FENCE);
-  PredictionCounts sum = own;
-  for (int i = 1; lane == 0 && i < ROW_GROUP; ++i) sum = sum_of(sum, lanes[i]);
-  return sum;
-}
-
-// Of a block of pixels, each counted as 1.
-static inline uint sum_of_pixels(const Floats counts) {
-#if PIXELS == 1
-  return (uint)counts;
-#else
-  const float8 eight = counts.lo + counts.hi;
-  const float4 four = eight.lo + eight.hi;
-  return (uint)(four.x + four.y + four.z + four.w);
-#endif
-}
-
 // `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
-// is taken that differs to the same side as those of EGOSGM_MOVING_COUNT around do. has_gate: else all that is predicted
-// and measured is averaged, and nothing is hidden or doubtful. `row_counts`: of every EGOSGM_CHECKED_ROWS-th row of the
-// left view; `warped` has its predictions before any was dropped or filled in. A work-group of ROW_GROUP a row and view.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update(
-    const ImageSize size, const int has_gate, const float gate, const int keep_predicted, const int ask_neighbours,
-    const float min_variance, global const uchar* hidden, global const float* warped, global const float* predicted,
-    global const float* predicted_variance, global const float* measured, global const float* measured_variance,
-    global const uchar* measured_doubtful, global float* updated, global float* updated_variance,
-    global uchar* updated_doubtful, global PredictionCounts* row_counts) {
+// is taken that differs to the same side as those of EGOSGM_MOVING_COUNT around do. has_gate: else all that is predicted and measured is
+// averaged, and nothing is hidden or doubtful.
+KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted, const int ask_neighbours,
+                   const float min_variance, global const uchar* hidden,
+                   global const float* predicted, global const float* predicted_variance, global const float* measured,
+                   global const float* measured_variance, global const uchar* measured_doubtful, global float* updated,
+                   global float* updated_variance, global uchar* updated_doubtful) {
   const int width = size.width;
   const int y = get_global_id(1);
-  const bool is_checked = get_global_id(2) == EGOSGM_LEFT && y % EGOSGM_CHECKED_ROWS == 0;
   const size_t view = (size_t)get_global_id(2) * size.height * width;
   const size_t row = view + (size_t)y * width;
   const Ints is_plain = (Ints)(has_gate ? 0 : -1);
-  local PredictionCounts lanes[ROW_GROUP];
-  Floats with_prediction = 0.0f;
-  Floats with_both = 0.0f;
-  Floats that_differ = 0.0f;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(predicted + row, x, width);
@@ -117,8 +79,7 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update(
     Floats variance = fuses ? fused_variance : has_both ? contradicting : has_measurement ? r : p;
 
     const Floats most = EGOSGM_DIFFERENCE_PX;
-    const Ints differs = has_both & (fabs(innovation) > most);
-    Ints moves = differs & fuses & (Ints)(ask_neighbours ? -1 : 0);
+    Ints moves = fuses & (fabs(innovation) > most) & (Ints)(ask_neighbours ? -1 : 0);
     if (any_of(moves)) {
       const Floats side = innovation > zero ? (Floats)(1.0f) : (Floats)(-1.0f);
       moves = move_together(size, x, y, side, moves, predicted + view, measured + view);
@@ -131,40 +92,5 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update(
     store_pixels(value > INVALID ? bounded : zero, updated_variance + row, x, width);
     const Ints contradicted = (has_both & !fuses) | (moves != 0) | (has_measurement & !has_prediction & is_doubtful);
     store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
-
-    if (is_checked) {
-      const Ints counts = has_both & (load_pixels(warped + row, x, width) > INVALID);
-      with_prediction += one_where(has_prediction);
-      with_both += one_where(counts);
-      that_differ += one_where(counts & differs);
-    }
-  }
-  const PredictionCounts own = {sum_of_pixels(with_prediction), sum_of_pixels(with_both), sum_of_pixels(that_differ)};
-  const PredictionCounts sum_of_row = sum_of_lanes(lanes, own);
-  if (is_checked && get_local_id(0) == 0) row_counts[y / EGOSGM_CHECKED_ROWS] = sum_of_row;
-}
-
-// Less than three quarters as many predictions as a frame before, as after a gap; or twice its share of contradictions
-// and 2.5 % more, as after a wrong motion.
-static inline int are_wrong(const PredictionCounts now, const PredictionCounts before) {
-  const ulong differing = (ulong)now.differing * before.both;
-  const ulong differed = (ulong)before.differing * now.both;
-  const ulong both = (ulong)now.both * before.both;
-  return before.both > 0 &&
-         (4 * (ulong)now.predicted < 3 * (ulong)before.predicted || differing > 2 * differed + both / 40);
-}
-
-// A single work-group of ROW_GROUP.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void judge(const int rows,
-                                                                         global const PredictionCounts* row_counts,
-                                                                         global const PredictionState* before,
-                                                                         global PredictionState* after) {
-  local PredictionCounts lanes[ROW_GROUP];
-  PredictionCounts own = {0, 0, 0};
-  for (int i = get_local_id(0); i < rows; i += ROW_GROUP) own = sum_of(own, row_counts[i]);
-  const PredictionCounts sum = sum_of_lanes(lanes, own);
-  if (get_local_id(0) == 0) {
-    after->counts = sum;
-    after->is_wrong = are_wrong(sum, before->counts);
   }
 }

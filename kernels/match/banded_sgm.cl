@@ -9,7 +9,8 @@
 // In a sweep, a pixel needs the one before it and three of the row above; tiles skewed by a column a row need the tiles
 // to the left, above and to the upper right, so all tiles (i, j) with j + 2 i = wave run at once: a launch a wave, a
 // work-item a tile. Where a device has no more compute units than there are sweeps, a work-item takes all tiles of a
-// sweep up to the middle or from there, row by row, and nobody waits.
+// sweep up to the middle or from there, row by row, and nobody waits. Where it has no more than the sweeps of a view,
+// the views are matched one after the other, in the same memory.
 //
 // Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d
 // +- 1) + P1, P2(p, q)), which is the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of
@@ -130,7 +131,7 @@ ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmPar
   }
 }
 
-// The row y of a sweep, from its pixel `from` to `to`. To the pixels before one on the four paths it is `left`, `above`
+// The row y of a sweep, from its pixel `from` to `to`. `view`: of those that are matched. To the pixels before one on the four paths it is `left`, `above`
 // and so on; where there is none, to one whose band and penalty do no harm: wiping some place in the slot, and a step
 // from nowhere.
 ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParameters q,
@@ -154,7 +155,7 @@ ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParamet
   row.above_right = y > 0 ? step - step * (long)width : 0;
   row.end = step * (long)(to - from);
   row.step = step;
-  row.code_step = view == EGOSGM_LEFT ? step : -step;
+  row.code_step = q.first_view + view == EGOSGM_LEFT ? step : -step;
   row.p1 = (uchar16)((uchar)q.p1);
   return row;
 }
@@ -168,7 +169,8 @@ ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const R
   const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
   const size_t row_start = (size_t)view * width * height + (size_t)image_y * width;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
-  const int along = view == EGOSGM_LEFT ? image_x : width - 1 - image_x;
+  const int image = q.first_view + view;
+  const int along = image == EGOSGM_LEFT ? image_x : width - 1 - image_x;
   const long above = y > 0 ? -row->step * (long)width : 0, left = from > 0 ? -row->step : 0;
   global const Code* codes = (global const Code*)all_codes + q.padding;
   // The sums move along with the pixel; a backward sweep comes from their end. Where offsets and bands do not belong
@@ -179,8 +181,8 @@ ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const R
   Place place;
   place.k = 0;
   place.cells = sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
-  place.own = codes + ((size_t)view * height + image_y) * code_stride + along;
-  place.other = codes + ((size_t)(1 - view) * height + image_y) * code_stride + (width - 1 - along);
+  place.own = codes + ((size_t)image * height + image_y) * code_stride + along;
+  place.other = codes + ((size_t)(1 - image) * height + image_y) * code_stride + (width - 1 - along);
   place.candidate = candidates;
   place.around.before = row->penalties[left];
   place.around.above_before = row->penalties[above + left];
@@ -234,7 +236,7 @@ ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmPa
 #define CELLS_A_PIXEL 16
 inline int rows_to_middle(const SgmParameters q, const int view, const int wave, global const RowSum* row_sums) {
   if (wave != EGOSGM_ALL_TILES) return q.height - q.height / 2;
-  global const RowSum* rows = row_sums + (size_t)view * q.height;
+  global const RowSum* rows = row_sums + (size_t)(q.first_view + view) * q.height;
   const ulong a_row = (ulong)q.width * CELLS_A_PIXEL;
   ulong all = a_row * q.height;
   for (int y = 0; y < q.height; ++y) all += rows[y].cells;
@@ -251,6 +253,10 @@ ALWAYS_INLINE void sweep(const bool meets, const SgmParameters q, const int midd
                                                  global const Band* bands, global const uint* offsets,
                                                  global const uchar* penalties, global uchar* slots, global uchar* sums,
                                                  global ulong* winners, global uint* ranks) {
+  const size_t not_matched = (size_t)q.first_view * q.width * q.height;
+  bands += not_matched;
+  offsets += not_matched;
+  penalties += 4 * not_matched;
   const bool all = wave == EGOSGM_ALL_TILES;
   const int own_rows = backward ? q.height - middle : middle;
   const int first_y = meets ? own_rows : 0;
@@ -311,13 +317,14 @@ KERNEL void refine(const SgmParameters q, global const ulong* winners, global fl
                    global float* variances, global uchar* doubtful) {
   const int width = q.width;
   const size_t row = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width;
+  const size_t image_row = (size_t)q.first_view * q.width * q.height + row;
   FOR_PIXELS(x, width) {
     const Winners winner = load_winners(winners + row, x, width);
     const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
     const Ints steps = FIELD(winner, 48);
-    store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities + row, x, width);
+    store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities + image_row, x, width);
     const Ints is_doubtful = falls_on(q, rise_before, rise_after);
-    store_pixels(matching_variance(q, steps, is_doubtful), variances + row, x, width);
-    store_bytes(is_doubtful & (Ints)(1), doubtful + row, x, width);
+    store_pixels(matching_variance(q, steps, is_doubtful), variances + image_row, x, width);
+    store_bytes(is_doubtful & (Ints)(1), doubtful + image_row, x, width);
   }
 }

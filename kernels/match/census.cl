@@ -131,13 +131,17 @@ typedef struct __attribute__((packed)) {
   Block greys;
 } PackedBlock;
 inline Greys load_greys(global const Pixel* from) { return ((global const PackedBlock*)from)->greys; }
-inline Bytes one_where_less(const Greys a, const Greys b) { return a < b ? (Block)(1) : (Block)(0); }
+inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
+  return a < b ? (Block)((uchar)bit) : (Block)(0);
+}
 #else
 #define AT_ONCE 16
 typedef Pixels Greys;
 typedef uchar16 Bytes;
 inline Greys load_greys(global const Pixel* from) { return load_grey(from); }
-inline Bytes one_where_less(const Greys a, const Greys b) { return as_uchar16(-convert_char16(a < b)); }
+inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
+  return as_uchar16(convert_char16(a < b)) & (uchar16)((uchar)bit);
+}
 #endif
 
 // Codes of their bytes, the lowest first.
@@ -155,7 +159,7 @@ inline uint16 joined(const uchar16 b0, const uchar16 b1, const uchar16 b2, const
 #endif
 #define WHOLE(bytes) (bytes)
 
-// Where no column needs clamping. Bits are appended to bytes: compilers keep these in narrow vectors.
+// Where no column needs clamping. Bits are put into bytes: compilers keep these in narrow vectors.
 inline void codes_at(const Rows* rows, const int x, Codes* codes) {
   const Greys centre = load_greys(rows->at[RADIUS_Y] + x);
   Bytes bytes[CODE_BYTES];
@@ -163,9 +167,8 @@ inline void codes_at(const Rows* rows, const int x, Codes* codes) {
   for (int byte = 0; byte < CODE_BYTES; ++byte) bytes[byte] = 0;
 #pragma unroll
   for (int i = 0; i < COUNT; ++i) {
-    const Bytes bits = bytes[(COUNT - 1 - i) / 8];
-    bytes[(COUNT - 1 - i) / 8] =
-        bits + bits + one_where_less(load_greys(rows->at[RADIUS_Y + DY(i)] + x + DX(i)), centre);
+    const int place = COUNT - 1 - i;
+    bytes[place / 8] |= bit_where_less(load_greys(rows->at[RADIUS_Y + DY(i)] + x + DX(i)), centre, 1 << place % 8);
   }
 #if AT_ONCE == 32
   codes[0] = JOINED(FIRST_VECTOR, bytes);

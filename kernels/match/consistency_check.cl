@@ -6,15 +6,13 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-KERNEL void check(const ImageSize size, const float max_difference, const float max_difference_in_doubt,
-                  global const PredictionState* last, const int keep_outside, global const float* disparity,
+KERNEL void check(const ImageSize size, const float max_difference, const int keep_outside, global const float* disparity,
                   global float* kept_disparity, global float* variance) {
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t other_row = ((size_t)(1 - view) * size.height + y) * width;
-  const float tolerance = last->is_wrong ? max_difference_in_doubt : max_difference;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
@@ -24,7 +22,7 @@ KERNEL void check(const ImageSize size, const float max_difference, const float 
     const Ints valid = d > INVALID;
     const Ints inside = valid & (at >= zero) & (at < (Floats)(width));
     const Floats other = gather(disparity + other_row, INTS_OF_FLOATS(inside ? at : zero));
-    const Ints agree = (other > INVALID) & (fabs(other - d) <= tolerance);
+    const Ints agree = (other > INVALID) & (fabs(other - d) <= max_difference);
     const Ints keeps = inside ? agree : valid & ((Ints)(keep_outside) != 0);
 
     store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);

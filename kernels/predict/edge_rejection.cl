@@ -25,10 +25,11 @@ KERNEL void reject(const ImageSize size, const float max_jump, global const floa
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(here, x, width);
-    const Ints jumps = is_jump(d, load_pixels(here, x - 1, width), load_pixels(here, x - 2, width), max_jump) |
-                       is_jump(d, load_pixels(here, x + 1, width), load_pixels(here, x + 2, width), max_jump) |
-                       is_jump(d, load_pixels(above, x, width), load_pixels(far_above, x, width), max_jump) |
-                       is_jump(d, load_pixels(below, x, width), load_pixels(far_below, x, width), max_jump);
+    const Ints jumps =
+        (d > INVALID) & (is_jump(d, load_pixels(here, x - 1, width), load_pixels(here, x - 2, width), max_jump) |
+                         is_jump(d, load_pixels(here, x + 1, width), load_pixels(here, x + 2, width), max_jump) |
+                         is_jump(d, load_pixels(above, x, width), load_pixels(far_above, x, width), max_jump) |
+                         is_jump(d, load_pixels(below, x, width), load_pixels(far_below, x, width), max_jump));
     store_pixels(jumps ? INVALID : d, kept_disparity + row, x, width);
     clear_dropped(jumps, variance + row, x, width);
   }

@@ -112,15 +112,14 @@ KERNEL void splat_variance(const ImageSize size, global const int* landed, globa
 }
 
 KERNEL void decode(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
-                   global float* disparity, global float* variance, global uchar* hidden) {
+                   global float* disparity, global float* variance) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
   const size_t i = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width + x;
   const float d = zbuffer[i] == 0 ? EGOSGM_INVALID_DISPARITY : disparity_of(zbuffer[i]);
   const int is_beyond = d > range.min + range.count - 1;
   disparity[i] = is_beyond ? EGOSGM_INVALID_DISPARITY : d;
-  if (is_beyond) variance[i] = 0.0f;
-  hidden[i] = is_beyond;
+  if (is_beyond) variance[i] = EGOSGM_HIDDEN;
 }
 
 #else
@@ -184,7 +183,7 @@ KERNEL void find_spans(const ImageSize size, const DisparityMotion left, const D
 KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const DisparityMotion left,
                         const DisparityMotion right, const float process_noise, const int band_rows,
                         global const int* spans, global const float* disparity, global const float* variance,
-                        global float* predicted, global float* predicted_variance, global uchar* hidden) {
+                        global float* predicted, global float* predicted_variance) {
   const int view = get_global_id(1);
   const int width = size.width;
   const int first = get_global_id(0) * band_rows;
@@ -226,10 +225,9 @@ KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const 
   for (int i = 0; i < pixels; i += PIXELS) {
     const Floats d = load_pixels(band, i, pixels);
     const Ints is_beyond = d > (Floats)(range.min + range.count - 1);
-    store_bytes(is_beyond ? (Ints)(1) : (Ints)(0), hidden + (rows + first) * width, i, pixels);
     if (!any_of(is_beyond)) continue;
     store_pixels(is_beyond ? INVALID : d, band, i, pixels);
-    clear_dropped(is_beyond, band_variance, i, pixels);
+    store_pixels(is_beyond ? (Floats)(EGOSGM_HIDDEN) : load_pixels(band_variance, i, pixels), band_variance, i, pixels);
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Hole fill (eqs. 7-8): gaps of a pixel between horizontal neighbours that differ by less than gamma, then, on that
-// result, between vertical ones. Between hidden neighbours (ForwardWarp), a pixel is hidden too. Bytes of `hidden`: 1.
+// result, between vertical ones. Between hidden neighbours (EGOSGM_HIDDEN), a pixel is hidden too.
 #include "pixels.h"
 
 // lint: PIXELS=1
@@ -13,70 +13,54 @@ static inline Ints is_gap(const Floats centre, const Floats before, const Floats
 static inline Floats mean_of(const Floats a, const Floats b) { return 0.5f * (a + b); }
 static inline Floats larger_of(const Floats a, const Floats b) { return a > b ? a : b; }
 
-// Where a pixel is filled: `mean` and `most`; where it is hidden: nothing; else d and p.
-static inline void store_filled(const Ints fills, const Floats mean, const Floats most, const Ints hides,
-                                const Floats d, const Floats p, global float* disparity, global float* variance,
-                                global uchar* hidden, const int x, const int width) {
-  const Ints is_hidden = fills ? (Ints)(0) : hides;
-  const Floats zero = 0.0f;
-  store_pixels(fills ? mean : is_hidden != 0 ? INVALID : d, disparity, x, width);
-  store_pixels(fills ? most : is_hidden != 0 ? zero : p, variance, x, width);
-  store_bytes(is_hidden, hidden, x, width);
+// By the variances: whether a pixel is hidden, unless it is filled.
+static inline Ints is_hidden(const Floats p, const Floats before, const Floats after) {
+  const Floats hidden = EGOSGM_HIDDEN;
+  return (p == hidden) | ((before == hidden) & (after == hidden));
 }
 
-// `whole_views`: those of which more than disparities is filled.
-KERNEL void fill_rows(const ImageSize size, const float gamma, const int whole_views, global const float* disparity,
-                      global const float* variance, global const uchar* hidden, global float* filled_disparity,
-                      global float* filled_variance, global uchar* still_hidden) {
+KERNEL void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
+                      global const float* variance, global float* filled_disparity, global float* filled_variance) {
   const int width = size.width;
   const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
-  const bool is_whole = get_global_id(2) < (size_t)whole_views;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
     const Floats left = load_pixels(disparity + row, x - 1, width);
     const Floats right = load_pixels(disparity + row, x + 1, width);
     const Ints fills = is_gap(d, left, right, gamma);
-    if (!is_whole) {
-      store_pixels(fills ? mean_of(left, right) : d, filled_disparity + row, x, width);
-      continue;
-    }
     const Floats p = load_pixels(variance + row, x, width);
-    const Floats p_around =
-        larger_of(load_pixels(variance + row, x - 1, width), load_pixels(variance + row, x + 1, width));
-    const Ints is_between = load_bytes(hidden + row, x - 1, width) & load_bytes(hidden + row, x + 1, width);
-    const Ints hides = is_between | load_bytes(hidden + row, x, width);
-    store_filled(fills, mean_of(left, right), p_around, hides, d, p, filled_disparity + row, filled_variance + row,
-                 still_hidden + row, x, width);
+    const Floats p_left = load_pixels(variance + row, x - 1, width);
+    const Floats p_right = load_pixels(variance + row, x + 1, width);
+    const Ints hides = is_hidden(p, p_left, p_right);
+    store_pixels(fills ? mean_of(left, right) : hides ? INVALID : d, filled_disparity + row, x, width);
+    store_pixels(fills ? larger_of(p_left, p_right) : hides ? (Floats)(EGOSGM_HIDDEN) : p, filled_variance + row, x,
+                 width);
   }
 }
 
-KERNEL void fill_columns(const ImageSize size, const float gamma, const int whole_views, global const float* disparity,
-                         global const float* variance, global const uchar* hidden, global float* filled_disparity,
-                         global float* filled_variance, global uchar* still_hidden) {
+// `hidden`: 1 where a pixel is, whose variance is 0.
+KERNEL void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
+                         global const float* variance, global float* filled_disparity, global float* filled_variance,
+                         global uchar* hidden) {
   const int y = get_global_id(1);
   const int width = size.width;
   const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
   // At the border the row itself, whose pixels are valid or no neighbours.
   const size_t row_above = y >= 1 ? row - width : row;
   const size_t row_below = y + 1 < size.height ? row + width : row;
-  const bool is_whole = get_global_id(2) < (size_t)whole_views;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
     const Floats above = load_pixels(disparity + row_above, x, width);
     const Floats below = load_pixels(disparity + row_below, x, width);
     const Ints fills = is_gap(d, above, below, gamma);
-    if (!is_whole) {
-      store_pixels(fills ? mean_of(above, below) : d, filled_disparity + row, x, width);
-      continue;
-    }
     const Floats p = load_pixels(variance + row, x, width);
-    const Floats p_around =
-        larger_of(load_pixels(variance + row_above, x, width), load_pixels(variance + row_below, x, width));
-    const Ints is_between = load_bytes(hidden + row_above, x, width) & load_bytes(hidden + row_below, x, width);
-    const Ints hides = is_between | load_bytes(hidden + row, x, width);
-    store_filled(fills, mean_of(above, below), p_around, hides, d, p, filled_disparity + row, filled_variance + row,
-                 still_hidden + row, x, width);
+    const Floats p_above = load_pixels(variance + row_above, x, width);
+    const Floats p_below = load_pixels(variance + row_below, x, width);
+    const Ints hides = fills ? (Ints)(0) : is_hidden(p, p_above, p_below);
+    store_pixels(fills ? mean_of(above, below) : hides ? INVALID : d, filled_disparity + row, x, width);
+    store_pixels(fills ? larger_of(p_above, p_below) : hides ? (Floats)(0.0f) : p, filled_variance + row, x, width);
+    store_bytes(hides & (Ints)(1), hidden + row, x, width);
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The right view's map by the left one's. Where the right view was measured, if it was, it has what the left pixel has
-// that it sees, or the measurement if that contradicts it. Elsewhere it has the nearest of the left surfaces that land
+// The right view's map by the left one's. Where the right view was measured, it has what the left pixel has that it
+// sees, or the measurement if that contradicts it. Elsewhere it has the nearest of the left surfaces that land
 // there: the left pixel x lands on the right pixel nearest to x - d.
 //
 // Several may land on one pixel. Each bids a key, of which the largest wins, so the result does not depend on the order
@@ -63,8 +63,8 @@ KERNEL void splat(const ImageSize size, const int min_disparity, global const fl
   }
 }
 
-// REQUIRES: unless is_measured, any maps as `measured`. makes_variance: else disparities only.
-KERNEL void decode(const ImageSize size, const int min_disparity, const float max_difference, const int is_measured,
+// makes_variance: else disparities only.
+KERNEL void decode(const ImageSize size, const int min_disparity, const float max_difference,
                    const int makes_variance, global const int* keys, global const float* measured,
                    global const float* measured_variance, global float* disparity, global float* variance) {
   const int y = get_global_id(1);
@@ -75,7 +75,7 @@ KERNEL void decode(const ImageSize size, const int min_disparity, const float ma
 
   FOR_PIXELS(x, width) {
     const Floats zero = 0.0f;
-    const Floats z = is_measured ? load_pixels(measured + right_row, x, width) : INVALID;
+    const Floats z = load_pixels(measured + right_row, x, width);
     const Ints key = load_keys(bids + x);
     const Floats landed = FLOATS_OF_INTS(key) * (1.0f / EGOSGM_RIGHT_MAP_STEPS_PER_PX) - 1.0f + (float)min_disparity;
     const Floats d = z > INVALID ? z : landed;

@@ -131,22 +131,19 @@ static inline Span span_around(const ImageSize blocks, const int view, const int
 }
 
 // The band of a block's unpredicted pixels; `found` is for the predicted ones: beside a jump a prediction may lie on the
-// wrong side of it. `before`: of the frame before; after wrong predictions every pixel searches everything. A work-item
-// PIXELS blocks and view, or a row of blocks and view.
+// wrong side of it. A work-item PIXELS blocks and view, or a row of blocks and view.
 KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
                             const float margin, const int min_count, const float coarse_margin,
-                            global const PredictionState* before, global const BlockRange* ranges,
-                            global const BlockRange* coarse_ranges,
+                            global const BlockRange* ranges, global const BlockRange* coarse_ranges,
                             global BlockRange* found, global Band* bands) {
   const ImageSize blocks = blocks_of(size);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
-  const int asks = from_neighbours && !before->is_wrong;
   FOR_PIXELS(x, blocks.width) {
     float from[PIXELS], to[PIXELS];
     for (int i = 0; i < PIXELS; ++i) {
-      const Span span = span_around(blocks, view, min(x + i, blocks.width - 1), y, asks, margin, min_count,
-                                    coarse_margin, ranges, coarse_ranges, found);
+      const Span span = span_around(blocks, view, min(x + i, blocks.width - 1), y, from_neighbours, margin,
+                                    min_count, coarse_margin, ranges, coarse_ranges, found);
       from[i] = span.from;
       to[i] = span.to;
     }
@@ -208,22 +205,21 @@ static inline Bands bands_of_predictions(const DisparityRange range, const float
 // Work-items that have a row alone sum it up, too. A work-item PIXELS pixels and view, or a row and view.
 KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
-                            const float coarse_tolerance, const float coarse_margin, global const PredictionState* before,
-                            global const BlockRange* found, global const Band* block_bands, global Band* bands,
-                            global uint* cell_offsets, global RowSum* row_sums) {
+                            const float coarse_tolerance, const float coarse_margin, global const BlockRange* found,
+                            global const Band* block_bands, global Band* bands, global uint* cell_offsets,
+                            global RowSum* row_sums) {
   const ImageSize blocks = blocks_of(size);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t row_of_blocks = index_of(blocks, view, 0, y / EGOSGM_BLOCK);
-  const Ints believed = (Ints)(before->is_wrong ? 0 : -1);
 #if ROW_GROUP == 1
   Sums sums = {0, 0};
 #endif
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
-    const Ints predicted = (d > INVALID) & believed;
+    const Ints predicted = d > INVALID;
     global const BlockRange* here = found + row_of_blocks + x / EGOSGM_BLOCK;
     const Bands own = bands_of_predictions(
         range, sigmas, min_half_width, coarse_tolerance, coarse_margin, predicted ? d : (Floats)(0.0f),

@@ -203,11 +203,13 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
 TEST(BandedSgmStripes, EqualTheTwinOfEach) {
   for (const Scheduling scheduling : {Scheduling::kWavefront, Scheduling::kPaths}) {
     for (const MatchingCost cost : {MatchingCost::kCensus13x11, MatchingCost::kSad3x3}) {
+      const bool reads_off = cost == MatchingCost::kSad3x3;
       const Case c{.size = {61, 301},
                    .range = {-5, 37},
                    .cost = cost,
                    .scheduling = scheduling,
-                   .reads_off = cost == MatchingCost::kSad3x3};
+                   .launches = reads_off ? BandedSgm::Launches::kWaves : BandedSgm::Launches::kSweepsOfAView,
+                   .reads_off = reads_off};
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
       const auto expected = stripe_by_stripe(m, c.size);
@@ -303,6 +305,7 @@ std::vector<Case> changed(std::vector<Case> cases, Change change) {
 void along_paths(Case& c) { c.scheduling = Scheduling::kPaths; }
 void read_off(Case& c) { c.reads_off = true; }
 void whole_sweeps(Case& c) { c.launches = BandedSgm::Launches::kSweeps; }
+void view_by_view(Case& c) { c.launches = BandedSgm::Launches::kSweepsOfAView; }
 
 /// Groups of other shapes than the default: single work-items, paths that do not share out evenly, more lanes than
 /// quads, a minimum in one, two and three steps.
@@ -356,12 +359,16 @@ INSTANTIATE_TEST_SUITE_P(BandedSweeps, BandedSgmTest, ValuesIn(changed(kBanded, 
 INSTANTIATE_TEST_SUITE_P(FullRangeSweeps, BandedSgmTest, ValuesIn(changed(kFullRange, whole_sweeps)), name);
 INSTANTIATE_TEST_SUITE_P(SmallTiles, BandedSgmTest, ValuesIn(in_small_tiles()), name);
 INSTANTIATE_TEST_SUITE_P(SmallTilesSweeps, BandedSgmTest, ValuesIn(changed(in_small_tiles(), whole_sweeps)), name);
+INSTANTIATE_TEST_SUITE_P(BandedViewByView, BandedSgmTest, ValuesIn(changed(kBanded, view_by_view)), name);
+INSTANTIATE_TEST_SUITE_P(FullRangeViewByView, BandedSgmTest, ValuesIn(changed(kFullRange, view_by_view)), name);
 INSTANTIATE_TEST_SUITE_P(Blocks, BandedSgmTest, ValuesIn(in_blocks()), name);
 INSTANTIATE_TEST_SUITE_P(BandedPaths, BandedSgmTest, ValuesIn(changed(kBanded, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(FullRangePaths, BandedSgmTest, ValuesIn(changed(kFullRange, along_paths)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOff, BandedSgmTest, ValuesIn(changed(kBanded, read_off)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOffFullRange, BandedSgmTest, ValuesIn(changed(kFullRange, read_off)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOffSweeps, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), whole_sweeps)),
+                         name);
+INSTANTIATE_TEST_SUITE_P(ReadOffViewByView, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), view_by_view)),
                          name);
 INSTANTIATE_TEST_SUITE_P(ReadOffSmallTiles, BandedSgmTest, ValuesIn(changed(in_small_tiles(), read_off)), name);
 INSTANTIATE_TEST_SUITE_P(ReadOffPaths, BandedSgmTest, ValuesIn(changed(changed(kBanded, read_off), along_paths)), name);

@@ -59,6 +59,16 @@ TEST(EdgeRejection, SeesAJumpAcrossOneHoleButNotAcrossTwo) {
   EXPECT_EQ(reject_row({10, 10, kNone, kNone, 30, 30}, 5), (std::vector<float>{10, 10, kNone, kNone, 30, 30}));
 }
 
+TEST(EdgeRejection, LeavesTheMarkOfWhatIsHidden) {
+  const shared::ImageSize size{3, 1};
+  testing::HostMaps maps = testing::empty_maps(size);
+  maps.disparity = {10, kNone, 30, kNone, kNone, kNone};
+  maps.variance = {1, EGOSGM_HIDDEN, 1, 0, 0, 0};
+  for (const int pixels : {1, 16}) {
+    EXPECT_EQ(reject(size, 5, maps, pixels).variance, (std::vector<float>{0, EGOSGM_HIDDEN, 0, 0, 0, 0}));
+  }
+}
+
 TEST(EdgeRejection, KeepsSlopesAndStepsUpToTheLimit) {
   const std::vector<float> row{10, 15, 20, 25, 20};
   EXPECT_EQ(reject_row(row, 5), row);

@@ -19,14 +19,13 @@ testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const te
                        Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   HoleFill fill(context, size, {.max_difference_px = max_difference_px}, pixels);
-  const StereoMaps in = testing::upload(context, size, maps);
+  const StereoMaps in = testing::upload(context, size, testing::with_marks(maps));
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  FlagMap hidden(context, in.disparity.size()), still_hidden(context, in.disparity.size());
-  hidden.write(context, maps.hidden);
-  still_hidden.write(context, std::vector<cl_uchar>(maps.hidden.size(), 9));
-  fill(in, hidden, out, still_hidden, views);
+  FlagMap hidden(context, in.disparity.size());
+  hidden.write(context, std::vector<cl_uchar>(hidden.size(), 9));
+  fill(in, out, hidden, views);
   testing::HostMaps filled = testing::download(context, out);
-  filled.hidden = still_hidden.read(context);
+  filled.hidden = hidden.read(context);
   return filled;
 }
 

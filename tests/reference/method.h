@@ -6,7 +6,6 @@ namespace egosgm::reference {
 
 inline constexpr int kCoarseMinCount = 8;
 inline constexpr int kCoarseOutliers = 2;
-inline constexpr int kCheckedRows = 4;
 inline constexpr float kDifferencePx = 1.0f;
 inline constexpr int kDynamicMinCount = 9;
 inline constexpr int kDynamicRadius = 4;

@@ -5,7 +5,6 @@
 
 #include "host/method_options.h"
 #include "tests/reference/fuse/kalman_update.h"
-#include "tests/reference/fuse/prediction_check.h"
 #include "tests/reference/fuse/sad_check.h"
 #include "tests/reference/match/banded_sgm.h"
 #include "tests/reference/match/census.h"
@@ -46,16 +45,11 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     frame.vertical_offset_px = known.terms_px[0];
     frame.passes.push_back(match(images, frame, known));
   }
-  if (options_.prediction_check.enabled) {
-    prediction_ = check_prediction(size_, prediction_, frame.warped.disparity, frame.predicted.disparity,
-                                   frame.passes.back().measured.disparity);
-  }
   if (has_prediction) update(images, frame);
 
   frame.dynamic.assign(static_cast<std::size_t>(size_.width) * size_.height, 0);
   if (has_prediction) {
-    frame.dynamic =
-        dynamic_map(size_, options_.dynamic_map.min_difference_px, frame.predicted, frame.passes.back().measured);
+    frame.dynamic = dynamic_map(size_, frame.predicted, frame.passes.back().measured);
   }
   frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
   frame.output_variance = options_.output_variance.enabled ? output_variance(size_, options_.output_variance,
@@ -86,13 +80,14 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
   frame.warped =
       forward_warp(size_, range_, motions.left, motions.right, options_.forward_warp.process_noise_px2, *belief_);
-  if (!options_.track_right) {
-    frame.warped = right_map(size_, range_.min, options_.consistency.prediction_px, {}, frame.warped);
-  }
-  frame.without_edges = edge_rejection(size_, options_.edge_rejection.max_jump_px, frame.warped);
-  frame.filled = hole_fill(size_, options_.hole_fill.max_difference_px, frame.without_edges);
+  const float max_jump_px = options_.edge_rejection.max_jump_px;
+  const ConsistencyCheckOptions& check = options_.consistency;
+  if (max_jump_px > 0) frame.without_edges = edge_rejection(size_, max_jump_px, frame.warped);
   frame.predicted =
-      consistency_check(size_, options_.consistency.prediction_px, options_.consistency.keep_unseen, frame.filled);
+      hole_fill(size_, options_.hole_fill.max_difference_px, max_jump_px > 0 ? frame.without_edges : frame.warped);
+  if (check.prediction_px <= 0 || !options_.track_right) return;
+  frame.filled = frame.predicted;
+  frame.predicted = consistency_check(size_, check.prediction_px, check.keep_unseen, frame.filled);
 }
 
 Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOffset& known) const {
@@ -105,12 +100,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
     pass.coarse = coarse_match(size_, options_, pass.images, images.bits);
   }
   pass.band = everything ? full_range(size_, range_, frame.predicted.disparity)
-                         : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse,
-                                       frame.warped.disparity);
-
-  if (!everything && prediction_.is_wrong) {
-    pass.band = full_range(size_, range_, frame.predicted.disparity);
-  }
+                         : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse);
 
   const auto middle = pass.images.begin() + static_cast<std::ptrdiff_t>(pass.images.size() / 2);
   const std::vector<std::uint64_t> both[2] = {codes(size_, {pass.images.begin(), middle}, images.bits, sgm.cost),
@@ -135,9 +125,8 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   pass.matched = banded_sgm(parameters, sgm, both, grey, pass.band.bands);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
-  const bool is_narrow = reads_off && !prediction_.is_wrong;
   pass.consistent =
-      consistency_check(size_, is_narrow ? check.read_off_px : check.measurement_px, false, pass.smoothed);
+      consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed);
   pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
   if (reads_off) {
     const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);
@@ -157,9 +146,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
 
 void Pipeline::update(const Images& images, Frame& frame) const {
   const Pass& pass = frame.passes.back();
-  KalmanUpdateOptions kalman = options_.kalman_update;
-  if (prediction_.is_wrong || prediction_.was_wrong) kalman.ask_neighbours = false;
-  frame.fused = kalman_update(size_, kalman, frame.predicted, pass.measured);
+  frame.fused = kalman_update(size_, options_.kalman_update, frame.predicted, pass.measured);
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
   if (!options_.track_right) {
     frame.fused_smoothed =

@@ -70,7 +70,6 @@ class Pipeline {
   std::optional<testing::HostMaps> belief_;
   std::string no_belief_reason_ = "first frame";
   VerticalOffset offset_;
-  shared::PredictionState prediction_{};
   bool has_offset_ = false;
 };
 

@@ -29,6 +29,21 @@ inline HostMaps download(ocl::Context& context, const Measurement& maps) {
   return {maps.disparity.read(context), maps.variance.read(context), {}, maps.doubtful.read(context)};
 }
 
+/// A prediction whose variances mark what is hidden (EGOSGM_HIDDEN), as `hidden` and variances; and back.
+inline HostMaps without_marks(HostMaps maps) {
+  for (float& p : maps.variance) {
+    maps.hidden.push_back(p == EGOSGM_HIDDEN);
+    if (p == EGOSGM_HIDDEN) p = 0;
+  }
+  return maps;
+}
+inline HostMaps with_marks(HostMaps maps) {
+  for (std::size_t i = 0; i < maps.hidden.size(); ++i) {
+    if (maps.hidden[i]) maps.variance[i] = EGOSGM_HIDDEN;
+  }
+  return maps;
+}
+
 /// Both views without any value.
 inline HostMaps empty_maps(shared::ImageSize size) {
   const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;

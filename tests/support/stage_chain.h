@@ -30,7 +30,10 @@ class StageChain {
     const Plan plan =
         plan_of(options_, before_.missing, before_.offset.is_known, motion, {Views::kBoth, true, true, true});
     const FrameImages& uploaded = transfer_.upload(left, right);
-    method_.observer = [&](Room room) { look(room, plan, uploaded, frame); };
+    method_.observer = [&](Room room) {
+      look(room, plan, uploaded, frame);
+      spoil_scratch();
+    };
     method_.frame(plan, uploaded, before_, after_, transfer_.output_variance());
     frame.result = download(context_, after_.maps);
     frame.output_variance = plan.wanted.variance ? transfer_.output_variance().read(context_) : frame.result.variance;
@@ -63,15 +66,24 @@ class StageChain {
         frame.reasons = work.reasons.read(context_);
         return;
       case Room::kRefineAlignment:
-      case Room::kCompare:
         return;
+    }
+  }
+
+  /// Nobody may read what a room before left there.
+  void spoil_scratch() {
+    for (const auto& [place, buffer] : context_.scratch()) {
+      ocl::Buffer<cl_uchar>(buffer, buffer.getInfo<CL_MEM_SIZE>()).fill(context_, 0x55);
     }
   }
 
   void look(const Prediction& prediction, reference::Frame& frame) {
     frame.warped.disparity = prediction.warped.disparity.read(context_);
-    frame.without_edges = {prediction.rejected.read(context_), prediction.warped.variance.read(context_)};
-    frame.filled.disparity = prediction.filled.read(context_);
+    if (options_.edge_rejection.max_jump_px > 0) {
+      frame.without_edges =
+          without_marks({prediction.rejected.read(context_), prediction.warped.variance.read(context_)});
+    }
+    if (options_.consistency.prediction_px > 0) frame.filled.disparity = prediction.filled.read(context_);
     frame.predicted = download(context_, prediction.maps);
     frame.predicted.hidden = prediction.hidden.read(context_);
   }

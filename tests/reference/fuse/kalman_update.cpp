@@ -31,7 +31,7 @@ class View {
   View(shared::ImageSize size, const float* predicted, const float* measured)
       : size_(size), predicted_(predicted), measured_(measured) {}
 
-  /// Of the pixels around, those measured nearer than predicted (sign 1), or farther (-1), by more than 0.75 px.
+  /// Of the pixels around, those measured nearer than predicted (sign 1), or farther (-1), by more than a pixel.
   int moving(int x, int y, float sign) const {
     return count(x, y, [&](std::size_t i) { return is_moving(i, sign); });
   }
@@ -45,7 +45,7 @@ class View {
  private:
   bool is_moving(std::size_t i, float sign) const {
     return predicted_[i] != EGOSGM_INVALID_DISPARITY && measured_[i] != EGOSGM_INVALID_DISPARITY &&
-           sign * (measured_[i] - predicted_[i]) > 0.75f;
+           sign * (measured_[i] - predicted_[i]) > kDifferencePx;
   }
 
   template <typename Condition>
@@ -75,9 +75,9 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
   if (!is_valid(predicted)) return measured;
   const float innovation = z - predicted.disparity;
   if (!contradict(options.gate_px, z, predicted.disparity) && (is_plain || !measured.doubtful)) {
-    const bool moves = options.ask_neighbours && std::abs(innovation) > 1 &&
+    const bool moves = options.ask_neighbours && std::abs(innovation) > kDifferencePx &&
                        view.is_between_moving(x, y, innovation > 0 ? 1.0f : -1.0f) &&
-                       view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 15;
+                       view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 13;
     return moves ? Estimate{z, wide, true} : fuse(predicted, measured);
   }
   return {z, std::max(measured.variance, wide), true};

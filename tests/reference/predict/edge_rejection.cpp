@@ -14,7 +14,6 @@ struct Step {
 
 testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in) {
   testing::HostMaps out = in;
-  if (max_jump_px == 0) return out;
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   for (std::size_t i = 0; i < 2 * pixels; ++i) {
     if (in.disparity[i] == EGOSGM_INVALID_DISPARITY) continue;

@@ -6,7 +6,6 @@
 
 namespace egosgm::reference {
 
-/// max_jump_px 0 keeps all.
 testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, const testing::HostMaps& in);
 
 }  // namespace egosgm::reference

@@ -34,11 +34,10 @@ testing::HostMaps right_map(shared::ImageSize size, int min_disparity, float max
                             const testing::HostMaps& measured, const testing::HostMaps& maps) {
   const std::size_t width = size.width, pixels = width * size.height;
   const std::vector<float> nearest = landed(size, min_disparity, maps);
-  const bool is_measured = !measured.disparity.empty();
   testing::HostMaps out = maps;
   if (!out.hidden.empty()) std::fill(out.hidden.begin() + static_cast<std::ptrdiff_t>(pixels), out.hidden.end(), 0);
   for (std::size_t i = 0; i < pixels; ++i) {
-    const float z = is_measured ? measured.disparity[pixels + i] : kNone, d = z > kNone ? z : nearest[i];
+    const float z = measured.disparity[pixels + i], d = z > kNone ? z : nearest[i];
     out.disparity[pixels + i] = z > kNone ? z : kNone;
     out.variance[pixels + i] = z > kNone ? measured.variance[pixels + i] : 0.0f;
     const float left_x = std::nearbyint(static_cast<float>(i % width) + d);

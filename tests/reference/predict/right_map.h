@@ -6,7 +6,7 @@
 
 namespace egosgm::reference {
 
-/// `maps` with another right half. An empty `measured`: of the left half alone.
+/// `maps` with another right half.
 testing::HostMaps right_map(shared::ImageSize size, int min_disparity, float max_difference_px,
                             const testing::HostMaps& measured, const testing::HostMaps& maps);
 

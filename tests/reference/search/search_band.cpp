@@ -119,21 +119,20 @@ void sum_rows(shared::ImageSize size, const std::vector<float>& disparity, Searc
 }  // namespace
 
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted, const std::vector<float>& coarse,
-                        const std::vector<float>& warped) {
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse) {
   const int blocks_x = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   const int blocks_y = (size.height + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK;
   std::vector<shared::Band> of_blocks;
   std::vector<std::pair<float, float>> found;
-  const std::vector<float>& whole = warped.empty() ? predicted.disparity : warped;
+  const std::vector<float>& disparity = predicted.disparity;
   for (int view = 0; view < 2; ++view) {
     for (int y = 0; y < blocks_y; ++y) {
       for (int x = 0; x < blocks_x; ++x) {
         const std::pair<float, float> of_coarse = found_around(size, coarse, view, x, y);
         of_blocks.push_back(options.from_neighbours
-                                ? from_neighbours(size, range, options, whole, of_coarse, view, x, y)
+                                ? from_neighbours(size, range, options, disparity, of_coarse, view, x, y)
                                 : band_of(range, -kInfinity, kInfinity));
-        const Predicted own = options.from_neighbours ? predicted_in(size, whole, view, x, y, x, y) : Predicted{};
+        const Predicted own = options.from_neighbours ? predicted_in(size, disparity, view, x, y, x, y) : Predicted{};
         found.push_back({std::min(of_coarse.first, own.least), std::max(of_coarse.second, own.most)});
       }
     }

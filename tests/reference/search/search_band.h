@@ -15,10 +15,9 @@ struct SearchBands {
   std::vector<shared::RowSum> row_sums;
 };
 
-/// `coarse`: what reference::coarse_match gives; `warped`: predictions before any was dropped, empty: `predicted`.
+/// `coarse`: what reference::coarse_match gives.
 SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                        const testing::HostMaps& predicted, const std::vector<float>& coarse = {},
-                        const std::vector<float>& warped = {});
+                        const testing::HostMaps& predicted, const std::vector<float>& coarse = {});
 SearchBands full_range(shared::ImageSize size, shared::DisparityRange range, const std::vector<float>& predicted = {});
 
 }  // namespace egosgm::reference
