@@ -102,7 +102,6 @@ class Frame {
             {"MedianFilter", 4 * maps},
             {"SpeckleRemoval", 2 * map},
             {"KalmanUpdate", 6 * maps},
-            {"PredictionCheck", 3 * map / 4},
             {"OutputVariance", 11 * map}};
   }
   /// A checksum (FNV-1a) of what the last steady frame found in the left view.

@@ -93,7 +93,6 @@ void for_each_chosen(Options& o, Method& m, Visit&& visit) {
 void choose_as_the_paper(MethodOptions& method) {
   method.forward_warp.motion_noise = 0.0f;
   method.edge_rejection.max_jump_px = 3.0f;
-  method.consistency.prediction_px = 3.0f;
   method.consistency.keep_unseen = false;
   method.search_band.from_neighbours = false;
   method.banded_sgm.p2_slope = 0;
@@ -119,8 +118,7 @@ void MethodOptions::give_options(PipelineOptions& options) const {
 MethodOptions::MethodOptions(const PipelineOptions& options) {
   if (options.preset == Preset::kPaper) choose_as_the_paper(*this);
   for_each_chosen(options, *this, [](const auto& option, auto& parameter) { parameter = option; });
-  consistency.update_px = options.left_right_px;
-  if (consistency.prediction_px > 0) consistency.prediction_px = options.left_right_px;
+  consistency.prediction_px = consistency.update_px = options.left_right_px;
   for (const auto& [name, value] : options.constants) set_parameter(*this, name, value);
 }
 

@@ -26,9 +26,8 @@ struct HoleFillOptions {
   float max_difference_px = 1.0f;  // gamma (eqs. 7-8): neighbours that differ by less fill the gap between them
 };
 struct ConsistencyCheckOptions {
-  float measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the two
-  float prediction_px = 0.0f;                     // of the prediction, where both views are tracked; 0: no check
-  float read_off_px = 1.45f;                      // of the measurement, where the right view is read off
+  float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
+  float read_off_px = 1.45f;  // of the measurement, where the right view is read off
   bool keep_unseen = true;    // of prediction and update: what the other camera cannot see stays
 };
 struct CoarseMatchOptions {

@@ -17,7 +17,6 @@ ABLATION = [
     ("no band from neighbours", {"constants.search_band.from_neighbours": False}, "A pixel without a prediction then searches everything."),
     ("no gate", {"gate_px": 0}, "Prediction and measurement are averaged even where they contradict each other."),
     ("neighbours not asked", {"constants.kalman_update.ask_neighbours": False}, "The measurement counts wherever it contradicts the prediction."),
-    ("predictions not checked", {"constants.prediction_check.enabled": False}, "Wrong predictions do not make the next frame search everything."),
     ("no prediction kept", {"keep_predicted": False}, "What is not measured in this frame is forgotten."),
     ("no edge rejection", {"constants.edge_rejection.max_jump_px": 0}, "Predictions beside a jump stay (the paper's)."),
     ("no hole fill", {"constants.hole_fill.max_difference_px": 0}, "Gaps that forward motion tears open stay unpredicted (the paper's)."),

@@ -69,8 +69,7 @@ Demand demand(const ocl::Context& context, shared::ImageSize size, shared::Dispa
   const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, range, kViews);
   const std::uint64_t ranks = ReadOff::bytes(size, BandedSgm::code_padding(range));
   if (paths) return {sums, 4 * sums + ranks};
-  const std::uint64_t slots = slot_bytes(size, range, kViews),
-                      winners = kViews * pixel_count(size) * sizeof(cl_ulong);
+  const std::uint64_t slots = slot_bytes(size, range, kViews), winners = kViews * pixel_count(size) * sizeof(cl_ulong);
   return {std::max({sums, slots, winners}), sums + slots + winners + ranks};
 }
 
@@ -212,8 +211,8 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
                           inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
                           wavefront.sums, wavefront.winners, read_off_.ranks());
   }
-  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views),
-                   parameters, wavefront.winners, measured.disparity, measured.variance, measured.doubtful);
+  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters,
+                   wavefront.winners, measured.disparity, measured.variance, measured.doubtful);
 }
 
 int BandedSgm::matched_rows() const {

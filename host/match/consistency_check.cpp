@@ -23,7 +23,8 @@ void ConsistencyCheck::operator()(const Map& disparity, float max_difference_px,
                                   Map& variance, Views views) {
   context_.enter("ConsistencyCheck");
   const cl_int keep_outside = outside == OutsideView::kKeep;
-  check_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_difference_px, keep_outside, disparity, kept, variance);
+  check_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_difference_px, keep_outside,
+         disparity, kept, variance);
 }
 
 }  // namespace egosgm

@@ -21,8 +21,8 @@ MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const Method
   if (options.median_filter.enabled) median_filter_.emplace(context, size);
 }
 
-void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands,
-                           Matching& matching, Measurement& measured) {
+void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
+                           Measurement& measured) {
   const bool reads_off = plan.matched == Views::kLeft;
   Measurement matched{{matching.matched, measured.variance}, measured.doubtful};
   if (reads_off) {

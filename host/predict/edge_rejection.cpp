@@ -23,7 +23,8 @@ EdgeRejection::EdgeRejection(ocl::Context& context, shared::ImageSize size, cons
 
 void EdgeRejection::operator()(const Map& disparity, Map& kept, Map& variance, Views views) {
   context_.enter("EdgeRejection");
-  reject_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_jump_px_, disparity, kept, variance);
+  reject_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_jump_px_, disparity, kept,
+          variance);
 }
 
 }  // namespace egosgm

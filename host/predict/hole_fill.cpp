@@ -24,8 +24,8 @@ HoleFill::HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFill
 void HoleFill::operator()(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views) {
   context_.enter("HoleFill");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, count(views));
-  fill_rows_(context_, pixels, size_, max_difference_px_, in.disparity, in.variance,
-             rows_filled_.disparity, rows_filled_.variance);
+  fill_rows_(context_, pixels, size_, max_difference_px_, in.disparity, in.variance, rows_filled_.disparity,
+             rows_filled_.variance);
   fill_columns_(context_, pixels, size_, max_difference_px_, rows_filled_.disparity, rows_filled_.variance,
                 out.disparity, out.variance, hidden);
 }

@@ -8,19 +8,19 @@ PredictRoom::PredictRoom(ocl::Context& context, shared::ImageSize size, const Ca
     : left_right_px_(options.consistency.prediction_px),
       outside_(outside_view(options.consistency)),
       forward_warp_(context, size, calibration, options.forward_warp, range_of(options), 0, tuning.warp_band_rows),
-      hole_fill_(context, size, options.hole_fill) {
+      hole_fill_(context, size, options.hole_fill),
+      consistency_(context, size) {
   if (options.edge_rejection.max_jump_px > 0) edge_rejection_.emplace(context, size, options.edge_rejection);
-  if (options.consistency.prediction_px > 0) consistency_.emplace(context, size);
 }
 
 void PredictRoom::operator()(const Plan& plan, const StereoMaps& belief, Prediction& prediction) {
   auto& [warped, rejected, filled, maps, hidden] = prediction;
-  const bool checks = consistency_ && plan.tracked == Views::kBoth;
+  const bool checks = plan.tracked == Views::kBoth;
   forward_warp_(belief, *plan.motion, warped, plan.tracked);
   if (edge_rejection_) (*edge_rejection_)(warped.disparity, rejected, warped.variance, plan.tracked);
   StereoMaps holes_filled{checks ? filled : maps.disparity, maps.variance};
   hole_fill_({edge_rejection_ ? rejected : warped.disparity, warped.variance}, holes_filled, hidden, plan.tracked);
-  if (checks) (*consistency_)(filled, left_right_px_, outside_, maps.disparity, maps.variance, plan.tracked);
+  if (checks) consistency_(filled, left_right_px_, outside_, maps.disparity, maps.variance, plan.tracked);
 }
 
 }  // namespace egosgm

@@ -39,7 +39,7 @@ class PredictRoom {
   ForwardWarp forward_warp_;
   std::optional<EdgeRejection> edge_rejection_;
   HoleFill hole_fill_;
-  std::optional<ConsistencyCheck> consistency_;  // of both views, where they are tracked
+  ConsistencyCheck consistency_;  // of both views, where they are tracked
 };
 
 }  // namespace egosgm

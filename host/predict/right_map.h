@@ -14,9 +14,9 @@ class RightMap {
   /// `pixels` of a work-item: 1 (and atomics) or 16 (a row); 0: by the device. Same bits.
   RightMap(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, int pixels = 0);
 
-  /// From the left half of `maps` and the right one of `measured` to the right half of `maps`. What differs by more than
-  /// `max_difference_px` contradicts. The variances only where `makes_variance`. REQUIRES: no disparity lies more than
-  /// half a pixel below the range.
+  /// From the left half of `maps` and the right one of `measured` to the right half of `maps`. What differs by more
+  /// than `max_difference_px` contradicts. The variances only where `makes_variance`. REQUIRES: no disparity lies more
+  /// than half a pixel below the range.
   void operator()(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance);
 
  private:

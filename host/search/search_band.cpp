@@ -67,15 +67,15 @@ void SearchBand::operator()(const StereoMaps& predicted, const Map* coarse, Sear
   context_.enter("SearchBand");
   const int pixels = row_group_ == 1 ? 2 * EGOSGM_BLOCK : 1;
   const ocl::Range blocks = ocl::every_pixels(context_, blocks_, pixels, count(views));
-  if (coarse) gather_coarse_(context_, ocl::every_pixel(context_, blocks_, count(views)), size_, *coarse, coarse_ranges_);
+  if (coarse)
+    gather_coarse_(context_, ocl::every_pixel(context_, blocks_, count(views)), size_, *coarse, coarse_ranges_);
   if (options_.from_neighbours) gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
   bands_of_blocks_(context_, blocks, size_, range_, options_.from_neighbours, options_.neighbour_margin_px,
                    options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_,
                    coarse ? coarse_ranges_ : none_, found_, block_bands_);
   bands_of_pixels_(context_, ocl::every_pixels(context_, size_, pixels, count(views)), size_, range_, options_.sigmas,
                    options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
-                   options_.coarse_margin_px, found_, block_bands_, bands.bands, bands.cell_offsets,
-                   bands.row_sums);
+                   options_.coarse_margin_px, found_, block_bands_, bands.bands, bands.cell_offsets, bands.row_sums);
   if (pixels == 1) sum_rows(predicted.disparity, bands, views);
 }
 

@@ -61,8 +61,8 @@ class SearchBand {
               const float, const Ranges, const Ranges, Ranges, ocl::Buffer<shared::Band>>
       bands_of_blocks_;
   ocl::Kernel<const shared::ImageSize, const shared::DisparityRange, const float, const float, Disparities, Disparities,
-              const float, const float, const Ranges, const ocl::Buffer<shared::Band>,
-              ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>, ocl::Buffer<shared::RowSum>>
+              const float, const float, const Ranges, const ocl::Buffer<shared::Band>, ocl::Buffer<shared::Band>,
+              ocl::Buffer<cl_uint>, ocl::Buffer<shared::RowSum>>
       bands_of_pixels_;
   ocl::Kernel<const shared::ImageSize, Disparities, const ocl::Buffer<shared::Band>, ocl::Buffer<cl_uint>,
               ocl::Buffer<shared::RowSum>>

@@ -17,20 +17,17 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 testing::HostMaps before_update(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
 
 testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& predicted,
-                         const testing::HostMaps& measured, int pixels = 0, const shared::PredictionState& check = {},
-                         Views views = Views::kBoth) {
+                         const testing::HostMaps& measured, int pixels = 0, Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   KalmanUpdate update(context, size, options, pixels);
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const Measurement measurement = testing::upload_measurement(context, size, measured);
   StereoMaps out = testing::upload(context, size, before_update(size));
-  ocl::Buffer<shared::PredictionState> checked(context, 1);
-  checked.write(context, {check});
   FlagMap hidden(context, predicted.disparity.size());
   hidden.write(context, predicted.hidden.empty() ? std::vector<cl_uchar>(hidden.size()) : predicted.hidden);
   FlagMap doubtful(context, predicted.disparity.size());
   doubtful.write(context, std::vector<cl_uchar>(doubtful.size(), 9));
-  update(checked, hidden, prediction, measurement, out, doubtful, views);
+  update(hidden, prediction, measurement, out, doubtful, views);
   return testing::download(context, Measurement{out, doubtful});
 }
 
@@ -94,7 +91,7 @@ TEST_P(KalmanUpdateTest, UpdatesTheLeftViewAlone) {
   const testing::HostMaps both = update(size, {}, predicted, measured);
   for (const int pixels : {1, 16}) {
     const testing::HostMaps was = before_update(size);
-    const testing::HostMaps one = update(size, {}, predicted, measured, pixels, {}, Views::kLeft);
+    const testing::HostMaps one = update(size, {}, predicted, measured, pixels, Views::kLeft);
     EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
     EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
   }
@@ -160,9 +157,8 @@ struct Surroundings {
     const std::size_t pixels = 2 * kSize.width * kSize.height;
     return {std::vector<float>(pixels, disparity), std::vector<float>(pixels, 1)};
   }
-  Estimate updated_in_the_middle(const KalmanUpdateOptions& options = {},
-                                 const shared::PredictionState& check = {}) const {
-    const testing::HostMaps updated = update(kSize, options, predicted, measured, 0, check);
+  Estimate updated_in_the_middle(const KalmanUpdateOptions& options = {}) const {
+    const testing::HostMaps updated = update(kSize, options, predicted, measured);
     return {updated.disparity[kMiddle], updated.variance[kMiddle], updated.doubtful[kMiddle] != 0};
   }
 };
@@ -177,24 +173,24 @@ Surroundings shifted(float off, float innovation) {
 
 TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
   for (const float sign : {1.0f, -1.0f}) {
-    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kWide, true}));
+    EXPECT_EQ(shifted(sign * 1.125f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kWide, true}));
     const Estimate fused{20 + sign * 0.625f, 0.5f};
-    EXPECT_EQ(shifted(sign * 0.75f, sign * 1.25f).updated_in_the_middle(), fused) << "the others not far enough";
-    EXPECT_EQ(shifted(sign * -0.875f, sign * 1.25f).updated_in_the_middle(), fused) << "to the other side";
-    EXPECT_EQ(shifted(sign * 0.875f, sign * 1).updated_in_the_middle(), (Estimate{20 + sign * 0.5f, 0.5f}));
-    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle({.ask_neighbours = false}), fused);
-    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle({}, {{}, 1, 0}), fused) << "wrong predictions";
-    EXPECT_EQ(shifted(sign * 0.875f, sign * 1.25f).updated_in_the_middle({}, {{}, 0, 1}), fused) << "they were";
+    EXPECT_EQ(shifted(sign * 1, sign * 1.25f).updated_in_the_middle(), fused) << "the others not far enough";
+    EXPECT_EQ(shifted(sign * -1.125f, sign * 1.25f).updated_in_the_middle(), fused) << "to the other side";
+    EXPECT_EQ(shifted(sign * 1.125f, sign * 1).updated_in_the_middle(), (Estimate{20 + sign * 0.5f, 0.5f}));
+    EXPECT_EQ(shifted(sign * 1.125f, sign * 1.25f).updated_in_the_middle({.ask_neighbours = false}), fused);
   }
-  Surroundings maps = shifted(0.875f, 1.25f);
+  Surroundings maps = shifted(1.125f, 1.25f);
   for (const int still : {2, 6, 10, 14, 18}) {
     maps.measured.disparity[2 * 21 + still] = maps.measured.disparity[18 * 21 + still] = 20;
   }
   EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kWide, true})) << "15 of 25";
-  maps.measured.disparity[6 * 21 + 2] = 20;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "14 of 25";
+  maps.measured.disparity[6 * 21 + 2] = maps.measured.disparity[14 * 21 + 18] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kWide, true})) << "13 of 25";
+  maps.measured.disparity[14 * 21 + 2] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "12 of 25";
   for (const int beside : {6, 14}) {
-    Surroundings between = shifted(0.875f, 1.25f);
+    Surroundings between = shifted(1.125f, 1.25f);
     between.measured.disparity[10 * 21 + beside] = 20;
     EXPECT_EQ(between.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "but not beside";
   }

@@ -88,23 +88,6 @@ TEST(ConsistencyCheck, ToleratesADifferenceUpToTheLimit) {
   EXPECT_EQ(check_row(left, right, 0.4375f), (std::vector<float>(4, kNone)));
 }
 
-TEST(ConsistencyCheck, HasAnotherToleranceWhereTheLastPredictionsWereWrong) {
-  const shared::ImageSize size{2, 1};
-  const testing::HostMaps maps{{kNone, 1.25f, 0.75f, kNone}, {1, 1, 1, 1}};
-  ocl::Context context(testing::any_device());
-  ConsistencyCheck check(context, size);
-  StereoMaps out(context, size);
-  ocl::Buffer<shared::PredictionState> last(context, 1);
-  for (const cl_uint is_wrong : {0u, 1u}) {
-    for (const auto& [usual_px, in_doubt_px] : {std::pair{0.4375f, 0.5f}, {0.5f, 0.4375f}}) {
-      last.write(context, {{.counts = {}, .is_wrong = is_wrong}});
-      StereoMaps in = testing::upload(context, size, maps);
-      check(in.disparity, usual_px, in_doubt_px, last, OutsideView::kDrop, out.disparity, in.variance, Views::kBoth);
-      EXPECT_EQ(out.disparity.read(context)[1], (is_wrong ? in_doubt_px : usual_px) == 0.5f ? 1.25f : kNone);
-    }
-  }
-}
-
 TEST(ConsistencyCheck, ChecksEachViewAgainstTheOtherAsItCame) {
   // Left 3 agrees with right 1, whose own match, left 4, does not agree with it: right 1 goes, left 3 stays.
   EXPECT_EQ(check_row({kNone, kNone, kNone, 2, 9}, {kNone, 3, kNone, kNone, kNone}, 1.5f),

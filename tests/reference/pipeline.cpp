@@ -85,7 +85,7 @@ void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
   if (max_jump_px > 0) frame.without_edges = edge_rejection(size_, max_jump_px, frame.warped);
   frame.predicted =
       hole_fill(size_, options_.hole_fill.max_difference_px, max_jump_px > 0 ? frame.without_edges : frame.warped);
-  if (check.prediction_px <= 0 || !options_.track_right) return;
+  if (!options_.track_right) return;
   frame.filled = frame.predicted;
   frame.predicted = consistency_check(size_, check.prediction_px, check.keep_unseen, frame.filled);
 }

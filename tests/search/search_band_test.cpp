@@ -26,8 +26,7 @@ reference::SearchBands read(ocl::Context& context, const SearchBands& bands) {
 }
 
 reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
-                           const HostMaps& maps, int row_group = 0, const std::vector<float>& coarse = {},
-                           const std::vector<float>& warped = {}) {
+                           const HostMaps& maps, int row_group = 0, const std::vector<float>& coarse = {}) {
   ocl::Context context(testing::any_device());
   SearchBand stage(context, size, range, options, row_group);
   StereoMaps predicted(context, size);
@@ -36,10 +35,7 @@ reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range,
   StereoMaps found(context, {(size.width + 3) / 4, (size.height + 3) / 4});
   if (!coarse.empty()) found.disparity.write(context, coarse);
   SearchBands bands(context, size, range);
-  StereoMaps before(context, size);
-  if (!warped.empty()) before.disparity.write(context, warped);
-  stage(predicted, {warped.empty() ? nullptr : &before.disparity, coarse.empty() ? nullptr : &found.disparity}, bands,
-        Views::kBoth);
+  stage(predicted, coarse.empty() ? nullptr : &found.disparity, bands, Views::kBoth);
   return read(context, bands);
 }
 
@@ -72,9 +68,6 @@ TEST_P(SearchBandTest, EqualsReferenceWithACoarseMatch) {
     const SearchBandOptions options{.coarse_tolerance_px = 1.25f, .coarse_margin_px = 0.5f};
     expect_same(run(size, range, options, maps, 0, coarse), reference::search_band(size, range, options, maps, coarse),
                 size);
-    const auto warped = testing::random_maps(size, static_cast<float>(range.min), end, 0.3, 38).disparity;
-    expect_same(run(size, range, options, maps, 0, coarse, warped),
-                reference::search_band(size, range, options, maps, coarse, warped), size);
   }
 }
 
@@ -111,23 +104,18 @@ TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
   const StereoMaps predicted = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.6, 40));
   const StereoMaps coarse = testing::upload(context, quarter, testing::random_maps(quarter, -1, 30, 0.3, 42));
   const StereoMaps earlier = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.6, 43));
-  ocl::Buffer<shared::PredictionState> wrong(context, 1);
-  wrong.write(context, {{.counts = {}, .is_wrong = 1}});
   for (const int row_group : {1, 64}) {
     SearchBand stage(context, size, {-5, 128}, {}, row_group);
     SearchBands bands(context, size, {-5, 128});
     const std::function<void(Views)> ways[] = {
-        [&](Views views) {
-          stage(predicted, {&earlier.disparity, &coarse.disparity}, bands, views);
-        },
-        [&](Views views) { stage(predicted, {.last = &wrong}, bands, views); },
+        [&](Views views) { stage(predicted, &coarse.disparity, bands, views); },
         [&](Views views) { stage.full_range(bands, views); },
         [&](Views views) { stage.full_range(predicted.disparity, bands, views); },
     };
     for (const auto& search : ways) {
       search(Views::kBoth);
       const reference::SearchBands both = read(context, bands);
-      stage(earlier, {}, bands, Views::kBoth);
+      stage(earlier, nullptr, bands, Views::kBoth);
       const reference::SearchBands before = read(context, bands);
       search(Views::kLeft);
       expect_same(read(context, bands),
@@ -146,28 +134,6 @@ INSTANTIATE_TEST_SUITE_P(Large, SearchBandTest, ::testing::Values(testing::kLarg
 HostMaps nothing(shared::ImageSize size) {
   const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
   return {std::vector(pixels, EGOSGM_INVALID_DISPARITY), std::vector(pixels, 0.0f)};
-}
-
-TEST(SearchBand, SearchesEverythingAfterWrongPredictions) {
-  constexpr shared::ImageSize kSize{65, 19};
-  for (const shared::DisparityRange range : kRanges) {
-    const auto maps = testing::random_maps(kSize, 0, static_cast<float>(range.count), 0.5, 41);
-    ocl::Context context(testing::any_device());
-    SearchBand stage(context, kSize, range, {});
-    const StereoMaps predicted = testing::upload(context, kSize, maps);
-    ocl::Buffer<shared::PredictionState> last(context, 1);
-    for (const cl_int is_wrong : {0, 1}) {
-      shared::PredictionState state{};
-      state.is_wrong = is_wrong;
-      last.write(context, {state});
-      SearchBands bands(context, kSize, range);
-      stage(predicted, {nullptr, nullptr, &last}, bands, Views::kBoth);
-      expect_same(read(context, bands),
-                  is_wrong ? reference::full_range(kSize, range, maps.disparity)
-                           : reference::search_band(kSize, range, {}, maps),
-                  kSize);
-    }
-  }
 }
 
 TEST(SearchBand, CoversWhatItSearchesWithTheFewestChunks) {
@@ -288,24 +254,6 @@ TEST(SearchBand, PredictedPixelReachesWhatItsBlockSpans) {
   EXPECT_EQ(run(size, {0, 128}, options, maps).bands[3 * 24 + 15].first, 58);
   for (int x = 8; x < 12; ++x) maps.disparity[3 * 24 + x] = 54.875f;
   EXPECT_EQ(run(size, {0, 128}, options, maps).bands[3 * 24 + 15].first, 53);
-}
-
-// EdgeRejection drops all of a pole, each pixel of which lies beside a jump.
-TEST(SearchBand, ReachesWhatWasDropped) {
-  const shared::ImageSize size{16, 16};
-  auto maps = nothing(size);
-  for (int i = 0; i < 256; ++i) maps.disparity[i] = 20;
-  auto warped = maps.disparity;
-  for (int x = 10; x < 12; ++x) {
-    for (int y = 0; y < 8; ++y) maps.disparity[16 * y + x] = EGOSGM_INVALID_DISPARITY, warped[16 * y + x] = 50;
-  }
-  const SearchBandOptions options{.min_half_width_px = 2, .neighbour_margin_px = 4, .coarse_margin_px = 1};
-  const auto bands = run(size, {0, 128}, options, maps, 0, {}, warped).bands;
-  EXPECT_EQ(bands[16 * 3 + 10].first, 16);
-  EXPECT_EQ(bands[16 * 3 + 10].last, 54) << "where it was";
-  EXPECT_EQ(bands[16 * 3 + 14].last, 51) << "beside it, in its block";
-  EXPECT_EQ(bands[16 * 3 + 2].last, 22) << "in another block";
-  EXPECT_EQ(run(size, {0, 128}, options, maps).bands[16 * 3 + 10].last, 24);
 }
 
 TEST(SearchBand, CountsCellsAndLanesOfARow) {

@@ -83,7 +83,7 @@ class StageChain {
       frame.without_edges =
           without_marks({prediction.rejected.read(context_), prediction.warped.variance.read(context_)});
     }
-    if (options_.consistency.prediction_px > 0) frame.filled.disparity = prediction.filled.read(context_);
+    if (options_.track_right) frame.filled.disparity = prediction.filled.read(context_);
     frame.predicted = download(context_, prediction.maps);
     frame.predicted.hidden = prediction.hidden.read(context_);
   }
