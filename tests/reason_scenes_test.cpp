@@ -204,7 +204,7 @@ std::vector<Case> cases() {
   // A board goes away while the cameras are blind.
   Board leaving = board(0.8, -0.5, 0.5, -0.4, 0.4);
   leaving.away_a_frame_m = 0.4;
-  const Scenery blind{{leaving, kWall}, 3, 0, 0, Rectangle{55, 25, 130, 84}};
+  const Scenery blind{{leaving, kWall}, 3, 0, 0, Rectangle{50, 22, 135, 88}};
   all.push_back({"predicted", Reason::kPredicted, 400, blind});
   all.push_back({"predicted_left_tracked", Reason::kPredicted, 500, blind, track_left});
   return all;
