@@ -84,8 +84,8 @@ typedef struct __attribute__((packed)) {
   Floats lanes;
 } PackedFloats;
 
-// Writes pixels x .. x + PIXELS - 1, as far as the row goes. REQUIRES: x lies in it. Not by vstore16, which some compilers
-// (PoCL 3.1) take to four pieces.
+// Writes pixels x .. x + PIXELS - 1, as far as the row goes. REQUIRES: x lies in it. Not by vstore16, which some
+// compilers (PoCL 3.1) take to four pieces.
 static inline void store_pixels(const Floats pixels, global float* row, const int x, const int width) {
 #if PIXELS == 1
   row[x] = pixels;

@@ -32,7 +32,8 @@ typedef float f32;
 
 // A pixel without a disparity; include/egosgm/image.h says the same to users.
 #define EGOSGM_INVALID_DISPARITY (-32768.0f)
-// In place of the variance of a prediction: a surface that came nearer than the range hides what is there (ForwardWarp).
+// In place of the variance of a prediction: a surface that came nearer than the range hides what is there
+// (ForwardWarp).
 #define EGOSGM_HIDDEN (-1.0f)
 
 // Maps and images of a stereo pair lie in one buffer, the left view first: index view * width * height + y * width + x.

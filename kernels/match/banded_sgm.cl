@@ -131,9 +131,9 @@ ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmPar
   }
 }
 
-// The row y of a sweep, from its pixel `from` to `to`. `view`: of those that are matched. To the pixels before one on the four paths it is `left`, `above`
-// and so on; where there is none, to one whose band and penalty do no harm: wiping some place in the slot, and a step
-// from nowhere.
+// The row y of a sweep, from its pixel `from` to `to`. `view`: of those that are matched. To the pixels before one on
+// the four paths it is `left`, `above` and so on; where there is none, to one whose band and penalty do no harm: wiping
+// some place in the slot, and a step from nowhere.
 ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParameters q,
                                                  const int view, const int y, const int from, const int to,
                                                  global const Band* bands, global const uchar* penalties,

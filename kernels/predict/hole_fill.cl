@@ -34,8 +34,10 @@ KERNEL void fill_rows(const ImageSize size, const float gamma, global const floa
     const Floats p_right = load_pixels(variance + row, x + 1, width);
     const Ints hides = is_hidden(p, p_left, p_right);
     store_pixels(fills ? mean_of(left, right) : hides ? INVALID : d, filled_disparity + row, x, width);
-    store_pixels(fills ? larger_of(p_left, p_right) : hides ? (Floats)(EGOSGM_HIDDEN) : p, filled_variance + row, x,
-                 width);
+    store_pixels(fills   ? larger_of(p_left, p_right)
+                 : hides ? (Floats)(EGOSGM_HIDDEN)
+                         : p,
+                 filled_variance + row, x, width);
   }
 }
 

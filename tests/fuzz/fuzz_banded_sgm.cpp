@@ -116,7 +116,8 @@ void run(std::string_view input) {
                                          o.variance_per_step_px2,
                                          o.variance_per_square_px2,
                                          o.doubts_band_ends,
-                                         reads_off};
+                                         reads_off,
+                                         /*first_view=*/0};
   const testing::HostMaps expected = reference::banded_sgm(parameters, o, codes, grey, bands);
   const testing::HostMaps actual = testing::download(m.context, m.measured);
   for (const auto& same : {testing::same_bits(actual.disparity, expected.disparity, m.size),

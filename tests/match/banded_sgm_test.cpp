@@ -131,7 +131,8 @@ Match match(const Case& c, int max_memory_mib = 0) {
                   m.options.variance_per_step_px2,
                   m.options.variance_per_square_px2,
                   m.options.doubts_band_ends,
-                  c.reads_off};
+                  c.reads_off,
+                  /*first_view=*/0};
   m.bands = bands.bands.read(context);
   m.measured = testing::download(context, measured);
   m.stripes = sgm.stripes();

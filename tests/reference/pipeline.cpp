@@ -117,7 +117,8 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
                                          sgm.variance_per_step_px2,
                                          sgm.variance_per_square_px2,
                                          sgm.doubts_band_ends,
-                                         reads_off};
+                                         reads_off,
+                                         /*first_view=*/0};
   const std::vector<std::uint16_t> values(pass.images.begin(), pass.images.end());
   pass.penalties = step_penalties(size_, values, images.bits, sgm);
   std::vector<std::uint16_t> grey = values;

@@ -62,7 +62,8 @@ std::vector<float> coarse_match(shared::ImageSize size, const MethodOptions& opt
                                          sgm.variance_per_step_px2,
                                          sgm.variance_per_square_px2,
                                          sgm.doubts_band_ends,
-                                         /*reads_off=*/0};
+                                         /*reads_off=*/0,
+                                         /*first_view=*/0};
   const testing::HostMaps matched = banded_sgm(parameters, sgm, both, grey, full_range(coarse, range).bands);
   return consistency_check(coarse, options.coarse_match.max_difference_px, false, matched).disparity;
 }
