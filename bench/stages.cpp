@@ -89,7 +89,6 @@ class Frame {
     const double pixels = static_cast<double>(pixel_count(size_));  // of a view; a map of both has two times as many
     const double map = 4 * pixels, maps = 2 * map, band = 12 * pixels, codes = 8 * pixels, grey = 2 * pixels;
     return {{"ForwardWarp", 4 * maps},
-            {"EdgeRejection", 4 * maps},
             {"HoleFill", 8 * maps},
             {"ConsistencyCheck", 3 * 4 * maps},
             {"CoarseMatch", grey},

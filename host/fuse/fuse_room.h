@@ -7,7 +7,7 @@
 #include "host/match/consistency_check.h"
 #include "host/match/median_filter.h"
 #include "host/predict/predict_room.h"
-#include "host/predict/right_map.h"
+#include "host/fuse/right_map.h"
 
 namespace egosgm {
 

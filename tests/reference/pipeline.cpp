@@ -15,7 +15,7 @@
 #include "tests/reference/predict/edge_rejection.h"
 #include "tests/reference/predict/forward_warp.h"
 #include "tests/reference/predict/hole_fill.h"
-#include "tests/reference/predict/right_map.h"
+#include "tests/reference/fuse/right_map.h"
 #include "tests/reference/publish/dynamic_map.h"
 #include "tests/reference/publish/output_variance.h"
 #include "tests/reference/publish/reasons.h"

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/predict/right_map.h"
+#include "host/fuse/right_map.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <utility>
 
-#include "tests/reference/predict/right_map.h"
+#include "tests/reference/fuse/right_map.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
 #include "tests/support/device_maps.h"

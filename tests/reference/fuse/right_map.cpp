@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/reference/predict/right_map.h"
+#include "tests/reference/fuse/right_map.h"
 
 #include <algorithm>
 #include <cmath>

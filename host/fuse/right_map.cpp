@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/predict/right_map.h"
+#include "host/fuse/right_map.h"
 
 namespace egosgm {
 namespace {
