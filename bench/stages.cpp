@@ -44,8 +44,7 @@ constexpr const char* kHelp =
     "are matched.\n";
 
 constexpr int kFramesARound = 5;
-constexpr const char* kRooms[] = {"predict",          "align",   "search", "match",
-                                  "refine_alignment", "compare", "fuse",   "publish"};
+constexpr const char* kRooms[] = {"predict", "align", "search", "match", "refine_alignment", "fuse", "publish"};
 
 using Clock = std::chrono::steady_clock;
 
