@@ -13,15 +13,20 @@
 // lint: PIXEL_BYTES=2 PIXELS=1
 // lint: PIXEL_BYTES=2 PIXELS=16
 
+#if PIXELS > 1
+AT_EDGE Ints grey_at_edge(global const Pixel* row, const int x, const int width) {
+  const Pixels pixels = GATHERED(Pixels, row, clamp(x + LANE_INDICES, 0, width - 1));
+  return convert_int16(to_8_bit(pixels));
+}
+#endif
+
 // Grey values of pixels x .. x + PIXELS - 1; outside the row its border's.
 static inline Ints grey_at(global const Pixel* row, const int x, const int width) {
 #if PIXELS == 1
   return to_8_bit(row[clamp(x, 0, width - 1)]);
 #else
   if (x >= 0 && x + PIXELS <= width) return convert_int16(to_8_bit(load_grey(row + x)));
-  int lanes[PIXELS];
-  for (int i = 0; i < PIXELS; ++i) lanes[i] = to_8_bit(row[clamp(x + i, 0, width - 1)]);
-  return vload16(0, lanes);
+  return grey_at_edge(row, x, width);
 #endif
 }
 

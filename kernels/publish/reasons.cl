@@ -24,15 +24,20 @@
 #endif
 #define NO_RUN 0xffff  // of a pixel that SpeckleRemoval did not look at
 
+#if PIXELS > 1
+AT_EDGE Floats load_greys_at_edge(global const Pixel* row, const int x, const int width) {
+  const Ints inside = clamp(x + LANE_INDICES, 0, width - 1);
+  return GATHERED(Floats, row, inside);
+}
+#endif
+
 // Grey values x .. x + PIXELS - 1 of a row; those outside of it are its border's.
 static inline Floats load_greys(global const Pixel* row, const int x, const int width) {
 #if PIXELS == 1
   return row[clamp(x, 0, width - 1)];
 #else
   if (x >= 0 && x + PIXELS <= width) return convert_float16(load_grey(row + x));
-  float lanes[PIXELS];
-  for (int i = 0; i < PIXELS; ++i) lanes[i] = row[clamp(x + i, 0, width - 1)];
-  return vload16(0, lanes);
+  return load_greys_at_edge(row, x, width);
 #endif
 }
 
