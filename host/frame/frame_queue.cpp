@@ -6,21 +6,17 @@
 #include "host/tuning_defaults.h"
 
 namespace egosgm {
-namespace {
 
 ocl::Context context_on(const Device::Handle& device) {
   return device.queue() ? ocl::Context(device.queue, device.programs) : ocl::Context(device.device, device.programs);
 }
 
-/// `options` as a pipeline on a device with this tuning runs them.
 MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning) {
   MethodOptions method(options);
   Scheduling& scheduling = method.banded_sgm.scheduling;
   if (scheduling == Scheduling::kAutomatic) scheduling = tuning.scheduling;
   return method;
 }
-
-}  // namespace
 
 FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options,
                        const Device& device, PixelType type)
@@ -34,7 +30,12 @@ FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, c
       transfers_{{{context_, size, range_of(method_options_)}, {context_, size, range_of(method_options_)}}},
       memory_{{{context_, size}, {context_, size}, {context_, size}}},
       belief_(memory_.front()) {
-  method_.prepare(type);
+  prepare(type, {});
+}
+
+void FrameQueue::prepare(PixelType type, const Wanted& wanted) {
+  method_.prepare(type, wanted);
+  context_.build();
 }
 
 void FrameQueue::submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
@@ -46,7 +47,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
                 .reasons = outputs.reason.data != nullptr};
   if (outputs.variance.data) wanted.variance = Views::kLeft;
   if (outputs.right_variance.data) wanted.variance = Views::kBoth;
-  method_.prepare(left.type, wanted);
+  prepare(left.type, wanted);
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};
   release_results();
@@ -80,7 +81,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
 DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done,
                                bool wants_dynamic) {
   expect_device_frame_not_failed();
-  method_.prepare(images.type);
+  prepare(images.type, {});
   FrameTransfer& transfer = free_transfer();
   Belief after = free_memory();
   ocl::Drain drain{context_};

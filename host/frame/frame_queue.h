@@ -12,6 +12,10 @@
 
 namespace egosgm {
 
+ocl::Context context_on(const Device::Handle& device);
+/// `options` as a pipeline on a device with this tuning runs them.
+MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning);
+
 /// Frames on their way: up to two at once, each on the belief that the one before leaves. One that fails takes those
 /// that rest on it along, and the belief goes back to what was before it.
 class FrameQueue {
@@ -21,6 +25,9 @@ class FrameQueue {
   ~FrameQueue() { context_.drain(); }
   FrameQueue(const FrameQueue&) = delete;
   FrameQueue& operator=(const FrameQueue&) = delete;
+
+  /// Builds what frames of `type` need, and what is wanted of them.
+  void prepare(PixelType type, const Wanted& wanted);
 
   /// As Pipeline. REQUIRES: arguments that were validated, and a frame under way or room for one.
   void submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,

@@ -6,7 +6,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, int row_group) {
+ocl::Program& build(ocl::Context& context, int row_group) {
   context.enter("PredictionCheck");
   return context.program("prediction_check.cl", ocl::Defines().set("ROW_GROUP", row_group));
 }
@@ -29,7 +29,7 @@ PredictionCheck::PredictionCheck(ocl::Context& context, shared::ImageSize size, 
       row_group_(row_group > 0 ? row_group : ocl::row_group(context)),
       nothing_(none(context)),
       row_counts_(context, checked_rows(size)),
-      count_rows_(build(context, row_group_), "count_rows"),
+      count_predictions_(build(context, row_group_), "count_predictions"),
       judge_(build(context, row_group_), "judge") {}
 
 void PredictionCheck::operator()(const State& before, const Map& warped, const Map& predicted, const Map& measured,
@@ -37,7 +37,7 @@ void PredictionCheck::operator()(const State& before, const Map& warped, const M
   context_.enter("PredictionCheck");
   const cl_int rows = is_enabled_ ? checked_rows(size_) : 0;
   if (rows > 0) {
-    count_rows_(context_, ocl::group_a_row({size_.width, rows}, row_group_, /*views=*/1), size_.width, warped,
+    count_predictions_(context_, ocl::group_a_row({size_.width, rows}, row_group_, /*views=*/1), size_.width, warped,
                 predicted, measured, row_counts_);
   }
   judge_(context_, ocl::group_a_row({size_.width, 1}, row_group_, /*views=*/1), rows, row_counts_, before, after);

@@ -35,7 +35,7 @@ class PredictionCheck {
   ocl::Buffer<shared::PredictionCounts> row_counts_;
   ocl::Kernel<const cl_int, const ocl::Buffer<float>, const ocl::Buffer<float>, const ocl::Buffer<float>,
               ocl::Buffer<shared::PredictionCounts>>
-      count_rows_;
+      count_predictions_;
   ocl::Kernel<const cl_int, const ocl::Buffer<shared::PredictionCounts>, const State, State> judge_;
 };
 

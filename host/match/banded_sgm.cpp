@@ -29,7 +29,7 @@ std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
   return (pixels * SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
 }
 
-const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+ocl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
                          BandedSgm::Tile tile) {
   ocl::Defines defines = sgm_defines(range, options);
   defines.set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
@@ -38,7 +38,7 @@ const cl::Program& build(ocl::Context& context, shared::DisparityRange range, co
       .set("PIXELS", ocl::pixels_a_work_item(context));
   if (tile.block_lanes > 0) defines.set("BLOCK", tile.block_lanes);
   if (ocl::counts_bits(context)) defines.set("COUNTS_BITS", 1);
-  return context.program("banded_sgm.cl", defines);
+  return context.program("banded_sgm.cl", defines, ocl::Joins::kNo);
 }
 
 bool follows_paths(const ocl::Context& context, Scheduling scheduling) {

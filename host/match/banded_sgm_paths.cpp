@@ -26,11 +26,11 @@ int vector_of(const ocl::Context& context) { return is_gpu(context) ? kQuad : kV
 /// A pixel's vectors hold so many cells more than its band, which may begin and end within one.
 int spare_cells(int vector) { return vector == kQuad ? kQuad : vector + EGOSGM_LANES; }
 
-const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+ocl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
                          BandedSgmPaths::Group group) {
   ocl::Defines defines = sgm_defines(range, options);
   defines.set("LANES", group.lanes).set("LINES", group.lines).set("VECTOR", vector_of(context)).set("PIXELS", 1);
-  return context.program("banded_sgm_paths.cl", defines);
+  return context.program("banded_sgm_paths.cl", defines, ocl::Joins::kNo);
 }
 
 }  // namespace

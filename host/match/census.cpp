@@ -24,7 +24,7 @@ Comparisons comparisons(MatchingCost cost) {
   return {};
 }
 
-const cl::Program& build(ocl::Context& context, PixelType type, MatchingCost cost, int pixels) {
+ocl::Program& build(ocl::Context& context, PixelType type, MatchingCost cost, int pixels) {
   context.enter("Census");
   const Comparisons chosen = comparisons(cost);
   return context.program("census.cl", ocl::Defines()

@@ -8,7 +8,7 @@ namespace {
 
 int floor_div(int a, int b) { return a / b - (a % b < 0); }
 
-const cl::Program& build(ocl::Context& context, PixelType type) {
+ocl::Program& build(ocl::Context& context, PixelType type) {
   context.enter("CoarseMatch");
   return context.program("coarse_match.cl", ocl::Defines()
                                                 .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)

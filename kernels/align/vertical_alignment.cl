@@ -35,10 +35,10 @@ typedef uint Weight;
 // Rows are resampled in 256ths of a pixel, columns read in 16ths.
 #define ROW_STEPS 256
 #define COLUMN_STEPS 16
-#define BLOCK 16
+#define COLUMNS 16
 // Pixels of a work-item: lanes that share a row take neighbours.
 #if ROW_GROUP == 1
-#define AT_ONCE BLOCK
+#define AT_ONCE COLUMNS
 #else
 #define AT_ONCE 1
 #endif
@@ -71,9 +71,9 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
   global const Pixel* from = (global const Pixel*)images + first;
   global Pixel* to = (global Pixel*)aligned + first + (size_t)y * size.width;
 
-  // One offset for BLOCK columns: on KITTI it changes by less than a 20th of a pixel over them.
+  // One offset for COLUMNS columns: on KITTI it changes by less than a 20th of a pixel over them.
   for (int x = get_local_id(0) * AT_ONCE; x < size.width; x += ROW_GROUP * AT_ONCE) {
-    const float u = (float)place(x / BLOCK * BLOCK + BLOCK / 2, size.width, PLACES) / PLACES;
+    const float u = (float)place(x / COLUMNS * COLUMNS + COLUMNS / 2, size.width, PLACES) / PLACES;
     const float dy = bounded(constant_term + (linear_term + square_term * u) * u);
     const int offset = is_moved ? convert_int_rte(dy * ROW_STEPS) : 0;
     const int above = y + (offset >> 8);
@@ -81,7 +81,7 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
     global const Pixel* upper = from + (size_t)clamp_row(above, size.height) * size.width;
     global const Pixel* lower = from + (size_t)clamp_row(above + 1, size.height) * size.width;
 #if AT_ONCE > 1
-    if (x + BLOCK <= size.width) {
+    if (x + COLUMNS <= size.width) {
       Pixels pixels = load_grey(upper + x);
       if (weight != 0) {
         const Wide sum = load_wide(upper + x) * (Wide)(ROW_STEPS - weight) + load_wide(lower + x) * (Wide)(weight);
@@ -112,7 +112,7 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
 #define COUNT (GR_SUMS + GG_SUMS)
 #define SUMS (COUNT + 1)
 
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_residuals(const ImageSize size,
                                                                             global const uchar* images,
                                                                             global const float* disparity,
                                                                             global long* row_sums) {
@@ -222,7 +222,7 @@ inline float moment_of(const int height, const int rows, const int n, const int 
 // The step of a frame, by the running mean of the frames so far at first and then at a fixed gain. state: the terms of
 // the offset [px], and the number of estimates that they rest on. A single work-group of ROW_GROUP, whose work-items
 // share the sums; `state` and `next` may be the same.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update(const ImageSize size, const int sampled_rows,
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update_terms(const ImageSize size, const int sampled_rows,
                                                                           const float gain, global const long* row_sums,
                                                                           global const float* state,
                                                                           global float* next) {

@@ -27,7 +27,7 @@ static inline PredictionCounts sum_of_lanes(local PredictionCounts* lanes, const
 }
 
 // Counts of every EGOSGM_CHECKED_ROWS-th row. A work-group of ROW_GROUP a row.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_rows(const int width,
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_predictions(const int width,
                                                                               global const float* warped,
                                                                               global const float* predicted,
                                                                               global const float* measured,

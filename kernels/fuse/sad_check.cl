@@ -15,7 +15,7 @@
 #define STEPS_PER_GREY 257
 #endif
 
-KERNEL void check(const ImageSize size, const float max_difference, global const uchar* images,
+KERNEL void check_greys(const ImageSize size, const float max_difference, global const uchar* images,
                   global float* disparity, global float* variance) {
   const int y = get_global_id(1);
   const int view = get_global_id(2);

@@ -9,6 +9,7 @@
 // codes a pixel is compared with at growing disparities lie at growing addresses in both views. The padding repeats the
 // border's codes.
 #include "block.h"
+#include "code.h"
 #include "grey.h"
 #include "method.h"
 
@@ -21,9 +22,6 @@
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=16
 
-#ifndef CODE_BYTES
-#error "CODE_BYTES: 4 or 8, the size of a code"
-#endif
 #ifndef PIXELS
 #error "PIXELS: of a work-item, 1 or 16"
 #endif
@@ -35,12 +33,6 @@
 #endif
 #ifndef RADIUS_Y
 #error "RADIUS_Y: half the window's height"
-#endif
-
-#if CODE_BYTES == 4
-typedef uint Code;
-#else
-typedef ulong Code;
 #endif
 
 // The comparisons, and the place of each beside the centre.
@@ -102,16 +94,10 @@ KERNEL void census(const ImageSize size, const int padding, global const uchar* 
 #else
 
 #if CODE_BYTES == 4
-typedef uint16 Codes;
 #define convert_codes convert_uint16
 #else
-typedef ulong16 Codes;
 #define convert_codes convert_ulong16
 #endif
-
-typedef struct __attribute__((packed)) {
-  Codes codes;
-} PackedCodes;
 
 #if COMPARISONS == 0
 
@@ -129,8 +115,8 @@ typedef Block Greys;
 typedef Block Bytes;
 typedef struct __attribute__((packed)) {
   Block greys;
-} PackedBlock;
-inline Greys load_greys(global const Pixel* from) { return ((global const PackedBlock*)from)->greys; }
+} PackedGreys;
+inline Greys load_greys(global const Pixel* from) { return ((global const PackedGreys*)from)->greys; }
 inline Bytes one_where_less(const Greys a, const Greys b) { return a < b ? (Block)(1) : (Block)(0); }
 #else
 #define AT_ONCE 16
@@ -141,17 +127,17 @@ inline Bytes one_where_less(const Greys a, const Greys b) { return as_uchar16(-c
 #endif
 
 // Codes of their bytes, the lowest first.
-inline uint16 joined(const uchar16 b0, const uchar16 b1, const uchar16 b2, const uchar16 b3) {
+inline uint16 joined_bytes(const uchar16 b0, const uchar16 b1, const uchar16 b2, const uchar16 b3) {
   const ushort16 upper = convert_ushort16(b3) << (ushort16)(8) | convert_ushort16(b2);
   const ushort16 lower = convert_ushort16(b1) << (ushort16)(8) | convert_ushort16(b0);
   return convert_uint16(upper) << (uint16)(16) | convert_uint16(lower);
 }
 #if CODE_BYTES == 4
-#define JOINED(HALF, bytes) joined(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))
+#define JOINED(HALF, bytes) joined_bytes(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))
 #else
 #define JOINED(HALF, bytes)                                                                                   \
-  (convert_ulong16(joined(HALF(bytes[4]), HALF(bytes[5]), HALF(bytes[6]), HALF(bytes[7]))) << (ulong16)(32) | \
-   convert_ulong16(joined(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))))
+  (convert_ulong16(joined_bytes(HALF(bytes[4]), HALF(bytes[5]), HALF(bytes[6]), HALF(bytes[7]))) << (ulong16)(32) | \
+   convert_ulong16(joined_bytes(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))))
 #endif
 #define WHOLE(bytes) (bytes)
 

@@ -3,21 +3,14 @@
 // parents[run] is never above run, so that the root of a region is its first run, whatever the order in which runs are
 // joined. A device may go on after a kernel that failed: indices that are read from memory are held below what they
 // can be, which also ends every loop.
-// lint: ROW_GROUP=1
-// lint: ROW_GROUP=64
+// lint: ROW_GROUP=1 PIXELS=16
+// lint: ROW_GROUP=64 PIXELS=1
 
 #ifndef ROW_GROUP
 #error "ROW_GROUP: work-items that share a row"
 #endif
 
 #define NO_RUN 0xffff  // of an invalid pixel
-
-// Of a work-item that looks for the beginnings of runs; few pixels are one.
-#if ROW_GROUP == 1
-#define PIXELS 16
-#else
-#define PIXELS 1
-#endif
 
 #include "pixels.h"
 

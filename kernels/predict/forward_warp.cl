@@ -111,7 +111,7 @@ KERNEL void splat_variance(const ImageSize size, global const int* landed, globa
   atomic_max((global uint*)predicted_variance + first + target, as_uint(moved_variance[i]));
 }
 
-KERNEL void decode(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
+KERNEL void decode_warped(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
                    global float* disparity, global float* variance, global uchar* hidden) {
   const int x = get_global_id(0);
   if (x >= size.width) return;

@@ -10,7 +10,7 @@ static inline Ints is_gap(const Floats centre, const Floats before, const Floats
   return (centre <= INVALID) & (before > INVALID) & (after > INVALID) & (fabs(before - after) < gamma);
 }
 
-static inline Floats mean_of(const Floats a, const Floats b) { return 0.5f * (a + b); }
+static inline Floats middle_of(const Floats a, const Floats b) { return 0.5f * (a + b); }
 static inline Floats larger_of(const Floats a, const Floats b) { return a > b ? a : b; }
 
 // Where a pixel is filled: `mean` and `most`; where it is hidden: nothing; else d and p.
@@ -38,7 +38,7 @@ KERNEL void fill_rows(const ImageSize size, const float gamma, const int whole_v
     const Floats right = load_pixels(disparity + row, x + 1, width);
     const Ints fills = is_gap(d, left, right, gamma);
     if (!is_whole) {
-      store_pixels(fills ? mean_of(left, right) : d, filled_disparity + row, x, width);
+      store_pixels(fills ? middle_of(left, right) : d, filled_disparity + row, x, width);
       continue;
     }
     const Floats p = load_pixels(variance + row, x, width);
@@ -46,7 +46,7 @@ KERNEL void fill_rows(const ImageSize size, const float gamma, const int whole_v
         larger_of(load_pixels(variance + row, x - 1, width), load_pixels(variance + row, x + 1, width));
     const Ints is_between = load_bytes(hidden + row, x - 1, width) & load_bytes(hidden + row, x + 1, width);
     const Ints hides = is_between | load_bytes(hidden + row, x, width);
-    store_filled(fills, mean_of(left, right), p_around, hides, d, p, filled_disparity + row, filled_variance + row,
+    store_filled(fills, middle_of(left, right), p_around, hides, d, p, filled_disparity + row, filled_variance + row,
                  still_hidden + row, x, width);
   }
 }
@@ -68,7 +68,7 @@ KERNEL void fill_columns(const ImageSize size, const float gamma, const int whol
     const Floats below = load_pixels(disparity + row_below, x, width);
     const Ints fills = is_gap(d, above, below, gamma);
     if (!is_whole) {
-      store_pixels(fills ? mean_of(above, below) : d, filled_disparity + row, x, width);
+      store_pixels(fills ? middle_of(above, below) : d, filled_disparity + row, x, width);
       continue;
     }
     const Floats p = load_pixels(variance + row, x, width);
@@ -76,7 +76,7 @@ KERNEL void fill_columns(const ImageSize size, const float gamma, const int whol
         larger_of(load_pixels(variance + row_above, x, width), load_pixels(variance + row_below, x, width));
     const Ints is_between = load_bytes(hidden + row_above, x, width) & load_bytes(hidden + row_below, x, width);
     const Ints hides = is_between | load_bytes(hidden + row, x, width);
-    store_filled(fills, mean_of(above, below), p_around, hides, d, p, filled_disparity + row, filled_variance + row,
+    store_filled(fills, middle_of(above, below), p_around, hides, d, p, filled_disparity + row, filled_variance + row,
                  still_hidden + row, x, width);
   }
 }

@@ -2,13 +2,12 @@
 // What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span; and
 // what its block's predictions span and CoarseMatch found there, where that lies elsewhere.
 
-// lint: ROW_GROUP=1
-// lint: ROW_GROUP=64
+// lint: ROW_GROUP=1 PIXELS=16
+// lint: ROW_GROUP=64 PIXELS=1
 
 #ifndef ROW_GROUP
 #error "ROW_GROUP: work-items that share a row"
 #endif
-#define PIXELS (ROW_GROUP == 1 ? 16 : 1)
 
 #include "bands.h"
 #include "spans.h"
