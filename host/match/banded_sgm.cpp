@@ -17,21 +17,29 @@ int ceil_div(int a, int b) { return (a + b - 1) / b; }
 /// ends.
 constexpr int kBlockVectors = 2;
 
-std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range) {
-  const int vectors = (SearchBand::max_chunks(range) + 1) / 2;
+std::size_t slot_bytes(shared::ImageSize size, int chunks) {
+  const int vectors = (chunks + 1) / 2;
   const std::size_t slot = static_cast<std::size_t>(vectors + kBlockVectors * 2) * 2 * EGOSGM_LANES;
   return 2 * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
 }
 
 /// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind a chunk, as two are read at once.
-std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range) {
+std::size_t sum_bytes(shared::ImageSize size, int chunks) {
   const std::size_t pixels = 2 * pixel_count(size) + size.width;
-  return (pixels * SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
+  return (pixels * chunks + 1) * EGOSGM_LANES;
+}
+
+int chunks_of(shared::DisparityRange range, BandedSgm::Tile tile) {
+  return std::max(SearchBand::max_chunks(range), tile.max_chunks);
+}
+
+int words_of(const BandedSgmOptions& options, BandedSgm::Tile tile) {
+  return std::max(Census::words(options.cost), tile.code_words);
 }
 
 ocl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
-                         BandedSgm::Tile tile) {
-  ocl::Defines defines = sgm_defines(range, options);
+                    BandedSgm::Tile tile) {
+  ocl::Defines defines = sgm_defines(chunks_of(range, tile), words_of(options, tile), options);
   defines.set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
       .set("TILE_WIDTH", tile.width)
       .set("TILE_HEIGHT", tile.height)
@@ -41,47 +49,44 @@ ocl::Program& build(ocl::Context& context, shared::DisparityRange range, const B
   return context.program("banded_sgm.cl", defines, ocl::Joins::kNo);
 }
 
-bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
-  if (scheduling != Scheduling::kAutomatic) return scheduling == Scheduling::kPaths;
-  return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
-}
-
 /// What a match takes on the device.
 struct Demand {
   std::uint64_t largest_buffer, total;
 };
 
-Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, bool paths) {
-  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, range);
+Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, int chunks,
+              bool paths) {
+  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, chunks);
   const std::uint64_t ranks = ReadOff::bytes(size, BandedSgm::code_padding(range));
   if (paths) return {sums, 4 * sums + ranks};
-  const std::uint64_t slots = slot_bytes(size, range), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
+  const std::uint64_t slots = slot_bytes(size, chunks), winners = 2 * pixel_count(size) * sizeof(cl_ulong);
   return {std::max({sums, slots, winners}), sums + slots + winners + ranks};
 }
 
-std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCost cost) {
-  return Census::words(cost, {width, 1}, BandedSgm::code_padding(range)) / 2;
+std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCost cost, BandedSgm::Tile tile) {
+  return Census::words(cost, {width, 1}, BandedSgm::code_padding(range), tile.code_words) / 2;
 }
 
 /// How many rows can be matched at once. A quarter of the memory is left to all else.
 int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-                 const BandedSgmOptions& options) {
-  const bool paths = follows_paths(context, options.scheduling);
+                 const BandedSgmOptions& options, BandedSgm::Tile tile) {
+  const bool paths = BandedSgm::follows_paths(context, options.scheduling);
+  const int chunks = chunks_of(range, tile);
   const std::uint64_t memory = context.device().getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>() / 4 * 3;
   const std::uint64_t device_limit = memory - std::min(memory, context.allocated_bytes());
   const std::uint64_t chosen = static_cast<std::uint64_t>(options.max_memory_mib) << 20;
   const std::uint64_t total_limit = chosen > 0 ? std::min(chosen, device_limit) : device_limit;
   const auto fits = [&](int rows, std::uint64_t copies) {
-    const Demand needs = demand(context, {size.width, rows}, range, paths);
+    const Demand needs = demand(context, {size.width, rows}, range, chunks, paths);
     return needs.largest_buffer <= context.max_allocation_bytes() && needs.total + copies <= total_limit;
   };
   if (fits(size.height, 0)) return size.height;
-  const std::size_t words = code_words_a_row(size.width, range, options.cost);
+  const std::size_t words = code_words_a_row(size.width, range, options.cost, tile);
   int rows = size.height;
   while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
   const int least = 3 * BandedSgm::kStripeOverlap;
   if (rows >= least) return rows;
-  const std::uint64_t needed = demand(context, {size.width, std::min(size.height, least)}, range, paths).total;
+  const std::uint64_t needed = demand(context, {size.width, std::min(size.height, least)}, range, chunks, paths).total;
   throw DeviceError(
       CL_MEM_OBJECT_ALLOCATION_FAILURE,
       "BandedSgm: a stripe of " + std::to_string(std::min(size.height, least)) + " rows needs " +
@@ -97,8 +102,8 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
 BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                                 const BandedSgmOptions& options, Tile chosen)
     : tile(chosen),
-      slots(context, slot_bytes(size, range)),
-      sums(context, sum_bytes(size, range)),
+      slots(context, slot_bytes(size, chunks_of(range, tile))),
+      sums(context, sum_bytes(size, chunks_of(range, tile))),
       winners(context, 2 * pixel_count(size)),
       to_middle(build(context, range, options, tile), "sweep_to_middle"),
       from_middle(build(context, range, options, tile), "sweep_from_middle"),
@@ -112,7 +117,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                      const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile,
                      Launches launches)
     : context_((context.enter("BandedSgm"), context)),
-      size_{size.width, rows_at_once(context, size, range, options)},
+      size_{size.width, rows_at_once(context, size, range, options, tile)},
       stripes_(cut_into_stripes(size.height, size_.height, kStripeOverlap)),
       parameters_{size_.width,
                   size_.height,
@@ -135,7 +140,8 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
     wavefront_.emplace(context, size_, range, options, tile);
   }
   if (stripes_.size() > 1) {
-    stripe_memory_.emplace(context, size, range, size_.height, code_words_a_row(size.width, range, options.cost));
+    stripe_memory_.emplace(context, size, range, size_.height,
+                           code_words_a_row(size.width, range, options.cost, tile));
   }
 }
 
@@ -193,6 +199,11 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
   }
   wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), count(views)),
                    parameters, wavefront.winners, measured.disparity, measured.variance, measured.doubtful);
+}
+
+bool BandedSgm::follows_paths(const ocl::Context& context, Scheduling scheduling) {
+  if (scheduling != Scheduling::kAutomatic) return scheduling == Scheduling::kPaths;
+  return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
 }
 
 bool BandedSgm::takes_whole_sweeps(Views views) const {

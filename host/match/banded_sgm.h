@@ -28,6 +28,9 @@ class BandedSgm {
   struct Tile {
     int width = kCpuTuning.tile_width, height = kCpuTuning.tile_height;
     int block_lanes = 0;
+    /// Where another match has the same program: what that one needs, so that it need not be built twice. A code of one
+    /// word stands twice in two.
+    int max_chunks = 0, code_words = 0;
   };
 
   /// Of the wavefronts, two sweeps a view, to the middle of the image and from there: one for every wave of tiles, or
@@ -57,6 +60,8 @@ class BandedSgm {
   void reading_off(const MatchInputs& image, Measurement& measured);
 
   static int code_padding(shared::DisparityRange range);
+  /// Whether it takes a few work-items a path.
+  static bool follows_paths(const ocl::Context& context, Scheduling scheduling);
 
   using ToMiddle =
       ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,

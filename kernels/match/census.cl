@@ -19,6 +19,8 @@
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=16
 
@@ -49,6 +51,9 @@ constant char kSparse[32][2] = EGOSGM_CENSUS13X11;
 #define DY(i) (PLACE(i) / WINDOW_WIDTH - RADIUS_Y)
 #endif
 
+// A code of one word: its distances are twice as large then, as those of one that is alone count twice (cost.h).
+#define STANDS_TWICE (CODE_BYTES == 8 && COUNT <= 32)
+
 // The rows of the window around a pixel; outside the image its border's.
 typedef struct {
   global const Pixel* at[2 * RADIUS_Y + 1];
@@ -71,7 +76,7 @@ inline Code code_at(const int width, const Rows* rows, const int x) {
   Code code = 0;
 #pragma unroll
   for (int i = 0; i < COUNT; ++i) code = code << 1 | (AT(DX(i), DY(i)) < AT(0, 0) ? 1 : 0);
-  return code;
+  return STANDS_TWICE ? code << (4 * CODE_BYTES) | code : code;
 #endif
 }
 
@@ -153,6 +158,10 @@ inline void codes_at(const Rows* rows, const int x, Codes* codes) {
     bytes[(COUNT - 1 - i) / 8] =
         bits + bits + one_where_less(load_greys(rows->at[RADIUS_Y + DY(i)] + x + DX(i)), centre);
   }
+#if STANDS_TWICE
+#pragma unroll
+  for (int byte = 0; byte < 4; ++byte) bytes[byte + 4] = bytes[byte];
+#endif
 #if AT_ONCE == 32
   codes[0] = JOINED(FIRST_VECTOR, bytes);
   codes[1] = JOINED(SECOND_VECTOR, bytes);
