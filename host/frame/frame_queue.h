@@ -26,7 +26,8 @@ class FrameQueue {
   FrameQueue(const FrameQueue&) = delete;
   FrameQueue& operator=(const FrameQueue&) = delete;
 
-  /// Builds what frames of `type` need, and what is wanted of them.
+  /// Builds what frames of `type` need, and what is wanted of them, and lets the driver make the machine code of all
+  /// their kernels: some drivers do that when a kernel first runs.
   void prepare(PixelType type, const Wanted& wanted);
 
   /// As Pipeline. REQUIRES: arguments that were validated, and a frame under way or room for one.
@@ -63,6 +64,7 @@ class FrameQueue {
     Clock::time_point start;
   };
 
+  void build(PixelType type, const Wanted& wanted);
   FrameTransfer& free_transfer();
   Belief& free_memory();
   void release_results();
@@ -73,6 +75,7 @@ class FrameQueue {
 
   const PipelineOptions options_;
   const Device device_;
+  const Calibration calibration_;
   const shared::ImageSize size_;
   const Tuning tuning_;
   const MethodOptions method_options_;

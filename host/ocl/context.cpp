@@ -123,6 +123,20 @@ Context::Context(const cl::Device& device, const cl::Context& context, const cl:
       profiles_kernels_(queue().getInfo<CL_QUEUE_PROPERTIES>() & CL_QUEUE_PROFILING_ENABLE),
       folder_(std::move(programs)) {}
 
+Context::Apart::Apart(Context& context)
+    : context_(context),
+      kernels_(context.queue()),
+      allocated_bytes_(context.allocated_bytes_),
+      stage_(context.stage_) {
+  context.queue() = make_queue(context.context_, context.device_);
+}
+
+Context::Apart::~Apart() {
+  context_.queue() = kernels_;
+  context_.allocated_bytes_ = allocated_bytes_;
+  context_.stage_ = stage_;
+}
+
 void Context::let_wait(Queue which, const cl::Event& event) {
   expect_not_failed(event);
   const std::vector<cl::Event> events{event};

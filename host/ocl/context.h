@@ -66,6 +66,22 @@ class Context {
   };
   const char* stage() const { return stage_; }
 
+  /// While it lives, kernels run on a queue of its own, and memory is not counted. REQUIRES: all recorded commands were
+  /// taken.
+  class Apart {
+   public:
+    explicit Apart(Context& context);
+    ~Apart();
+    Apart(const Apart&) = delete;
+    Apart& operator=(const Apart&) = delete;
+
+   private:
+    Context& context_;
+    const cl::CommandQueue kernels_;
+    const std::uint64_t allocated_bytes_;
+    const char* const stage_;
+  };
+
   cl::CommandQueue& queue(Queue which = Queue::kKernels) { return queues_[static_cast<std::size_t>(which)]; }
 
   /// Lets what is enqueued on `which` from now on wait for `event` of another queue. Throws if the event's command has
