@@ -29,8 +29,8 @@ typedef uint16 Uints;
 #define LANE_INDICES (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 #endif
 
-// A work-item's blocks of PIXELS pixels of a row: all of them where there is one work-item a row, else one.
-#define FOR_PIXELS(x, width) for (int x = get_global_id(0) * PIXELS; x < (width); x += (int)get_global_size(0) * PIXELS)
+// The blocks of PIXELS pixels of a row that the work-item `at` takes: all of them where it has the row alone, else one.
+#define FOR_PIXELS(x, width) for (int x = at.x * PIXELS; x < (width); x += at.items * PIXELS)
 
 #define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
 

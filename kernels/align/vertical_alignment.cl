@@ -56,12 +56,9 @@ inline int place(const int at, const int count, const int steps) {
 
 // Copies the left image, and resamples the right one by the quadratic state[0] + state[1] u + state[2] v + state[3] u v
 // + state[4] u^2 + state[5] v^2 pixels; u, v: -1 to 1 over the image. A work-group of ROW_GROUP a row and view.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(const ImageSize size,
-                                                                            global const float* state,
-                                                                            global const uchar* images,
-                                                                            global uchar* aligned) {
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+COMPILED_ONCE void resample_row(const WorkItem at, const ImageSize size, global const float* state, global const uchar* images, global uchar* aligned) {
+  const int y = at.y;
+  const int view = at.view;
   const int is_moved = view == EGOSGM_RIGHT;
   const float v = (float)place(y, size.height, PLACES) / PLACES;
   const float constant_term = (state[0] + state[2] * v) + state[5] * (v * v);
@@ -72,7 +69,7 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
   global Pixel* to = (global Pixel*)aligned + first + (size_t)y * size.width;
 
   // One offset for COLUMNS columns: on KITTI it changes by less than a 20th of a pixel over them.
-  for (int x = get_local_id(0) * AT_ONCE; x < size.width; x += ROW_GROUP * AT_ONCE) {
+  for (int x = at.x * AT_ONCE; x < size.width; x += ROW_GROUP * AT_ONCE) {
     const float u = (float)place(x / COLUMNS * COLUMNS + COLUMNS / 2, size.width, PLACES) / PLACES;
     const float dy = bounded(constant_term + (linear_term + square_term * u) * u);
     const int offset = is_moved ? convert_int_rte(dy * ROW_STEPS) : 0;
@@ -97,6 +94,13 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
   }
 }
 
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(const ImageSize size,
+                                                                            global const float* state,
+                                                                            global const uchar* images,
+                                                                            global uchar* aligned) {
+  resample_row(THIS_WORK_ITEM, size, state, images, aligned);
+}
+
 // Residuals and gradients are those of 8-bit grey values in 64ths: 4 by smoothing, 16 by interpolation.
 #define GREY 64
 #define MAX_RESIDUAL (EGOSGM_ALIGNED_MAX_RESIDUAL * GREY)
@@ -112,6 +116,46 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
 #define COUNT (GR_SUMS + GG_SUMS)
 #define SUMS (COUNT + 1)
 
+// What every ROW_GROUP-th sample of row y from that of `lane` on gives.
+COMPILED_ONCE void sum_row_residuals(const ImageSize size, const int y, const int lane, global const uchar* images,
+                                     global const float* disparity, long row_sums[SUMS]) {
+  long sums[SUMS] = {0};
+  const size_t width = size.width;
+  const float last = (float)(COLUMN_STEPS * (size.width - 2));
+  const size_t row = (size_t)y * width;
+  global const Pixel* left = (global const Pixel*)images + row;
+  global const Pixel* right = (global const Pixel*)images + width * size.height + row;
+  for (int x = lane * EGOSGM_ALIGNED_COLUMN_STRIDE; x < size.width; x += ROW_GROUP * EGOSGM_ALIGNED_COLUMN_STRIDE) {
+    const float d = disparity[row + x];
+    const float at = ((float)x - d) * COLUMN_STEPS;
+    // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
+    const int inside = (d > EGOSGM_INVALID_DISPARITY) & (at >= 0.0f) & (at <= last);
+    if (!inside) continue;
+    const uint position = convert_uint_rte(at);
+    const size_t u = position / COLUMN_STEPS;
+    const int after = position % COLUMN_STEPS;
+    const int before = COLUMN_STEPS - after;
+
+    const int i0 = left[x - width], i1 = left[x], i2 = left[x + width];
+    const int j0 = before * right[u - width] + after * right[u + 1 - width];
+    const int j1 = before * right[u] + after * right[u + 1];
+    const int j2 = before * right[u + width] + after * right[u + 1 + width];
+    const int r = rounded_to_8_bit(COLUMN_STEPS * (i0 + 2 * i1 + i2) - (j0 + 2 * j1 + j2));
+    const int g_left = rounded_to_8_bit(COLUMN_STEPS * (i2 - i0));
+    const int g_right = rounded_to_8_bit(j2 - j0);
+    const int g = g_left + g_right;
+    const int is_textured = abs(g) >= MIN_GRADIENT;
+    const int is_inlier = is_textured & (abs(r) < MAX_RESIDUAL);
+    const int place_u = place((int)u, size.width, COARSE_PLACES);
+    long gr = is_textured ? g * clamp(r, -MAX_RESIDUAL, MAX_RESIDUAL) : 0;
+    long gg = is_inlier ? 4 * g_left * g_right : 0;  // each is half of what g is
+    for (int n = 0; n < GR_SUMS; ++n, gr *= place_u) sums[n] += gr;
+    for (int n = 0; n < GG_SUMS; ++n, gg *= place_u) sums[GR_SUMS + n] += gg;
+    sums[COUNT] += is_inlier;
+  }
+  for (int n = 0; n < SUMS; ++n) row_sums[n] = sums[n];
+}
+
 KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_residuals(const ImageSize size,
                                                                             global const uchar* images,
                                                                             global const float* disparity,
@@ -119,42 +163,8 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_residuals
   const int lane = get_local_id(0);
   const int sampled_row = get_global_id(1);
   const int y = EGOSGM_ALIGNED_BORDER_ROWS + sampled_row * EGOSGM_ALIGNED_ROW_STRIDE;
-  const size_t width = size.width;
-  const float last = (float)(COLUMN_STEPS * (size.width - 2));
   long sums[SUMS] = {0};
-  if (y + EGOSGM_ALIGNED_BORDER_ROWS < size.height) {
-    const size_t row = (size_t)y * width;
-    global const Pixel* left = (global const Pixel*)images + row;
-    global const Pixel* right = (global const Pixel*)images + width * size.height + row;
-    for (int x = lane * EGOSGM_ALIGNED_COLUMN_STRIDE; x < size.width; x += ROW_GROUP * EGOSGM_ALIGNED_COLUMN_STRIDE) {
-      const float d = disparity[row + x];
-      const float at = ((float)x - d) * COLUMN_STEPS;
-      // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
-      const int inside = (d > EGOSGM_INVALID_DISPARITY) & (at >= 0.0f) & (at <= last);
-      if (!inside) continue;
-      const uint position = convert_uint_rte(at);
-      const size_t u = position / COLUMN_STEPS;
-      const int after = position % COLUMN_STEPS;
-      const int before = COLUMN_STEPS - after;
-
-      const int i0 = left[x - width], i1 = left[x], i2 = left[x + width];
-      const int j0 = before * right[u - width] + after * right[u + 1 - width];
-      const int j1 = before * right[u] + after * right[u + 1];
-      const int j2 = before * right[u + width] + after * right[u + 1 + width];
-      const int r = rounded_to_8_bit(COLUMN_STEPS * (i0 + 2 * i1 + i2) - (j0 + 2 * j1 + j2));
-      const int g_left = rounded_to_8_bit(COLUMN_STEPS * (i2 - i0));
-      const int g_right = rounded_to_8_bit(j2 - j0);
-      const int g = g_left + g_right;
-      const int is_textured = abs(g) >= MIN_GRADIENT;
-      const int is_inlier = is_textured & (abs(r) < MAX_RESIDUAL);
-      const int place_u = place((int)u, size.width, COARSE_PLACES);
-      long gr = is_textured ? g * clamp(r, -MAX_RESIDUAL, MAX_RESIDUAL) : 0;
-      long gg = is_inlier ? 4 * g_left * g_right : 0;  // each is half of what g is
-      for (int n = 0; n < GR_SUMS; ++n, gr *= place_u) sums[n] += gr;
-      for (int n = 0; n < GG_SUMS; ++n, gg *= place_u) sums[GR_SUMS + n] += gg;
-      sums[COUNT] += is_inlier;
-    }
-  }
+  if (y + EGOSGM_ALIGNED_BORDER_ROWS < size.height) sum_row_residuals(size, y, lane, images, disparity, sums);
 #if ROW_GROUP > 1
   local long totals[SUMS][ROW_GROUP];
   for (int n = 0; n < SUMS; ++n) totals[n][lane] = sums[n];
@@ -176,7 +186,7 @@ constant const int POWER_OF_V[TERMS] = {0, 0, 1, 1, 0, 2};
 
 // Solves a system of equations by Cholesky's form without square roots: x is its right side and becomes its solution;
 // of the symmetric matrix the lower half is given, and lost. Returns 0 where a pivot is not above `least`.
-inline int solve(float matrix[TERMS][TERMS], float x[TERMS], const float least) {
+COMPILED_ONCE int solve(float matrix[TERMS][TERMS], float x[TERMS], const float least) {
   for (int i = 0; i < TERMS; ++i) {
     for (int j = 0; j < i; ++j) {
       const float factor = matrix[i][j] / matrix[j][j];
@@ -205,7 +215,7 @@ inline int solve(float matrix[TERMS][TERMS], float x[TERMS], const float least) 
 
 // A sum over the image of u^n v^m, from the rows' sums number `sum`, which hold u^n. The sums are of integers, and the
 // rest is exact but for two conversions and a sum, so that no compiler can make another number of it.
-inline float moment_of(const int height, const int rows, const int n, const int m, const int sum,
+COMPILED_ONCE float moment_of(const int height, const int rows, const int n, const int m, const int sum,
                        global const long* row_sums) {
   long high = 0, low = 0;
   for (int row = 0; row < rows; ++row) {

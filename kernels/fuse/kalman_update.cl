@@ -44,14 +44,14 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
 // `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
 // is taken that differs as those of EGOSGM_MOVING_COUNT around do. has_gate: else all that is predicted and measured is
 // averaged, and nothing is hidden or doubtful.
-KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted, const int ask_neighbours,
+COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int has_gate, const float gate, const int keep_predicted, const int ask_neighbours,
                    const float min_variance, global const PredictionState* check, global const uchar* hidden,
                    global const float* predicted, global const float* predicted_variance, global const float* measured,
                    global const float* measured_variance, global const uchar* measured_doubtful, global float* updated,
                    global float* updated_variance, global uchar* updated_doubtful) {
   const int width = size.width;
-  const int y = get_global_id(1);
-  const size_t view = (size_t)get_global_id(2) * size.height * width;
+  const int y = at.y;
+  const size_t view = (size_t)at.view * size.height * width;
   const size_t row = view + (size_t)y * width;
   const int asks = ask_neighbours & (check->is_wrong == 0) & (check->was_wrong == 0);
   const Ints is_plain = (Ints)(has_gate ? 0 : -1);
@@ -95,4 +95,12 @@ KERNEL void update(const ImageSize size, const int has_gate, const float gate, c
     const Ints contradicted = (has_both & !fuses) | (moves != 0) | (has_measurement & !has_prediction & is_doubtful);
     store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
   }
+}
+
+KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted, const int ask_neighbours,
+                   const float min_variance, global const PredictionState* check, global const uchar* hidden,
+                   global const float* predicted, global const float* predicted_variance, global const float* measured,
+                   global const float* measured_variance, global const uchar* measured_doubtful, global float* updated,
+                   global float* updated_variance, global uchar* updated_doubtful) {
+  update_row(THIS_WORK_ITEM, size, has_gate, gate, keep_predicted, ask_neighbours, min_variance, check, hidden, predicted, predicted_variance, measured, measured_variance, measured_doubtful, updated, updated_variance, updated_doubtful);
 }

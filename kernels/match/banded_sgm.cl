@@ -304,10 +304,10 @@ KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int t
 
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, the matching variance
 // (options.h), and whether the disparity is doubtful.
-KERNEL void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
+COMPILED_ONCE void refine_row(const WorkItem at, const SgmParameters q, global const ulong* winners, global float* disparities,
                    global float* variances, global uchar* doubtful) {
   const int width = q.width;
-  const size_t row = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width;
+  const size_t row = ((size_t)at.view * q.height + at.y) * q.width;
   FOR_PIXELS(x, width) {
     const Winners winner = load_winners(winners + row, x, width);
     const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
@@ -317,4 +317,9 @@ KERNEL void refine(const SgmParameters q, global const ulong* winners, global fl
     store_pixels(matching_variance(q, steps, is_doubtful), variances + row, x, width);
     store_bytes(is_doubtful & (Ints)(1), doubtful + row, x, width);
   }
+}
+
+KERNEL void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
+                   global float* variances, global uchar* doubtful) {
+  refine_row(THIS_WORK_ITEM, q, winners, disparities, variances, doubtful);
 }

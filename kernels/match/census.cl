@@ -173,9 +173,9 @@ inline void codes_at(const Rows* rows, const int x, Codes* codes) {
 #endif
 
 // A work-item a row and view.
-KERNEL void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
-  const int y = get_global_id(0);
-  const int view = get_global_id(1);
+COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
+  const int y = at.x;
+  const int view = at.y;
   if (y >= size.height) return;
 
   const int width = size.width;
@@ -211,6 +211,10 @@ KERNEL void census(const ImageSize size, const int padding, global const uchar* 
     row[-i] = row[0];
     row[width - 1 + i] = row[width - 1];
   }
+}
+
+KERNEL void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
+  census_row(THIS_WORK_ITEM, size, padding, images, all_codes);
 }
 
 #endif

@@ -44,7 +44,7 @@ int lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 // Where runs begin, as far as a row has seventeen pixels from x on, sixteen at a time: an inclusive maximum of the
 // columns that do not continue their left neighbour's run. Returns the column behind; `begin` is where its left
 // neighbour's run begins.
-int find_runs_by_lanes(const int width, const float max_difference, global const float* disparity, const uint row,
+COMPILED_ONCE int find_runs_by_lanes(const int width, const float max_difference, global const float* disparity, const uint row,
                        global ushort* runs, global uint* parents, global uint* sizes, int* begin) {
   int x = 0;
   for (; x + 17 <= width; x += 16) {
@@ -148,10 +148,10 @@ void join(global uint* parents, uint a, uint b) {
 
 // Joins each row of a strip with the one above; the strip's own runs are touched by no other work-item. A work-item a
 // strip and view. Sixteen pixels at a time: few of them join what their left neighbour has not joined before them.
-KERNEL void join_strips(const ImageSize size, const float max_difference, const int strip_rows,
+COMPILED_ONCE void join_strips_row(const WorkItem at, const ImageSize size, const float max_difference, const int strip_rows,
                         global const float* disparity, global const ushort* runs, global uint* parents) {
-  const int strip = get_global_id(0);
-  const int view = get_global_id(1);
+  const int strip = at.x;
+  const int view = at.y;
   const int end = min((strip + 1) * strip_rows, size.height);
   for (int y = strip * strip_rows + 1; y < end; ++y) {
     const size_t row = ((size_t)view * size.height + y) * size.width;
@@ -176,6 +176,11 @@ KERNEL void join_strips(const ImageSize size, const float max_difference, const 
       }
     }
   }
+}
+
+KERNEL void join_strips(const ImageSize size, const float max_difference, const int strip_rows,
+                        global const float* disparity, global const ushort* runs, global uint* parents) {
+  join_strips_row(THIS_WORK_ITEM, size, max_difference, strip_rows, disparity, runs, parents);
 }
 
 uint root_now(volatile global uint* parents, uint run) {
@@ -232,10 +237,10 @@ uint beginnings(global const ushort* runs, int x, int width) {
 }
 
 // Adds every run to its root. Only roots are added to, and only others are read.
-KERNEL void measure(const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
+COMPILED_ONCE void measure_row(const WorkItem at, const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
                     volatile global uint* sizes) {
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int y = at.y;
+  const int view = at.view;
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * size.width;
   FOR_PIXELS(x, width) {
@@ -249,10 +254,15 @@ KERNEL void measure(const ImageSize size, global const ushort* runs, global cons
   }
 }
 
-KERNEL void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
+KERNEL void measure(const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
+                    volatile global uint* sizes) {
+  measure_row(THIS_WORK_ITEM, size, runs, parents, roots, sizes);
+}
+
+COMPILED_ONCE void drop_row(const WorkItem at, const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
                  global const uint* sizes, global float* disparity, global float* variance) {
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int y = at.y;
+  const int view = at.view;
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * size.width;
   FOR_PIXELS(x, width) {
@@ -265,4 +275,9 @@ KERNEL void drop(const ImageSize size, const uint max_size, global const ushort*
       }
     }
   }
+}
+
+KERNEL void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
+                 global const uint* sizes, global float* disparity, global float* variance) {
+  drop_row(THIS_WORK_ITEM, size, max_size, runs, roots, sizes, disparity, variance);
 }

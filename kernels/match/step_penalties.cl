@@ -34,11 +34,11 @@ static inline Ints penalty(const Ints most, const Ints least, const Ints slope, 
   return max(most - slope * max(p - q, q - p), least);
 }
 
-KERNEL void penalties(const ImageSize size, const int most, const int least, const int slope,
+COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const int most, const int least, const int slope,
                       global const uchar* images, global uchar* steps) {
-  const int y = get_global_id(1);
+  const int y = at.y;
   const int width = size.width;
-  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  const size_t row = ((size_t)at.view * size.height + y) * width;
   // Outside the image there is no step: the border's pixel stands in.
   global const Pixel* here = (global const Pixel*)images + row;
   global const Pixel* above = here - (y > 0 ? width : 0);
@@ -51,4 +51,9 @@ KERNEL void penalties(const ImageSize size, const int most, const int least, con
     const Ints upper_right = penalty(most, least, slope, grey, grey_at(above, x + 1, width));
     store_words(left | up << 8 | upper_left << 16 | upper_right << 24, steps + 4 * row, x, width);
   }
+}
+
+KERNEL void penalties(const ImageSize size, const int most, const int least, const int slope,
+                      global const uchar* images, global uchar* steps) {
+  penalties_row(THIS_WORK_ITEM, size, most, least, slope, images, steps);
 }

@@ -11,10 +11,10 @@ static inline Ints has_both(const Floats predicted, const Floats measured) {
 }
 
 // Of 2 EGOSGM_DYNAMIC_RADIUS + 1 pixels of the row: how many have both, and how many of those differ.
-KERNEL void count_rows(const ImageSize size, const float min_difference, global const float* predicted,
+COMPILED_ONCE void count_rows_row(const WorkItem at, const ImageSize size, const float min_difference, global const float* predicted,
                        global const float* measured, global float* both, global float* different) {
   const int width = size.width;
-  const size_t row = (size_t)get_global_id(1) * width;
+  const size_t row = (size_t)at.y * width;
   FOR_PIXELS(x, width) {
     Floats with_both = 0.0f;
     Floats that_differ = 0.0f;
@@ -30,10 +30,15 @@ KERNEL void count_rows(const ImageSize size, const float min_difference, global 
   }
 }
 
+KERNEL void count_rows(const ImageSize size, const float min_difference, global const float* predicted,
+                       global const float* measured, global float* both, global float* different) {
+  count_rows_row(THIS_WORK_ITEM, size, min_difference, predicted, measured, both, different);
+}
+
 // 255 where at least half of the window's pixels that have both differ, if enough have.
-KERNEL void mark(const ImageSize size, global const float* predicted, global const float* measured,
+COMPILED_ONCE void mark_row(const WorkItem at, const ImageSize size, global const float* predicted, global const float* measured,
                  global const float* both, global const float* different, global uchar* marks) {
-  const int y = get_global_id(1);
+  const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
   FOR_PIXELS(x, width) {
@@ -49,4 +54,9 @@ KERNEL void mark(const ImageSize size, global const float* predicted, global con
     const Ints marked = here & (with_both >= enough) & (that_differ + that_differ >= with_both);
     store_bytes(marked ? (Ints)(255) : (Ints)(0), marks + row, x, width);
   }
+}
+
+KERNEL void mark(const ImageSize size, global const float* predicted, global const float* measured,
+                 global const float* both, global const float* different, global uchar* marks) {
+  mark_row(THIS_WORK_ITEM, size, predicted, measured, both, different, marks);
 }

@@ -129,12 +129,12 @@ static inline Ints has_run(global const ushort* runs, const int x, const int wid
 
 // `all_codes`: Census's, read where they are a census and no grey values. `runs`: SpeckleRemoval's.
 // `doubtful`: KalmanUpdate's. What there is not (has_prediction, has_runs) may be any buffer.
-KERNEL void explain(const ImageSize size, const int disparities, global const uchar* images, const int has_census,
+COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const int disparities, global const uchar* images, const int has_census,
                     const int padding, global const uint* all_codes, const int has_prediction,
                     global const float* warped, global const uchar* hidden, global const float* measured,
                     const int has_runs, global const ushort* runs, global const float* disparity,
                     global const uchar* doubtful, global uchar* reasons) {
-  const int y = get_global_id(1);
+  const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
   const long stride = width + 2 * (long)padding;
@@ -176,4 +176,12 @@ KERNEL void explain(const ImageSize size, const int disparities, global const uc
     reason = is_hidden ? (Ints)(EGOSGM_REASON_NEARER) : reason;
     store_bytes(reason, reasons + row, x, width);
   }
+}
+
+KERNEL void explain(const ImageSize size, const int disparities, global const uchar* images, const int has_census,
+                    const int padding, global const uint* all_codes, const int has_prediction,
+                    global const float* warped, global const uchar* hidden, global const float* measured,
+                    const int has_runs, global const ushort* runs, global const float* disparity,
+                    global const uchar* doubtful, global uchar* reasons) {
+  explain_row(THIS_WORK_ITEM, size, disparities, images, has_census, padding, all_codes, has_prediction, warped, hidden, measured, has_runs, runs, disparity, doubtful, reasons);
 }

@@ -17,12 +17,12 @@
 #endif
 
 // A work-item BLOCKS blocks and view, or a row of blocks and view.
-KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
+COMPILED_ONCE void gather_blocks_row(const WorkItem at, const ImageSize size, global const float* disparity, global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int y = at.y;
+  const int view = at.view;
   const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
-  for (int x = get_global_id(0) * BLOCKS; x < blocks.width; x += (int)get_global_size(0) * BLOCKS) {
+  for (int x = at.x * BLOCKS; x < blocks.width; x += at.items * BLOCKS) {
     Spans spans = no_spans();
     for (int row = y * EGOSGM_BLOCK; row < end; ++row) {
       spans = with(spans, load_across(disparity + ((size_t)view * size.height + row) * size.width, x * EGOSGM_BLOCK,
@@ -38,16 +38,20 @@ KERNEL void gather_blocks(const ImageSize size, global const float* disparity, g
   }
 }
 
+KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
+  gather_blocks_row(THIS_WORK_ITEM, size, disparity, ranges);
+}
+
 // What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at
 // either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. A work-item a
 // block and view.
-KERNEL void gather_coarse(const ImageSize size, global const float* coarse, global BlockRange* ranges) {
+COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, global const float* coarse, global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
   const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
-  const int x = get_global_id(0);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int x = at.x;
+  const int y = at.y;
+  const int view = at.view;
   if (x >= blocks.width || y >= blocks.height) return;
 
 #if EGOSGM_BLOCK != 2 * EGOSGM_COARSE
@@ -84,6 +88,10 @@ KERNEL void gather_coarse(const ImageSize size, global const float* coarse, glob
   range.max = EGOSGM_COARSE * most[EGOSGM_COARSE_OUTLIERS].x;
   range.count = count.x + count.y + count.z + count.w;
   ranges[index_of(blocks, view, x, y)] = range;
+}
+
+KERNEL void gather_coarse(const ImageSize size, global const float* coarse, global BlockRange* ranges) {
+  gather_coarse_block(THIS_WORK_ITEM, size, coarse, ranges);
 }
 
 // From what to what the unpredicted pixels of a block search.
@@ -132,14 +140,14 @@ static inline Span span_around(const ImageSize blocks, const int view, const int
 // The band of a block's unpredicted pixels; `found` is for the predicted ones: beside a jump a prediction may lie on the
 // wrong side of it. `before`: of the frame before; after wrong predictions every pixel searches everything. A work-item
 // PIXELS blocks and view, or a row of blocks and view.
-KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
+COMPILED_ONCE void bands_of_blocks_row(const WorkItem at, const ImageSize size, const DisparityRange range, const int from_neighbours,
                             const float margin, const int min_count, const float coarse_margin,
                             global const PredictionState* before, global const BlockRange* ranges,
                             global const BlockRange* coarse_ranges,
                             global BlockRange* found, global Band* bands) {
   const ImageSize blocks = blocks_of(size);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int y = at.y;
+  const int view = at.view;
   const int asks = from_neighbours && !before->is_wrong;
   FOR_PIXELS(x, blocks.width) {
     float from[PIXELS], to[PIXELS];
@@ -152,6 +160,14 @@ KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, co
     store_bands(bands_of(range, load_pixels_of(from), load_pixels_of(to)), bands + index_of(blocks, view, 0, y), x,
                 blocks.width);
   }
+}
+
+KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
+                            const float margin, const int min_count, const float coarse_margin,
+                            global const PredictionState* before, global const BlockRange* ranges,
+                            global const BlockRange* coarse_ranges,
+                            global BlockRange* found, global Band* bands) {
+  bands_of_blocks_row(THIS_WORK_ITEM, size, range, from_neighbours, margin, min_count, coarse_margin, before, ranges, coarse_ranges, found, bands);
 }
 
 #if ROW_GROUP == 1
@@ -205,14 +221,14 @@ static inline Bands bands_of_predictions(const DisparityRange range, const float
 }
 
 // Work-items that have a row alone sum it up, too. A work-item PIXELS pixels and view, or a row and view.
-KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
+COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
                             const float coarse_tolerance, const float coarse_margin, global const PredictionState* before,
                             global const BlockRange* found, global const Band* block_bands, global Band* bands,
                             global uint* cell_offsets, global RowSum* row_sums) {
   const ImageSize blocks = blocks_of(size);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int y = at.y;
+  const int view = at.view;
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t row_of_blocks = index_of(blocks, view, 0, y / EGOSGM_BLOCK);
@@ -238,20 +254,28 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
 #if ROW_GROUP == 1
     const Ints chunks = x + LANE_INDICES < width ? all.chunks : (Ints)(0);
     sums = with_offsets(sums, chunks, d, (global uchar*)(cell_offsets + row), x, width);
-  }
-  row_sums[(size_t)view * size.height + y] = row_sum_of(sums);
-#else
-  }
 #endif
+  }
+#if ROW_GROUP == 1
+  row_sums[(size_t)view * size.height + y] = row_sum_of(sums);
+#endif
+}
+
+KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
+                            const float min_half_width, global const float* disparity, global const float* variance,
+                            const float coarse_tolerance, const float coarse_margin, global const PredictionState* before,
+                            global const BlockRange* found, global const Band* block_bands, global Band* bands,
+                            global uint* cell_offsets, global RowSum* row_sums) {
+  bands_of_pixels_row(THIS_WORK_ITEM, size, range, sigmas, min_half_width, disparity, variance, coarse_tolerance, coarse_margin, before, found, block_bands, bands, cell_offsets, row_sums);
 }
 
 #if ROW_GROUP == 1
 
 // Sums up each row of what was not banded pixel by pixel. A work-item a row and view.
-KERNEL void sum_rows(const ImageSize size, global const float* disparity, global const Band* bands,
+COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, global const float* disparity, global const Band* bands,
                      global uint* cell_offsets, global RowSum* row_sums) {
   const int width = size.width;
-  const size_t row = (size_t)get_global_id(2) * size.height + get_global_id(1);
+  const size_t row = (size_t)at.view * size.height + at.y;
   Sums sums = {0, 0};
   FOR_PIXELS(x, width) {
     int chunks[PIXELS];
@@ -260,6 +284,11 @@ KERNEL void sum_rows(const ImageSize size, global const float* disparity, global
                         (global uchar*)(cell_offsets + row * width), x, width);
   }
   row_sums[row] = row_sum_of(sums);
+}
+
+KERNEL void sum_rows(const ImageSize size, global const float* disparity, global const Band* bands,
+                     global uint* cell_offsets, global RowSum* row_sums) {
+  sum_row(THIS_WORK_ITEM, size, disparity, bands, cell_offsets, row_sums);
 }
 
 #else
