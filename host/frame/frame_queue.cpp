@@ -24,6 +24,15 @@ MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning) {
   return method;
 }
 
+Wanted wanted_of(const FrameOutputs& outputs) {
+  Wanted wanted{.dynamic = outputs.debug.dynamic.data != nullptr,
+                .right = outputs.right_disparity.data || outputs.right_variance.data,
+                .reasons = outputs.reason.data != nullptr};
+  if (outputs.variance.data) wanted.variance = Views::kLeft;
+  if (outputs.right_variance.data) wanted.variance = Views::kBoth;
+  return wanted;
+}
+
 FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options,
                        const Device& device, PixelType type)
     : options_(options),
@@ -57,9 +66,8 @@ void FrameQueue::prepare(PixelType type, const Wanted& wanted) {
   FrameImages images{ocl::Buffer<cl_uchar>(context_, 2 * 2 * pixel_count(narrow)), type};
   images.pixels.write(context_, std::vector<cl_uchar>(images.pixels.size()));
   const ocl::Drain drain{context_};
-  const Wanted all{Views::kBoth, /*dynamic=*/true, /*right=*/true, wanted.reasons};
-  method.frame(plan_of(method_options_, none.missing, false, {}, all), images, none, first, variance);
-  method.frame(plan_of(method_options_, first.missing, first.offset.is_known, Motion(), all), images, first, second,
+  method.frame(plan_of(method_options_, none.missing, false, {}, wanted), images, none, first, variance);
+  method.frame(plan_of(method_options_, first.missing, first.offset.is_known, Motion(), wanted), images, first, second,
                variance);
   context_.wait();
 }
@@ -68,11 +76,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
                         const FrameOutputs& outputs) {
   expect_device_frame_not_failed();
   expect_none_failed();
-  Wanted wanted{.dynamic = outputs.debug.dynamic.data != nullptr,
-                .right = outputs.right_disparity.data || outputs.right_variance.data,
-                .reasons = outputs.reason.data != nullptr};
-  if (outputs.variance.data) wanted.variance = Views::kLeft;
-  if (outputs.right_variance.data) wanted.variance = Views::kBoth;
+  const Wanted wanted = wanted_of(outputs);
   build(left.type, wanted);
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};

@@ -16,6 +16,9 @@ ocl::Context context_on(const Device::Handle& device);
 /// `options` as a pipeline on a device with this tuning runs them.
 MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning);
 
+/// What is wanted of a frame with these outputs.
+Wanted wanted_of(const FrameOutputs& outputs);
+
 /// Frames on their way: up to two at once, each on the belief that the one before leaves. One that fails takes those
 /// that rest on it along, and the belief goes back to what was before it.
 class FrameQueue {
@@ -27,7 +30,7 @@ class FrameQueue {
   FrameQueue& operator=(const FrameQueue&) = delete;
 
   /// Builds what frames of `type` need, and what is wanted of them, and lets the driver make the machine code of all
-  /// their kernels: some drivers do that when a kernel first runs.
+  /// their kernels: some drivers do that when a kernel first runs. REQUIRES: no frame is under way.
   void prepare(PixelType type, const Wanted& wanted);
 
   /// As Pipeline. REQUIRES: arguments that were validated, and a frame under way or room for one.
