@@ -52,7 +52,7 @@ static inline int any_of(const Ints condition) {
 #if PIXELS == 1
 #define GATHERED(Values, row, x) ((Values)((row)[x]))
 #else
-#define GATHERED(Values, row, x)                                                                                   \
+#define GATHERED(Values, row, x)                                                                                     \
   ((Values)((row)[(x).s0], (row)[(x).s1], (row)[(x).s2], (row)[(x).s3], (row)[(x).s4], (row)[(x).s5], (row)[(x).s6], \
             (row)[(x).s7], (row)[(x).s8], (row)[(x).s9], (row)[(x).sa], (row)[(x).sb], (row)[(x).sc], (row)[(x).sd], \
             (row)[(x).se], (row)[(x).sf]))
@@ -60,8 +60,8 @@ static inline int any_of(const Ints condition) {
 static inline Floats gather(volatile global const float* row, const Ints x) { return GATHERED(Floats, row, x); }
 
 #if PIXELS > 1
-// What a block does where its row begins or ends. Not inlined: inlined at every load and store, it would be most of what
-// is compiled. Without a branch a lane: a row has few blocks.
+// What a block does where its row begins or ends. Not inlined: inlined at every load and store, it would be most of
+// what is compiled. Without a branch a lane: a row has few blocks.
 #define AT_EDGE static __attribute__((noinline, cold))
 AT_EDGE Floats load_pixels_at_edge(global const float* row, const int x, const int width) {
   const Ints at = x + LANE_INDICES, inside = clamp(at, 0, width - 1);

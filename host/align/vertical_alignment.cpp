@@ -54,9 +54,9 @@ void VerticalAlignment::estimate(const FrameImages& aligned, const Map& disparit
   context_.enter("VerticalAlignment");
   const cl_int rows = sampled_rows(size_);
   sum_residuals_(context_, ocl::group_a_row({size_.width, rows}, row_group_, 1), size_, aligned.pixels, disparity,
-            sums_.of_rows);
-  update_terms_(context_, ocl::group_a_row({size_.width, 1}, row_group_, 1), size_, rows, gain_, sums_.of_rows, offset.terms,
-          improved.terms);
+                 sums_.of_rows);
+  update_terms_(context_, ocl::group_a_row({size_.width, 1}, row_group_, 1), size_, rows, gain_, sums_.of_rows,
+                offset.terms, improved.terms);
   improved.is_known = true;
 }
 

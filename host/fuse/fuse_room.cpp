@@ -8,8 +8,8 @@ FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOp
       outside_(outside_view(options.consistency)),
       prediction_check_(context, size, options.prediction_check, tuning.row_group),
       kalman_update_(context, size, options.kalman_update),
-      right_map_(context, size, range_of(options)),
       consistency_(context, size) {
+  if (!options.track_right) right_map_.emplace(context, size, range_of(options));
   if (options.median_filter.enabled) median_filter_.emplace(context, size);
   if (options.sad_check.max_difference > 0) {
     sad_check_.emplace(
@@ -37,7 +37,7 @@ void FuseRoom::fuse(const Plan& plan, const FrameImages& images, const Predictio
   kalman_update_(agreement, prediction.hidden, prediction.maps, measured, fused, fusion.doubtful, plan.tracked);
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
-  if (plan.tracked == Views::kLeft) right_map_(measured, left_right_px_, smoothed, plan.wanted.right);
+  if (plan.tracked == Views::kLeft) (*right_map_)(measured, left_right_px_, smoothed, plan.wanted.right);
   const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
   consistency_(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
   if (sad_check_) (*sad_check_)[images.type](images.pixels, belief, checked);

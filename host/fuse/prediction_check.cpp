@@ -38,7 +38,7 @@ void PredictionCheck::operator()(const State& before, const Map& warped, const M
   const cl_int rows = is_enabled_ ? checked_rows(size_) : 0;
   if (rows > 0) {
     count_predictions_(context_, ocl::group_a_row({size_.width, rows}, row_group_, /*views=*/1), size_.width, warped,
-                predicted, measured, row_counts_);
+                       predicted, measured, row_counts_);
   }
   judge_(context_, ocl::group_a_row({size_.width, 1}, row_group_, /*views=*/1), rows, row_counts_, before, after);
 }

@@ -132,7 +132,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   options.doubts_band_ends,
                   /*reads_off=*/0},
       launches_(launches),
-      read_off_(context, size_, code_padding(range)) {
+      no_ranks_(context, 1) {
   if (follows_paths(context, options.scheduling)) {
     paths_.emplace(context, size_, range, options,
                    group ? *group : BandedSgmPaths::default_group(context, range, options.cost));
@@ -140,9 +140,13 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
     wavefront_.emplace(context, size_, range, options, tile);
   }
   if (stripes_.size() > 1) {
-    stripe_memory_.emplace(context, size, range, size_.height,
-                           code_words_a_row(size.width, range, options.cost, tile));
+    stripe_memory_.emplace(context, size, range, size_.height, code_words_a_row(size.width, range, options.cost, tile));
   }
+}
+
+void BandedSgm::prepare_reading_off() {
+  context_.enter("BandedSgm");
+  read_off_.emplace(context_, size_, parameters_.padding);
 }
 
 void BandedSgm::operator()(const MatchInputs& image, Measurement& measured, Views views) {
@@ -166,13 +170,13 @@ void BandedSgm::match_stripes(const MatchInputs& image, Measurement& measured, V
 void BandedSgm::match(const MatchInputs& inputs, Measurement& measured, Views views, bool reads_off) {
   shared::SgmParameters parameters = parameters_;
   parameters.reads_off = reads_off;
-  if (reads_off) read_off_.clear();
+  if (reads_off) read_off_->clear();
   if (paths_) {
-    (*paths_)(parameters, inputs, measured, read_off_.ranks(), views);
+    (*paths_)(parameters, inputs, measured, ranks(), views);
   } else {
     sweep(parameters, inputs, measured, views);
   }
-  if (reads_off) read_off_(parameters, measured);
+  if (reads_off) (*read_off_)(parameters, measured);
 }
 
 void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
@@ -195,7 +199,7 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
                           inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
-                          wavefront.sums, wavefront.winners, read_off_.ranks());
+                          wavefront.sums, wavefront.winners, ranks());
   }
   wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), count(views)),
                    parameters, wavefront.winners, measured.disparity, measured.variance, measured.doubtful);

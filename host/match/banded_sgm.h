@@ -57,7 +57,10 @@ class BandedSgm {
   /// read; of penalties and bands, theirs.
   void operator()(const MatchInputs& image, Measurement& measured, Views views);
   /// Matches the left view, and reads the right one's disparities off its sums: half of the work, whole disparities.
+  /// REQUIRES: that was prepared.
   void reading_off(const MatchInputs& image, Measurement& measured);
+  /// Builds and allocates what that needs.
+  void prepare_reading_off();
 
   static int code_padding(shared::DisparityRange range);
   /// Whether it takes a few work-items a path.
@@ -91,13 +94,15 @@ class BandedSgm {
   void match(const MatchInputs& inputs, Measurement& measured, Views views, bool reads_off);
   void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured, Views views);
   bool takes_whole_sweeps(Views views) const;
+  ocl::Buffer<cl_uint>& ranks() { return read_off_ ? read_off_->ranks() : no_ranks_; }
 
   ocl::Context& context_;
   const shared::ImageSize size_;  // of what is matched at once: the image, or a stripe
   const std::vector<Stripe> stripes_;
   const shared::SgmParameters parameters_;
   const Launches launches_;
-  ReadOff read_off_;
+  std::optional<ReadOff> read_off_;
+  ocl::Buffer<cl_uint> no_ranks_;              // in place of ReadOff's
   std::optional<StripeMemory> stripe_memory_;  // where there is more than one
   std::optional<Wavefront> wavefront_;         // one of the two
   std::optional<BandedSgmPaths> paths_;

@@ -27,7 +27,7 @@ int vector_of(const ocl::Context& context) { return is_gpu(context) ? kQuad : kV
 int spare_cells(int vector) { return vector == kQuad ? kQuad : vector + EGOSGM_LANES; }
 
 ocl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
-                         BandedSgmPaths::Group group) {
+                    BandedSgmPaths::Group group) {
   ocl::Defines defines = sgm_defines(SearchBand::max_chunks(range), Census::words(options.cost), options);
   defines.set("LANES", group.lanes).set("LINES", group.lines).set("VECTOR", vector_of(context)).set("PIXELS", 1);
   return context.program("banded_sgm_paths.cl", defines, ocl::Joins::kNo);

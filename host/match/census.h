@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "egosgm/image.h"
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {

@@ -6,8 +6,7 @@ namespace egosgm {
 Matcher::Matcher(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                  const BandedSgmOptions& options, const Sizes& sizes)
     : census_([=, &context](PixelType type) {
-        return Census(context, size, type, options.cost, BandedSgm::code_padding(range), 0,
-                      sizes.tile.code_words);
+        return Census(context, size, type, options.cost, BandedSgm::code_padding(range), 0, sizes.tile.code_words);
       }),
       step_penalties_([=, &context](PixelType type) { return StepPenalties(context, size, type, options); }),
       banded_sgm_(context, size, range, options, sizes.group, sizes.tile),

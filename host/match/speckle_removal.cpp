@@ -6,7 +6,8 @@ namespace {
 
 ocl::Program& build(ocl::Context& context, int row_group) {
   context.enter("SpeckleRemoval");
-  return context.program("speckle_removal.cl", ocl::Defines().set("ROW_GROUP", row_group).set("PIXELS", row_group == 1 ? 16 : 1));
+  return context.program("speckle_removal.cl",
+                         ocl::Defines().set("ROW_GROUP", row_group).set("PIXELS", row_group == 1 ? 16 : 1));
 }
 
 }  // namespace

@@ -124,10 +124,7 @@ Context::Context(const cl::Device& device, const cl::Context& context, const cl:
       folder_(std::move(programs)) {}
 
 Context::Apart::Apart(Context& context)
-    : context_(context),
-      kernels_(context.queue()),
-      allocated_bytes_(context.allocated_bytes_),
-      stage_(context.stage_) {
+    : context_(context), kernels_(context.queue()), allocated_bytes_(context.allocated_bytes_), stage_(context.stage_) {
   context.queue() = make_queue(context.context_, context.device_);
 }
 
@@ -277,8 +274,7 @@ cl::Program Context::built(const ProgramSource& source) {
   // cl::Program::build asks for the log whatever went wrong, and reports that there is none instead of why.
   const std::string options = folder_ ? folder_->options(source) : source.options;
   ++builds_;
-  return expect_built(source, program,
-                      ::clBuildProgram(program(), 1, &device_(), options.c_str(), nullptr, nullptr));
+  return expect_built(source, program, ::clBuildProgram(program(), 1, &device_(), options.c_str(), nullptr, nullptr));
 }
 
 cl::Program Context::expect_built(const ProgramSource& source, const cl::Program& program, cl_int status) const {

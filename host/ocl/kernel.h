@@ -89,7 +89,8 @@ class Kernel {
   }
   Kernel(const cl::Program& program, const char* name)
       : name_(name),
-        made_(std::make_shared<MadeKernel>(program, name, std::vector<std::string>{KernelParameter<Params>::text()...})) {}
+        made_(std::make_shared<MadeKernel>(program, name,
+                                           std::vector<std::string>{KernelParameter<Params>::text()...})) {}
 
   /// Throws DeviceError where the device, for what this kernel takes of it, cannot hold the range's work-groups and the
   /// kernel needs them so large. Of a program that was not built, builds it.
@@ -104,7 +105,6 @@ class Kernel {
     context.queue().enqueueNDRangeKernel(made_->kernel, cl::NullRange, range.global, local, nullptr, &done);
     context.record(done, name_, Queue::kKernels, /*is_launch=*/true);
   }
-
 
  private:
   template <typename T>

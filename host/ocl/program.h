@@ -34,9 +34,11 @@ class Program {
   void when_built(std::function<void(const cl::Program&)> f) {
     is_built() ? f(built_) : waiting_.push_back(std::move(f));
   }
+  /// Where one of those that wait throws, it is not built.
   void set_built(const cl::Program& built) {
+    for (const auto& f : waiting_) f(built);
+    waiting_.clear();
     built_ = built;
-    for (const auto& f : std::exchange(waiting_, {})) f(built_);
   }
 
  private:

@@ -44,7 +44,7 @@ class PredictRoom {
   const float left_right_px_;
   const OutsideView outside_;
   ForwardWarp forward_warp_;
-  RightMap right_map_;
+  std::optional<RightMap> right_map_;  // where the left view alone is tracked
   EdgeRejection edge_rejection_;
   HoleFill hole_fill_;
   ConsistencyCheck consistency_;

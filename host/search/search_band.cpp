@@ -19,7 +19,8 @@ shared::Band whole(shared::DisparityRange range) {
 
 ocl::Program& build(ocl::Context& context, int row_group) {
   context.enter("SearchBand");
-  return context.program("search_band.cl", ocl::Defines().set("ROW_GROUP", row_group).set("PIXELS", row_group == 1 ? 16 : 1));
+  return context.program("search_band.cl",
+                         ocl::Defines().set("ROW_GROUP", row_group).set("PIXELS", row_group == 1 ? 16 : 1));
 }
 
 }  // namespace

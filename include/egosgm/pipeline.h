@@ -32,9 +32,9 @@ class EGOSGM_EXPORT Pipeline {
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
 
-  /// Builds what frames of `type` with such outputs need, as far as it is not built yet, so that none of them waits for a
-  /// compiler; without, the first of them does. Of the outputs it is asked which have memory, not which size. REQUIRES:
-  /// no frame is under way. Throws DeviceError or BuildError.
+  /// Builds what frames of `type` with such outputs need, as far as it is not built yet, so that none of them waits for
+  /// a compiler; without, the first of them does. Of the outputs it is asked which have memory, not which size.
+  /// REQUIRES: no frame is under way. Throws DeviceError or BuildError.
   void prepare(PixelType type, const FrameOutputs& outputs);
 
   /// Matches one rectified pair, both images of the same type, and fills `outputs`.

@@ -56,7 +56,8 @@ inline int place(const int at, const int count, const int steps) {
 
 // Copies the left image, and resamples the right one by the quadratic state[0] + state[1] u + state[2] v + state[3] u v
 // + state[4] u^2 + state[5] v^2 pixels; u, v: -1 to 1 over the image. A work-group of ROW_GROUP a row and view.
-COMPILED_ONCE void resample_row(const WorkItem at, const ImageSize size, global const float* state, global const uchar* images, global uchar* aligned) {
+COMPILED_ONCE void resample_row(const WorkItem at, const ImageSize size, global const float* state,
+                                global const uchar* images, global uchar* aligned) {
   const int y = at.y;
   const int view = at.view;
   const int is_moved = view == EGOSGM_RIGHT;
@@ -157,9 +158,9 @@ COMPILED_ONCE void sum_row_residuals(const ImageSize size, const int y, const in
 }
 
 KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_residuals(const ImageSize size,
-                                                                            global const uchar* images,
-                                                                            global const float* disparity,
-                                                                            global long* row_sums) {
+                                                                                 global const uchar* images,
+                                                                                 global const float* disparity,
+                                                                                 global long* row_sums) {
   const int lane = get_local_id(0);
   const int sampled_row = get_global_id(1);
   const int y = EGOSGM_ALIGNED_BORDER_ROWS + sampled_row * EGOSGM_ALIGNED_ROW_STRIDE;
@@ -216,7 +217,7 @@ COMPILED_ONCE int solve(float matrix[TERMS][TERMS], float x[TERMS], const float 
 // A sum over the image of u^n v^m, from the rows' sums number `sum`, which hold u^n. The sums are of integers, and the
 // rest is exact but for two conversions and a sum, so that no compiler can make another number of it.
 COMPILED_ONCE float moment_of(const int height, const int rows, const int n, const int m, const int sum,
-                       global const long* row_sums) {
+                              global const long* row_sums) {
   long high = 0, low = 0;
   for (int row = 0; row < rows; ++row) {
     const long v = place(EGOSGM_ALIGNED_BORDER_ROWS + row * EGOSGM_ALIGNED_ROW_STRIDE, height, PLACES);
@@ -232,10 +233,9 @@ COMPILED_ONCE float moment_of(const int height, const int rows, const int n, con
 // The step of a frame, by the running mean of the frames so far at first and then at a fixed gain. state: the terms of
 // the offset [px], and the number of estimates that they rest on. A single work-group of ROW_GROUP, whose work-items
 // share the sums; `state` and `next` may be the same.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update_terms(const ImageSize size, const int sampled_rows,
-                                                                          const float gain, global const long* row_sums,
-                                                                          global const float* state,
-                                                                          global float* next) {
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update_terms(
+    const ImageSize size, const int sampled_rows, const float gain, global const long* row_sums,
+    global const float* state, global float* next) {
   local float moments[MOMENTS];
   for (int i = get_local_id(0); i < MOMENTS; i += ROW_GROUP) {
     const int is_gr = i < GR_MOMENTS, side = is_gr ? GR_SUMS : GG_SUMS;

@@ -44,11 +44,13 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
 // `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
 // is taken that differs as those of EGOSGM_MOVING_COUNT around do. has_gate: else all that is predicted and measured is
 // averaged, and nothing is hidden or doubtful.
-COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int has_gate, const float gate, const int keep_predicted, const int ask_neighbours,
-                   const float min_variance, global const PredictionState* check, global const uchar* hidden,
-                   global const float* predicted, global const float* predicted_variance, global const float* measured,
-                   global const float* measured_variance, global const uchar* measured_doubtful, global float* updated,
-                   global float* updated_variance, global uchar* updated_doubtful) {
+COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int has_gate, const float gate,
+                              const int keep_predicted, const int ask_neighbours, const float min_variance,
+                              global const PredictionState* check, global const uchar* hidden,
+                              global const float* predicted, global const float* predicted_variance,
+                              global const float* measured, global const float* measured_variance,
+                              global const uchar* measured_doubtful, global float* updated,
+                              global float* updated_variance, global uchar* updated_doubtful) {
   const int width = size.width;
   const int y = at.y;
   const size_t view = (size_t)at.view * size.height * width;
@@ -97,10 +99,13 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
   }
 }
 
-KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted, const int ask_neighbours,
-                   const float min_variance, global const PredictionState* check, global const uchar* hidden,
-                   global const float* predicted, global const float* predicted_variance, global const float* measured,
-                   global const float* measured_variance, global const uchar* measured_doubtful, global float* updated,
-                   global float* updated_variance, global uchar* updated_doubtful) {
-  update_row(THIS_WORK_ITEM, size, has_gate, gate, keep_predicted, ask_neighbours, min_variance, check, hidden, predicted, predicted_variance, measured, measured_variance, measured_doubtful, updated, updated_variance, updated_doubtful);
+KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted,
+                   const int ask_neighbours, const float min_variance, global const PredictionState* check,
+                   global const uchar* hidden, global const float* predicted, global const float* predicted_variance,
+                   global const float* measured, global const float* measured_variance,
+                   global const uchar* measured_doubtful, global float* updated, global float* updated_variance,
+                   global uchar* updated_doubtful) {
+  update_row(THIS_WORK_ITEM, size, has_gate, gate, keep_predicted, ask_neighbours, min_variance, check, hidden,
+             predicted, predicted_variance, measured, measured_variance, measured_doubtful, updated, updated_variance,
+             updated_doubtful);
 }

@@ -27,11 +27,9 @@ static inline PredictionCounts sum_of_lanes(local PredictionCounts* lanes, const
 }
 
 // Counts of every EGOSGM_CHECKED_ROWS-th row. A work-group of ROW_GROUP a row.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_predictions(const int width,
-                                                                              global const float* warped,
-                                                                              global const float* predicted,
-                                                                              global const float* measured,
-                                                                              global PredictionCounts* row_counts) {
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void count_predictions(
+    const int width, global const float* warped, global const float* predicted, global const float* measured,
+    global PredictionCounts* row_counts) {
   const int lane = get_local_id(0);
   const size_t row = (size_t)get_global_id(1) * EGOSGM_CHECKED_ROWS * width;
   local PredictionCounts lanes[ROW_GROUP];

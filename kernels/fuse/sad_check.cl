@@ -15,8 +15,8 @@
 #define STEPS_PER_GREY 257
 #endif
 
-COMPILED_ONCE void check_greys_row(const WorkItem at, const ImageSize size, const float max_difference, global const uchar* images,
-                  global float* disparity, global float* variance) {
+COMPILED_ONCE void check_greys_row(const WorkItem at, const ImageSize size, const float max_difference,
+                                   global const uchar* images, global float* disparity, global float* variance) {
   const int y = at.y;
   const int view = at.view;
   const int width = size.width;
@@ -56,6 +56,6 @@ COMPILED_ONCE void check_greys_row(const WorkItem at, const ImageSize size, cons
 }
 
 KERNEL void check_greys(const ImageSize size, const float max_difference, global const uchar* images,
-                  global float* disparity, global float* variance) {
+                        global float* disparity, global float* variance) {
   check_greys_row(THIS_WORK_ITEM, size, max_difference, images, disparity, variance);
 }

@@ -304,8 +304,8 @@ KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int t
 
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, the matching variance
 // (options.h), and whether the disparity is doubtful.
-COMPILED_ONCE void refine_row(const WorkItem at, const SgmParameters q, global const ulong* winners, global float* disparities,
-                   global float* variances, global uchar* doubtful) {
+COMPILED_ONCE void refine_row(const WorkItem at, const SgmParameters q, global const ulong* winners,
+                              global float* disparities, global float* variances, global uchar* doubtful) {
   const int width = q.width;
   const size_t row = ((size_t)at.view * q.height + at.y) * q.width;
   FOR_PIXELS(x, width) {

@@ -140,7 +140,7 @@ inline uint16 joined_bytes(const uchar16 b0, const uchar16 b1, const uchar16 b2,
 #if CODE_BYTES == 4
 #define JOINED(HALF, bytes) joined_bytes(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))
 #else
-#define JOINED(HALF, bytes)                                                                                   \
+#define JOINED(HALF, bytes)                                                                                         \
   (convert_ulong16(joined_bytes(HALF(bytes[4]), HALF(bytes[5]), HALF(bytes[6]), HALF(bytes[7]))) << (ulong16)(32) | \
    convert_ulong16(joined_bytes(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))))
 #endif
@@ -173,7 +173,8 @@ inline void codes_at(const Rows* rows, const int x, Codes* codes) {
 #endif
 
 // A work-item a row and view.
-COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
+COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int padding, global const uchar* images,
+                              global uint* all_codes) {
   const int y = at.x;
   const int view = at.y;
   if (y >= size.height) return;

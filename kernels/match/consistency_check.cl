@@ -6,9 +6,10 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const float max_difference, const float max_difference_in_doubt,
-                  global const PredictionState* last, const int keep_outside, global const float* disparity,
-                  global float* kept_disparity, global float* variance) {
+COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const float max_difference,
+                             const float max_difference_in_doubt, global const PredictionState* last,
+                             const int keep_outside, global const float* disparity, global float* kept_disparity,
+                             global float* variance) {
   const int y = at.y;
   const int view = at.view;
   const int width = size.width;
@@ -35,5 +36,6 @@ COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const floa
 KERNEL void check(const ImageSize size, const float max_difference, const float max_difference_in_doubt,
                   global const PredictionState* last, const int keep_outside, global const float* disparity,
                   global float* kept_disparity, global float* variance) {
-  check_row(THIS_WORK_ITEM, size, max_difference, max_difference_in_doubt, last, keep_outside, disparity, kept_disparity, variance);
+  check_row(THIS_WORK_ITEM, size, max_difference, max_difference_in_doubt, last, keep_outside, disparity,
+            kept_disparity, variance);
 }

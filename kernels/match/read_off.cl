@@ -15,8 +15,8 @@ inline Uints load_ranks(global const uint* row, const int x) {
 }
 
 // Writes the right half of the maps. Nothing is doubtful.
-COMPILED_ONCE void read_off_row(const WorkItem at, const SgmParameters q, global const uint* ranks, global float* disparities,
-                     global float* variances, global uchar* doubtful) {
+COMPILED_ONCE void read_off_row(const WorkItem at, const SgmParameters q, global const uint* ranks,
+                                global float* disparities, global float* variances, global uchar* doubtful) {
   const int y = at.y;
   const size_t row = ((size_t)q.height + y) * q.width;
   global const uint* seen = ranks + (size_t)y * ((size_t)q.width + 2 * (size_t)q.padding) + q.padding;

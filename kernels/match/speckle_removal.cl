@@ -44,8 +44,9 @@ int lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 // Where runs begin, as far as a row has seventeen pixels from x on, sixteen at a time: an inclusive maximum of the
 // columns that do not continue their left neighbour's run. Returns the column behind; `begin` is where its left
 // neighbour's run begins.
-COMPILED_ONCE int find_runs_by_lanes(const int width, const float max_difference, global const float* disparity, const uint row,
-                       global ushort* runs, global uint* parents, global uint* sizes, int* begin) {
+COMPILED_ONCE int find_runs_by_lanes(const int width, const float max_difference, global const float* disparity,
+                                     const uint row, global ushort* runs, global uint* parents, global uint* sizes,
+                                     int* begin) {
   int x = 0;
   for (; x + 17 <= width; x += 16) {
     const float16 d = vload16(0, disparity + x);
@@ -148,8 +149,9 @@ void join(global uint* parents, uint a, uint b) {
 
 // Joins each row of a strip with the one above; the strip's own runs are touched by no other work-item. A work-item a
 // strip and view. Sixteen pixels at a time: few of them join what their left neighbour has not joined before them.
-COMPILED_ONCE void join_strips_row(const WorkItem at, const ImageSize size, const float max_difference, const int strip_rows,
-                        global const float* disparity, global const ushort* runs, global uint* parents) {
+COMPILED_ONCE void join_strips_row(const WorkItem at, const ImageSize size, const float max_difference,
+                                   const int strip_rows, global const float* disparity, global const ushort* runs,
+                                   global uint* parents) {
   const int strip = at.x;
   const int view = at.y;
   const int end = min((strip + 1) * strip_rows, size.height);
@@ -237,8 +239,8 @@ uint beginnings(global const ushort* runs, int x, int width) {
 }
 
 // Adds every run to its root. Only roots are added to, and only others are read.
-COMPILED_ONCE void measure_row(const WorkItem at, const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
-                    volatile global uint* sizes) {
+COMPILED_ONCE void measure_row(const WorkItem at, const ImageSize size, global const ushort* runs,
+                               global const uint* parents, global uint* roots, volatile global uint* sizes) {
   const int y = at.y;
   const int view = at.view;
   const int width = size.width;
@@ -259,8 +261,9 @@ KERNEL void measure(const ImageSize size, global const ushort* runs, global cons
   measure_row(THIS_WORK_ITEM, size, runs, parents, roots, sizes);
 }
 
-COMPILED_ONCE void drop_row(const WorkItem at, const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
-                 global const uint* sizes, global float* disparity, global float* variance) {
+COMPILED_ONCE void drop_row(const WorkItem at, const ImageSize size, const uint max_size, global const ushort* runs,
+                            global const uint* roots, global const uint* sizes, global float* disparity,
+                            global float* variance) {
   const int y = at.y;
   const int view = at.view;
   const int width = size.width;

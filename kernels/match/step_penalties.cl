@@ -34,8 +34,8 @@ static inline Ints penalty(const Ints most, const Ints least, const Ints slope, 
   return max(most - slope * max(p - q, q - p), least);
 }
 
-COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const int most, const int least, const int slope,
-                      global const uchar* images, global uchar* steps) {
+COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const int most, const int least,
+                                 const int slope, global const uchar* images, global uchar* steps) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;

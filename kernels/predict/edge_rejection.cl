@@ -11,8 +11,8 @@ static inline Ints is_jump(const Floats d, const Floats near, const Floats far, 
   return (neighbour > INVALID) & (fabs(neighbour - d) > max_jump);
 }
 
-COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const float max_jump, global const float* disparity,
-                   global float* kept_disparity, global float* variance) {
+COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const float max_jump,
+                              global const float* disparity, global float* kept_disparity, global float* variance) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;

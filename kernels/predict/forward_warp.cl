@@ -112,7 +112,7 @@ KERNEL void splat_variance(const ImageSize size, global const int* landed, globa
 }
 
 KERNEL void decode_warped(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
-                   global float* disparity, global float* variance, global uchar* hidden) {
+                          global float* disparity, global float* variance, global uchar* hidden) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
   const size_t i = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width + x;
@@ -152,8 +152,8 @@ static inline int2 span_of(const ImageSize size, const DisparityMotion motion, c
 
 // Between which rows each source row lands; the first lies behind the last where it lands on none. A work-item a row
 // and view.
-COMPILED_ONCE void find_spans_row(const WorkItem at, const ImageSize size, const DisparityMotion left, const DisparityMotion right,
-                       global const float* disparity, global int* spans) {
+COMPILED_ONCE void find_spans_row(const WorkItem at, const ImageSize size, const DisparityMotion left,
+                                  const DisparityMotion right, global const float* disparity, global int* spans) {
   const int y = at.x;
   const int view = at.y;
   const size_t row = (size_t)view * size.height + y;
@@ -186,10 +186,11 @@ KERNEL void find_spans(const ImageSize size, const DisparityMotion left, const D
 }
 
 // Moves and splats what lands on a band of `band_rows` rows. A work-item a band and view; no other touches its rows.
-COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, const DisparityRange range, const DisparityMotion left,
-                        const DisparityMotion right, const float process_noise, const int band_rows,
-                        global const int* spans, global const float* disparity, global const float* variance,
-                        global float* predicted, global float* predicted_variance, global uchar* hidden) {
+COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, const DisparityRange range,
+                                   const DisparityMotion left, const DisparityMotion right, const float process_noise,
+                                   const int band_rows, global const int* spans, global const float* disparity,
+                                   global const float* variance, global float* predicted,
+                                   global float* predicted_variance, global uchar* hidden) {
   const int view = at.y;
   const int width = size.width;
   const int first = at.x * band_rows;
@@ -242,7 +243,8 @@ KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const 
                         const DisparityMotion right, const float process_noise, const int band_rows,
                         global const int* spans, global const float* disparity, global const float* variance,
                         global float* predicted, global float* predicted_variance, global uchar* hidden) {
-  splat_bands_row(THIS_WORK_ITEM, size, range, left, right, process_noise, band_rows, spans, disparity, variance, predicted, predicted_variance, hidden);
+  splat_bands_row(THIS_WORK_ITEM, size, range, left, right, process_noise, band_rows, spans, disparity, variance,
+                  predicted, predicted_variance, hidden);
 }
 
 #endif

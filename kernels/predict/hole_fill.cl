@@ -25,12 +25,13 @@ static inline void store_filled(const Ints fills, const Floats mean, const Float
 }
 
 // `whole_views`: those of which more than disparities is filled.
-COMPILED_ONCE void fill_rows_row(const WorkItem at, const ImageSize size, const float gamma, const int whole_views, global const float* disparity,
-                      global const float* variance, global const uchar* hidden, global float* filled_disparity,
-                      global float* filled_variance, global uchar* still_hidden) {
+COMPILED_ONCE void fill_rows_row(const WorkItem at, const ImageSize size, const float gamma, const int whole_views,
+                                 global const float* disparity, global const float* variance,
+                                 global const uchar* hidden, global float* filled_disparity,
+                                 global float* filled_variance, global uchar* still_hidden) {
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
-  const bool is_whole = at.view < (size_t)whole_views;
+  const bool is_whole = at.view < whole_views;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
@@ -54,19 +55,21 @@ COMPILED_ONCE void fill_rows_row(const WorkItem at, const ImageSize size, const 
 KERNEL void fill_rows(const ImageSize size, const float gamma, const int whole_views, global const float* disparity,
                       global const float* variance, global const uchar* hidden, global float* filled_disparity,
                       global float* filled_variance, global uchar* still_hidden) {
-  fill_rows_row(THIS_WORK_ITEM, size, gamma, whole_views, disparity, variance, hidden, filled_disparity, filled_variance, still_hidden);
+  fill_rows_row(THIS_WORK_ITEM, size, gamma, whole_views, disparity, variance, hidden, filled_disparity,
+                filled_variance, still_hidden);
 }
 
-COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, const float gamma, const int whole_views, global const float* disparity,
-                         global const float* variance, global const uchar* hidden, global float* filled_disparity,
-                         global float* filled_variance, global uchar* still_hidden) {
+COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, const float gamma, const int whole_views,
+                                    global const float* disparity, global const float* variance,
+                                    global const uchar* hidden, global float* filled_disparity,
+                                    global float* filled_variance, global uchar* still_hidden) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
   // At the border the row itself, whose pixels are valid or no neighbours.
   const size_t row_above = y >= 1 ? row - width : row;
   const size_t row_below = y + 1 < size.height ? row + width : row;
-  const bool is_whole = at.view < (size_t)whole_views;
+  const bool is_whole = at.view < whole_views;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
@@ -90,5 +93,6 @@ COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, con
 KERNEL void fill_columns(const ImageSize size, const float gamma, const int whole_views, global const float* disparity,
                          global const float* variance, global const uchar* hidden, global float* filled_disparity,
                          global float* filled_variance, global uchar* still_hidden) {
-  fill_columns_row(THIS_WORK_ITEM, size, gamma, whole_views, disparity, variance, hidden, filled_disparity, filled_variance, still_hidden);
+  fill_columns_row(THIS_WORK_ITEM, size, gamma, whole_views, disparity, variance, hidden, filled_disparity,
+                   filled_variance, still_hidden);
 }

@@ -38,7 +38,8 @@ static inline void bid(const Ints keys, const Ints targets, global int* row) {
 }
 
 // REQUIRES: on GPUs, keys of 0.
-COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const int min_disparity, global const float* disparity, global int* keys) {
+COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const int min_disparity,
+                             global const float* disparity, global int* keys) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -68,9 +69,10 @@ KERNEL void splat(const ImageSize size, const int min_disparity, global const fl
 }
 
 // REQUIRES: unless is_measured, any maps as `measured`. makes_variance: else disparities only.
-COMPILED_ONCE void decode_row(const WorkItem at, const ImageSize size, const int min_disparity, const float max_difference, const int is_measured,
-                   const int makes_variance, global const int* keys, global const float* measured,
-                   global const float* measured_variance, global float* disparity, global float* variance) {
+COMPILED_ONCE void decode_row(const WorkItem at, const ImageSize size, const int min_disparity,
+                              const float max_difference, const int is_measured, const int makes_variance,
+                              global const int* keys, global const float* measured,
+                              global const float* measured_variance, global float* disparity, global float* variance) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -100,5 +102,6 @@ COMPILED_ONCE void decode_row(const WorkItem at, const ImageSize size, const int
 KERNEL void decode(const ImageSize size, const int min_disparity, const float max_difference, const int is_measured,
                    const int makes_variance, global const int* keys, global const float* measured,
                    global const float* measured_variance, global float* disparity, global float* variance) {
-  decode_row(THIS_WORK_ITEM, size, min_disparity, max_difference, is_measured, makes_variance, keys, measured, measured_variance, disparity, variance);
+  decode_row(THIS_WORK_ITEM, size, min_disparity, max_difference, is_measured, makes_variance, keys, measured,
+             measured_variance, disparity, variance);
 }

@@ -11,8 +11,9 @@ static inline Ints has_both(const Floats predicted, const Floats measured) {
 }
 
 // Of 2 EGOSGM_DYNAMIC_RADIUS + 1 pixels of the row: how many have both, and how many of those differ.
-COMPILED_ONCE void count_rows_row(const WorkItem at, const ImageSize size, const float min_difference, global const float* predicted,
-                       global const float* measured, global float* both, global float* different) {
+COMPILED_ONCE void count_rows_row(const WorkItem at, const ImageSize size, const float min_difference,
+                                  global const float* predicted, global const float* measured, global float* both,
+                                  global float* different) {
   const int width = size.width;
   const size_t row = (size_t)at.y * width;
   FOR_PIXELS(x, width) {
@@ -36,8 +37,9 @@ KERNEL void count_rows(const ImageSize size, const float min_difference, global 
 }
 
 // 255 where at least half of the window's pixels that have both differ, if enough have.
-COMPILED_ONCE void mark_row(const WorkItem at, const ImageSize size, global const float* predicted, global const float* measured,
-                 global const float* both, global const float* different, global uchar* marks) {
+COMPILED_ONCE void mark_row(const WorkItem at, const ImageSize size, global const float* predicted,
+                            global const float* measured, global const float* both, global const float* different,
+                            global uchar* marks) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;

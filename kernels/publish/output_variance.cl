@@ -32,9 +32,10 @@ static inline Floats blend(const Floats p, const Floats measured, const Floats r
 
 // Of each pixel: the variances' blend, and the sum of the horizontal and the vertical second difference. A pixel at the
 // image's edge is its own neighbour.
-COMPILED_ONCE void of_each_pixel_row(const WorkItem at, const ImageSize size, global const float* disparity, global const float* variance,
-                          global const float* measured, global const float* measured_variance, global float* blended,
-                          global float* roughness) {
+COMPILED_ONCE void of_each_pixel_row(const WorkItem at, const ImageSize size, global const float* disparity,
+                                     global const float* variance, global const float* measured,
+                                     global const float* measured_variance, global float* blended,
+                                     global float* roughness) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
@@ -61,8 +62,9 @@ KERNEL void of_each_pixel(const ImageSize size, global const float* disparity, g
 }
 
 // Means along the row: of the variances at every fourth pixel; of the roughness at every pixel.
-COMPILED_ONCE void row_means_row(const WorkItem at, const ImageSize size, global const float* variance, global const float* roughness,
-                      global float* mean_variance, global float* mean_roughness) {
+COMPILED_ONCE void row_means_row(const WorkItem at, const ImageSize size, global const float* variance,
+                                 global const float* roughness, global float* mean_variance,
+                                 global float* mean_roughness) {
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + at.y) * width;
   FOR_PIXELS(x, width) {
@@ -126,9 +128,10 @@ static inline Floats calibrated(const Floats sum) {
   return right + EGOSGM_WRONG_SURFACE_PX2 * sqrt(sum) / (1.0f + EGOSGM_WRONG_SURFACE_HALF / (square * square * sum));
 }
 
-COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,
-                    global const float* disparity, global const float* mean_variance,
-                    global const float* mean_roughness, global float* variance) {
+COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const float scale, const float roughness_weight,
+                               const float jump_weight, global const float* disparity,
+                               global const float* mean_variance, global const float* mean_roughness,
+                               global float* variance) {
   const int y = at.y;
   const int width = size.width;
   const size_t view = (size_t)at.view * size.height * width;
@@ -146,5 +149,6 @@ COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const fl
 KERNEL void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,
                     global const float* disparity, global const float* mean_variance,
                     global const float* mean_roughness, global float* variance) {
-  combine_row(THIS_WORK_ITEM, size, scale, roughness_weight, jump_weight, disparity, mean_variance, mean_roughness, variance);
+  combine_row(THIS_WORK_ITEM, size, scale, roughness_weight, jump_weight, disparity, mean_variance, mean_roughness,
+              variance);
 }

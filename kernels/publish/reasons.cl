@@ -65,7 +65,7 @@ static inline Texture texture_around(const ImageSize size, global const Pixel* i
 }
 
 // How far apart those disparities lie that were warped near a pixel of the row.
-static inline Floats jump_beside(global const float* warped, const int x, const int width) {
+static inline Floats jump_in_row(global const float* warped, const int x, const int width) {
   Floats least = INFINITY;
   Floats most = -INFINITY;
   for (int u = x - EGOSGM_UNCOVERED_RADIUS; u <= x + EGOSGM_UNCOVERED_RADIUS; ++u) {
@@ -129,11 +129,12 @@ static inline Ints has_run(global const ushort* runs, const int x, const int wid
 
 // `all_codes`: Census's, read where they are a census and no grey values. `runs`: SpeckleRemoval's.
 // `doubtful`: KalmanUpdate's. What there is not (has_prediction, has_runs) may be any buffer.
-COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const int disparities, global const uchar* images, const int has_census,
-                    const int padding, global const uint* all_codes, const int has_prediction,
-                    global const float* warped, global const uchar* hidden, global const float* measured,
-                    const int has_runs, global const ushort* runs, global const float* disparity,
-                    global const uchar* doubtful, global uchar* reasons) {
+COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const int disparities,
+                               global const uchar* images, const int has_census, const int padding,
+                               global const uint* all_codes, const int has_prediction, global const float* warped,
+                               global const uchar* hidden, global const float* measured, const int has_runs,
+                               global const ushort* runs, global const float* disparity, global const uchar* doubtful,
+                               global uchar* reasons) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -156,7 +157,7 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const in
     const Ints differs = has_value ? is_doubtful : fabs(z - w) > off;
     const Ints contradicts = is_measured & is_warped & differs;
     const Ints is_speckle = has_runs ? has_run(runs + row, x, width) & !is_measured : (Ints)(0);
-    const Ints is_uncovered = has_prediction ? (jump_beside(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
+    const Ints is_uncovered = has_prediction ? (jump_in_row(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
     const Texture texture = texture_around(size, (global const Pixel*)images, x, y);
     const Ints is_flat = texture.changes < (Floats)(EGOSGM_LEAST_CHANGE * STEPS_PER_GREY * texture.pixels);
     const Ints is_saturated = 2.0f * texture.extremes >= (Floats)(texture.pixels);
@@ -183,5 +184,6 @@ KERNEL void explain(const ImageSize size, const int disparities, global const uc
                     global const float* warped, global const uchar* hidden, global const float* measured,
                     const int has_runs, global const ushort* runs, global const float* disparity,
                     global const uchar* doubtful, global uchar* reasons) {
-  explain_row(THIS_WORK_ITEM, size, disparities, images, has_census, padding, all_codes, has_prediction, warped, hidden, measured, has_runs, runs, disparity, doubtful, reasons);
+  explain_row(THIS_WORK_ITEM, size, disparities, images, has_census, padding, all_codes, has_prediction, warped, hidden,
+              measured, has_runs, runs, disparity, doubtful, reasons);
 }

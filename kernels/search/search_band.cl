@@ -17,7 +17,8 @@
 #endif
 
 // A work-item BLOCKS blocks and view, or a row of blocks and view.
-COMPILED_ONCE void gather_blocks_row(const WorkItem at, const ImageSize size, global const float* disparity, global BlockRange* ranges) {
+KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
+  const WorkItem at = THIS_WORK_ITEM;
   const ImageSize blocks = blocks_of(size);
   const int y = at.y;
   const int view = at.view;
@@ -38,14 +39,11 @@ COMPILED_ONCE void gather_blocks_row(const WorkItem at, const ImageSize size, gl
   }
 }
 
-KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
-  gather_blocks_row(THIS_WORK_ITEM, size, disparity, ranges);
-}
-
 // What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at
 // either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. A work-item a
 // block and view.
-COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, global const float* coarse, global BlockRange* ranges) {
+COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, global const float* coarse,
+                                       global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
   const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
@@ -140,11 +138,11 @@ static inline Span span_around(const ImageSize blocks, const int view, const int
 // The band of a block's unpredicted pixels; `found` is for the predicted ones: beside a jump a prediction may lie on the
 // wrong side of it. `before`: of the frame before; after wrong predictions every pixel searches everything. A work-item
 // PIXELS blocks and view, or a row of blocks and view.
-COMPILED_ONCE void bands_of_blocks_row(const WorkItem at, const ImageSize size, const DisparityRange range, const int from_neighbours,
-                            const float margin, const int min_count, const float coarse_margin,
-                            global const PredictionState* before, global const BlockRange* ranges,
-                            global const BlockRange* coarse_ranges,
-                            global BlockRange* found, global Band* bands) {
+COMPILED_ONCE void bands_of_blocks_row(const WorkItem at, const ImageSize size, const DisparityRange range,
+                                       const int from_neighbours, const float margin, const int min_count,
+                                       const float coarse_margin, global const PredictionState* before,
+                                       global const BlockRange* ranges, global const BlockRange* coarse_ranges,
+                                       global BlockRange* found, global Band* bands) {
   const ImageSize blocks = blocks_of(size);
   const int y = at.y;
   const int view = at.view;
@@ -165,43 +163,10 @@ COMPILED_ONCE void bands_of_blocks_row(const WorkItem at, const ImageSize size, 
 KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
                             const float margin, const int min_count, const float coarse_margin,
                             global const PredictionState* before, global const BlockRange* ranges,
-                            global const BlockRange* coarse_ranges,
-                            global BlockRange* found, global Band* bands) {
-  bands_of_blocks_row(THIS_WORK_ITEM, size, range, from_neighbours, margin, min_count, coarse_margin, before, ranges, coarse_ranges, found, bands);
+                            global const BlockRange* coarse_ranges, global BlockRange* found, global Band* bands) {
+  bands_of_blocks_row(THIS_WORK_ITEM, size, range, from_neighbours, margin, min_count, coarse_margin, before, ranges,
+                      coarse_ranges, found, bands);
 }
-
-#if ROW_GROUP == 1
-
-// Of a row up to a pixel.
-typedef struct {
-  int chunks;
-  Ints predicted;
-} Sums;
-
-// Leaves where the cells of PIXELS pixels begin, which have so many chunks, and sums them up.
-static inline Sums with_offsets(Sums sums, const Ints chunks, const Floats d, global uchar* offsets, const int x,
-                                const int width) {
-  Ints scan = chunks;  // inclusive, in steps of 1, 2, 4 and 8
-  scan += (Ints)(0, scan.s0123, scan.s4567, scan.s89ab, scan.scd, scan.se);
-  scan += (Ints)(0, 0, scan.s0123, scan.s4567, scan.s89ab, scan.scd);
-  scan += (Ints)(0, 0, 0, 0, scan.s0123, scan.s4567, scan.s89ab);
-  scan += (Ints)((int8)(0), scan.s01234567);
-  store_words(sums.chunks + scan - chunks, offsets, x, width);
-  sums.chunks += scan.sf;
-  sums.predicted -= d > INVALID;
-  return sums;
-}
-
-static inline RowSum row_sum_of(const Sums sums) {
-  const int8 halves = sums.predicted.lo + sums.predicted.hi;
-  const int4 quarters = halves.lo + halves.hi;
-  RowSum sum;
-  sum.cells = sums.chunks * EGOSGM_LANES;
-  sum.predicted = quarters.x + quarters.y + quarters.z + quarters.w;
-  return sum;
-}
-
-#endif
 
 // What PIXELS predictions and what was found in their blocks search.
 static inline Bands bands_of_predictions(const DisparityRange range, const float sigmas, const float min_half_width,
@@ -221,11 +186,12 @@ static inline Bands bands_of_predictions(const DisparityRange range, const float
 }
 
 // Work-items that have a row alone sum it up, too. A work-item PIXELS pixels and view, or a row and view.
-COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const DisparityRange range, const float sigmas,
-                            const float min_half_width, global const float* disparity, global const float* variance,
-                            const float coarse_tolerance, const float coarse_margin, global const PredictionState* before,
-                            global const BlockRange* found, global const Band* block_bands, global Band* bands,
-                            global uint* cell_offsets, global RowSum* row_sums) {
+COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const DisparityRange range,
+                                       const float sigmas, const float min_half_width, global const float* disparity,
+                                       global const float* variance, const float coarse_tolerance,
+                                       const float coarse_margin, global const PredictionState* before,
+                                       global const BlockRange* found, global const Band* block_bands,
+                                       global Band* bands, global uint* cell_offsets, global RowSum* row_sums) {
   const ImageSize blocks = blocks_of(size);
   const int y = at.y;
   const int view = at.view;
@@ -263,17 +229,20 @@ COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, 
 
 KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
                             const float min_half_width, global const float* disparity, global const float* variance,
-                            const float coarse_tolerance, const float coarse_margin, global const PredictionState* before,
-                            global const BlockRange* found, global const Band* block_bands, global Band* bands,
-                            global uint* cell_offsets, global RowSum* row_sums) {
-  bands_of_pixels_row(THIS_WORK_ITEM, size, range, sigmas, min_half_width, disparity, variance, coarse_tolerance, coarse_margin, before, found, block_bands, bands, cell_offsets, row_sums);
+                            const float coarse_tolerance, const float coarse_margin,
+                            global const PredictionState* before, global const BlockRange* found,
+                            global const Band* block_bands, global Band* bands, global uint* cell_offsets,
+                            global RowSum* row_sums) {
+  bands_of_pixels_row(THIS_WORK_ITEM, size, range, sigmas, min_half_width, disparity, variance, coarse_tolerance,
+                      coarse_margin, before, found, block_bands, bands, cell_offsets, row_sums);
 }
 
 #if ROW_GROUP == 1
 
 // Sums up each row of what was not banded pixel by pixel. A work-item a row and view.
-COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, global const float* disparity, global const Band* bands,
+KERNEL void sum_rows(const ImageSize size, global const float* disparity, global const Band* bands,
                      global uint* cell_offsets, global RowSum* row_sums) {
+  const WorkItem at = THIS_WORK_ITEM;
   const int width = size.width;
   const size_t row = (size_t)at.view * size.height + at.y;
   Sums sums = {0, 0};
@@ -284,11 +253,6 @@ COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, global const
                         (global uchar*)(cell_offsets + row * width), x, width);
   }
   row_sums[row] = row_sum_of(sums);
-}
-
-KERNEL void sum_rows(const ImageSize size, global const float* disparity, global const Band* bands,
-                     global uint* cell_offsets, global RowSum* row_sums) {
-  sum_row(THIS_WORK_ITEM, size, disparity, bands, cell_offsets, row_sums);
 }
 
 #else

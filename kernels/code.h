@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What matching compares of a pixel (census.cl). OpenCL C only.
-#ifndef EGOSGM_KERNELS_MATCH_CODE_H
-#define EGOSGM_KERNELS_MATCH_CODE_H
+// What matching compares of a pixel (match/census.cl). OpenCL C only.
+#ifndef EGOSGM_KERNELS_CODE_H
+#define EGOSGM_KERNELS_CODE_H
 
 #ifndef CODE_BYTES
 #error "CODE_BYTES: 4 or 8, the size of a code"
