@@ -28,12 +28,13 @@ std::string clock_text(double seconds) {
 
 }  // namespace
 
-Waiting::Waiting(const std::string& what, bool quiet) : shown_(!quiet && isatty(STDOUT_FILENO) == 1) {
-  if (shown_) print_now(kEraseLine + what);
-}
-
-Waiting::~Waiting() {
-  if (shown_) print_now(kEraseLine);
+Waiting::Waiting(const std::string& what, bool quiet) {
+  if (quiet) return;
+  after_a_while_ = std::jthread([this, what](const std::stop_token& stop) {
+    std::unique_lock lock(mutex_);
+    ended_.wait_for(lock, stop, std::chrono::milliseconds(500), [] { return false; });
+    if (!stop.stop_requested()) fmt::print(stderr, "egosgm: {}\n", what);
+  });
 }
 
 Progress::Progress(int frames, bool quiet) : frames_(frames), quiet_(quiet), terminal_(isatty(STDOUT_FILENO) == 1) {}

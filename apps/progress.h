@@ -2,20 +2,22 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <string>
+#include <thread>
 
 namespace egosgm::app {
 
-/// Says on a terminal what is waited for, in a line that goes with it. Nothing elsewhere, or if quiet.
+/// Says on the standard error what is waited for, where that takes half a second. Nothing if quiet.
 class Waiting {
  public:
   Waiting(const std::string& what, bool quiet);
-  ~Waiting();
-  Waiting(const Waiting&) = delete;
-  Waiting& operator=(const Waiting&) = delete;
 
  private:
-  const bool shown_;
+  std::mutex mutex_;
+  std::condition_variable_any ended_;
+  std::jthread after_a_while_;  // ends with this object
 };
 
 /// Progress on the standard output: a bar with frames per second and the time left on a terminal, a line a frame

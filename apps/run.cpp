@@ -48,6 +48,10 @@ std::string note_of(const FrameReport& report) {
                                        : fmt::format("  ({}; matched {:.2g} times)", why, report.search_fraction);
 }
 
+PixelType type_of(const vision::StereoSequence& sequence) {
+  return vision::read_pixel_type(sequence.frames.front().left);
+}
+
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
@@ -79,13 +83,17 @@ class Run {
         input_(job.input),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
-        waiting_(std::in_place, fmt::format("building the kernels for {} ...", device.info().name), quiet_),
-        pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device),
+        waiting_(std::in_place,
+                 fmt::format("compiling the kernels for {}, which its driver keeps if it can", device.info().name),
+                 quiet_),
+        pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, type_of(sequence_)),
         report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height, job.batch_input),
         doubt_(sequence_.calibration) {
     folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options.disparities, sequence_.calibration);
+    pipeline_.prepare(type_of(sequence_), outputs_->views());
+    waiting_.reset();
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
     pipeline_.record_commands(true);
@@ -167,7 +175,6 @@ class Run {
   /// The oldest frame under way: waits for it, writes and reports it.
   void collect(Progress& progress) {
     const FrameReport result = pipeline_.collect();
-    waiting_.reset();
     const PreparedFrame prepared = std::move(under_way_.front());
     under_way_.pop_front();
     const vision::StereoFrame& frame = sequence_.frames[prepared.index];
@@ -254,7 +261,7 @@ class Run {
   const cv::Size size_;
   MotionSource motions_;
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
-  std::optional<Waiting> waiting_;     // until the first frame is there: drivers build in its launches, too
+  std::optional<Waiting> waiting_;     // until all is built
   Pipeline pipeline_;
   RunReport report_;
   Doubt doubt_;

@@ -39,6 +39,11 @@ Pipeline::~Pipeline() = default;
 Pipeline::Pipeline(Pipeline&&) noexcept = default;
 Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 
+void Pipeline::prepare(PixelType type, const FrameOutputs& outputs) {
+  if (under_way() > 0) throw InvalidArgument("prepare: a frame that was submitted is under way: collect it first");
+  ocl::translated(impl_->context(), [&] { impl_->prepare(type, wanted_of(outputs)); });
+}
+
 FrameReport Pipeline::process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
                               const FrameOutputs& outputs) {
   if (under_way() > 0) throw InvalidArgument("process: a frame that was submitted is under way: collect it first");

@@ -29,8 +29,8 @@ typedef uint16 Uints;
 #define LANE_INDICES (int16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 #endif
 
-// A work-item's blocks of PIXELS pixels of a row: all of them where there is one work-item a row, else one.
-#define FOR_PIXELS(x, width) for (int x = get_global_id(0) * PIXELS; x < (width); x += (int)get_global_size(0) * PIXELS)
+// The blocks of PIXELS pixels of a row that the work-item `at` takes: all of them where it has the row alone, else one.
+#define FOR_PIXELS(x, width) for (int x = at.x * PIXELS; x < (width); x += at.items * PIXELS)
 
 #define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
 
@@ -47,15 +47,59 @@ static inline int any_of(const Ints condition) {
 #endif
 }
 
+// Values of a row at places x, lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of
+// loads that may be joined.
+#if PIXELS == 1
+#define GATHERED(Values, row, x) ((Values)((row)[x]))
+#else
+#define GATHERED(Values, row, x)                                                                                     \
+  ((Values)((row)[(x).s0], (row)[(x).s1], (row)[(x).s2], (row)[(x).s3], (row)[(x).s4], (row)[(x).s5], (row)[(x).s6], \
+            (row)[(x).s7], (row)[(x).s8], (row)[(x).s9], (row)[(x).sa], (row)[(x).sb], (row)[(x).sc], (row)[(x).sd], \
+            (row)[(x).se], (row)[(x).sf]))
+#endif
+static inline Floats gather(volatile global const float* row, const Ints x) { return GATHERED(Floats, row, x); }
+
+#if PIXELS > 1
+// What a block does where its row begins or ends. Not inlined: inlined at every load and store, it would be most of
+// what is compiled. Without a branch a lane: a row has few blocks.
+#define AT_EDGE static __attribute__((noinline, cold))
+AT_EDGE Floats load_pixels_at_edge(global const float* row, const int x, const int width) {
+  const Ints at = x + LANE_INDICES, inside = clamp(at, 0, width - 1);
+  return at == inside ? GATHERED(Floats, row, inside) : INVALID;
+}
+AT_EDGE Ints load_bytes_at_edge(global const uchar* row, const int x, const int width) {
+  const Ints at = x + LANE_INDICES, inside = clamp(at, 0, width - 1);
+  return at == inside ? GATHERED(Ints, row, inside) : (Ints)(0);
+}
+// `count` < 16 lanes, by powers of two.
+#define STORE_LANES(lanes, to, count) \
+  if ((count)&8) {                    \
+    vstore8((lanes).lo, 0, to);       \
+    (lanes).lo = (lanes).hi;          \
+    (to) += 8;                        \
+  }                                   \
+  if ((count)&4) {                    \
+    vstore4((lanes).s0123, 0, to);    \
+    (lanes).s0123 = (lanes).s4567;    \
+    (to) += 4;                        \
+  }                                   \
+  if ((count)&2) {                    \
+    vstore2((lanes).s01, 0, to);      \
+    (lanes).s0 = (lanes).s2;          \
+    (to) += 2;                        \
+  }                                   \
+  if ((count)&1) *(to) = (lanes).s0
+AT_EDGE void store_pixels_at_edge(Floats pixels, global float* to, const int count) { STORE_LANES(pixels, to, count); }
+AT_EDGE void store_bytes_at_edge(uchar16 bytes, global uchar* to, const int count) { STORE_LANES(bytes, to, count); }
+AT_EDGE void store_words_at_edge(Ints words, global int* to, const int count) { STORE_LANES(words, to, count); }
+#endif
+
 // Pixels x .. x + PIXELS - 1 of a row; what lies outside of it is invalid.
 static inline Floats load_pixels(global const float* row, const int x, const int width) {
 #if PIXELS == 1
   return x >= 0 && x < width ? row[x] : EGOSGM_INVALID_DISPARITY;
 #else
-  if (x >= 0 && x + PIXELS <= width) return vload16(0, row + x);
-  float lanes[PIXELS];
-  for (int i = 0; i < PIXELS; ++i) lanes[i] = x + i >= 0 && x + i < width ? row[x + i] : EGOSGM_INVALID_DISPARITY;
-  return vload16(0, lanes);
+  return x >= 0 && x + PIXELS <= width ? vload16(0, row + x) : load_pixels_at_edge(row, x, width);
 #endif
 }
 
@@ -67,18 +111,6 @@ static inline Floats load_pixels_of(const float* values) {
   return vload16(0, values);
 #endif
 }
-
-// Values of a row at places x, lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of
-// loads that may be joined.
-#if PIXELS == 1
-#define GATHERED(Values, row, x) ((Values)((row)[x]))
-#else
-#define GATHERED(Values, row, x)                                                                                   \
-  ((Values)((row)[(x).s0], (row)[(x).s1], (row)[(x).s2], (row)[(x).s3], (row)[(x).s4], (row)[(x).s5], (row)[(x).s6], \
-            (row)[(x).s7], (row)[(x).s8], (row)[(x).s9], (row)[(x).sa], (row)[(x).sb], (row)[(x).sc], (row)[(x).sd], \
-            (row)[(x).se], (row)[(x).sf]))
-#endif
-static inline Floats gather(volatile global const float* row, const Ints x) { return GATHERED(Floats, row, x); }
 
 typedef struct __attribute__((packed)) {
   Floats lanes;
@@ -92,11 +124,9 @@ static inline void store_pixels(const Floats pixels, global float* row, const in
 #else
   if (x + PIXELS <= width) {
     ((global PackedFloats*)(row + x))->lanes = pixels;
-    return;
+  } else {
+    store_pixels_at_edge(pixels, row + x, width - x);
   }
-  float lanes[PIXELS];
-  vstore16(pixels, 0, lanes);
-  for (int i = 0; i < width - x; ++i) row[x + i] = lanes[i];
 #endif
 }
 
@@ -110,9 +140,7 @@ static inline Ints load_bytes(global const uchar* row, const int x, const int wi
   return x >= 0 && x < width ? row[x] : 0;
 #else
   if (x >= 0 && x + PIXELS <= width) return convert_int16(((global const PackedBytes*)(row + x))->lanes);
-  int lanes[PIXELS];
-  for (int i = 0; i < PIXELS; ++i) lanes[i] = x + i >= 0 && x + i < width ? row[x + i] : 0;
-  return vload16(0, lanes);
+  return load_bytes_at_edge(row, x, width);
 #endif
 }
 
@@ -123,11 +151,9 @@ static inline void store_bytes(const Ints values, global uchar* row, const int x
 #else
   if (x + PIXELS <= width) {
     ((global PackedBytes*)(row + x))->lanes = convert_uchar16(values);
-    return;
+  } else {
+    store_bytes_at_edge(convert_uchar16(values), row + x, width - x);
   }
-  int lanes[PIXELS];
-  vstore16(values, 0, lanes);
-  for (int i = 0; i < width - x; ++i) row[x + i] = (uchar)lanes[i];
 #endif
 }
 
@@ -142,11 +168,9 @@ static inline void store_words(const Ints words, global uchar* row, const int x,
 #else
   if (x + PIXELS <= width) {
     ((global PackedInts*)(row + 4 * x))->lanes = words;
-    return;
+  } else {
+    store_words_at_edge(words, (global int*)row + x, width - x);
   }
-  int lanes[PIXELS];
-  vstore16(words, 0, lanes);
-  for (int i = 0; i < width - x; ++i) ((global int*)row)[x + i] = lanes[i];
 #endif
 }
 

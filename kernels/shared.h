@@ -30,6 +30,21 @@ typedef float f32;
 #endif
 #endif
 
+#ifndef __cplusplus
+// Some compilers (PoCL) make three of a kernel and of what is inlined into it. What a kernel does is therefore a
+// function of its own, which takes what a work-item knows of itself. Not where work-items are lanes: there calls are
+// dear.
+#if defined(PIXELS) && PIXELS > 1
+#define COMPILED_ONCE static __attribute__((noinline))
+#else
+#define COMPILED_ONCE static inline
+#endif
+typedef struct {
+  int x, items, y, view;  // global ids 0, 1 and 2; how many work-items there are along the first
+} WorkItem;
+#define THIS_WORK_ITEM ((WorkItem){get_global_id(0), get_global_size(0), get_global_id(1), get_global_id(2)})
+#endif
+
 // A pixel without a disparity; include/egosgm/image.h says the same to users.
 #define EGOSGM_INVALID_DISPARITY (-32768.0f)
 // In place of the variance of a prediction: a surface that came nearer than the range hides what is there

@@ -21,12 +21,13 @@ struct Built {
       : method(context, kSize, standard().scene().calibration(), options(32, 0, change),
                with_defaults({}, Device::select().info())) {
     method.prepare(PixelType::kU8);
+    context.build();
   }
 
   bool has(const std::string& file, const std::string& define = "") const {
-    const auto programs = context.programs();
-    return std::any_of(programs.begin(), programs.end(), [&](const auto& program) {
-      return program.first.kernel_file == file && program.first.options.find(define) != std::string::npos;
+    const auto sources = context.sources();
+    return std::any_of(sources.begin(), sources.end(), [&](const ocl::ProgramSource& source) {
+      return source.kernel_file == file && source.options.find(define) != std::string::npos;
     });
   }
 
@@ -40,6 +41,10 @@ TEST(Method, BuildsWhatItsOptionsNeed) {
   EXPECT_TRUE(Built().has("output_variance.cl"));
   EXPECT_FALSE(Built([](auto& o) { o.output_variance.enabled = false; }).has("output_variance.cl"));
   EXPECT_TRUE(Built().has("dynamic_map.cl"));
+  for (const char* file : {"right_map.cl", "read_off.cl"}) {
+    EXPECT_FALSE(Built().has(file)) << file;
+    EXPECT_TRUE(Built([](auto& o) { o.track_right = false; }).has(file)) << file;
+  }
   const Built paper([](auto& o) { o = MethodOptions(PipelineOptions::paper()); });
   EXPECT_TRUE(paper.has("sad_check.cl"));
   for (const char* file : {"coarse_match.cl", "median_filter.cl", "vertical_alignment.cl", "output_variance.cl"}) {
@@ -70,7 +75,7 @@ TEST(Method, BuildsNothingInAFrame) {
   const Video video(standard(), 3);
   FrameTransfer transfer(built.context, kSize, {0, 32});
   Belief before(built.context, kSize), after(built.context, kSize);
-  const std::size_t programs = built.context.programs().size();
+  const int builds = built.context.builds();
   for (int index = 0; index < video.size(); ++index) {
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
     const Plan plan =
@@ -79,7 +84,7 @@ TEST(Method, BuildsNothingInAFrame) {
     built.context.wait();
     std::swap(before, after);
   }
-  EXPECT_EQ(built.context.programs().size(), programs);
+  EXPECT_EQ(built.context.builds(), builds);
 }
 
 // A belief is a value: a frame leaves the one before it as it was, and may be run on it again.

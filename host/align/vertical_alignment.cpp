@@ -12,7 +12,7 @@ namespace {
 constexpr int kSums = 9;  // a row, as kernels/align/vertical_alignment.cl has them
 constexpr std::size_t kTerms = EGOSGM_OFFSET_TERMS + 1;
 
-const cl::Program& build(ocl::Context& context, PixelType type, int row_group) {
+ocl::Program& build(ocl::Context& context, PixelType type, int row_group) {
   context.enter("VerticalAlignment");
   return context.program("vertical_alignment.cl",
                          ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2).set("ROW_GROUP", row_group));
@@ -39,8 +39,8 @@ VerticalAlignment::VerticalAlignment(ocl::Context& context, shared::ImageSize si
       gain_(options.gain),
       row_group_(row_group > 0 ? row_group : ocl::row_group(context)),
       resample_(build(context, type, row_group_), "resample"),
-      sum_rows_(build(context, type, row_group_), "sum_rows"),
-      update_(build(context, type, row_group_), "update"),
+      sum_residuals_(build(context, type, row_group_), "sum_residuals"),
+      update_terms_(build(context, type, row_group_), "update_terms"),
       sums_(std::move(sums)) {}
 
 void VerticalAlignment::resample(const FrameImages& images, const VerticalOffset& offset, FrameImages& aligned) {
@@ -53,10 +53,10 @@ void VerticalAlignment::estimate(const FrameImages& aligned, const Map& disparit
                                  VerticalOffset& improved) {
   context_.enter("VerticalAlignment");
   const cl_int rows = sampled_rows(size_);
-  sum_rows_(context_, ocl::group_a_row({size_.width, rows}, row_group_, 1), size_, aligned.pixels, disparity,
-            sums_.of_rows);
-  update_(context_, ocl::group_a_row({size_.width, 1}, row_group_, 1), size_, rows, gain_, sums_.of_rows, offset.terms,
-          improved.terms);
+  sum_residuals_(context_, ocl::group_a_row({size_.width, rows}, row_group_, 1), size_, aligned.pixels, disparity,
+                 sums_.of_rows);
+  update_terms_(context_, ocl::group_a_row({size_.width, 1}, row_group_, 1), size_, rows, gain_, sums_.of_rows,
+                offset.terms, improved.terms);
   improved.is_known = true;
 }
 

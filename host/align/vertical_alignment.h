@@ -49,10 +49,10 @@ class VerticalAlignment {
   const int row_group_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>
       resample_;
-  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, const Map, ocl::Buffer<cl_long>> sum_rows_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, const Map, ocl::Buffer<cl_long>> sum_residuals_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const float, const ocl::Buffer<cl_long>, const ocl::Buffer<float>,
               ocl::Buffer<float>>
-      update_;
+      update_terms_;
   Sums sums_;
 };
 

@@ -8,11 +8,15 @@
 namespace egosgm {
 namespace {
 
+/// Of the images that show the driver all kernels: those are as high as others, for every launch.
+constexpr int kRehearsedWidth = 16;
+
+}  // namespace
+
 ocl::Context context_on(const Device::Handle& device) {
   return device.queue() ? ocl::Context(device.queue, device.programs) : ocl::Context(device.device, device.programs);
 }
 
-/// `options` as a pipeline on a device with this tuning runs them.
 MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning) {
   MethodOptions method(options);
   Scheduling& scheduling = method.banded_sgm.scheduling;
@@ -20,12 +24,20 @@ MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning) {
   return method;
 }
 
-}  // namespace
+Wanted wanted_of(const FrameOutputs& outputs) {
+  Wanted wanted{.dynamic = outputs.debug.dynamic.data != nullptr,
+                .right = outputs.right_disparity.data || outputs.right_variance.data,
+                .reasons = outputs.reason.data != nullptr};
+  if (outputs.variance.data) wanted.variance = Views::kLeft;
+  if (outputs.right_variance.data) wanted.variance = Views::kBoth;
+  return wanted;
+}
 
 FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, const PipelineOptions& options,
                        const Device& device, PixelType type)
     : options_(options),
       device_(device),
+      calibration_(calibration),
       size_(size),
       tuning_(with_defaults(device.handle().tuning, device.info())),
       method_options_(method_of(options, tuning_)),
@@ -34,19 +46,38 @@ FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, c
       transfers_{{{context_, size, range_of(method_options_)}, {context_, size, range_of(method_options_)}}},
       memory_{{{context_, size}, {context_, size}, {context_, size}}},
       belief_(memory_.front()) {
-  method_.prepare(type);
+  prepare(type, {});
+}
+
+void FrameQueue::build(PixelType type, const Wanted& wanted) {
+  method_.prepare(type, wanted);
+  context_.build();
+}
+
+void FrameQueue::prepare(PixelType type, const Wanted& wanted) {
+  build(type, wanted);
+  const ocl::Context::Apart apart(context_);
+  const shared::ImageSize narrow{std::min(size_.width, kRehearsedWidth), size_.height};
+  Method method(context_, narrow, calibration_, method_options_, tuning_);
+  method.prepare(type, wanted);
+  context_.build();
+  Belief none(context_, narrow), first(context_, narrow), second(context_, narrow);
+  Map variance(context_, 2 * pixel_count(narrow));
+  FrameImages images{ocl::Buffer<cl_uchar>(context_, 2 * 2 * pixel_count(narrow)), type};
+  images.pixels.write(context_, std::vector<cl_uchar>(images.pixels.size()));
+  const ocl::Drain drain{context_};
+  method.frame(plan_of(method_options_, none.missing, false, {}, wanted), images, none, first, variance);
+  method.frame(plan_of(method_options_, first.missing, first.offset.is_known, Motion(), wanted), images, first, second,
+               variance);
+  context_.wait();
 }
 
 void FrameQueue::submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
                         const FrameOutputs& outputs) {
   expect_device_frame_not_failed();
   expect_none_failed();
-  Wanted wanted{.dynamic = outputs.debug.dynamic.data != nullptr,
-                .right = outputs.right_disparity.data || outputs.right_variance.data,
-                .reasons = outputs.reason.data != nullptr};
-  if (outputs.variance.data) wanted.variance = Views::kLeft;
-  if (outputs.right_variance.data) wanted.variance = Views::kBoth;
-  method_.prepare(left.type, wanted);
+  const Wanted wanted = wanted_of(outputs);
+  build(left.type, wanted);
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};
   release_results();
@@ -80,7 +111,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
 DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done,
                                bool wants_dynamic) {
   expect_device_frame_not_failed();
-  method_.prepare(images.type);
+  build(images.type, {});
   FrameTransfer& transfer = free_transfer();
   Belief after = free_memory();
   ocl::Drain drain{context_};

@@ -12,6 +12,13 @@
 
 namespace egosgm {
 
+ocl::Context context_on(const Device::Handle& device);
+/// `options` as a pipeline on a device with this tuning runs them.
+MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning);
+
+/// What is wanted of a frame with these outputs.
+Wanted wanted_of(const FrameOutputs& outputs);
+
 /// Frames on their way: up to two at once, each on the belief that the one before leaves. One that fails takes those
 /// that rest on it along, and the belief goes back to what was before it.
 class FrameQueue {
@@ -21,6 +28,10 @@ class FrameQueue {
   ~FrameQueue() { context_.drain(); }
   FrameQueue(const FrameQueue&) = delete;
   FrameQueue& operator=(const FrameQueue&) = delete;
+
+  /// Builds what frames of `type` need, and what is wanted of them, and lets the driver make the machine code of all
+  /// their kernels: some drivers do that when a kernel first runs. REQUIRES: no frame is under way.
+  void prepare(PixelType type, const Wanted& wanted);
 
   /// As Pipeline. REQUIRES: arguments that were validated, and a frame under way or room for one.
   void submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
@@ -56,6 +67,7 @@ class FrameQueue {
     Clock::time_point start;
   };
 
+  void build(PixelType type, const Wanted& wanted);
   FrameTransfer& free_transfer();
   Belief& free_memory();
   void release_results();
@@ -66,6 +78,7 @@ class FrameQueue {
 
   const PipelineOptions options_;
   const Device device_;
+  const Calibration calibration_;
   const shared::ImageSize size_;
   const Tuning tuning_;
   const MethodOptions method_options_;

@@ -23,21 +23,33 @@ MethodOptions all_stages(MethodOptions options) {
   return options;
 }
 
-// Of images of the least size, as no define depends on it, and of both types.
-std::vector<std::pair<ocl::ProgramSource, cl::Program>> programs_of(const Device& device,
-                                                                    const PipelineOptions& options) {
+/// Asks for all that a pipeline with these options may need: of images of the least size, as no define depends on it,
+/// and of both types.
+std::vector<ocl::ProgramSource> sources_of(ocl::Context& context, const Device& device,
+                                           const PipelineOptions& options) {
   const Calibration any{.fx = 1, .fy = 1, .cx = 0, .cy = 0, .baseline_m = 1};
-  FrameQueue frames(any, shared::ImageSize{1, 1}, all_stages(options), device, PixelType::kU8);
-  for (const PixelType type : {PixelType::kU8, PixelType::kU16}) frames.method().prepare(type, {.reasons = true});
-  return frames.context().programs();
+  const Tuning tuning = with_defaults(device.handle().tuning, device.info());
+  for (const bool track_right : {true, false}) {
+    MethodOptions all = all_stages(method_of(options, tuning));
+    all.track_right = track_right;
+    Method method(context, {1, 1}, any, all, tuning);
+    for (const PixelType type : {PixelType::kU8, PixelType::kU16}) method.prepare(type, {.reasons = true});
+  }
+  return context.sources();
 }
 
 }  // namespace
 
 std::vector<ProgramFile> compile_programs(const Device& device, const PipelineOptions& options) {
   options.validate();
-  return ocl::translated("compile",
-                         [&] { return ocl::files_of(device.handle().device, programs_of(device, options)); });
+  return ocl::translated("compile", [&] {
+    ocl::Context context = context_on(device.handle());
+    std::vector<std::pair<ocl::ProgramSource, cl::Program>> programs;
+    for (const ocl::ProgramSource& source : sources_of(context, device, options)) {
+      programs.emplace_back(source, context.built(source));
+    }
+    return ocl::files_of(device.handle().device, programs);
+  });
 }
 
 std::vector<ProgramText> list_programs(const Device& device, const PipelineOptions& options) {
@@ -50,7 +62,8 @@ std::vector<ProgramText> list_programs(const Device& device, const PipelineOptio
     }
     std::map<std::pair<std::string, std::string>, std::string> texts;
     for (const Device& each : devices) {
-      for (const auto& [source, program] : programs_of(each, options)) {
+      ocl::Context context = context_on(each.handle());
+      for (const ocl::ProgramSource& source : sources_of(context, each, options)) {
         const ProgramText text = ocl::portable(source);
         texts[{text.kernel_file, text.options}] = text.text;
       }

@@ -7,8 +7,8 @@ FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOp
     : left_right_px_(options.consistency.update_px),
       outside_(outside_view(options.consistency)),
       kalman_update_(context, size, options.kalman_update),
-      right_map_(context, size, range_of(options)),
       consistency_(context, size) {
+  if (!options.track_right) right_map_.emplace(context, size, range_of(options));
   if (options.median_filter.enabled) median_filter_.emplace(context, size);
   if (options.sad_check.max_difference > 0) {
     sad_check_.emplace(
@@ -26,7 +26,7 @@ void FuseRoom::operator()(const Plan& plan, const FrameImages& images, const Pre
   kalman_update_(prediction.hidden, prediction.maps, measured, fused, fusion.doubtful, plan.tracked);
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
-  if (plan.tracked == Views::kLeft) right_map_(measured, left_right_px_, smoothed, plan.wanted.right);
+  if (plan.tracked == Views::kLeft) (*right_map_)(measured, left_right_px_, smoothed, plan.wanted.right);
   const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
   consistency_(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
   if (sad_check_) (*sad_check_)[images.type](images.pixels, belief, checked);

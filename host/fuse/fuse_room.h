@@ -39,7 +39,7 @@ class FuseRoom {
   const OutsideView outside_;
   KalmanUpdate kalman_update_;
   std::optional<MedianFilter> median_filter_;
-  RightMap right_map_;
+  std::optional<RightMap> right_map_;  // where the left view alone is tracked
   ConsistencyCheck consistency_;
   std::optional<OfEachType<SadCheck>> sad_check_;
 };

@@ -4,7 +4,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, int pixels) {
+ocl::Program& build(ocl::Context& context, int pixels) {
   context.enter("RightMap");
   return context.program("right_map.cl", ocl::Defines().set("PIXELS", pixels));
 }

@@ -6,7 +6,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, PixelType type, int pixels) {
+ocl::Program& build(ocl::Context& context, PixelType type, int pixels) {
   context.enter("SadCheck");
   return context.program("sad_check.cl",
                          ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU16 ? 2 : 1).set("PIXELS", pixels));
@@ -20,7 +20,7 @@ SadCheck::SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type
       size_(size),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       max_difference_(options.max_difference),
-      check_(build(context, type, pixels_), "check") {}
+      check_(build(context, type, pixels_), "check_greys") {}
 
 void SadCheck::operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps, Views views) {
   context_.enter("SadCheck");

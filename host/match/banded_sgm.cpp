@@ -19,33 +19,36 @@ constexpr int kBlockVectors = 2;
 
 constexpr int kViews = 2;
 
-std::size_t slot_bytes(shared::ImageSize size, shared::DisparityRange range, int views) {
-  const int vectors = (SearchBand::max_chunks(range) + 1) / 2;
+std::size_t slot_bytes(shared::ImageSize size, int chunks, int views) {
+  const int vectors = (chunks + 1) / 2;
   const std::size_t slot = static_cast<std::size_t>(vectors + kBlockVectors * 2) * 2 * EGOSGM_LANES;
   return static_cast<std::size_t>(views) * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
 }
 
 /// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind a chunk, as two are read at once.
-std::size_t sum_bytes(shared::ImageSize size, shared::DisparityRange range, int views) {
+std::size_t sum_bytes(shared::ImageSize size, int chunks, int views) {
   const std::size_t pixels = views * pixel_count(size) + size.width;
-  return (pixels * SearchBand::max_chunks(range) + 1) * EGOSGM_LANES;
+  return (pixels * chunks + 1) * EGOSGM_LANES;
 }
 
-const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
-                         BandedSgm::Tile tile) {
-  ocl::Defines defines = sgm_defines(range, options);
+int chunks_of(shared::DisparityRange range, BandedSgm::Tile tile) {
+  return std::max(SearchBand::max_chunks(range), tile.max_chunks);
+}
+
+int words_of(const BandedSgmOptions& options, BandedSgm::Tile tile) {
+  return std::max(Census::words(options.cost), tile.code_words);
+}
+
+ocl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+                    BandedSgm::Tile tile) {
+  ocl::Defines defines = sgm_defines(chunks_of(range, tile), words_of(options, tile), options);
   defines.set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
       .set("TILE_WIDTH", tile.width)
       .set("TILE_HEIGHT", tile.height)
       .set("PIXELS", ocl::pixels_a_work_item(context));
   if (tile.block_lanes > 0) defines.set("BLOCK", tile.block_lanes);
   if (ocl::counts_bits(context)) defines.set("COUNTS_BITS", 1);
-  return context.program("banded_sgm.cl", defines);
-}
-
-bool follows_paths(const ocl::Context& context, Scheduling scheduling) {
-  if (scheduling != Scheduling::kAutomatic) return scheduling == Scheduling::kPaths;
-  return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
+  return context.program("banded_sgm.cl", defines, ocl::Joins::kNo);
 }
 
 /// Whether the device has no more compute units than sweeps of `views`, each of a work-item.
@@ -65,37 +68,39 @@ struct Demand {
 };
 
 /// Of both views at once, whatever the device has of compute units: stripes, and with them bits, do not depend on that.
-Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, bool paths) {
-  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, range, kViews);
+Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, int chunks,
+              bool paths) {
+  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, chunks, kViews);
   const std::uint64_t ranks = ReadOff::bytes(size, BandedSgm::code_padding(range));
   if (paths) return {sums, 4 * sums + ranks};
-  const std::uint64_t slots = slot_bytes(size, range, kViews), winners = kViews * pixel_count(size) * sizeof(cl_ulong);
+  const std::uint64_t slots = slot_bytes(size, chunks, kViews), winners = kViews * pixel_count(size) * sizeof(cl_ulong);
   return {std::max({sums, slots, winners}), sums + slots + winners + ranks};
 }
 
-std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCost cost) {
-  return Census::words(cost, {width, 1}, BandedSgm::code_padding(range)) / 2;
+std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCost cost, BandedSgm::Tile tile) {
+  return Census::words(cost, {width, 1}, BandedSgm::code_padding(range), tile.code_words) / 2;
 }
 
 /// How many rows can be matched at once. A quarter of the memory is left to all else.
 int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
-                 const BandedSgmOptions& options) {
-  const bool paths = follows_paths(context, options.scheduling);
+                 const BandedSgmOptions& options, BandedSgm::Tile tile) {
+  const bool paths = BandedSgm::follows_paths(context, options.scheduling);
+  const int chunks = chunks_of(range, tile);
   const std::uint64_t memory = context.device().getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>() / 4 * 3;
   const std::uint64_t device_limit = memory - std::min(memory, context.allocated_bytes());
   const std::uint64_t chosen = static_cast<std::uint64_t>(options.max_memory_mib) << 20;
   const std::uint64_t total_limit = chosen > 0 ? std::min(chosen, device_limit) : device_limit;
   const auto fits = [&](int rows, std::uint64_t copies) {
-    const Demand needs = demand(context, {size.width, rows}, range, paths);
+    const Demand needs = demand(context, {size.width, rows}, range, chunks, paths);
     return needs.largest_buffer <= context.max_allocation_bytes() && needs.total + copies <= total_limit;
   };
   if (fits(size.height, 0)) return size.height;
-  const std::size_t words = code_words_a_row(size.width, range, options.cost);
+  const std::size_t words = code_words_a_row(size.width, range, options.cost, tile);
   int rows = size.height;
   while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
   const int least = 3 * BandedSgm::kStripeOverlap;
   if (rows >= least) return rows;
-  const std::uint64_t needed = demand(context, {size.width, std::min(size.height, least)}, range, paths).total;
+  const std::uint64_t needed = demand(context, {size.width, std::min(size.height, least)}, range, chunks, paths).total;
   throw DeviceError(
       CL_MEM_OBJECT_ALLOCATION_FAILURE,
       "BandedSgm: a stripe of " + std::to_string(std::min(size.height, least)) + " rows needs " +
@@ -112,8 +117,8 @@ BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, s
                                 const BandedSgmOptions& options, Tile chosen, int at_once)
     : tile(chosen),
       views(at_once),
-      slots(context, slot_bytes(size, range, views)),
-      sums(context, sum_bytes(size, range, views)),
+      slots(context, slot_bytes(size, chunks_of(range, tile), views)),
+      sums(context, sum_bytes(size, chunks_of(range, tile), views)),
       winners(context, ocl::Scratch::kOfStage0, views * pixel_count(size)),
       to_middle(build(context, range, options, tile), "sweep_to_middle"),
       from_middle(build(context, range, options, tile), "sweep_from_middle"),
@@ -127,7 +132,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                      const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group, Tile tile,
                      Launches launches)
     : context_((context.enter("BandedSgm"), context)),
-      size_{size.width, rows_at_once(context, size, range, options)},
+      size_{size.width, rows_at_once(context, size, range, options, tile)},
       stripes_(cut_into_stripes(size.height, size_.height, kStripeOverlap)),
       parameters_{size_.width,
                   size_.height,
@@ -143,7 +148,7 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   /*reads_off=*/0,
                   /*first_view=*/0},
       launches_(launches),
-      read_off_(context, size_, code_padding(range)) {
+      no_ranks_(context, 1) {
   if (follows_paths(context, options.scheduling)) {
     paths_.emplace(context, size_, range, options,
                    group ? *group : BandedSgmPaths::default_group(context, range, options.cost));
@@ -151,8 +156,13 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
     wavefront_.emplace(context, size_, range, options, tile, views_at_once(context, launches));
   }
   if (stripes_.size() > 1) {
-    stripe_memory_.emplace(context, size, range, size_.height, code_words_a_row(size.width, range, options.cost));
+    stripe_memory_.emplace(context, size, range, size_.height, code_words_a_row(size.width, range, options.cost, tile));
   }
+}
+
+void BandedSgm::prepare_reading_off() {
+  context_.enter("BandedSgm");
+  read_off_.emplace(context_, size_, parameters_.padding);
 }
 
 void BandedSgm::operator()(const MatchInputs& image, Measurement& measured, Views views) {
@@ -176,16 +186,16 @@ void BandedSgm::match_stripes(const MatchInputs& image, Measurement& measured, V
 void BandedSgm::match(const MatchInputs& inputs, Measurement& measured, Views views, bool reads_off) {
   shared::SgmParameters parameters = parameters_;
   parameters.reads_off = reads_off;
-  if (reads_off) read_off_.clear();
+  if (reads_off) read_off_->clear();
   if (paths_) {
-    (*paths_)(parameters, inputs, measured, read_off_.ranks(), views);
+    (*paths_)(parameters, inputs, measured, ranks(), views);
   } else {
     const int at_once = std::min(wavefront_->views, count(views));
     for (parameters.first_view = 0; parameters.first_view < count(views); parameters.first_view += at_once) {
       sweep(parameters, inputs, measured, at_once);
     }
   }
-  if (reads_off) read_off_(parameters, measured);
+  if (reads_off) (*read_off_)(parameters, measured);
 }
 
 void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
@@ -209,10 +219,15 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
                           inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
-                          wavefront.sums, wavefront.winners, read_off_.ranks());
+                          wavefront.sums, wavefront.winners, ranks());
   }
   wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters,
                    wavefront.winners, measured.disparity, measured.variance, measured.doubtful);
+}
+
+bool BandedSgm::follows_paths(const ocl::Context& context, Scheduling scheduling) {
+  if (scheduling != Scheduling::kAutomatic) return scheduling == Scheduling::kPaths;
+  return context.device().getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU;
 }
 
 int BandedSgm::matched_rows() const {

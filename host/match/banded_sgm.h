@@ -28,6 +28,9 @@ class BandedSgm {
   struct Tile {
     int width = kCpuTuning.tile_width, height = kCpuTuning.tile_height;
     int block_lanes = 0;
+    /// Where another match has the same program: what that one needs, so that it need not be built twice. A code of one
+    /// word stands twice in two.
+    int max_chunks = 0, code_words = 0;
   };
 
   /// Of the wavefronts, two sweeps a view, to the middle of the image and from there: one for every wave of tiles, or
@@ -54,9 +57,14 @@ class BandedSgm {
   /// read; of penalties and bands, theirs.
   void operator()(const MatchInputs& image, Measurement& measured, Views views);
   /// Matches the left view, and reads the right one's disparities off its sums: half of the work, whole disparities.
+  /// REQUIRES: that was prepared.
   void reading_off(const MatchInputs& image, Measurement& measured);
+  /// Builds and allocates what that needs.
+  void prepare_reading_off();
 
   static int code_padding(shared::DisparityRange range);
+  /// Whether it takes a few work-items a path.
+  static bool follows_paths(const ocl::Context& context, Scheduling scheduling);
 
   using ToMiddle =
       ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
@@ -86,13 +94,15 @@ class BandedSgm {
   void match_stripes(const MatchInputs& image, Measurement& measured, Views views, bool reads_off);
   void match(const MatchInputs& inputs, Measurement& measured, Views views, bool reads_off);
   void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured, int views);
+  ocl::Buffer<cl_uint>& ranks() { return read_off_ ? read_off_->ranks() : no_ranks_; }
 
   ocl::Context& context_;
   const shared::ImageSize size_;  // of what is matched at once: the image, or a stripe
   const std::vector<Stripe> stripes_;
   const shared::SgmParameters parameters_;
   const Launches launches_;
-  ReadOff read_off_;
+  std::optional<ReadOff> read_off_;
+  ocl::Buffer<cl_uint> no_ranks_;              // in place of ReadOff's
   std::optional<StripeMemory> stripe_memory_;  // where there is more than one
   std::optional<Wavefront> wavefront_;         // one of the two
   std::optional<BandedSgmPaths> paths_;

@@ -26,11 +26,11 @@ int vector_of(const ocl::Context& context) { return is_gpu(context) ? kQuad : kV
 /// A pixel's vectors hold so many cells more than its band, which may begin and end within one.
 int spare_cells(int vector) { return vector == kQuad ? kQuad : vector + EGOSGM_LANES; }
 
-const cl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
-                         BandedSgmPaths::Group group) {
-  ocl::Defines defines = sgm_defines(range, options);
+ocl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+                    BandedSgmPaths::Group group) {
+  ocl::Defines defines = sgm_defines(SearchBand::max_chunks(range), Census::words(options.cost), options);
   defines.set("LANES", group.lanes).set("LINES", group.lines).set("VECTOR", vector_of(context)).set("PIXELS", 1);
-  return context.program("banded_sgm_paths.cl", defines);
+  return context.program("banded_sgm_paths.cl", defines, ocl::Joins::kNo);
 }
 
 }  // namespace
@@ -51,13 +51,13 @@ std::size_t BandedSgmPaths::sum_bytes(const ocl::Context& context, shared::Image
   return 2 * pixel_count(size) * (SearchBand::max_chunks(range) * EGOSGM_LANES + spare_cells(vector_of(context)));
 }
 
-ocl::Defines sgm_defines(shared::DisparityRange range, const BandedSgmOptions& options) {
+ocl::Defines sgm_defines(int max_chunks, int code_words, const BandedSgmOptions& options) {
   ocl::Defines defines;
-  defines.set("MAX_CHUNKS", SearchBand::max_chunks(range))
+  defines.set("MAX_CHUNKS", max_chunks)
       .set("PATHS", options.paths)
-      .set("CODE_BYTES", 4 * Census::words(options.cost))
+      .set("CODE_BYTES", 4 * code_words)
       .set("COST_SAD", options.cost == MatchingCost::kSad3x3 ? 1 : 0)
-      .set("COST_SCALE", options.cost == MatchingCost::kCensus9x7 ? 1 : 2);
+      .set("COST_SCALE", code_words == 2 ? 1 : 2);
   return defines;
 }
 

@@ -10,7 +10,7 @@
 namespace egosgm {
 
 /// What the programs of both ways of BandedSgm are told.
-ocl::Defines sgm_defines(shared::DisparityRange range, const BandedSgmOptions& options);
+ocl::Defines sgm_defines(int max_chunks, int code_words, const BandedSgmOptions& options);
 
 /// How BandedSgm runs on GPUs: a few work-items follow each path across the image (see
 /// kernels/match/banded_sgm_paths.cl).

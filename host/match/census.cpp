@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/match/census.h"
 
+#include <algorithm>
+
 #include "kernels/method.h"
 
 namespace egosgm {
@@ -24,12 +26,12 @@ Comparisons comparisons(MatchingCost cost) {
   return {};
 }
 
-const cl::Program& build(ocl::Context& context, PixelType type, MatchingCost cost, int pixels) {
+ocl::Program& build(ocl::Context& context, PixelType type, MatchingCost cost, int pixels, int words) {
   context.enter("Census");
   const Comparisons chosen = comparisons(cost);
   return context.program("census.cl", ocl::Defines()
                                           .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
-                                          .set("CODE_BYTES", 4 * Census::words(cost))
+                                          .set("CODE_BYTES", 4 * words)
                                           .set("PIXELS", pixels)
                                           .set("COMPARISONS", chosen.kind)
                                           .set("RADIUS_X", chosen.radius_x)
@@ -39,12 +41,12 @@ const cl::Program& build(ocl::Context& context, PixelType type, MatchingCost cos
 }  // namespace
 
 Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding,
-               int pixels)
+               int pixels, int words)
     : context_(context),
       size_(size),
       padding_(padding),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
-      census_(build(context, type, cost, pixels_), "census") {}
+      census_(build(context, type, cost, pixels_, std::max(words, Census::words(cost))), "census") {}
 
 void Census::operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
   context_.enter("Census");

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+
 #include "egosgm/image.h"
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {
@@ -13,17 +15,18 @@ namespace egosgm {
 class Census {
  public:
   /// Codes may be read up to `padding` pixels outside the image. `pixels`: of a work-item, 1 or 16; 0: what suits the
-  /// device. Same bits.
-  Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding, int pixels = 0);
+  /// device. Same bits. `words`: of a code, which stands twice where it needs one of two; 0: what it needs.
+  Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding, int pixels = 0,
+         int words = 0);
 
   /// `images`: both views' pixels, the left view first, without gaps.
   void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes);
 
   /// 32-bit words of a code, and of all codes.
   static int words(MatchingCost cost) { return cost == MatchingCost::kCensus9x7 ? 2 : 1; }
-  static std::size_t words(MatchingCost cost, shared::ImageSize size, int padding) {
+  static std::size_t words(MatchingCost cost, shared::ImageSize size, int padding, int code_words = 0) {
     return 2 * (static_cast<std::size_t>(size.width) + 2 * static_cast<std::size_t>(padding)) * size.height *
-           words(cost);
+           std::max(code_words, words(cost));
   }
 
   using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>>;

@@ -6,7 +6,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, int pixels) {
+ocl::Program& build(ocl::Context& context, int pixels) {
   context.enter("ConsistencyCheck");
   return context.program("consistency_check.cl", ocl::Defines().set("PIXELS", pixels));
 }

@@ -19,6 +19,7 @@ MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const Method
       speckle_removal_(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
       removes_speckles_(options.speckle_removal.max_size_px > 0) {
   if (options.median_filter.enabled) median_filter_.emplace(context, size);
+  if (options.temporal && !options.track_right) matcher_.prepare_reading_off();
 }
 
 void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,

@@ -6,11 +6,11 @@ namespace egosgm {
 Matcher::Matcher(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                  const BandedSgmOptions& options, const Sizes& sizes)
     : census_([=, &context](PixelType type) {
-        return Census(context, size, type, options.cost, BandedSgm::code_padding(range));
+        return Census(context, size, type, options.cost, BandedSgm::code_padding(range), 0, sizes.tile.code_words);
       }),
       step_penalties_([=, &context](PixelType type) { return StepPenalties(context, size, type, options); }),
       banded_sgm_(context, size, range, options, sizes.group, sizes.tile),
-      codes_(context, Census::words(options.cost, size, BandedSgm::code_padding(range))),
+      codes_(context, Census::words(options.cost, size, BandedSgm::code_padding(range), sizes.tile.code_words)),
       penalties_(context, StepPenalties::bytes(size)) {}
 
 void Matcher::prepare(PixelType type) {

@@ -6,7 +6,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, int pixels) {
+ocl::Program& build(ocl::Context& context, int pixels) {
   context.enter("MedianFilter");
   return context.program("median_filter.cl", ocl::Defines().set("PIXELS", pixels));
 }

@@ -4,7 +4,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context) {
+ocl::Program& build(ocl::Context& context) {
   return context.program("read_off.cl", ocl::Defines().set("PIXELS", ocl::pixels_a_work_item(context)));
 }
 

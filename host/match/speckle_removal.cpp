@@ -4,9 +4,10 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, int row_group) {
+ocl::Program& build(ocl::Context& context, int row_group) {
   context.enter("SpeckleRemoval");
-  return context.program("speckle_removal.cl", ocl::Defines().set("ROW_GROUP", row_group));
+  return context.program("speckle_removal.cl",
+                         ocl::Defines().set("ROW_GROUP", row_group).set("PIXELS", row_group == 1 ? 16 : 1));
 }
 
 }  // namespace

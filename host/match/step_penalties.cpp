@@ -6,7 +6,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, PixelType type, int pixels) {
+ocl::Program& build(ocl::Context& context, PixelType type, int pixels) {
   context.enter("StepPenalties");
   return context.program("step_penalties.cl",
                          ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2).set("PIXELS", pixels));

@@ -2,6 +2,8 @@
 #include "host/ocl/context.h"
 
 #include <algorithm>
+#include <set>
+#include <sstream>
 
 #include "egosgm/error.h"
 #include "host/ocl/errors.h"
@@ -23,15 +25,33 @@ constexpr std::string_view kPreamble =
     "#pragma clang diagnostic ignored \"-Wpsabi\"\n"
     "#endif\n";
 
-// Headers have guards and do not include each other in a circle.
-std::string expand(const std::string& file) {
+/// The text of a kernel file or header with what it includes, but for what is in `seen`, and is added to it.
+std::string expand(const std::string& file, std::set<std::string>& seen) {
+  if (!seen.insert(file).second) return {};
   const auto found = sources().find(file);
   if (found == sources().end()) throw std::invalid_argument("no embedded kernel named " + file);
-  std::string text(found->second);
-  for (const auto& source : sources()) {
-    const std::string name(source.first), include = "#include \"" + name + "\"";
-    for (auto at = text.find(include); at != std::string::npos; at = text.find(include, at)) {
-      text.replace(at, include.size(), expand(name));
+  std::string text;
+  std::istringstream lines{std::string(found->second)};
+  constexpr std::string_view kInclude = "#include \"";
+  for (std::string line; std::getline(lines, line);) {
+    const bool includes = line.starts_with(kInclude);
+    text += includes ? expand(line.substr(kInclude.size(), line.rfind('"') - kInclude.size()), seen) : line + '\n';
+  }
+  return text;
+}
+
+/// Files in one text. Their macros end with them; their other names must differ.
+std::string joined(const std::vector<Program*>& programs) {
+  std::string text(kPreamble);
+  std::set<std::string> seen;
+  for (const Program* program : programs) {
+    text += expand(program->file(), seen);
+    std::istringstream lines{std::string(sources().at(program->file()))};
+    constexpr std::string_view kDefine = "#define ";
+    for (std::string line; std::getline(lines, line);) {
+      if (!line.starts_with(kDefine)) continue;
+      const std::string name = line.substr(kDefine.size());
+      text += "#undef " + name.substr(0, name.find_first_of(" (")) + '\n';
     }
   }
   return text;
@@ -102,6 +122,17 @@ Context::Context(const cl::Device& device, const cl::Context& context, const cl:
       shares_host_memory_(device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>()),
       profiles_kernels_(queue().getInfo<CL_QUEUE_PROPERTIES>() & CL_QUEUE_PROFILING_ENABLE),
       folder_(std::move(programs)) {}
+
+Context::Apart::Apart(Context& context)
+    : context_(context), kernels_(context.queue()), allocated_bytes_(context.allocated_bytes_), stage_(context.stage_) {
+  context.queue() = make_queue(context.context_, context.device_);
+}
+
+Context::Apart::~Apart() {
+  context_.queue() = kernels_;
+  context_.allocated_bytes_ = allocated_bytes_;
+  context_.stage_ = stage_;
+}
 
 void Context::let_wait(Queue which, const cl::Event& event) {
   expect_not_failed(event);
@@ -197,31 +228,84 @@ cl::Buffer Context::scratch(Scratch place, std::uint64_t bytes) {
   return found != end ? found->second : scratch_.emplace(place, allocate(bytes))->second;
 }
 
-const cl::Program& Context::program(const std::string& file, const Defines& defines) {
-  const std::pair key{file, defines.text()};
-  if (const auto built = programs_.find(key); built != programs_.end()) return built->second.second;
+/// What is built together.
+struct Context::Group {
+  Defines defines;
+  std::vector<Program*> members;
 
-  const ProgramSource source{file, std::string(kPreamble) + expand(file), build_options_ + key.second, build_options_};
-  const cl::Program program = created(source);
+  bool takes(const Program& program) const {
+    return members.front()->joins() == Joins::kYes && program.joins() == Joins::kYes &&
+           defines.agrees_with(program.defines()) &&
+           std::none_of(members.begin(), members.end(), [&](const Program* p) { return p->file() == program.file(); });
+  }
+};
+
+Program& Context::program(const std::string& file, const Defines& defines, Joins joins) {
+  return programs_.try_emplace(std::pair{file, defines.text()}, stage_, file, defines, joins).first->second;
+}
+
+void Context::build() {
+  const char* const stage = stage_;
+  std::vector<Group> groups;
+  for (auto& [key, program] : programs_) {
+    if (program.is_built()) continue;
+    auto group = std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.takes(program); });
+    if (folder_ || group == groups.end()) group = groups.insert(groups.end(), Group{});
+    group->defines.add(program.defines());
+    group->members.push_back(&program);
+  }
+  for (const Group& group : groups) build_together(group);
+  stage_ = stage;
+}
+
+void Context::build_together(const Group& group) {
+  if (group.members.size() == 1) return build_alone(*group.members.front());
+  enter(group.members.front()->stage());
+  const ProgramSource source{"kernels", joined(group.members), build_options_ + group.defines.text(), build_options_};
+  const cl::Program program(context_, source.text);
+  ++builds_;
+  const cl_int status = ::clBuildProgram(program(), 1, &device_(), source.options.c_str(), nullptr, nullptr);
+  if (status == CL_BUILD_PROGRAM_FAILURE) {  // an error names the file
+    for (Program* member : group.members) build_alone(*member);
+    return;
+  }
+  expect_built(source, program, status);
+  for (Program* member : group.members) {
+    enter(member->stage());
+    member->set_built(program);
+  }
+}
+
+void Context::build_alone(Program& program) {
+  enter(program.stage());
+  program.set_built(built(source_of(program)));
+}
+
+cl::Program Context::built(const ProgramSource& source) {
+  const cl::Program program =
+      folder_ ? folder_->program(context_, device_, source) : cl::Program(context_, source.text);
   // cl::Program::build asks for the log whatever went wrong, and reports that there is none instead of why.
   const std::string options = folder_ ? folder_->options(source) : source.options;
-  const cl_int status = ::clBuildProgram(program(), 1, &device_(), options.c_str(), nullptr, nullptr);
-  if (status != CL_SUCCESS) {
-    const std::string log = build_log(program, device_);
-    throw BuildError(status, std::string(stage_) + ": building " + file + " failed with OpenCL status " +
-                                 status_name(status) + reason_beside(log, device_) + '\n' + log);
-  }
-  return programs_.emplace(key, std::pair{source, program}).first->second.second;
+  ++builds_;
+  return expect_built(source, program, ::clBuildProgram(program(), 1, &device_(), options.c_str(), nullptr, nullptr));
 }
 
-cl::Program Context::created(const ProgramSource& source) const {
-  if (!folder_) return {context_, source.text};
-  return folder_->program(context_, device_, source);
+cl::Program Context::expect_built(const ProgramSource& source, const cl::Program& program, cl_int status) const {
+  if (status == CL_SUCCESS) return program;
+  const std::string log = build_log(program, device_);
+  throw BuildError(status, std::string(stage_) + ": building " + source.kernel_file + " failed with OpenCL status " +
+                               status_name(status) + reason_beside(log, device_) + '\n' + log);
 }
 
-std::vector<std::pair<ProgramSource, cl::Program>> Context::programs() const {
-  std::vector<std::pair<ProgramSource, cl::Program>> all;
-  for (const auto& [key, built] : programs_) all.push_back(built);
+ProgramSource Context::source_of(const Program& program) const {
+  std::set<std::string> seen;
+  return {program.file(), std::string(kPreamble) + expand(program.file(), seen),
+          build_options_ + program.defines().text(), build_options_};
+}
+
+std::vector<ProgramSource> Context::sources() const {
+  std::vector<ProgramSource> all;
+  for (const auto& [key, program] : programs_) all.push_back(source_of(program));
   return all;
 }
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "egosgm/device.h"
-#include "host/ocl/defines.h"
+#include "host/ocl/program.h"
 #include "host/ocl/program_folder.h"
 
 namespace egosgm::ocl {
@@ -42,10 +42,17 @@ class Context {
   /// On a queue of the caller's, in its context; kernels run there.
   explicit Context(const cl::CommandQueue& kernels, std::shared_ptr<const ProgramFolder> programs = nullptr);
 
-  /// Builds `file`, or returns what it built before. Throws BuildError, or InvalidArgument as ProgramFolder does.
-  const cl::Program& program(const std::string& file, const Defines& defines);
-  /// All that were built.
-  std::vector<std::pair<ProgramSource, cl::Program>> programs() const;
+  /// The program of `file`, which `build` builds.
+  Program& program(const std::string& file, const Defines& defines, Joins joins = Joins::kYes);
+  /// Builds what was asked for since the last call: what joins, and whose defines agree, together. Programs that come
+  /// from a folder are those of a file each. Throws BuildError, or InvalidArgument as ProgramFolder does.
+  void build();
+  /// How often a compiler was called.
+  int builds() const { return builds_; }
+  /// All files that were asked for, as a compiler gets each of them alone.
+  std::vector<ProgramSource> sources() const;
+  /// Builds one of them.
+  cl::Program built(const ProgramSource& source);
 
   /// What is built, allocated and enqueued from now on belongs to `stage`: errors and timings name it. A string
   /// literal.
@@ -62,6 +69,22 @@ class Context {
     Context& context_;
   };
   const char* stage() const { return stage_; }
+
+  /// While it lives, kernels run on a queue of its own, and memory is not counted. REQUIRES: all recorded commands were
+  /// taken.
+  class Apart {
+   public:
+    explicit Apart(Context& context);
+    ~Apart();
+    Apart(const Apart&) = delete;
+    Apart& operator=(const Apart&) = delete;
+
+   private:
+    Context& context_;
+    const cl::CommandQueue kernels_;
+    const std::uint64_t allocated_bytes_;
+    const char* const stage_;
+  };
 
   cl::CommandQueue& queue(Queue which = Queue::kKernels) { return queues_[static_cast<std::size_t>(which)]; }
 
@@ -134,7 +157,12 @@ class Context {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
         .count();
   }
-  cl::Program created(const ProgramSource& source) const;
+  struct Group;
+  void build_together(const Group& group);
+  void build_alone(Program& program);
+  ProgramSource source_of(const Program& program) const;
+  /// Throws BuildError.
+  cl::Program expect_built(const ProgramSource& source, const cl::Program& program, cl_int status) const;
 
   cl::Device device_;
   cl::Context context_;
@@ -148,7 +176,8 @@ class Context {
   const char* stage_ = "setup";
   const char* whole_ = nullptr;
   std::shared_ptr<const ProgramFolder> folder_;
-  std::map<std::pair<std::string, std::string>, std::pair<ProgramSource, cl::Program>> programs_;
+  std::map<std::pair<std::string, std::string>, Program> programs_;  // by file and defines
+  int builds_ = 0;
   std::multimap<Scratch, cl::Buffer> scratch_;
   std::vector<Command> commands_;
   std::int64_t clock_offset_ns_ = std::numeric_limits<std::int64_t>::max();  // steady clock - device's clock, at most

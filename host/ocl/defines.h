@@ -20,6 +20,10 @@ class Defines {
 
   std::string text() const;
 
+  /// Whether no name has another value there.
+  bool agrees_with(const Defines& other) const;
+  void add(const Defines& other) { values_.insert(other.values_.begin(), other.values_.end()); }
+
  private:
   static std::string literal(bool value) { return value ? "1" : "0"; }
   static std::string literal(int value) { return std::to_string(value); }

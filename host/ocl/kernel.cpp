@@ -31,6 +31,14 @@ bool counts_bits(const Context& context) {
          trimmed(platform.getInfo<CL_PLATFORM_NAME>()) == "Portable Computing Language";
 }
 
+MadeKernel::MadeKernel(const cl::Program& program, const char* name, const std::vector<std::string>& signature)
+    : kernel(program, name) {
+  expect_signature(kernel, signature);
+  const cl::Device device = program.getInfo<CL_PROGRAM_DEVICES>().front();
+  max_work_group_size = kernel.getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(device);
+  has_fixed_group = kernel.getWorkGroupInfo<CL_KERNEL_COMPILE_WORK_GROUP_SIZE>(device)[0] > 0;
+}
+
 cl::NDRange halved_to(const cl::NDRange& local, std::size_t limit) {
   cl::NDRange fitting = local;
   while (work_items(fitting) > limit && fitting.get()[0] % 2 == 0) fitting.get()[0] /= 2;

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
+#include <string>
+#include <vector>
+
 #include "host/ocl/buffer.h"
 #include "host/ocl/signature.h"
 #include "kernels/shared.h"
@@ -61,48 +65,60 @@ void expect_work_group(const Context& context, const char* kernel, const cl::NDR
 /// bounds can do with. The global size, a multiple of the former, is one of it too.
 cl::NDRange halved_to(const cl::NDRange& local, std::size_t limit);
 
+/// What a program has under a name.
+struct MadeKernel {
+  cl::Kernel kernel;
+  std::size_t max_work_group_size = 0;
+  bool has_fixed_group = false;  // by reqd_work_group_size
+
+  MadeKernel() = default;
+  MadeKernel(const cl::Program& program, const char* name, const std::vector<std::string>& signature);
+};
+
 /// A kernel with its C++ signature: `Buffer<T>` for `global T*`, `const Buffer<T>` for
 /// `global const T*`, anything else by value.
 template <typename... Params>
 class Kernel {
  public:
-  /// `name`: a string literal. Throws std::logic_error where the .cl does not fit the signature.
-  Kernel(const cl::Program& program, const char* name) : kernel_(program, name), name_(name) {
-    expect_signature(kernel_, {KernelParameter<Params>::text()...});
-    const cl::Device device = program.getInfo<CL_PROGRAM_DEVICES>().front();
-    max_work_group_size_ = kernel_.template getWorkGroupInfo<CL_KERNEL_WORK_GROUP_SIZE>(device);
-    has_fixed_group_ = kernel_.template getWorkGroupInfo<CL_KERNEL_COMPILE_WORK_GROUP_SIZE>(device)[0] > 0;
+  /// `name`: a string literal. Made when the program is built, which throws std::logic_error where the .cl does not fit
+  /// the signature.
+  Kernel(Program& program, const char* name) : name_(name) {
+    program.when_built([made = made_, name](const cl::Program& built) {
+      *made = MadeKernel(built, name, {KernelParameter<Params>::text()...});
+    });
   }
+  Kernel(const cl::Program& program, const char* name)
+      : name_(name),
+        made_(std::make_shared<MadeKernel>(program, name,
+                                           std::vector<std::string>{KernelParameter<Params>::text()...})) {}
 
   /// Throws DeviceError where the device, for what this kernel takes of it, cannot hold the range's work-groups and the
-  /// kernel needs them so large.
+  /// kernel needs them so large. Of a program that was not built, builds it.
   void operator()(Context& context, const Range& range, Params&... args) {
-    const cl::NDRange local = has_fixed_group_ ? range.local : halved_to(range.local, max_work_group_size_);
-    expect_work_group(context, name_, local, max_work_group_size_);
+    if (!made_->kernel()) context.build();
+    const std::size_t limit = made_->max_work_group_size;
+    const cl::NDRange local = made_->has_fixed_group ? range.local : halved_to(range.local, limit);
+    expect_work_group(context, name_, local, limit);
     cl_uint index = 0;
     (set(index++, args), ...);
     cl::Event done;
-    context.queue().enqueueNDRangeKernel(kernel_, cl::NullRange, range.global, local, nullptr, &done);
+    context.queue().enqueueNDRangeKernel(made_->kernel, cl::NullRange, range.global, local, nullptr, &done);
     context.record(done, name_, Queue::kKernels, /*is_launch=*/true);
   }
-
-  const cl::Kernel& get() const { return kernel_; }
 
  private:
   template <typename T>
   void set(cl_uint index, const Buffer<T>& buffer) {
-    kernel_.setArg(index, buffer.get());
+    made_->kernel.setArg(index, buffer.get());
   }
   template <typename T>
   void set(cl_uint index, const T& value) {
     static_assert(std::is_trivially_copyable_v<T> && !std::is_pointer_v<T>);
-    kernel_.setArg(index, sizeof(T), &value);
+    made_->kernel.setArg(index, sizeof(T), &value);
   }
 
-  cl::Kernel kernel_;
   const char* name_;
-  std::size_t max_work_group_size_ = 0;
-  bool has_fixed_group_ = false;  // by reqd_work_group_size
+  std::shared_ptr<MadeKernel> made_ = std::make_shared<MadeKernel>();
 };
 
 }  // namespace egosgm::ocl

@@ -6,7 +6,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, int pixels) {
+ocl::Program& build(ocl::Context& context, int pixels) {
   context.enter("EdgeRejection");
   return context.program("edge_rejection.cl", ocl::Defines().set("PIXELS", pixels));
 }

@@ -4,7 +4,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, int pixels) {
+ocl::Program& build(ocl::Context& context, int pixels) {
   context.enter("ForwardWarp");
   return context.program("forward_warp.cl", ocl::Defines().set("PIXELS", pixels));
 }
@@ -74,7 +74,7 @@ ForwardWarp::Atomics::Atomics(ocl::Context& context, shared::ImageSize size)
     : move(build(context, 1), "move"),
       splat_disparity(build(context, 1), "splat_disparity"),
       splat_variance(build(context, 1), "splat_variance"),
-      decode(build(context, 1), "decode"),
+      decode(build(context, 1), "decode_warped"),
       landed(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
       moved_key(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size)),
       moved_variance(context, ocl::Scratch::kOfStage2, 2 * pixel_count(size)),

@@ -4,7 +4,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, int pixels) {
+ocl::Program& build(ocl::Context& context, int pixels) {
   context.enter("HoleFill");
   return context.program("hole_fill.cl", ocl::Defines().set("PIXELS", pixels));
 }

@@ -4,7 +4,7 @@
 namespace egosgm {
 namespace {
 
-const cl::Program& build(ocl::Context& context, int pixels) {
+ocl::Program& build(ocl::Context& context, int pixels) {
   context.enter("OutputVariance");
   return context.program("output_variance.cl", ocl::Defines().set("PIXELS", pixels));
 }

@@ -19,7 +19,7 @@ static_assert(static_cast<int>(Reason::kTrusted) == EGOSGM_REASON_TRUSTED &&
               static_cast<int>(Reason::kPredicted) == EGOSGM_REASON_PREDICTED &&
               static_cast<int>(Reason::kPredicted) + 1 == kReasonCount);
 
-const cl::Program& build(ocl::Context& context, PixelType type, const BandedSgmOptions& options, int pixels) {
+ocl::Program& build(ocl::Context& context, PixelType type, const BandedSgmOptions& options, int pixels) {
   context.enter("Reasons");
   return context.program("reasons.cl", ocl::Defines()
                                            .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)

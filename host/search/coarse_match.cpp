@@ -8,7 +8,7 @@ namespace {
 
 int floor_div(int a, int b) { return a / b - (a % b < 0); }
 
-const cl::Program& build(ocl::Context& context, PixelType type) {
+ocl::Program& build(ocl::Context& context, PixelType type) {
   context.enter("CoarseMatch");
   return context.program("coarse_match.cl", ocl::Defines()
                                                 .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
@@ -47,13 +47,22 @@ void Shrink::operator()(const FrameImages& images, FrameImages& coarse) {
           size_, images.pixels, coarse.pixels);
 }
 
-CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
+BandedSgm::Tile CoarseMatch::tile(const ocl::Context& context, const MethodOptions& options, BandedSgm::Tile tile) {
+  const BandedSgmOptions& full = options.banded_sgm;
+  if (full.cost == MatchingCost::kSad3x3 || BandedSgm::follows_paths(context, full.scheduling)) return tile;
+  tile.max_chunks = SearchBand::max_chunks(range_of(options));
+  tile.code_words = Census::words(full.cost);
+  return tile;
+}
+
+CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const MethodOptions& options,
+                         BandedSgm::Tile tile)
     : context_((context.enter("CoarseMatch"), context)),
       coarse_(coarse_size(size)),
-      range_(coarse_range({options.min_disparity, options.disparities})),
+      range_(coarse_range(range_of(options))),
       max_difference_px_(options.coarse_match.max_difference_px),
       shrink_([=, &context](PixelType type) { return Shrink(context, size, type); }),
-      matcher_(context, coarse_, range_, matcher(options)),
+      matcher_(context, coarse_, range_, matcher(options), {{}, CoarseMatch::tile(context, options, tile)}),
       consistency_(context, coarse_),
       everything_(context, coarse_, range_),
       images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(coarse_)), PixelType::kU16},

@@ -27,7 +27,8 @@ class Shrink {
 /// disparity for EGOSGM_COARSE times as many.
 class CoarseMatch {
  public:
-  CoarseMatch(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
+  /// `tile`: of the match at full resolution, whose program this one takes where it can.
+  CoarseMatch(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, BandedSgm::Tile tile = {});
 
   /// Builds what images of `type` need.
   void prepare(PixelType type) { shrink_.prepare(type); }
@@ -43,6 +44,7 @@ class CoarseMatch {
   static shared::DisparityRange coarse_range(shared::DisparityRange range);
   /// The options of BandedSgm at that resolution.
   static BandedSgmOptions matcher(const MethodOptions& options);
+  static BandedSgm::Tile tile(const ocl::Context& context, const MethodOptions& options, BandedSgm::Tile tile);
 
  private:
   ocl::Context& context_;

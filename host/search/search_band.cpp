@@ -17,9 +17,10 @@ shared::Band whole(shared::DisparityRange range) {
           static_cast<cl_short>(range.min), static_cast<cl_short>(range.min + range.count - 1)};
 }
 
-const cl::Program& build(ocl::Context& context, int row_group) {
+ocl::Program& build(ocl::Context& context, int row_group) {
   context.enter("SearchBand");
-  return context.program("search_band.cl", ocl::Defines().set("ROW_GROUP", row_group));
+  return context.program("search_band.cl",
+                         ocl::Defines().set("ROW_GROUP", row_group).set("PIXELS", row_group == 1 ? 16 : 1));
 }
 
 }  // namespace

@@ -7,7 +7,8 @@ SearchRoom::SearchRoom(ocl::Context& context, shared::ImageSize size, const Meth
                        const Tuning& tuning)
     : search_band_(context, size, range_of(options), options.search_band, tuning.row_group) {
   if (options.coarse_match.enabled && options.temporal && options.search == SearchMode::kBand) {
-    coarse_match_.emplace(context, size, options);
+    coarse_match_.emplace(context, size, options,
+                          BandedSgm::Tile{tuning.tile_width, tuning.tile_height, tuning.block_lanes});
   }
 }
 

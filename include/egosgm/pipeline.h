@@ -24,13 +24,18 @@ struct ProgramFile;  // egosgm/programs.h
 /// Not thread-safe; two pipelines may run in two threads, also on one device.
 class EGOSGM_EXPORT Pipeline {
  public:
-  /// Allocates all memory for images of exactly `width` x `height`, and builds the kernels for those of `type`; what
-  /// the other type needs is built before its first frame. Throws InvalidArgument, DeviceError or BuildError.
+  /// Allocates all memory for images of exactly `width` x `height`, and builds the kernels for disparities of images of
+  /// `type`: see `prepare` for all else. Throws InvalidArgument, DeviceError or BuildError.
   Pipeline(const Calibration& calibration, int width, int height, const PipelineOptions& options = {},
            const Device& device = Device::select(), PixelType type = PixelType::kU8);
   ~Pipeline();
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
+
+  /// Builds what frames of `type` with such outputs need, as far as it is not built yet, so that none of them waits for
+  /// a compiler; without, the first of them does. Of the outputs it is asked which have memory, not which size.
+  /// REQUIRES: no frame is under way. Throws DeviceError or BuildError.
+  void prepare(PixelType type, const FrameOutputs& outputs);
 
   /// Matches one rectified pair, both images of the same type, and fills `outputs`.
   /// `motion`: how the camera moved since the last frame that was processed; none: the whole range is searched.

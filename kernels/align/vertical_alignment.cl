@@ -18,9 +18,6 @@
 #error "ROW_GROUP: work-items that share a row"
 #endif
 
-#define PIXELS 1
-#include "pixels.h"
-
 #if PIXEL_BYTES == 1
 #define load_wide(from) convert_ushort16(load_grey(from))
 #define convert_pixels convert_uchar16
@@ -35,13 +32,19 @@ typedef uint Weight;
 #define rounded_to_8_bit(value) (((value) + 128) >> 8)
 #endif
 
+// As `nearest` has it of blocks of pixels.
+static inline float nearest_whole(const float value) {
+  const float shift = 12582912.0f;  // 1.5 * 2^23
+  return (value + shift) - shift;
+}
+
 // Rows are resampled in 256ths of a pixel, columns read in 16ths.
 #define ROW_STEPS 256
 #define COLUMN_STEPS 16
-#define BLOCK 16
+#define COLUMNS 16
 // Pixels of a work-item: lanes that share a row take neighbours.
 #if ROW_GROUP == 1
-#define AT_ONCE BLOCK
+#define AT_ONCE COLUMNS
 #else
 #define AT_ONCE 1
 #endif
@@ -54,17 +57,15 @@ inline int clamp_row(const int y, const int height) { return clamp(y, 0, height 
 
 // Where among `count` rows or columns, in `steps` from the middle to either end.
 inline int place(const int at, const int count, const int steps) {
-  return (int)nearest((float)(2 * at + 1 - count) * ((float)steps / (float)count));
+  return (int)nearest_whole((float)(2 * at + 1 - count) * ((float)steps / (float)count));
 }
 
 // Copies the left image, and resamples the right one by the quadratic state[0] + state[1] u + state[2] v + state[3] u v
 // + state[4] u^2 + state[5] v^2 pixels; u, v: -1 to 1 over the image. A work-group of ROW_GROUP a row and view.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(const ImageSize size,
-                                                                            global const float* state,
-                                                                            global const uchar* images,
-                                                                            global uchar* aligned) {
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+COMPILED_ONCE void resample_row(const WorkItem at, const ImageSize size, global const float* state,
+                                global const uchar* images, global uchar* aligned) {
+  const int y = at.y;
+  const int view = at.view;
   const int is_moved = view == EGOSGM_RIGHT;
   const float v = (float)place(y, size.height, PLACES) / PLACES;
   const float constant_term = (state[0] + state[2] * v) + state[5] * (v * v);
@@ -74,17 +75,17 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
   global const Pixel* from = (global const Pixel*)images + first;
   global Pixel* to = (global Pixel*)aligned + first + (size_t)y * size.width;
 
-  // One offset for BLOCK columns: on KITTI it changes by less than a 20th of a pixel over them.
-  for (int x = get_local_id(0) * AT_ONCE; x < size.width; x += ROW_GROUP * AT_ONCE) {
-    const float u = (float)place(x / BLOCK * BLOCK + BLOCK / 2, size.width, PLACES) / PLACES;
+  // One offset for COLUMNS columns: on KITTI it changes by less than a 20th of a pixel over them.
+  for (int x = at.x * AT_ONCE; x < size.width; x += ROW_GROUP * AT_ONCE) {
+    const float u = (float)place(x / COLUMNS * COLUMNS + COLUMNS / 2, size.width, PLACES) / PLACES;
     const float dy = bounded(constant_term + (linear_term + square_term * u) * u);
-    const int offset = is_moved ? (int)nearest(dy * ROW_STEPS) : 0;
+    const int offset = is_moved ? (int)nearest_whole(dy * ROW_STEPS) : 0;
     const int above = y + (offset >> 8);
     const Weight weight = offset & (ROW_STEPS - 1);
     global const Pixel* upper = from + (size_t)clamp_row(above, size.height) * size.width;
     global const Pixel* lower = from + (size_t)clamp_row(above + 1, size.height) * size.width;
 #if AT_ONCE > 1
-    if (x + BLOCK <= size.width) {
+    if (x + COLUMNS <= size.width) {
       Pixels pixels = load_grey(upper + x);
       if (weight != 0) {
         const Wide sum = load_wide(upper + x) * (Wide)(ROW_STEPS - weight) + load_wide(lower + x) * (Wide)(weight);
@@ -98,6 +99,13 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
       to[i] = ((uint)upper[i] * (ROW_STEPS - weight) + (uint)lower[i] * weight + ROW_STEPS / 2) >> 8;
     }
   }
+}
+
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(const ImageSize size,
+                                                                            global const float* state,
+                                                                            global const uchar* images,
+                                                                            global uchar* aligned) {
+  resample_row(THIS_WORK_ITEM, size, state, images, aligned);
 }
 
 // Residuals and gradients are those of 8-bit grey values in 64ths: 4 by smoothing, 16 by interpolation.
@@ -116,61 +124,67 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
 #define SUMS (COUNT + 1)
 
 // Adds to them what the pixels at a place have together.
-inline void add_at(const int place_u, long gr, long gg, long sums[SUMS]) {
+static inline void add_at(const int place_u, long gr, long gg, long sums[SUMS]) {
   for (int n = 0; n < GR_SUMS; ++n, gr *= place_u) sums[n] += gr;
   for (int n = 0; n < GG_SUMS; ++n, gg *= place_u) sums[GR_SUMS + n] += gg;
 }
 
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_rows(const ImageSize size,
-                                                                            global const uchar* images,
-                                                                            global const float* disparity,
-                                                                            global long* row_sums) {
-  const int lane = get_local_id(0);
-  const int sampled_row = get_global_id(1);
-  const int y = EGOSGM_ALIGNED_BORDER_ROWS + sampled_row * EGOSGM_ALIGNED_ROW_STRIDE;
-  const size_t width = size.width;
-  const float last = (float)(COLUMN_STEPS * (size.width - 2));
+// What every ROW_GROUP-th sample of row y from that of `lane` on gives.
+COMPILED_ONCE void sum_row_residuals(const ImageSize size, const int y, const int lane, global const uchar* images,
+                                     global const float* disparity, long row_sums[SUMS]) {
   long sums[SUMS] = {0};
   long gr_here = 0, gg_here = 0;  // of the last pixels, which have one place
   int here = 0;
-  if (y + EGOSGM_ALIGNED_BORDER_ROWS < size.height) {
-    const size_t row = (size_t)y * width;
-    global const Pixel* left = (global const Pixel*)images + row;
-    global const Pixel* right = (global const Pixel*)images + width * size.height + row;
-    for (int x = lane * EGOSGM_ALIGNED_COLUMN_STRIDE; x < size.width; x += ROW_GROUP * EGOSGM_ALIGNED_COLUMN_STRIDE) {
-      const float d = disparity[row + x];
-      const float at = ((float)x - d) * COLUMN_STEPS;
-      // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
-      const int inside = (d > EGOSGM_INVALID_DISPARITY) & (at >= 0.0f) & (at <= last);
-      if (!inside) continue;
-      const uint position = (uint)nearest(at);
-      const size_t u = position / COLUMN_STEPS;
-      const int after = position % COLUMN_STEPS;
-      const int before = COLUMN_STEPS - after;
+  const size_t width = size.width;
+  const float last = (float)(COLUMN_STEPS * (size.width - 2));
+  const size_t row = (size_t)y * width;
+  global const Pixel* left = (global const Pixel*)images + row;
+  global const Pixel* right = (global const Pixel*)images + width * size.height + row;
+  for (int x = lane * EGOSGM_ALIGNED_COLUMN_STRIDE; x < size.width; x += ROW_GROUP * EGOSGM_ALIGNED_COLUMN_STRIDE) {
+    const float d = disparity[row + x];
+    const float at = ((float)x - d) * COLUMN_STEPS;
+    // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
+    const int inside = (d > EGOSGM_INVALID_DISPARITY) & (at >= 0.0f) & (at <= last);
+    if (!inside) continue;
+    const uint position = (uint)nearest_whole(at);
+    const size_t u = position / COLUMN_STEPS;
+    const int after = position % COLUMN_STEPS;
+    const int before = COLUMN_STEPS - after;
 
-      const int i0 = left[x - width], i1 = left[x], i2 = left[x + width];
-      const int j0 = before * right[u - width] + after * right[u + 1 - width];
-      const int j1 = before * right[u] + after * right[u + 1];
-      const int j2 = before * right[u + width] + after * right[u + 1 + width];
-      const int r = rounded_to_8_bit(COLUMN_STEPS * (i0 + 2 * i1 + i2) - (j0 + 2 * j1 + j2));
-      const int g_left = rounded_to_8_bit(COLUMN_STEPS * (i2 - i0));
-      const int g_right = rounded_to_8_bit(j2 - j0);
-      const int g = g_left + g_right;
-      const int is_textured = abs(g) >= MIN_GRADIENT;
-      const int is_inlier = is_textured & (abs(r) < MAX_RESIDUAL);
-      const int place_u = place((int)u, size.width, COARSE_PLACES);
-      if (place_u != here) {
-        add_at(here, gr_here, gg_here, sums);
-        gr_here = 0;
-        gg_here = 0;
-        here = place_u;
-      }
-      gr_here += is_textured ? g * clamp(r, -MAX_RESIDUAL, MAX_RESIDUAL) : 0;
-      gg_here += is_inlier ? 4 * g_left * g_right : 0;  // each is half of what g is
-      sums[COUNT] += is_inlier;
+    const int i0 = left[x - width], i1 = left[x], i2 = left[x + width];
+    const int j0 = before * right[u - width] + after * right[u + 1 - width];
+    const int j1 = before * right[u] + after * right[u + 1];
+    const int j2 = before * right[u + width] + after * right[u + 1 + width];
+    const int r = rounded_to_8_bit(COLUMN_STEPS * (i0 + 2 * i1 + i2) - (j0 + 2 * j1 + j2));
+    const int g_left = rounded_to_8_bit(COLUMN_STEPS * (i2 - i0));
+    const int g_right = rounded_to_8_bit(j2 - j0);
+    const int g = g_left + g_right;
+    const int is_textured = abs(g) >= MIN_GRADIENT;
+    const int is_inlier = is_textured & (abs(r) < MAX_RESIDUAL);
+    const int place_u = place((int)u, size.width, COARSE_PLACES);
+    if (place_u != here) {
+      add_at(here, gr_here, gg_here, sums);
+      gr_here = 0;
+      gg_here = 0;
+      here = place_u;
     }
+    gr_here += is_textured ? g * clamp(r, -MAX_RESIDUAL, MAX_RESIDUAL) : 0;
+    gg_here += is_inlier ? 4 * g_left * g_right : 0;  // each is half of what g is
+    sums[COUNT] += is_inlier;
   }
   add_at(here, gr_here, gg_here, sums);
+  for (int n = 0; n < SUMS; ++n) row_sums[n] = sums[n];
+}
+
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_residuals(const ImageSize size,
+                                                                                 global const uchar* images,
+                                                                                 global const float* disparity,
+                                                                                 global long* row_sums) {
+  const int lane = get_local_id(0);
+  const int sampled_row = get_global_id(1);
+  const int y = EGOSGM_ALIGNED_BORDER_ROWS + sampled_row * EGOSGM_ALIGNED_ROW_STRIDE;
+  long sums[SUMS] = {0};
+  if (y + EGOSGM_ALIGNED_BORDER_ROWS < size.height) sum_row_residuals(size, y, lane, images, disparity, sums);
 #if ROW_GROUP > 1
   local long totals[SUMS][ROW_GROUP];
   for (int n = 0; n < SUMS; ++n) totals[n][lane] = sums[n];
@@ -192,7 +206,7 @@ constant const int POWER_OF_V[TERMS] = {0, 0, 1, 1, 0, 2};
 
 // Solves a system of equations by Cholesky's form without square roots: x is its right side and becomes its solution;
 // of the symmetric matrix the lower half is given, and lost. Returns 0 where a pivot is not above `least`.
-inline int solve(float matrix[TERMS][TERMS], float x[TERMS], const float least) {
+COMPILED_ONCE int solve(float matrix[TERMS][TERMS], float x[TERMS], const float least) {
   for (int i = 0; i < TERMS; ++i) {
     for (int j = 0; j < i; ++j) {
       const float factor = matrix[i][j] / matrix[j][j];
@@ -221,8 +235,8 @@ inline int solve(float matrix[TERMS][TERMS], float x[TERMS], const float least) 
 
 // A sum over the image of u^n v^m, from the rows' sums number `sum`, which hold u^n. The sums are of integers, and the
 // rest is exact but for two conversions and a sum, so that no compiler can make another number of it.
-inline float moment_of(const int height, const int rows, const int n, const int m, const int sum,
-                       global const long* row_sums) {
+COMPILED_ONCE float moment_of(const int height, const int rows, const int n, const int m, const int sum,
+                              global const long* row_sums) {
   long high = 0, low = 0;
   for (int row = 0; row < rows; ++row) {
     const long v = place(EGOSGM_ALIGNED_BORDER_ROWS + row * EGOSGM_ALIGNED_ROW_STRIDE, height, PLACES);
@@ -238,10 +252,9 @@ inline float moment_of(const int height, const int rows, const int n, const int 
 // The step of a frame, by the running mean of the frames so far at first and then at a fixed gain. state: the terms of
 // the offset [px], and the number of estimates that they rest on. A single work-group of ROW_GROUP, whose work-items
 // share the sums; `state` and `next` may be the same.
-KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update(const ImageSize size, const int sampled_rows,
-                                                                          const float gain, global const long* row_sums,
-                                                                          global const float* state,
-                                                                          global float* next) {
+KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void update_terms(
+    const ImageSize size, const int sampled_rows, const float gain, global const long* row_sums,
+    global const float* state, global float* next) {
   local float moments[MOMENTS];
   for (int i = get_local_id(0); i < MOMENTS; i += ROW_GROUP) {
     const int is_gr = i < GR_MOMENTS, side = is_gr ? GR_SUMS : GG_SUMS;

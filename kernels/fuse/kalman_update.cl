@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two contradict each
 // other, by more than the gate or because the measurement is doubtful, or where they differ to the same side as most
-// pixels around, as on what moves by itself, the measurement is taken. It then is doubtful, and its variance is so large
-// that the next frame searches wide.
-// What is hidden by a surface nearer than the range (ForwardWarp) has no disparity: whatever is measured there is a
-// mismatch. Without a gate nothing contradicts anything.
+// pixels around, as on what moves by itself, the measurement is taken. It then is doubtful, and its variance is so
+// large that the next frame searches wide. What is hidden by a surface nearer than the range (ForwardWarp) has no
+// disparity: whatever is measured there is a mismatch. Without a gate nothing contradicts anything.
 #include "method.h"
 #include "pixels.h"
 
@@ -41,16 +40,17 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
 }
 
 // `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
-// is taken that differs to the same side as those of EGOSGM_MOVING_COUNT around do. has_gate: else all that is predicted and measured is
-// averaged, and nothing is hidden or doubtful.
-KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted, const int ask_neighbours,
-                   const float min_variance, global const uchar* hidden,
-                   global const float* predicted, global const float* predicted_variance, global const float* measured,
-                   global const float* measured_variance, global const uchar* measured_doubtful, global float* updated,
-                   global float* updated_variance, global uchar* updated_doubtful) {
+// is taken that differs to the same side as those of EGOSGM_MOVING_COUNT around do. has_gate: else all that is
+// predicted and measured is averaged, and nothing is hidden or doubtful.
+COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int has_gate, const float gate,
+                              const int keep_predicted, const int ask_neighbours, const float min_variance,
+                              global const uchar* hidden, global const float* predicted,
+                              global const float* predicted_variance, global const float* measured,
+                              global const float* measured_variance, global const uchar* measured_doubtful,
+                              global float* updated, global float* updated_variance, global uchar* updated_doubtful) {
   const int width = size.width;
-  const int y = get_global_id(1);
-  const size_t view = (size_t)get_global_id(2) * size.height * width;
+  const int y = at.y;
+  const size_t view = (size_t)at.view * size.height * width;
   const size_t row = view + (size_t)y * width;
   const Ints is_plain = (Ints)(has_gate ? 0 : -1);
 
@@ -93,4 +93,14 @@ KERNEL void update(const ImageSize size, const int has_gate, const float gate, c
     const Ints contradicted = (has_both & !fuses) | (moves != 0) | (has_measurement & !has_prediction & is_doubtful);
     store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
   }
+}
+
+KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted,
+                   const int ask_neighbours, const float min_variance, global const uchar* hidden,
+                   global const float* predicted, global const float* predicted_variance, global const float* measured,
+                   global const float* measured_variance, global const uchar* measured_doubtful, global float* updated,
+                   global float* updated_variance, global uchar* updated_doubtful) {
+  update_row(THIS_WORK_ITEM, size, has_gate, gate, keep_predicted, ask_neighbours, min_variance, hidden, predicted,
+             predicted_variance, measured, measured_variance, measured_doubtful, updated, updated_variance,
+             updated_doubtful);
 }

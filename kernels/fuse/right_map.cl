@@ -38,8 +38,9 @@ static inline void bid(const Ints keys, const Ints targets, global int* row) {
 }
 
 // REQUIRES: on GPUs, keys of 0.
-KERNEL void splat(const ImageSize size, const int min_disparity, global const float* disparity, global int* keys) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const int min_disparity,
+                             global const float* disparity, global int* keys) {
+  const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
   global int* bids = keys + key_row(y, width);
@@ -63,11 +64,16 @@ KERNEL void splat(const ImageSize size, const int min_disparity, global const fl
   }
 }
 
+KERNEL void splat(const ImageSize size, const int min_disparity, global const float* disparity, global int* keys) {
+  splat_row(THIS_WORK_ITEM, size, min_disparity, disparity, keys);
+}
+
 // makes_variance: else disparities only.
-KERNEL void decode(const ImageSize size, const int min_disparity, const float max_difference,
-                   const int makes_variance, global const int* keys, global const float* measured,
-                   global const float* measured_variance, global float* disparity, global float* variance) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void decode_row(const WorkItem at, const ImageSize size, const int min_disparity,
+                              const float max_difference, const int makes_variance, global const int* keys,
+                              global const float* measured, global const float* measured_variance,
+                              global float* disparity, global float* variance) {
+  const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
   const size_t right_row = ((size_t)EGOSGM_RIGHT * size.height + y) * width;
@@ -91,4 +97,11 @@ KERNEL void decode(const ImageSize size, const int min_disparity, const float ma
     const Floats its_variance = z > INVALID ? r : zero;
     store_pixels(agrees ? p : its_variance, variance + right_row, x, width);
   }
+}
+
+KERNEL void decode(const ImageSize size, const int min_disparity, const float max_difference, const int makes_variance,
+                   global const int* keys, global const float* measured, global const float* measured_variance,
+                   global float* disparity, global float* variance) {
+  decode_row(THIS_WORK_ITEM, size, min_disparity, max_difference, makes_variance, keys, measured, measured_variance,
+             disparity, variance);
 }

@@ -15,10 +15,10 @@
 #define STEPS_PER_GREY 257
 #endif
 
-KERNEL void check(const ImageSize size, const float max_difference, global const uchar* images,
-                  global float* disparity, global float* variance) {
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+COMPILED_ONCE void check_greys_row(const WorkItem at, const ImageSize size, const float max_difference,
+                                   global const uchar* images, global float* disparity, global float* variance) {
+  const int y = at.y;
+  const int view = at.view;
   const int width = size.width;
   const size_t pixels = (size_t)width * size.height;
   const size_t row = view * pixels + (size_t)y * width;
@@ -53,4 +53,9 @@ KERNEL void check(const ImageSize size, const float max_difference, global const
     store_pixels(drops ? INVALID : d, disparity + row, x, width);
     clear_dropped(drops, variance + row, x, width);
   }
+}
+
+KERNEL void check_greys(const ImageSize size, const float max_difference, global const uchar* images,
+                        global float* disparity, global float* variance) {
+  check_greys_row(THIS_WORK_ITEM, size, max_difference, images, disparity, variance);
 }

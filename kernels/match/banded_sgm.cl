@@ -44,9 +44,6 @@
 #ifndef PATHS
 #error "PATHS: 4 or 8"
 #endif
-#ifndef CODE_BYTES
-#error "CODE_BYTES: 4 or 8, the size of a code"
-#endif
 #ifndef COST_SCALE
 #error "COST_SCALE: what a bit of Hamming distance costs, 1 or 2"
 #endif
@@ -313,10 +310,10 @@ KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int t
 
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, the matching variance
 // (options.h), and whether the disparity is doubtful.
-KERNEL void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
-                   global float* variances, global uchar* doubtful) {
+COMPILED_ONCE void refine_row(const WorkItem at, const SgmParameters q, global const ulong* winners,
+                              global float* disparities, global float* variances, global uchar* doubtful) {
   const int width = q.width;
-  const size_t row = ((size_t)get_global_id(2) * q.height + get_global_id(1)) * q.width;
+  const size_t row = ((size_t)at.view * q.height + at.y) * q.width;
   const size_t image_row = (size_t)q.first_view * q.width * q.height + row;
   FOR_PIXELS(x, width) {
     const Winners winner = load_winners(winners + row, x, width);
@@ -327,4 +324,9 @@ KERNEL void refine(const SgmParameters q, global const ulong* winners, global fl
     store_pixels(matching_variance(q, steps, is_doubtful), variances + image_row, x, width);
     store_bytes(is_doubtful & (Ints)(1), doubtful + image_row, x, width);
   }
+}
+
+KERNEL void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
+                   global float* variances, global uchar* doubtful) {
+  refine_row(THIS_WORK_ITEM, q, winners, disparities, variances, doubtful);
 }

@@ -23,9 +23,6 @@
 #ifndef PATHS
 #error "PATHS: 4 or 8"
 #endif
-#ifndef CODE_BYTES
-#error "CODE_BYTES: 4 or 8, the size of a code"
-#endif
 #ifndef COST_SCALE
 #error "COST_SCALE: what a bit of Hamming distance costs"
 #endif

@@ -9,6 +9,7 @@
 // codes a pixel is compared with at growing disparities lie at growing addresses in both views. The padding repeats the
 // border's codes.
 #include "block.h"
+#include "code.h"
 #include "grey.h"
 #include "method.h"
 
@@ -18,12 +19,11 @@
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=16
 
-#ifndef CODE_BYTES
-#error "CODE_BYTES: 4 or 8, the size of a code"
-#endif
 #ifndef PIXELS
 #error "PIXELS: of a work-item, 1 or 16"
 #endif
@@ -35,12 +35,6 @@
 #endif
 #ifndef RADIUS_Y
 #error "RADIUS_Y: half the window's height"
-#endif
-
-#if CODE_BYTES == 4
-typedef uint Code;
-#else
-typedef ulong Code;
 #endif
 
 // The comparisons, and the place of each beside the centre.
@@ -56,6 +50,9 @@ constant char kSparse[32][2] = EGOSGM_CENSUS13X11;
 #define DX(i) (PLACE(i) % WINDOW_WIDTH - RADIUS_X)
 #define DY(i) (PLACE(i) / WINDOW_WIDTH - RADIUS_Y)
 #endif
+
+// A code of one word: its distances are twice as large then, as those of one that is alone count twice (cost.h).
+#define STANDS_TWICE (CODE_BYTES == 8 && COUNT <= 32)
 
 // The rows of the window around a pixel; outside the image its border's.
 typedef struct {
@@ -79,7 +76,7 @@ inline Code code_at(const int width, const Rows* rows, const int x) {
   Code code = 0;
 #pragma unroll
   for (int i = 0; i < COUNT; ++i) code = code << 1 | (AT(DX(i), DY(i)) < AT(0, 0) ? 1 : 0);
-  return code;
+  return STANDS_TWICE ? code << (4 * CODE_BYTES) | code : code;
 #endif
 }
 
@@ -102,16 +99,10 @@ KERNEL void census(const ImageSize size, const int padding, global const uchar* 
 #else
 
 #if CODE_BYTES == 4
-typedef uint16 Codes;
 #define convert_codes convert_uint16
 #else
-typedef ulong16 Codes;
 #define convert_codes convert_ulong16
 #endif
-
-typedef struct __attribute__((packed)) {
-  Codes codes;
-} PackedCodes;
 
 #if COMPARISONS == 0
 
@@ -129,8 +120,8 @@ typedef Block Greys;
 typedef Block Bytes;
 typedef struct __attribute__((packed)) {
   Block greys;
-} PackedBlock;
-inline Greys load_greys(global const Pixel* from) { return ((global const PackedBlock*)from)->greys; }
+} PackedGreys;
+inline Greys load_greys(global const Pixel* from) { return ((global const PackedGreys*)from)->greys; }
 inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
   return a < b ? (Block)((uchar)bit) : (Block)(0);
 }
@@ -145,17 +136,17 @@ inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
 #endif
 
 // Codes of their bytes, the lowest first.
-inline uint16 joined(const uchar16 b0, const uchar16 b1, const uchar16 b2, const uchar16 b3) {
+inline uint16 joined_bytes(const uchar16 b0, const uchar16 b1, const uchar16 b2, const uchar16 b3) {
   const ushort16 upper = convert_ushort16(b3) << (ushort16)(8) | convert_ushort16(b2);
   const ushort16 lower = convert_ushort16(b1) << (ushort16)(8) | convert_ushort16(b0);
   return convert_uint16(upper) << (uint16)(16) | convert_uint16(lower);
 }
 #if CODE_BYTES == 4
-#define JOINED(HALF, bytes) joined(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))
+#define JOINED(HALF, bytes) joined_bytes(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))
 #else
-#define JOINED(HALF, bytes)                                                                                   \
-  (convert_ulong16(joined(HALF(bytes[4]), HALF(bytes[5]), HALF(bytes[6]), HALF(bytes[7]))) << (ulong16)(32) | \
-   convert_ulong16(joined(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))))
+#define JOINED(HALF, bytes)                                                                                         \
+  (convert_ulong16(joined_bytes(HALF(bytes[4]), HALF(bytes[5]), HALF(bytes[6]), HALF(bytes[7]))) << (ulong16)(32) | \
+   convert_ulong16(joined_bytes(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))))
 #endif
 #define WHOLE(bytes) (bytes)
 
@@ -170,6 +161,10 @@ inline void codes_at(const Rows* rows, const int x, Codes* codes) {
     const int place = COUNT - 1 - i;
     bytes[place / 8] |= bit_where_less(load_greys(rows->at[RADIUS_Y + DY(i)] + x + DX(i)), centre, 1 << place % 8);
   }
+#if STANDS_TWICE
+#pragma unroll
+  for (int byte = 0; byte < 4; ++byte) bytes[byte + 4] = bytes[byte];
+#endif
 #if AT_ONCE == 32
   codes[0] = JOINED(FIRST_VECTOR, bytes);
   codes[1] = JOINED(SECOND_VECTOR, bytes);
@@ -181,9 +176,10 @@ inline void codes_at(const Rows* rows, const int x, Codes* codes) {
 #endif
 
 // A work-item a row and view.
-KERNEL void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
-  const int y = get_global_id(0);
-  const int view = get_global_id(1);
+COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int padding, global const uchar* images,
+                              global uint* all_codes) {
+  const int y = at.x;
+  const int view = at.y;
   if (y >= size.height) return;
 
   const int width = size.width;
@@ -219,6 +215,10 @@ KERNEL void census(const ImageSize size, const int padding, global const uchar* 
     row[-i] = row[0];
     row[width - 1 + i] = row[width - 1];
   }
+}
+
+KERNEL void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
+  census_row(THIS_WORK_ITEM, size, padding, images, all_codes);
 }
 
 #endif

@@ -6,10 +6,11 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-KERNEL void check(const ImageSize size, const float max_difference, const int keep_outside, global const float* disparity,
-                  global float* kept_disparity, global float* variance) {
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const float max_difference,
+                             const int keep_outside, global const float* disparity, global float* kept_disparity,
+                             global float* variance) {
+  const int y = at.y;
+  const int view = at.view;
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t other_row = ((size_t)(1 - view) * size.height + y) * width;
@@ -28,4 +29,9 @@ KERNEL void check(const ImageSize size, const float max_difference, const int ke
     store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);
     clear_dropped(!keeps, variance + row, x, width);
   }
+}
+
+KERNEL void check(const ImageSize size, const float max_difference, const int keep_outside,
+                  global const float* disparity, global float* kept_disparity, global float* variance) {
+  check_row(THIS_WORK_ITEM, size, max_difference, keep_outside, disparity, kept_disparity, variance);
 }

@@ -4,26 +4,19 @@
 #define EGOSGM_KERNELS_MATCH_COST_H
 
 #include "bit_count.h"
+#include "code.h"
 #include "lanes.h"
 #include "method.h"
 
 #if CODE_BYTES == 4
-typedef uint Code;
 typedef uint8 ChunkCodes;
-typedef uint16 Codes;
 #else
-typedef ulong Code;
 typedef ulong8 ChunkCodes;
-typedef ulong16 Codes;
 #endif
-typedef struct __attribute__((packed)) {
-  Codes codes;
-} PackedCodes;
 typedef struct __attribute__((packed)) {
   ChunkCodes codes;
 } PackedChunkCodes;
 
-inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
 inline ChunkCodes load_chunk_codes(global const Code* from) { return ((global const PackedChunkCodes*)from)->codes; }
 
 // Matching cost of 16 disparities, or 8. `own` and `other` point at the pixel's code and at the first disparity's in

@@ -27,11 +27,11 @@ static inline Sorted sort(const Floats a, const Floats b, const Floats c) {
 }
 
 // Where it does not fill, `variance` is not looked at.
-static inline void filter_window(const bool fills, const ImageSize size, global const float* disparity,
-                                 global float* filtered, global float* variance) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSize size, global const float* disparity,
+                              global float* filtered, global float* variance) {
+  const int y = at.y;
   const int width = size.width;
-  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  const size_t row = ((size_t)at.view * size.height + y) * width;
   global const float* here = disparity + row;
   const int has_above = y >= 1;
   const int has_below = y + 1 < size.height;
@@ -84,10 +84,10 @@ static inline void filter_window(const bool fills, const ImageSize size, global 
 }
 
 KERNEL void filter(const ImageSize size, global const float* disparity, global float* filtered) {
-  filter_window(false, size, disparity, filtered, 0);
+  filter_row(THIS_WORK_ITEM, false, size, disparity, filtered, 0);
 }
 
 KERNEL void filter_and_fill(const ImageSize size, global const float* disparity, global float* filtered,
                             global float* variance) {
-  filter_window(true, size, disparity, filtered, variance);
+  filter_row(THIS_WORK_ITEM, true, size, disparity, filtered, variance);
 }

@@ -15,9 +15,9 @@ inline Uints load_ranks(global const uint* row, const int x) {
 }
 
 // Writes the right half of the maps. Nothing is doubtful.
-KERNEL void read_off(const SgmParameters q, global const uint* ranks, global float* disparities,
-                     global float* variances, global uchar* doubtful) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void read_off_row(const WorkItem at, const SgmParameters q, global const uint* ranks,
+                                global float* disparities, global float* variances, global uchar* doubtful) {
+  const int y = at.y;
   const size_t row = ((size_t)q.height + y) * q.width;
   global const uint* seen = ranks + (size_t)y * ((size_t)q.width + 2 * (size_t)q.padding) + q.padding;
   FOR_PIXELS(x, q.width) {
@@ -28,4 +28,9 @@ KERNEL void read_off(const SgmParameters q, global const uint* ranks, global flo
     store_pixels(is_seen ? (Floats)(q.variance_floor) : (Floats)(0.0f), variances + row, x, q.width);
     store_bytes((Ints)(0), doubtful + row, x, q.width);
   }
+}
+
+KERNEL void read_off(const SgmParameters q, global const uint* ranks, global float* disparities,
+                     global float* variances, global uchar* doubtful) {
+  read_off_row(THIS_WORK_ITEM, q, ranks, disparities, variances, doubtful);
 }

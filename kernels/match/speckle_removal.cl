@@ -3,21 +3,14 @@
 // parents[run] is never above run, so that the root of a region is its first run, whatever the order in which runs are
 // joined. A device may go on after a kernel that failed: indices that are read from memory are held below what they
 // can be, which also ends every loop.
-// lint: ROW_GROUP=1
-// lint: ROW_GROUP=64
+// lint: ROW_GROUP=1 PIXELS=16
+// lint: ROW_GROUP=64 PIXELS=1
 
 #ifndef ROW_GROUP
 #error "ROW_GROUP: work-items that share a row"
 #endif
 
 #define NO_RUN 0xffff  // of an invalid pixel
-
-// Of a work-item that looks for the beginnings of runs; few pixels are one.
-#if ROW_GROUP == 1
-#define PIXELS 16
-#else
-#define PIXELS 1
-#endif
 
 #include "pixels.h"
 
@@ -51,8 +44,9 @@ int lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 // Where runs begin, as far as a row has seventeen pixels from x on, sixteen at a time: an inclusive maximum of the
 // columns that do not continue their left neighbour's run. Returns the column behind; `begin` is where its left
 // neighbour's run begins.
-int find_runs_by_lanes(const int width, const float max_difference, global const float* disparity, const uint row,
-                       global ushort* runs, global uint* parents, global uint* sizes, int* begin) {
+COMPILED_ONCE int find_runs_by_lanes(const int width, const float max_difference, global const float* disparity,
+                                     const uint row, global ushort* runs, global uint* parents, global uint* sizes,
+                                     int* begin) {
   int x = 0;
   for (; x + 17 <= width; x += 16) {
     const float16 d = vload16(0, disparity + x);
@@ -155,10 +149,11 @@ void join(global uint* parents, uint a, uint b) {
 
 // Joins each row of a strip with the one above; the strip's own runs are touched by no other work-item. A work-item a
 // strip and view. Sixteen pixels at a time: few of them join what their left neighbour has not joined before them.
-KERNEL void join_strips(const ImageSize size, const float max_difference, const int strip_rows,
-                        global const float* disparity, global const ushort* runs, global uint* parents) {
-  const int strip = get_global_id(0);
-  const int view = get_global_id(1);
+COMPILED_ONCE void join_strips_row(const WorkItem at, const ImageSize size, const float max_difference,
+                                   const int strip_rows, global const float* disparity, global const ushort* runs,
+                                   global uint* parents) {
+  const int strip = at.x;
+  const int view = at.y;
   const int end = min((strip + 1) * strip_rows, size.height);
   for (int y = strip * strip_rows + 1; y < end; ++y) {
     const size_t row = ((size_t)view * size.height + y) * size.width;
@@ -183,6 +178,11 @@ KERNEL void join_strips(const ImageSize size, const float max_difference, const 
       }
     }
   }
+}
+
+KERNEL void join_strips(const ImageSize size, const float max_difference, const int strip_rows,
+                        global const float* disparity, global const ushort* runs, global uint* parents) {
+  join_strips_row(THIS_WORK_ITEM, size, max_difference, strip_rows, disparity, runs, parents);
 }
 
 uint root_now(volatile global uint* parents, uint run) {
@@ -239,10 +239,10 @@ uint beginnings(global const ushort* runs, int x, int width) {
 }
 
 // Adds every run to its root. Only roots are added to, and only others are read.
-KERNEL void measure(const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
-                    volatile global uint* sizes) {
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+COMPILED_ONCE void measure_row(const WorkItem at, const ImageSize size, global const ushort* runs,
+                               global const uint* parents, global uint* roots, volatile global uint* sizes) {
+  const int y = at.y;
+  const int view = at.view;
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * size.width;
   FOR_PIXELS(x, width) {
@@ -256,10 +256,16 @@ KERNEL void measure(const ImageSize size, global const ushort* runs, global cons
   }
 }
 
-KERNEL void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
-                 global const uint* sizes, global float* disparity, global float* variance) {
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+KERNEL void measure(const ImageSize size, global const ushort* runs, global const uint* parents, global uint* roots,
+                    volatile global uint* sizes) {
+  measure_row(THIS_WORK_ITEM, size, runs, parents, roots, sizes);
+}
+
+COMPILED_ONCE void drop_row(const WorkItem at, const ImageSize size, const uint max_size, global const ushort* runs,
+                            global const uint* roots, global const uint* sizes, global float* disparity,
+                            global float* variance) {
+  const int y = at.y;
+  const int view = at.view;
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * size.width;
   FOR_PIXELS(x, width) {
@@ -272,4 +278,9 @@ KERNEL void drop(const ImageSize size, const uint max_size, global const ushort*
       }
     }
   }
+}
+
+KERNEL void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
+                 global const uint* sizes, global float* disparity, global float* variance) {
+  drop_row(THIS_WORK_ITEM, size, max_size, runs, roots, sizes, disparity, variance);
 }

@@ -13,15 +13,20 @@
 // lint: PIXEL_BYTES=2 PIXELS=1
 // lint: PIXEL_BYTES=2 PIXELS=16
 
+#if PIXELS > 1
+AT_EDGE Ints grey_at_edge(global const Pixel* row, const int x, const int width) {
+  const Pixels pixels = GATHERED(Pixels, row, clamp(x + LANE_INDICES, 0, width - 1));
+  return convert_int16(to_8_bit(pixels));
+}
+#endif
+
 // Grey values of pixels x .. x + PIXELS - 1; outside the row its border's.
 static inline Ints grey_at(global const Pixel* row, const int x, const int width) {
 #if PIXELS == 1
   return to_8_bit(row[clamp(x, 0, width - 1)]);
 #else
   if (x >= 0 && x + PIXELS <= width) return convert_int16(to_8_bit(load_grey(row + x)));
-  int lanes[PIXELS];
-  for (int i = 0; i < PIXELS; ++i) lanes[i] = to_8_bit(row[clamp(x + i, 0, width - 1)]);
-  return vload16(0, lanes);
+  return grey_at_edge(row, x, width);
 #endif
 }
 
@@ -29,11 +34,11 @@ static inline Ints penalty(const Ints most, const Ints least, const Ints slope, 
   return max(most - slope * max(p - q, q - p), least);
 }
 
-KERNEL void penalties(const ImageSize size, const int most, const int least, const int slope,
-                      global const uchar* images, global uchar* steps) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void penalties_row(const WorkItem at, const ImageSize size, const int most, const int least,
+                                 const int slope, global const uchar* images, global uchar* steps) {
+  const int y = at.y;
   const int width = size.width;
-  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  const size_t row = ((size_t)at.view * size.height + y) * width;
   // Outside the image there is no step: the border's pixel stands in.
   global const Pixel* here = (global const Pixel*)images + row;
   global const Pixel* above = here - (y > 0 ? width : 0);
@@ -46,4 +51,9 @@ KERNEL void penalties(const ImageSize size, const int most, const int least, con
     const Ints upper_right = penalty(most, least, slope, grey, grey_at(above, x + 1, width));
     store_words(left | up << 8 | upper_left << 16 | upper_right << 24, steps + 4 * row, x, width);
   }
+}
+
+KERNEL void penalties(const ImageSize size, const int most, const int least, const int slope,
+                      global const uchar* images, global uchar* steps) {
+  penalties_row(THIS_WORK_ITEM, size, most, least, slope, images, steps);
 }

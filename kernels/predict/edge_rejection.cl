@@ -11,11 +11,11 @@ static inline Ints is_jump(const Floats d, const Floats near, const Floats far, 
   return (neighbour > INVALID) & (fabs(neighbour - d) > max_jump);
 }
 
-KERNEL void reject(const ImageSize size, const float max_jump, global const float* disparity,
-                   global float* kept_disparity, global float* variance) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const float max_jump,
+                              global const float* disparity, global float* kept_disparity, global float* variance) {
+  const int y = at.y;
   const int width = size.width;
-  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  const size_t row = ((size_t)at.view * size.height + y) * width;
   global const float* here = disparity + row;
   // Above and below the image, the pixel itself is read, which is no jump.
   global const float* above = here - (y >= 1 ? width : 0);
@@ -33,4 +33,9 @@ KERNEL void reject(const ImageSize size, const float max_jump, global const floa
     store_pixels(jumps ? INVALID : d, kept_disparity + row, x, width);
     clear_dropped(jumps, variance + row, x, width);
   }
+}
+
+KERNEL void reject(const ImageSize size, const float max_jump, global const float* disparity,
+                   global float* kept_disparity, global float* variance) {
+  reject_row(THIS_WORK_ITEM, size, max_jump, disparity, kept_disparity, variance);
 }

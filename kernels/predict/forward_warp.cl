@@ -111,8 +111,8 @@ KERNEL void splat_variance(const ImageSize size, global const int* landed, globa
   atomic_max((global uint*)predicted_variance + first + target, as_uint(moved_variance[i]));
 }
 
-KERNEL void decode(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
-                   global float* disparity, global float* variance) {
+KERNEL void decode_warped(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
+                          global float* disparity, global float* variance) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
   const size_t i = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width + x;
@@ -151,10 +151,10 @@ static inline int2 span_of(const ImageSize size, const DisparityMotion motion, c
 
 // Between which rows each source row lands; the first lies behind the last where it lands on none. A work-item a row
 // and view.
-KERNEL void find_spans(const ImageSize size, const DisparityMotion left, const DisparityMotion right,
-                       global const float* disparity, global int* spans) {
-  const int y = get_global_id(0);
-  const int view = get_global_id(1);
+COMPILED_ONCE void find_spans_row(const WorkItem at, const ImageSize size, const DisparityMotion left,
+                                  const DisparityMotion right, global const float* disparity, global int* spans) {
+  const int y = at.x;
+  const int view = at.y;
   const size_t row = (size_t)view * size.height + y;
   Floats least = INFINITY;
   Floats most = INVALID;
@@ -179,14 +179,20 @@ KERNEL void find_spans(const ImageSize size, const DisparityMotion left, const D
   spans[2 * row + 1] = span.y;
 }
 
+KERNEL void find_spans(const ImageSize size, const DisparityMotion left, const DisparityMotion right,
+                       global const float* disparity, global int* spans) {
+  find_spans_row(THIS_WORK_ITEM, size, left, right, disparity, spans);
+}
+
 // Moves and splats what lands on a band of `band_rows` rows. A work-item a band and view; no other touches its rows.
-KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const DisparityMotion left,
-                        const DisparityMotion right, const float process_noise, const int band_rows,
-                        global const int* spans, global const float* disparity, global const float* variance,
-                        global float* predicted, global float* predicted_variance) {
-  const int view = get_global_id(1);
+COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, const DisparityRange range,
+                                   const DisparityMotion left, const DisparityMotion right, const float process_noise,
+                                   const int band_rows, global const int* spans, global const float* disparity,
+                                   global const float* variance, global float* predicted,
+                                   global float* predicted_variance) {
+  const int view = at.y;
   const int width = size.width;
-  const int first = get_global_id(0) * band_rows;
+  const int first = at.x * band_rows;
   const int end = min(first + band_rows, size.height);
   const DisparityMotion motion = view == EGOSGM_LEFT ? left : right;
   const size_t rows = (size_t)view * size.height;
@@ -229,6 +235,14 @@ KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const 
     store_pixels(is_beyond ? INVALID : d, band, i, pixels);
     store_pixels(is_beyond ? (Floats)(EGOSGM_HIDDEN) : load_pixels(band_variance, i, pixels), band_variance, i, pixels);
   }
+}
+
+KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const DisparityMotion left,
+                        const DisparityMotion right, const float process_noise, const int band_rows,
+                        global const int* spans, global const float* disparity, global const float* variance,
+                        global float* predicted, global float* predicted_variance) {
+  splat_bands_row(THIS_WORK_ITEM, size, range, left, right, process_noise, band_rows, spans, disparity, variance,
+                  predicted, predicted_variance);
 }
 
 #endif

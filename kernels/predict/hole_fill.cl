@@ -10,7 +10,7 @@ static inline Ints is_gap(const Floats centre, const Floats before, const Floats
   return (centre <= INVALID) & (before > INVALID) & (after > INVALID) & (fabs(before - after) < gamma);
 }
 
-static inline Floats mean_of(const Floats a, const Floats b) { return 0.5f * (a + b); }
+static inline Floats middle_of(const Floats a, const Floats b) { return 0.5f * (a + b); }
 static inline Floats larger_of(const Floats a, const Floats b) { return a > b ? a : b; }
 
 // By the variances: whether a pixel is hidden, unless it is filled.
@@ -19,10 +19,11 @@ static inline Ints is_hidden(const Floats p, const Floats before, const Floats a
   return (p == hidden) | ((before == hidden) & (after == hidden));
 }
 
-KERNEL void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
-                      global const float* variance, global float* filled_disparity, global float* filled_variance) {
+COMPILED_ONCE void fill_row(const WorkItem at, const ImageSize size, const float gamma, global const float* disparity,
+                            global const float* variance, global float* filled_disparity,
+                            global float* filled_variance) {
   const int width = size.width;
-  const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
+  const size_t row = ((size_t)at.view * size.height + at.y) * width;
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(disparity + row, x, width);
@@ -33,7 +34,7 @@ KERNEL void fill_rows(const ImageSize size, const float gamma, global const floa
     const Floats p_left = load_pixels(variance + row, x - 1, width);
     const Floats p_right = load_pixels(variance + row, x + 1, width);
     const Ints hides = is_hidden(p, p_left, p_right);
-    store_pixels(fills ? mean_of(left, right) : hides ? INVALID : d, filled_disparity + row, x, width);
+    store_pixels(fills ? middle_of(left, right) : hides ? INVALID : d, filled_disparity + row, x, width);
     store_pixels(fills   ? larger_of(p_left, p_right)
                  : hides ? (Floats)(EGOSGM_HIDDEN)
                          : p,
@@ -41,13 +42,19 @@ KERNEL void fill_rows(const ImageSize size, const float gamma, global const floa
   }
 }
 
+KERNEL void fill_rows(const ImageSize size, const float gamma, global const float* disparity,
+                      global const float* variance, global float* filled_disparity, global float* filled_variance) {
+  fill_row(THIS_WORK_ITEM, size, gamma, disparity, variance, filled_disparity, filled_variance);
+}
+
 // `hidden`: 1 where a pixel is, whose variance is 0.
-KERNEL void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
-                         global const float* variance, global float* filled_disparity, global float* filled_variance,
-                         global uchar* hidden) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, const float gamma,
+                                    global const float* disparity, global const float* variance,
+                                    global float* filled_disparity, global float* filled_variance,
+                                    global uchar* hidden) {
+  const int y = at.y;
   const int width = size.width;
-  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  const size_t row = ((size_t)at.view * size.height + y) * width;
   // At the border the row itself, whose pixels are valid or no neighbours.
   const size_t row_above = y >= 1 ? row - width : row;
   const size_t row_below = y + 1 < size.height ? row + width : row;
@@ -61,8 +68,14 @@ KERNEL void fill_columns(const ImageSize size, const float gamma, global const f
     const Floats p_above = load_pixels(variance + row_above, x, width);
     const Floats p_below = load_pixels(variance + row_below, x, width);
     const Ints hides = fills ? (Ints)(0) : is_hidden(p, p_above, p_below);
-    store_pixels(fills ? mean_of(above, below) : hides ? INVALID : d, filled_disparity + row, x, width);
+    store_pixels(fills ? middle_of(above, below) : hides ? INVALID : d, filled_disparity + row, x, width);
     store_pixels(fills ? larger_of(p_above, p_below) : hides ? (Floats)(0.0f) : p, filled_variance + row, x, width);
     store_bytes(hides & (Ints)(1), hidden + row, x, width);
   }
+}
+
+KERNEL void fill_columns(const ImageSize size, const float gamma, global const float* disparity,
+                         global const float* variance, global float* filled_disparity, global float* filled_variance,
+                         global uchar* hidden) {
+  fill_columns_row(THIS_WORK_ITEM, size, gamma, disparity, variance, filled_disparity, filled_variance, hidden);
 }

@@ -11,9 +11,9 @@ static inline Ints has_both(const Floats predicted, const Floats measured) {
 }
 
 // 255 where at least half of the window's pixels that have both differ, if enough have.
-KERNEL void mark(const ImageSize size, global const float* predicted, global const float* measured,
-                 global uchar* marks) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void mark_row(const WorkItem at, const ImageSize size, global const float* predicted,
+                            global const float* measured, global uchar* marks) {
+  const int y = at.y;
   const int width = size.width;
   const size_t own = (size_t)y * width;
   const Floats most = EGOSGM_DIFFERENCE_PX;
@@ -36,4 +36,9 @@ KERNEL void mark(const ImageSize size, global const float* predicted, global con
     const Ints marked = here & (with_both >= enough) & (that_differ + that_differ >= with_both);
     store_bytes(marked ? (Ints)(255) : (Ints)(0), marks + own, x, width);
   }
+}
+
+KERNEL void mark(const ImageSize size, global const float* predicted, global const float* measured,
+                 global uchar* marks) {
+  mark_row(THIS_WORK_ITEM, size, predicted, measured, marks);
 }

@@ -32,12 +32,13 @@ static inline Floats blend(const Floats p, const Floats measured, const Floats r
 
 // Of each pixel: the variances' blend, and the sum of the horizontal and the vertical second difference. A pixel at the
 // image's edge is its own neighbour.
-KERNEL void of_each_pixel(const ImageSize size, global const float* disparity, global const float* variance,
-                          global const float* measured, global const float* measured_variance, global float* blended,
-                          global float* roughness) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void of_each_pixel_row(const WorkItem at, const ImageSize size, global const float* disparity,
+                                     global const float* variance, global const float* measured,
+                                     global const float* measured_variance, global float* blended,
+                                     global float* roughness) {
+  const int y = at.y;
   const int width = size.width;
-  const size_t row = ((size_t)get_global_id(2) * size.height + y) * width;
+  const size_t row = ((size_t)at.view * size.height + y) * width;
   global const float* above = disparity + (y > 0 ? row - width : row);
   global const float* below = disparity + (y + 1 < size.height ? row + width : row);
   FOR_PIXELS(x, width) {
@@ -54,11 +55,18 @@ KERNEL void of_each_pixel(const ImageSize size, global const float* disparity, g
   }
 }
 
+KERNEL void of_each_pixel(const ImageSize size, global const float* disparity, global const float* variance,
+                          global const float* measured, global const float* measured_variance, global float* blended,
+                          global float* roughness) {
+  of_each_pixel_row(THIS_WORK_ITEM, size, disparity, variance, measured, measured_variance, blended, roughness);
+}
+
 // Means along the row: of the variances at every fourth pixel; of the roughness at every pixel.
-KERNEL void row_means(const ImageSize size, global const float* variance, global const float* roughness,
-                      global float* mean_variance, global float* mean_roughness) {
+COMPILED_ONCE void row_means_row(const WorkItem at, const ImageSize size, global const float* variance,
+                                 global const float* roughness, global float* mean_variance,
+                                 global float* mean_roughness) {
   const int width = size.width;
-  const size_t row = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * width;
+  const size_t row = ((size_t)at.view * size.height + at.y) * width;
   FOR_PIXELS(x, width) {
     Floats sum = 0.0f;
     Floats count = 0.0f;
@@ -78,6 +86,11 @@ KERNEL void row_means(const ImageSize size, global const float* variance, global
     }
     store_pixels(sum / count, mean_roughness + row, x, width);
   }
+}
+
+KERNEL void row_means(const ImageSize size, global const float* variance, global const float* roughness,
+                      global float* mean_variance, global float* mean_roughness) {
+  row_means_row(THIS_WORK_ITEM, size, variance, roughness, mean_variance, mean_roughness);
 }
 
 // Mean of every step-th row within the radius, as far as the image reaches.
@@ -115,12 +128,13 @@ static inline Floats calibrated(const Floats sum) {
   return right + EGOSGM_WRONG_SURFACE_PX2 * sqrt(sum) / (1.0f + EGOSGM_WRONG_SURFACE_HALF / (square * square * sum));
 }
 
-KERNEL void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,
-                    global const float* disparity, global const float* mean_variance,
-                    global const float* mean_roughness, global float* variance) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const float scale, const float roughness_weight,
+                               const float jump_weight, global const float* disparity,
+                               global const float* mean_variance, global const float* mean_roughness,
+                               global float* variance) {
+  const int y = at.y;
   const int width = size.width;
-  const size_t view = (size_t)get_global_id(2) * size.height * width;
+  const size_t view = (size_t)at.view * size.height * width;
   const size_t row = view + (size_t)y * width;
   FOR_PIXELS(x, width) {
     const Floats p = column_mean(mean_variance + view, size, x, y, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP);
@@ -130,4 +144,11 @@ KERNEL void combine(const ImageSize size, const float scale, const float roughne
     const Floats sum = scale * (p * sqrt(p)) + roughness_weight * (r * r) + jump_weight * (j * j);
     store_pixels(d > INVALID ? calibrated(sum) : (Floats)(0.0f), variance + row, x, width);
   }
+}
+
+KERNEL void combine(const ImageSize size, const float scale, const float roughness_weight, const float jump_weight,
+                    global const float* disparity, global const float* mean_variance,
+                    global const float* mean_roughness, global float* variance) {
+  combine_row(THIS_WORK_ITEM, size, scale, roughness_weight, jump_weight, disparity, mean_variance, mean_roughness,
+              variance);
 }

@@ -2,6 +2,7 @@
 // Why a left pixel has no value, or one that is doubtful: a byte of EGOSGM_REASON_*. What the stages decided follows
 // from their maps. What the image alone tells (flat, saturated, repeating) is looked for here, only where it is asked
 // for.
+#include "code.h"
 #include "grey.h"
 #include "method.h"
 #include "pixels.h"
@@ -10,10 +11,6 @@
 // lint: PIXEL_BYTES=1 CODE_BYTES=8 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=8 PIXELS=16
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 PIXELS=1
-
-#ifndef CODE_BYTES
-#error "CODE_BYTES: 4 or 8, the size of a census code"
-#endif
 
 #if PIXEL_BYTES == 1
 #define WHITE 255.0f
@@ -24,15 +21,20 @@
 #endif
 #define NO_RUN 0xffff  // of a pixel that SpeckleRemoval did not look at
 
+#if PIXELS > 1
+AT_EDGE Floats load_grey_values_at_edge(global const Pixel* row, const int x, const int width) {
+  const Ints inside = clamp(x + LANE_INDICES, 0, width - 1);
+  return GATHERED(Floats, row, inside);
+}
+#endif
+
 // Grey values x .. x + PIXELS - 1 of a row; those outside of it are its border's.
-static inline Floats load_greys(global const Pixel* row, const int x, const int width) {
+static inline Floats load_grey_values(global const Pixel* row, const int x, const int width) {
 #if PIXELS == 1
   return row[clamp(x, 0, width - 1)];
 #else
   if (x >= 0 && x + PIXELS <= width) return convert_float16(load_grey(row + x));
-  float lanes[PIXELS];
-  for (int i = 0; i < PIXELS; ++i) lanes[i] = row[clamp(x + i, 0, width - 1)];
-  return vload16(0, lanes);
+  return load_grey_values_at_edge(row, x, width);
 #endif
 }
 
@@ -48,10 +50,10 @@ static inline Texture texture_around(const ImageSize size, global const Pixel* i
   const int end = min(y + EGOSGM_TEXTURE_RADIUS, size.height - 1);
   for (int v = max(y - EGOSGM_TEXTURE_RADIUS, 0); v <= end; ++v) {
     global const Pixel* row = image + (size_t)v * size.width;
-    Floats before = load_greys(row, x - EGOSGM_TEXTURE_RADIUS - 1, size.width);
-    Floats at = load_greys(row, x - EGOSGM_TEXTURE_RADIUS, size.width);
+    Floats before = load_grey_values(row, x - EGOSGM_TEXTURE_RADIUS - 1, size.width);
+    Floats at = load_grey_values(row, x - EGOSGM_TEXTURE_RADIUS, size.width);
     for (int u = x - EGOSGM_TEXTURE_RADIUS; u <= x + EGOSGM_TEXTURE_RADIUS; ++u) {
-      const Floats after = load_greys(row, u + 1, size.width);
+      const Floats after = load_grey_values(row, u + 1, size.width);
       texture.changes += fabs(after - before);
       texture.extremes += one_where((at <= 0.0f) | (at >= WHITE));
       before = at;
@@ -63,7 +65,7 @@ static inline Texture texture_around(const ImageSize size, global const Pixel* i
 }
 
 // How far apart those disparities lie that were warped near a pixel of the row.
-static inline Floats jump_beside(global const float* warped, const int x, const int width) {
+static inline Floats jump_in_row(global const float* warped, const int x, const int width) {
   Floats least = INFINITY;
   Floats most = -INFINITY;
   for (int u = x - EGOSGM_UNCOVERED_RADIUS; u <= x + EGOSGM_UNCOVERED_RADIUS; ++u) {
@@ -74,29 +76,12 @@ static inline Floats jump_beside(global const float* warped, const int x, const 
   return most - least;
 }
 
-#if CODE_BYTES == 4
-typedef uint Code;
-typedef uint16 SixteenCodes;
-#else
-typedef ulong Code;
-typedef ulong16 SixteenCodes;
-#endif
-
-#if PIXELS == 1
-typedef Code Codes;
-#define INTS_OF_CODES convert_int
-static inline Codes load_codes(global const Code* from) { return *from; }
-#else
-typedef SixteenCodes Codes;
-typedef struct __attribute__((packed)) {
-  Codes codes;
-} PackedCodes;
-#define INTS_OF_CODES convert_int16
-static inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
-#endif
-
 static inline Ints distances(global const Code* own, global const Code* other) {
-  return INTS_OF_CODES(popcount(load_codes(own) ^ load_codes(other)));
+#if PIXELS == 1
+  return convert_int(popcount(*own ^ *other));
+#else
+  return convert_int16(popcount(load_codes(own) ^ load_codes(other)));
+#endif
 }
 
 // Which of `asked` look like the pixels at `other`: their own codes, and in the mean those of a grid around.
@@ -144,12 +129,13 @@ static inline Ints has_run(global const ushort* runs, const int x, const int wid
 
 // `all_codes`: Census's, read where they are a census and no grey values. `runs`: SpeckleRemoval's.
 // `doubtful`: KalmanUpdate's. What there is not (has_prediction, has_runs) may be any buffer.
-KERNEL void explain(const ImageSize size, const int disparities, global const uchar* images, const int has_census,
-                    const int padding, global const uint* all_codes, const int has_prediction,
-                    global const float* warped, global const uchar* hidden, global const float* measured,
-                    const int has_runs, global const ushort* runs, global const float* disparity,
-                    global const uchar* doubtful, global uchar* reasons) {
-  const int y = get_global_id(1);
+COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const int disparities,
+                               global const uchar* images, const int has_census, const int padding,
+                               global const uint* all_codes, const int has_prediction, global const float* warped,
+                               global const uchar* hidden, global const float* measured, const int has_runs,
+                               global const ushort* runs, global const float* disparity, global const uchar* doubtful,
+                               global uchar* reasons) {
+  const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
   const long stride = width + 2 * (long)padding;
@@ -171,7 +157,7 @@ KERNEL void explain(const ImageSize size, const int disparities, global const uc
     const Ints differs = has_value ? is_doubtful : fabs(z - w) > off;
     const Ints contradicts = is_measured & is_warped & differs;
     const Ints is_speckle = has_runs ? has_run(runs + row, x, width) & !is_measured : (Ints)(0);
-    const Ints is_uncovered = has_prediction ? (jump_beside(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
+    const Ints is_uncovered = has_prediction ? (jump_in_row(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
     const Texture texture = texture_around(size, (global const Pixel*)images, x, y);
     const Ints is_flat = texture.changes < (Floats)(EGOSGM_LEAST_CHANGE * STEPS_PER_GREY * texture.pixels);
     const Ints is_saturated = 2.0f * texture.extremes >= (Floats)(texture.pixels);
@@ -191,4 +177,13 @@ KERNEL void explain(const ImageSize size, const int disparities, global const uc
     reason = is_hidden ? (Ints)(EGOSGM_REASON_NEARER) : reason;
     store_bytes(reason, reasons + row, x, width);
   }
+}
+
+KERNEL void explain(const ImageSize size, const int disparities, global const uchar* images, const int has_census,
+                    const int padding, global const uint* all_codes, const int has_prediction,
+                    global const float* warped, global const uchar* hidden, global const float* measured,
+                    const int has_runs, global const ushort* runs, global const float* disparity,
+                    global const uchar* doubtful, global uchar* reasons) {
+  explain_row(THIS_WORK_ITEM, size, disparities, images, has_census, padding, all_codes, has_prediction, warped, hidden,
+              measured, has_runs, runs, disparity, doubtful, reasons);
 }

@@ -97,4 +97,37 @@ static inline void store_bands(const Bands bands, global Band* row, const int x,
 #endif
 }
 
+#if PIXELS > 1
+
+// Of a row up to a pixel.
+typedef struct {
+  int chunks;
+  Ints predicted;
+} Sums;
+
+// Leaves where the cells of PIXELS pixels begin, which have so many chunks, and sums them up.
+static inline Sums with_offsets(Sums sums, const Ints chunks, const Floats d, global uchar* offsets, const int x,
+                                const int width) {
+  Ints scan = chunks;  // inclusive, in steps of 1, 2, 4 and 8
+  scan += (Ints)(0, scan.s0123, scan.s4567, scan.s89ab, scan.scd, scan.se);
+  scan += (Ints)(0, 0, scan.s0123, scan.s4567, scan.s89ab, scan.scd);
+  scan += (Ints)(0, 0, 0, 0, scan.s0123, scan.s4567, scan.s89ab);
+  scan += (Ints)((int8)(0), scan.s01234567);
+  store_words(sums.chunks + scan - chunks, offsets, x, width);
+  sums.chunks += scan.sf;
+  sums.predicted -= d > INVALID;
+  return sums;
+}
+
+static inline RowSum row_sum_of(const Sums sums) {
+  const int8 halves = sums.predicted.lo + sums.predicted.hi;
+  const int4 quarters = halves.lo + halves.hi;
+  RowSum sum;
+  sum.cells = sums.chunks * EGOSGM_LANES;
+  sum.predicted = quarters.x + quarters.y + quarters.z + quarters.w;
+  return sum;
+}
+
+#endif
+
 #endif

@@ -12,12 +12,12 @@
 #define AT_ONCE (PIXELS == 1 ? 1 : 4)
 
 #if PIXEL_BYTES == 1
-typedef ushort16 Sums;
+typedef ushort16 ColumnSums;
 typedef ushort4 Means;
 #define convert_sums convert_ushort16
 #define to_16_bit(sum) ((sum) << 4)
 #else
-typedef uint16 Sums;
+typedef uint16 ColumnSums;
 typedef uint4 Means;
 #define convert_sums convert_uint16
 #define to_16_bit(sum) ((sum) >> 4)
@@ -36,7 +36,7 @@ KERNEL void shrink(const ImageSize size, global const uchar* images, global ucha
   global ushort* to = (global ushort*)coarse_images + ((size_t)view * coarse_height + y) * coarse_width;
 #if PIXELS > 1
   if ((x + AT_ONCE) * EGOSGM_COARSE <= size.width) {
-    Sums columns = 0;
+    ColumnSums columns = 0;
     for (int v = 0; v < EGOSGM_COARSE; ++v) {
       const size_t row = min(y * EGOSGM_COARSE + v, size.height - 1);
       columns += convert_sums(load_grey(image + row * size.width + x * EGOSGM_COARSE));

@@ -2,13 +2,12 @@
 // What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span; and
 // what its block's predictions span and CoarseMatch found there, where that lies elsewhere.
 
-// lint: ROW_GROUP=1
-// lint: ROW_GROUP=64
+// lint: ROW_GROUP=1 PIXELS=16
+// lint: ROW_GROUP=64 PIXELS=1
 
 #ifndef ROW_GROUP
 #error "ROW_GROUP: work-items that share a row"
 #endif
-#define PIXELS (ROW_GROUP == 1 ? 16 : 1)
 
 #include "bands.h"
 #include "spans.h"
@@ -19,11 +18,12 @@
 
 // A work-item BLOCKS blocks and view, or a row of blocks and view.
 KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
+  const WorkItem at = THIS_WORK_ITEM;
   const ImageSize blocks = blocks_of(size);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int y = at.y;
+  const int view = at.view;
   const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
-  for (int x = get_global_id(0) * BLOCKS; x < blocks.width; x += (int)get_global_size(0) * BLOCKS) {
+  for (int x = at.x * BLOCKS; x < blocks.width; x += at.items * BLOCKS) {
     Spans spans = no_spans();
     for (int row = y * EGOSGM_BLOCK; row < end; ++row) {
       spans = with(spans, load_across(disparity + ((size_t)view * size.height + row) * size.width, x * EGOSGM_BLOCK,
@@ -42,13 +42,14 @@ KERNEL void gather_blocks(const ImageSize size, global const float* disparity, g
 // What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at
 // either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. A work-item a
 // block and view.
-KERNEL void gather_coarse(const ImageSize size, global const float* coarse, global BlockRange* ranges) {
+COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, global const float* coarse,
+                                       global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
   const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
-  const int x = get_global_id(0);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int x = at.x;
+  const int y = at.y;
+  const int view = at.view;
   if (x >= blocks.width || y >= blocks.height) return;
 
 #if EGOSGM_BLOCK != 2 * EGOSGM_COARSE
@@ -85,6 +86,10 @@ KERNEL void gather_coarse(const ImageSize size, global const float* coarse, glob
   range.max = EGOSGM_COARSE * most[EGOSGM_COARSE_OUTLIERS].x;
   range.count = count.x + count.y + count.z + count.w;
   ranges[index_of(blocks, view, x, y)] = range;
+}
+
+KERNEL void gather_coarse(const ImageSize size, global const float* coarse, global BlockRange* ranges) {
+  gather_coarse_block(THIS_WORK_ITEM, size, coarse, ranges);
 }
 
 // From what to what the unpredicted pixels of a block search.
@@ -130,20 +135,21 @@ static inline Span span_around(const ImageSize blocks, const int view, const int
   return span;
 }
 
-// The band of a block's unpredicted pixels; `found` is for the predicted ones: beside a jump a prediction may lie on the
-// wrong side of it. A work-item PIXELS blocks and view, or a row of blocks and view.
-KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
-                            const float margin, const int min_count, const float coarse_margin,
-                            global const BlockRange* ranges, global const BlockRange* coarse_ranges,
-                            global BlockRange* found, global Band* bands) {
+// The band of a block's unpredicted pixels; `found` is for the predicted ones: beside a jump a prediction may lie on
+// the wrong side of it. A work-item PIXELS blocks and view, or a row of blocks and view.
+COMPILED_ONCE void bands_of_blocks_row(const WorkItem at, const ImageSize size, const DisparityRange range,
+                                       const int from_neighbours, const float margin, const int min_count,
+                                       const float coarse_margin, global const BlockRange* ranges,
+                                       global const BlockRange* coarse_ranges, global BlockRange* found,
+                                       global Band* bands) {
   const ImageSize blocks = blocks_of(size);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int y = at.y;
+  const int view = at.view;
   FOR_PIXELS(x, blocks.width) {
     float from[PIXELS], to[PIXELS];
     for (int i = 0; i < PIXELS; ++i) {
-      const Span span = span_around(blocks, view, min(x + i, blocks.width - 1), y, from_neighbours, margin,
-                                    min_count, coarse_margin, ranges, coarse_ranges, found);
+      const Span span = span_around(blocks, view, min(x + i, blocks.width - 1), y, from_neighbours, margin, min_count,
+                                    coarse_margin, ranges, coarse_ranges, found);
       from[i] = span.from;
       to[i] = span.to;
     }
@@ -152,38 +158,13 @@ KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, co
   }
 }
 
-#if ROW_GROUP == 1
-
-// Of a row up to a pixel.
-typedef struct {
-  int chunks;
-  Ints predicted;
-} Sums;
-
-// Leaves where the cells of PIXELS pixels begin, which have so many chunks, and sums them up.
-static inline Sums with_offsets(Sums sums, const Ints chunks, const Floats d, global uchar* offsets, const int x,
-                                const int width) {
-  Ints scan = chunks;  // inclusive, in steps of 1, 2, 4 and 8
-  scan += (Ints)(0, scan.s0123, scan.s4567, scan.s89ab, scan.scd, scan.se);
-  scan += (Ints)(0, 0, scan.s0123, scan.s4567, scan.s89ab, scan.scd);
-  scan += (Ints)(0, 0, 0, 0, scan.s0123, scan.s4567, scan.s89ab);
-  scan += (Ints)((int8)(0), scan.s01234567);
-  store_words(sums.chunks + scan - chunks, offsets, x, width);
-  sums.chunks += scan.sf;
-  sums.predicted -= d > INVALID;
-  return sums;
+KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, const int from_neighbours,
+                            const float margin, const int min_count, const float coarse_margin,
+                            global const BlockRange* ranges, global const BlockRange* coarse_ranges,
+                            global BlockRange* found, global Band* bands) {
+  bands_of_blocks_row(THIS_WORK_ITEM, size, range, from_neighbours, margin, min_count, coarse_margin, ranges,
+                      coarse_ranges, found, bands);
 }
-
-static inline RowSum row_sum_of(const Sums sums) {
-  const int8 halves = sums.predicted.lo + sums.predicted.hi;
-  const int4 quarters = halves.lo + halves.hi;
-  RowSum sum;
-  sum.cells = sums.chunks * EGOSGM_LANES;
-  sum.predicted = quarters.x + quarters.y + quarters.z + quarters.w;
-  return sum;
-}
-
-#endif
 
 // What PIXELS predictions and what was found in their blocks search.
 static inline Bands bands_of_predictions(const DisparityRange range, const float sigmas, const float min_half_width,
@@ -195,7 +176,8 @@ static inline Bands bands_of_predictions(const DisparityRange range, const float
   const Floats half_width = deviation <= min_half_width ? (Floats)(min_half_width) : deviation;
   const Floats reach = half_width <= (float)range.count ? half_width : (Floats)(range.count);
   const Floats low = d - reach, high = d + reach;
-  const Ints contradicted = (found_count > 0) & ((found_min < low - coarse_tolerance) | (found_max > high + coarse_tolerance));
+  const Ints contradicted =
+      (found_count > 0) & ((found_min < low - coarse_tolerance) | (found_max > high + coarse_tolerance));
   const Floats found_low = found_min - coarse_margin, found_high = found_max + coarse_margin;
   const Floats from = (contradicted & (found_low < low)) ? found_low : low;
   const Floats to = (contradicted & (found_high > high)) ? found_high : high;
@@ -203,14 +185,15 @@ static inline Bands bands_of_predictions(const DisparityRange range, const float
 }
 
 // Work-items that have a row alone sum it up, too. A work-item PIXELS pixels and view, or a row and view.
-KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
-                            const float min_half_width, global const float* disparity, global const float* variance,
-                            const float coarse_tolerance, const float coarse_margin, global const BlockRange* found,
-                            global const Band* block_bands, global Band* bands, global uint* cell_offsets,
-                            global RowSum* row_sums) {
+COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const DisparityRange range,
+                                       const float sigmas, const float min_half_width, global const float* disparity,
+                                       global const float* variance, const float coarse_tolerance,
+                                       const float coarse_margin, global const BlockRange* found,
+                                       global const Band* block_bands, global Band* bands, global uint* cell_offsets,
+                                       global RowSum* row_sums) {
   const ImageSize blocks = blocks_of(size);
-  const int y = get_global_id(1);
-  const int view = get_global_id(2);
+  const int y = at.y;
+  const int view = at.view;
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t row_of_blocks = index_of(blocks, view, 0, y / EGOSGM_BLOCK);
@@ -221,11 +204,11 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
     const Floats d = load_pixels(disparity + row, x, width);
     const Ints predicted = d > INVALID;
     global const BlockRange* here = found + row_of_blocks + x / EGOSGM_BLOCK;
-    const Bands own = bands_of_predictions(
-        range, sigmas, min_half_width, coarse_tolerance, coarse_margin, predicted ? d : (Floats)(0.0f),
-        load_pixels(variance + row, x, width), OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), min),
-        OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), max),
-        OF_BLOCKS(Ints, int8, here, NEXT_BLOCK(x, blocks.width), count));
+    const Bands own = bands_of_predictions(range, sigmas, min_half_width, coarse_tolerance, coarse_margin,
+                                           predicted ? d : (Floats)(0.0f), load_pixels(variance + row, x, width),
+                                           OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), min),
+                                           OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), max),
+                                           OF_BLOCKS(Ints, int8, here, NEXT_BLOCK(x, blocks.width), count));
     Bands all = bands_at(block_bands + row_of_blocks, x, blocks.width);
     all.origin = predicted ? own.origin : all.origin;
     all.chunks = predicted ? own.chunks : all.chunks;
@@ -235,11 +218,20 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
 #if ROW_GROUP == 1
     const Ints chunks = x + LANE_INDICES < width ? all.chunks : (Ints)(0);
     sums = with_offsets(sums, chunks, d, (global uchar*)(cell_offsets + row), x, width);
-  }
-  row_sums[(size_t)view * size.height + y] = row_sum_of(sums);
-#else
-  }
 #endif
+  }
+#if ROW_GROUP == 1
+  row_sums[(size_t)view * size.height + y] = row_sum_of(sums);
+#endif
+}
+
+KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, const float sigmas,
+                            const float min_half_width, global const float* disparity, global const float* variance,
+                            const float coarse_tolerance, const float coarse_margin, global const BlockRange* found,
+                            global const Band* block_bands, global Band* bands, global uint* cell_offsets,
+                            global RowSum* row_sums) {
+  bands_of_pixels_row(THIS_WORK_ITEM, size, range, sigmas, min_half_width, disparity, variance, coarse_tolerance,
+                      coarse_margin, found, block_bands, bands, cell_offsets, row_sums);
 }
 
 #if ROW_GROUP == 1
@@ -247,8 +239,9 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
 // Sums up each row of what was not banded pixel by pixel. A work-item a row and view.
 KERNEL void sum_rows(const ImageSize size, global const float* disparity, global const Band* bands,
                      global uint* cell_offsets, global RowSum* row_sums) {
+  const WorkItem at = THIS_WORK_ITEM;
   const int width = size.width;
-  const size_t row = (size_t)get_global_id(2) * size.height + get_global_id(1);
+  const size_t row = (size_t)at.view * size.height + at.y;
   Sums sums = {0, 0};
   FOR_PIXELS(x, width) {
     int chunks[PIXELS];

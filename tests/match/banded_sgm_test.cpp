@@ -118,6 +118,7 @@ Match match(const Case& c, int max_memory_mib = 0) {
   ocl::Buffer<cl_uchar> penalties(context, steps.size());
   penalties.write(context, {steps.begin(), steps.end()});
   const MatchInputs inputs{device_codes, penalties, bands};
+  if (c.reads_off) sgm.prepare_reading_off();
   c.reads_off ? sgm.reading_off(inputs, measured) : sgm(inputs, measured, Views::kBoth);
 
   m.parameters = {c.size.width,

@@ -110,7 +110,8 @@ class ProgramTest(unittest.TestCase):
     def assert_works(self, *arguments, **options):
         done = egosgm(*arguments, **options)
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertEqual(done.stderr, "")
+        told = [line for line in done.stderr.splitlines() if not line.startswith("egosgm: compiling the kernels for ")]  # where nothing is cached
+        self.assertEqual(told, [])
         return done.stdout
 
     def assert_refused(self, arguments, *named, code=2, **options):

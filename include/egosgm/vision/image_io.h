@@ -37,6 +37,9 @@ EGOSGM_EXPORT bool holds_8_bits_in_16(const cv::Mat& grey);
 /// Thread-safe.
 EGOSGM_EXPORT cv::Size read_image_size(const std::filesystem::path& file);
 
+/// What the header of a PNG or JPEG says of its grey values; kU8 of anything else. Throws IoError.
+EGOSGM_EXPORT PixelType read_pixel_type(const std::filesystem::path& file);
+
 /// Writes CV_8UC1, CV_8UC3 (BGR) or CV_16UC1, whole or not at all. Throws IoError, and InvalidArgument for another type
 /// or an empty image. Thread-safe for different files.
 EGOSGM_EXPORT void write_png(const std::filesystem::path& file, const cv::Mat& image);
