@@ -80,7 +80,7 @@ Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration&
       publish_(context, size, options) {
   if (!options.temporal) return;
   predict_.emplace(context, size, calibration, options, tuning);
-  fuse_.emplace(context, size, options, tuning);
+  fuse_.emplace(context, size, options);
 }
 
 void Method::prepare(PixelType type, const Wanted& wanted) {

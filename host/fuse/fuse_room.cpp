@@ -3,7 +3,7 @@
 
 namespace egosgm {
 
-FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning)
+FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : left_right_px_(options.consistency.update_px),
       outside_(outside_view(options.consistency)),
       kalman_update_(context, size, options.kalman_update),

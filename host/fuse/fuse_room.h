@@ -3,11 +3,11 @@
 
 #include "host/frame/plan.h"
 #include "host/fuse/kalman_update.h"
+#include "host/fuse/right_map.h"
 #include "host/fuse/sad_check.h"
 #include "host/match/consistency_check.h"
 #include "host/match/median_filter.h"
 #include "host/predict/predict_room.h"
-#include "host/fuse/right_map.h"
 
 namespace egosgm {
 
@@ -25,7 +25,7 @@ struct Fusion {
 /// Makes one map of prediction and measurement.
 class FuseRoom {
  public:
-  FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, const Tuning& tuning);
+  FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
 
   /// Builds what images of `type` need.
   void prepare(PixelType type);
