@@ -64,11 +64,11 @@ static inline Floats gather(volatile global const float* row, const Ints x) { re
 // what is compiled. Without a branch a lane: a row has few blocks.
 #define AT_EDGE static __attribute__((noinline, cold))
 AT_EDGE Floats load_pixels_at_edge(global const float* row, const int x, const int width) {
-  const Ints at = x + LANE_INDICES, inside = clamp(at, 0, width - 1);
+  const Ints at = x + LANE_INDICES, inside = clamp(at, (Ints)(0), (Ints)(width - 1));
   return at == inside ? GATHERED(Floats, row, inside) : INVALID;
 }
 AT_EDGE Ints load_bytes_at_edge(global const uchar* row, const int x, const int width) {
-  const Ints at = x + LANE_INDICES, inside = clamp(at, 0, width - 1);
+  const Ints at = x + LANE_INDICES, inside = clamp(at, (Ints)(0), (Ints)(width - 1));
   return at == inside ? GATHERED(Ints, row, inside) : (Ints)(0);
 }
 // `count` < 16 lanes, by powers of two.
