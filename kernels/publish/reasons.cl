@@ -23,7 +23,7 @@
 
 #if PIXELS > 1
 AT_EDGE Floats load_grey_values_at_edge(global const Pixel* row, const int x, const int width) {
-  const Ints inside = clamp(x + LANE_INDICES, 0, width - 1);
+  const Ints inside = clamp(x + LANE_INDICES, (Ints)(0), (Ints)(width - 1));
   return GATHERED(Floats, row, inside);
 }
 #endif
