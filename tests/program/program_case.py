@@ -73,6 +73,11 @@ def grey_png(width, height, depth=8):
     return png(width, height, depth, (bytes((x * 7 + y * 13 + x * y) % 256 for x in range(width * depth // 8)) for y in range(height)))
 
 
+def told(done):
+    """The lines on the standard error, but for that of a device whose driver has to compile."""
+    return [line for line in done.stderr.splitlines() if line and not line.startswith("egosgm: compiling the kernels for ")]
+
+
 class ProgramTest(unittest.TestCase):
     """A folder with a small synthetic sequence for each class, and a copy of it for each test that breaks it."""
 
@@ -110,14 +115,13 @@ class ProgramTest(unittest.TestCase):
     def assert_works(self, *arguments, **options):
         done = egosgm(*arguments, **options)
         self.assertEqual(done.returncode, 0, done.stderr)
-        told = [line for line in done.stderr.splitlines() if not line.startswith("egosgm: compiling the kernels for ")]  # where nothing is cached
-        self.assertEqual(told, [])
+        self.assertEqual(told(done), [])
         return done.stdout
 
     def assert_refused(self, arguments, *named, code=2, **options):
         """One line on the standard error that holds every text of `named`, and the exit code."""
         done = egosgm(*arguments, **options)
-        lines = [line for line in done.stderr.splitlines() if line]
+        lines = told(done)
         self.assertEqual(done.returncode, code, f"{arguments}: {done.stdout}{done.stderr}")
         self.assertEqual(len(lines), 1, done.stderr)
         self.assertTrue(lines[0].startswith("egosgm: error: "), lines[0])
