@@ -120,7 +120,7 @@ ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmPar
     const uint extent = extent_at(row->bands + place->k);
     place->wiped[3] = extent_at(row->bands + place->k + row->above_right);
     const uint steps = penalties_to(backward, &place->around, row->penalties + place->k, row->above_right);
-    if (goes_straight(q, extent, place->wiped, (int)((uint)origin_of(extent) - (uint)q.min_disparity))) {
+    if (goes_straight(q, extent, place->wiped)) {
       match_straight(meets, backward, q, row, extent, steps, place);
     } else {
       match_pixel(meets, backward, q, row, extent, steps, place);
@@ -194,6 +194,7 @@ ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const R
   }
 #if BLOCK_VECTORS == 2
   place.last_block = (Block)(ABSENT);
+  place.least_of_block = (Block)(0);
   if (from > 0 && is_block(place.wiped[0])) {
     place.last_block = load_block(row->slot[0] + (origin_of(place.wiped[0]) - q.min_disparity));
   }

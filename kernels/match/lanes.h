@@ -4,6 +4,7 @@
 #define EGOSGM_KERNELS_MATCH_LANES_H
 
 #include "block.h"
+#include "compiler.h"
 #include "shared.h"
 
 #define ABSENT 255
@@ -46,6 +47,24 @@ inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535)
 
 constant uchar16 kLane = (uchar16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 
+#ifdef LEAST_OF_WORDS
+inline ushort8 least_word(const ushort8 v) { return LEAST_OF_WORDS(v); }
+
+// The least lane of each vector, in all lanes.
+inline void minima(const uchar16* v, uchar16* least) {
+#pragma unroll
+  for (int n = 0; n < DIRECTIONS; ++n) {
+    const uchar16 of_pairs = min(v[n], as_uchar16(as_ushort8(v[n]) >> (ushort8)(8)));
+    least[n] = (uchar16)(as_uchar16(least_word(as_ushort8(of_pairs))).s0);
+  }
+}
+#else
+inline ushort8 least_word(ushort8 v) {
+  v = min(v, v.s45670123);
+  v = min(v, v.s23016745);
+  return min(v, v.s10325476);
+}
+
 // The least lane of each vector, in all lanes.
 inline void minima(const uchar16* v, uchar16* least) {
 #if PATHS == 8
@@ -67,6 +86,7 @@ inline void minima(const uchar16* v, uchar16* least) {
   least[1] = (uchar16)(of_two.s8);
 #endif
 }
+#endif
 
 // The same of vectors that hold two paths, a chunk of each.
 inline void minima_of_chunks(const uchar16* v, uchar16* least) {

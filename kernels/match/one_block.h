@@ -19,25 +19,26 @@ ALWAYS_INLINE void follow_block(const SgmParameters q, const Row* row, const uin
   for (int n = 0; n < DIRECTIONS; ++n) {
     const uint moved = n > 0 ? place->moved : -(uint)q.min_disparity;
     global const uchar* from = row->slot[n] + (moved + (uint)origin);
-    // What was just stored is not read again a lane off, which stalls.
+    // What was just stored is not read again a lane off, which stalls. Its minimum is still on it (see `FromLeft`).
     const bool beside = n == 0 && extent == place->wiped[0];
     const Block below = beside ? LANES_BELOW(place->last_block) : load_block(from - 1);
     const Block above = beside ? LANES_ABOVE(place->last_block) : load_block(from + 1);
     const Block same = beside ? place->last_block : load_block(from);
+    const Block before = beside ? place->least_of_block : (Block)(0);
     const Block other = saturated_sum(least_of(below, above), p1);
-    r[n] = saturated_sum(cost, least_of(least_of(same, other), (Block)((uchar)(steps >> 8 * n))));
+    const Block p2 = saturated_sum(before, (Block)((uchar)(steps >> 8 * n)));
+    r[n] = saturated_sum(cost, least_of(least_of(same, other), p2) - before);
     least[n] = LEAST_OF_VECTORS(r[n]);
-    if (!covers(extent, place->wiped[n])) {
-      wipe(row->slot[n] + (moved + (uint)origin_of(place->wiped[n])), place->wiped[n]);
-    }
+    wipe(row->slot[n] + (moved + (uint)origin_of(place->wiped[n])), place->wiped[n]);
   }
   minima(least, least);
+  place->last_block = r[0];
+  place->least_of_block = (Block)(least[0].s0);
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) {
     r[n] = (r[n] - (Block)(least[n].s0)) | absent;
     store_block(r[n], row->slot[n] + ((n > 0 ? place->moved : -(uint)q.min_disparity) + (uint)origin));
   }
-  place->last_block = r[0];
 }
 
 // The winner of a block with its neighbourhood; and offers the pixel to the right ones.

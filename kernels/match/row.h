@@ -33,7 +33,7 @@ typedef struct {
   uint wiped[4];  // the extents of those before it on the four paths
   uchar16 last;   // the path costs of the one to the left, where its band is narrow
 #if BLOCK_VECTORS == 2
-  Block last_block;  // the same where it takes a block
+  Block last_block, least_of_block;  // the same where it takes a block, and what is still to be taken off
 #endif
   uint moved;     // how far the slots have moved on, less the least disparity
 } Place;

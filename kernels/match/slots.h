@@ -14,11 +14,12 @@ inline bool is_narrow(const uint extent) { return extent < 3u << 16; }
 inline bool is_block(const uint extent) { return extent >> 16 == BLOCK / EGOSGM_LANES; }
 inline bool is_chunk(const uint extent) { return extent < 2u << 16; }
 
-// Makes what a predecessor with `extent` left in a slot absent, `at` being its first disparity's place.
+// Makes what a predecessor with `extent` left in a slot absent, `at` being its first disparity's place. More may be
+// wiped: all else is absent.
 inline void wipe(global uchar* at, const uint extent) {
-  store((uchar16)(ABSENT), at);
-  if (!is_narrow(extent)) {
-    for (int v = 1; v < chunks_of(extent) / 2; ++v) store((uchar16)(ABSENT), at + VECTOR * v);
+  store_block((Block)(ABSENT), at);
+  if (chunks_of(extent) > BLOCK / EGOSGM_LANES) {
+    for (int v = BLOCK_VECTORS; v < chunks_of(extent) / 2; ++v) store((uchar16)(ABSENT), at + VECTOR * v);
   }
 }
 

@@ -11,13 +11,13 @@
 #define PATH_PAIRS (DIRECTIONS / 2)
 
 // Whether a pixel has one chunk, all of it in the disparity range, as the one to its left, and those above it fit a
-// vector, as most pixels in bands. Then the path from the left stays in its place and in a register.
-inline bool goes_straight(const SgmParameters q, const uint extent, const uint* before, const int lane) {
+// vector, as most pixels in bands. Then the path from the left stays in a register.
+inline bool goes_straight(const SgmParameters q, const uint extent, const uint* before) {
   if (!is_chunk(extent)) return false;
 #if PARTIAL_CHUNKS
-  if (lane + EGOSGM_LANES > q.disparities) return false;
+  if ((int)((uint)origin_of(extent) - (uint)q.min_disparity) + EGOSGM_LANES > q.disparities) return false;
 #endif
-  bool fit = extent == before[0];
+  bool fit = is_chunk(before[0]);
 #pragma unroll
   for (int n = 1; n < DIRECTIONS; ++n) fit &= is_narrow(before[n]);
   return fit;
@@ -46,10 +46,40 @@ typedef struct {
 
 inline uchar8 path_costs_of(const FromLeft left) { return left.t.lo - left.least.lo; }
 
+// A chunk as it lies at a pixel's own disparities, and at those one below and one above. The upper halves are not used.
+typedef struct {
+  ulong2 same, below, above;
+} Before;
+
+// A chunk so many lanes further up.
+inline ulong2 moved(const ulong2 chunk, const int lanes) {
+  const ulong2 left = ~chunk;  // of what is absent, nothing
+  const ulong2 up = lanes < EGOSGM_LANES ? left >> (ulong2)((ulong)(8 * lanes)) : (ulong2)(0),
+               down = lanes > -EGOSGM_LANES ? left << (ulong2)((ulong)(-8 * lanes)) : (ulong2)(0);
+  return ~(lanes >= 0 ? up : down);
+}
+
+// `lanes`: how far the pixel's origin lies above that of the one before.
+inline Before before_at(const uchar16 t, const int lanes) {
+  const ulong2 chunk = as_ulong2(t);
+  const Before before = {moved(chunk, lanes), moved(chunk, lanes - 1), moved(chunk, lanes + 1)};
+  return before;
+}
+
+// The same of an origin as before.
+inline Before straight_before(const uchar16 t) {
+  const ulong2 chunk = as_ulong2(t);
+  const Before before = {chunk, chunk << (ulong2)(8) | (ulong2)(ABSENT),
+                         chunk >> (ulong2)(8) | (ulong2)((ulong)ABSENT << 56)};
+  return before;
+}
+
+inline uchar16 in_lower_lanes(const ushort8 v) { return (uchar16)(as_uchar16(v).s00000000, (uchar8)(0)); }
+
 // The path costs of a pixel that goes straight, but for those from the left left in the slots in place of those before
 // it, and half of their sum.
 ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, const uchar16 p1, const Places* to,
-                                  const uint along, FromLeft* left) {
+                                  const uint along, const Before before, FromLeft* left) {
   const uchar16 cost = (uchar16)(chunk_cost, chunk_cost);
   const uchar4 p2 = as_uchar4(steps);
 #if PATHS == 8
@@ -59,11 +89,9 @@ ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, con
 #endif
   uchar16 t[PATH_PAIRS], least[PATH_PAIRS];
   global const uchar* upper = to->at[PATH_PAIRS] + along;
-  const ulong2 before = as_ulong2(left->t);
-  const uchar16 beside = add_sat(min(load_upper(before << (ulong2)(8) | (ulong2)(ABSENT), upper - 1),
-                                     load_upper(before >> (ulong2)(8) | (ulong2)((ulong)ABSENT << 56), upper + 1)),
-                                 p1);
-  t[0] = add_sat(cost, min(min(load_upper(before, upper), beside), add_sat(left->least, p2_of[0])) - left->least);
+  const uchar16 beside = add_sat(min(load_upper(before.below, upper - 1), load_upper(before.above, upper + 1)), p1);
+  // No sum of a cost and P2 is above 255, and nothing lies below the minimum.
+  t[0] = min(min(load_upper(before.same, upper), beside), add_sat(left->least, p2_of[0])) + (cost - left->least);
 #if PATHS == 8
   t[1] = path_cost(cost, load_pair(to, 1, along, 0), load_pair(to, 1, along, -1), load_pair(to, 1, along, 1), p1,
                    p2_of[1]);
@@ -72,7 +100,7 @@ ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, con
   for (int n = 1; n < DIRECTIONS; ++n) store((uchar16)(ABSENT), to->wiped_at[n] + along);
   minima_of_chunks(t, least);
   left->t = t[0];
-  left->least = (uchar16)(least[0].lo, (uchar8)(0));
+  left->least = in_lower_lanes(least_word(convert_ushort8(t[0].lo)));
 #pragma unroll
   for (int n = 0; n < PATH_PAIRS; ++n) {
     t[n] -= least[n];
@@ -134,16 +162,23 @@ ALWAYS_INLINE void leave_chunk(const bool meets, const SgmParameters q, const Ro
   candidate->disparity = origin + (rank & 15);
 }
 
+inline Seen seen_of(const Row* row, const Place* place, const int origin) {
+  return seen_from(row->seen ? row->seen + place->k - origin - (EGOSGM_LANES - 1) : 0);
+}
+
 // Matches a pixel that goes straight and those after it, as long as they do. `steps`: the penalties to it.
 ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const SgmParameters q, const Row* row,
-                                  const uint extent, uint steps, Place* place) {
-  const int origin = origin_of(extent);
+                                  uint extent, uint steps, Place* place) {
+  int origin = origin_of(extent);
+  const int turn = origin - origin_of(place->wiped[0]);
   const uint lane = (uint)origin - (uint)q.min_disparity, moved_lane = place->moved + (uint)origin;
   Places to;
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) to.at[n] = row->slot[n] + (n > 0 ? moved_lane : lane);
-  Seen seen = seen_from(row->seen ? row->seen + place->k - origin - (EGOSGM_LANES - 1) : 0);
+  store_chunk((uchar8)(ABSENT), to.at[0] - turn);
+  Seen seen = seen_of(row, place, origin);
   FromLeft left = {place->last, (uchar16)(0)};
+  Before before = before_at(left.t, turn);
   uint along = 0;
   while (true) {
 #pragma unroll
@@ -151,16 +186,32 @@ ALWAYS_INLINE void match_straight(const bool meets, const bool backward, const S
       to.wiped_at[n] = row->slot[n] + (place->moved + (uint)origin_of(place->wiped[n]));
     if (backward) place->cells -= EGOSGM_LANES;
     const uchar8 cost = matching_cost_of_chunk(place->own, place->other + origin, row->row_above, row->row_below);
-    const uchar8 sum = follow_chunk(cost, steps, row->p1, &to, along, &left);
+    const uchar8 sum = follow_chunk(cost, steps, row->p1, &to, along, before, &left);
     leave_chunk(meets, q, row, place, origin, cost, sum, &seen);
     go_on(meets, row, place);
+    place->wiped[0] = extent;
     if (!backward) place->cells += EGOSGM_LANES;
     along += SLOT;
-    if (place->k == row->end || extent_at(row->bands + place->k) != extent) break;
+    if (place->k == row->end) break;
+    const uint next = extent_at(row->bands + place->k);
     place->wiped[3] = extent_at(row->bands + place->k + row->above_right);
-    if (!goes_straight(q, extent, place->wiped, (int)lane)) break;
+    if (!goes_straight(q, next, place->wiped)) break;
     steps = penalties_to(backward, &place->around, row->penalties + place->k, row->above_right);
-    move_seen(backward, &seen);
+    if (next == extent) {
+      before = straight_before(left.t);
+      move_seen(backward, &seen);
+    } else {
+      const int lanes = origin_of(next) - origin;
+      left.t = (uchar16)(path_costs_of(left), (uchar8)(0));
+      left.least = (uchar16)(0);
+      before = before_at(left.t, lanes);
+#pragma unroll
+      for (int n = 0; n < DIRECTIONS; ++n) to.at[n] += lanes;
+      extent = next;
+      origin += lanes;
+      leave_seen(&seen);
+      seen = seen_of(row, place, origin);
+    }
   }
   leave_seen(&seen);
   const uchar8 last = path_costs_of(left);
