@@ -19,10 +19,11 @@ constexpr int kBlockVectors = 2;
 
 constexpr int kViews = 2;
 
-std::size_t slot_bytes(shared::ImageSize size, int chunks, int views) {
+std::size_t slot_bytes(shared::ImageSize size, int chunks, int paths, int views) {
   const int vectors = (chunks + 1) / 2;
   const std::size_t slot = static_cast<std::size_t>(vectors + kBlockVectors * 2) * 2 * EGOSGM_LANES;
-  return static_cast<std::size_t>(views) * 2 * 3 * (static_cast<std::size_t>(size.width) + size.height) * slot;
+  const std::size_t slots = (paths / 2 - 1) * (static_cast<std::size_t>(size.width) + size.height);
+  return static_cast<std::size_t>(views) * 2 * slots * slot;
 }
 
 /// A byte a cell; before them a row that is nobody's (see `sweep_tile`), and behind a chunk, as two are read at once.
@@ -56,10 +57,14 @@ bool has_few_units(const ocl::Context& context, int views) {
   return context.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>() <= static_cast<cl_uint>(2 * views);
 }
 
-/// How many views wavefronts match at once.
-int views_at_once(const ocl::Context& context, BandedSgm::Launches launches) {
-  const bool is_automatic = launches == BandedSgm::Launches::kAutomatic;
-  return (is_automatic ? has_few_units(context, 1) : launches == BandedSgm::Launches::kSweepsOfAView) ? 1 : kViews;
+/// Sums of a view that are worth to be kept once in place of twice, for two launches more.
+constexpr std::size_t kSparedBytes = std::size_t{16} << 20;
+
+/// How many views wavefronts match at once. `bytes`: the sums of one.
+int views_at_once(const ocl::Context& context, BandedSgm::Launches launches, std::size_t bytes) {
+  const bool spares = launches == BandedSgm::Launches::kAutomatic ? has_few_units(context, 1) && bytes >= kSparedBytes
+                                                                  : launches == BandedSgm::Launches::kSweepsOfAView;
+  return spares ? 1 : kViews;
 }
 
 /// What a match takes on the device.
@@ -68,13 +73,15 @@ struct Demand {
 };
 
 /// Of both views at once, whatever the device has of compute units: stripes, and with them bits, do not depend on that.
-Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, int chunks,
-              bool paths) {
-  const std::uint64_t sums = paths ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, chunks, kViews);
+Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+              const BandedSgmOptions& options, int chunks) {
+  const bool follows = BandedSgm::follows_paths(context, options.scheduling);
+  const std::uint64_t sums =
+      follows ? BandedSgmPaths::sum_bytes(context, size, range) : sum_bytes(size, chunks, kViews);
   const std::uint64_t ranks = ReadOff::bytes(size, BandedSgm::code_padding(range));
-  if (paths) return {sums, 4 * sums + ranks};
-  const std::uint64_t slots = slot_bytes(size, chunks, kViews), winners = kViews * pixel_count(size) * sizeof(cl_ulong);
-  return {std::max({sums, slots, winners}), sums + slots + winners + ranks};
+  if (follows) return {sums, 4 * sums + ranks};
+  const std::uint64_t slots = slot_bytes(size, chunks, options.paths, kViews);
+  return {std::max(sums, slots), sums + slots + ranks};
 }
 
 std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCost cost, BandedSgm::Tile tile) {
@@ -84,14 +91,13 @@ std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCo
 /// How many rows can be matched at once. A quarter of the memory is left to all else.
 int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                  const BandedSgmOptions& options, BandedSgm::Tile tile) {
-  const bool paths = BandedSgm::follows_paths(context, options.scheduling);
   const int chunks = chunks_of(range, tile);
   const std::uint64_t memory = context.device().getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>() / 4 * 3;
   const std::uint64_t device_limit = memory - std::min(memory, context.allocated_bytes());
   const std::uint64_t chosen = static_cast<std::uint64_t>(options.max_memory_mib) << 20;
   const std::uint64_t total_limit = chosen > 0 ? std::min(chosen, device_limit) : device_limit;
   const auto fits = [&](int rows, std::uint64_t copies) {
-    const Demand needs = demand(context, {size.width, rows}, range, chunks, paths);
+    const Demand needs = demand(context, {size.width, rows}, range, options, chunks);
     return needs.largest_buffer <= context.max_allocation_bytes() && needs.total + copies <= total_limit;
   };
   if (fits(size.height, 0)) return size.height;
@@ -100,7 +106,7 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
   while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
   const int least = 3 * BandedSgm::kStripeOverlap;
   if (rows >= least) return rows;
-  const std::uint64_t needed = demand(context, {size.width, std::min(size.height, least)}, range, chunks, paths).total;
+  const std::uint64_t needed = demand(context, {size.width, std::min(size.height, least)}, range, options, chunks).total;
   throw DeviceError(
       CL_MEM_OBJECT_ALLOCATION_FAILURE,
       "BandedSgm: a stripe of " + std::to_string(std::min(size.height, least)) + " rows needs " +
@@ -117,12 +123,10 @@ BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, s
                                 const BandedSgmOptions& options, Tile chosen, int at_once)
     : tile(chosen),
       views(at_once),
-      slots(context, slot_bytes(size, chunks_of(range, tile), views)),
+      slots(context, slot_bytes(size, chunks_of(range, tile), options.paths, views)),
       sums(context, sum_bytes(size, chunks_of(range, tile), views)),
-      winners(context, ocl::Scratch::kOfStage0, views * pixel_count(size)),
       to_middle(build(context, range, options, tile), "sweep_to_middle"),
-      from_middle(build(context, range, options, tile), "sweep_from_middle"),
-      refine(build(context, range, options, tile), "refine") {}
+      from_middle(build(context, range, options, tile), "sweep_from_middle") {}
 
 BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                      const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group)
@@ -153,7 +157,8 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
     paths_.emplace(context, size_, range, options,
                    group ? *group : BandedSgmPaths::default_group(context, range, options.cost));
   } else {
-    wavefront_.emplace(context, size_, range, options, tile, views_at_once(context, launches));
+    wavefront_.emplace(context, size_, range, options, tile,
+                       views_at_once(context, launches, sum_bytes(size_, chunks_of(range, tile), 1)));
   }
   if (stripes_.size() > 1) {
     stripe_memory_.emplace(context, size, range, size_.height, code_words_a_row(size.width, range, options.cost, tile));
@@ -219,10 +224,8 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
                           inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
-                          wavefront.sums, wavefront.winners, ranks());
+                          wavefront.sums, ranks(), measured.disparity, measured.variance, measured.doubtful);
   }
-  wavefront.refine(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), views), parameters,
-                   wavefront.winners, measured.disparity, measured.variance, measured.doubtful);
 }
 
 bool BandedSgm::follows_paths(const ocl::Context& context, Scheduling scheduling) {

@@ -73,8 +73,7 @@ class BandedSgm {
   using FromMiddle = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
                                  const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>,
                                  const ocl::Buffer<shared::RowSum>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>,
-                                 const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_ulong>, ocl::Buffer<cl_uint>>;
-  using Refine = ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_ulong>, Map, Map, FlagMap>;
+                                 const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>, Map, Map, FlagMap>;
 
  private:
   struct Wavefront {
@@ -85,10 +84,8 @@ class BandedSgm {
     int views;                    // at once
     ocl::Buffer<cl_uchar> slots;  // path costs under way, one row of disparities a path, sweep and view
     ocl::Buffer<cl_uchar> sums;   // of the sweep that comes first, 8 bits a cell
-    ocl::Buffer<cl_ulong> winners;
     ToMiddle to_middle;
     FromMiddle from_middle;
-    Refine refine;
   };
 
   void match_stripes(const MatchInputs& image, Measurement& measured, Views views, bool reads_off);

@@ -128,56 +128,74 @@ ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmPar
   }
 }
 
-// The row y of a sweep, from its pixel `from` to `to`. `view`: of those that are matched. To the pixels before one on
-// the four paths it is `left`, `above` and so on; where there is none, to one whose band and penalty do no harm: wiping
-// some place in the slot, and a step from nowhere.
-ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParameters q,
-                                                 const int view, const int y, const int from, const int to,
-                                                 global const Band* bands, global const uchar* penalties,
-                                                 global uchar* slots, global uint* ranks) {
+// What the sweeps read and write, from the first view that is matched on.
+typedef struct {
+  global const uint* codes;  // of both views
+  global const Band* bands;
+  global const uint* offsets;  // where a row's cells begin
+  global const RowSum* row_sums;
+  global const uchar* penalties;
+  global uchar *slots, *sums;
+  global uint* ranks;  // of the right pixels, if they are kept
+  global float *disparities, *variances;
+  global uchar* doubtful;
+} Maps;
+
+// A sweep of a view. In `backward` ones, x and y count from the lower right corner.
+typedef struct {
+  int view;  // of those that are matched
+  Maps maps;
+} Sweep;
+
+// The row y of a sweep, from its pixel `from` to `to`. To the pixels before one on the four paths it is `left`, `above`
+// and so on; where there is none, to one whose band and penalty do no harm: wiping some place in the slot, and a step
+// from nowhere.
+ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParameters q, const Sweep* sweep, const int y,
+                         const int from, const int to) {
   const int width = q.width, height = q.height, step = backward ? -1 : 1;
   const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
-  const size_t first = (size_t)view * width * height + (size_t)image_y * width + image_x;
+  const size_t first = (size_t)sweep->view * width * height + (size_t)image_y * width + image_x;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
+  global uchar* slots = sweep->maps.slots;
   Row row;
-  row.bands = bands + first;
-  row.penalties = (global const uint*)penalties + first;
+  row.bands = sweep->maps.bands + first;
+  row.penalties = (global const uint*)sweep->maps.penalties + first;
   row.slot[0] = slots + (size_t)y * SLOT;
   row.slot[1] = slots + (size_t)(height + from) * SLOT;
+#if PATHS == 8
   row.slot[2] = slots + ((long)2 * height + width - y + from) * SLOT;
   row.slot[3] = slots + (size_t)(2 * height + 2 * width + y + from) * SLOT;
-  row.seen = meets && q.reads_off ? ranks + (size_t)image_y * code_stride + q.padding + image_x : 0;
+#endif
+  row.seen = meets && q.reads_off ? sweep->maps.ranks + (size_t)image_y * code_stride + q.padding + image_x : 0;
   row.row_above = image_y > 0 ? -(long)code_stride : 0;
   row.row_below = image_y + 1 < height ? (long)code_stride : 0;
   row.above_right = y > 0 ? step - step * (long)width : 0;
   row.end = step * (long)(to - from);
   row.step = step;
-  row.code_step = q.first_view + view == EGOSGM_LEFT ? step : -step;
+  row.code_step = q.first_view + sweep->view == EGOSGM_LEFT ? step : -step;
   row.p1 = (uchar16)((uchar)q.p1);
   return row;
 }
 
 // The first pixel of a row.
-ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const Row* row,
-                                                     const int view, const int y, const int from, const int to,
-                                                     global const uint* all_codes, global const uint* offsets,
-                                                     global uchar* sums, Candidate* candidates) {
+ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const Sweep* sweep, const Row* row,
+                             const int y, const int from, const int to, Candidate* candidates) {
   const int width = q.width, height = q.height;
   const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
-  const size_t row_start = (size_t)view * width * height + (size_t)image_y * width;
+  const size_t row_start = (size_t)sweep->view * width * height + (size_t)image_y * width;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
-  const int image = q.first_view + view;
+  const int image = q.first_view + sweep->view;
   const int along = image == EGOSGM_LEFT ? image_x : width - 1 - image_x;
   const long above = y > 0 ? -row->step * (long)width : 0, left = from > 0 ? -row->step : 0;
-  global const Code* codes = (global const Code*)all_codes + q.padding;
+  global const Code* codes = (global const Code*)sweep->maps.codes + q.padding;
   // The sums move along with the pixel; a backward sweep comes from their end. Where offsets and bands do not belong
   // together, after a kernel that failed, it stays within the sums, which begin with a row that is nobody's.
-  const int cells_of_row = width * MAX_CHUNKS, offset = (int)offsets[row_start + image_x];
+  const int cells_of_row = width * MAX_CHUNKS, offset = (int)sweep->maps.offsets[row_start + image_x];
   const int first_cell = backward ? clamp(offset + chunks_of(extent_at(row->bands)), 0, cells_of_row)
                                   : clamp(offset, 0, cells_of_row - (to - from) * MAX_CHUNKS);
   Place place;
   place.k = 0;
-  place.cells = sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
+  place.cells = sweep->maps.sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
   place.own = codes + ((size_t)image * height + image_y) * code_stride + along;
   place.other = codes + ((size_t)(1 - image) * height + image_y) * code_stride + (width - 1 - along);
   place.candidate = candidates;
@@ -203,28 +221,42 @@ ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const R
   return place;
 }
 
-// Both flags are constants wherever it is called: each direction has code of its own, whose steps need no registers.
-ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmParameters q,
-                                                      const int tile_x, const int first_y, const int end_y,
-                                                      const int view, global const uint* all_codes,
-                                                      global const Band* bands, global const uint* offsets,
-                                                      global const uchar* penalties, global uchar* slots,
-                                                      global uchar* sums, global ulong* winners, global uint* ranks) {
-  const int width = q.width, height = q.height;
-  slots += (size_t)(2 * view + backward) * 3 * (width + height) * SLOT + SLOT_PADDING;
+// Leaves the winners of `count` pixels of a row, from the first one in the image on: disparity with its sub-pixel part,
+// by a symmetric V through the winner and its neighbours, the matching variance (options.h), and whether the disparity
+// is doubtful.
+COMPILED_ONCE void leave_winners(const bool backward, const SgmParameters q, const Candidate* candidates,
+                                 const int count, global float* disparities, global float* variances,
+                                 global uchar* doubtful) {
+  ulong winners[TILE_WIDTH + PIXELS];
+  for (int i = 0; i < count; ++i) winners[backward ? count - 1 - i : i] = winner_of(q, &candidates[i]);
+  for (int x = 0; x < count; x += PIXELS) {
+    const Winners winner = load_winners(winners + x);
+    const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
+    const Ints steps = FIELD(winner, 48);
+    store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities, x, count);
+    const Ints is_doubtful = falls_on(q, rise_before, rise_after);
+    store_pixels(matching_variance(q, steps, is_doubtful), variances, x, count);
+    store_bytes(is_doubtful & (Ints)(1), doubtful, x, count);
+  }
+}
 
+// Both flags are constants wherever it is called: each direction has code of its own, whose steps need no registers.
+ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmParameters q, const Sweep* sweep,
+                              const int tile_x, const int first_y, const int end_y) {
+  const Maps* maps = &sweep->maps;
   Candidate candidates[TILE_WIDTH];
   for (int y = first_y; y < end_y; ++y) {
     const int skew = y - first_y;
-    const int from = max(0, tile_x * TILE_WIDTH - skew), to = min(width, (tile_x + 1) * TILE_WIDTH - skew);
+    const int from = max(0, tile_x * TILE_WIDTH - skew), to = min(q.width, (tile_x + 1) * TILE_WIDTH - skew);
     if (from >= to) continue;
-    const Row row = row_at(meets, backward, q, view, y, from, to, bands, penalties, slots, ranks);
-    Place place = place_in(backward, q, &row, view, y, from, to, all_codes, offsets, sums, candidates);
+    const Row row = row_at(meets, backward, q, sweep, y, from, to);
+    Place place = place_in(backward, q, sweep, &row, y, from, to, candidates);
     sweep_row(meets, backward, q, &row, &place);
     // Apart from the sweep, whose pixels wait for each other: these do not.
     if (meets) {
-      global ulong* of_row = winners + (row.bands - bands);
-      for (int i = 0; i < to - from; ++i) of_row[row.step * i] = winner_of(q, &candidates[i]);
+      const size_t at = row.bands - maps->bands - (backward ? to - from - 1 : 0);
+      leave_winners(backward, q, candidates, to - from, maps->disparities + at, maps->variances + at,
+                    maps->doubtful + at);
     }
   }
 }
@@ -234,7 +266,7 @@ ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmPa
 #define CELLS_A_PIXEL 16
 inline int rows_to_middle(const SgmParameters q, const int view, const int wave, global const RowSum* row_sums) {
   if (wave != EGOSGM_ALL_TILES) return q.height - q.height / 2;
-  global const RowSum* rows = row_sums + (size_t)(q.first_view + view) * q.height;
+  global const RowSum* rows = row_sums + (size_t)view * q.height;
   const ulong a_row = (ulong)q.width * CELLS_A_PIXEL;
   ulong all = a_row * q.height;
   for (int y = 0; y < q.height; ++y) all += rows[y].cells;
@@ -245,17 +277,10 @@ inline int rows_to_middle(const SgmParameters q, const int view, const int wave,
 }
 
 // The tile of a wave in a row of tiles, or all tiles of a view and direction.
-ALWAYS_INLINE void sweep(const bool meets, const SgmParameters q, const int middle,
-                                                 const int first_row, const int view, const bool backward,
-                                                 const int wave, const int tile_columns, global const uint* all_codes,
-                                                 global const Band* bands, global const uint* offsets,
-                                                 global const uchar* penalties, global uchar* slots, global uchar* sums,
-                                                 global ulong* winners, global uint* ranks) {
-  const size_t not_matched = (size_t)q.first_view * q.width * q.height;
-  bands += not_matched;
-  offsets += not_matched;
-  penalties += 4 * not_matched;
+ALWAYS_INLINE void sweep_tiles(const bool meets, const bool backward, const SgmParameters q, const Sweep* sweep,
+                               const int first_row, const int wave, const int tile_columns) {
   const bool all = wave == EGOSGM_ALL_TILES;
+  const int middle = rows_to_middle(q, sweep->view, wave, sweep->maps.row_sums);
   const int own_rows = backward ? q.height - middle : middle;
   const int first_y = meets ? own_rows : 0;
   const int end_y = meets ? q.height : own_rows;
@@ -265,69 +290,54 @@ ALWAYS_INLINE void sweep(const bool meets, const SgmParameters q, const int midd
     const int first = all ? 0 : max(tile_of_wave, 0), end = all ? tile_columns : min(tile_of_wave + 1, tile_columns);
     const int y = first_y + tile_y * TILE_HEIGHT;
     for (int tile_x = first; tile_x < end; ++tile_x) {
-      if (backward) {
-        sweep_tile(meets, true, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
-                   slots, sums, winners, ranks);
-      } else {
-        sweep_tile(meets, false, q, tile_x, y, min(y + TILE_HEIGHT, end_y), view, all_codes, bands, offsets, penalties,
-                   slots, sums, winners, ranks);
-      }
+      sweep_tile(meets, backward, q, sweep, tile_x, y, min(y + TILE_HEIGHT, end_y));
     }
   }
 }
 
-WITH_BIT_COUNT void to_middle(const SgmParameters q, const int middle, const int first_row, const int view, const bool backward,
-                              const int wave, const int tile_columns, global const uint* all_codes,
-                              global const Band* bands, global const uint* offsets, global const uchar* penalties,
-                              global uchar* slots, global uchar* sums) {
-  sweep(false, q, middle, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums, 0,
-        0);
-}
-
-WITH_BIT_COUNT void from_middle(const SgmParameters q, const int middle, const int first_row, const int view, const bool backward,
-                                const int wave, const int tile_columns, global const uint* all_codes,
-                                global const Band* bands, global const uint* offsets, global const uchar* penalties,
-                                global uchar* slots, global uchar* sums, global ulong* winners, global uint* ranks) {
-  sweep(true, q, middle, first_row, view, backward, wave, tile_columns, all_codes, bands, offsets, penalties, slots, sums,
-        winners, ranks);
-}
-
-// Both sweeps to the middle of the image, where they leave their sums.
-KERNEL void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* all_codes,
-                            global const Band* bands, global const uint* offsets, global const RowSum* row_sums,
-                            global const uchar* penalties, global uchar* slots, global uchar* sums) {
-  to_middle(q, rows_to_middle(q, get_global_id(1), wave, row_sums), get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands, offsets,
-            penalties, slots, sums);
-}
-
-// Both on from there, over the sums of the other one, to the winners.
-KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int tile_columns,
-                              global const uint* all_codes, global const Band* bands, global const uint* offsets,
-                              global const RowSum* row_sums, global const uchar* penalties, global uchar* slots,
-                              global const uchar* sums, global ulong* winners, global uint* ranks) {
-  from_middle(q, rows_to_middle(q, get_global_id(1), wave, row_sums), get_global_id(0), get_global_id(1), get_global_id(2) > 0, wave, tile_columns, all_codes, bands,
-              offsets, penalties, slots, (global uchar*)sums, winners, ranks);
-}
-
-// Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, the matching variance
-// (options.h), and whether the disparity is doubtful.
-COMPILED_ONCE void refine_row(const WorkItem at, const SgmParameters q, global const ulong* winners,
-                              global float* disparities, global float* variances, global uchar* doubtful) {
-  const int width = q.width;
-  const size_t row = ((size_t)at.view * q.height + at.y) * q.width;
-  const size_t image_row = (size_t)q.first_view * q.width * q.height + row;
-  FOR_PIXELS(x, width) {
-    const Winners winner = load_winners(winners + row, x, width);
-    const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
-    const Ints steps = FIELD(winner, 48);
-    store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities + image_row, x, width);
-    const Ints is_doubtful = falls_on(q, rise_before, rise_after);
-    store_pixels(matching_variance(q, steps, is_doubtful), variances + image_row, x, width);
-    store_bytes(is_doubtful & (Ints)(1), doubtful + image_row, x, width);
+ALWAYS_INLINE void sweep(const bool meets, const bool backward, const SgmParameters q, Maps maps, const int view,
+                         const int first_row, const int wave, const int tile_columns) {
+  const size_t not_matched = (size_t)q.first_view * q.width * q.height;
+  maps.bands += not_matched;
+  maps.offsets += not_matched;
+  maps.penalties += 4 * not_matched;
+  maps.disparities += not_matched;
+  maps.variances += not_matched;
+  maps.doubtful += not_matched;
+  maps.row_sums += (size_t)q.first_view * q.height;
+  maps.slots += (size_t)(2 * view + backward) * SLOTS_OF(q) * SLOT + SLOT_PADDING;
+  const Sweep of_view = {view, maps};
+  if (backward) {
+    sweep_tiles(meets, true, q, &of_view, first_row, wave, tile_columns);
+  } else {
+    sweep_tiles(meets, false, q, &of_view, first_row, wave, tile_columns);
   }
 }
 
-KERNEL void refine(const SgmParameters q, global const ulong* winners, global float* disparities,
-                   global float* variances, global uchar* doubtful) {
-  refine_row(THIS_WORK_ITEM, q, winners, disparities, variances, doubtful);
+WITH_BIT_COUNT void to_middle(const bool backward, const SgmParameters q, const Maps maps, const int view,
+                              const int first_row, const int wave, const int tile_columns) {
+  sweep(false, backward, q, maps, view, first_row, wave, tile_columns);
+}
+
+WITH_BIT_COUNT void from_middle(const bool backward, const SgmParameters q, const Maps maps, const int view,
+                                const int first_row, const int wave, const int tile_columns) {
+  sweep(true, backward, q, maps, view, first_row, wave, tile_columns);
+}
+
+// Both sweeps to the middle of the image, where they leave their sums.
+KERNEL void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* codes,
+                            global const Band* bands, global const uint* offsets, global const RowSum* row_sums,
+                            global const uchar* penalties, global uchar* slots, global uchar* sums) {
+  const Maps maps = {codes, bands, offsets, row_sums, penalties, slots, sums, 0, 0, 0, 0};
+  to_middle(get_global_id(2) > 0, q, maps, get_global_id(1), get_global_id(0), wave, tile_columns);
+}
+
+// Both on from there, over the sums of the other one, to the winners.
+KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* codes,
+                              global const Band* bands, global const uint* offsets, global const RowSum* row_sums,
+                              global const uchar* penalties, global uchar* slots, global const uchar* sums,
+                              global uint* ranks, global float* disparities, global float* variances,
+                              global uchar* doubtful) {
+  const Maps maps = {codes, bands, offsets, row_sums, penalties, slots, (global uchar*)sums, ranks, disparities, variances, doubtful};
+  from_middle(get_global_id(2) > 0, q, maps, get_global_id(1), get_global_id(0), wave, tile_columns);
 }

@@ -15,6 +15,7 @@
 #define SLOT_PADDING 32  // the larger block: one is read and left where a vector ends
 #define SLOT (MAX_VECTORS * VECTOR + 2 * SLOT_PADDING)
 #define DIRECTIONS (PATHS / 2)
+#define SLOTS_OF(q) ((size_t)(DIRECTIONS - 1) * ((q).width + (q).height))  // of a sweep
 #define MAX_STEPS 8
 
 // vload16 and vstore16 go byte by byte on some compilers (PoCL 3.1); a packed struct is a plain unaligned access on

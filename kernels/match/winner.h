@@ -43,7 +43,7 @@ inline void put_window(const ushort* totals, const int winner_total, Candidate* 
   candidate->rank = winner_total << 4;
 }
 
-// What `refine` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one is
+// What `leave_winners` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one is
 // missing), steps; 16 bits each.
 inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
   const int here = candidate->rank >> 4;
@@ -101,14 +101,11 @@ typedef ulong16 Winners;
 #define FIELD(winners, bit) convert_int16(as_long16((winners) << (48 - (bit))) >> 48)
 #endif
 
-inline Winners load_winners(global const ulong* row, const int x, const int width) {
+inline Winners load_winners(const ulong* from) {
 #if PIXELS == 1
-  return row[x];
+  return from[0];
 #else
-  if (x + PIXELS <= width) return vload16(0, row + x);
-  ulong lanes[PIXELS];
-  for (int i = 0; i < PIXELS; ++i) lanes[i] = row[min(x + i, width - 1)];
-  return vload16(0, lanes);
+  return vload16(0, from);
 #endif
 }
 
