@@ -67,8 +67,8 @@
 #include "wide.h"
 
 // A pixel with more than one vector, as wide.h takes it.
-ALWAYS_INLINE void match_wide(const bool meets, const SgmParameters q, const Row* row,
-                                                      const uint extent, const uint steps, const Place* place) {
+ALWAYS_INLINE void match_wide(const bool meets, const SgmParameters q, const Row* row, const uint extent,
+                              const uint steps, const Place* place) {
   const int origin = origin_of(extent);
   Pixel pixel;
 #pragma unroll
@@ -95,9 +95,8 @@ ALWAYS_INLINE void match_wide(const bool meets, const SgmParameters q, const Row
 }
 
 // Matches the next pixel that does not go straight, and goes on to the one after it.
-ALWAYS_INLINE void match_pixel(const bool meets, const bool backward, const SgmParameters q,
-                                                       const Row* row, const uint extent, const uint steps,
-                                                       Place* place) {
+ALWAYS_INLINE void match_pixel(const bool meets, const bool backward, const SgmParameters q, const Row* row,
+                               const uint extent, const uint steps, Place* place) {
   if (backward) place->cells -= EGOSGM_LANES * chunks_of(extent);
   if (is_narrow(extent)) {
     match_narrow(meets, q, row, extent, steps, place);
@@ -114,8 +113,8 @@ ALWAYS_INLINE void match_pixel(const bool meets, const bool backward, const SgmP
   go_on(meets, row, place);
 }
 
-ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmParameters q,
-                                                     const Row* row, Place* place) {
+ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmParameters q, const Row* row,
+                             Place* place) {
   while (place->k != row->end) {
     const uint extent = extent_at(row->bands + place->k);
     place->wiped[3] = extent_at(row->bands + place->k + row->above_right);
@@ -261,8 +260,9 @@ ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmPa
   }
 }
 
-// The rows that the forward sweep takes before it comes to those that the backward one has been to. Half of them; where a
-// work-item takes all tiles of a sweep, those that take half of the time: as long as a row's cells and so many a pixel.
+// The rows that the forward sweep takes before it comes to those that the backward one has been to. Half of them; where
+// a work-item takes all tiles of a sweep, those that take half of the time: as long as a row's cells and so many a
+// pixel.
 #define CELLS_A_PIXEL 16
 inline int rows_to_middle(const SgmParameters q, const int view, const int wave, global const RowSum* row_sums) {
   if (wave != EGOSGM_ALL_TILES) return q.height - q.height / 2;
@@ -338,6 +338,7 @@ KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int t
                               global const uchar* penalties, global uchar* slots, global const uchar* sums,
                               global uint* ranks, global float* disparities, global float* variances,
                               global uchar* doubtful) {
-  const Maps maps = {codes, bands, offsets, row_sums, penalties, slots, (global uchar*)sums, ranks, disparities, variances, doubtful};
+  const Maps maps = {codes, bands,       offsets,   row_sums, penalties, slots, (global uchar*)sums,
+                     ranks, disparities, variances, doubtful};
   from_middle(get_global_id(2) > 0, q, maps, get_global_id(1), get_global_id(0), wave, tile_columns);
 }

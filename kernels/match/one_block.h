@@ -53,8 +53,8 @@ ALWAYS_INLINE void find_winner_of_block(const SgmParameters q, const Row* row, c
   const ushort16 allowed[2] = {totals[0] | barred(first, last), totals[1] | barred(first - VECTOR, last - VECTOR)};
   // The least total in the upper bits, its lane in the lower five.
   const ushort16 lanes = convert_ushort16(kLane);
-  const int rank = minimum_of_totals(min((allowed[0] << (ushort16)(5)) | lanes,
-                                         (allowed[1] << (ushort16)(5)) | lanes | (ushort16)(VECTOR)));
+  const int rank = minimum_of_totals(
+      min((allowed[0] << (ushort16)(5)) | lanes, (allowed[1] << (ushort16)(5)) | lanes | (ushort16)(VECTOR)));
   const int best_lane = rank & (BLOCK - 1), winner_total = rank >> 5;
 
   ushort all[BLOCK + 2 * MAX_STEPS];
