@@ -2,8 +2,11 @@
 #include "host/vision/odometry_features.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cstdlib>
 #include <cstring>
+#include <functional>
 
 #include "host/cpu_clones.h"
 
@@ -50,22 +53,6 @@ void filter_columns(const std::uint16_t* __restrict column3, const std::uint16_t
   }
 }
 
-using Row = const std::int16_t* __restrict;
-
-EGOSGM_CPU_CLONES
-void column_maxima(Row a, Row b, Row c, Row d, Row e, Row f, Row g, std::int16_t* __restrict out, int width) {
-  for (int x = 0; x < width; ++x) {
-    out[x] = std::max(std::max(std::max(a[x], b[x]), std::max(c[x], d[x])), std::max(std::max(e[x], f[x]), g[x]));
-  }
-}
-
-EGOSGM_CPU_CLONES
-void column_minima(Row a, Row b, Row c, Row d, Row e, Row f, Row g, std::int16_t* __restrict out, int width) {
-  for (int x = 0; x < width; ++x) {
-    out[x] = std::min(std::min(std::min(a[x], b[x]), std::min(c[x], d[x])), std::min(std::min(e[x], f[x]), g[x]));
-  }
-}
-
 // Extrema over x - 3 .. x + 3.
 EGOSGM_CPU_CLONES
 void row_extrema(const std::int16_t* __restrict in, std::int16_t* __restrict maxima, std::int16_t* __restrict minima,
@@ -80,37 +67,48 @@ void row_extrema(const std::int16_t* __restrict in, std::int16_t* __restrict max
   }
 }
 
-// Bit 0: a maximum, bit 1: a minimum.
+constexpr int kTwoRows = 2 * kSuppressionRadius + 2;  // around two rows below each other
+static_assert(kTwoRows <= kRingRows && kCell % 2 == 0);
+using RingRows = std::array<const std::int16_t*, kTwoRows>;
+
+// Of the two rows in the middle of `high` and `low`. Bit 0: a maximum of at least `above`, bit 1: a minimum of at most
+// -`below`.
 EGOSGM_CPU_CLONES
-void flag_extrema(const std::int16_t* __restrict response, const std::int16_t* __restrict maxima,
-                  const std::int16_t* __restrict minima, std::int16_t threshold, std::uint8_t* __restrict flags,
-                  int width) {
+void flag_extrema(const std::int16_t* upper, const std::int16_t* lower, const RingRows& high, const RingRows& low,
+                  const std::int16_t* above, const std::int16_t* below, std::uint8_t* __restrict upper_flags,
+                  std::uint8_t* __restrict lower_flags, int width) {
+  const auto [a, b, c, d, e, f, g, h] = high;
+  const auto [i, j, k, l, m, n, o, p] = low;
   for (int x = 0; x < width; ++x) {
-    const std::int16_t r = response[x];
-    flags[x] = static_cast<std::uint8_t>(
-        (((r == maxima[x]) & (r >= threshold)) | (((r == minima[x]) & (r <= -threshold)) << 1)));
+    const std::int16_t most = std::max(std::max(std::max(b[x], c[x]), std::max(d[x], e[x])), std::max(f[x], g[x]));
+    const std::int16_t least = std::min(std::min(std::min(j[x], k[x]), std::min(l[x], m[x])), std::min(n[x], o[x]));
+    const std::int16_t u = upper[x], v = lower[x], from = above[x], to = static_cast<std::int16_t>(-below[x]);
+    upper_flags[x] = static_cast<std::uint8_t>(((u == std::max(most, a[x])) & (u >= from)) |
+                                               (((u == std::min(least, i[x])) & (u <= to)) << 1));
+    lower_flags[x] = static_cast<std::uint8_t>(((v == std::max(most, h[x])) & (v >= from)) |
+                                               (((v == std::min(least, p[x])) & (v <= to)) << 1));
   }
 }
 
-Descriptor describe(const GreyImage& smooth, int x, int y) {
-  Descriptor descriptor;
+EGOSGM_CPU_CLONES
+void describe(const GreyImage& smooth, int x, int y, Descriptor& descriptor) {
+  std::uint8_t samples[kDescriptorSize];
   int sum = 0;
   for (int i = 0; i < 8; ++i) {
     const std::uint8_t* row = smooth.row(y - 7 + 2 * i) + x - 7;
     for (int j = 0; j < 8; ++j) {
-      descriptor[8 * i + j] = row[2 * j];
+      samples[8 * i + j] = row[2 * j];
       sum += row[2 * j];
     }
   }
   const int mean = (sum + kDescriptorSize / 2) / kDescriptorSize;
   int deviation = 0;
-  for (int i = 0; i < kDescriptorSize; ++i) deviation += std::abs(descriptor[i] - mean);
+  for (int i = 0; i < kDescriptorSize; ++i) deviation += std::abs(samples[i] - mean);
   // 24 levels a mean deviation; below four grey levels contrast is not raised further: it is noise.
   const int gain = 24 * kDescriptorSize * 256 / std::max(deviation, 4 * kDescriptorSize);
   for (int i = 0; i < kDescriptorSize; ++i) {
-    descriptor[i] = static_cast<std::uint8_t>(std::clamp(128 + (((descriptor[i] - mean) * gain) >> 8), 0, 255));
+    descriptor[i] = static_cast<std::uint8_t>(std::clamp(128 + (((samples[i] - mean) * gain) >> 8), 0, 255));
   }
-  return descriptor;
 }
 
 }  // namespace
@@ -154,48 +152,48 @@ void FeatureDetector::filter_row(const GreyImage& image, int y) {
   }
 }
 
-void FeatureDetector::suppress_row(int y, int threshold, int width) {
-  const auto ring = [width](int row) { return static_cast<std::size_t>(row % kRingRows) * width; };
+void FeatureDetector::suppress_rows(int y, int width, int height) {
+  const auto row = [width](const std::vector<std::int16_t>& ring, int at) {
+    return ring.data() + static_cast<std::size_t>(at % kRingRows) * width;
+  };
+  const auto around = [&](const std::vector<std::int16_t>& ring) {
+    RingRows rows;
+    for (int i = 0; i < kTwoRows; ++i) rows[i] = row(ring, y - kSuppressionRadius + i);
+    return rows;
+  };
   for (int f = 0; f < 2; ++f) {
-    const std::int16_t *high = row_max_[f].data(), *low = row_min_[f].data();
-    column_maxima(high + ring(y - 3), high + ring(y - 2), high + ring(y - 1), high + ring(y), high + ring(y + 1),
-                  high + ring(y + 2), high + ring(y + 3), maximum_.data(), width);
-    column_minima(low + ring(y - 3), low + ring(y - 2), low + ring(y - 1), low + ring(y), low + ring(y + 1),
-                  low + ring(y + 2), low + ring(y + 3), minimum_.data(), width);
-    const std::int16_t* response = response_[f].data() + ring(y);
-    flag_extrema(response, maximum_.data(), minimum_.data(), static_cast<std::int16_t>(threshold), flags_.data(),
-                 width);
-    for (int x0 = kMargin; x0 < width - kMargin; x0 += 8) {
-      std::uint64_t word;
-      std::memcpy(&word, flags_.data() + x0, sizeof(word));
-      if (word == 0) continue;
-      for (int x = x0; x < std::min(x0 + 8, width - kMargin); ++x) {
-        if (flags_[x] == 0) continue;
-        const int feature_class = 2 * f + (flags_[x] == 1 ? 0 : 1);
-        found_[feature_class].push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
-                                         static_cast<std::int16_t>(std::abs(response[x]))});
-      }
+    flag_extrema(row(response_[f], y), row(response_[f], y + 1), around(row_max_[f]), around(row_min_[f]),
+                 least_[2 * f].data(), least_[2 * f + 1].data(), flags_[0].data(), flags_[1].data(), width);
+    for (int i = 0; i < 2; ++i) {
+      if (y + i >= kMargin && y + i < height - kMargin) keep_strongest(f, row(response_[f], y + i), y + i, width, flags_[i]);
     }
   }
 }
 
-// Marks what is not kept with strength 0; ties go to the upper and left.
-void FeatureDetector::keep_strongest(int per_cell, int width, int height) {
-  const int columns = (width + kCell - 1) / kCell, rows = (height + kCell - 1) / kCell;
-  cells_.resize(static_cast<std::size_t>(columns) * rows);
-  for (auto& found : found_) {
-    for (auto& cell : cells_) cell.clear();
-    for (int i = 0; i < static_cast<int>(found.size()); ++i) {
-      cells_[(found[i].y / kCell) * columns + found[i].x / kCell].push_back(i);
-    }
-    const auto stronger = [&found](int a, int b) {
-      return found[a].strength != found[b].strength ? found[a].strength > found[b].strength : a < b;
-    };
-    for (auto& cell : cells_) {
-      const std::size_t limit = std::max(1, per_cell / kFeatureClasses);
-      if (cell.size() <= limit) continue;
-      std::nth_element(cell.begin(), cell.begin() + limit, cell.end(), stronger);
-      for (std::size_t i = limit; i < cell.size(); ++i) found[cell[i]].strength = 0;
+// Where a cell has enough, only a stronger one is let in, in place of the weakest; ties go to the upper and left.
+void FeatureDetector::keep_strongest(int filter, const std::int16_t* response, int y, int width,
+                                     std::vector<std::uint8_t>& flags) {
+  std::fill(flags.begin() + width - kMargin, flags.end(), std::uint8_t{0});
+  for (int x0 = kMargin; x0 < width - kMargin; x0 += 8) {
+    std::uint64_t word;
+    std::memcpy(&word, flags.data() + x0, sizeof(word));
+    if constexpr (std::endian::native == std::endian::big) word = __builtin_bswap64(word);
+    for (; word != 0; word &= word - 1) {
+      const int bit = std::countr_zero(word), x = x0 + bit / 8, feature_class = 2 * filter + bit % 8;
+      auto& found = found_[feature_class];
+      auto& cell = cells_[feature_class][x / kCell];
+      const auto strength = static_cast<std::int16_t>(std::abs(response[x]));
+      cell.push_back(static_cast<std::uint64_t>(strength) << 32 | ~static_cast<std::uint32_t>(found.size()));
+      found.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), strength});
+      std::push_heap(cell.begin(), cell.end(), std::greater<>());
+      if (cell.size() > per_cell_) {
+        std::pop_heap(cell.begin(), cell.end(), std::greater<>());
+        found[~static_cast<std::uint32_t>(cell.back())].strength = 0;
+        cell.pop_back();
+      }
+      if (cell.size() < per_cell_) continue;
+      const auto first = least_[feature_class].begin() + x / kCell * kCell;
+      std::fill(first, first + kCell, static_cast<std::int16_t>((cell.front() >> 32) + 1));
     }
   }
 }
@@ -218,17 +216,24 @@ void FeatureDetector::detect(const GreyImage& image, int threshold, int per_cell
   for (int f = 0; f < 2; ++f) {
     for (auto* rows : {&response_[f], &row_max_[f], &row_min_[f]}) rows->assign(kRingRows * width, 0);
   }
-  maximum_.resize(width);
-  minimum_.resize(width);
-  flags_.resize(width + 8);
+  for (auto& flags : flags_) flags.resize(width + 8);
+  const int columns = (width + kCell - 1) / kCell;
   for (auto& found : found_) found.clear();
+  for (auto& cells : cells_) cells.resize(columns);
+  per_cell_ = std::max(1, per_cell / kFeatureClasses);
 
-  for (int y = 2; y < height - 2; ++y) {
-    filter_row(image, y);
-    const int complete = y - kSuppressionRadius;
-    if (complete >= kMargin && complete < height - kMargin) suppress_row(complete, threshold, width);
+  int filtered = 2;
+  for (int y = kMargin - kMargin % 2; y < height - kMargin; y += 2) {
+    for (; filtered <= y + 1 + kSuppressionRadius; ++filtered) filter_row(image, filtered);
+    if (y % kCell == 0 || y < kMargin) {  // new cells
+      for (auto& least : least_) least.assign(static_cast<std::size_t>(columns) * kCell, threshold);
+      for (auto& cells : cells_) {
+        for (auto& cell : cells) cell.clear();
+      }
+    }
+    suppress_rows(y, width, height);
   }
-  keep_strongest(per_cell, width, height);
+  for (; filtered < height - 2; ++filtered) filter_row(image, filtered);  // descriptors reach farther
 
   for (int c = 0; c < kFeatureClasses; ++c) {
     int* row_begin = set.row_begin.data() + c * (height + 1);
@@ -238,7 +243,7 @@ void FeatureDetector::detect(const GreyImage& image, int threshold, int per_cell
       for (; row <= feature.y; ++row) row_begin[row] = set.size();
       set.features.push_back(feature);
       set.classes.push_back(static_cast<std::uint8_t>(c));
-      set.descriptors.push_back(describe(smooth_, feature.x, feature.y));
+      describe(smooth_, feature.x, feature.y, set.descriptors.emplace_back());
     }
     for (; row <= height; ++row) row_begin[row] = set.size();
   }

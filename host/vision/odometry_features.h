@@ -60,17 +60,19 @@ class FeatureDetector {
  private:
   struct Responses;
   void filter_row(const GreyImage& image, int y);
-  void suppress_row(int y, int threshold, int width);
-  void keep_strongest(int per_cell, int width, int height);
+  void suppress_rows(int y, int width, int height);
+  void keep_strongest(int filter, const std::int16_t* response, int y, int width, std::vector<std::uint8_t>& flags);
 
   GreyImage smooth_;
   std::vector<std::uint16_t> column5_, column3_;
   std::vector<std::int16_t> column_step_;
   std::vector<std::int16_t> response_[2], row_max_[2], row_min_[2];  // rings of rows: blob, corner
-  std::vector<std::int16_t> maximum_, minimum_;
-  std::vector<std::uint8_t> flags_;
-  std::vector<Feature> found_[kFeatureClasses];
-  std::vector<std::vector<int>> cells_;
+  std::vector<std::uint8_t> flags_[2];            // of two rows
+  std::vector<Feature> found_[kFeatureClasses];   // those of strength 0 were replaced by stronger ones
+  // Of the present row of cells: heaps with the weakest first, each its strength and the complement of its index.
+  std::vector<std::vector<std::uint64_t>> cells_[kFeatureClasses];
+  std::vector<std::int16_t> least_[kFeatureClasses];  // strength that a column still asks for
+  std::size_t per_cell_ = 0;
 };
 
 /// Sum of absolute differences.
