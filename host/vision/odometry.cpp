@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <sstream>
 #include <utility>
 
@@ -151,9 +152,10 @@ void StereoOdometry::State::estimate(const std::optional<Eigen::Isometry3d>& pri
   if (!rough.reason.empty()) return;
 
   std::vector<CircularMatch> refined;
-  const auto candidates =
-      match_circle(calibration, previous, current, select_spread(previous, kFeatureCell_px, 1 << 20),
-                   &rough.motion.current_from_previous, kGuidedWindow, max_disparity_px(current.left.width));
+  std::vector<int> all(previous.left_features.size());
+  std::iota(all.begin(), all.end(), 0);
+  const auto candidates = match_circle(calibration, previous, current, all, &rough.motion.current_from_previous,
+                                       kGuidedWindow, max_disparity_px(current.left.width));
   auto points = refine_matches(calibration, previous, current, candidates, rough.motion.current_from_previous, refined);
   if (options.learn_rectification) rectification.correct(calibration, points);
   result.times_ms.matching = stopwatch.lap();

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 #include <vector>
 
 #include "egosgm/image.h"
@@ -78,7 +79,7 @@ class FeatureDetector {
 /// Sum of absolute differences.
 inline int descriptor_distance(const Descriptor& a, const Descriptor& b) {
   int sum = 0;
-  for (int i = 0; i < kDescriptorSize; ++i) sum += a[i] > b[i] ? a[i] - b[i] : b[i] - a[i];
+  for (int i = 0; i < kDescriptorSize; ++i) sum += std::abs(a[i] - b[i]);
   return sum;
 }
 

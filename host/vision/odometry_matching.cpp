@@ -26,18 +26,16 @@ struct Box {
 EGOSGM_CPU_CLONES
 int best_match(const FeatureSet& set, int feature_class, const Descriptor& descriptor, const Box& box) {
   int best = kNoMatch, least = kMaxDistance;
-  const int last_row = std::min(box.y1, set.height - 1);
-  for (int y = std::max(box.y0, 0); y <= last_row; ++y) {
-    const int end = set.first_of_row(feature_class, y + 1);
-    for (int k = set.first_of_row(feature_class, y); k < end; ++k) {
-      const int x = set.features[k].x;
-      if (x < box.x0) continue;
-      if (x > box.x1) break;
-      const int distance = descriptor_distance(set.descriptors[k], descriptor);
-      if (distance < least) {
-        least = distance;
-        best = k;
-      }
+  const int first_row = std::max(box.y0, 0), last_row = std::min(box.y1, set.height - 1);
+  if (first_row > last_row) return best;
+  const int end = set.first_of_row(feature_class, last_row + 1);
+  for (int k = set.first_of_row(feature_class, first_row); k < end; ++k) {
+    const int x = set.features[k].x;
+    if ((x < box.x0) | (x > box.x1)) continue;
+    const int distance = descriptor_distance(set.descriptors[k], descriptor);
+    if (distance < least) {
+      least = distance;
+      best = k;
     }
   }
   return best;
@@ -160,7 +158,7 @@ std::vector<int> select_spread(const TrackedFrame& frame, int cell_px, int per_c
   std::vector<int> selected;
   for (auto& cell : cells) {
     const std::size_t count = std::min<std::size_t>(per_cell, cell.size());
-    std::partial_sort(cell.begin(), cell.begin() + count, cell.end(), before);
+    std::nth_element(cell.begin(), cell.begin() + count, cell.end(), before);
     selected.insert(selected.end(), cell.begin(), cell.begin() + count);
   }
   std::sort(selected.begin(), selected.end());
