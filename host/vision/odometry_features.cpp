@@ -6,7 +6,6 @@
 #include <bit>
 #include <cstdlib>
 #include <cstring>
-#include <functional>
 
 #include "host/cpu_clones.h"
 
@@ -180,20 +179,22 @@ void FeatureDetector::keep_strongest(int filter, const std::int16_t* response, i
     if constexpr (std::endian::native == std::endian::big) word = __builtin_bswap64(word);
     for (; word != 0; word &= word - 1) {
       const int bit = std::countr_zero(word), x = x0 + bit / 8, feature_class = 2 * filter + bit % 8;
+      const auto strength = static_cast<std::int16_t>(std::abs(response[x]));
+      std::int16_t* least = least_[feature_class].data() + x / kCell * kCell;
+      if (strength < *least) continue;  // one of this row raised it
       auto& found = found_[feature_class];
       auto& cell = cells_[feature_class][x / kCell];
-      const auto strength = static_cast<std::int16_t>(std::abs(response[x]));
-      cell.push_back(static_cast<std::uint64_t>(strength) << 32 | ~static_cast<std::uint32_t>(found.size()));
+      const std::uint64_t key = static_cast<std::uint64_t>(strength) << 32 | ~static_cast<std::uint32_t>(found.size());
       found.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y), strength});
-      std::push_heap(cell.begin(), cell.end(), std::greater<>());
-      if (cell.size() > per_cell_) {
-        std::pop_heap(cell.begin(), cell.end(), std::greater<>());
-        found[~static_cast<std::uint32_t>(cell.back())].strength = 0;
-        cell.pop_back();
+      if (cell.size() < per_cell_) {
+        cell.push_back(key);
+        if (cell.size() < per_cell_) continue;
+      } else {
+        found[~static_cast<std::uint32_t>(cell.front())].strength = 0;
+        cell.front() = key;
       }
-      if (cell.size() < per_cell_) continue;
-      const auto first = least_[feature_class].begin() + x / kCell * kCell;
-      std::fill(first, first + kCell, static_cast<std::int16_t>((cell.front() >> 32) + 1));
+      std::iter_swap(cell.begin(), std::min_element(cell.begin(), cell.end()));
+      std::fill_n(least, kCell, static_cast<std::int16_t>((cell.front() >> 32) + 1));
     }
   }
 }

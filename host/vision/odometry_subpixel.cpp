@@ -17,17 +17,19 @@ constexpr int kRegion = kPatchRows + 2 * kReach + 1;
 constexpr int kRegionStride = 24;
 constexpr int kSource = kPatchRows + 2;
 
+// The functions below are inlined into versions for AVX2 of those that call them.
+
 // `image` at integer offsets from (x0, y0), the border repeated.
-EGOSGM_CPU_CLONES
-void load(const GreyImage& image, int x0, int y0, int rows, int columns, float* out, int stride) {
-  const bool inside = x0 >= 0 && y0 >= 0 && x0 + columns <= image.width && y0 + rows <= image.height;
-  for (int i = 0; i < rows; ++i) {
+template <int kRows, int kColumns>
+inline void load(const GreyImage& image, int x0, int y0, float* __restrict out) {
+  const bool inside = x0 >= 0 && y0 >= 0 && x0 + kColumns <= image.width && y0 + kRows <= image.height;
+  for (int i = 0; i < kRows; ++i) {
     const std::uint8_t* row = image.row(std::clamp(y0 + i, 0, image.height - 1));
-    float* to = out + i * stride;
+    float* to = out + i * kColumns;
     if (inside) {
-      for (int j = 0; j < columns; ++j) to[j] = row[x0 + j];
+      for (int j = 0; j < kColumns; ++j) to[j] = row[x0 + j];
     } else {
-      for (int j = 0; j < columns; ++j) to[j] = row[std::clamp(x0 + j, 0, image.width - 1)];
+      for (int j = 0; j < kColumns; ++j) to[j] = row[std::clamp(x0 + j, 0, image.width - 1)];
     }
   }
 }
@@ -44,43 +46,53 @@ Between between(float at, int count) {
   return {first, at - first};
 }
 
-void sample(const GreyImage& image, float x, float y, float scale, float source[kSource][kSource]) {
-  const float step = 1 / scale;
-  if (scale == 1.0f && x == std::floor(x) && y == std::floor(y)) {
-    const int reach = kPatchRadius + 1;
-    load(image, static_cast<int>(x) - reach, static_cast<int>(y) - reach, kSource, kSource, source[0], kSource);
-    return;
-  }
-  Between columns[kSource];
-  for (int j = 0; j < kSource; ++j) columns[j] = between(x + (j - kPatchRadius - 1) * step, image.width);
-  for (int i = 0; i < kSource; ++i) {
-    const auto [y0, b] = between(y + (i - kPatchRadius - 1) * step, image.height);
-    const std::uint8_t *upper = image.row(y0), *lower = image.row(y0 + 1);
-    for (int j = 0; j < kSource; ++j) {
-      const auto [x0, a] = columns[j];
-      source[i][j] =
-          (1 - b) * ((1 - a) * upper[x0] + a * upper[x0 + 1]) + b * ((1 - a) * lower[x0] + a * lower[x0 + 1]);
-    }
-  }
+inline float sum_inner(const float row[kSource], float sum) {
+  for (int j = 1; j <= kPatchRows; ++j) sum += row[j];
+  return sum;
 }
 
-// Removes from `gradient` its mean and its part along `values`, which have zero mean and squared norm `norm2`.
-EGOSGM_CPU_CLONES
-void make_orthogonal(const float values[kPatchRows][kPatchColumns], float norm2,
-                     float gradient[kPatchRows][kPatchColumns]) {
-  float mean = 0, along = 0;
-  for (int i = 0; i < kPatchRows; ++i) {
-    for (int j = 0; j < kPatchRows; ++j) {
-      mean += gradient[i][j];
-      along += gradient[i][j] * values[i][j];
+// The patch with one pixel more on each side. Returns the sum of its inner values.
+inline float sample(const GreyImage& image, float x, float y, float scale, float source[kSource][kSource]) {
+  const float step = 1 / scale;
+  float sum = 0;
+  if (scale == 1.0f && x == std::floor(x) && y == std::floor(y)) {
+    const int reach = kPatchRadius + 1;
+    load<kSource, kSource>(image, static_cast<int>(x) - reach, static_cast<int>(y) - reach, source[0]);
+    for (int i = 1; i <= kPatchRows; ++i) sum = sum_inner(source[i], sum);
+    return sum;
+  }
+  int columns[kSource];
+  float shares[kSource];
+  for (int j = 0; j < kSource; ++j) {
+    const auto [first, share] = between(x + (j - kPatchRadius - 1) * step, image.width);
+    columns[j] = first;
+    shares[j] = share;
+  }
+  const auto sample_row = [&](int at, float* __restrict to) {
+    const std::uint8_t* row = image.row(at);
+    std::uint8_t before[kSource], behind[kSource];
+    for (int j = 0; j < kSource; ++j) {
+      before[j] = row[columns[j]];
+      behind[j] = row[columns[j] + 1];
     }
+    for (int j = 0; j < kSource; ++j) to[j] = (1 - shares[j]) * before[j] + shares[j] * behind[j];
+  };
+  float upper[kSource] = {}, lower[kSource] = {};
+  int row = -1;  // of the image, in `upper`; the next one is in `lower`
+  for (int i = 0; i < kSource; ++i) {
+    const auto [first, share] = between(y + (i - kPatchRadius - 1) * step, image.height);
+    if (i == 0 || first > row + 1) {
+      sample_row(first, upper);
+      sample_row(first + 1, lower);
+    } else if (first == row + 1) {
+      std::copy_n(lower, kSource, upper);
+      sample_row(first + 1, lower);
+    }
+    row = first;
+    for (int j = 0; j < kSource; ++j) source[i][j] = (1 - share) * upper[j] + share * lower[j];
+    if (i >= 1 && i <= kPatchRows) sum = sum_inner(source[i], sum);
   }
-  mean /= kPatchRows * kPatchRows;
-  along /= norm2;
-  for (int i = 0; i < kPatchRows; ++i) {
-    for (int j = 0; j < kPatchRows; ++j) gradient[i][j] -= mean + along * values[i][j];
-    gradient[i][kPatchRows] = 0;
-  }
+  return sum;
 }
 
 struct Sums {
@@ -88,8 +100,7 @@ struct Sums {
 };
 
 // Products of the gradients with the image shifted to (column, row) of the region.
-EGOSGM_CPU_CLONES
-Sums correlate(const Patch& patch, const float* region, float column, float row) {
+inline Sums correlate(const Patch& patch, const float* region, float column, float row) {
   const int j0 = static_cast<int>(column), i0 = static_cast<int>(row);
   const float a = column - j0, b = row - i0;
   const float w00 = (1 - a) * (1 - b), w01 = a * (1 - b), w10 = (1 - a) * b, w11 = a * b;
@@ -112,8 +123,7 @@ Sums correlate(const Patch& patch, const float* region, float column, float row)
 }
 
 // Root of the summed squared deviation of the region's values, whole pixels from (column, row).
-EGOSGM_CPU_CLONES
-float deviation(const float* region, float column, float row) {
+inline float deviation(const float* region, float column, float row) {
   const auto nearest = [](float position) { return static_cast<int>(std::floor(position + 0.5f)); };
   const float* first = region + nearest(row) * kRegionStride + nearest(column);
   float sum[kPatchRows] = {}, sum2[kPatchRows] = {};
@@ -132,8 +142,7 @@ float deviation(const float* region, float column, float row) {
   return std::sqrt(std::max(0.0f, total2 - total * total / (kPatchRows * kPatchRows)));
 }
 
-EGOSGM_CPU_CLONES
-float correlation(const Patch& patch, const float* region, float column, float row) {
+inline float correlation(const Patch& patch, const float* region, float column, float row) {
   const int j0 = static_cast<int>(column), i0 = static_cast<int>(row);
   const float a = column - j0, b = row - i0;
   float sum = 0, sum2 = 0, product = 0;
@@ -154,32 +163,40 @@ float correlation(const Patch& patch, const float* region, float column, float r
 
 }  // namespace
 
+// Sums are in the order of rows and columns, so each waits for its last addition: as many as can be go side by side.
 EGOSGM_CPU_CLONES
 bool make_patch(const GreyImage& image, float x, float y, float scale, Patch& patch) {
+  constexpr int kCount = kPatchRows * kPatchRows;
   float source[kSource][kSource];
-  sample(image, x, y, scale, source);
-  float mean = 0;
-  for (int i = 0; i < kPatchRows; ++i) {
-    for (int j = 0; j < kPatchRows; ++j) {
-      mean += source[i + 1][j + 1];
-      patch.gradient_x[i][j] = 0.5f * (source[i + 1][j + 2] - source[i + 1][j]);
-      patch.gradient_y[i][j] = 0.5f * (source[i + 2][j + 1] - source[i][j + 1]);
-    }
-  }
-  mean /= kPatchRows * kPatchRows;
-  float norm2 = 0;
+  const float mean = sample(image, x, y, scale, source) / kCount;
+  float norm2 = 0, mean_x = 0, mean_y = 0, along_x = 0, along_y = 0;
   for (int i = 0; i < kPatchRows; ++i) {
     for (int j = 0; j < kPatchRows; ++j) {
       patch.values[i][j] = source[i + 1][j + 1] - mean;
+      patch.gradient_x[i][j] = 0.5f * (source[i + 1][j + 2] - source[i + 1][j]);
+      patch.gradient_y[i][j] = 0.5f * (source[i + 2][j + 1] - source[i][j + 1]);
+    }
+    for (int j = 0; j < kPatchRows; ++j) {
       norm2 += patch.values[i][j] * patch.values[i][j];
+      mean_x += patch.gradient_x[i][j];
+      mean_y += patch.gradient_y[i][j];
+      along_x += patch.gradient_x[i][j] * patch.values[i][j];
+      along_y += patch.gradient_y[i][j] * patch.values[i][j];
     }
   }
   if (norm2 < kMinEigenvalue) return false;
   patch.deviation = std::sqrt(norm2);
-  make_orthogonal(patch.values, norm2, patch.gradient_x);
-  make_orthogonal(patch.values, norm2, patch.gradient_y);
+  mean_x /= kCount;
+  mean_y /= kCount;
+  along_x /= norm2;
+  along_y /= norm2;
   float xx = 0, xy = 0, yy = 0;
   for (int i = 0; i < kPatchRows; ++i) {
+    for (int j = 0; j < kPatchRows; ++j) {
+      patch.gradient_x[i][j] -= mean_x + along_x * patch.values[i][j];
+      patch.gradient_y[i][j] -= mean_y + along_y * patch.values[i][j];
+    }
+    patch.gradient_x[i][kPatchRows] = patch.gradient_y[i][kPatchRows] = 0;
     for (int j = 0; j < kPatchRows; ++j) {
       xx += patch.gradient_x[i][j] * patch.gradient_x[i][j];
       xy += patch.gradient_x[i][j] * patch.gradient_y[i][j];
@@ -195,11 +212,12 @@ bool make_patch(const GreyImage& image, float x, float y, float scale, Patch& pa
   return true;
 }
 
+EGOSGM_CPU_CLONES
 bool align_patch(const Patch& patch, const GreyImage& image, float min_correlation, float& x, float& y) {
   const int x0 = static_cast<int>(std::floor(x + 0.5f)) - kPatchRadius - kReach;
   const int y0 = static_cast<int>(std::floor(y + 0.5f)) - kPatchRadius - kReach;
   float region[kRegion * kRegionStride];
-  load(image, x0, y0, kRegion, kRegionStride, region, kRegionStride);
+  load<kRegion, kRegionStride>(image, x0, y0, region);
   float column = x - kPatchRadius - x0, row = y - kPatchRadius - y0;
   // With more contrast than in the patch, a step would overshoot by as much.
   const float contrast = std::max(0.1f, deviation(region, column, row) / patch.deviation);
