@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/vision/odometry_subpixel.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -17,9 +18,7 @@ constexpr int kRegion = kPatchRows + 2 * kReach + 1;
 constexpr int kRegionStride = 24;
 constexpr int kSource = kPatchRows + 2;
 
-// The functions below are inlined into versions for AVX2 of those that call them.
-
-// `image` at integer offsets from (x0, y0), the border repeated.
+// `image` at integer offsets from (x0, y0), the border repeated. Inlined into versions for AVX2, as is `sample`.
 template <int kRows, int kColumns>
 inline void load(const GreyImage& image, int x0, int y0, float* __restrict out) {
   const bool inside = x0 >= 0 && y0 >= 0 && x0 + kColumns <= image.width && y0 + kRows <= image.height;
@@ -99,20 +98,23 @@ struct Sums {
   float x, y;
 };
 
+using Columns = Eigen::Array<float, kPatchColumns, 1>;
+
+Eigen::Map<const Columns> columns_at(const float* values) { return Eigen::Map<const Columns>(values); }
+
 // Products of the gradients with the image shifted to (column, row) of the region.
-inline Sums correlate(const Patch& patch, const float* region, float column, float row) {
+Sums correlate(const Patch& patch, const float* region, float column, float row) {
   const int j0 = static_cast<int>(column), i0 = static_cast<int>(row);
   const float a = column - j0, b = row - i0;
   const float w00 = (1 - a) * (1 - b), w01 = a * (1 - b), w10 = (1 - a) * b, w11 = a * b;
-  float sum_x[kPatchColumns] = {}, sum_y[kPatchColumns] = {};
+  Columns sum_x = Columns::Zero(), sum_y = Columns::Zero();
   for (int i = 0; i < kPatchRows; ++i) {
-    const float* __restrict upper = region + (i0 + i) * kRegionStride + j0;
-    const float* __restrict lower = upper + kRegionStride;
-    for (int j = 0; j < kPatchColumns; ++j) {
-      const float value = w00 * upper[j] + w01 * upper[j + 1] + w10 * lower[j] + w11 * lower[j + 1];
-      sum_x[j] += patch.gradient_x[i][j] * value;
-      sum_y[j] += patch.gradient_y[i][j] * value;
-    }
+    const float* upper = region + (i0 + i) * kRegionStride + j0;
+    const float* lower = upper + kRegionStride;
+    const Columns values = w00 * columns_at(upper) + w01 * columns_at(upper + 1) + w10 * columns_at(lower) +
+                           w11 * columns_at(lower + 1);
+    sum_x += columns_at(patch.gradient_x[i]) * values;
+    sum_y += columns_at(patch.gradient_y[i]) * values;
   }
   Sums sums{0, 0};
   for (int j = 0; j < kPatchColumns; ++j) {
@@ -123,16 +125,14 @@ inline Sums correlate(const Patch& patch, const float* region, float column, flo
 }
 
 // Root of the summed squared deviation of the region's values, whole pixels from (column, row).
-inline float deviation(const float* region, float column, float row) {
+float deviation(const float* region, float column, float row) {
   const auto nearest = [](float position) { return static_cast<int>(std::floor(position + 0.5f)); };
   const float* first = region + nearest(row) * kRegionStride + nearest(column);
-  float sum[kPatchRows] = {}, sum2[kPatchRows] = {};
+  Columns sum = Columns::Zero(), sum2 = Columns::Zero();
   for (int i = 0; i < kPatchRows; ++i) {
-    const float* values = first + i * kRegionStride;
-    for (int j = 0; j < kPatchRows; ++j) {
-      sum[j] += values[j];
-      sum2[j] += values[j] * values[j];
-    }
+    const auto values = columns_at(first + i * kRegionStride);
+    sum += values;
+    sum2 += values * values;
   }
   float total = 0, total2 = 0;
   for (int j = 0; j < kPatchRows; ++j) {
@@ -142,20 +142,23 @@ inline float deviation(const float* region, float column, float row) {
   return std::sqrt(std::max(0.0f, total2 - total * total / (kPatchRows * kPatchRows)));
 }
 
-inline float correlation(const Patch& patch, const float* region, float column, float row) {
+float correlation(const Patch& patch, const float* region, float column, float row) {
   const int j0 = static_cast<int>(column), i0 = static_cast<int>(row);
   const float a = column - j0, b = row - i0;
+  const auto row_at = [&](int i) -> Columns {
+    const float* values = region + (i0 + i) * kRegionStride + j0;
+    return (1 - a) * columns_at(values) + a * columns_at(values + 1);
+  };
   float sum = 0, sum2 = 0, product = 0;
+  Columns upper = row_at(0);
   for (int i = 0; i < kPatchRows; ++i) {
-    const float* upper = region + (i0 + i) * kRegionStride + j0;
-    const float* lower = upper + kRegionStride;
+    const Columns lower = row_at(i + 1), values = (1 - b) * upper + b * lower;
     for (int j = 0; j < kPatchRows; ++j) {
-      const float value =
-          (1 - b) * ((1 - a) * upper[j] + a * upper[j + 1]) + b * ((1 - a) * lower[j] + a * lower[j + 1]);
-      sum += value;
-      sum2 += value * value;
-      product += value * patch.values[i][j];
+      sum += values[j];
+      sum2 += values[j] * values[j];
+      product += values[j] * patch.values[i][j];
     }
+    upper = lower;
   }
   const float variance = sum2 - sum * sum / (kPatchRows * kPatchRows);
   return variance > 1.0f ? product / (std::sqrt(variance) * patch.deviation) : 0.0f;
