@@ -79,13 +79,13 @@ void flag_extrema(const std::int16_t* upper, const std::int16_t* lower, const Ri
   const auto [a, b, c, d, e, f, g, h] = high;
   const auto [i, j, k, l, m, n, o, p] = low;
   for (int x = 0; x < width; ++x) {
-    const std::int16_t most = std::max(std::max(std::max(b[x], c[x]), std::max(d[x], e[x])), std::max(f[x], g[x]));
-    const std::int16_t least = std::min(std::min(std::min(j[x], k[x]), std::min(l[x], m[x])), std::min(n[x], o[x]));
-    const std::int16_t u = upper[x], v = lower[x], from = above[x], to = static_cast<std::int16_t>(-below[x]);
-    upper_flags[x] = static_cast<std::uint8_t>(((u == std::max(most, a[x])) & (u >= from)) |
-                                               (((u == std::min(least, i[x])) & (u <= to)) << 1));
-    lower_flags[x] = static_cast<std::uint8_t>(((v == std::max(most, h[x])) & (v >= from)) |
-                                               (((v == std::min(least, p[x])) & (v <= to)) << 1));
+    std::int16_t most = std::max(std::max(std::max(b[x], c[x]), std::max(d[x], e[x])), std::max(f[x], g[x]));
+    std::int16_t least = std::min(std::min(std::min(j[x], k[x]), std::min(l[x], m[x])), std::min(n[x], o[x]));
+    most = std::max(most, above[x]);
+    least = std::min(least, static_cast<std::int16_t>(-below[x]));
+    const std::int16_t u = upper[x], v = lower[x];
+    upper_flags[x] = static_cast<std::uint8_t>((u >= std::max(most, a[x])) | ((u <= std::min(least, i[x])) << 1));
+    lower_flags[x] = static_cast<std::uint8_t>((v >= std::max(most, h[x])) | ((v <= std::min(least, p[x])) << 1));
   }
 }
 
