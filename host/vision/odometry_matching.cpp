@@ -2,6 +2,7 @@
 #include "host/vision/odometry_matching.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -29,11 +30,17 @@ int best_match(const FeatureSet& set, int feature_class, const Descriptor& descr
   const int first_row = std::max(box.y0, 0), last_row = std::min(box.y1, set.height - 1);
   if (first_row > last_row) return best;
   const int end = set.first_of_row(feature_class, last_row + 1);
-  for (int k = set.first_of_row(feature_class, first_row); k < end; ++k) {
-    const int x = set.features[k].x;
-    if ((x < box.x0) | (x > box.x1)) continue;
-    const int distance = descriptor_distance(set.descriptors[k], descriptor);
-    if (distance < least) {
+  for (int first = set.first_of_row(feature_class, first_row); first < end; first += 64) {
+    std::uint64_t inside = 0;  // a bit each: no branch can tell beforehand
+    const int count = std::min(end - first, 64);
+    for (int i = 0; i < count; ++i) {
+      const int x = set.features[first + i].x;
+      inside |= static_cast<std::uint64_t>((x >= box.x0) & (x <= box.x1)) << i;
+    }
+    for (; inside != 0; inside &= inside - 1) {
+      const int k = first + std::countr_zero(inside);
+      const int distance = descriptor_distance(set.descriptors[k], descriptor);
+      if (distance >= least) continue;
       least = distance;
       best = k;
     }
