@@ -164,7 +164,8 @@ void FeatureDetector::suppress_rows(int y, int width, int height) {
     flag_extrema(row(response_[f], y), row(response_[f], y + 1), around(row_max_[f]), around(row_min_[f]),
                  least_[2 * f].data(), least_[2 * f + 1].data(), flags_[0].data(), flags_[1].data(), width);
     for (int i = 0; i < 2; ++i) {
-      if (y + i >= kMargin && y + i < height - kMargin) keep_strongest(f, row(response_[f], y + i), y + i, width, flags_[i]);
+      if (y + i >= kMargin && y + i < height - kMargin)
+        keep_strongest(f, row(response_[f], y + i), y + i, width, flags_[i]);
     }
   }
 }

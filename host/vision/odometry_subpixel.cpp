@@ -111,8 +111,8 @@ Sums correlate(const Patch& patch, const float* region, float column, float row)
   for (int i = 0; i < kPatchRows; ++i) {
     const float* upper = region + (i0 + i) * kRegionStride + j0;
     const float* lower = upper + kRegionStride;
-    const Columns values = w00 * columns_at(upper) + w01 * columns_at(upper + 1) + w10 * columns_at(lower) +
-                           w11 * columns_at(lower + 1);
+    const Columns values =
+        w00 * columns_at(upper) + w01 * columns_at(upper + 1) + w10 * columns_at(lower) + w11 * columns_at(lower + 1);
     sum_x += columns_at(patch.gradient_x[i]) * values;
     sum_y += columns_at(patch.gradient_y[i]) * values;
   }

@@ -62,6 +62,36 @@ TEST(OdometryFeatures, EqualsFiltersAndSuppressionAsWrittenInThePaper) {
   EXPECT_GT(expected, 100);
 }
 
+TEST(OdometryFeatures, KeepsTheStrongestOfEveryCell) {
+  std::mt19937 generator(17);
+  odometry::GreyImage image = random_image(generator, 203, 145);
+  for (auto& pixel : image.pixels) pixel &= 0xc0;  // many of the same strength: the upper and left ones stay
+  odometry::FeatureDetector detector;
+  odometry::FeatureSet all, kept;
+  detector.detect(image, 100, 1 << 20, all);
+  for (const int per_class : {1, 3}) {
+    detector.detect(image, 100, per_class * odometry::kFeatureClasses, kept);
+    int next = 0;
+    for (int i = 0; i < all.size(); ++i) {
+      const odometry::Feature& feature = all.features[i];
+      int before = 0;  // in its cell and class
+      for (int k = 0; k < all.size(); ++k) {
+        const odometry::Feature& other = all.features[k];
+        if (all.classes[k] != all.classes[i] || other.x / 64 != feature.x / 64 || other.y / 64 != feature.y / 64)
+          continue;
+        if (other.strength > feature.strength || (other.strength == feature.strength && k < i)) ++before;
+      }
+      if (before >= per_class) continue;
+      ASSERT_LT(next, kept.size()) << "no feature at " << feature.x << ", " << feature.y;
+      EXPECT_EQ(kept.features[next].x, feature.x) << "feature " << next << " of " << per_class;
+      EXPECT_EQ(kept.features[next].y, feature.y) << "feature " << next << " of " << per_class;
+      EXPECT_EQ(kept.descriptors[next], all.descriptors[i]) << "feature " << next << " of " << per_class;
+      ++next;
+    }
+    EXPECT_EQ(next, kept.size());
+  }
+}
+
 TEST(OdometryFeatures, DescriptorsDoNotDependOnBrightnessAndContrast) {
   std::mt19937 generator(12);
   odometry::GreyImage image = random_image(generator, 60, 60), dimmed = image;
