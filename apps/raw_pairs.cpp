@@ -8,12 +8,10 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/videoio.hpp>
 #include <sstream>
 
 #include "apps/counted.h"
-#include "apps/open_video.h"
+#include "apps/media.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/image_io.h"
 #include "host/vision/file_io.h"
@@ -49,7 +47,7 @@ void expect_file(const fs::path& file) {
 cv::Mat read_image(const fs::path& file) {
   if (!is_foreign(file)) return vision::read_stored_image(file);
   expect_file(file);
-  cv::Mat image = cv::imread(file.string(), cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
+  cv::Mat image = media().read_image(file.string(), cv::IMREAD_ANYDEPTH | cv::IMREAD_ANYCOLOR);
   if (image.empty() || (image.depth() != CV_8U && image.depth() != CV_16U)) {
     throw InvalidArgument(file.string() + ": cannot be read as an image of 8 or 16 bits");
   }
@@ -72,22 +70,23 @@ class Video : public ImageSource {
  public:
   explicit Video(const std::string& file) : file_(file) {
     expect_file(file);
-    if (!open_video(video_, file)) throw InvalidArgument(file + ": neither an image nor a video that OpenCV can read");
+    video_ = media().open_video(file);
+    if (!video_) throw InvalidArgument(file + ": neither an image nor a video that OpenCV can read");
   }
   cv::Mat next() override {
     cv::Mat image;
-    const double rate = video_.get(cv::CAP_PROP_FPS);
-    if (!video_.read(image)) return {};
+    const double rate = video_->get(cv::CAP_PROP_FPS);
+    if (!video_->read(image)) return {};
     time_s_ = rate > 0 ? std::optional<double>(number_ / rate) : std::nullopt;
     ++number_;
     return image;
   }
   std::optional<double> time_s() const override { return time_s_; }
-  int count() const override { return static_cast<int>(video_.get(cv::CAP_PROP_FRAME_COUNT)); }
+  int count() const override { return static_cast<int>(video_->get(cv::CAP_PROP_FRAME_COUNT)); }
 
  private:
   const std::string file_;
-  cv::VideoCapture video_;
+  std::unique_ptr<cv::VideoCapture> video_;
   std::optional<double> time_s_;
   int number_ = 0;
 };

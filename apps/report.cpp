@@ -3,13 +3,13 @@
 #include <fmt/core.h>
 
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
 #include <sstream>
 
 #include "apps/command.h"
 #include "apps/frame_panels.h"
+#include "apps/media.h"
 #include "apps/metrics_json.h"
 #include "apps/output_folder.h"
 #include "apps/run_folder.h"
@@ -106,7 +106,7 @@ std::string base64(const std::vector<std::uint8_t>& bytes) {
 
 std::string data_uri(const cv::Mat& picture, const char* kind) {
   std::vector<std::uint8_t> bytes;
-  cv::imencode(fmt::format(".{}", kind), picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 92});
+  media().encode_image(fmt::format(".{}", kind), picture, bytes, {cv::IMWRITE_JPEG_QUALITY, 92});
   return fmt::format("data:image/{};base64,{}", kind, base64(bytes));
 }
 

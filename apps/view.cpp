@@ -3,9 +3,7 @@
 #include <fmt/core.h>
 
 #include <filesystem>
-#include <opencv2/highgui.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "apps/command.h"
 #include "apps/counted.h"
@@ -14,8 +12,8 @@
 #include "apps/frame_panels.h"
 #include "apps/interrupt.h"
 #include "apps/last_ones.h"
+#include "apps/media.h"
 #include "apps/motion_source.h"
-#include "apps/open_video.h"
 #include "apps/option_arguments.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
@@ -115,7 +113,6 @@ class VideoFile {
  public:
   VideoFile(std::filesystem::path file, double frames_per_second)
       : file_(std::move(file)), frames_per_second_(frames_per_second) {
-    quiet_opencv();
     std::string folder = (std::filesystem::absolute(file_).parent_path() / ".egosgm-XXXXXX").string();
     if (!::mkdtemp(folder.data())) {
       throw IoError(file_.string() + ": cannot be written: " + std::generic_category().message(errno));
@@ -133,21 +130,21 @@ class VideoFile {
   void add(const cv::Mat& picture) {
     cv::Mat even;  // the codecs want even sides
     cv::copyMakeBorder(picture, even, 0, picture.rows % 2, 0, picture.cols % 2, cv::BORDER_CONSTANT);
-    if (!writer_.isOpened()) {
+    if (!writer_) {
       const bool mp4 = file_.extension() == ".mp4";
-      const int codec = mp4 ? cv::VideoWriter::fourcc('m', 'p', '4', 'v') : cv::VideoWriter::fourcc('M', 'J', 'P', 'G');
-      if (!writer_.open(unfinished_.string(), codec, frames_per_second_, even.size())) {
+      writer_ = media().create_video(unfinished_.string(), mp4 ? "mp4v" : "MJPG", frames_per_second_, even.size());
+      if (!writer_) {
         throw IoError(file_.string() + ": OpenCV cannot write this video: " +
                       (mp4 ? "give a name that ends in .avi, or use --pictures" : "use --pictures"));
       }
     }
-    writer_.write(even);
+    writer_->write(even);
     ++written_;
   }
 
   void finish() {
-    if (!writer_.isOpened()) return;
-    writer_.release();
+    if (!writer_) return;
+    writer_->release();
     expect_whole();
     vision::move_file(unfinished_, file_);
   }
@@ -156,8 +153,8 @@ class VideoFile {
   /// OpenCV's writer does not say where the disk is full.
   void expect_whole() const {
     int found = 0;
-    if (cv::VideoCapture video; open_video(video, unfinished_.string())) {
-      while (video.grab()) ++found;
+    if (const auto video = media().open_video(unfinished_.string())) {
+      while (video->grab()) ++found;
     }
     if (found == written_) return;
     throw IoError(
@@ -168,7 +165,7 @@ class VideoFile {
   const std::filesystem::path file_;
   const double frames_per_second_;
   std::filesystem::path unfinished_;
-  cv::VideoWriter writer_;
+  std::unique_ptr<cv::VideoWriter> writer_;
   int written_ = 0;
 };
 
@@ -198,17 +195,17 @@ class Window {
  public:
   Window(DrawnSequence& drawn, const ViewArguments& arguments)
       : drawn_(drawn), playing_(!arguments.paused), delay_ms_(std::max(1, int(1000 / arguments.frames_per_second))) {
-    cv::namedWindow(kName, cv::WINDOW_NORMAL | cv::WINDOW_KEEPRATIO);
+    window_.open_window(kName, cv::WINDOW_NORMAL | cv::WINDOW_KEEPRATIO);
   }
-  ~Window() { cv::destroyAllWindows(); }
+  ~Window() { window_.close_windows(); }
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
   int operator()() {
     show(0);
-    cv::resizeWindow(kName, pictures_[0].size());
+    window_.resize_window(kName, pictures_[0].size());
     while (!interrupted() && is_open()) {
-      const int key = cv::waitKeyEx(playing_ ? delay_ms_ : 50);
+      const int key = window_.wait_for_key(playing_ ? delay_ms_ : 50);
       if (is_quit(key) || !is_open()) break;
       if (key == ' ') playing_ = !playing_;
       if (is_step_back(key) && at_ > pictures_.first()) playing_ = false, show(at_ - 1);
@@ -224,14 +221,15 @@ class Window {
   static bool is_arrow(int key) { return (key & 0xff00) == 0xff00; }  // X11's, as all of OpenCV's windows give them
   static bool is_step(int key) { return key == 'n' || (is_arrow(key) && (key & 0xff) == 0x53); }
   static bool is_step_back(int key) { return key == 'p' || (is_arrow(key) && (key & 0xff) == 0x51); }
-  static bool is_open() { return cv::getWindowProperty(kName, cv::WND_PROP_VISIBLE) >= 1; }
+  bool is_open() const { return window_.window_property(kName, cv::WND_PROP_VISIBLE) >= 1; }
 
   void show(std::size_t i) {
     while (pictures_.end() <= i) pictures_.push_back(drawn_.draw(pictures_.end()));
     at_ = i;
-    cv::imshow(kName, pictures_[i]);
+    window_.show(kName, pictures_[i]);
   }
 
+  const Media& window_ = media();
   DrawnSequence& drawn_;
   bool playing_;
   const int delay_ms_;
@@ -242,8 +240,8 @@ class Window {
 void require_display() {
   constexpr const char* kRemedy = "give --video FILE.mp4 or --pictures DIR";
   const auto open_window = [] {
-    cv::namedWindow("egosgm");
-    cv::destroyAllWindows();
+    media().open_window("egosgm", cv::WINDOW_AUTOSIZE);
+    media().close_windows();
   };
   try {
     if (vision::has_display(open_window)) return;
