@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <fmt/core.h>
+#include <isa-l.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -67,10 +68,8 @@ Contents contents_of(const fs::path& file) {
 
 }  // namespace
 
-std::string digest_of(std::string_view bytes) {  // FNV-1a
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3u;
-  return fmt::format("{:016x}", hash);
+std::string digest_of(std::string_view bytes) {  // CRC-64/XZ, in a fraction of the time that writing takes
+  return fmt::format("{:016x}", crc64_ecma_refl(0, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
 }
 
 LockedFile::LockedFile(const fs::path& file, int flags, int lock)

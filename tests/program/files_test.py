@@ -28,11 +28,20 @@ def state(folder):
     return found
 
 
+def shifted(value):
+    for _ in range(8):
+        value = value >> 1 ^ (0xC96C5795D7870F42 if value & 1 else 0)
+    return value
+
+
+SHIFTED = [shifted(value) for value in range(256)]
+
+
 def digest_of(data):
-    digest = 0xcbf29ce484222325
+    digest = 2**64 - 1
     for byte in data:
-        digest = (digest ^ byte) * 0x100000001b3 % 2**64
-    return f"{digest:016x}"
+        digest = digest >> 8 ^ SHIFTED[(digest ^ byte) & 255]
+    return f"{digest ^ 2**64 - 1:016x}"
 
 
 def signed(json_object):
