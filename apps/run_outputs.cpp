@@ -164,8 +164,7 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
     if (wants(kind)) write(file(kind, frame, extension_of(kind)));
   }
   // Last: a frame with it is complete.
-  vision::write_disparity_png(file("disparity", frame, extension_of("disparity")), disparity_);
-  return vision::count_outside_png(disparity_);
+  return vision::write_disparity_png(file("disparity", frame, extension_of("disparity")), disparity_);
 }
 
 std::filesystem::path RunOutputs::file(const char* kind, const vision::StereoFrame& frame,

@@ -37,13 +37,6 @@ bool has_neighbour_within(const cv::Mat& disparity, int x, int y, float max_jump
   return near(x - 1, y) || near(x + 1, y) || near(x, y - 1) || near(x, y + 1);
 }
 
-template <typename T>
-void put(std::string& bytes, T value) {
-  char raw[sizeof value];
-  std::memcpy(raw, &value, sizeof value);
-  bytes.append(raw, sizeof value);
-}
-
 }  // namespace
 
 void PointCloudOptions::validate() const {
@@ -61,6 +54,8 @@ PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const 
   options.validate();
   const cv::Mat picture = colors.type() == CV_8UC3 ? colors : color_grey(colors);
   PointCloud cloud;
+  cloud.points_m.reserve(disparity.total());
+  cloud.colors.reserve(disparity.total());
   for (int y = 0; y < disparity.rows; ++y) {
     for (int x = 0; x < disparity.cols; ++x) {
       const float d = disparity.at<float>(y, x);
@@ -87,12 +82,17 @@ void write_ply(const std::filesystem::path& file, const PointCloud& cloud) {
       std::to_string(cloud.points_m.size()) +
       "\nproperty float x\nproperty float y\nproperty float z\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
-  constexpr std::size_t kBytesPerPoint = 15;
-  bytes.reserve(bytes.size() + kBytesPerPoint * cloud.points_m.size());
-  for (std::size_t i = 0; i < cloud.points_m.size(); ++i) {
+  constexpr std::size_t kPointBytes = 3 * sizeof(float) + 3;
+  const std::size_t header_bytes = bytes.size();
+  bytes.resize(header_bytes + kPointBytes * cloud.points_m.size());
+  char* next = bytes.data() + header_bytes;
+  for (std::size_t i = 0; i < cloud.points_m.size(); ++i, next += kPointBytes) {
     const cv::Point3f& point = cloud.points_m[i];
-    for (const float value : {point.x, point.y, point.z}) put(bytes, value);
-    for (const int channel : {2, 1, 0}) put(bytes, cloud.colors[i][channel]);
+    const float position[3] = {point.x, point.y, point.z};
+    std::memcpy(next, position, sizeof position);
+    for (int channel = 0; channel < 3; ++channel) {
+      next[sizeof position + channel] = static_cast<char>(cloud.colors[i][2 - channel]);
+    }
   }
   write_file(file, bytes);
 }
@@ -103,12 +103,13 @@ std::int64_t write_depth_png(const std::filesystem::path& file, const cv::Mat& d
   cv::Mat stored(depth_m.size(), CV_16UC1, cv::Scalar(0));
   std::int64_t not_stored = 0;
   for (int y = 0; y < depth_m.rows; ++y) {
+    const auto* depths = depth_m.ptr<float>(y);
+    auto* row = stored.ptr<std::uint16_t>(y);
     for (int x = 0; x < depth_m.cols; ++x) {
-      const float depth = depth_m.at<float>(y, x);
-      if (!is_valid_disparity(depth) || depth <= 0) continue;
-      const float steps = std::max(std::round(depth * kStepsPerMetre), 1.0f);
-      if (steps <= 65535.0f) {
-        stored.at<std::uint16_t>(y, x) = static_cast<std::uint16_t>(steps);
+      if (!is_valid_disparity(depths[x]) || depths[x] <= 0) continue;
+      const float steps = std::max(depths[x] * kStepsPerMetre + 0.5f, 1.0f);
+      if (steps < 65536.0f) {
+        row[x] = static_cast<std::uint16_t>(steps);
       } else {
         ++not_stored;
       }

@@ -70,13 +70,21 @@ void require_width(int width) {
   if (width < 1 || width > kMaxPictureSide) throw InvalidArgument("picture width: must be in 1..32768 px");
 }
 
-/// Where a value stands in the range, 0..1.
-double position_in(const ColorRange& range, double value) {
-  const double position = range.logarithmic
-                              ? std::log(std::max(value, range.low) / range.low) / std::log(range.high / range.low)
-                              : (value - range.low) / (range.high - range.low);
-  return std::clamp(position, 0.0, 1.0);
-}
+/// Where values stand in a range, 0..1.
+class Scale {
+ public:
+  explicit Scale(const ColorRange& range)
+      : range_(range), span_(range.logarithmic ? std::log(range.high / range.low) : range.high - range.low) {}
+  double position_of(double value) const {
+    const double from_low =
+        range_.logarithmic ? std::log(std::max(value, range_.low) / range_.low) : value - range_.low;
+    return std::clamp(from_low / span_, 0.0, 1.0);
+  }
+
+ private:
+  const ColorRange range_;
+  const double span_;
+};
 
 double value_at(const ColorRange& range, double position) {
   return range.logarithmic ? range.low * std::pow(range.high / range.low, position)
@@ -91,7 +99,7 @@ cv::Mat turbo_colors() {
 }
 
 cv::Vec3b color_at(const cv::Mat& colors, double position) {
-  return colors.at<cv::Vec3b>(static_cast<int>(std::lround(255.0 * position)));
+  return colors.ptr<cv::Vec3b>()[static_cast<int>(255.0 * position + 0.5)];
 }
 
 cv::Vec3b error_color(float error_px) {
@@ -138,11 +146,18 @@ cv::Mat color_map(const cv::Mat& map, ColorRange range) {
   require_map(map, "color_map");
   require_range(range);
   const cv::Mat colors = turbo_colors();
+  const Scale scale(range);
   cv::Mat picture(map.size(), CV_8UC3, kBlack);
+  float last = kInvalidDisparity;  // widths of the search are often those of the pixel before
+  cv::Vec3b color;
   for (int y = 0; y < map.rows; ++y) {
     const auto* row = map.ptr<float>(y);
+    auto* colored = picture.ptr<cv::Vec3b>(y);
     for (int x = 0; x < map.cols; ++x) {
-      if (is_valid_disparity(row[x])) picture.at<cv::Vec3b>(y, x) = color_at(colors, position_in(range, row[x]));
+      if (!is_valid_disparity(row[x])) continue;
+      if (row[x] != last) color = color_at(colors, scale.position_of(row[x]));
+      last = row[x];
+      colored[x] = color;
     }
   }
   return picture;
@@ -277,9 +292,10 @@ cv::Mat depth_from_disparity(const cv::Mat& disparity, const Calibration& calibr
   cv::Mat depth_m(disparity.size(), CV_32FC1, cv::Scalar(kInvalidDisparity));
   for (int y = 0; y < disparity.rows; ++y) {
     const auto* row = disparity.ptr<float>(y);
+    auto* depths = depth_m.ptr<float>(y);
     for (int x = 0; x < disparity.cols; ++x) {
       const double d = row[x] + calibration.doffs_px;
-      if (is_valid_disparity(row[x]) && d > 0) depth_m.at<float>(y, x) = static_cast<float>(numerator / d);
+      if (is_valid_disparity(row[x]) && d > 0) depths[x] = static_cast<float>(numerator / d);
     }
   }
   return depth_m;
