@@ -43,6 +43,12 @@ class Help(ProgramTest):
     def test_version(self):
         self.assertRegex(self.assert_works("--version"), r"^egosgm \d+\.\d+\.\d+\n$")
 
+    def test_starts_without_the_libraries_that_read_videos_and_open_windows(self):
+        loaded = subprocess.run([PROGRAM], env={**os.environ, "LD_TRACE_LOADED_OBJECTS": "1"}, capture_output=True, text=True, check=True).stdout
+        if "libegosgm_vision" not in loaded:
+            self.skipTest("the program is linked with static libraries")
+        self.assertNotRegex(loaded, "opencv_(highgui|imgcodecs|videoio)")
+
     def complete(self, *words):
         """What bash offers after these words."""
         script = self.new_folder() / "completion.bash"
