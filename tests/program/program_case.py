@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of the program from outside share.
 
-EGOSGM_PROGRAM names the program, EGOSGM_FORKING_PROGRAM the one that is loaded once for all commands (forking_program.cpp; empty: each
-starts EGOSGM_PROGRAM), EGOSGM_EXAMPLES the folder of the examples; EGOSGM_DATA the folder of real data (tests that need it are skipped without).
+EGOSGM_PROGRAM names the program, EGOSGM_EXAMPLES the folder of the examples; EGOSGM_DATA the folder of real data (tests that need it are skipped
+without).
 """
-import atexit
 import fcntl
 import json
 import os
@@ -17,7 +16,6 @@ import unittest
 import zlib
 
 PROGRAM = os.environ["EGOSGM_PROGRAM"]
-FORKING = os.environ.get("EGOSGM_FORKING_PROGRAM", "")
 EXAMPLES = pathlib.Path(os.environ.get("EGOSGM_EXAMPLES", ""))
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = os.environ.get("EGOSGM_DATA", "")
@@ -25,45 +23,12 @@ WIDTH, HEIGHT, FRAMES = 320, 96, 4
 F_SETPIPE_SZ = 1031  # fcntl has it since Python 3.10
 
 
-class LoadedProgram:
-    """Runs commands: loading the program takes longer than most of them, so it is loaded once."""
-
-    def __init__(self):
-        self.holder = tempfile.TemporaryDirectory(prefix="egosgm_loaded_")
-        self.files = [pathlib.Path(self.holder.name) / name for name in ("output", "errors")]
-        self.process = subprocess.Popen([FORKING, *self.files], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        atexit.register(self.close)
-
-    def __call__(self, words, cwd):
-        words = [str(word) for word in words]
-        self.process.stdin.write(b"".join(os.fsencode(word) + b"\0" for word in [str(cwd), str(len(words)), *words]))
-        self.process.stdin.flush()
-        code = int(self.process.stdout.readline())
-        return subprocess.CompletedProcess(words, code, *(file.read_text(errors="replace") for file in self.files))
-
-    def close(self):
-        self.process.communicate()
-        self.holder.cleanup()
-
-
-loaded = None
-
-
 def egosgm(*arguments, cwd=None, **options):
-    """Runs the program; one of its own where `options` has more to say of the process, or its output is to be a pipe. A line on the standard
-    error that comes where the driver's cache is empty is left out."""
-    done = run(arguments, cwd, options)
+    """Runs the program. A line on the standard error that comes where the driver's cache is empty is left out."""
+    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=600, cwd=cwd, **options)
     if isinstance(done.stderr, str):
         done.stderr = "".join(line for line in done.stderr.splitlines(True) if not line.startswith("egosgm: compiling the kernels for "))
     return done
-
-
-def run(arguments, cwd, options):
-    global loaded
-    if options or not FORKING or any(str(word).startswith("/dev/") for word in arguments):
-        return subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=600, cwd=cwd, **options)
-    loaded = loaded or LoadedProgram()
-    return loaded(arguments, cwd or os.getcwd())
 
 
 def png(width, height, depth, rows, palette=b""):
