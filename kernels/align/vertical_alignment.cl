@@ -10,9 +10,10 @@
 // order does not matter.
 #include "grey.h"
 #include "method.h"
+#include "pixels.h"
 
-// lint: PIXEL_BYTES=1 ROW_GROUP=1
-// lint: PIXEL_BYTES=2 ROW_GROUP=64
+// lint: PIXEL_BYTES=1 ROW_GROUP=1 PIXELS=16
+// lint: PIXEL_BYTES=2 ROW_GROUP=64 PIXELS=1
 
 #ifndef ROW_GROUP
 #error "ROW_GROUP: work-items that share a row"
@@ -32,33 +33,43 @@ typedef uint Weight;
 #define rounded_to_8_bit(value) (((value) + 128) >> 8)
 #endif
 
-// As `nearest` has it of blocks of pixels.
-static inline float nearest_whole(const float value) {
-  const float shift = 12582912.0f;  // 1.5 * 2^23
-  return (value + shift) - shift;
-}
+#if PIXELS == 1
+typedef long Longs;
+#define LONGS_OF_INTS convert_long
+#else
+typedef long16 Longs;
+#define LONGS_OF_INTS convert_long16
+#endif
 
 // Rows are resampled in 256ths of a pixel, columns read in 16ths.
 #define ROW_STEPS 256
-#define COLUMN_STEPS 16
+#define COLUMN_BITS 4
+#define COLUMN_STEPS (1 << COLUMN_BITS)
 #define COLUMNS 16
-// Pixels of a work-item: lanes that share a row take neighbours.
-#if ROW_GROUP == 1
-#define AT_ONCE COLUMNS
-#else
+// Pixels of a work-item: lanes that share a row take neighbours, others as many blocks of COLUMNS as there are lanes.
+#if PIXELS == 1
 #define AT_ONCE 1
+#else
+#define AT_ONCE (PIXELS * COLUMNS)
 #endif
 #define PLACES_BITS 8
 #define PLACES (1 << PLACES_BITS)  // from the middle of the image to its end
 
-inline float bounded(const float offset_px) { return clamp(offset_px, -EGOSGM_MAX_OFFSET_PX, EGOSGM_MAX_OFFSET_PX); }
+static inline float bounded(const float offset_px) {
+  return clamp(offset_px, -EGOSGM_MAX_OFFSET_PX, EGOSGM_MAX_OFFSET_PX);
+}
 
-inline int clamp_row(const int y, const int height) { return clamp(y, 0, height - 1); }
+#define LANE(lanes, i) ((const int*)&(lanes))[i]
 
 // Where among `count` rows or columns, in `steps` from the middle to either end.
-inline int place(const int at, const int count, const int steps) {
-  return (int)nearest_whole((float)(2 * at + 1 - count) * ((float)steps / (float)count));
+static inline Ints places(const Ints at, const int count, const int steps) {
+  return INTS_OF_FLOATS(nearest(FLOATS_OF_INTS(2 * at + 1 - count) * ((float)steps / (float)count)));
 }
+#if PIXELS == 1
+#define place places
+#else
+static inline int place(const int at, const int count, const int steps) { return places(at, count, steps).s0; }
+#endif
 
 // Copies the left image, and resamples the right one by the quadratic state[0] + state[1] u + state[2] v + state[3] u v
 // + state[4] u^2 + state[5] v^2 pixels; u, v: -1 to 1 over the image. A work-group of ROW_GROUP a row and view.
@@ -66,7 +77,6 @@ COMPILED_ONCE void resample_row(const WorkItem at, const ImageSize size, global 
                                 global const uchar* images, global uchar* aligned) {
   const int y = at.y;
   const int view = at.view;
-  const int is_moved = view == EGOSGM_RIGHT;
   const float v = (float)place(y, size.height, PLACES) / PLACES;
   const float constant_term = (state[0] + state[2] * v) + state[5] * (v * v);
   const float linear_term = state[1] + state[3] * v;
@@ -74,29 +84,35 @@ COMPILED_ONCE void resample_row(const WorkItem at, const ImageSize size, global 
   const size_t first = (size_t)view * size.height * size.width;
   global const Pixel* from = (global const Pixel*)images + first;
   global Pixel* to = (global Pixel*)aligned + first + (size_t)y * size.width;
+  const Floats most = EGOSGM_MAX_OFFSET_PX;
 
   // One offset for COLUMNS columns: on KITTI it changes by less than a 20th of a pixel over them.
   for (int x = at.x * AT_ONCE; x < size.width; x += ROW_GROUP * AT_ONCE) {
-    const float u = (float)place(x / COLUMNS * COLUMNS + COLUMNS / 2, size.width, PLACES) / PLACES;
-    const float dy = bounded(constant_term + (linear_term + square_term * u) * u);
-    const int offset = is_moved ? (int)nearest_whole(dy * ROW_STEPS) : 0;
-    const int above = y + (offset >> 8);
-    const Weight weight = offset & (ROW_STEPS - 1);
-    global const Pixel* upper = from + (size_t)clamp_row(above, size.height) * size.width;
-    global const Pixel* lower = from + (size_t)clamp_row(above + 1, size.height) * size.width;
-#if AT_ONCE > 1
-    if (x + COLUMNS <= size.width) {
-      Pixels pixels = load_grey(upper + x);
-      if (weight != 0) {
-        const Wide sum = load_wide(upper + x) * (Wide)(ROW_STEPS - weight) + load_wide(lower + x) * (Wide)(weight);
-        pixels = convert_pixels((sum + (Wide)(ROW_STEPS / 2)) >> (Wide)(8));
-      }
-      ((global PackedPixels*)(to + x))->pixels = pixels;
-      continue;
+    const Ints middle = (x / COLUMNS + LANE_INDICES) * COLUMNS + COLUMNS / 2;
+    const Floats u = FLOATS_OF_INTS(places(middle, size.width, PLACES)) / PLACES;
+    const Floats dy = constant_term + (linear_term + square_term * u) * u;
+    const Floats bounded_dy = dy < -most ? -most : dy > most ? most : dy;
+    const Ints moved = INTS_OF_FLOATS(nearest(bounded_dy * ROW_STEPS));
+    const Ints offset = view == EGOSGM_RIGHT ? moved : (Ints)(0);
+    const Ints weights = offset & (ROW_STEPS - 1);
+    const Ints above = y + (offset >> 8), last_row = size.height - 1;
+    const Ints uppers = min(max(above, (Ints)(0)), last_row) * size.width;
+    const Ints lowers = min(max(above + 1, (Ints)(0)), last_row) * size.width;
+    const int end = min(x + AT_ONCE, size.width);
+    int block = 0;
+#if PIXELS > 1
+    for (; x + (block + 1) * COLUMNS <= end; ++block) {
+      const int column = x + block * COLUMNS;
+      const Weight weight = LANE(weights, block);
+      const Wide sum = load_wide(from + LANE(uppers, block) + column) * (Wide)(ROW_STEPS - weight) +
+                       load_wide(from + LANE(lowers, block) + column) * (Wide)(weight);
+      ((global PackedPixels*)(to + column))->pixels = convert_pixels((sum + (Wide)(ROW_STEPS / 2)) >> (Wide)(8));
     }
 #endif
-    for (int i = x; i < min(x + AT_ONCE, size.width); ++i) {
-      to[i] = ((uint)upper[i] * (ROW_STEPS - weight) + (uint)lower[i] * weight + ROW_STEPS / 2) >> 8;
+    for (int i = x + block * COLUMNS; i < end; ++i) {
+      const uint upper = from[LANE(uppers, block) + i], lower = from[LANE(lowers, block) + i];
+      const uint weight = LANE(weights, block);
+      to[i] = (upper * (ROW_STEPS - weight) + lower * weight + ROW_STEPS / 2) >> 8;
     }
   }
 }
@@ -123,57 +139,93 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
 #define COUNT (GR_SUMS + GG_SUMS)
 #define SUMS (COUNT + 1)
 
-// Adds to them what the pixels at a place have together.
-static inline void add_at(const int place_u, long gr, long gg, long sums[SUMS]) {
-  for (int n = 0; n < GR_SUMS; ++n, gr *= place_u) sums[n] += gr;
-  for (int n = 0; n < GG_SUMS; ++n, gg *= place_u) sums[GR_SUMS + n] += gg;
+// Every EGOSGM_ALIGNED_COLUMN_STRIDE-th value of a row from x on; where the row ends, its last one.
+#if EGOSGM_ALIGNED_COLUMN_STRIDE != 2
+#error "samples are the even lanes"
+#endif
+#define SAMPLE_INDICES (EGOSGM_ALIGNED_COLUMN_STRIDE * LANE_INDICES)
+#if PIXELS == 1
+static inline Floats sampled_disparities(global const float* row, const int x, const int width) { return row[x]; }
+static inline Ints sampled_greys(global const Pixel* row, const int x, const int width) { return row[x]; }
+#else
+AT_EDGE Floats sampled_disparities_at_edge(global const float* row, const int x, const int width) {
+  return gather(row, min(x + SAMPLE_INDICES, (Ints)(width - 1)));
+}
+AT_EDGE Ints sampled_greys_at_edge(global const Pixel* row, const int x, const int width) {
+  const Ints columns = min(x + SAMPLE_INDICES, (Ints)(width - 1));
+  return GATHERED(Ints, row, columns);
+}
+static inline Floats sampled_disparities(global const float* row, const int x, const int width) {
+  if (x + 2 * PIXELS > width) return sampled_disparities_at_edge(row, x, width);
+  return (Floats)(vload16(0, row + x).even, vload16(0, row + x + PIXELS).even);
+}
+static inline Ints sampled_greys(global const Pixel* row, const int x, const int width) {
+  if (x + 2 * PIXELS > width) return sampled_greys_at_edge(row, x, width);
+  return convert_int16((Pixels)(load_grey(row + x).even, load_grey(row + x + PIXELS).even));
+}
+#endif
+
+// The grey values between columns u and u + 1, times COLUMN_STEPS.
+static inline Ints between(global const Pixel* row, const Ints u, const Ints after) {
+  return (COLUMN_STEPS - after) * GATHERED(Ints, row, u) + after * GATHERED(Ints, row + 1, u);
 }
 
-// What every ROW_GROUP-th sample of row y from that of `lane` on gives.
+static inline long sum_of_lanes(const Longs lanes) {
+#if PIXELS == 1
+  return lanes;
+#else
+  const long8 halves = lanes.lo + lanes.hi;
+  const long4 quarters = halves.lo + halves.hi;
+  return quarters.x + quarters.y + quarters.z + quarters.w;
+#endif
+}
+
+// What every ROW_GROUP-th sample of row y from that of `lane` on gives, or blocks of PIXELS samples.
 COMPILED_ONCE void sum_row_residuals(const ImageSize size, const int y, const int lane, global const uchar* images,
                                      global const float* disparity, long row_sums[SUMS]) {
-  long sums[SUMS] = {0};
-  long gr_here = 0, gg_here = 0;  // of the last pixels, which have one place
-  int here = 0;
-  const size_t width = size.width;
-  const float last = (float)(COLUMN_STEPS * (size.width - 2));
+  Longs sums[SUMS];
+  for (int n = 0; n < SUMS; ++n) sums[n] = 0;
+  const int width = size.width;
   const size_t row = (size_t)y * width;
   global const Pixel* left = (global const Pixel*)images + row;
-  global const Pixel* right = (global const Pixel*)images + width * size.height + row;
-  for (int x = lane * EGOSGM_ALIGNED_COLUMN_STRIDE; x < size.width; x += ROW_GROUP * EGOSGM_ALIGNED_COLUMN_STRIDE) {
-    const float d = disparity[row + x];
-    const float at = ((float)x - d) * COLUMN_STEPS;
+  global const Pixel* right = (global const Pixel*)images + (size_t)width * size.height + row;
+  const Floats zero = 0.0f;
+  const Floats last = COLUMN_STEPS * (width - 2);
+  const Ints no = 0;
+  const Ints most = MAX_RESIDUAL;
+  const int step = EGOSGM_ALIGNED_COLUMN_STRIDE * PIXELS;
+  for (int x = lane * step; x < width; x += ROW_GROUP * step) {
+    const Ints column = x + SAMPLE_INDICES;
+    const Floats d = sampled_disparities(disparity + row, x, width);
+    const Floats at = (FLOATS_OF_INTS(column) - d) * COLUMN_STEPS;
     // Asked of the float, with comparisons that NaN fails, before it becomes an integer.
-    const int inside = (d > EGOSGM_INVALID_DISPARITY) & (at >= 0.0f) & (at <= last);
-    if (!inside) continue;
-    const uint position = (uint)nearest_whole(at);
-    const size_t u = position / COLUMN_STEPS;
-    const int after = position % COLUMN_STEPS;
-    const int before = COLUMN_STEPS - after;
+    const Ints inside = (column < width) & (d > INVALID) & (at >= zero) & (at <= last);
+    const Ints position = INTS_OF_FLOATS(nearest(inside ? at : zero));
+    const Ints u = position >> COLUMN_BITS;
+    const Ints after = position & (COLUMN_STEPS - 1);
 
-    const int i0 = left[x - width], i1 = left[x], i2 = left[x + width];
-    const int j0 = before * right[u - width] + after * right[u + 1 - width];
-    const int j1 = before * right[u] + after * right[u + 1];
-    const int j2 = before * right[u + width] + after * right[u + 1 + width];
-    const int r = rounded_to_8_bit(COLUMN_STEPS * (i0 + 2 * i1 + i2) - (j0 + 2 * j1 + j2));
-    const int g_left = rounded_to_8_bit(COLUMN_STEPS * (i2 - i0));
-    const int g_right = rounded_to_8_bit(j2 - j0);
-    const int g = g_left + g_right;
-    const int is_textured = abs(g) >= MIN_GRADIENT;
-    const int is_inlier = is_textured & (abs(r) < MAX_RESIDUAL);
-    const int place_u = place((int)u, size.width, COARSE_PLACES);
-    if (place_u != here) {
-      add_at(here, gr_here, gg_here, sums);
-      gr_here = 0;
-      gg_here = 0;
-      here = place_u;
+    const Ints i0 = sampled_greys(left - width, x, width), i1 = sampled_greys(left, x, width),
+               i2 = sampled_greys(left + width, x, width);
+    const Ints j0 = between(right - width, u, after), j1 = between(right, u, after),
+               j2 = between(right + width, u, after);
+    const Ints r = rounded_to_8_bit(COLUMN_STEPS * (i0 + 2 * i1 + i2) - (j0 + 2 * j1 + j2));
+    const Ints g_left = rounded_to_8_bit(COLUMN_STEPS * (i2 - i0));
+    const Ints g_right = rounded_to_8_bit(j2 - j0);
+    const Ints g = g_left + g_right;
+    const Ints is_textured = inside & (max(g, -g) >= MIN_GRADIENT);
+    const Ints is_inlier = is_textured & (max(r, -r) < most);
+    const Longs gr = LONGS_OF_INTS(is_textured ? g * min(max(r, -most), most) : no);
+    const Longs gg = LONGS_OF_INTS(is_inlier ? 4 * g_left * g_right : no);  // each is half of what g is
+    const Ints place_u = places(u, width, COARSE_PLACES);
+    Ints power = 1;
+#pragma unroll
+    for (int n = 0; n < GG_SUMS; ++n, power *= place_u) {
+      if (n < GR_SUMS) sums[n] += gr * LONGS_OF_INTS(power);
+      sums[GR_SUMS + n] += gg * LONGS_OF_INTS(power);
     }
-    gr_here += is_textured ? g * clamp(r, -MAX_RESIDUAL, MAX_RESIDUAL) : 0;
-    gg_here += is_inlier ? 4 * g_left * g_right : 0;  // each is half of what g is
-    sums[COUNT] += is_inlier;
+    sums[COUNT] += LONGS_OF_INTS(is_inlier & (Ints)(1));
   }
-  add_at(here, gr_here, gg_here, sums);
-  for (int n = 0; n < SUMS; ++n) row_sums[n] = sums[n];
+  for (int n = 0; n < SUMS; ++n) row_sums[n] = sum_of_lanes(sums[n]);
 }
 
 KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void sum_residuals(const ImageSize size,
