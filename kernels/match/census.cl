@@ -104,11 +104,20 @@ KERNEL void census(const ImageSize size, const int padding, global const uchar* 
 #define convert_codes convert_ulong16
 #endif
 
+// Writes the codes of pixels x .. x + 15 of a row, the right view's from right to left.
+static inline void write_codes(const Codes codes, const int x, const int width, const int view, global Code* row) {
+  if (view == EGOSGM_LEFT) {
+    ((global PackedCodes*)(row + x))->codes = codes;
+  } else {
+    ((global PackedCodes*)(row + width - 16 - x))->codes = codes.sfedcba9876543210;
+  }
+}
+
 #if COMPARISONS == 0
 
 #define AT_ONCE 16
-inline void codes_at(const Rows* rows, const int x, Codes* codes) {
-  *codes = convert_codes(to_8_bit(load_grey(rows->at[RADIUS_Y] + x)));
+inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
+  write_codes(convert_codes(to_8_bit(load_grey(rows->at[RADIUS_Y] + x))), x, width, view, row);
 }
 
 #else
@@ -151,7 +160,7 @@ inline uint16 joined_bytes(const uchar16 b0, const uchar16 b1, const uchar16 b2,
 #define WHOLE(bytes) (bytes)
 
 // Where no column needs clamping. Bits are put into bytes: compilers keep these in narrow vectors.
-inline void codes_at(const Rows* rows, const int x, Codes* codes) {
+inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
   const Greys centre = load_greys(rows->at[RADIUS_Y] + x);
   Bytes bytes[CODE_BYTES];
 #pragma unroll
@@ -166,10 +175,10 @@ inline void codes_at(const Rows* rows, const int x, Codes* codes) {
   for (int byte = 0; byte < 4; ++byte) bytes[byte + 4] = bytes[byte];
 #endif
 #if AT_ONCE == 32
-  codes[0] = JOINED(FIRST_VECTOR, bytes);
-  codes[1] = JOINED(SECOND_VECTOR, bytes);
+  write_codes(JOINED(FIRST_VECTOR, bytes), x, width, view, row);
+  write_codes(JOINED(SECOND_VECTOR, bytes), x + 16, width, view, row);
 #else
-  codes[0] = JOINED(WHOLE, bytes);
+  write_codes(JOINED(WHOLE, bytes), x, width, view, row);
 #endif
 }
 
@@ -194,26 +203,22 @@ COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int
     const bool inside = last_block >= RADIUS_X && x >= RADIUS_X && x < width - RADIUS_X;
     if (inside) {
       const int first = min(x, last_block);
-      Codes codes[AT_ONCE / 16];
-      codes_at(&rows, first, codes);
-#pragma unroll
-      for (int i = 0; i < AT_ONCE / 16; ++i) {
-        const int at = first + 16 * i;
-        if (view == EGOSGM_LEFT) {
-          ((global PackedCodes*)(row + at))->codes = codes[i];
-        } else {
-          ((global PackedCodes*)(row + width - 16 - at))->codes = codes[i].sfedcba9876543210;
-        }
-      }
+      write_codes_at(&rows, first, width, view, row);
       x += first - x + AT_ONCE;
     } else {
       row[view == EGOSGM_LEFT ? x : width - 1 - x] = code_at(width, &rows, x);
       x += 1;
     }
   }
-  for (int i = 1; i <= padding; ++i) {
-    row[-i] = row[0];
-    row[width - 1 + i] = row[width - 1];
+  const Codes first = row[0], last = row[width - 1];
+  int i = 0;
+  for (; i + 16 <= padding; i += 16) {
+    ((global PackedCodes*)(row - 16 - i))->codes = first;
+    ((global PackedCodes*)(row + width + i))->codes = last;
+  }
+  for (; i < padding; ++i) {
+    row[-1 - i] = row[0];
+    row[width + i] = row[width - 1];
   }
 }
 
