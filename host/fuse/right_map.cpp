@@ -9,9 +9,9 @@ ocl::Program& build(ocl::Context& context, int pixels) {
   return context.program("right_map.cl", ocl::Defines().set("PIXELS", pixels));
 }
 
-// Rows of whole blocks.
+// Rows of whole blocks, with a place behind the image.
 std::size_t key_count(shared::ImageSize size, int pixels) {
-  return pixel_count({(size.width + pixels - 1) / pixels * pixels, size.height});
+  return pixel_count({(size.width / pixels + 1) * pixels, size.height});
 }
 
 }  // namespace

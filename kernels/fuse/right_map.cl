@@ -12,10 +12,8 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-// Rows of keys are whole blocks.
-static inline size_t key_row(const int y, const int width) {
-  return (size_t)y * ((width + PIXELS - 1) / PIXELS * PIXELS);
-}
+// Rows of keys are whole blocks, with a place behind the image for what lands nowhere.
+static inline size_t key_row(const int y, const int width) { return (size_t)y * ((width / PIXELS + 1) * PIXELS); }
 
 static inline Ints load_keys(global const int* keys) {
 #if PIXELS == 1
@@ -25,16 +23,23 @@ static inline Ints load_keys(global const int* keys) {
 #endif
 }
 
-// 0 bids nothing. On CPUs no branch asks for it, which holes would make mispredict.
-static inline void bid(const Ints keys, const Ints targets, global int* row) {
-#if PIXELS == 1
-  if (keys != 0) atomic_max(&row[targets], keys);
-#else
-  int key[PIXELS], target[PIXELS];
-  vstore16(keys, 0, key);
-  vstore16(targets, 0, target);
-  for (int i = 0; i < PIXELS; ++i) row[target[i]] = max(row[target[i]], key[i]);
-#endif
+typedef struct {
+  Ints keys, targets;  // where it lands nowhere 0 and `width`
+} Bids;
+
+static inline Bids bids_of(const int width, const int min_disparity, const int x, const Floats d) {
+  const Floats zero = 0.0f;
+  const Floats least = 1.0f;
+  const Floats most = 2147483520.0f;  // the largest below 2^31
+  // Asked of the floats, with comparisons that NaN fails, before they become integers.
+  const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) - d);
+  const Ints lands = (d > INVALID) & (at >= zero) & (at < (Floats)(width));
+  const Floats steps = (d - (float)min_disparity + 1.0f) * EGOSGM_RIGHT_MAP_STEPS_PER_PX;
+  const Floats above = steps > least ? steps : least;
+  Bids bids;
+  bids.keys = lands ? INTS_OF_FLOATS(above < most ? above : most) : (Ints)(0);
+  bids.targets = INTS_OF_FLOATS(lands ? at : (Floats)(width));
+  return bids;
 }
 
 // REQUIRES: on GPUs, keys of 0.
@@ -45,22 +50,24 @@ COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const int 
   const size_t row = (size_t)y * width;
   global int* bids = keys + key_row(y, width);
 #if PIXELS > 1
-  for (int x = 0; x < width; x += PIXELS) vstore16((int16)(0), 0, bids + x);
+  for (int x = 0; x <= width; x += PIXELS) ((global PackedInts*)(bids + x))->lanes = 0;
 #endif
 
   FOR_PIXELS(x, width) {
-    const Floats d = load_pixels(disparity + row, x, width);
-    const Floats zero = 0.0f;
-    const Floats least = 1.0f;
-    const Floats most = 2147483520.0f;  // the largest below 2^31
-    // Asked of the floats, with comparisons that NaN fails, before they become integers.
-    const Floats here = FLOATS_OF_INTS(x + LANE_INDICES);
-    const Floats at = nearest(here - d);
-    const Ints lands = (d > INVALID) & (at >= zero) & (at < (Floats)(width));
-    const Floats steps = (d - (float)min_disparity + 1.0f) * EGOSGM_RIGHT_MAP_STEPS_PER_PX;
-    const Floats above = steps > least ? steps : least;
-    const Ints key = INTS_OF_FLOATS(above < most ? above : most);
-    bid(lands ? key : (Ints)(0), INTS_OF_FLOATS(lands ? at : here), bids);
+    const Bids own = bids_of(width, min_disparity, x, load_pixels(disparity + row, x, width));
+#if PIXELS == 1
+    if (own.keys != 0) atomic_max(&bids[own.targets], own.keys);
+#else
+    // Of those that land on a pixel, each but the one to its left is smaller by half a pixel at least: written from left
+    // to right, the last one is the largest.
+    const Bids left = bids_of(width, min_disparity, x - 1, load_pixels(disparity + row, x - 1, width));
+    const Ints larger = own.targets == left.targets ? max(own.keys, left.keys) : own.keys;
+    int key[PIXELS], target[PIXELS];
+    ((PackedInts*)key)->lanes = larger;
+    ((PackedInts*)target)->lanes = own.targets;
+#pragma unroll
+    for (int i = 0; i < PIXELS; ++i) bids[target[i]] = key[i];
+#endif
   }
 }
 

@@ -117,6 +117,19 @@ TEST(RightMap, TakesTheNearestWhicheverComesLast) {
   EXPECT_EQ(right_row(falling, Row(5, kNone)).disparity, (Row{2, kNone, kNone, kNone, kNone}));
 }
 
+TEST(RightMap, TakesTheLargerOfNeighboursThatRoundingBringsTogether) {
+  // 999.5 - 2^-16 is rounded to 999.5, and so comes to 1000 as the farther 1000.5 to its right does.
+  constexpr int kWidth = 1024;
+  const Row none(2 * kWidth, kNone), variance(2 * kWidth, 1);
+  testing::HostMaps maps{none, variance};
+  maps.disparity[1004] = 4.5f + 0x1p-16f;
+  maps.disparity[1005] = 4.5f;
+  for (const int pixels : {1, 16}) {
+    const testing::HostMaps found = right_map({kWidth, 1}, {0, 64}, 0, {none, variance}, maps, pixels);
+    EXPECT_EQ(found.disparity[kWidth + 1000], 4.5f + 0x1p-16f) << pixels;
+  }
+}
+
 TEST(RightMap, KnowsNegativeDisparities) {
   EXPECT_EQ(right_row({kNone, -2, kNone, -3.5f, kNone, kNone, kNone, kNone}, Row(8, kNone), -3).disparity,
             (Row{kNone, kNone, kNone, -2, kNone, kNone, kNone, kNone}))
