@@ -58,8 +58,8 @@ COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const int 
 #if PIXELS == 1
     if (own.keys != 0) atomic_max(&bids[own.targets], own.keys);
 #else
-    // Of those that land on a pixel, each but the one to its left is smaller by half a pixel at least: written from left
-    // to right, the last one is the largest.
+    // Of what lands on a pixel, that of two pixels or more to the left is smaller: written from left to right, what
+    // comes last is the nearest.
     const Bids left = bids_of(width, min_disparity, x - 1, load_pixels(disparity + row, x - 1, width));
     const Ints larger = own.targets == left.targets ? max(own.keys, left.keys) : own.keys;
     int key[PIXELS], target[PIXELS];
