@@ -16,6 +16,9 @@
 #error "bands are written as words: a little-endian device"
 #endif
 
+// So many times BLOCKS at once: less of a row at a time would cost as long a wait for memory.
+#define GATHERED_AT_ONCE (PIXELS == 1 ? 1 : 8)
+
 // A work-item BLOCKS blocks and view, or a row of blocks and view.
 KERNEL void gather_blocks(const ImageSize size, global const float* disparity, global BlockRange* ranges) {
   const WorkItem at = THIS_WORK_ITEM;
@@ -23,19 +26,28 @@ KERNEL void gather_blocks(const ImageSize size, global const float* disparity, g
   const int y = at.y;
   const int view = at.view;
   const int end = min((y + 1) * EGOSGM_BLOCK, size.height);
-  for (int x = at.x * BLOCKS; x < blocks.width; x += at.items * BLOCKS) {
-    Spans spans = no_spans();
+  for (int x = at.x * BLOCKS * GATHERED_AT_ONCE; x < blocks.width; x += at.items * BLOCKS * GATHERED_AT_ONCE) {
+    Spans spans[GATHERED_AT_ONCE];
+#pragma unroll
+    for (int i = 0; i < GATHERED_AT_ONCE; ++i) spans[i] = no_spans();
     for (int row = y * EGOSGM_BLOCK; row < end; ++row) {
-      spans = with(spans, load_across(disparity + ((size_t)view * size.height + row) * size.width, x * EGOSGM_BLOCK,
-                                      size.width));
+      global const float* of_row = disparity + ((size_t)view * size.height + row) * size.width;
+#pragma unroll
+      for (int i = 0; i < GATHERED_AT_ONCE; ++i) {
+        spans[i] = with(spans[i], load_across(of_row, (x + BLOCKS * i) * EGOSGM_BLOCK, size.width));
+      }
     }
     global BlockRange* to = ranges + index_of(blocks, view, x, y);
+#pragma unroll
+    for (int i = 0; i < GATHERED_AT_ONCE; ++i) {
 #if BLOCKS == 1
-    to[0] = range_of(spans.least, spans.most, spans.count);
+      to[i] = range_of(spans[i].least, spans[i].most, spans[i].count);
 #else
-    to[0] = range_of(spans.least.lo, spans.most.lo, spans.count.lo);
-    if (x + 1 < blocks.width) to[1] = range_of(spans.least.hi, spans.most.hi, spans.count.hi);
+      const int left = blocks.width - x - BLOCKS * i;
+      if (left > 0) to[2 * i] = range_of(spans[i].least.lo, spans[i].most.lo, spans[i].count.lo);
+      if (left > 1) to[2 * i + 1] = range_of(spans[i].least.hi, spans[i].most.hi, spans[i].count.hi);
 #endif
+    }
   }
 }
 
@@ -58,6 +70,7 @@ COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, 
   // Of each column the outermost ones, then of all four.
   float4 least[EGOSGM_COARSE_OUTLIERS + 1];  // in rising order
   float4 most[EGOSGM_COARSE_OUTLIERS + 1];   // in falling order
+#pragma unroll
   for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
     least[i] = INFINITY;
     most[i] = -INFINITY;
@@ -70,10 +83,12 @@ COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, 
     insert_least(least, valid ? d : INFINITY);
     insert_most(most, valid ? d : -INFINITY);
   }
+#pragma unroll
   for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
     // The other columns go to lane 0, which alone is read then.
     float4 low = least[i];
     float4 high = most[i];
+#pragma unroll
     for (int lane = 1; lane < 4; ++lane) {
       low = low.yzwx;
       high = high.yzwx;

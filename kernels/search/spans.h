@@ -78,6 +78,7 @@ BlockRange joined(const BlockRange a, const BlockRange b) {
 
 // Keeps the EGOSGM_COARSE_OUTLIERS + 1 least values of each lane, in rising order; the most, in falling order.
 void insert_least(float4* least, float4 value) {
+#pragma unroll
   for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
     const float4 before = least[i];
     least[i] = value < before ? value : before;
@@ -85,6 +86,7 @@ void insert_least(float4* least, float4 value) {
   }
 }
 void insert_most(float4* most, float4 value) {
+#pragma unroll
   for (int i = 0; i <= EGOSGM_COARSE_OUTLIERS; ++i) {
     const float4 before = most[i];
     most[i] = value > before ? value : before;
