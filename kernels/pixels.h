@@ -32,6 +32,18 @@ typedef uint16 Uints;
 // The blocks of PIXELS pixels of a row that the work-item `at` takes: all of them where it has the row alone, else one.
 #define FOR_PIXELS(x, width) for (int x = at.x * PIXELS; x < (width); x += at.items * PIXELS)
 
+// What is long is done in several loops over a chunk of blocks each: a CPU has many turns of a short loop under way,
+// but hardly two of a long one, whose instructions wait for each other.
+#if PIXELS == 1
+#define CHUNK 1
+#else
+#define CHUNK 8
+#endif
+#define FOR_CHUNKS(start, width) \
+  for (int start = at.x * PIXELS * CHUNK; start < (width); start += at.items * PIXELS * CHUNK)
+// Block `i` of the chunk, which begins at column x.
+#define FOR_BLOCKS(x, i, start, width) for (int i = 0, x = start; i < CHUNK && x < (width); ++i, x += PIXELS)
+
 #define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
 
 // What conditions count as; and whether one holds in any pixel, for what most blocks need not do. any() asks lane by

@@ -206,24 +206,25 @@ COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, cons
   for (int y = 0; y < size.height; ++y) {
     if (spans[2 * (rows + y)] >= end || spans[2 * (rows + y) + 1] < first) continue;
     const size_t row = (rows + y) * width;
-    for (int x = 0; x < width; x += PIXELS) {
-      const Floats d = load_pixels(disparity + row, x, width);
-      const Floats p = load_pixels(variance + row, x, width);
-      const Moved moved = move_pixels(size, range, motion, process_noise, x, y, d, p);
-      const Ints lands = moved.lands & (moved.y >= (Ints)(first)) & (moved.y < (Ints)(end));
-      int targets[PIXELS];
-      float disparities[PIXELS];
-      float variances[PIXELS];
-      vstore16(lands ? (moved.y - first) * width + moved.x : (Ints)(-1), 0, targets);
-      vstore16(moved.disparity, 0, disparities);
-      vstore16(moved.variance, 0, variances);
-      for (int i = 0; i < PIXELS; ++i) {
-        const int target = targets[i];
+    for (int start = 0; start < width; start += PIXELS * CHUNK) {
+      Ints targets[CHUNK];
+      Floats disparities[CHUNK], variances[CHUNK];
+      FOR_BLOCKS(x, i, start, width) {
+        const Floats d = load_pixels(disparity + row, x, width);
+        const Floats p = load_pixels(variance + row, x, width);
+        const Moved moved = move_pixels(size, range, motion, process_noise, x, y, d, p);
+        const Ints lands = moved.lands & (moved.y >= (Ints)(first)) & (moved.y < (Ints)(end));
+        targets[i] = lands ? (moved.y - first) * width + moved.x : (Ints)(-1);
+        disparities[i] = moved.disparity;
+        variances[i] = moved.variance;
+      }
+      for (int i = 0; i < min(PIXELS * CHUNK, width - start); ++i) {
+        const int target = ((const int*)targets)[i];
         if (target < 0) continue;
-        const float winner = band[target];
-        if (disparities[i] > winner || (disparities[i] == winner && variances[i] > band_variance[target])) {
-          band[target] = disparities[i];
-          band_variance[target] = variances[i];
+        const float d = ((const float*)disparities)[i], p = ((const float*)variances)[i];
+        if (d > band[target] || (d == band[target] && p > band_variance[target])) {
+          band[target] = d;
+          band_variance[target] = p;
         }
       }
     }

@@ -12,6 +12,11 @@ typedef struct {
 static inline Ints floor_to(const Ints step, const Ints lane) { return lane & ~(step - 1); }
 static inline Ints ceil_to(const Ints step, const Ints lane) { return floor_to(step, lane + (step - 1)); }
 
+#define LANES_BITS 3
+#if EGOSGM_LANES != 1 << LANES_BITS
+#error "LANES_BITS: the logarithm of EGOSGM_LANES"
+#endif
+
 // Rounds down what fits, in instructions that every device has.
 static inline Ints floor_int(const Floats value) {
   const Ints towards_zero = INTS_OF_FLOATS(value);
@@ -32,22 +37,19 @@ static inline Bands bands_of(const DisparityRange range, Floats from, Floats to)
   const Ints begin = floor_int(from) - range.min;
   const Ints end = 1 - floor_int(-to) - range.min;
   const Ints has_one = end - begin <= EGOSGM_LANES;
-  Ints pairs = (end - begin + (2 * EGOSGM_LANES - 1)) / (2 * EGOSGM_LANES);
-  pairs = ceil_to(EGOSGM_BAND_STEP, end - pairs * (2 * EGOSGM_LANES)) > floor_to(EGOSGM_BAND_STEP, begin) ? pairs + 1
-                                                                                                          : pairs;
-  const Ints chunks = has_one ? (Ints)(1) : 2 * pairs;
-  const Ints step = has_one ? (Ints)(1) : (Ints)(EGOSGM_BAND_STEP);
+  const Ints step = EGOSGM_BAND_STEP;
+  const Ints in_steps = ceil_to(step, end) - floor_to(step, begin);
+  const Ints lanes = has_one ? (Ints)(EGOSGM_LANES) : ceil_to((Ints)(2 * EGOSGM_LANES), in_steps);
+  const Ints own_step = has_one ? (Ints)(1) : step;
 
-  const Ints last_origin = floor_to(step, begin);
-  const Ints lanes = chunks * EGOSGM_LANES;
-  const Ints centred = floor_to(step, begin - (lanes - (end - begin)) / 2);
-  const Ints first_origin = max(ceil_to(step, end - lanes), (Ints)(0));
-  const Ints limit = max(ceil_to(step, range.count) - lanes, (Ints)(0));
-  const Ints origin = max(min(centred, min(last_origin, limit)), first_origin);
+  const Ints centred = floor_to(own_step, begin - ((lanes - (end - begin)) >> 1));
+  const Ints first_origin = max(ceil_to(own_step, end) - lanes, (Ints)(0));
+  const Ints limit = max(ceil_to(own_step, range.count) - lanes, (Ints)(0));
+  const Ints origin = max(min(centred, limit), first_origin);
 
   Bands bands;
   bands.origin = range.min + origin;
-  bands.chunks = chunks;
+  bands.chunks = lanes >> LANES_BITS;
   bands.first = range.min + begin;
   bands.last = range.min + end - 1;
   return bands;
@@ -98,6 +100,19 @@ static inline void store_bands(const Bands bands, global Band* row, const int x,
 }
 
 #if PIXELS > 1
+
+// The chunks of pixels x .. x + PIXELS - 1, 0 behind the row.
+AT_EDGE Ints chunks_at_edge(global const Band* row, const int x, const int width) {
+  int chunks[PIXELS];
+  for (int i = 0; i < PIXELS; ++i) chunks[i] = x + i < width ? row[x + i].chunks : 0;
+  return vload16(0, chunks);
+}
+static inline Ints chunks_at(global const Band* row, const int x, const int width) {
+  if (x + PIXELS > width) return chunks_at_edge(row, x, width);
+  const uint16 low = as_uint16(vload16(0, (global const int*)(row + x))),
+               high = as_uint16(vload16(0, (global const int*)(row + x + EGOSGM_BLOCK)));
+  return as_int16((uint16)(low.even, high.even) >> 16);
+}
 
 // Of a row up to a pixel.
 typedef struct {

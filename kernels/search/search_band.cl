@@ -181,11 +181,16 @@ KERNEL void bands_of_blocks(const ImageSize size, const DisparityRange range, co
                       coarse_ranges, found, bands);
 }
 
+typedef struct {
+  Floats from, to;
+} SearchedRange;
+
 // What PIXELS predictions and what was found in their blocks search.
-static inline Bands bands_of_predictions(const DisparityRange range, const float sigmas, const float min_half_width,
-                                         const float coarse_tolerance, const float coarse_margin, const Floats d,
-                                         const Floats variance, const Floats found_min, const Floats found_max,
-                                         const Ints found_count) {
+static inline SearchedRange range_of_predictions(const DisparityRange range, const float sigmas,
+                                                 const float min_half_width, const float coarse_tolerance,
+                                                 const float coarse_margin, const Floats d, const Floats variance,
+                                                 const Floats found_min, const Floats found_max,
+                                                 const Ints found_count) {
   const Floats deviation = sigmas * sqrt(variance);
   // A variance that is not a number searches everything.
   const Floats half_width = deviation <= min_half_width ? (Floats)(min_half_width) : deviation;
@@ -194,10 +199,26 @@ static inline Bands bands_of_predictions(const DisparityRange range, const float
   const Ints contradicted =
       (found_count > 0) & ((found_min < low - coarse_tolerance) | (found_max > high + coarse_tolerance));
   const Floats found_low = found_min - coarse_margin, found_high = found_max + coarse_margin;
-  const Floats from = (contradicted & (found_low < low)) ? found_low : low;
-  const Floats to = (contradicted & (found_high > high)) ? found_high : high;
-  return bands_of(range, from, to);
+  SearchedRange searched;
+  searched.from = (contradicted & (found_low < low)) ? found_low : low;
+  searched.to = (contradicted & (found_high > high)) ? found_high : high;
+  return searched;
 }
+
+#if ROW_GROUP == 1
+// Sums up a row, and writes where the cells of its pixels begin.
+COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, global const float* disparity,
+                           global const Band* bands, global uint* cell_offsets, global RowSum* row_sums) {
+  const int width = size.width;
+  const size_t row = (size_t)at.view * size.height + at.y;
+  Sums sums = {0, 0};
+  FOR_PIXELS(x, width) {
+    sums = with_offsets(sums, chunks_at(bands + row * width, x, width), load_pixels(disparity + row * width, x, width),
+                        (global uchar*)(cell_offsets + row * width), x, width);
+  }
+  row_sums[row] = row_sum_of(sums);
+}
+#endif
 
 // Work-items that have a row alone sum it up, too. A work-item PIXELS pixels and view, or a row and view.
 COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, const DisparityRange range,
@@ -212,31 +233,30 @@ COMPILED_ONCE void bands_of_pixels_row(const WorkItem at, const ImageSize size, 
   const int width = size.width;
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t row_of_blocks = index_of(blocks, view, 0, y / EGOSGM_BLOCK);
-#if ROW_GROUP == 1
-  Sums sums = {0, 0};
-#endif
-  FOR_PIXELS(x, width) {
-    const Floats d = load_pixels(disparity + row, x, width);
-    const Ints predicted = d > INVALID;
-    global const BlockRange* here = found + row_of_blocks + x / EGOSGM_BLOCK;
-    const Bands own = bands_of_predictions(range, sigmas, min_half_width, coarse_tolerance, coarse_margin,
-                                           predicted ? d : (Floats)(0.0f), load_pixels(variance + row, x, width),
-                                           OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), min),
-                                           OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), max),
-                                           OF_BLOCKS(Ints, int8, here, NEXT_BLOCK(x, blocks.width), count));
-    Bands all = bands_at(block_bands + row_of_blocks, x, blocks.width);
-    all.origin = predicted ? own.origin : all.origin;
-    all.chunks = predicted ? own.chunks : all.chunks;
-    all.first = predicted ? own.first : all.first;
-    all.last = predicted ? own.last : all.last;
-    store_bands(all, bands + row, x, width);
-#if ROW_GROUP == 1
-    const Ints chunks = x + LANE_INDICES < width ? all.chunks : (Ints)(0);
-    sums = with_offsets(sums, chunks, d, (global uchar*)(cell_offsets + row), x, width);
-#endif
+  FOR_CHUNKS(start, width) {
+    SearchedRange own[CHUNK];
+    FOR_BLOCKS(x, i, start, width) {
+      const Floats d = load_pixels(disparity + row, x, width);
+      global const BlockRange* here = found + row_of_blocks + x / EGOSGM_BLOCK;
+      own[i] = range_of_predictions(range, sigmas, min_half_width, coarse_tolerance, coarse_margin,
+                                    d > INVALID ? d : (Floats)(0.0f), load_pixels(variance + row, x, width),
+                                    OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), min),
+                                    OF_BLOCKS(Floats, float8, here, NEXT_BLOCK(x, blocks.width), max),
+                                    OF_BLOCKS(Ints, int8, here, NEXT_BLOCK(x, blocks.width), count));
+    }
+    FOR_BLOCKS(x, i, start, width) {
+      const Ints predicted = load_pixels(disparity + row, x, width) > INVALID;
+      const Bands of_own = bands_of(range, own[i].from, own[i].to);
+      Bands all = bands_at(block_bands + row_of_blocks, x, blocks.width);
+      all.origin = predicted ? of_own.origin : all.origin;
+      all.chunks = predicted ? of_own.chunks : all.chunks;
+      all.first = predicted ? of_own.first : all.first;
+      all.last = predicted ? of_own.last : all.last;
+      store_bands(all, bands + row, x, width);
+    }
   }
 #if ROW_GROUP == 1
-  row_sums[(size_t)view * size.height + y] = row_sum_of(sums);
+  sum_row(at, size, disparity, bands, cell_offsets, row_sums);
 #endif
 }
 
@@ -251,20 +271,10 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
 
 #if ROW_GROUP == 1
 
-// Sums up each row of what was not banded pixel by pixel. A work-item a row and view.
+// What was not banded pixel by pixel. A work-item a row and view.
 KERNEL void sum_rows(const ImageSize size, global const float* disparity, global const Band* bands,
                      global uint* cell_offsets, global RowSum* row_sums) {
-  const WorkItem at = THIS_WORK_ITEM;
-  const int width = size.width;
-  const size_t row = (size_t)at.view * size.height + at.y;
-  Sums sums = {0, 0};
-  FOR_PIXELS(x, width) {
-    int chunks[PIXELS];
-    for (int i = 0; i < PIXELS; ++i) chunks[i] = x + i < width ? bands[row * width + x + i].chunks : 0;
-    sums = with_offsets(sums, vload16(0, chunks), load_pixels(disparity + row * width, x, width),
-                        (global uchar*)(cell_offsets + row * width), x, width);
-  }
-  row_sums[row] = row_sum_of(sums);
+  sum_row(THIS_WORK_ITEM, size, disparity, bands, cell_offsets, row_sums);
 }
 
 #else
