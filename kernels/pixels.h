@@ -59,6 +59,9 @@ static inline int any_of(const Ints condition) {
 #endif
 }
 
+// A lane of a block that lies in memory.
+#define LANE(type, block, lane) (((const type*)&(block))[lane])
+
 // Values of a row at places x, lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of
 // loads that may be joined.
 #if PIXELS == 1
@@ -69,7 +72,16 @@ static inline int any_of(const Ints condition) {
             (row)[(x).s7], (row)[(x).s8], (row)[(x).s9], (row)[(x).sa], (row)[(x).sb], (row)[(x).sc], (row)[(x).sd], \
             (row)[(x).se], (row)[(x).sf]))
 #endif
-static inline Floats gather(volatile global const float* row, const Ints x) { return GATHERED(Floats, row, x); }
+// At places that lie in memory, which are loaded one by one: quicker than to take a vector apart.
+static inline Floats gather(volatile global const float* row, const Ints* places) {
+  const int* x = (const int*)places;
+#if PIXELS == 1
+  return row[x[0]];
+#else
+  return (Floats)(row[x[0]], row[x[1]], row[x[2]], row[x[3]], row[x[4]], row[x[5]], row[x[6]], row[x[7]], row[x[8]],
+                  row[x[9]], row[x[10]], row[x[11]], row[x[12]], row[x[13]], row[x[14]], row[x[15]]);
+#endif
+}
 
 #if PIXELS > 1
 // What a block does where its row begins or ends. Not inlined: inlined at every load and store, it would be most of

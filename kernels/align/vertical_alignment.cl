@@ -59,8 +59,6 @@ static inline float bounded(const float offset_px) {
   return clamp(offset_px, -EGOSGM_MAX_OFFSET_PX, EGOSGM_MAX_OFFSET_PX);
 }
 
-#define LANE(lanes, i) ((const int*)&(lanes))[i]
-
 // Where among `count` rows or columns, in `steps` from the middle to either end.
 static inline Ints places(const Ints at, const int count, const int steps) {
   return INTS_OF_FLOATS(nearest(FLOATS_OF_INTS(2 * at + 1 - count) * ((float)steps / (float)count)));
@@ -103,15 +101,15 @@ COMPILED_ONCE void resample_row(const WorkItem at, const ImageSize size, global 
 #if PIXELS > 1
     for (; x + (block + 1) * COLUMNS <= end; ++block) {
       const int column = x + block * COLUMNS;
-      const Weight weight = LANE(weights, block);
-      const Wide sum = load_wide(from + LANE(uppers, block) + column) * (Wide)(ROW_STEPS - weight) +
-                       load_wide(from + LANE(lowers, block) + column) * (Wide)(weight);
+      const Weight weight = LANE(int, weights, block);
+      const Wide sum = load_wide(from + LANE(int, uppers, block) + column) * (Wide)(ROW_STEPS - weight) +
+                       load_wide(from + LANE(int, lowers, block) + column) * (Wide)(weight);
       ((global PackedPixels*)(to + column))->pixels = convert_pixels((sum + (Wide)(ROW_STEPS / 2)) >> (Wide)(8));
     }
 #endif
     for (int i = x + block * COLUMNS; i < end; ++i) {
-      const uint upper = from[LANE(uppers, block) + i], lower = from[LANE(lowers, block) + i];
-      const uint weight = LANE(weights, block);
+      const uint upper = from[LANE(int, uppers, block) + i], lower = from[LANE(int, lowers, block) + i];
+      const uint weight = LANE(int, weights, block);
       to[i] = (upper * (ROW_STEPS - weight) + lower * weight + ROW_STEPS / 2) >> 8;
     }
   }
@@ -149,7 +147,8 @@ static inline Floats sampled_disparities(global const float* row, const int x, c
 static inline Ints sampled_greys(global const Pixel* row, const int x, const int width) { return row[x]; }
 #else
 AT_EDGE Floats sampled_disparities_at_edge(global const float* row, const int x, const int width) {
-  return gather(row, min(x + SAMPLE_INDICES, (Ints)(width - 1)));
+  const Ints columns = min(x + SAMPLE_INDICES, (Ints)(width - 1));
+  return gather(row, &columns);
 }
 AT_EDGE Ints sampled_greys_at_edge(global const Pixel* row, const int x, const int width) {
   const Ints columns = min(x + SAMPLE_INDICES, (Ints)(width - 1));

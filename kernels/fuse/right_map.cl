@@ -53,21 +53,26 @@ COMPILED_ONCE void splat_row(const WorkItem at, const ImageSize size, const int 
   for (int x = 0; x <= width; x += PIXELS) ((global PackedInts*)(bids + x))->lanes = 0;
 #endif
 
-  FOR_PIXELS(x, width) {
-    const Bids own = bids_of(width, min_disparity, x, load_pixels(disparity + row, x, width));
+  FOR_CHUNKS(start, width) {
+    Ints keys_of[CHUNK], targets[CHUNK];
+    FOR_BLOCKS(x, i, start, width) {
+      const Bids own = bids_of(width, min_disparity, x, load_pixels(disparity + row, x, width));
+      // Of what lands on a pixel, that of two pixels or more to the left is smaller: written from left to right, what
+      // comes last is the nearest.
+      const Bids left = bids_of(width, min_disparity, x - 1, load_pixels(disparity + row, x - 1, width));
+      keys_of[i] = own.targets == left.targets ? max(own.keys, left.keys) : own.keys;
+      targets[i] = own.targets;
+    }
+    FOR_BLOCKS(x, i, start, width) {
 #if PIXELS == 1
-    if (own.keys != 0) atomic_max(&bids[own.targets], own.keys);
+      if (keys_of[i] != 0) atomic_max(&bids[targets[i]], keys_of[i]);
 #else
-    // Of what lands on a pixel, that of two pixels or more to the left is smaller: written from left to right, what
-    // comes last is the nearest.
-    const Bids left = bids_of(width, min_disparity, x - 1, load_pixels(disparity + row, x - 1, width));
-    const Ints larger = own.targets == left.targets ? max(own.keys, left.keys) : own.keys;
-    int key[PIXELS], target[PIXELS];
-    ((PackedInts*)key)->lanes = larger;
-    ((PackedInts*)target)->lanes = own.targets;
 #pragma unroll
-    for (int i = 0; i < PIXELS; ++i) bids[target[i]] = key[i];
+      for (int lane = 0; lane < PIXELS; ++lane) {
+        bids[LANE(int, targets[i], lane)] = LANE(int, keys_of[i], lane);
+      }
 #endif
+    }
   }
 }
 
@@ -86,23 +91,31 @@ COMPILED_ONCE void decode_row(const WorkItem at, const ImageSize size, const int
   const size_t right_row = ((size_t)EGOSGM_RIGHT * size.height + y) * width;
   global const int* bids = keys + key_row(y, width);
 
-  FOR_PIXELS(x, width) {
-    const Floats zero = 0.0f;
-    const Floats z = load_pixels(measured + right_row, x, width);
-    const Ints key = load_keys(bids + x);
-    const Floats landed = FLOATS_OF_INTS(key) * (1.0f / EGOSGM_RIGHT_MAP_STEPS_PER_PX) - 1.0f + (float)min_disparity;
-    const Floats d = z > INVALID ? z : landed;
-    const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + d);
-    const Ints inside = ((z > INVALID) | (key != 0)) & (at >= zero) & (at < (Floats)(width));
-    const Ints left = INTS_OF_FLOATS(inside ? at : zero);
-    const Floats seen = gather(disparity + row, left);
-    const Ints agrees = inside & (seen > INVALID) & (fabs(seen - d) <= max_difference);
-    const Floats otherwise = z > INVALID ? z : INVALID;
-    store_pixels(agrees ? seen : otherwise, disparity + right_row, x, width);
-    if (!makes_variance) continue;
-    const Floats p = gather(variance + row, left), r = load_pixels(measured_variance + right_row, x, width);
-    const Floats its_variance = z > INVALID ? r : zero;
-    store_pixels(agrees ? p : its_variance, variance + right_row, x, width);
+  FOR_CHUNKS(start, width) {
+    Floats values[CHUNK];
+    Ints sees[CHUNK], lefts[CHUNK];
+    FOR_BLOCKS(x, i, start, width) {
+      const Floats zero = 0.0f;
+      const Floats z = load_pixels(measured + right_row, x, width);
+      const Ints key = load_keys(bids + x);
+      const Floats landed = FLOATS_OF_INTS(key) * (1.0f / EGOSGM_RIGHT_MAP_STEPS_PER_PX) - 1.0f + (float)min_disparity;
+      const Floats d = z > INVALID ? z : landed;
+      const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + d);
+      const Ints inside = ((z > INVALID) | (key != 0)) & (at >= zero) & (at < (Floats)(width));
+      values[i] = d;
+      sees[i] = inside;
+      lefts[i] = INTS_OF_FLOATS(inside ? at : zero);
+    }
+    FOR_BLOCKS(x, i, start, width) {
+      const Floats z = load_pixels(measured + right_row, x, width);
+      const Floats seen = gather(disparity + row, &lefts[i]);
+      const Ints agrees = sees[i] & (seen > INVALID) & (fabs(seen - values[i]) <= max_difference);
+      store_pixels(agrees ? seen : z > INVALID ? z : INVALID, disparity + right_row, x, width);
+      if (!makes_variance) continue;
+      const Floats p = gather(variance + row, &lefts[i]);
+      const Floats r = load_pixels(measured_variance + right_row, x, width);
+      store_pixels(agrees ? p : z > INVALID ? r : (Floats)(0.0f), variance + right_row, x, width);
+    }
   }
 }
 

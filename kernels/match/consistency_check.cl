@@ -15,19 +15,25 @@ COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const floa
   const size_t row = ((size_t)view * size.height + y) * width;
   const size_t other_row = ((size_t)(1 - view) * size.height + y) * width;
 
-  FOR_PIXELS(x, width) {
-    const Floats d = load_pixels(disparity + row, x, width);
-    const Floats zero = 0.0f;
-    // Asked of the floats, with comparisons that NaN fails, before they become integers.
-    const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + (view == EGOSGM_LEFT ? -d : d));
-    const Ints valid = d > INVALID;
-    const Ints inside = valid & (at >= zero) & (at < (Floats)(width));
-    const Floats other = gather(disparity + other_row, INTS_OF_FLOATS(inside ? at : zero));
-    const Ints agree = (other > INVALID) & (fabs(other - d) <= max_difference);
-    const Ints keeps = inside ? agree : valid & ((Ints)(keep_outside) != 0);
-
-    store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);
-    clear_dropped(!keeps, variance + row, x, width);
+  FOR_CHUNKS(start, width) {
+    Ints is_inside[CHUNK], places[CHUNK];
+    FOR_BLOCKS(x, i, start, width) {
+      const Floats d = load_pixels(disparity + row, x, width);
+      const Floats zero = 0.0f;
+      // Asked of the floats, with comparisons that NaN fails, before they become integers.
+      const Floats at = nearest(FLOATS_OF_INTS(x + LANE_INDICES) + (view == EGOSGM_LEFT ? -d : d));
+      const Ints inside = (d > INVALID) & (at >= zero) & (at < (Floats)(width));
+      is_inside[i] = inside;
+      places[i] = INTS_OF_FLOATS(inside ? at : zero);
+    }
+    FOR_BLOCKS(x, i, start, width) {
+      const Floats d = load_pixels(disparity + row, x, width);
+      const Floats other = gather(disparity + other_row, &places[i]);
+      const Ints agree = (other > INVALID) & (fabs(other - d) <= max_difference);
+      const Ints keeps = is_inside[i] ? agree : (d > INVALID) & ((Ints)(keep_outside) != 0);
+      store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);
+      clear_dropped(!keeps, variance + row, x, width);
+    }
   }
 }
 
