@@ -93,27 +93,33 @@ KERNEL void row_means(const ImageSize size, global const float* variance, global
   row_means_row(THIS_WORK_ITEM, size, variance, roughness, mean_variance, mean_roughness);
 }
 
-// Mean of every step-th row within the radius, as far as the image reaches.
-static inline Floats column_mean(global const float* view, const ImageSize size, const int x, const int y,
-                                 const int radius, const int step) {
-  Floats sum = 0.0f;
-  float count = 0.0f;
-  for (int v = y - radius; v <= y + radius; v += step) {
-    if (v < 0 || v >= size.height) continue;
-    sum += load_pixels(view + (size_t)v * size.width, x, size.width);
-    count += 1.0f;
+// Mean of every STEP-th row within the radius, as far as the image reaches. The numbers are constants, so that loops
+// can be unrolled.
+#define COLUMN_MEAN(NAME, RADIUS, STEP)                                                                 \
+  static inline Floats NAME(global const float* view, const ImageSize size, const int x, const int y) { \
+    Floats sum = 0.0f;                                                                                  \
+    float count = 0.0f;                                                                                 \
+    _Pragma("unroll") for (int i = -RADIUS; i <= RADIUS; i += STEP) {                                   \
+      if (y + i < 0 || y + i >= size.height) continue;                                                  \
+      sum += load_pixels(view + (size_t)(y + i) * size.width, x, size.width);                           \
+      count += 1.0f;                                                                                    \
+    }                                                                                                   \
+    return sum / count;                                                                                 \
   }
-  return sum / count;
-}
+COLUMN_MEAN(column_mean_of_variance, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP)
+COLUMN_MEAN(column_mean_of_roughness, EGOSGM_ROUGHNESS_RADIUS, 1)
 
 // The largest of the differences to the disparities EGOSGM_JUMP_DISTANCE pixels off.
 static inline Floats jump_beside(global const float* view, const ImageSize size, const int x, const int y,
                                  const Floats d) {
   Floats most = 0.0f;
-  for (int v = y - EGOSGM_JUMP_DISTANCE; v <= y + EGOSGM_JUMP_DISTANCE; v += EGOSGM_JUMP_DISTANCE) {
+#pragma unroll
+  for (int i = -EGOSGM_JUMP_DISTANCE; i <= EGOSGM_JUMP_DISTANCE; i += EGOSGM_JUMP_DISTANCE) {
+    const int v = y + i;
     if (v < 0 || v >= size.height) continue;
-    for (int u = x - EGOSGM_JUMP_DISTANCE; u <= x + EGOSGM_JUMP_DISTANCE; u += EGOSGM_JUMP_DISTANCE) {
-      const Floats other = load_pixels(view + (size_t)v * size.width, u, size.width);
+#pragma unroll
+    for (int u = -EGOSGM_JUMP_DISTANCE; u <= EGOSGM_JUMP_DISTANCE; u += EGOSGM_JUMP_DISTANCE) {
+      const Floats other = load_pixels(view + (size_t)v * size.width, x + u, size.width);
       const Floats difference = fabs(other - d);
       most = ((other > INVALID) & (difference > most)) ? difference : most;
     }
@@ -136,13 +142,21 @@ COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const fl
   const int width = size.width;
   const size_t view = (size_t)at.view * size.height * width;
   const size_t row = view + (size_t)y * width;
-  FOR_PIXELS(x, width) {
-    const Floats p = column_mean(mean_variance + view, size, x, y, EGOSGM_VARIANCE_RADIUS, EGOSGM_VARIANCE_STEP);
-    const Floats r = column_mean(mean_roughness + view, size, x, y, EGOSGM_ROUGHNESS_RADIUS, 1);
-    const Floats d = load_pixels(disparity + row, x, width);
-    const Floats j = jump_beside(disparity + view, size, x, y, d);
-    const Floats sum = scale * (p * sqrt(p)) + roughness_weight * (r * r) + jump_weight * (j * j);
-    store_pixels(d > INVALID ? calibrated(sum) : (Floats)(0.0f), variance + row, x, width);
+  FOR_CHUNKS(start, width) {
+    Floats sums[CHUNK], jumps[CHUNK];
+    FOR_BLOCKS(x, i, start, width) {
+      jumps[i] = jump_beside(disparity + view, size, x, y, load_pixels(disparity + row, x, width));
+    }
+    FOR_BLOCKS(x, i, start, width) {
+      const Floats p = column_mean_of_variance(mean_variance + view, size, x, y);
+      const Floats r = column_mean_of_roughness(mean_roughness + view, size, x, y);
+      const Floats j = jumps[i];
+      sums[i] = scale * (p * sqrt(p)) + roughness_weight * (r * r) + jump_weight * (j * j);
+    }
+    FOR_BLOCKS(x, i, start, width) {
+      const Floats d = load_pixels(disparity + row, x, width);
+      store_pixels(d > INVALID ? calibrated(sums[i]) : (Floats)(0.0f), variance + row, x, width);
+    }
   }
 }
 
