@@ -97,9 +97,10 @@ COMPILED_ONCE void resample_row(const WorkItem at, const ImageSize size, global 
     const Ints uppers = min(max(above, (Ints)(0)), last_row) * size.width;
     const Ints lowers = min(max(above + 1, (Ints)(0)), last_row) * size.width;
     const int end = min(x + AT_ONCE, size.width);
-    int block = 0;
+    int blocks = 0;
 #if PIXELS > 1
-    for (; x + (block + 1) * COLUMNS <= end; ++block) {
+    blocks = (end - x) / COLUMNS;
+    for (int block = 0; block < blocks; ++block) {
       const int column = x + block * COLUMNS;
       const Weight weight = LANE(int, weights, block);
       const Wide sum = load_wide(from + LANE(int, uppers, block) + column) * (Wide)(ROW_STEPS - weight) +
@@ -107,9 +108,9 @@ COMPILED_ONCE void resample_row(const WorkItem at, const ImageSize size, global 
       ((global PackedPixels*)(to + column))->pixels = convert_pixels((sum + (Wide)(ROW_STEPS / 2)) >> (Wide)(8));
     }
 #endif
-    for (int i = x + block * COLUMNS; i < end; ++i) {
-      const uint upper = from[LANE(int, uppers, block) + i], lower = from[LANE(int, lowers, block) + i];
-      const uint weight = LANE(int, weights, block);
+    for (int i = x + blocks * COLUMNS; i < end; ++i) {
+      const uint upper = from[LANE(int, uppers, blocks) + i], lower = from[LANE(int, lowers, blocks) + i];
+      const uint weight = LANE(int, weights, blocks);
       to[i] = (upper * (ROW_STEPS - weight) + lower * weight + ROW_STEPS / 2) >> 8;
     }
   }
