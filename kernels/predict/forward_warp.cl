@@ -218,16 +218,13 @@ COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, cons
         disparities[i] = moved.disparity;
         variances[i] = moved.variance;
       }
-      FOR_BLOCKS(x, i, start, width) {
-#pragma unroll
-        for (int lane = 0; lane < PIXELS; ++lane) {
-          const int target = LANE(int, targets[i], lane);
-          if (target < 0) continue;
-          const float d = LANE(float, disparities[i], lane), p = LANE(float, variances[i], lane);
-          if (d > band[target] || (d == band[target] && p > band_variance[target])) {
-            band[target] = d;
-            band_variance[target] = p;
-          }
+      for (int i = 0; i < min(PIXELS * CHUNK, width - start); ++i) {
+        const int target = LANE(int, targets, i);
+        if (target < 0) continue;
+        const float d = LANE(float, disparities, i), p = LANE(float, variances, i);
+        if (d > band[target] || (d == band[target] && p > band_variance[target])) {
+          band[target] = d;
+          band_variance[target] = p;
         }
       }
     }
