@@ -165,6 +165,10 @@ INSTANTIATE_TEST_SUITE_P(Sizes, VerticalAlignmentTest,
                                             ::testing::Values(PixelType::kU8, PixelType::kU16),
                                             ::testing::Values(1, 8)),
                          name);
+INSTANTIATE_TEST_SUITE_P(WithHalfABlock, VerticalAlignmentTest,
+                         ::testing::Combine(::testing::Values(shared::ImageSize{309, 97}),
+                                            ::testing::Values(PixelType::kU8, PixelType::kU16), ::testing::Values(1)),
+                         name);
 INSTANTIATE_TEST_SUITE_P(Large, VerticalAlignmentTest,
                          ::testing::Values(std::tuple{testing::kLargest, PixelType::kU8, 8}), name);
 
