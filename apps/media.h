@@ -10,11 +10,12 @@
 namespace egosgm::app {
 
 /// What OpenCV has for images of other formats, videos and windows. These modules bring a hundred libraries, which take
-/// longer to load than most commands: only who calls this needs them. No error is printed.
+/// longer to load than most commands: only who calls this needs them.
 struct Media {
   decltype(&cv::imread) read_image;
   decltype(&cv::imencode) encode_image;
-  /// By FFmpeg alone where OpenCV has it: other readers, which it would try next, print. Nothing where it cannot.
+  /// By FFmpeg alone where OpenCV has it: other readers, which it would try next, print. Nothing where it cannot, and
+  /// no error is printed; so does the next one.
   std::unique_ptr<cv::VideoCapture> (*open_video)(const std::string& file);
   /// `codec` has four letters. Nothing where it cannot.
   std::unique_ptr<cv::VideoWriter> (*create_video)(const std::string& file, const char* codec, double frames_per_second,

@@ -62,25 +62,21 @@ static inline int any_of(const Ints condition) {
 // A lane of a block that lies in memory.
 #define LANE(type, block, lane) (((const type*)&(block))[lane])
 
-// Values of a row at places x, lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of
-// loads that may be joined.
+// Values of a row at places, lane by lane: gather instructions are slower, and what a compiler makes of a loop, or of
+// loads that may be joined. The places lie in memory: they are quicker loaded one by one than taken out of a vector.
+#define VALUE_AT(row, places, lane) (row)[LANE(int, places, lane)]
 #if PIXELS == 1
-#define GATHERED(Values, row, x) ((Values)((row)[x]))
+#define GATHERED(Values, row, places) ((Values)(VALUE_AT(row, places, 0)))
 #else
-#define GATHERED(Values, row, x)                                                                                     \
-  ((Values)((row)[(x).s0], (row)[(x).s1], (row)[(x).s2], (row)[(x).s3], (row)[(x).s4], (row)[(x).s5], (row)[(x).s6], \
-            (row)[(x).s7], (row)[(x).s8], (row)[(x).s9], (row)[(x).sa], (row)[(x).sb], (row)[(x).sc], (row)[(x).sd], \
-            (row)[(x).se], (row)[(x).sf]))
+#define GATHERED(Values, row, places)                                                                             \
+  ((Values)(VALUE_AT(row, places, 0), VALUE_AT(row, places, 1), VALUE_AT(row, places, 2), VALUE_AT(row, places, 3), \
+            VALUE_AT(row, places, 4), VALUE_AT(row, places, 5), VALUE_AT(row, places, 6), VALUE_AT(row, places, 7), \
+            VALUE_AT(row, places, 8), VALUE_AT(row, places, 9), VALUE_AT(row, places, 10),                          \
+            VALUE_AT(row, places, 11), VALUE_AT(row, places, 12), VALUE_AT(row, places, 13),                        \
+            VALUE_AT(row, places, 14), VALUE_AT(row, places, 15)))
 #endif
-// At places that lie in memory, which are loaded one by one: quicker than to take a vector apart.
 static inline Floats gather(volatile global const float* row, const Ints* places) {
-  const int* x = (const int*)places;
-#if PIXELS == 1
-  return row[x[0]];
-#else
-  return (Floats)(row[x[0]], row[x[1]], row[x[2]], row[x[3]], row[x[4]], row[x[5]], row[x[6]], row[x[7]], row[x[8]],
-                  row[x[9]], row[x[10]], row[x[11]], row[x[12]], row[x[13]], row[x[14]], row[x[15]]);
-#endif
+  return GATHERED(Floats, row, *places);
 }
 
 #if PIXELS > 1

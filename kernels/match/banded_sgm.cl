@@ -127,8 +127,10 @@ ALWAYS_INLINE void sweep_row(const bool meets, const bool backward, const SgmPar
   }
 }
 
-// What the sweeps read and write, from the first view that is matched on.
+// A sweep of a view, and what it reads and writes, from the first view that is matched on. In `backward` ones, x and y
+// count from the lower right corner.
 typedef struct {
+  int view;                  // of those that are matched
   global const uint* codes;  // of both views
   global const Band* bands;
   global const uint* offsets;  // where a row's cells begin
@@ -138,12 +140,6 @@ typedef struct {
   global uint* ranks;  // of the right pixels, if they are kept
   global float *disparities, *variances;
   global uchar* doubtful;
-} Maps;
-
-// A sweep of a view. In `backward` ones, x and y count from the lower right corner.
-typedef struct {
-  int view;  // of those that are matched
-  Maps maps;
 } Sweep;
 
 // The row y of a sweep, from its pixel `from` to `to`. To the pixels before one on the four paths it is `left`, `above`
@@ -155,17 +151,17 @@ ALWAYS_INLINE Row row_at(const bool meets, const bool backward, const SgmParamet
   const int image_y = backward ? height - 1 - y : y, image_x = backward ? width - 1 - from : from;
   const size_t first = (size_t)sweep->view * width * height + (size_t)image_y * width + image_x;
   const size_t code_stride = (size_t)width + 2 * (size_t)q.padding;
-  global uchar* slots = sweep->maps.slots;
+  global uchar* slots = sweep->slots;
   Row row;
-  row.bands = sweep->maps.bands + first;
-  row.penalties = (global const uint*)sweep->maps.penalties + first;
+  row.bands = sweep->bands + first;
+  row.penalties = (global const uint*)sweep->penalties + first;
   row.slot[0] = slots + (size_t)y * SLOT;
   row.slot[1] = slots + (size_t)(height + from) * SLOT;
 #if PATHS == 8
   row.slot[2] = slots + ((long)2 * height + width - y + from) * SLOT;
   row.slot[3] = slots + (size_t)(2 * height + 2 * width + y + from) * SLOT;
 #endif
-  row.seen = meets && q.reads_off ? sweep->maps.ranks + (size_t)image_y * code_stride + q.padding + image_x : 0;
+  row.seen = meets && q.reads_off ? sweep->ranks + (size_t)image_y * code_stride + q.padding + image_x : 0;
   row.row_above = image_y > 0 ? -(long)code_stride : 0;
   row.row_below = image_y + 1 < height ? (long)code_stride : 0;
   row.above_right = y > 0 ? step - step * (long)width : 0;
@@ -186,15 +182,15 @@ ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const S
   const int image = q.first_view + sweep->view;
   const int along = image == EGOSGM_LEFT ? image_x : width - 1 - image_x;
   const long above = y > 0 ? -row->step * (long)width : 0, left = from > 0 ? -row->step : 0;
-  global const Code* codes = (global const Code*)sweep->maps.codes + q.padding;
+  global const Code* codes = (global const Code*)sweep->codes + q.padding;
   // The sums move along with the pixel; a backward sweep comes from their end. Where offsets and bands do not belong
   // together, after a kernel that failed, it stays within the sums, which begin with a row that is nobody's.
-  const int cells_of_row = width * MAX_CHUNKS, offset = (int)sweep->maps.offsets[row_start + image_x];
+  const int cells_of_row = width * MAX_CHUNKS, offset = (int)sweep->offsets[row_start + image_x];
   const int first_cell = backward ? clamp(offset + chunks_of(extent_at(row->bands)), 0, cells_of_row)
                                   : clamp(offset, 0, cells_of_row - (to - from) * MAX_CHUNKS);
   Place place;
   place.k = 0;
-  place.cells = sweep->maps.sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
+  place.cells = sweep->sums + ((row_start + width) * MAX_CHUNKS + first_cell) * EGOSGM_LANES;
   place.own = codes + ((size_t)image * height + image_y) * code_stride + along;
   place.other = codes + ((size_t)(1 - image) * height + image_y) * code_stride + (width - 1 - along);
   place.candidate = candidates;
@@ -242,7 +238,6 @@ COMPILED_ONCE void leave_winners(const bool backward, const SgmParameters q, con
 // Both flags are constants wherever it is called: each direction has code of its own, whose steps need no registers.
 ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmParameters q, const Sweep* sweep,
                               const int tile_x, const int first_y, const int end_y) {
-  const Maps* maps = &sweep->maps;
   Candidate candidates[TILE_WIDTH];
   for (int y = first_y; y < end_y; ++y) {
     const int skew = y - first_y;
@@ -253,9 +248,9 @@ ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmPa
     sweep_row(meets, backward, q, &row, &place);
     // Apart from the sweep, whose pixels wait for each other: these do not.
     if (meets) {
-      const size_t at = row.bands - maps->bands - (backward ? to - from - 1 : 0);
-      leave_winners(backward, q, candidates, to - from, maps->disparities + at, maps->variances + at,
-                    maps->doubtful + at);
+      const size_t at = row.bands - sweep->bands - (backward ? to - from - 1 : 0);
+      leave_winners(backward, q, candidates, to - from, sweep->disparities + at, sweep->variances + at,
+                    sweep->doubtful + at);
     }
   }
 }
@@ -280,7 +275,7 @@ inline int rows_to_middle(const SgmParameters q, const int view, const int wave,
 ALWAYS_INLINE void sweep_tiles(const bool meets, const bool backward, const SgmParameters q, const Sweep* sweep,
                                const int first_row, const int wave, const int tile_columns) {
   const bool all = wave == EGOSGM_ALL_TILES;
-  const int middle = rows_to_middle(q, sweep->view, wave, sweep->maps.row_sums);
+  const int middle = rows_to_middle(q, sweep->view, wave, sweep->row_sums);
   const int own_rows = backward ? q.height - middle : middle;
   const int first_y = meets ? own_rows : 0;
   const int end_y = meets ? q.height : own_rows;
@@ -295,41 +290,40 @@ ALWAYS_INLINE void sweep_tiles(const bool meets, const bool backward, const SgmP
   }
 }
 
-ALWAYS_INLINE void sweep(const bool meets, const bool backward, const SgmParameters q, Maps maps, const int view,
-                         const int first_row, const int wave, const int tile_columns) {
+ALWAYS_INLINE void sweep_view(const bool meets, const bool backward, const SgmParameters q, Sweep sweep,
+                              const int first_row, const int wave, const int tile_columns) {
   const size_t not_matched = (size_t)q.first_view * q.width * q.height;
-  maps.bands += not_matched;
-  maps.offsets += not_matched;
-  maps.penalties += 4 * not_matched;
-  maps.disparities += not_matched;
-  maps.variances += not_matched;
-  maps.doubtful += not_matched;
-  maps.row_sums += (size_t)q.first_view * q.height;
-  maps.slots += (size_t)(2 * view + backward) * SLOTS_OF(q) * SLOT + SLOT_PADDING;
-  const Sweep of_view = {view, maps};
+  sweep.bands += not_matched;
+  sweep.offsets += not_matched;
+  sweep.penalties += 4 * not_matched;
+  sweep.disparities += not_matched;
+  sweep.variances += not_matched;
+  sweep.doubtful += not_matched;
+  sweep.row_sums += (size_t)q.first_view * q.height;
+  sweep.slots += (size_t)(2 * sweep.view + backward) * SLOTS_OF(q) * SLOT + SLOT_PADDING;
   if (backward) {
-    sweep_tiles(meets, true, q, &of_view, first_row, wave, tile_columns);
+    sweep_tiles(meets, true, q, &sweep, first_row, wave, tile_columns);
   } else {
-    sweep_tiles(meets, false, q, &of_view, first_row, wave, tile_columns);
+    sweep_tiles(meets, false, q, &sweep, first_row, wave, tile_columns);
   }
 }
 
-WITH_BIT_COUNT void to_middle(const bool backward, const SgmParameters q, const Maps maps, const int view,
-                              const int first_row, const int wave, const int tile_columns) {
-  sweep(false, backward, q, maps, view, first_row, wave, tile_columns);
+WITH_BIT_COUNT void to_middle(const bool backward, const SgmParameters q, const Sweep sweep, const int first_row,
+                              const int wave, const int tile_columns) {
+  sweep_view(false, backward, q, sweep, first_row, wave, tile_columns);
 }
 
-WITH_BIT_COUNT void from_middle(const bool backward, const SgmParameters q, const Maps maps, const int view,
-                                const int first_row, const int wave, const int tile_columns) {
-  sweep(true, backward, q, maps, view, first_row, wave, tile_columns);
+WITH_BIT_COUNT void from_middle(const bool backward, const SgmParameters q, const Sweep sweep, const int first_row,
+                                const int wave, const int tile_columns) {
+  sweep_view(true, backward, q, sweep, first_row, wave, tile_columns);
 }
 
 // Both sweeps to the middle of the image, where they leave their sums.
 KERNEL void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* codes,
                             global const Band* bands, global const uint* offsets, global const RowSum* row_sums,
                             global const uchar* penalties, global uchar* slots, global uchar* sums) {
-  const Maps maps = {codes, bands, offsets, row_sums, penalties, slots, sums, 0, 0, 0, 0};
-  to_middle(get_global_id(2) > 0, q, maps, get_global_id(1), get_global_id(0), wave, tile_columns);
+  const Sweep sweep = {get_global_id(1), codes, bands, offsets, row_sums, penalties, slots, sums, 0, 0, 0, 0};
+  to_middle(get_global_id(2) > 0, q, sweep, get_global_id(0), wave, tile_columns);
 }
 
 // Both on from there, over the sums of the other one, to the winners.
@@ -338,7 +332,7 @@ KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int t
                               global const uchar* penalties, global uchar* slots, global const uchar* sums,
                               global uint* ranks, global float* disparities, global float* variances,
                               global uchar* doubtful) {
-  const Maps maps = {codes, bands,       offsets,   row_sums, penalties, slots, (global uchar*)sums,
-                     ranks, disparities, variances, doubtful};
-  from_middle(get_global_id(2) > 0, q, maps, get_global_id(1), get_global_id(0), wave, tile_columns);
+  const Sweep sweep = {get_global_id(1),    codes, bands,       offsets,   row_sums, penalties, slots,
+                       (global uchar*)sums, ranks, disparities, variances, doubtful};
+  from_middle(get_global_id(2) > 0, q, sweep, get_global_id(0), wave, tile_columns);
 }

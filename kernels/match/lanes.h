@@ -128,12 +128,7 @@ inline Block block_from(const int first) {
 // 65535 where a lane is 255; lanes are 0 or 255.
 inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
 
-inline ushort minimum_of_chunk(ushort8 v) {
-  v = min(v, v.s45674567);
-  v = min(v, v.s23232323);
-  v = min(v, v.s11111111);
-  return v.s0;
-}
+inline ushort minimum_of_chunk(const ushort8 v) { return least_word(v).s0; }
 
 inline ushort minimum_of_totals(const ushort16 totals) { return minimum_of_chunk(min(totals.lo, totals.hi)); }
 

@@ -23,14 +23,6 @@ inline uchar16 path_cost_beside(const uchar16 before, const uchar16 cost, const 
   return path_cost(cost, before, below, above, p1, p2);
 }
 
-// The same of two paths at once, a chunk of each.
-inline uchar16 path_cost_of_chunks(const uchar16 before, const uchar16 cost, const uchar16 p1, const uchar16 p2) {
-  const ulong2 lanes = as_ulong2(before);
-  const uchar16 below = as_uchar16(lanes << (ulong2)(8) | (ulong2)(ABSENT)),
-                above = as_uchar16(lanes >> (ulong2)(8) | (ulong2)((ulong)ABSENT << 56));
-  return path_cost(cost, before, below, above, p1, p2);
-}
-
 // As `mean_of` has it of blocks.
 inline uchar16 mean(const uchar16 a, const uchar16 b) {
   return convert_uchar16((convert_ushort16(a) + convert_ushort16(b) + (ushort16)(1)) >> (ushort16)(1));

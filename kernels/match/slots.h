@@ -18,9 +18,7 @@ inline bool is_chunk(const uint extent) { return extent < 2u << 16; }
 // wiped: all else is absent.
 inline void wipe(global uchar* at, const uint extent) {
   store_block((Block)(ABSENT), at);
-  if (chunks_of(extent) > BLOCK / EGOSGM_LANES) {
-    for (int v = BLOCK_VECTORS; v < chunks_of(extent) / 2; ++v) store((uchar16)(ABSENT), at + VECTOR * v);
-  }
+  for (int v = BLOCK_VECTORS; v < chunks_of(extent) / 2; ++v) store((uchar16)(ABSENT), at + VECTOR * v);
 }
 
 // Whether what a predecessor with `extent` left in a slot is overwritten by a pixel with `own`.

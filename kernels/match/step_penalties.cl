@@ -15,7 +15,8 @@
 
 #if PIXELS > 1
 AT_EDGE Ints grey_at_edge(global const Pixel* row, const int x, const int width) {
-  const Pixels pixels = GATHERED(Pixels, row, clamp(x + LANE_INDICES, (Ints)(0), (Ints)(width - 1)));
+  const Ints inside = clamp(x + LANE_INDICES, (Ints)(0), (Ints)(width - 1));
+  const Pixels pixels = GATHERED(Pixels, row, inside);
   return convert_int16(to_8_bit(pixels));
 }
 #endif

@@ -100,6 +100,7 @@ ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, con
   for (int n = 1; n < DIRECTIONS; ++n) store((uchar16)(ABSENT), to->wiped_at[n] + along);
   minima_of_chunks(t, least);
   left->t = t[0];
+  // Apart from the others, as the next pixel waits for it.
   left->least = in_lower_lanes(least_word(convert_ushort8(t[0].lo)));
 #pragma unroll
   for (int n = 0; n < PATH_PAIRS; ++n) {
