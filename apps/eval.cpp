@@ -148,15 +148,16 @@ std::string cell(double value, int width, const char* unit) {
 }
 
 void print_row(const std::string& name, const DisparityMetrics& m) {
-  fmt::print("{:<14}{}{}{}{}{}{}{}\n", name, cell(m.bad_or_missing, 16, " %"), cell(m.bad_of_valid, 14, " %"),
-             cell(m.density, 11, " %"), cell(m.interpolated, 14, " %"), cell(m.d1, 11, " %"),
-             cell(m.d1_interpolated, 17, " %"), cell(m.mae_px, 11, "px"));
+  fmt::print("{:<14}{}{}{}{}{}{}{}{}{}\n", name, cell(m.wrong_of_all, 13, " %"), cell(m.bad_of_valid, 14, " %"),
+             cell(m.filled, 11, " %"), cell(m.density, 11, " %"), cell(m.bad_or_missing, 16, " %"),
+             cell(m.interpolated, 14, " %"), cell(m.d1, 11, " %"), cell(m.d1_interpolated, 17, " %"),
+             cell(m.mae_px, 11, "px"));
 }
 
 void print_errors(const Result& result) {
   if (result.rows.empty()) return;
-  fmt::print("{:<14}{:>16}{:>14}{:>11}{:>14}{:>11}{:>17}{:>11}\n", "", "bad_or_missing", "bad_of_valid", "density",
-             "interpolated", "d1", "d1_interpolated", "mae");
+  fmt::print("{:<14}{:>13}{:>14}{:>11}{:>11}{:>16}{:>14}{:>11}{:>17}{:>11}\n", "", "wrong_of_all", "bad_of_valid",
+             "filled", "density", "bad_or_missing", "interpolated", "d1", "d1_interpolated", "mae");
   for (std::size_t i = 0; i < result.rows.size(); ++i) print_row(result.rows[i].name, result.each[i]);
   if (result.rows.size() > 1) {
     print_row("pooled", result.pooled);
@@ -178,16 +179,16 @@ void print_over_time(const VideoInput& input, const VideoCounts& total) {
 }
 
 void print_regions(const VideoCounts& total) {
-  fmt::print("\n{:<12}{:>12}{:>16}{:>14}{:>11}{:>14}{:>12}{:>12}\n", "region", "truth", "bad_or_missing",
-             "bad_of_valid", "density", "interpolated", "mae", "tepe");
+  fmt::print("\n{:<12}{:>12}{:>13}{:>14}{:>11}{:>11}{:>16}{:>14}{:>12}{:>12}\n", "region", "truth", "wrong_of_all",
+             "bad_of_valid", "filled", "density", "bad_or_missing", "interpolated", "mae", "tepe");
   for (std::size_t r = 0; r < total.regions.size(); ++r) {
     const vision::RegionCounts& region = total.regions[r];
     if (region.errors.truth == 0) continue;
     const DisparityMetrics m = vision::metrics_of(region.errors);
-    fmt::print("{:<12}{:>12}{}{}{}{}{}{}\n", vision::kRegionNames[r], region.errors.truth,
-               cell(m.bad_or_missing, 16, " %"), cell(m.bad_of_valid, 14, " %"), cell(m.density, 11, " %"),
-               cell(m.interpolated, 14, " %"), cell(m.mae_px, 12, "px"),
-               cell(mean(region.tepe.sum_px, region.tepe.pixels), 12, "px"));
+    fmt::print("{:<12}{:>12}{}{}{}{}{}{}{}{}\n", vision::kRegionNames[r], region.errors.truth,
+               cell(m.wrong_of_all, 13, " %"), cell(m.bad_of_valid, 14, " %"), cell(m.filled, 11, " %"),
+               cell(m.density, 11, " %"), cell(m.bad_or_missing, 16, " %"), cell(m.interpolated, 14, " %"),
+               cell(m.mae_px, 12, "px"), cell(mean(region.tepe.sum_px, region.tepe.pixels), 12, "px"));
   }
 }
 
@@ -246,10 +247,12 @@ int evaluate(EvalArguments arguments) {
     return kOk;
   }
   print_errors(result);
-  if (input.successors() > 0 || !arguments.video.against.empty() || result.video.total.density.truth > 0) {
-    print_over_time(input, result.video.total);
-    if (!result.rows.empty()) print_regions(result.video.total);
-    print_density(result.video.total.density);
+  const VideoCounts& total = result.video.total;
+  if (input.successors() > 0 || !arguments.video.against.empty() || total.density.truth > 0 ||
+      total.region(vision::Region::kAll).trust.valid > 0) {
+    print_over_time(input, total);
+    if (!result.rows.empty()) print_regions(total);
+    print_density(total.density);
   }
   print_pairing(input.truth_pairs());
   return kOk;
@@ -280,13 +283,18 @@ Command add_eval(CLI::App& program) {
   command->add_flag("--json", arguments->json, "print JSON");
   command->footer(
       "In percent of the pixels with truth (bad_of_valid: of those with an estimate too); bad: off by more than 3 px.\n"
-      "  bad_or_missing   bad, or without an estimate\n"
+      "  wrong_of_all     bad; what is missing does not count\n"
+      "  filled           with an estimate; density: of the pixels with a surface, those with an estimate\n"
+      "  bad_or_missing   bad, or without an estimate; who guesses everywhere looks good in it\n"
       "  interpolated     bad after filling holes from the background (KITTI 2012's official figure)\n"
       "  d1               off by more than 3 px and 5 %, or without an estimate (KITTI 2015); d1_interpolated "
       "likewise\n"
       "  mae              mean absolute error of the pixels with an estimate [px]\n"
       "pooled: over all pixels (KITTI 2015); mean: of the images' figures (KITTI 2012).\n"
-      "Over time: docs/evaluation.md has the formula, the source and the pixels of every figure.");
+      "A truth of 1/256 px (1 in KITTI's PNG) or less says that nothing is there, the sky for instance: a hole is "
+      "right.\n"
+      "Beside --against, among pixels that `run --write reason` trusts, and over time: docs/evaluation.md has the "
+      "formula, the source and the pixels of every figure.");
   return {command, [arguments] { return evaluate(*arguments); }};
 }
 

@@ -15,7 +15,9 @@ inline nlohmann::ordered_json json_of(const vision::DisparityMetrics& m) {
           {"interpolated", m.interpolated},
           {"d1", m.d1},
           {"d1_interpolated", m.d1_interpolated},
-          {"mae", m.mae_px}};
+          {"mae", m.mae_px},
+          {"filled", m.filled},
+          {"wrong_of_all", m.wrong_of_all}};
 }
 
 }  // namespace egosgm::app

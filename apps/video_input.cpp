@@ -67,7 +67,8 @@ void VideoArguments::add_to(CLI::App& command) {
       "calibration, poses, images, and truth where --truth is not given");
   add("--scene", scene, "scene of --sequence, for example 000151", "NUMBER");
   add("--poses", poses, "KITTI poses of --sequence, in place of its own; without any: stereo odometry", "FILE");
-  add("--against", against, "another method's maps: what was changed for the worse and for the better");
+  add("--against", against,
+      "another method's maps: what was changed for the worse and for the better, what was gained and what was lost");
   add("--variance", variance, "a map per frame that grows with the expected error (PFM, .npy, grey PNG)");
   add("--confidence", confidence, "a map per frame that falls with the expected error");
   add("--moving", moving, "masks of what moves by itself, not 0; without: those in --sequence");
@@ -115,6 +116,7 @@ VideoInput::VideoInput(const ComparisonArguments& compared, const VideoArguments
     throw InvalidArgument("--poses and --scene belong to a sequence: give --sequence DIR with them");
   }
   list_frames(compared);
+  find_reasons();
   pair(arguments.against, "disparity", &FrameFiles::against);
   pair(arguments.variance, "variance", &FrameFiles::uncertainty);
   pair(arguments.confidence, "", &FrameFiles::uncertainty);
@@ -166,6 +168,15 @@ void VideoInput::pair(const std::string& folder, const char* inside, fs::path Fr
   }
   for (FrameFiles& frame : frames_) {
     if (const auto file = files.find(frame.name); file != files.end()) frame.*member = file->second;
+  }
+}
+
+/// Those that `egosgm run` wrote beside its maps.
+void VideoInput::find_reasons() {
+  for (FrameFiles& frame : frames_) {
+    const fs::path run = frame.estimate.parent_path() / "..";
+    const fs::path file = run / "reason" / (frame.estimate.stem().string() + ".png");
+    if (is_regular_file(run / "report.json") && is_regular_file(file)) frame.reason = file;
   }
 }
 
@@ -233,6 +244,7 @@ vision::VideoFrame VideoInput::read(int i) const {
   frame.all_truth = read_into(files.all_truth, disparity(256));
   frame.against = read_into(files.against, disparity(arguments_.scale));
   frame.next_truth = read_into(files.next_truth, disparity(arguments_.truth_scale));
+  frame.reason = read_into(files.reason, vision::read_grey_image);
   frame.uncertainty = read_into(files.uncertainty, vision::read_values);
   if (!arguments_.confidence.empty() && !frame.uncertainty.empty()) frame.uncertainty *= -1;
   const cv::Mat moving = read_into(files.moving, vision::read_grey_image);

@@ -30,7 +30,7 @@ struct FrameFiles {
       : name(std::move(its_name)), estimate(std::move(its_estimate)) {}
 
   std::string name;
-  std::filesystem::path estimate, truth, all_truth, against, uncertainty, moving, image, flow, next_truth, mask;
+  std::filesystem::path estimate, truth, all_truth, against, reason, uncertainty, moving, image, flow, next_truth, mask;
 };
 
 /// The motions of a stereo sequence by odometry, found on a thread of its own while others wait for those they need.
@@ -72,6 +72,7 @@ class VideoInput {
  private:
   void list_frames(const ComparisonArguments& compared);
   void pair(const std::string& folder, const char* inside, std::filesystem::path FrameFiles::*member);
+  void find_reasons();
   void open_sequence();
   void open_motions();
   vision::VideoFrame read(int i) const;

@@ -51,17 +51,21 @@ void bind_disparity(py::module_& module) {
       .def_readonly("bad_interpolated", &DisparityCounts::bad_interpolated)
       .def_readonly("d1_interpolated", &DisparityCounts::d1_interpolated)
       .def_readonly("absolute_error_px", &DisparityCounts::absolute_error_px)
+      .def_readonly("sky", &DisparityCounts::sky, "Where the truth says that nothing is there.")
+      .def_readonly("sky_valid", &DisparityCounts::sky_valid)
       .def("__add__", [](DisparityCounts a, const DisparityCounts& b) { return a += b; })
       .def_property_readonly("metrics", &vision::metrics_of, "The figures in percent.");
   py::class_<DisparityMetrics>(module, "DisparityMetrics",
                                "Percent of the pixels with truth; bad: off by more than 3 px (KITTI).")
       .def_readonly("bad_or_missing", &DisparityMetrics::bad_or_missing)
       .def_readonly("bad_of_valid", &DisparityMetrics::bad_of_valid, "Percent of the pixels with an estimate.")
-      .def_readonly("density", &DisparityMetrics::density)
+      .def_readonly("density", &DisparityMetrics::density, "Percent of the pixels with a surface.")
       .def_readonly("interpolated", &DisparityMetrics::interpolated, "After background interpolation (KITTI 2012).")
       .def_readonly("d1", &DisparityMetrics::d1)
       .def_readonly("d1_interpolated", &DisparityMetrics::d1_interpolated, "KITTI 2015's official figure.")
-      .def_readonly("mae_px", &DisparityMetrics::mae_px);
+      .def_readonly("mae_px", &DisparityMetrics::mae_px)
+      .def_readonly("filled", &DisparityMetrics::filled)
+      .def_readonly("wrong_of_all", &DisparityMetrics::wrong_of_all, "What is missing does not count.");
   module.def("compare_disparity", &compare, py::arg("estimate"), py::arg("truth"),
              "Compares two H x W maps over the pixels that have truth, as KITTI's development kits do.");
   module.def("mean_of", &vision::mean_of, py::arg("images"), "The mean of each image's figures (KITTI 2012).");

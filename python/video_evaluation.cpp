@@ -108,12 +108,12 @@ py::dict dict_of(const vision::VideoEvaluation& evaluation) {
 py::dict evaluate_video(const py::object& estimates, const py::object& truths, const py::object& all_truths,
                         const py::object& against, const py::object& uncertainties, const py::object& moving,
                         const py::object& images, const py::object& flows, const py::object& next_truths,
-                        std::optional<Calibration> calibration, const py::object& world_from_camera, float near_px,
-                        int threads) {
+                        const py::object& reasons, std::optional<Calibration> calibration,
+                        const py::object& world_from_camera, float near_px, int threads) {
   const Maps maps[] = {{estimates, "estimates"},         {truths, "truths"},
                        {all_truths, "all_truths"},       {against, "against"},
                        {uncertainties, "uncertainties"}, {next_truths, "next_truths"}};
-  const Maps masks{moving, "moving"}, pictures{images, "images"}, flow{flows, "flows"};
+  const Maps masks{moving, "moving"}, why{reasons, "reasons"}, pictures{images, "images"}, flow{flows, "flows"};
   vision::Video video;
   video.frames = static_cast<int>(py::len(estimates));
   video.read = [&](int i) {
@@ -123,6 +123,7 @@ py::dict evaluate_video(const py::object& estimates, const py::object& truths, c
                                 &frame.against,  &frame.uncertainty, &frame.next_truth};
     for (std::size_t m = 0; m < std::size(maps); ++m) *targets[m] = maps[m].at(i);
     frame.moving = masks.mask_at(i);
+    frame.reason = why.image_at(i);
     frame.image = pictures.image_at(i);
     frame.flow_to_next = flow.flow_at(i);
     return frame;

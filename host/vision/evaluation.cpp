@@ -63,7 +63,7 @@ class Mean {
 DisparityCounts& DisparityCounts::operator+=(const DisparityCounts& other) {
   return add_members(*this, other, &DisparityCounts::truth, &DisparityCounts::valid, &DisparityCounts::bad,
                      &DisparityCounts::d1, &DisparityCounts::bad_interpolated, &DisparityCounts::d1_interpolated,
-                     &DisparityCounts::absolute_error_px);
+                     &DisparityCounts::absolute_error_px, &DisparityCounts::sky, &DisparityCounts::sky_valid);
 }
 
 DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth) {
@@ -87,14 +87,17 @@ DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth)
 }
 
 DisparityMetrics metrics_of(const DisparityCounts& counts) {
-  const std::int64_t missing = counts.truth - counts.valid;
+  const std::int64_t surfaces = counts.truth - counts.sky, seen = counts.valid - counts.sky_valid;
+  const std::int64_t missing = surfaces - seen;
   return {.bad_or_missing = percent(counts.bad + missing, counts.truth),
           .bad_of_valid = percent(counts.bad, counts.valid),
-          .density = percent(counts.valid, counts.truth),
+          .density = percent(seen, surfaces),
           .interpolated = percent(counts.bad_interpolated, counts.truth),
           .d1 = percent(counts.d1 + missing, counts.truth),
           .d1_interpolated = percent(counts.d1_interpolated, counts.truth),
-          .mae_px = ratio(counts.absolute_error_px, static_cast<double>(counts.valid))};
+          .mae_px = ratio(counts.absolute_error_px, static_cast<double>(counts.valid)),
+          .filled = percent(counts.valid, counts.truth),
+          .wrong_of_all = percent(counts.bad, counts.truth)};
 }
 
 DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images) {
@@ -109,7 +112,9 @@ DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images) {
           .interpolated = mean(&DisparityMetrics::interpolated),
           .d1 = mean(&DisparityMetrics::d1),
           .d1_interpolated = mean(&DisparityMetrics::d1_interpolated),
-          .mae_px = mean(&DisparityMetrics::mae_px)};
+          .mae_px = mean(&DisparityMetrics::mae_px),
+          .filled = mean(&DisparityMetrics::filled),
+          .wrong_of_all = mean(&DisparityMetrics::wrong_of_all)};
 }
 
 cv::Mat interpolate_background(const cv::Mat& disparity) {

@@ -25,6 +25,20 @@ double area_between(const DensityCounts& counts, double SparsificationPoint::*cu
 
 double pooled(const TemporalCounts& c) { return ratio(c.sum_px, static_cast<double>(c.pixels)); }
 
+/// What a region stands for beside another method, and whether it knows where it is wrong.
+void add_comparison(const RegionCounts& counts, std::vector<NamedFigure>& figures) {
+  const ChangeCounts& change = counts.against;
+  const TrustCounts& trust = counts.trust;
+  figures.insert(figures.end(), {{"changed_percent", percent(change.changed, change.both)},
+                                 {"harm_percent", percent(change.worse, change.changed)},
+                                 {"help_percent", percent(change.better, change.changed)},
+                                 {"gained_percent", percent(change.gained, change.truth)},
+                                 {"gained_right_percent", percent(change.gained_right, change.gained)},
+                                 {"lost_right_percent", percent(change.lost_right, change.truth)},
+                                 {"wrong_of_trusted_percent", percent(trust.trusted_bad, trust.trusted)},
+                                 {"trusted_of_wrong_percent", percent(trust.trusted_bad, trust.bad)}});
+}
+
 }  // namespace
 
 TemporalCounts& TemporalCounts::operator+=(const TemporalCounts& other) {
@@ -41,7 +55,13 @@ double PairMean::value() const { return ratio(sum, pairs); }
 
 ChangeCounts& ChangeCounts::operator+=(const ChangeCounts& other) {
   return add_members(*this, other, &ChangeCounts::both, &ChangeCounts::changed, &ChangeCounts::worse,
-                     &ChangeCounts::better);
+                     &ChangeCounts::better, &ChangeCounts::truth, &ChangeCounts::gained, &ChangeCounts::gained_right,
+                     &ChangeCounts::lost_right);
+}
+
+TrustCounts& TrustCounts::operator+=(const TrustCounts& other) {
+  return add_members(*this, other, &TrustCounts::valid, &TrustCounts::bad, &TrustCounts::trusted,
+                     &TrustCounts::trusted_bad);
 }
 
 DensityCounts& DensityCounts::operator+=(const DensityCounts& other) {
@@ -80,7 +100,7 @@ std::vector<DensityPoint> densities_of(const DensityCounts& counts) {
 
 RegionCounts& RegionCounts::operator+=(const RegionCounts& other) {
   return add_members(*this, other, &RegionCounts::errors, &RegionCounts::tepe, &RegionCounts::tepe_interpolated,
-                     &RegionCounts::against);
+                     &RegionCounts::against, &RegionCounts::trust);
 }
 
 VideoCounts& VideoCounts::operator+=(const VideoCounts& other) {
@@ -92,46 +112,48 @@ VideoCounts& VideoCounts::operator+=(const VideoCounts& other) {
 std::vector<NamedFigure> figures_of(const VideoCounts& counts) {
   const RegionCounts& all = counts.region(Region::kAll);
   const TemporalCounts& along = counts.tepe_along_motion;
-  return {{"flicker_px", pooled(counts.flicker)},
-          {"tae_vda_percent", counts.tae_percent.value()},
-          {"tepe_dynamicstereo_px", pooled(all.tepe)},
-          {"tepe_dynamicstereo_above_1px_percent", percent(all.tepe.above_1px, all.tepe.pixels)},
-          {"tepe_dynamicstereo_above_3px_percent", percent(all.tepe.above_3px, all.tepe.pixels)},
-          {"tepe_dynamicstereo_filled_px", pooled(all.tepe_interpolated)},
-          {"tepe_dynamicstereo_filled_above_1px_percent",
-           percent(all.tepe_interpolated.above_1px, all.tepe_interpolated.pixels)},
-          {"tepe_dynamicstereo_filled_above_3px_percent",
-           percent(all.tepe_interpolated.above_3px, all.tepe_interpolated.pixels)},
-          {"tepe_codd_px", pooled(along)},
-          {"tepe_codd_mean_of_pairs_px", ratio(along.sum_of_pair_means_px, along.pairs)},
-          {"tepe_codd_above_3px_percent", percent(along.above_3px, along.pixels)},
-          {"tepe_codd_relative", ratio(along.relative_sum, static_cast<double>(along.pixels))},
-          {"tepe_codd_relative_above_1_percent", percent(along.relative_above_1, along.pixels)},
-          {"opw_nvds_px", counts.opw_px.value()},
-          {"opw_nvds_m", counts.opw_m.value()},
-          {"rtc_1_01_percent", counts.rtc_1_01_percent.value()},
-          {"rtc_1_25_percent", counts.rtc_1_25_percent.value()},
-          {"changed_percent", percent(all.against.changed, all.against.both)},
-          {"harm_percent", percent(all.against.worse, all.against.changed)},
-          {"help_percent", percent(all.against.better, all.against.changed)},
-          {"ause_px", counts.density.ause_px()},
-          {"ause_bad_percent", counts.density.ause_percent()}};
+  std::vector<NamedFigure> figures{
+      {"flicker_px", pooled(counts.flicker)},
+      {"tae_vda_percent", counts.tae_percent.value()},
+      {"tepe_dynamicstereo_px", pooled(all.tepe)},
+      {"tepe_dynamicstereo_above_1px_percent", percent(all.tepe.above_1px, all.tepe.pixels)},
+      {"tepe_dynamicstereo_above_3px_percent", percent(all.tepe.above_3px, all.tepe.pixels)},
+      {"tepe_dynamicstereo_filled_px", pooled(all.tepe_interpolated)},
+      {"tepe_dynamicstereo_filled_above_1px_percent",
+       percent(all.tepe_interpolated.above_1px, all.tepe_interpolated.pixels)},
+      {"tepe_dynamicstereo_filled_above_3px_percent",
+       percent(all.tepe_interpolated.above_3px, all.tepe_interpolated.pixels)},
+      {"tepe_codd_px", pooled(along)},
+      {"tepe_codd_mean_of_pairs_px", ratio(along.sum_of_pair_means_px, along.pairs)},
+      {"tepe_codd_above_3px_percent", percent(along.above_3px, along.pixels)},
+      {"tepe_codd_relative", ratio(along.relative_sum, static_cast<double>(along.pixels))},
+      {"tepe_codd_relative_above_1_percent", percent(along.relative_above_1, along.pixels)},
+      {"opw_nvds_px", counts.opw_px.value()},
+      {"opw_nvds_m", counts.opw_m.value()},
+      {"rtc_1_01_percent", counts.rtc_1_01_percent.value()},
+      {"rtc_1_25_percent", counts.rtc_1_25_percent.value()}};
+  add_comparison(all, figures);
+  figures.insert(figures.end(),
+                 {{"ause_px", counts.density.ause_px()}, {"ause_bad_percent", counts.density.ause_percent()}});
+  return figures;
 }
 
 std::vector<NamedFigure> figures_of(const RegionCounts& counts) {
   const DisparityMetrics errors = metrics_of(counts.errors);
-  return {{"bad_or_missing", errors.bad_or_missing},
-          {"bad_of_valid", errors.bad_of_valid},
-          {"density", errors.density},
-          {"interpolated", errors.interpolated},
-          {"mae", errors.mae_px},
-          {"tepe_dynamicstereo_px", pooled(counts.tepe)},
-          {"tepe_dynamicstereo_above_1px_percent", percent(counts.tepe.above_1px, counts.tepe.pixels)},
-          {"tepe_dynamicstereo_above_3px_percent", percent(counts.tepe.above_3px, counts.tepe.pixels)},
-          {"tepe_dynamicstereo_filled_px", pooled(counts.tepe_interpolated)},
-          {"changed_percent", percent(counts.against.changed, counts.against.both)},
-          {"harm_percent", percent(counts.against.worse, counts.against.changed)},
-          {"help_percent", percent(counts.against.better, counts.against.changed)}};
+  std::vector<NamedFigure> figures{
+      {"bad_or_missing", errors.bad_or_missing},
+      {"bad_of_valid", errors.bad_of_valid},
+      {"density", errors.density},
+      {"interpolated", errors.interpolated},
+      {"mae", errors.mae_px},
+      {"filled", errors.filled},
+      {"wrong_of_all", errors.wrong_of_all},
+      {"tepe_dynamicstereo_px", pooled(counts.tepe)},
+      {"tepe_dynamicstereo_above_1px_percent", percent(counts.tepe.above_1px, counts.tepe.pixels)},
+      {"tepe_dynamicstereo_above_3px_percent", percent(counts.tepe.above_3px, counts.tepe.pixels)},
+      {"tepe_dynamicstereo_filled_px", pooled(counts.tepe_interpolated)}};
+  add_comparison(counts, figures);
+  return figures;
 }
 
 }  // namespace egosgm::vision

@@ -48,6 +48,7 @@ Prepared read(const Video& video, int number) {
   require(frame.uncertainty, CV_32FC1, "the uncertainty", frame, number);
   require(frame.next_truth, CV_32FC1, "the next frame's truth", frame, number);
   require(frame.flow_to_next, CV_32FC2, "the flow", frame, number);
+  require(frame.reason, CV_8UC1, "the reasons", frame, number);
   require(frame.moving, CV_8UC1, "the mask of what moves", frame, number);
   require(frame.image, frame.image.depth() == CV_16U ? CV_16UC1 : CV_8UC1, "the image", frame, number);
   if (!frame.truth.empty()) result.filled = interpolate_background(frame.estimate);
@@ -85,6 +86,9 @@ void count_regions(const Prepared* before, const Prepared& now, const cv::Mat& r
         count_pixel(estimate, now.filled.at<float>(y, x), truth, counts.regions[r].errors);
         if (!frame.against.empty()) {
           add_change(estimate, frame.against.at<float>(y, x), truth, counts.regions[r].against);
+        }
+        if (!frame.reason.empty()) {
+          add_trust(estimate, truth, frame.reason.at<std::uint8_t>(y, x), counts.regions[r].trust);
         }
         if (before) add_tepe(*before, now, y, x, counts.regions[r]);
       }

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "egosgm/error.h"
+#include "egosgm/reason.h"
 #include "egosgm/vision/disparity_io.h"
 #include "host/vision/disparity_error.h"
 
@@ -287,13 +288,27 @@ void add_flow_figures(const VideoFrame& before, const VideoFrame& now, const std
 }
 
 void add_change(float estimate, float against, float truth, ChangeCounts& counts) {
-  if (!is_valid_disparity(estimate) || !is_valid_disparity(against)) return;
+  const bool has = is_valid_disparity(estimate), had = is_valid_disparity(against);
+  ++counts.truth;
+  counts.gained += has && !had;
+  counts.gained_right += has && !had && is_right(estimate, truth);
+  counts.lost_right += had && is_right(against, truth) && !is_right(estimate, truth);
+  if (!has || !had) return;
   ++counts.both;
   const double e = estimate, a = against, t = truth;
   if (!(std::abs(e - a) > 1)) return;
   ++counts.changed;
   counts.worse += std::abs(e - t) > std::abs(a - t);
   counts.better += std::abs(e - t) < std::abs(a - t);
+}
+
+void add_trust(float estimate, float truth, std::uint8_t reason, TrustCounts& counts) {
+  if (!is_valid_disparity(estimate)) return;
+  const bool bad = is_bad(estimate, truth), trusted = reason == static_cast<std::uint8_t>(Reason::kTrusted);
+  ++counts.valid;
+  counts.bad += bad;
+  counts.trusted += trusted;
+  counts.trusted_bad += trusted && bad;
 }
 
 DensityCounts count_density(const VideoFrame& frame) {
@@ -350,6 +365,7 @@ cv::Mat find_regions(const VideoFrame& now, const VideoFrame* before, const Cali
       if (!has(now.truth, y, x)) continue;
       const float truth = now.truth.at<float>(y, x);
       std::uint8_t bits = bit_of(Region::kAll) | bit_of(truth >= near_px ? Region::kNear : Region::kFar);
+      if (is_sky(truth)) bits |= bit_of(Region::kSky);
       if (edges.at<std::uint8_t>(y, x)) bits |= bit_of(Region::kEdges);
       if (!now.moving.empty()) bits |= bit_of(is_set(now.moving, y, x) ? Region::kMoving : Region::kStill);
       if (back && !is_set(now.moving, y, x)) {

@@ -66,8 +66,11 @@ TemporalCounts tepe_along_poses(const VideoFrame& before, const VideoFrame& now,
 void add_flow_figures(const VideoFrame& before, const VideoFrame& now, const std::optional<Calibration>& calibration,
                       VideoCounts& counts);
 
-/// Harm and help of one pixel where both methods have an estimate.
+/// Harm, help, gain and loss of one pixel that has truth.
 void add_change(float estimate, float against, float truth, ChangeCounts& counts);
+
+/// One pixel that has truth and a Reason.
+void add_trust(float estimate, float truth, std::uint8_t reason, TrustCounts& counts);
 
 /// Bad pixels and |error| in the order of the uncertainty, beside the oracle's order (Ilg et al., Poggi et al.).
 DensityCounts count_density(const VideoFrame& frame);

@@ -34,6 +34,11 @@ class VideoFigures:
     changed_percent: float
     harm_percent: float
     help_percent: float
+    gained_percent: float
+    gained_right_percent: float
+    lost_right_percent: float
+    wrong_of_trusted_percent: float
+    trusted_of_wrong_percent: float
     ause_px: float
     ause_bad_percent: float
 
@@ -48,6 +53,8 @@ class RegionFigures:
     density: float
     interpolated: float
     mae: float
+    filled: float
+    wrong_of_all: float
     tepe_dynamicstereo_px: float
     tepe_dynamicstereo_above_1px_percent: float
     tepe_dynamicstereo_above_3px_percent: float
@@ -55,6 +62,11 @@ class RegionFigures:
     changed_percent: float
     harm_percent: float
     help_percent: float
+    gained_percent: float
+    gained_right_percent: float
+    lost_right_percent: float
+    wrong_of_trusted_percent: float
+    trusted_of_wrong_percent: float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,8 +96,8 @@ class VideoEvaluation:
 
 def evaluate_video(estimates: Sequence[ArrayLike], truths: _Maps = None, *, calibration: Optional[Any] = None,
                    world_from_camera: Optional[ArrayLike] = None, all_truths: _Maps = None, against: _Maps = None, uncertainties: _Maps = None,
-                   moving: _Maps = None, images: _Maps = None, flows: _Maps = None, next_truths: _Maps = None, near_px: float = 32.0,
-                   threads: int = 0) -> VideoEvaluation:
+                   moving: _Maps = None, images: _Maps = None, flows: _Maps = None, next_truths: _Maps = None, reasons: _Maps = None,
+                   near_px: float = 32.0, threads: int = 0) -> VideoEvaluation:
     """Evaluates disparity maps over time. No device is needed.
 
     Each of these is a sequence with an H x W array for each frame, or None for a frame that has none; anything with a length and [] does,
@@ -93,14 +105,14 @@ def evaluate_video(estimates: Sequence[ArrayLike], truths: _Maps = None, *, cali
 
     estimates: the maps to evaluate.
     truths: of the pixels that count. all_truths: of occluded pixels too; tells edges and what is uncovered.
-    against: another method's maps. uncertainties: what grows with the expected error, a variance for instance.
+    against: another method's maps. reasons: those of the estimates, uint8. uncertainties: what grows with the expected error, a variance for instance.
     moving: masks of what moves by itself. images: left images, uint8 or uint16, for the mask of OPW and RTC.
     flows: true flow to the next frame, H x W x 2, NaN where there is none. next_truths: the next frame's truth at this frame's pixels.
     calibration, world_from_camera: the camera and its (N, 4, 4) poses; without them nothing that needs a motion is measured.
     near_px: the region "near" begins at this true disparity. threads: 0 is as many as the machine runs at once.
     """
-    result = _egosgm._evaluate_video(estimates, truths, all_truths, against, uncertainties, moving, images, flows, next_truths, calibration,
-                                     world_from_camera, near_px, threads)
+    result = _egosgm._evaluate_video(estimates, truths, all_truths, against, uncertainties, moving, images, flows, next_truths, reasons,
+                                     calibration, world_from_camera, near_px, threads)
     return VideoEvaluation(figures=VideoFigures(**result["figures"]), frames=[VideoFigures(**frame) for frame in result["frames"]],
                            regions={name: RegionFigures(**region) for name, region in result["regions"].items()},
                            density=DensityFigures(**result["density"]) if result["density"] else None)

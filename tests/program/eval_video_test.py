@@ -85,6 +85,30 @@ class EvalOverTime(ProgramTest):
         figures = self.evaluate(estimate, truth, "--against", against)["video"]["figures"]
         self.assertEqual((figures["changed_percent"], figures["harm_percent"], figures["help_percent"]), (100, 50, 50))
 
+    def test_against_counts_what_was_gained_and_lost(self):
+        estimate, against, truth = self.maps([10, 0, 14]), self.maps([0, 10, 10]), self.maps([10, 10, 10])
+        figures = self.evaluate(estimate, truth, "--against", against)["video"]["figures"]
+        for name, value in {"gained_percent": 100 / 3, "gained_right_percent": 100, "lost_right_percent": 200 / 3}.items():
+            self.assertAlmostEqual(figures[name], value, msg=name)
+        self.assertRegex(self.assert_works("eval", estimate, truth, "--against", against), r"lost_right_percent +66\.6667")
+
+    def test_a_truth_of_one_step_says_that_nothing_is_there(self):
+        sky, hole_and_surface = self.maps([1 / 256, 1 / 256]), self.maps([0, 4])
+        for estimate, wrong, filled in ((sky, 0, 100), (hole_and_surface, 50, 50)):
+            pooled = self.evaluate(estimate, sky)["pooled"]
+            self.assertEqual([pooled[name] for name in ("wrong_of_all", "bad_or_missing", "interpolated", "d1", "filled")], [wrong] * 4 + [filled])
+            self.assertIsNone(pooled["density"])
+
+    def test_reasons_of_a_run_tell_what_was_trusted(self):
+        out, truth = self.new_folder() / "out", self.street / "truth/left_disp_noc"
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "reason", "--quiet")
+        figures = self.evaluate(out, truth)["video"]["figures"]
+        self.assertLess(figures["wrong_of_trusted_percent"], 5)
+        self.assertEqual(self.evaluate(out / "disparity", truth)["video"]["figures"], figures)
+        self.assertIn("wrong_of_trusted_percent", self.assert_works("eval", out / "disparity/000001.png", truth / "000001.png"))
+        (out / "report.json").unlink()
+        self.assertIsNone(self.evaluate(out / "disparity", truth)["video"]["figures"]["wrong_of_trusted_percent"])
+
     def test_formats_of_others(self):
         def npy(value):
             header = f"{{'descr': '<f4', 'fortran_order': False, 'shape': ({HEIGHT}, {WIDTH}), }}".ljust(117) + "\n"

@@ -250,6 +250,8 @@ def test_metrics_and_pictures(frames, street):
     counts = egosgm.compare_disparity(wrong, truth)
     assert counts.bad == counts.truth == truth.size and counts.metrics.mae_px == pytest.approx(10, abs=1e-3)
     assert (counts + egosgm.compare_disparity(truth, truth)).metrics.bad_or_missing == 50
+    sky = egosgm.compare_disparity(wrong, np.zeros_like(truth))
+    assert sky.sky == sky.sky_valid == truth.size and sky.metrics.wrong_of_all == sky.metrics.filled == 100
     poses = np.stack([street.render(i).world_from_camera for i in range(FRAMES)])
     assert egosgm.evaluate_poses(poses, poses).end_drift_m < 1e-9
     holes = truth.copy()

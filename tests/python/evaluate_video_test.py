@@ -266,6 +266,16 @@ def test_harm_and_help():
     assert figures.help_percent == pytest.approx(100 * np.mean((np.abs(a - t) < np.abs(b - t))[changed]))
 
 
+def test_gained_lost_and_trusted():
+    estimate, against, truth = (np.float32([row]) for row in ([10, 20, 20, NO, NO, 10, NO, 2], [NO, NO, 10, 10, 20, 20, 0, NO], [10] * 6 + [0] * 2))
+    reasons = np.uint8([[0, 0, egosgm.REASONS.index("flat")] + [0] * 5])
+    result = egosgm.evaluate_video([estimate], [truth], against=[against], reasons=[reasons])
+    figures = result.figures
+    assert (figures.gained_percent, figures.gained_right_percent, figures.lost_right_percent) == pytest.approx((300 / 8, 200 / 3, 200 / 8))
+    assert (figures.wrong_of_trusted_percent, figures.trusted_of_wrong_percent) == (25, 50)
+    assert (result.regions["sky"].filled, result.regions["all"].wrong_of_all, result.regions["sky"].gained_right_percent) == (50, 25, 100)
+
+
 def half_up(value):
     return int(np.floor(value + 0.5))
 

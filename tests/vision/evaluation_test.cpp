@@ -41,6 +41,38 @@ TEST(Evaluation, CountsByTheRules) {
   EXPECT_DOUBLE_EQ(metrics.mae_px, 12.5 / 3);
 }
 
+TEST(Evaluation, AHoleInTheSkyIsRightAndASurfaceThereIsWrong) {
+  // A surface and a hole in one; then sky: right at 3 px, wrong at 3.5 px, a hole that would be filled with 3.5 px.
+  const cv::Mat truth = (cv::Mat_<float>(1, 5) << 10, 10, 0, 0, 1.0f / 256);
+  const cv::Mat estimate = (cv::Mat_<float>(1, 5) << 10, kNo, 3, 3.5f, kNo);
+  const DisparityCounts counts = compare_disparity(estimate, truth);
+  EXPECT_EQ(counts.sky, 3);
+  EXPECT_EQ(counts.sky_valid, 2);
+  EXPECT_EQ(counts.bad, 1);
+  EXPECT_EQ(counts.bad_interpolated, 2) << "the hole in the surface, and the wrong surface";
+  EXPECT_EQ(counts.d1_interpolated, 2);
+  const DisparityMetrics metrics = metrics_of(counts);
+  EXPECT_DOUBLE_EQ(metrics.density, 50) << "of the two pixels with a surface";
+  EXPECT_DOUBLE_EQ(metrics.filled, 60);
+  EXPECT_DOUBLE_EQ(metrics.wrong_of_all, 20);
+  EXPECT_DOUBLE_EQ(metrics.bad_of_valid, 100.0 / 3);
+  EXPECT_DOUBLE_EQ(metrics.bad_or_missing, 40);
+  EXPECT_DOUBLE_EQ(metrics.d1, 40);
+  EXPECT_DOUBLE_EQ(mean_of({metrics}).filled, 60);
+  EXPECT_DOUBLE_EQ(mean_of({metrics}).wrong_of_all, 20);
+  DisparityCounts twice = counts;
+  twice += counts;
+  EXPECT_DOUBLE_EQ(metrics_of(twice).density, 50);
+}
+
+TEST(Evaluation, OneStepOfKittisPngIsSkyAndTwoAreNot) {
+  for (const float sky : {0.0f, 1.0f / 256}) EXPECT_TRUE(is_sky(sky)) << sky;
+  for (const float no_sky : {2.0f / 256, 1.0f, -0.1f, kNo, std::nanf("")}) EXPECT_FALSE(is_sky(no_sky)) << no_sky;
+  const TemporaryFolder folder;
+  write_disparity_png(folder / "truth.png", cv::Mat(1, 1, CV_32FC1, cv::Scalar(0)));
+  EXPECT_TRUE(is_sky(read_disparity(folder / "truth.png").at<float>(0, 0)));
+}
+
 TEST(Evaluation, PoolingDiffersFromAveraging) {
   const DisparityCounts a{.truth = 10, .valid = 10, .bad = 1}, b{.truth = 90, .valid = 45, .bad = 45};
   DisparityCounts pooled = a;

@@ -16,6 +16,9 @@ namespace egosgm::vision {
 
 inline bool is_valid_disparity(float d) { return d > kInvalidDisparity && d <= 3.402823466e38f; }
 
+/// A true disparity which says that nothing is there, the sky for instance: from 0 to 1/256 px, KITTI's PNG value 1.
+inline bool is_sky(float truth) { return truth >= 0 && truth <= 1.0f / 256; }
+
 /// Reads 16-bit grey PNG (KITTI's has 256 steps a pixel), PFM, or NumPy's .npy, in which what is not above 0 or not
 /// finite is invalid; the file's first bytes tell which.
 EGOSGM_EXPORT cv::Mat read_disparity(const std::filesystem::path& file, double png_steps_per_px = 256);

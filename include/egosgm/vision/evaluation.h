@@ -11,7 +11,8 @@ namespace egosgm::vision {
 
 /// What comparing one disparity map with its truth counted, over pixels that have truth. Counts of several images add
 /// up (KITTI 2015 pools pixels); KITTI 2012 instead averages each image's figures (mean_of). `bad`: |error| > 3 px.
-/// `d1`: bad, and |error| > 5 % of the truth. `interpolated`: after interpolate_background.
+/// `d1`: bad, and |error| > 5 % of the truth. `interpolated`: after interpolate_background. Where the truth says that
+/// nothing is there (is_sky), a hole is right: it is neither missing nor filled.
 struct EGOSGM_EXPORT DisparityCounts {
   std::int64_t truth = 0;             // pixels with truth
   std::int64_t valid = 0;             // of these, with an estimate
@@ -20,19 +21,23 @@ struct EGOSGM_EXPORT DisparityCounts {
   std::int64_t bad_interpolated = 0;  // of all with truth
   std::int64_t d1_interpolated = 0;   // of all with truth
   double absolute_error_px = 0;       // sum over the valid ones
+  std::int64_t sky = 0;               // of all with truth: nothing is there
+  std::int64_t sky_valid = 0;         // of these, with an estimate
 
   DisparityCounts& operator+=(const DisparityCounts& other);
 };
 
 /// The figures, in percent of the pixels with truth unless said otherwise. NaN where there is nothing to divide by.
 struct DisparityMetrics {
-  double bad_or_missing = 0;   // bad or without an estimate
+  double bad_or_missing = 0;   // bad, or a surface without an estimate
   double bad_of_valid = 0;     // percent of the pixels with an estimate
-  double density = 0;          // with an estimate
+  double density = 0;          // percent of the pixels with a surface: those with an estimate
   double interpolated = 0;     // bad after background interpolation: KITTI 2012's official figure
-  double d1 = 0;               // KITTI 2015's rule, or without an estimate
+  double d1 = 0;               // KITTI 2015's rule, or a surface without an estimate
   double d1_interpolated = 0;  // KITTI 2015's official figure
   double mae_px = 0;           // mean absolute error of the pixels with an estimate [px]
+  double filled = 0;           // with an estimate, whether a surface is there or not
+  double wrong_of_all = 0;     // bad: what is missing does not count
 };
 
 /// Both CV_32FC1 with kInvalidDisparity (see disparity_io.h). Throws InvalidArgument where sizes or types differ.

@@ -33,11 +33,21 @@ struct EGOSGM_EXPORT PairMean {
   double value() const;  // NaN without pairs
 };
 
-/// Pixels with truth where both methods have an estimate; `changed`: they differ by more than 1 px.
+/// Pixels with truth, and what another method has there. `both` have an estimate; `changed`: they differ by more than
+/// 1 px. `gained`: the other one has none. `lost_right`: the other one's is right, and this method has none or a bad
+/// one; none is as good where the truth says that nothing is there.
 struct EGOSGM_EXPORT ChangeCounts {
   std::int64_t both = 0, changed = 0, worse = 0, better = 0;
+  std::int64_t truth = 0, gained = 0, gained_right = 0, lost_right = 0;
 
   ChangeCounts& operator+=(const ChangeCounts& other);
+};
+
+/// Pixels with truth, estimate and Reason; `trusted`: of Reason::kTrusted.
+struct EGOSGM_EXPORT TrustCounts {
+  std::int64_t valid = 0, bad = 0, trusted = 0, trusted_bad = 0;
+
+  TrustCounts& operator+=(const TrustCounts& other);
 };
 
 /// What is left if the least certain pixels are dropped. Share k keeps 2 * (k + 1) percent of each frame's pixels that
@@ -57,14 +67,15 @@ struct EGOSGM_EXPORT DensityCounts {
 };
 
 /// Parts of the image that are looked at apart, told by truth, masks and motion of the later frame.
-enum class Region { kAll, kMoving, kStill, kUncovered, kEdges, kNear, kFar };
-inline constexpr std::array<const char*, 7> kRegionNames = {"all",   "moving", "still", "uncovered",
-                                                            "edges", "near",   "far"};
+enum class Region { kAll, kMoving, kStill, kUncovered, kEdges, kNear, kFar, kSky };
+inline constexpr std::array<const char*, 8> kRegionNames = {"all",   "moving", "still", "uncovered",
+                                                            "edges", "near",   "far",   "sky"};
 
 struct EGOSGM_EXPORT RegionCounts {
   DisparityCounts errors;
   TemporalCounts tepe, tepe_interpolated;  // same pixel
   ChangeCounts against;
+  TrustCounts trust;
 
   RegionCounts& operator+=(const RegionCounts& other);
 };
@@ -103,7 +114,7 @@ struct NamedFigure {
 
 /// The figures over time.
 EGOSGM_EXPORT std::vector<NamedFigure> figures_of(const VideoCounts& counts);
-/// The errors, TEPE, harm and help of one region.
+/// The errors, TEPE, and what stands beside another method, of one region.
 EGOSGM_EXPORT std::vector<NamedFigure> figures_of(const RegionCounts& counts);
 
 }  // namespace egosgm::vision

@@ -24,6 +24,7 @@ struct VideoFrame {
   cv::Mat truth;         // of the pixels that count
   cv::Mat all_truth;     // of occluded pixels too: tells edges and what is uncovered; empty: `truth`
   cv::Mat against;       // another method's estimate
+  cv::Mat reason;        // CV_8UC1: the estimate's, as FrameOutputs::reason
   cv::Mat uncertainty;   // CV_32FC1: any number that grows with the expected error, a variance for instance
   cv::Mat moving;        // mask: moves by itself
   cv::Mat image;         // CV_8UC1 or CV_16UC1: the left image, for OPW's and RTC's mask
