@@ -49,7 +49,10 @@ Command add_synth(CLI::App& program) {
   command->add_option("--seed", options.seed, "seed of street, texture and noise")
       ->type_name("S")
       ->capture_default_str();
-  command->add_flag("--moving-object", options.moving_object, "vehicles that move on their own");
+  command->add_flag("--plain", options.plain,
+                    "what has no texture: a sky, which is nothing in the truth, walls and ground; people and poles");
+  command->add_flag("--moving-object", options.moving_object,
+                    "vehicles that move on their own; with --plain people who walk");
   command->add_option("--speed", options.speed_m, "travel per frame [m]")->type_name("M")->capture_default_str();
   command->add_option("--turn", options.turn_deg, "largest turn per frame [deg]")
       ->type_name("DEG")

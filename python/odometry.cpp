@@ -35,6 +35,7 @@ void for_each_field(SyntheticOptions& o, Visit&& visit) {
   visit("width", o.width);
   visit("height", o.height);
   visit("seed", o.seed);
+  visit("plain", o.plain);
   visit("moving_object", o.moving_object);
   visit("moving_object_scale", o.moving_object_scale);
   visit("speed_m", o.speed_m);

@@ -16,6 +16,8 @@ constexpr double kVignette = 0.10;   // darkening at the image's corner
 constexpr double kRightGain = 0.98;  // of the right camera against the left one
 constexpr double kHaze_m = 350;      // distance at which 63 % of the light is the air's
 constexpr double kHazeGrey = 205;
+constexpr double kPlainSkyGrey = 225;
+constexpr double kPlainGround = 0.5;      // reflectance
 constexpr double kSameSurface_px = 0.02;  // disparities that differ by less belong to the same point
 
 const Eigen::Vector3d kToSun = Eigen::Vector3d(-0.55, -0.75, -0.5).normalized();
@@ -142,7 +144,7 @@ Hit View::cast(double x, double y) const {
     if (locals_[index].nearest_m > best.depth_m) break;
     meet(index, direction, best);
   }
-  if (best.depth_m < 0.25 * street_.dome_radius_m) return best;
+  if (street_.options.plain || best.depth_m < 0.25 * street_.dome_radius_m) return best;
   // The camera is inside of the dome: the far root.
   const Eigen::Vector3d o = origin - Eigen::Vector3d(street_.dome_centre.x(), 0, street_.dome_centre.y());
   const double a = direction.squaredNorm(), b = o.dot(direction), r = street_.dome_radius_m;
@@ -152,6 +154,7 @@ Hit View::cast(double x, double y) const {
 }
 
 double View::shade_ground(const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double pixel_m) const {
+  if (street_.options.plain) return kPlainGround * lambert(-Eigen::Vector3d::UnitY());
   const Road::Place place = street_.road.locate(point.x(), point.z());
   const double length = std::hypot(direction.x(), direction.z());
   const double across = std::abs(direction.x() * place.cos_heading - direction.z() * place.sin_heading) / length;
@@ -196,6 +199,7 @@ double View::shade_solid(const Hit& hit, const Eigen::Vector3d& direction, doubl
 }
 
 double View::shade(double x, double y, const Hit& hit) const {
+  if (hit.solid == Hit::kSky && street_.options.plain) return kPlainSkyGrey;
   const Eigen::Vector3d direction = camera_.ray(x, y);
   const Eigen::Vector3d point = camera_.world_from_camera.translation() + hit.depth_m * direction;
   const double pixel_m = hit.depth_m / camera_.focal_px;

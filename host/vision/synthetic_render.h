@@ -17,7 +17,8 @@ struct Camera {
   }
 };
 
-/// What a ray meets first: a solid (index >= 0), the ground or the sky, at `depth_m` along the optical axis.
+/// What a ray meets first: a solid (index >= 0), the ground or the sky, at `depth_m` along the optical axis, which is
+/// infinite in the sky of a plain street.
 struct Hit {
   static constexpr int kGround = -1, kSky = -2;
   double depth_m;

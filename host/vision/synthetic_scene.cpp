@@ -98,6 +98,11 @@ Street::Street(const SyntheticOptions& o)
 
 void Street::build() {
   for (const int side : {-1, 1}) {
+    if (options.plain) {
+      add_walls(side, kRoadBegin_m + 10, road.end_m());
+      add_poles(side, kRoadBegin_m + 10, road.end_m());
+      continue;
+    }
     add_houses(side, kRoadBegin_m + 10, road.end_m());
     add_cars(side, kRoadBegin_m + 10, road.end_m());
     add_poles(side, kRoadBegin_m + 10, road.end_m());
@@ -198,6 +203,20 @@ void Street::add_trees(int side, double begin, double end) {
   }
 }
 
+void Street::add_walls(int side, double begin, double end) {
+  uint32_t h = mix(options.seed, 500 + side);
+  for (double s = begin; s < end;) {
+    h = mix(h, 1);
+    const double length = range(mix(h, 2), 6, 12), height = range(mix(h, 3), 2.2, 4.5);
+    if (unit(mix(h, 4)) < 0.75) {
+      const Material material = unit(mix(h, 5)) < 0.6 ? Material::kWall : Material::kBlock;  // the latter has texture
+      static_solids_.push_back(place(Shape::kBox, material, mix(h, 6), s + length / 2, side * range(mix(h, 7), 6.8, 9),
+                                     0, {0.4, height, length}));
+    }
+    s += length;
+  }
+}
+
 Eigen::Isometry3d Street::camera_pose(int frame) const {
   const double s = frame * options.speed_m, w = options.wobble;
   const auto swing = [&](double period, uint32_t which) {
@@ -223,7 +242,11 @@ std::vector<Solid> Street::solids(int frame) const {
   const auto first = std::lower_bound(static_solids_.begin(), static_solids_.end(), s - kSightBack_m, before);
   const auto last = std::lower_bound(first, static_solids_.end(), s + kSightAhead_m, before);
   std::vector<Solid> visible(first, last);
-  if (options.moving_object) add_moving(frame, visible);
+  if (options.plain) {
+    add_people(frame, visible);
+  } else if (options.moving_object) {
+    add_moving(frame, visible);
+  }
   return visible;
 }
 
@@ -248,6 +271,22 @@ void Street::add_moving(int frame, std::vector<Solid>& out) const {
     const double sine = solid->sin_heading, cosine = solid->cos_heading;
     solid->sin_heading = side * cosine, solid->cos_heading = -side * sine;  // turned by a right angle
     out.push_back(*solid);
+  }
+}
+
+void Street::add_people(int frame, std::vector<Solid>& out) const {
+  constexpr double kApart_m = 5, kAhead_m = 80;
+  const double s = frame * options.speed_m;
+  for (int i = std::max(1, static_cast<int>(s / kApart_m)); i * kApart_m < s + kAhead_m; ++i) {
+    const uint32_t h = mix(mix(options.seed, 600), static_cast<uint32_t>(i));
+    const double phase = 0.2 * (options.moving_object ? frame : 0) + kTwoPi * unit(mix(h, 1));
+    const double lateral = (unit(mix(h, 2)) < 0.5 ? -1 : 1) * (3.0 + 0.7 * std::sin(phase));
+    Solid body = place(Shape::kEllipsoid, Material::kCloth, mix(h, 3), i * kApart_m, lateral, 0, {0.5, 1.5, 0.35});
+    Solid head = place(Shape::kEllipsoid, Material::kCloth, mix(h, 4), i * kApart_m, lateral, 1.45, {0.22, 0.28, 0.24});
+    for (Solid* solid : {&body, &head}) {
+      solid->moving = options.moving_object;
+      out.push_back(*solid);
+    }
   }
 }
 

@@ -53,7 +53,7 @@ class Road {
 };
 
 enum class Shape : uint8_t { kBox, kCylinder, kEllipsoid };
-enum class Material : uint8_t { kFacade, kBlock, kBody, kCabin, kVan, kPole, kSign, kTrunk, kCrown };
+enum class Material : uint8_t { kFacade, kBlock, kBody, kCabin, kVan, kPole, kSign, kTrunk, kCrown, kWall, kCloth };
 
 /// A solid with a vertical axis: `half` is its half extent across, up and along its heading.
 struct Solid {
@@ -88,9 +88,11 @@ struct Street {
   void add_cars(int side, double begin, double end);
   void add_poles(int side, double begin, double end);
   void add_trees(int side, double begin, double end);
+  void add_walls(int side, double begin, double end);
   Solid place(Shape shape, Material material, uint32_t seed, double s, double lateral, double bottom_m,
               const Eigen::Vector3d& size) const;
   void add_moving(int frame, std::vector<Solid>& out) const;
+  void add_people(int frame, std::vector<Solid>& out) const;
 
   std::vector<Solid> static_solids_;  // by s
 };

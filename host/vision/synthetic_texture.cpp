@@ -128,6 +128,14 @@ double sign(const Solid& solid, const SurfacePoint& at) {
   return blend(blend(0.3, 0.95, rim), 0.95, bar) * (1 + 0.1 * fractal_noise(at, 0.2, solid.seed));
 }
 
+/// Plain but for a door in the middle of the long side.
+double wall(const Solid& solid, int face, const SurfacePoint& at) {
+  const double tone = uniform_in(mix(solid.seed, 1), 0.35, 0.85);
+  if (face != 0) return tone;
+  const double door = 0.3 * (1 + 0.6 * fractal_noise(at, 0.4, mix(solid.seed, 2)));
+  return blend(tone, door, stripe(at.u, 0.5, at.du) * stripe(at.v - 1, 1, at.dv));
+}
+
 }  // namespace
 
 double fractal_noise(const SurfacePoint& at, double cell_m, uint32_t seed) {
@@ -204,6 +212,10 @@ double solid_reflectance(const Solid& solid, int face, const SurfacePoint& at) {
       return (unit(mix(h, 1)) < 0.5 ? 0.12 : 0.92) * (1 + 0.25 * fractal_noise(at, 0.6, mix(h, 2)));
     case Material::kTrunk:
       return 0.25 * (1 + 0.5 * fractal_noise({at.u * 3, at.v, at.du * 3, at.dv}, 0.5, mix(h, 2)));
+    case Material::kWall:
+      return wall(solid, face, at);
+    case Material::kCloth:
+      return uniform_in(mix(h, 1), 0.12, 0.6) * (1 + 0.6 * fractal_noise(at, 0.4, mix(h, 2)));
     case Material::kCrown:
       return 0.34 * (1 + 0.75 * fractal_noise(at, 0.8, mix(h, 2)));
   }

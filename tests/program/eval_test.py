@@ -17,6 +17,15 @@ class Synth(ProgramTest):
         for file in ("calib.txt", "poses.txt", "times.txt"):
             self.assertTrue((street / file).read_text().strip(), file)
 
+    def test_a_plain_street_has_a_sky(self):
+        plain = self.new_folder() / "plain"
+        self.assert_works("synth", "--out", plain, "--plain", "--frames", 1, "--width", 160, "--height", 64, "--quiet")
+        for folder, sky in ((plain, True), (self.street, False)):
+            truth = folder / "truth/left_disp_occ"
+            result = json.loads(self.assert_works("eval", "--estimate", truth, "--truth", truth, "--json"))
+            self.assertEqual("sky" in result["video"]["regions"], sky)
+            self.assertEqual(result["pooled"]["wrong_of_all"], 0)
+
     def test_the_command_that_it_names_can_be_pasted(self):
         street = self.new_folder() / "it's a street"
         said = self.assert_works("synth", "--out", street, "--frames", 1, "--width", 80, "--height", 40)

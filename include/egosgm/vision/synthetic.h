@@ -13,12 +13,14 @@
 
 namespace egosgm::vision {
 
-/// A drive through a street of houses, parked cars, trees and thin poles. Equal options give equal bits.
+/// A drive through a street of houses, parked cars, trees and thin poles, or of what has no texture: a plain sky, plain
+/// ground and walls, with people and poles before them. Equal options give equal bits.
 struct EGOSGM_EXPORT SyntheticOptions {
-  int frames = 20;                 // 1..10000
-  int width = 640, height = 240;   // [px], 1..8192 each
-  unsigned seed = 1;               // of street, texture and sensor noise
-  bool moving_object = false;      // a vehicle ahead, and from time to time one that crosses the road
+  int frames = 20;                // 1..10000
+  int width = 640, height = 240;  // [px], 1..8192 each
+  unsigned seed = 1;              // of street, texture and sensor noise
+  bool plain = false;             // sky, ground and walls without texture, people, poles
+  bool moving_object = false;  // a vehicle ahead, and from time to time one that crosses the road; plain: people walk
   double moving_object_scale = 1;  // size of the vehicle ahead, 0.5..8; 5 covers 30 to 45 % of the image
   double speed_m = 0.8;            // forward travel per frame [m], 0..3
   double turn_deg = 1.0;    // largest turn per frame [deg], -4..4, positive: to the right first; radius at least 15 m
@@ -33,10 +35,11 @@ struct EGOSGM_EXPORT SyntheticOptions {
 };
 
 /// One rendered frame, all maps `height` x `width`. Disparities are exact at the pixel's centre (intensities are
-/// averaged over the pixel) and positive everywhere: the sky is a dome at a finite distance.
+/// averaged over the pixel). They are positive, since the sky is a dome at a finite distance, but in a plain street:
+/// its sky has 0 (is_sky).
 struct SyntheticFrame {
   cv::Mat left, right;                      // CV_8UC1
-  cv::Mat left_disparity, right_disparity;  // CV_32FC1, x_left - x_right > 0 [px]
+  cv::Mat left_disparity, right_disparity;  // CV_32FC1, x_left - x_right >= 0 [px]
   cv::Mat left_noc, right_noc;              // CV_8UC1: 255 where the other camera sees the same surface point, else 0
   cv::Mat left_moving, right_moving;        // CV_8UC1: 255 on moving objects, else 0
   Eigen::Isometry3d world_from_camera;      // left camera's pose; identity for frame 0
@@ -73,7 +76,7 @@ class EGOSGM_EXPORT SyntheticSequence {
 ///   image_0/N.png, image_1/N.png          left and right, 8-bit grey
 ///   calib.txt                             P0..P3 (P2, P3 repeat P0, P1)
 ///   poses.txt, times.txt                  camera-to-world rows; seconds at 10 frames per second
-///   truth/left_disp_occ/N.png             disparity of every pixel, KITTI's 16-bit PNG
+///   truth/left_disp_occ/N.png             disparity of every pixel, KITTI's 16-bit PNG, 1 in a plain street's sky
 ///   truth/left_disp_noc/N.png             the same, 0 where the right camera does not see the point
 ///   truth/right_disp_occ, right_disp_noc  likewise for the right view
 ///   truth/left_moving, right_moving       with moving_object only: 255 on moving objects
