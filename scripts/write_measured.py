@@ -15,6 +15,7 @@ import sys
 
 DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs"
 FILES = ("accuracy", "video", "compare", "stages")
+EVIDENCE = "evidence"  # may be missing
 DRIVERS = "drivers"  # of scripts/drivers, which runs apart: each row has a commit of its own, and all may be missing
 CONTENDERS = {
     "opencv_hh": "OpenCV MODE_HH, 8 paths, left view",
@@ -48,10 +49,10 @@ def read(folder):
     missing = [name for name in FILES if not (folder / f"{name}.json").exists()]
     if missing:
         raise FileNotFoundError(", ".join(f"{folder / name}.json" for name in missing))
-    others = sorted(file.name for file in folder.iterdir() if file.stem not in (*FILES, DRIVERS))
+    others = sorted(file.name for file in folder.iterdir() if file.stem not in (*FILES, EVIDENCE, DRIVERS))
     if others:
         raise Refused(f"{folder}: the page is not made from {', '.join(others)}: remove what is left of other runs")
-    present = [name for name in (*FILES, DRIVERS) if (folder / f"{name}.json").exists()]
+    present = [name for name in (*FILES, EVIDENCE, DRIVERS) if (folder / f"{name}.json").exists()]
     return {name: json.loads((folder / f"{name}.json").read_text()) for name in present}
 
 
@@ -62,7 +63,7 @@ def is_clean(commit):
 def expect_one_commit(found):
     if DRIVERS in found and not all(is_clean(row[-1]) for row in found[DRIVERS]["rows"]):
         raise Refused(f"{DRIVERS}.json: not of a commit without changes: run scripts/drivers on a clean checkout")
-    found = {name: found[name] for name in FILES}
+    found = {name: content for name, content in found.items() if name != DRIVERS}
     commits = {name: content["commit"] for name, content in found.items()}
     if len(set(commits.values())) != 1 or not all(map(is_clean, commits.values())):
         raise Refused(f"not of one commit without changes: {commits}: run scripts/measure on a clean checkout")
@@ -117,8 +118,20 @@ def video(content):
         "frame's by more than 1 px. \"Bad at the single frame's density\": of the surest pixels by the variance, of as many as the single frame has. "
         "\"Error² / variance\": the mean, of errors up to 3 px. The filters are those of cameras: 0.4 of the new and 0.6 of the old disparity where they differ by less than the step. "
         "[What each figure is](evaluation.md).\n", video_table(found["methods"]),
+        *([] if "ratios" not in found else ["### Bad of valid, to the single frame\n\nOne video can decide a mean, but no median.\n",
+                                           video_table(found["ratios"])]),
         "### A wrong motion\n\nThe true motions, each off by so much in a random direction, and believed.\n", video_table(found["pose_noise"]),
         "### Missing frames\n\nThe last frame, when the frames before it are missing.\n", video_table(found["dropped_frames"])])
+
+
+def evidence(content):
+    found = content["evidence"]
+    return "\n".join([
+        "## Places without evidence\n\nThe last frame beside the same frame alone; percent, all pixels that have truth. Sky, corridor, fence, poles and plain streets "
+        "have no texture, or one that repeats, in large parts. \"Gained\": what the video's map has and the single frame's has not. What is right is off by at most 3 px. "
+        "[What each figure is](evaluation.md#figures-of-single-frames).\n", video_table(found["places"]),
+        "### One pair again and again\n\nIt brings no evidence that the first time did not bring.\n", video_table(found["repeated"]),
+        "### Thin poles\n\nPercent of the pixels of a pole, before a wall, that are off by at most 2 px.\n", video_table(found["poles"])])
 
 
 def speed(content):
@@ -157,7 +170,8 @@ def page(found):
             f"{machine['device']}, {machine['compute_units']} compute units, {machine['version']}, driver {machine['driver']}; commit {machine['commit']}; "
             f"{machine['date'][:10]}. Speed on {machine['input']}.\n`scripts/measure` runs all of it again. \"Search\" counts every cell that is matched "
             "([how much is searched](how-it-works.md#how-much-is-searched)).\n")
-    parts = [head, accuracy(found["accuracy"]), video(found["video"]), speed(found["compare"]), stages(found["stages"])]
+    places = [evidence(found[EVIDENCE])] if EVIDENCE in found else []
+    parts = [head, accuracy(found["accuracy"]), video(found["video"]), *places, speed(found["compare"]), stages(found["stages"])]
     return "\n".join(parts + ([drivers(found[DRIVERS])] if DRIVERS in found else []))
 
 

@@ -5,6 +5,7 @@
   python3 bench/accuracy                      the table of limits (exit code 1 where one is missed, 3 where rows were skipped)
   python3 bench/accuracy --ego-motion         the table of stereo odometry alone: drift, error, time, and what it is worth to the disparities
   python3 bench/accuracy --ablation           every correction on and off, on four kinds of input apart
+  python3 bench/accuracy --evidence           places without evidence: what is filled there, what is wrong, what was gained over the single frame
   python3 bench/accuracy --video              over time: beside the single frame, OpenCV and its maps averaged in time; wrong motions, dropped frames
   python3 bench/accuracy --paper      the table of Fucek et al. (IFAC 2017) on all scenes at hand, and its figure of a frame's stages
   python3 bench/accuracy --paper --kitti2015 DIR --scenes 84,87,130,146,148 --frames 0:10
@@ -21,6 +22,7 @@ import sys
 
 from ablation import ablation
 from ego_motion import ego_motion_table
+from evidence import evidence_tables
 from inputs import PROJECT, Bench, Missing
 from paper import paper_figure, paper_table
 from rows import main_table
@@ -49,6 +51,7 @@ def parse_arguments():
     parser.add_argument("--compare-json", metavar="FILE", help="take the speed from what egosgm_compare --json wrote")
     parser.add_argument("--no-maps", action="store_true", help="leave out what needs the maps pixel by pixel: flicker, poles, variances, 500 frames")
     parser.add_argument("--video", action="store_true", help="the figures over time (docs/evaluation.md), and nothing else")
+    parser.add_argument("--evidence", action="store_true", help="places without evidence, and nothing else")
     parser.add_argument("--ego-motion", action="store_true", help="stereo odometry alone, and nothing else")
     parser.add_argument("--ablation", action="store_true", help="every correction on and off, on four kinds of input apart, and nothing else")
     parser.add_argument("--inputs", metavar="REGEX", default="", help="only these inputs of --ablation, by title")
@@ -78,6 +81,10 @@ def main():
     elif arguments.ablation:
         content["ablation"] = ablation(bench, arguments.inputs)
         skipped, code = [], 0
+    elif arguments.evidence:
+        content["evidence"] = evidence_tables(bench, re.compile(arguments.only))
+        skipped = [row for table in content["evidence"].values() for row in table["rows"] if str(row[1]).startswith("skipped")]
+        code = 3 if skipped else 0
     elif arguments.video:
         content["video"] = video_tables(bench, re.compile(arguments.only))
         skipped = [row for row in content["video"]["methods"]["rows"] if "skipped" in row[1]]

@@ -10,6 +10,7 @@ import json
 import pathlib
 import shutil
 
+from evidence import print_table, ratios_of
 from inputs import SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect
 
 ALPHA = 0.4
@@ -270,4 +271,7 @@ def link_frames(folder, frames, source):
 def video_tables(bench, only):
     """`only`: a compiled pattern of the videos' titles."""
     print(f"{'':<89} " + " ".join(f"{heading[:7]:>7}" for heading in HEADINGS[2:]))
-    return {"methods": compared(bench, only), "pose_noise": pose_noise(bench, only), "dropped_frames": dropped_frames(bench, only)}
+    methods = compared(bench, only)
+    ratios = ratios_of(methods["rows"], OURS, SINGLE, HEADINGS.index("bad of valid"))
+    print_table(ratios)
+    return {"methods": methods, "ratios": ratios, "pose_noise": pose_noise(bench, only), "dropped_frames": dropped_frames(bench, only)}
