@@ -22,7 +22,8 @@ FILTERS = {"OpenCV HH, averaged at the same pixel, step 20/32 px": (False, 20 / 
 METHODS = (OURS, SINGLE, *OPENCV, *FILTERS)
 HEADINGS = ["video", "method", "bad or missing", "bad of valid", "density", "interpolated", "mean error [px]", "TEPE, same pixel [px]", "above 1 px",
             "above 3 px", "TEPE, filled [px]", "TEPE, along the motion [px]", "flicker [px]", "TAE", "uncovered: bad or missing",
-            "moving: bad or missing", "harm", "help", "bad at the single frame's density", "error² / variance"]
+            "moving: bad or missing", "harm", "help", "bad at the single frame's density", "error² / variance", "wrong of all", "gained", "gained, right",
+            "lost, right"]
 FIGURES = ("tepe_dynamicstereo_px", "tepe_dynamicstereo_above_1px_percent", "tepe_dynamicstereo_above_3px_percent", "tepe_dynamicstereo_filled_px",
            "tepe_codd_px", "flicker_px", "tae_vda_percent")
 NOISE = [(0, 0), (0.1, 0), (0.2, 0), (0.5, 0), (1, 0), (0, 0.01), (0, 0.02), (0, 0.05), (0, 0.1)]  # degrees, metres
@@ -142,9 +143,12 @@ def row_of(bench, maps, method):
     video = result["video"]
     regions, figures, pooled = video["regions"], video["figures"], result["pooled"]
     bad = [regions.get(region, {}).get("bad_or_missing") for region in ("uncovered", "moving")]
-    harm = [None, None] if method == SINGLE else [figures["harm_percent"], figures["help_percent"]]
+    harm, gain = [None] * 2, [None] * 3
+    if method != SINGLE:
+        harm, gain = ([figures[f"{name}_percent"] for name in names] for names in (("harm", "help"), ("gained", "gained_right", "lost_right")))
     return [maps.video.title, method, *(pooled[name] for name in ("bad_or_missing", "bad_of_valid", "density", "interpolated", "mae")),
-            *(figures[name] for name in FIGURES), *bad, *harm, *(certainty(maps, method) if method in (OURS, SINGLE) else [None, None])]
+            *(figures[name] for name in FIGURES), *bad, *harm, *(certainty(maps, method) if method in (OURS, SINGLE) else [None, None]),
+            pooled["wrong_of_all"], *gain]
 
 
 def certainty(maps, method):
