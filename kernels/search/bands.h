@@ -26,8 +26,10 @@ static inline Ints floor_int(const Floats value) {
 // The bands that search [from, to], cut to the range. A band has as few chunks as cover that, one or an even number:
 // with begin and end counted from range.min, its origin is a multiple of the step (of 1 with one chunk) in [end -
 // lanes, begin], and not above ceil_to(step, count) - lanes, so that hardly a lane lies beyond the range. If there is
-// none, the next number of chunks has one. Slack is shared out to both sides, as far as this allows. Chunks never
-// exceed SearchBand::max_chunks, because from the origin range.min that many cover everything.
+// none, the next number of chunks has one. Lanes that are computed and cannot win still take part in the paths. On one
+// side alone they would draw surfaces to that side. So both sides share them out, and of two origins that are as near
+// to the middle, the even multiple of the step is taken. Chunks never exceed SearchBand::max_chunks, because from the
+// origin range.min that many cover everything.
 static inline Bands bands_of(const DisparityRange range, Floats from, Floats to) {
   const Floats lowest = range.min;
   const Floats highest = range.min + range.count - 1;
@@ -42,7 +44,11 @@ static inline Bands bands_of(const DisparityRange range, Floats from, Floats to)
   const Ints lanes = has_one ? (Ints)(EGOSGM_LANES) : ceil_to((Ints)(2 * EGOSGM_LANES), in_steps);
   const Ints own_step = has_one ? (Ints)(1) : step;
 
-  const Ints centred = floor_to(own_step, begin - ((lanes - (end - begin)) >> 1));
+  const Ints unit = own_step << 1;  // in half lanes, as the middle may lie between two
+  const Ints middle = begin + end - lanes + own_step;
+  const Ints above = floor_to(unit, middle);
+  const Ints is_odd_tie = (above == middle) & ((above & unit) != 0);
+  const Ints centred = (above - (is_odd_tie ? unit : (Ints)(0))) >> 1;
   const Ints first_origin = max(ceil_to(own_step, end) - lanes, (Ints)(0));
   const Ints limit = max(ceil_to(own_step, range.count) - lanes, (Ints)(0));
   const Ints origin = max(min(centred, limit), first_origin);

@@ -112,8 +112,9 @@ typedef struct {
   float from, to;
 } Span;
 
-// What the predictions in the 3x3 blocks around it and the coarse match span. `found`: what the block's own predictions
-// and the coarse match span.
+// What the predictions in the 3x3 blocks around it and the coarse match span. `found`: what the predictions in the block
+// and in those above and below it, and the coarse match span. Thin things stand upright: where a frame lost a part of
+// one, the parts above and below it say where to search.
 static inline Span span_around(const ImageSize blocks, const int view, const int x, const int y,
                                const int from_neighbours, const float margin, const int min_count,
                                const float coarse_margin, global const BlockRange* ranges,
@@ -121,12 +122,14 @@ static inline Span span_around(const ImageSize blocks, const int view, const int
   float least = INFINITY;
   float most = -INFINITY;
   uint count = 0;
+  BlockRange upright = {INFINITY, -INFINITY, 0};
   for (int v = max(y - 1, 0); v <= min(y + 1, blocks.height - 1); ++v) {
     for (int u = max(x - 1, 0); u <= min(x + 1, blocks.width - 1); ++u) {
       const BlockRange block = ranges[index_of(blocks, view, u, v)];
       least = fmin(least, block.min);
       most = fmax(most, block.max);
       count += block.count;
+      if (u == x) upright = joined(upright, block);
     }
   }
   const size_t here = index_of(blocks, view, x, y);
@@ -135,7 +138,7 @@ static inline Span span_around(const ImageSize blocks, const int view, const int
   const bool has_coarse = coarse.count >= EGOSGM_COARSE_MIN_COUNT;
   BlockRange both = {INFINITY, -INFINITY, 0};
   if (has_coarse) both = coarse;
-  found[here] = joined(both, ranges[here]);
+  found[here] = joined(both, upright);
 
   const bool has_any = from_neighbours && (has_around || has_coarse);
   Span span = {has_any ? INFINITY : -INFINITY, has_any ? -INFINITY : INFINITY};

@@ -21,13 +21,17 @@ shared::Band band_of(shared::DisparityRange range, float from, float to) {
   for (int chunks = 1;; chunks += chunks > 1 ? 2 : 1) {
     const int step = chunks > 1 ? EGOSGM_BAND_STEP : 1;
     const int lanes = chunks * EGOSGM_LANES;
-    const int slack = lanes - (last - first + 1);
-    if (slack < 0) continue;
+    if (lanes < last - first + 1) continue;
     int best = -1;
     for (int origin = 0; range.min + origin <= first; origin += step) {
       if (range.min + origin + lanes <= last) continue;
       if (origin > 0 && origin + lanes >= range.count + step) continue;
-      if (best < 0 || range.min + origin <= first - slack / 2) best = origin;
+      // How far the middles of band and lanes are apart, in half lanes; of equal ones, an even multiple of the step.
+      const auto distance = [&](int at) { return std::abs(2 * (range.min + at) + lanes - (first + last + 1)); };
+      const bool is_even = origin / step % 2 == 0;
+      if (best < 0 || distance(origin) < distance(best) || (distance(origin) == distance(best) && is_even)) {
+        best = origin;
+      }
     }
     if (best < 0) continue;
     return {static_cast<cl_short>(range.min + best), static_cast<cl_ushort>(chunks), static_cast<cl_short>(first),
@@ -132,7 +136,8 @@ SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, co
         of_blocks.push_back(options.from_neighbours
                                 ? from_neighbours(size, range, options, disparity, of_coarse, view, x, y)
                                 : band_of(range, -kInfinity, kInfinity));
-        const Predicted own = options.from_neighbours ? predicted_in(size, disparity, view, x, y, x, y) : Predicted{};
+        const Predicted own =
+            options.from_neighbours ? predicted_in(size, disparity, view, x, y - 1, x, y + 1) : Predicted{};
         found.push_back({std::min(of_coarse.first, own.least), std::max(of_coarse.second, own.most)});
       }
     }
