@@ -57,6 +57,12 @@ struct StereoMaps {
       : disparity(context, 2 * pixel_count(size)), variance(context, 2 * pixel_count(size)) {}
 };
 
+/// Where a frame writes what is given out of its belief.
+struct GivenOut {
+  Map& disparity;  // what is confirmed; not written where that is all of the belief
+  Map& variance;   // see PublishRoom
+};
+
 /// A map of both views of bytes: 1 where something holds, else 0.
 using FlagMap = ocl::Buffer<cl_uchar>;
 

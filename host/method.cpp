@@ -5,13 +5,13 @@
 namespace egosgm {
 
 FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
-                           Map& variance) {
+                           const GivenOut& given_out) {
   Workspace& w = work_;
   Measurement measured{plan.predicts() ? w.measured : after.maps, w.matching.doubtful};
   VerticalOffset offset = before.offset.is_known ? before.offset : unknown_;
   FrameImages images = uploaded;
 
-  in(Room::kPredict, [&] { predict(plan, before.maps, w.prediction); });
+  in(Room::kPredict, [&] { predict(plan, before, w.prediction); });
   for (int match = 1; match <= plan.matches; ++match) {
     if (match > 1) offset = w.first_offset;
     VerticalOffset& refined = match < plan.matches ? w.first_offset : after.offset;
@@ -21,17 +21,20 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     in(Room::kRefineAlignment, [&] { refine(images, measured, offset, refined); });
   }
   in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, w.fusion, after); });
+  StereoMaps result{after.maps.disparity, after.maps.variance};
   in(Room::kPublish, [&] {
+    result.disparity = confirmed(plan, after, given_out.disparity);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_(
         plan,
-        {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), after.maps, w.fusion.doubtful},
-        {variance, w.dynamic, w.reasons});
+        {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), result, w.fusion.doubtful},
+        {given_out.variance, w.dynamic, w.reasons});
   });
-  return {measured, offset, images};
+  if (plan.wanted.variance) result.variance = given_out.variance;
+  return {result, measured, offset, images};
 }
 
-void Method::predict(const Plan& plan, const StereoMaps& belief, Prediction& prediction) {
+void Method::predict(const Plan& plan, const Belief& belief, Prediction& prediction) {
   if (plan.predicts()) (*predict_)(plan, belief, prediction);
 }
 
@@ -50,8 +53,20 @@ void Method::refine(const FrameImages& images, const StereoMaps& measured, const
 
 void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction,
                   const Measurement& measured, Fusion& fusion, Belief& belief) {
-  if (plan.predicts()) (*fuse_)(plan, images, prediction, measured, fusion, belief.maps);
+  if (plan.predicts()) {
+    std::optional<CoarseView> coarse;
+    if (plan.has_coarse_match) coarse.emplace(CoarseView{search_.coarse_images(), work_.coarse.disparity});
+    (*fuse_)(plan, {images, match_.matcher().codes(), coarse ? &*coarse : nullptr}, prediction, measured, fusion, belief);
+  } else if (fuse_ && fuse_->has_evidence()) {
+    fuse_->begin(belief);
+  }
   belief.missing = fuse_ ? Unpredicted::kNo : Unpredicted::kNotTemporal;
+}
+
+Map Method::confirmed(const Plan& plan, const Belief& belief, Map& published) {
+  if (!plan.predicts() || !fuse_->has_evidence()) return belief.maps.disparity;
+  fuse_->publish(plan, belief, published);
+  return published;
 }
 
 Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)

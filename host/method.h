@@ -32,6 +32,7 @@ struct Workspace {
 
 /// What a frame left on the device. Handles: it is there until a later frame overwrites it.
 struct FrameResults {
+  StereoMaps given_out;
   StereoMaps measured;
   VerticalOffset offset;  // by which the right image was resampled for the last match
   FrameImages images;     // that were matched
@@ -46,9 +47,10 @@ class Method {
   /// Builds what images of `type` need, and what is wanted of them. Enqueues nothing.
   void prepare(PixelType type, const Wanted& wanted = {});
 
-  /// Enqueues a frame. Writes `after` and `variance` (see PublishRoom), which share no memory with `before`.
+  /// Enqueues a frame. Writes `after` and `given_out`, which share no memory with `before`.
   /// REQUIRES: the images' type was prepared, with what the plan wants.
-  FrameResults frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after, Map& variance);
+  FrameResults frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
+                     const GivenOut& given_out);
 
   /// Called after each room of each frame; null: nobody looks on.
   std::function<void(Room)> observer;
@@ -63,12 +65,13 @@ class Method {
     enqueue();
     if (observer) observer(room);
   }
-  void predict(const Plan& plan, const StereoMaps& belief, Prediction& prediction);
+  void predict(const Plan& plan, const Belief& belief, Prediction& prediction);
   FrameImages align(const FrameImages& uploaded, const VerticalOffset& offset, FrameImages& aligned);
   void refine(const FrameImages& images, const StereoMaps& measured, const VerticalOffset& offset,
               VerticalOffset& refined);
   void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
             Fusion& fusion, Belief& belief);
+  Map confirmed(const Plan& plan, const Belief& belief, Map& published);
 
   const MethodOptions options_;
   Workspace work_;

@@ -60,6 +60,7 @@ void for_each(Options& o, Visit&& visit) {
   visit("kalman_update.keep_predicted", o.kalman_update.keep_predicted);
   visit("kalman_update.ask_neighbours", o.kalman_update.ask_neighbours);
   visit("kalman_update.min_variance_px2", o.kalman_update.min_variance_px2);
+  visit("evidence.enabled", o.evidence.enabled);
   visit("output_variance.enabled", o.output_variance.enabled);
   visit("output_variance.scale", o.output_variance.scale);
   visit("output_variance.roughness_weight", o.output_variance.roughness_weight);
@@ -106,6 +107,7 @@ void choose_as_the_paper(MethodOptions& method) {
   method.kalman_update.ask_neighbours = false;
   method.kalman_update.min_variance_px2 = 0.0f;
   method.sad_check.max_difference = 20.0f;
+  method.evidence.enabled = false;
   method.output_variance.enabled = false;
 }
 

@@ -84,6 +84,9 @@ struct KalmanUpdateOptions {
   bool ask_neighbours = true;  // the measurement is taken, too, where most of them are off to the same side
   float min_variance_px2 = 0.02f;
 };
+struct EvidenceOptions {
+  bool enabled = true;  // what no evidence says is there dies, and what is not confirmed is not given out
+};
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
   // Of the averaged variance to the power 1.5; of the squares of the distance from a plane and of jumps beside [px^2].
@@ -108,6 +111,7 @@ struct MethodOptions {
   SadCheckOptions sad_check;
   SpeckleRemovalOptions speckle_removal;
   KalmanUpdateOptions kalman_update;
+  EvidenceOptions evidence;
   OutputVarianceOptions output_variance;
 
   MethodOptions() = default;

@@ -18,6 +18,35 @@
 // fall on beyond the end of a band, and the least variance where measurement and prediction contradict each other.
 #define EGOSGM_DOUBTFUL_VARIANCE_PX2 16.0f
 
+// Evidence (fuse/evidence.cl) is counted in whole numbers, so many a bit of Hamming distance.
+#define EGOSGM_EVIDENCE_UNITS 16
+// How far from the match the controls lie [px]: two on each side; at a quarter of the resolution, four.
+#define EGOSGM_NEAR_CONTROL 8
+#define EGOSGM_FAR_CONTROL 14
+#define EGOSGM_COARSE_CONTROLS \
+  { -19, -14, -10, -7, 7, 10, 14, 19 }
+// Codes may be read so far beside a match.
+#define EGOSGM_CONTROLS_REACH 19
+// The window, in blocks to all sides; half of a window counts with more than so many pixels in it, a quarter.
+#define EGOSGM_EVIDENCE_RADIUS 2
+#define EGOSGM_EVIDENCE_LEAST_COUNT 60
+// Rows of what is known of blocks begin at multiples of what a work-item reads of them.
+#define EGOSGM_EVIDENCE_STRIDE(width) (((width) + 15) / 16 * (16 / EGOSGM_COARSE))
+// A pixel's evidence is a sum over frames, at most MOST: of what it was, so many 64ths are kept, and a frame adds what
+// its images say, less what noise must not reach. What was chosen in this frame alone, and not by the coarse match too,
+// has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is given out from CONFIRMED
+// on. A full-range match that both views confirm begins with FIRST. Where a match lies outside of the other image,
+// nothing can be asked, and so many 64ths are kept.
+#define EGOSGM_EVIDENCE_MOST 128
+#define EGOSGM_EVIDENCE_KEPT 45
+#define EGOSGM_EVIDENCE_KEPT_UNSEEN 58
+#define EGOSGM_EVIDENCE_OF_NOISE 24
+#define EGOSGM_EVIDENCE_OF_CHOICE 48
+#define EGOSGM_EVIDENCE_CONFIRMED 32
+#define EGOSGM_EVIDENCE_FIRST 48
+// The coarse match confirms a disparity that differs by no more than one of its pixels.
+#define EGOSGM_EVIDENCE_COARSE_PX 4.0f
+
 // OutputVariance: the filter's and the measurement's variance, each cut, at every fourth pixel around; the sum of two
 // second differences of disparities, each cut, at every pixel nearer by; and how far the disparities this far off to
 // eight sides are from a pixel's own, each cut.

@@ -121,6 +121,11 @@ typedef struct {
   u32 count;
 } BlockRange;
 
+// The evidence of a block of EGOSGM_COARSE x EGOSGM_COARSE pixels, of those that were asked; how many these are.
+typedef struct {
+  i32 sum, count;
+} EvidenceSum;
+
 // What a sweep of BandedSgm needs to know.
 typedef struct {
   i32 width, height;
@@ -143,7 +148,7 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
-                  sizeof(BlockRange) == 12 && sizeof(SgmParameters) == 52 && sizeof(DisparityMotion) == 84,
+                  sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 52 && sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

@@ -80,7 +80,7 @@ TEST(Method, BuildsNothingInAFrame) {
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
     const Plan plan =
         plan_of(options(32, 0), before.missing, before.offset.is_known, video.motion(index), {Views::kBoth, true});
-    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.output_variance());
+    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.given_out());
     built.context.wait();
     std::swap(before, after);
   }
@@ -96,7 +96,7 @@ TEST(Method, AFrameLeavesTheBeliefBeforeItAsItWas) {
   const auto frame = [&](int index, const Belief& before, Belief& after) {
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
     const Plan plan = plan_of(options(32, 0), before.missing, before.offset.is_known, video.motion(index), {});
-    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.output_variance());
+    built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.given_out());
     built.context.wait();
   };
   frame(0, nothing, first);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
+#include <vector>
+
 #include "egosgm/pipeline.h"
 #include "host/align/vertical_alignment.h"
 #include "host/maps.h"
@@ -10,15 +13,18 @@ namespace egosgm {
 /// All that survives a frame. A value: copies share the device's memory, so that going back to one is an assignment.
 struct Belief {
   StereoMaps maps;
+  FlagMap evidence;  // of each pixel (kernels/method.h); what has enough of it is given out
   VerticalOffset offset;
+  std::shared_ptr<const std::vector<cl_uchar>> images;  // of the frame, where the host has them
   Unpredicted missing = Unpredicted::kFirstFrame;  // why there are no maps; kNo: there are
 
   /// Of nothing.
-  Belief(ocl::Context& context, shared::ImageSize size) : maps(context, size), offset(context) {}
+  Belief(ocl::Context& context, shared::ImageSize size) : maps(context, size), evidence(context, 2 * pixel_count(size)), offset(context) {}
 
   /// Forgets all.
   void forget(Unpredicted why) {
     missing = why;
+    images = nullptr;
     offset.is_known = false;
   }
 

@@ -11,6 +11,20 @@ namespace {
 /// Of the images that show the driver all kernels: those are as high as others, for every launch.
 constexpr int kRehearsedWidth = 16;
 
+/// The pixels of both views without gaps, behind a byte for their type.
+std::vector<cl_uchar> packed(const ImageView& left, const ImageView& right) {
+  const std::size_t bytes = left.type == PixelType::kU8 ? 1 : 2;
+  std::vector<cl_uchar> pixels{static_cast<cl_uchar>(bytes)};
+  pixels.reserve(1 + 2 * bytes * left.width * left.height);
+  for (const ImageView* view : {&left, &right}) {
+    for (int y = 0; y < view->height; ++y) {
+      const auto* row = static_cast<const cl_uchar*>(view->data) + y * view->stride_bytes;
+      pixels.insert(pixels.end(), row, row + bytes * view->width);
+    }
+  }
+  return pixels;
+}
+
 }  // namespace
 
 ocl::Context context_on(const Device::Handle& device) {
@@ -62,13 +76,14 @@ void FrameQueue::prepare(PixelType type, const Wanted& wanted) {
   method.prepare(type, wanted);
   context_.build();
   Belief none(context_, narrow), first(context_, narrow), second(context_, narrow);
-  Map variance(context_, 2 * pixel_count(narrow));
+  Map disparity(context_, 2 * pixel_count(narrow)), variance(context_, 2 * pixel_count(narrow));
   FrameImages images{ocl::Buffer<cl_uchar>(context_, 2 * 2 * pixel_count(narrow)), type};
   images.pixels.write(context_, std::vector<cl_uchar>(images.pixels.size()));
   const ocl::Drain drain{context_};
-  method.frame(plan_of(method_options_, none.missing, false, {}, wanted), images, none, first, variance);
+  method.frame(plan_of(method_options_, none.missing, false, {}, wanted), images, none, first,
+               {disparity, variance});
   method.frame(plan_of(method_options_, first.missing, first.offset.is_known, Motion(), wanted), images, first, second,
-               variance);
+               {disparity, variance});
   context_.wait();
 }
 
@@ -81,14 +96,14 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};
   release_results();
-  const Plan plan = plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, wanted);
+  frame.after.images = std::make_shared<const std::vector<cl_uchar>>(packed(left, right));
+  const bool repeats = belief_.images && *belief_.images == *frame.after.images;
+  const Plan plan = plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, wanted, repeats);
   const FrameImages& images = frame.transfer->upload(left, right);
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
-  Map& variance = frame.transfer->output_variance();
-  const FrameResults results = method_.frame(plan, images, belief_, frame.after, variance);
+  const FrameResults results = method_.frame(plan, images, belief_, frame.after, frame.transfer->given_out());
   const Workspace& workspace = method_.workspace();
-  frame.transfer->download({.result = frame.after.maps,
-                            .variance = plan.wanted.variance ? variance : frame.after.maps.variance,
+  frame.transfer->download({.result = results.given_out,
                             .predicted = plan.predicts() ? &workspace.prediction.maps : nullptr,
                             .measured = results.measured,
                             .bands = workspace.bands,
@@ -118,7 +133,8 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   release_results();
   const Plan plan =
       plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, {Views::kBoth, wants_dynamic});
-  method_.frame(plan, images, belief_, after, transfer.output_variance());
+  after.images = nullptr;
+  const StereoMaps result = method_.frame(plan, images, belief_, after, transfer.given_out()).given_out;
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
 
   drain.is_dismissed = true;
@@ -128,8 +144,8 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
     ::clRetainEvent(*done);
   }
   belief_ = after;
-  return {.disparity = after.maps.disparity.get()(),
-          .variance = plan.wanted.variance ? transfer.output_variance().get()() : after.maps.variance.get()(),
+  return {.disparity = result.disparity.get()(),
+          .variance = result.variance.get()(),
           .unpredicted = plan.unpredicted,
           .dynamic = plan.wanted.dynamic ? method_.workspace().dynamic.get()() : nullptr};
 }

@@ -108,6 +108,7 @@ FrameTransfer::FrameTransfer(ocl::Context& context, shared::ImageSize size, shar
       size_(size),
       range_(range),
       images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(size)), PixelType::kU8},
+      output_disparity_(context, 2 * pixel_count(size)),
       output_variance_(context, 2 * pixel_count(size)),
       upload_(context, images_.pixels),
       disparity_(context, pixel_count(size)),
@@ -190,9 +191,9 @@ void FrameTransfer::download(const FrameOnDevice& frame, const FrameOutputs& out
   fetch(frame.offset.terms, 1, vertical_offset_px_);
 
   disparity_.fetch(frame.result.disparity, 0, pixel_count(size_));  // always: the report counts its valid pixels
-  fetch_view(frame.variance, EGOSGM_LEFT, outputs.variance, variance_);
+  fetch_view(frame.result.variance, EGOSGM_LEFT, outputs.variance, variance_);
   fetch_view(frame.result.disparity, EGOSGM_RIGHT, outputs.right_disparity, right_disparity_);
-  fetch_view(frame.variance, EGOSGM_RIGHT, outputs.right_variance, right_variance_);
+  fetch_view(frame.result.variance, EGOSGM_RIGHT, outputs.right_variance, right_variance_);
 }
 
 double FrameTransfer::matched_cells() const {

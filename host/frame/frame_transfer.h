@@ -23,8 +23,7 @@ struct MatchedParts {
 
 /// What a frame leaves on the device.
 struct FrameOnDevice {
-  const StereoMaps& result;     // no later frame writes it before this one is collected,
-  const Map& variance;          // nor this, which is given out in place of the result's
+  const StereoMaps& result;     // that is given out; no later frame writes it before this one is collected
   const StereoMaps* predicted;  // null where there is no prediction. From here on, the next frame writes them:
   const StereoMaps& measured;   // (or they are the result)
   const SearchBands& bands;
@@ -50,8 +49,8 @@ class FrameTransfer {
   /// REQUIRES: what `validate` asks; no frame of this transfer is under way.
   const FrameImages& upload(const ImageView& left, const ImageView& right);
 
-  /// A place for the variance that is given out, of both views; this transfer's until it is released.
-  ocl::Buffer<float>& output_variance() { return output_variance_; }
+  /// Places for disparity and variance that are given out, of both views; this transfer's until it is released.
+  GivenOut given_out() { return {output_disparity_, output_variance_}; }
 
   /// Enqueues the way back, behind all that was enqueued for the device.
   void download(const FrameOnDevice& frame, const FrameOutputs& outputs);
@@ -81,7 +80,7 @@ class FrameTransfer {
   const shared::ImageSize size_;
   const shared::DisparityRange range_;
   FrameImages images_;
-  ocl::Buffer<float> output_variance_;
+  ocl::Buffer<float> output_disparity_, output_variance_;
   ocl::Upload upload_;
   MapReadback disparity_, variance_, right_disparity_, right_variance_;
   Scratch predicted_, predicted_variance_, measured_, measured_variance_, vertical_offset_px_;

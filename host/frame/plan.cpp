@@ -13,7 +13,7 @@ Unpredicted unpredicted(const MethodOptions& options, Unpredicted missing, const
 }  // namespace
 
 Plan plan_of(const MethodOptions& options, Unpredicted missing, bool knows_offset, const std::optional<Motion>& motion,
-             const Wanted& wanted) {
+             const Wanted& wanted, bool repeats) {
   Plan plan{};
   plan.unpredicted = unpredicted(options, missing, motion);
   const bool searches_bands = plan.predicts() && options.search == SearchMode::kBand;
@@ -23,6 +23,7 @@ Plan plan_of(const MethodOptions& options, Unpredicted missing, bool knows_offse
   plan.matched = plan.predicts() ? plan.tracked : Views::kBoth;
   plan.matches = options.vertical_alignment.enabled && !knows_offset ? 2 : 1;
   plan.has_coarse_match = searches_bands && options.coarse_match.enabled;
+  plan.repeats = repeats;
   plan.wanted = wanted;
   if (!options.output_variance.enabled) plan.wanted.variance.reset();
   return plan;

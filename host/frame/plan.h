@@ -29,13 +29,15 @@ struct Plan {
   Views matched;  // where it is the left one, the right one is read off its match
   int matches;    // 2 where the first one gives the vertical offset
   bool has_coarse_match;
+  bool repeats;  // the images are those of the frame before
   Wanted wanted;
 
   bool predicts() const { return unpredicted == Unpredicted::kNo; }
 };
 
-/// `missing`: why the belief has no maps; kNo: it has. `knows_offset`: whether it has a vertical offset.
+/// `missing`: why the belief has no maps; kNo: it has. `knows_offset`: whether it has a vertical offset. `repeats`:
+/// whether the images are those of the frame before.
 Plan plan_of(const MethodOptions& options, Unpredicted missing, bool knows_offset, const std::optional<Motion>& motion,
-             const Wanted& wanted);
+             const Wanted& wanted, bool repeats = false);
 
 }  // namespace egosgm

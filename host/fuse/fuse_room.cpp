@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/fuse/fuse_room.h"
 
+#include "kernels/method.h"
+
 namespace egosgm {
 
 FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : left_right_px_(options.consistency.update_px),
       outside_(outside_view(options.consistency)),
+      context_(context),
       kalman_update_(context, size, options.kalman_update),
       consistency_(context, size) {
+  if (Evidence::is_of(options)) evidence_.emplace(context, size, options);
   if (!options.track_right) right_map_.emplace(context, size, range_of(options));
   if (options.median_filter.enabled) median_filter_.emplace(context, size);
   if (options.sad_check.max_difference > 0) {
@@ -20,16 +24,33 @@ void FuseRoom::prepare(PixelType type) {
   if (sad_check_) sad_check_->prepare(type);
 }
 
-void FuseRoom::operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                          const Measurement& measured, Fusion& fusion, StereoMaps& belief) {
+void FuseRoom::operator()(const Plan& plan, const Matched& matched, const Prediction& prediction,
+                          const Measurement& measured, Fusion& fusion, Belief& after) {
+  StereoMaps& belief = after.maps;
   StereoMaps fused{fusion.fused, belief.variance};
-  kalman_update_(prediction.hidden, prediction.maps, measured, fused, fusion.doubtful, plan.tracked);
+  if (evidence_) {
+    (*evidence_)(matched.codes, matched.coarse, prediction.maps.disparity, measured.disparity, fusion.evidence,
+                 plan.tracked);
+  }
+  const KalmanUpdate::FrameEvidence of_frame{prediction.evidence, fusion.evidence, plan.repeats};
+  kalman_update_(prediction.hidden, prediction.maps, measured, evidence_ ? &of_frame : nullptr, fused, fusion.doubtful,
+                 after.evidence, plan.tracked);
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (plan.tracked == Views::kLeft) (*right_map_)(measured, left_right_px_, smoothed, plan.wanted.right);
   const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
   consistency_(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
-  if (sad_check_) (*sad_check_)[images.type](images.pixels, belief, checked);
+  if (sad_check_) (*sad_check_)[matched.images.type](matched.images.pixels, belief, checked);
+}
+
+void FuseRoom::begin(Belief& belief) const {
+  context_.enter("Evidence");
+  belief.evidence.fill(context_, EGOSGM_EVIDENCE_FIRST);
+}
+
+void FuseRoom::publish(const Plan& plan, const Belief& belief, Map& published) {
+  evidence_->publish(belief.maps.disparity, belief.evidence, published,
+                     plan.wanted.right ? Views::kBoth : Views::kLeft, plan.tracked);
 }
 
 }  // namespace egosgm

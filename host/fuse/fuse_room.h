@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/frame/plan.h"
+#include "host/fuse/evidence.h"
 #include "host/fuse/kalman_update.h"
 #include "host/fuse/right_map.h"
 #include "host/fuse/sad_check.h"
@@ -15,11 +16,13 @@ namespace egosgm {
 struct Fusion {
   Map fused, smoothed;  // disparities, until the room ends; the latter where the median filter is on
   FlagMap doubtful;     // 1 where the measurement was taken although the prediction or its own sums speak against it
+  BlockEvidence evidence;
 
   Fusion(ocl::Context& context, shared::ImageSize size)
       : fused(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
         smoothed(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
-        doubtful(context, 2 * pixel_count(size)) {}
+        doubtful(context, 2 * pixel_count(size)),
+        evidence(context, size) {}
 };
 
 /// Makes one map of prediction and measurement.
@@ -30,13 +33,29 @@ class FuseRoom {
   /// Builds what images of `type` need.
   void prepare(PixelType type);
 
+  /// What was matched: images and their codes; and by CoarseMatch, or null.
+  struct Matched {
+    const FrameImages& images;
+    const ocl::Buffer<cl_uint>& codes;
+    const CoarseView* coarse;
+  };
+
   /// REQUIRES: the plan predicts.
-  void operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                  const Measurement& measured, Fusion& fusion, StereoMaps& belief);
+  void operator()(const Plan& plan, const Matched& matched, const Prediction& prediction, const Measurement& measured,
+                  Fusion& fusion, Belief& belief);
+
+  /// A belief without a prediction: what both views confirm over the full range begins with some evidence.
+  void begin(Belief& belief) const;
+
+  /// What is given out of a belief. REQUIRES: the method has evidence.
+  void publish(const Plan& plan, const Belief& belief, Map& published);
+  bool has_evidence() const { return evidence_.has_value(); }
 
  private:
   const float left_right_px_;
   const OutsideView outside_;
+  ocl::Context& context_;
+  std::optional<Evidence> evidence_;
   KalmanUpdate kalman_update_;
   std::optional<MedianFilter> median_filter_;
   std::optional<RightMap> right_map_;  // where the left view alone is tracked

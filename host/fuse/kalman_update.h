@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "host/fuse/evidence.h"
 #include "host/maps.h"
 #include "host/method_options.h"
 #include "host/ocl/kernel.h"
@@ -13,14 +14,23 @@ namespace egosgm {
 /// is averaged, and nothing hides it.
 class KalmanUpdate {
  public:
+  /// What is known of a frame before it is fused.
+  struct FrameEvidence {
+    const FlagMap& before;         // that moved with the prediction
+    const BlockEvidence& blocks;  // of this frame's images
+    bool repeats;                  // they are those of the frame before, and make nobody surer
+  };
+
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
 
   /// Nothing is believed of what is `hidden`. `doubtful`: 1 where the measurement was taken although the prediction, or
-  /// its own path sums, speak against it.
+  /// its own path sums, speak against it. `evidence` is null where the method has none: then all that is updated has the
+  /// most of it.
   /// REQUIRES: `updated` is neither `predicted` nor `measured`.
-  void operator()(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured, StereoMaps& updated,
-                  FlagMap& doubtful, Views views);
+  void operator()(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
+                  const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful, FlagMap& updated_evidence,
+                  Views views);
 
  private:
   ocl::Context& context_;
@@ -31,8 +41,10 @@ class KalmanUpdate {
   const cl_int keep_predicted_, ask_neighbours_;
   const float min_variance_px2_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const cl_int, const float,
-              const FlagMap, const Map, const Map, const Map, const Map, const FlagMap, Map, Map, FlagMap>
+              const FlagMap, const Map, const Map, const Map, const Map, const FlagMap, const cl_int, const cl_int,
+              const FlagMap, const ocl::Buffer<cl_int>, const Map, Map, Map, FlagMap, FlagMap>
       update_;
+  const BlockEvidence none_;
 };
 
 }  // namespace egosgm

@@ -78,7 +78,8 @@ ForwardWarp::Atomics::Atomics(ocl::Context& context, shared::ImageSize size)
       landed(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
       moved_key(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size)),
       moved_variance(context, ocl::Scratch::kOfStage2, 2 * pixel_count(size)),
-      zbuffer(context, ocl::Scratch::kOfStage3, 2 * pixel_count(size)) {}
+      zbuffer(context, ocl::Scratch::kOfStage3, 2 * pixel_count(size)),
+      most_evidence(context, ocl::Scratch::kOfStage4, 2 * pixel_count(size)) {}
 
 ForwardWarp::Bands::Bands(ocl::Context& context, shared::ImageSize size)
     : find_spans(build(context, 16), "find_spans"),
@@ -100,8 +101,8 @@ ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Ca
   }
 }
 
-void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted,
-                             Views views) {
+void ForwardWarp::operator()(const StereoMaps& belief, const FlagMap& evidence, const Motion& current_from_previous,
+                             StereoMaps& predicted, FlagMap& predicted_evidence, Views views) {
   context_.enter("ForwardWarp");
   Motion motion = current_from_previous;
   motion.covariance *= static_cast<double>(options_.motion_noise);
@@ -112,17 +113,20 @@ void ForwardWarp::operator()(const StereoMaps& belief, const Motion& current_fro
     const int bands = (size_.height + band_rows_ - 1) / band_rows_;
     find_spans(context_, ocl::every_row(context_, size_, count(views)), size_, left, right, belief.disparity, spans);
     splat_bands(context_, ocl::every_row(context_, {1, bands}, count(views)), size_, range_, left, right,
-                options_.process_noise_px2, band_rows_, spans, belief.disparity, belief.variance, predicted.disparity,
-                predicted.variance);
+                options_.process_noise_px2, band_rows_, spans, belief.disparity, belief.variance, evidence,
+                predicted.disparity, predicted.variance, predicted_evidence);
     return;
   }
   const ocl::Range pixels = ocl::every_pixel(context_, size_, count(views));
-  auto& [move, splat_disparity, splat_variance, decode, landed, moved_key, moved_variance, zbuffer] = *atomics_;
+  auto& [move, splat_disparity, splat_variance, decode, landed, moved_key, moved_variance, zbuffer, most_evidence] =
+      *atomics_;
   move(context_, pixels, size_, range_, left, right, options_.process_noise_px2, belief.disparity, belief.variance,
-       landed, moved_key, moved_variance, zbuffer, predicted.variance);
+       landed, moved_key, moved_variance, zbuffer, predicted.variance, most_evidence);
   splat_disparity(context_, pixels, size_, landed, moved_key, zbuffer);
-  splat_variance(context_, pixels, size_, landed, moved_key, moved_variance, zbuffer, predicted.variance);
-  decode(context_, pixels, size_, range_, zbuffer, predicted.disparity, predicted.variance);
+  splat_variance(context_, pixels, size_, landed, moved_key, moved_variance, zbuffer, predicted.variance, evidence,
+                 most_evidence);
+  decode(context_, pixels, size_, range_, zbuffer, predicted.disparity, predicted.variance, most_evidence,
+         predicted_evidence);
 }
 
 }  // namespace egosgm

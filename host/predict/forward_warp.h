@@ -28,8 +28,10 @@ class ForwardWarp {
               const ForwardWarpOptions& options, shared::DisparityRange range, int pixels = 0,
               int band_rows = kCpuTuning.warp_band_rows);
 
-  /// REQUIRES: `motion` is valid; `predicted` is not `belief`.
-  void operator()(const StereoMaps& belief, const Motion& current_from_previous, StereoMaps& predicted, Views views);
+  /// `evidence` moves with the belief; it is 0 where nothing lands. REQUIRES: `motion` is valid; `predicted` is not
+  /// `belief`.
+  void operator()(const StereoMaps& belief, const FlagMap& evidence, const Motion& current_from_previous,
+                  StereoMaps& predicted, FlagMap& predicted_evidence, Views views);
 
  private:
   using Size = const shared::ImageSize;
@@ -40,22 +42,23 @@ class ForwardWarp {
 
   struct Atomics {
     ocl::Kernel<Size, Range, ViewMotion, ViewMotion, const float, In, In, ocl::Buffer<cl_int>, ocl::Buffer<cl_uint>,
-                Out, ocl::Buffer<cl_uint>, Out>
+                Out, ocl::Buffer<cl_uint>, Out, ocl::Buffer<cl_uint>>
         move;
     ocl::Kernel<Size, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, ocl::Buffer<cl_uint>> splat_disparity;
-    ocl::Kernel<Size, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, In, const ocl::Buffer<cl_uint>, Out>
+    ocl::Kernel<Size, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_uint>, In, const ocl::Buffer<cl_uint>, Out,
+                const FlagMap, ocl::Buffer<cl_uint>>
         splat_variance;
-    ocl::Kernel<Size, Range, const ocl::Buffer<cl_uint>, Out, Out> decode;
+    ocl::Kernel<Size, Range, const ocl::Buffer<cl_uint>, Out, Out, const ocl::Buffer<cl_uint>, FlagMap> decode;
     ocl::Buffer<cl_int> landed;
     ocl::Buffer<cl_uint> moved_key;
     ocl::Buffer<float> moved_variance;
-    ocl::Buffer<cl_uint> zbuffer;
+    ocl::Buffer<cl_uint> zbuffer, most_evidence;
     Atomics(ocl::Context& context, shared::ImageSize size);
   };
   struct Bands {
     ocl::Kernel<Size, ViewMotion, ViewMotion, In, ocl::Buffer<cl_int>> find_spans;
-    ocl::Kernel<Size, Range, ViewMotion, ViewMotion, const float, const cl_int, const ocl::Buffer<cl_int>, In, In, Out,
-                Out>
+    ocl::Kernel<Size, Range, ViewMotion, ViewMotion, const float, const cl_int, const ocl::Buffer<cl_int>, In, In,
+                const FlagMap, Out, Out, FlagMap>
         splat_bands;
     ocl::Buffer<cl_int> spans;
     Bands(ocl::Context& context, shared::ImageSize size);

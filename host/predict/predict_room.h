@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "host/frame/belief.h"
 #include "host/frame/plan.h"
 #include "host/match/consistency_check.h"
 #include "host/predict/edge_rejection.h"
@@ -14,13 +15,15 @@ struct Prediction {
   StereoMaps warped;     // before anything was dropped; of what EdgeRejection dropped, the variances are gone
   Map rejected, filled;  // disparities after those stages, where others follow; until the room ends
   StereoMaps maps;
-  FlagMap hidden;  // where a surface that came nearer than the range hides what is behind it
+  FlagMap evidence;  // of what was warped
+  FlagMap hidden;    // where a surface that came nearer than the range hides what is behind it
 
   Prediction(ocl::Context& context, shared::ImageSize size)
       : warped(context, size),
         rejected(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
         filled(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
         maps(context, size),
+        evidence(context, 2 * pixel_count(size)),
         hidden(context, 2 * pixel_count(size)) {}
 };
 
@@ -31,7 +34,7 @@ class PredictRoom {
               const MethodOptions& options, const Tuning& tuning);
 
   /// REQUIRES: the plan has a motion.
-  void operator()(const Plan& plan, const StereoMaps& belief, Prediction& prediction);
+  void operator()(const Plan& plan, const Belief& belief, Prediction& prediction);
 
  private:
   const float left_right_px_;

@@ -40,6 +40,9 @@ class CoarseMatch {
   /// Cells that a call matches, of both views.
   std::uint64_t matched_cells() const;
 
+  /// Both views at a quarter of the resolution, 16 bits: of the last call.
+  const ocl::Buffer<cl_uchar>& images() const { return images_.pixels; }
+
   static shared::ImageSize coarse_size(shared::ImageSize size);
   static shared::DisparityRange coarse_range(shared::DisparityRange range);
   /// The options of BandedSgm at that resolution.

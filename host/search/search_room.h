@@ -20,6 +20,9 @@ class SearchRoom {
   void operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction, Measurement& coarse,
                   SearchBands& bands);
 
+  /// REQUIRES: the last frame had a coarse match.
+  const ocl::Buffer<cl_uchar>& coarse_images() const { return coarse_match_->images(); }
+
   /// Cells that a coarse match matches, of both views.
   std::uint64_t coarse_cells() const { return coarse_match_ ? coarse_match_->matched_cells() : 0; }
 

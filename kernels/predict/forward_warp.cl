@@ -2,7 +2,7 @@
 // Forward warp of both views' disparity maps by the camera's motion (eqs. 1-6), nearest surface first.
 //
 // Several sources may land on one target. The largest disparity wins, of equal ones the one with the largest variance,
-// so the result does not depend on the order in which they come. What came nearer than the range still hides what is
+// so the result does not depend on the order in which they come; its evidence is the most that such a source has. What came nearer than the range still hides what is
 // behind it: such a target has no disparity, and is marked as hidden. GPUs, a pixel a work-item: disparities bid by
 // atomic maxima of keys that are ordered as they are, then variances do among the sources that reached the winner.
 // CPUs, where atomics are slow: a work-item owns a band of target rows and looks through the source rows that reach
@@ -73,7 +73,7 @@ static inline float disparity_of(const uint key) { return as_float(key >> 31 ? k
 KERNEL void move(const ImageSize size, const DisparityRange range, const DisparityMotion left,
                  const DisparityMotion right, const float process_noise, global const float* disparity,
                  global const float* variance, global int* landed, global uint* moved_key, global float* moved_variance,
-                 global uint* zbuffer, global float* predicted_variance) {
+                 global uint* zbuffer, global float* predicted_variance, global uint* most_evidence) {
   const int x = get_global_id(0);
   const int y = get_global_id(1);
   const int view = get_global_id(2);
@@ -86,6 +86,7 @@ KERNEL void move(const ImageSize size, const DisparityRange range, const Dispari
   moved_variance[i] = moved.variance;
   zbuffer[i] = 0;
   predicted_variance[i] = 0.0f;
+  most_evidence[i] = 0;
 }
 
 KERNEL void splat_disparity(const ImageSize size, global const int* landed, global const uint* moved_key,
@@ -101,7 +102,7 @@ KERNEL void splat_disparity(const ImageSize size, global const int* landed, glob
 // Positive floats are ordered as their bits are.
 KERNEL void splat_variance(const ImageSize size, global const int* landed, global const uint* moved_key,
                            global const float* moved_variance, global const uint* zbuffer,
-                           global float* predicted_variance) {
+                           global float* predicted_variance, global const uchar* evidence, global uint* most_evidence) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
   const size_t first = (size_t)get_global_id(2) * size.width * size.height;
@@ -109,10 +110,12 @@ KERNEL void splat_variance(const ImageSize size, global const int* landed, globa
   const uint target = landed[i];
   if (target >= (uint)(size.width * size.height) || zbuffer[first + target] != moved_key[i]) return;
   atomic_max((global uint*)predicted_variance + first + target, as_uint(moved_variance[i]));
+  atomic_max(most_evidence + first + target, evidence[i]);
 }
 
 KERNEL void decode_warped(const ImageSize size, const DisparityRange range, global const uint* zbuffer,
-                          global float* disparity, global float* variance) {
+                          global float* disparity, global float* variance, global const uint* most_evidence,
+                          global uchar* evidence) {
   const int x = get_global_id(0);
   if (x >= size.width) return;
   const size_t i = ((size_t)get_global_id(2) * size.height + get_global_id(1)) * size.width + x;
@@ -120,6 +123,7 @@ KERNEL void decode_warped(const ImageSize size, const DisparityRange range, glob
   const int is_beyond = d > range.min + range.count - 1;
   disparity[i] = is_beyond ? EGOSGM_INVALID_DISPARITY : d;
   if (is_beyond) variance[i] = EGOSGM_HIDDEN;
+  evidence[i] = (uchar)most_evidence[i];
 }
 
 #else
@@ -188,8 +192,8 @@ KERNEL void find_spans(const ImageSize size, const DisparityMotion left, const D
 COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, const DisparityRange range,
                                    const DisparityMotion left, const DisparityMotion right, const float process_noise,
                                    const int band_rows, global const int* spans, global const float* disparity,
-                                   global const float* variance, global float* predicted,
-                                   global float* predicted_variance) {
+                                   global const float* variance, global const uchar* evidence, global float* predicted,
+                                   global float* predicted_variance, global uchar* predicted_evidence) {
   const int view = at.y;
   const int width = size.width;
   const int first = at.x * band_rows;
@@ -198,10 +202,12 @@ COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, cons
   const size_t rows = (size_t)view * size.height;
   global float* band = predicted + (rows + first) * width;
   global float* band_variance = predicted_variance + (rows + first) * width;
+  global uchar* band_evidence = predicted_evidence + (rows + first) * width;
   const int pixels = (end - first) * width;
   for (int i = 0; i < pixels; i += PIXELS) {
     store_pixels(INVALID, band, i, pixels);
     store_pixels(0.0f, band_variance, i, pixels);
+    store_bytes(0, band_evidence, i, pixels);
   }
   for (int y = 0; y < size.height; ++y) {
     if (spans[2 * (rows + y)] >= end || spans[2 * (rows + y) + 1] < first) continue;
@@ -222,9 +228,14 @@ COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, cons
         const int target = LANE(int, targets, i);
         if (target < 0) continue;
         const float d = LANE(float, disparities, i), p = LANE(float, variances, i);
-        if (d > band[target] || (d == band[target] && p > band_variance[target])) {
+        const uchar of_source = evidence[row + start + i];
+        if (d > band[target]) {
           band[target] = d;
           band_variance[target] = p;
+          band_evidence[target] = of_source;
+        } else if (d == band[target]) {
+          band_variance[target] = fmax(band_variance[target], p);
+          band_evidence[target] = max(band_evidence[target], of_source);
         }
       }
     }
@@ -241,9 +252,10 @@ COMPILED_ONCE void splat_bands_row(const WorkItem at, const ImageSize size, cons
 KERNEL void splat_bands(const ImageSize size, const DisparityRange range, const DisparityMotion left,
                         const DisparityMotion right, const float process_noise, const int band_rows,
                         global const int* spans, global const float* disparity, global const float* variance,
-                        global float* predicted, global float* predicted_variance) {
+                        global const uchar* evidence, global float* predicted, global float* predicted_variance,
+                        global uchar* predicted_evidence) {
   splat_bands_row(THIS_WORK_ITEM, size, range, left, right, process_noise, band_rows, spans, disparity, variance,
-                  predicted, predicted_variance);
+                  evidence, predicted, predicted_variance, predicted_evidence);
 }
 
 #endif

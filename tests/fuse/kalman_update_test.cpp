@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "tests/reference/fuse/kalman_update.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
@@ -16,8 +18,18 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 /// What lies in the output must not shine through.
 testing::HostMaps before_update(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
 
+/// Values of blocks as the device has them.
+template <typename T>
+std::vector<T> in_padded_rows(shared::ImageSize size, const std::vector<T>& values) {
+  const int columns = (size.width + 3) / 4, stride = (size.width + 15) / 16 * 4;
+  std::vector<T> padded(values.size() / columns * stride);
+  for (std::size_t i = 0; i < values.size(); ++i) padded[i / columns * stride + i % columns] = values[i];
+  return padded;
+}
+
 testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& predicted,
-                         const testing::HostMaps& measured, int pixels = 0, Views views = Views::kBoth) {
+                         const testing::HostMaps& measured, int pixels = 0, Views views = Views::kBoth,
+                         const reference::FrameEvidence* evidence = nullptr) {
   ocl::Context context(testing::any_device());
   KalmanUpdate update(context, size, options, pixels);
   const StereoMaps prediction = testing::upload(context, size, predicted);
@@ -27,8 +39,19 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
   hidden.write(context, predicted.hidden.empty() ? std::vector<cl_uchar>(hidden.size()) : predicted.hidden);
   FlagMap doubtful(context, predicted.disparity.size());
   doubtful.write(context, std::vector<cl_uchar>(doubtful.size(), 9));
-  update(hidden, prediction, measurement, out, doubtful, views);
-  return testing::download(context, Measurement{out, doubtful});
+  BlockEvidence blocks(context, size);
+  FlagMap before(context, predicted.disparity.size()), after(context, predicted.disparity.size());
+  after.write(context, std::vector<cl_uchar>(after.size(), 7));
+  if (evidence) {
+    before.write(context, evidence->before);
+    blocks.evidence.write(context, in_padded_rows(size, evidence->blocks.evidence));
+    blocks.found.write(context, in_padded_rows(size, evidence->blocks.found));
+  }
+  const KalmanUpdate::FrameEvidence of_frame{before, blocks, evidence && evidence->repeats};
+  update(hidden, prediction, measurement, evidence ? &of_frame : nullptr, out, doubtful, after, views);
+  testing::HostMaps maps = testing::download(context, Measurement{out, doubtful});
+  maps.evidence = after.read(context);
+  return maps;
 }
 
 struct Estimate {
@@ -80,6 +103,40 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
       EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
           << "gate " << options.gate_px << ", by " << pixels;
       EXPECT_EQ(actual.doubtful, expected.doubtful) << "gate " << options.gate_px << ", by " << pixels;
+    }
+  }
+}
+
+/// Of which nothing is hidden, and all that is asked has an answer.
+reference::FrameEvidence random_evidence(shared::ImageSize size, unsigned seed, bool repeats) {
+  std::mt19937 random(seed);
+  reference::FrameEvidence evidence;
+  for (std::size_t i = 0; i < 2 * pixel_count(size); ++i) {
+    evidence.before.push_back(random() % 3 == 0 ? 0 : static_cast<std::uint8_t>(random() % 129));
+  }
+  const std::size_t blocks = 2 * static_cast<std::size_t>((size.width + 3) / 4) * ((size.height + 3) / 4);
+  for (std::size_t i = 0; i < blocks; ++i) {
+    evidence.blocks.evidence.push_back(static_cast<int>(random() % 240) - 80);
+    evidence.blocks.found.push_back(random() % 3 == 0 ? kNone : static_cast<float>(random() % 13) - 6);
+  }
+  evidence.repeats = repeats;
+  return evidence;
+}
+
+TEST_P(KalmanUpdateTest, EqualsReferenceWithEvidence) {
+  const shared::ImageSize size = GetParam();
+  const testing::HostMaps predicted = testing::random_maps(size, -4, 4, 0.3, 16);
+  testing::HostMaps measured = testing::random_maps(size, -5, 5, 0.2, 17);
+  for (std::size_t i = 0; i < measured.disparity.size(); ++i) measured.doubtful.push_back(i % 11 == 0);
+  for (const bool repeats : {false, true}) {
+    const reference::FrameEvidence evidence = random_evidence(size, 18, repeats);
+    const testing::HostMaps expected = reference::kalman_update(size, {}, predicted, measured, &evidence);
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps actual = update(size, {}, predicted, measured, pixels, Views::kBoth, &evidence);
+      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << repeats << ", by " << pixels;
+      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << repeats << ", by " << pixels;
+      EXPECT_EQ(actual.doubtful, expected.doubtful) << repeats << ", by " << pixels;
+      EXPECT_EQ(actual.evidence, expected.evidence) << repeats << ", by " << pixels;
     }
   }
 }
@@ -207,6 +264,64 @@ TEST(KalmanUpdate, CountsNoPixelOutsideOfTheImageAmongThoseThatMove) {
     EXPECT_FALSE(moved(view, 7, 17) || moved(view, 13, 17));
     EXPECT_FALSE(moved(view, 3, 10) || moved(view, 17, 10)) << "none beside";
   }
+}
+
+/// The left pixel in the middle of 25x1, whose match lies in the image, and its evidence.
+struct Pixel {
+  float predicted = kNone, measured = kNone;
+  std::uint8_t before = 0;
+  int now = 0;
+  float found = kNone;
+  bool repeats = false;
+};
+struct Judged {
+  Estimate estimate;
+  int evidence;
+  bool operator==(const Judged&) const = default;
+};
+
+Judged judged(const Pixel& pixel, int x = 12) {
+  constexpr shared::ImageSize kRow{25, 1};
+  testing::HostMaps predicted = testing::empty_maps(kRow), measured = predicted;
+  predicted.disparity[x] = pixel.predicted, measured.disparity[x] = pixel.measured;
+  predicted.variance[x] = measured.variance[x] = 1;
+  reference::FrameEvidence evidence{std::vector<std::uint8_t>(50, 0), {std::vector<int>(14, pixel.now), std::vector<float>(14, pixel.found)}, pixel.repeats};
+  evidence.before[x] = pixel.before;
+  const testing::HostMaps out = update(kRow, {}, predicted, measured, 0, Views::kBoth, &evidence);
+  return {{out.disparity[x], out.variance[x], out.doubtful[x] != 0}, out.evidence[x]};
+}
+
+// In sixteenths of a bit: 1.5 bits a frame must be had, 3 more by what was chosen in this frame alone.
+TEST(KalmanUpdate, EvidenceAddsUpAndDecays) {
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40}), (Judged{{5.5f, 0.5f}, 45 + 40 - 24}));
+  EXPECT_EQ(judged({.predicted = 5, .measured = 5, .before = 128, .now = 400}).evidence, 128) << "at most";
+  EXPECT_EQ(judged({.measured = 5, .now = 72}), (Judged{{5, 1}, 0})) << "chosen: just alive";
+  EXPECT_EQ(judged({.measured = 5, .now = 71}), (Judged{kNothing, 0}));
+  EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9}), (Judged{{5, 1}, 0})) << "the coarse match found it, too";
+  EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9.5f}), (Judged{kNothing, 0})) << "but not that";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 90}).evidence, 90 - 72)
+      << "contradicted: what was believed does not count";
+}
+
+TEST(KalmanUpdate, WithoutEvidenceAPredictionLivesAFewFrames) {
+  int evidence = 128, frames = 0;
+  for (; frames < 20; ++frames) {
+    const Judged now = judged({.predicted = 5, .measured = 6, .before = static_cast<std::uint8_t>(evidence)});
+    if (now.estimate.disparity == kNone) break;
+    EXPECT_EQ(now.estimate, (Estimate{5, 1})) << "the measurement moves nothing, and no variance falls";
+    evidence = now.evidence;
+  }
+  EXPECT_EQ(frames, 2);
+}
+
+TEST(KalmanUpdate, WhereNothingCanBeAskedEvidenceDecaysAlone) {
+  EXPECT_EQ(judged({.predicted = 5, .before = 64, .now = -100}, 3).evidence, 58) << "the match lies outside of the image";
+  EXPECT_EQ(judged({.predicted = 5, .before = 64, .now = -100}, 5), (Judged{kNothing, 0})) << "and inside";
+}
+
+TEST(KalmanUpdate, ARepeatedPairMakesNobodySurer) {
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 90, .repeats = true}), (Judged{{5, 1}, 64}));
+  EXPECT_EQ(judged({.measured = 6, .now = 200, .repeats = true}), (Judged{kNothing, 0}));
 }
 
 TEST(KalmanUpdate, NeverClaimsMoreThanTheFloor) {

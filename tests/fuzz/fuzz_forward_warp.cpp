@@ -54,17 +54,21 @@ void run(std::string_view input) {
   for (float& d : belief.disparity) d = disparity(bytes, range);
   for (std::size_t i = 0; i < belief.variance.size(); ++i) {
     if (belief.disparity[i] > EGOSGM_INVALID_DISPARITY) belief.variance[i] = variance(bytes);
+    belief.evidence.push_back(static_cast<std::uint8_t>(i * 29));
   }
   const testing::HostMaps expected =
       reference::forward_warp(kSize, range, disparity_motion(calibration, motion, EGOSGM_LEFT),
                               disparity_motion(calibration, motion, EGOSGM_RIGHT), kProcessNoisePx2, belief);
   static ocl::Context context(testing::any_device());
   const StereoMaps on_device = testing::upload(context, kSize, belief);
+  FlagMap evidence(context, belief.evidence.size()), moved(context, belief.evidence.size());
+  evidence.write(context, belief.evidence);
   for (const int pixels : {1, 16}) {
     ForwardWarp warp(context, kSize, calibration, {.process_noise_px2 = kProcessNoisePx2}, range, pixels);
     StereoMaps predicted(context, kSize);
-    warp(on_device, motion, predicted, Views::kBoth);
+    warp(on_device, evidence, motion, predicted, moved, Views::kBoth);
     const testing::HostMaps actual = testing::without_marks(testing::download(context, predicted));
+    if (moved.read(context) != expected.evidence) throw std::logic_error("by " + std::to_string(pixels) + ": evidence");
     if (actual.hidden != expected.hidden) throw std::logic_error("by " + std::to_string(pixels) + ": hidden");
     for (const auto& same : {testing::same_bits(actual.disparity, expected.disparity, kSize),
                              testing::same_bits(actual.variance, expected.variance, kSize)}) {

@@ -31,8 +31,13 @@ testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, s
   ForwardWarp warp(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
   StereoMaps out = testing::upload(context, size, before(size));
-  warp(in, motion, out, views);
-  return testing::without_marks(testing::download(context, out));
+  FlagMap evidence(context, 2 * pixel_count(size)), moved(context, 2 * pixel_count(size));
+  evidence.write(context, belief.evidence.empty() ? std::vector<cl_uchar>(evidence.size()) : belief.evidence);
+  moved.write(context, std::vector<cl_uchar>(moved.size(), 77));
+  warp(in, evidence, motion, out, moved, views);
+  testing::HostMaps maps = testing::without_marks(testing::download(context, out));
+  maps.evidence = moved.read(context);
+  return maps;
 }
 
 testing::HostMaps warp(const testing::HostMaps& belief, const Motion& motion) {
@@ -88,6 +93,7 @@ TEST_P(ForwardWarpTest, EqualsReference) {
     testing::HostMaps belief = testing::random_maps(size, static_cast<float>(range.min) - 1,
                                                     static_cast<float>(range.min + range.count), 0.2, 12);
     for (float& d : belief.disparity) d = std::nearbyint(4 * d) / 4;
+    for (std::size_t i = 0; i < belief.disparity.size(); ++i) belief.evidence.push_back(i * 37 % 251);
     for (int repetition = 0; repetition < 3; ++repetition) {
       Motion motion = random_motion(random, 0.5, 0.05);
       if (repetition > 0) motion.covariance = random_covariance(random, 0.01);
@@ -100,6 +106,7 @@ TEST_P(ForwardWarpTest, EqualsReference) {
             << "min " << range.min << ", by " << pixels;
         EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
             << "min " << range.min << ", by " << pixels;
+        EXPECT_EQ(actual.evidence, expected.evidence) << "min " << range.min << ", by " << pixels;
         EXPECT_EQ(actual.hidden, expected.hidden) << "min " << range.min << ", by " << pixels;
       }
     }
@@ -193,6 +200,25 @@ TEST(ForwardWarp, OfEqualDisparitiesTheLeastCertainWins) {
     EXPECT_EQ(predicted.disparity[at(kSize, EGOSGM_LEFT, 52, 30)], 5);
     EXPECT_EQ(predicted.variance[at(kSize, EGOSGM_LEFT, 52, 30)], 1.25f);
   }
+}
+
+TEST(ForwardWarp, EvidenceGoesWithTheNearest) {
+  testing::HostMaps belief = testing::empty_maps(kSize);
+  belief.evidence.assign(belief.disparity.size(), 9);
+  belief.disparity[at(kSize, EGOSGM_LEFT, 50, 30)] = 20;
+  belief.evidence[at(kSize, EGOSGM_LEFT, 50, 30)] = 5;
+  belief.disparity[at(kSize, EGOSGM_LEFT, 54, 30)] = 1;
+  for (const int x : {70, 71, 72}) {  // all land on one pixel
+    belief.disparity[at(kSize, EGOSGM_RIGHT, x, 40)] = 10;
+    belief.evidence[at(kSize, EGOSGM_RIGHT, x, 40)] = static_cast<std::uint8_t>(x == 71 ? 30 : 20);
+  }
+  const testing::HostMaps sideways = warp(belief, translation(0.1, 0, 0));
+  EXPECT_EQ(sideways.evidence[at(kSize, EGOSGM_LEFT, 54, 30)], 5) << "not the most of all, but the nearest's";
+  EXPECT_EQ(sideways.evidence[at(kSize, EGOSGM_LEFT, 50, 30)], 0) << "nothing lands there";
+  const testing::HostMaps back = warp(belief, translation(0, 0, 10));
+  EXPECT_EQ(*std::max_element(back.evidence.begin() + static_cast<std::ptrdiff_t>(at(kSize, EGOSGM_RIGHT, 0, 0)),
+                              back.evidence.end()),
+            30) << "of equal ones, the most";
 }
 
 TEST(ForwardWarp, PointsBehindTheCameraVanish) {

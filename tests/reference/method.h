@@ -6,6 +6,14 @@ namespace egosgm::reference {
 
 inline constexpr int kCoarseMinCount = 8;
 inline constexpr int kCoarseOutliers = 2;
+// Evidence, in sixteenths of a bit; controls in pixels from the match.
+inline constexpr int kControls[4] = {-14, -8, 8, 14};
+inline constexpr int kCoarseControls[8] = {-19, -14, -10, -7, 7, 10, 14, 19};
+inline constexpr int kConfirmedEvidence = 32;
+inline constexpr int kEvidenceOfChoice = 48;
+inline constexpr int kEvidenceOfNoise = 24;
+inline constexpr int kFirstEvidence = 48;
+inline constexpr int kMostEvidence = 128;
 inline constexpr float kDifferencePx = 1.0f;
 inline constexpr int kDynamicMinCount = 9;
 inline constexpr int kDynamicRadius = 4;

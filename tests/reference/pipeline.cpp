@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "host/method_options.h"
+#include "tests/reference/fuse/evidence.h"
 #include "tests/reference/fuse/kalman_update.h"
 #include "tests/reference/fuse/sad_check.h"
 #include "tests/reference/match/banded_sgm.h"
@@ -20,6 +21,7 @@
 #include "tests/reference/publish/output_variance.h"
 #include "tests/reference/publish/reasons.h"
 #include "tests/reference/search/coarse_match.h"
+#include "tests/reference/method.h"
 
 namespace egosgm::reference {
 
@@ -28,6 +30,7 @@ Pipeline::Pipeline(shared::ImageSize size, const MethodOptions& options, int cod
 
 void Pipeline::reset() {
   belief_.reset();
+  greys_.clear();
   no_belief_reason_ = "reset";
   offset_ = {};
   has_offset_ = false;
@@ -52,14 +55,28 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     frame.dynamic = dynamic_map(size_, frame.predicted, frame.passes.back().measured);
   }
   frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
-  frame.output_variance = options_.output_variance.enabled ? output_variance(size_, options_.output_variance,
-                                                                             frame.result, frame.passes.back().measured)
+  frame.evidence = has_prediction ? frame.fused.evidence
+                                  : std::vector<std::uint8_t>(frame.result.disparity.size(), kFirstEvidence);
+  frame.given_out = has_prediction && has_evidence() ? confirmed(size_, frame.result.disparity,
+                                                                 frame.evidence, !options_.track_right)
+                                                     : frame.result.disparity;
+  const testing::HostMaps given_out{frame.given_out, frame.result.variance};
+  frame.output_variance = options_.output_variance.enabled ? output_variance(size_, options_.output_variance, given_out,
+                                                                             frame.passes.back().measured)
                                                            : frame.result.variance;
   frame.reasons = explain(images, frame);
   offset_ = frame.passes.back().offset;
   has_offset_ = true;
-  if (options_.temporal) belief_ = frame.result;
+  if (options_.temporal) {
+    belief_ = frame.result;
+    belief_->evidence = frame.evidence;
+    greys_ = images.greys;
+  }
   return frame;
+}
+
+bool Pipeline::has_evidence() const {
+  return options_.evidence.enabled && options_.banded_sgm.cost == MatchingCost::kCensus9x7;
 }
 
 std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& frame) const {
@@ -73,7 +90,7 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
                   .hidden = frame.predicted.hidden,
                   .consistent = pass.consistent.disparity,
                   .measured = pass.measured.disparity,
-                  .belief = frame.result,
+                  .belief = {frame.given_out, frame.result.variance},
                   .doubtful = frame.fused.doubtful});
 }
 
@@ -90,6 +107,19 @@ void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
   frame.predicted = consistency_check(size_, check.prediction_px, check.keep_unseen, frame.filled);
 }
 
+namespace {
+
+ViewCodes coarse_codes(shared::ImageSize size, const std::vector<int>& images, int bits) {
+  const shared::ImageSize coarse{(size.width + 3) / 4, (size.height + 3) / 4};
+  const std::vector<std::uint16_t> shrunken = shrink(size, images, bits);
+  const auto middle = shrunken.begin() + static_cast<std::ptrdiff_t>(shrunken.size() / 2);
+  return {coarse,
+          {codes(coarse, {shrunken.begin(), middle}, 16, MatchingCost::kCensus9x7),
+           codes(coarse, {middle, shrunken.end()}, 16, MatchingCost::kCensus9x7)}};
+}
+
+}  // namespace
+
 Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOffset& known) const {
   const BandedSgmOptions& sgm = options_.banded_sgm;
   const bool everything = frame.predicted.disparity.empty() || options_.search == SearchMode::kFull;
@@ -98,6 +128,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   pass.images = resample(size_, known, images.greys);
   if (!everything && options_.coarse_match.enabled) {
     pass.coarse = coarse_match(size_, options_, pass.images, images.bits);
+    pass.coarse_codes = coarse_codes(size_, pass.images, images.bits);
   }
   pass.band = everything ? full_range(size_, range_, frame.predicted.disparity)
                          : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse);
@@ -105,6 +136,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   const auto middle = pass.images.begin() + static_cast<std::ptrdiff_t>(pass.images.size() / 2);
   const std::vector<std::uint64_t> both[2] = {codes(size_, {pass.images.begin(), middle}, images.bits, sgm.cost),
                                               codes(size_, {middle, pass.images.end()}, images.bits, sgm.cost)};
+  pass.view_codes = {size_, {both[0], both[1]}};
   pass.codes = padded_codes(size_, both[0], both[1], code_padding_, sgm.cost);
   const shared::SgmParameters parameters{size_.width,
                                          size_.height,
@@ -147,7 +179,17 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
 
 void Pipeline::update(const Images& images, Frame& frame) const {
   const Pass& pass = frame.passes.back();
-  frame.fused = kalman_update(size_, options_.kalman_update, frame.predicted, pass.measured);
+  std::optional<FrameEvidence> evidence;
+  if (has_evidence()) {
+    std::optional<CoarseView> coarse;
+    if (!pass.coarse.empty()) coarse = CoarseView{pass.coarse_codes, pass.coarse};
+    evidence = FrameEvidence{frame.warped.evidence,
+                             block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, frame.predicted,
+                                            pass.measured),
+                             images.greys == greys_};
+  }
+  frame.fused = kalman_update(size_, options_.kalman_update, frame.predicted, pass.measured,
+                              evidence ? &*evidence : nullptr);
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
   if (!options_.track_right) {
     frame.fused_smoothed =

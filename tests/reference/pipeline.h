@@ -9,6 +9,7 @@
 #include "host/method_options.h"
 #include "kernels/shared.h"
 #include "tests/reference/align/vertical_alignment.h"
+#include "tests/reference/fuse/evidence.h"
 #include "tests/reference/search/search_band.h"
 #include "tests/support/random_maps.h"
 
@@ -29,6 +30,7 @@ struct ViewMotions {
 struct Pass {
   std::vector<int> images;
   std::vector<float> coarse;  // disparities of both views at a quarter of the resolution
+  ViewCodes view_codes, coarse_codes;
   SearchBands band;
   std::vector<std::uint32_t> codes;     // as kernels/match/census.cl lays them out
   std::vector<std::uint8_t> penalties;  // as kernels/match/step_penalties.cl does
@@ -43,6 +45,8 @@ struct Frame {
   std::vector<Pass> passes;  // two where nothing was known of the vertical offset
   testing::HostMaps fused, fused_smoothed, fused_consistent, updated;
   testing::HostMaps result;  // on which the next frame rests
+  std::vector<std::uint8_t> evidence;
+  std::vector<float> given_out;  // disparities that are confirmed
   std::vector<std::uint8_t> dynamic, reasons;
   std::vector<float> output_variance;  // given out in place of the result's
   float vertical_offset_px = 0;        // that the last pass was resampled by in the middle
@@ -61,6 +65,7 @@ class Pipeline {
   void predict(const ViewMotions& motions, Frame& frame) const;
   Pass match(const Images& images, const Frame& frame, const VerticalOffset& known) const;
   void update(const Images& images, Frame& frame) const;
+  bool has_evidence() const;
   std::vector<std::uint8_t> explain(const Images& images, const Frame& frame) const;
 
   shared::ImageSize size_;
@@ -68,6 +73,7 @@ class Pipeline {
   MethodOptions options_;
   int code_padding_;
   std::optional<testing::HostMaps> belief_;
+  std::vector<int> greys_;  // of the frame that it is of
   std::string no_belief_reason_ = "first frame";
   VerticalOffset offset_;
   bool has_offset_ = false;

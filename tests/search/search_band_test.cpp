@@ -281,7 +281,7 @@ TEST(SearchBand, ReportsAllThatWasMatched) {
   const auto report_of = [&](Views views, const MatchedParts& parts) {
     stage(predicted, {}, bands, views);
     transfer.download(
-        {predicted, predicted.variance, &predicted, predicted, bands, views, parts, offset, /*dynamic=*/nullptr}, {});
+        {predicted, &predicted, predicted, bands, views, parts, offset, /*dynamic=*/nullptr}, {});
     context.wait();
     FrameReport report;
     transfer.collect(report);

@@ -34,9 +34,11 @@ class StageChain {
       look(room, plan, uploaded, frame);
       spoil_scratch();
     };
-    method_.frame(plan, uploaded, before_, after_, transfer_.output_variance());
+    const FrameResults results = method_.frame(plan, uploaded, before_, after_, transfer_.given_out());
     frame.result = download(context_, after_.maps);
-    frame.output_variance = plan.wanted.variance ? transfer_.output_variance().read(context_) : frame.result.variance;
+    frame.evidence = after_.evidence.read(context_);
+    frame.given_out = results.given_out.disparity.read(context_);
+    frame.output_variance = results.given_out.variance.read(context_);
     std::swap(before_, after_);
     return frame;
   }

@@ -86,21 +86,30 @@ Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int
 }  // namespace
 
 testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOptions& options,
-                                const testing::HostMaps& predicted, const testing::HostMaps& measured) {
+                                const testing::HostMaps& predicted, const testing::HostMaps& measured,
+                                const FrameEvidence* evidence) {
   testing::HostMaps out = predicted;
+  out.evidence.clear();
   const int pixels = size.width * size.height;
   for (int i = 0; i < 2 * pixels; ++i) {
-    const int first = i / pixels * pixels;
+    const int first = i / pixels * pixels, x = (i - first) % size.width, y = (i - first) / size.width;
     const View view(size, &predicted.disparity[first], &measured.disparity[first]);
     const bool is_hidden = options.gate_px > 0 && !predicted.hidden.empty() && predicted.hidden[i] != 0;
-    const Estimate estimate = is_hidden ? kNone
-                                        : update(options, view, (i - first) % size.width, (i - first) / size.width,
-                                                 {predicted.disparity[i], predicted.variance[i], false},
-                                                 {measured.disparity[i], measured.variance[i],
-                                                  !measured.doubtful.empty() && measured.doubtful[i] != 0});
-    out.disparity[i] = estimate.disparity;
-    out.doubtful.push_back(estimate.doubtful);
-    out.variance[i] = is_valid(estimate) ? std::max(estimate.variance, options.min_variance_px2) : 0;
+    Estimate of_measurement{measured.disparity[i], measured.variance[i],
+                            !measured.doubtful.empty() && measured.doubtful[i] != 0};
+    Verdict verdict{kMostEvidence, true, true};
+    if (evidence) {
+      verdict = judge(size, options.gate_px, *evidence, i / pixels, x, y, predicted.disparity[i], measured.disparity[i]);
+    }
+    if (!verdict.counts) of_measurement = kNone;
+    const bool lives = verdict.lives && !is_hidden;
+    const Estimate estimate =
+        update(options, view, x, y, {predicted.disparity[i], predicted.variance[i], false}, of_measurement);
+    const bool is_there = lives && is_valid(estimate);
+    out.disparity[i] = is_there ? estimate.disparity : EGOSGM_INVALID_DISPARITY;
+    out.doubtful.push_back(!is_hidden && estimate.doubtful);
+    out.variance[i] = is_there ? std::max(estimate.variance, options.min_variance_px2) : 0;
+    out.evidence.push_back(static_cast<std::uint8_t>(is_there ? verdict.evidence : 0));
   }
   return out;
 }

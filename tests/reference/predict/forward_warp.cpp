@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/reference/predict/forward_warp.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/reference/method.h"
@@ -20,8 +21,8 @@ float variance_of_motion(const shared::DisparityMotion& m, float u, float v, flo
 }
 
 void warp_view(shared::ImageSize size, shared::DisparityRange range, const shared::DisparityMotion& m,
-               float process_noise_px2, const float* disparity, const float* variance, float* out_disparity,
-               float* out_variance, std::uint8_t* hidden) {
+               float process_noise_px2, const float* disparity, const float* variance, const std::uint8_t* evidence,
+               float* out_disparity, float* out_variance, std::uint8_t* out_evidence, std::uint8_t* hidden) {
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const std::size_t source = static_cast<std::size_t>(y) * size.width + x;
@@ -41,10 +42,11 @@ void warp_view(shared::ImageSize size, shared::DisparityRange range, const share
       if (!(p < kMaxVariancePx2)) p = kMaxVariancePx2;
 
       const std::size_t target = static_cast<std::size_t>(target_y) * size.width + static_cast<std::size_t>(target_x);
-      if (d > out_disparity[target] || (d == out_disparity[target] && p > out_variance[target])) {
-        out_disparity[target] = d;
-        out_variance[target] = p;
-      }
+      if (d < out_disparity[target]) continue;
+      const bool is_nearer = d > out_disparity[target];
+      out_disparity[target] = d;
+      out_variance[target] = is_nearer ? p : std::max(p, out_variance[target]);
+      out_evidence[target] = is_nearer ? evidence[source] : std::max(evidence[source], out_evidence[target]);
     }
   }
   for (std::size_t i = 0; i < static_cast<std::size_t>(size.width) * size.height; ++i) {
@@ -62,11 +64,14 @@ testing::HostMaps forward_warp(shared::ImageSize size, shared::DisparityRange ra
                                float process_noise_px2, const testing::HostMaps& belief) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f),
-                        std::vector<std::uint8_t>(2 * pixels, 0)};
-  warp_view(size, range, left, process_noise_px2, belief.disparity.data(), belief.variance.data(), out.disparity.data(),
-            out.variance.data(), out.hidden.data());
+                        std::vector<std::uint8_t>(2 * pixels, 0), {}, std::vector<std::uint8_t>(2 * pixels, 0)};
+  const std::vector<std::uint8_t> evidence =
+      belief.evidence.empty() ? std::vector<std::uint8_t>(2 * pixels, 0) : belief.evidence;
+  warp_view(size, range, left, process_noise_px2, belief.disparity.data(), belief.variance.data(), evidence.data(),
+            out.disparity.data(), out.variance.data(), out.evidence.data(), out.hidden.data());
   warp_view(size, range, right, process_noise_px2, belief.disparity.data() + pixels, belief.variance.data() + pixels,
-            out.disparity.data() + pixels, out.variance.data() + pixels, out.hidden.data() + pixels);
+            evidence.data() + pixels, out.disparity.data() + pixels, out.variance.data() + pixels,
+            out.evidence.data() + pixels, out.hidden.data() + pixels);
   return out;
 }
 
