@@ -20,6 +20,7 @@
 #include "host/ocl/device_handle.h"
 #include "host/ocl/errors.h"
 #include "host/tuning_defaults.h"
+#include "kernels/method.h"
 
 namespace egosgm::bench {
 namespace {
@@ -63,6 +64,7 @@ class Frame {
         options_(options(disparities)),
         method_(context, size_, street.calibration, options_, with_defaults({}, Device::select().info())),
         images_{ocl::Buffer<cl_uchar>(context, street.images.size()), PixelType::kU8},
+        disparity_(context, 2 * pixel_count(size_)),
         variance_(context, 2 * pixel_count(size_)),
         belief_(context, size_),
         after_(context, size_) {
@@ -74,6 +76,7 @@ class Frame {
     full_range_cells_ = cells(Views::kBoth);
     belief_.maps.disparity.write(context, street.disparity);
     belief_.maps.variance.write(context, street.variance);
+    belief_.evidence.fill(context, EGOSGM_EVIDENCE_MOST);
     steady();
   }
 
@@ -99,6 +102,8 @@ class Frame {
             {"BandedSgm", 2 * (2 * (codes + band) + maps + cells(Views::kBoth))},
             {"MedianFilter", 4 * maps},
             {"SpeckleRemoval", 2 * map},
+            // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.
+            {"Evidence", codes * 17 / 16 + 2 * maps + 2 * map},
             {"KalmanUpdate", 6 * maps},
             {"OutputVariance", 11 * map}};
   }
@@ -106,7 +111,7 @@ class Frame {
   std::string bits() const {
     const auto pixels = static_cast<std::ptrdiff_t>(pixel_count(size_));
     std::uint64_t hash = 14695981039346656037u;
-    for (const Map* map : {&after_.maps.disparity, &after_.maps.variance, &variance_}) {
+    for (const Map* map : {&disparity_, &after_.maps.variance, &variance_}) {
       const std::vector<float> values = map->read(context_);
       std::for_each(values.begin(), values.begin() + pixels, [&](float value) {
         for (const auto byte : std::bit_cast<std::array<unsigned char, sizeof value>>(value))
@@ -141,7 +146,7 @@ class Frame {
     times_ = {};
     const Plan plan = plan_of(options_, before.missing, before.offset.is_known, motion_, {Views::kLeft, false, false});
     last_ = Clock::now();
-    method_.frame(plan, images_, before, after, variance_);
+    method_.frame(plan, images_, before, after, {disparity_, variance_});
   }
 
   void look(Room room) {
@@ -163,7 +168,7 @@ class Frame {
   const MethodOptions options_;
   Method method_;
   FrameImages images_;
-  Map variance_;
+  Map disparity_, variance_;
   Belief belief_, after_;
   Times times_, full_range_;
   double full_range_cells_ = 0;

@@ -27,7 +27,8 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_(
         plan,
-        {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), result, w.fusion.doubtful},
+        {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), result, w.fusion.doubtful,
+         plan.predicts() && fuse_->has_evidence() ? &after.evidence : nullptr},
         {given_out.variance, w.dynamic, w.reasons});
   });
   if (plan.wanted.variance) result.variance = given_out.variance;

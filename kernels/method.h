@@ -27,9 +27,11 @@
   { -19, -14, -10, -7, 7, 10, 14, 19 }
 // Codes may be read so far beside a match.
 #define EGOSGM_CONTROLS_REACH 19
+// Of a block, every second row is asked, as the codes of neighbouring rows are alike.
+#define EGOSGM_EVIDENCE_ROW_STEP 2
 // The window, in blocks to all sides; half of a window counts with more than so many pixels in it, a quarter.
 #define EGOSGM_EVIDENCE_RADIUS 2
-#define EGOSGM_EVIDENCE_LEAST_COUNT 60
+#define EGOSGM_EVIDENCE_LEAST_COUNT 30
 // Rows of what is known of blocks begin at multiples of what a work-item reads of them.
 #define EGOSGM_EVIDENCE_STRIDE(width) (((width) + 15) / 16 * (16 / EGOSGM_COARSE))
 // A pixel's evidence is a sum over frames, at most MOST: of what it was, so many 64ths are kept, and a frame adds what
@@ -44,6 +46,8 @@
 #define EGOSGM_EVIDENCE_OF_CHOICE 48
 #define EGOSGM_EVIDENCE_CONFIRMED 32
 #define EGOSGM_EVIDENCE_FIRST 48
+// Below this, what is given out is named flat: the images hardly say that it is there.
+#define EGOSGM_EVIDENCE_TRUSTED 96
 // The coarse match confirms a disparity that differs by no more than one of its pixels.
 #define EGOSGM_EVIDENCE_COARSE_PX 4.0f
 

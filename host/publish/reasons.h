@@ -23,6 +23,7 @@ class Reasons {
     const ocl::Buffer<cl_ushort>* runs;  // of SpeckleRemoval; null: it is off
     const StereoMaps& belief;
     const FlagMap& doubtful;  // what KalmanUpdate says; not read without a prediction
+    const FlagMap* evidence;  // the same; null: the method has none
   };
 
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
@@ -39,7 +40,7 @@ class Reasons {
   const cl_int disparities_, has_census_, padding_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const Bytes, const cl_int, const cl_int,
               const ocl::Buffer<cl_uint>, const cl_int, In, const FlagMap, In, const cl_int,
-              const ocl::Buffer<cl_ushort>, In, const FlagMap, Bytes>
+              const ocl::Buffer<cl_ushort>, In, const FlagMap, const cl_int, const FlagMap, Bytes>
       explain_;
 };
 

@@ -8,6 +8,7 @@
 // than chance in noise, too. Where there is none, or the measurement lies beyond the gate, it is the measurement.
 //
 // All is counted in whole numbers, EGOSGM_EVIDENCE_UNITS a bit.
+#include "bit_count.h"
 #include "code.h"
 #include "method.h"
 #include "pixels.h"
@@ -38,9 +39,18 @@ static inline CodeRows code_rows(global const uint* all_codes, const ImageSize s
   return rows;
 }
 
-static inline int bits_apart(const Code a, const Code b) { return (int)popcount(a ^ b); }
+static inline int bits_apart(const Code a, const Code b) {
+#if PIXELS == 1
+  return (int)popcount(a ^ b);
+#else
+  Code x = a ^ b;
+  BIT_COUNT(Code, x);
+  return (int)x;
+#endif
+}
 
-// The place of the match of pixel x in the other row, which lies outside of the image if it is not in [0, width).
+// The place of a pixel in its row of codes. That of its match lies as far from the other end of the other row, and the
+// disparity further.
 static inline int own_place(const CodeRows* rows, const int x) {
   return rows->view == EGOSGM_LEFT ? x : rows->width - 1 - x;
 }
@@ -48,80 +58,116 @@ static inline int place_of_match(const CodeRows* rows, const int x, const int di
   return rows->width - 1 - own_place(rows, x) + disparity;
 }
 
-constant int kControls[8] = EGOSGM_COARSE_CONTROLS;
+constant int kCoarseControls[8] = EGOSGM_COARSE_CONTROLS;
 
-// The controls' distances less that of the match, times their number: of four controls, and of eight.
-static inline int beyond_four(const CodeRows* rows, const int x, const int at) {
-  const Code own = rows->own[own_place(rows, x)];
-  global const Code* match = rows->other + at;
+// The controls' distances less that of the match, times their number: of four controls, and of eight. Loads are volatile
+// lest a compiler makes gather instructions of them, which are slower.
+static inline int beyond_four(const Code own, volatile global const Code* match) {
   return bits_apart(own, match[-EGOSGM_FAR_CONTROL]) + bits_apart(own, match[-EGOSGM_NEAR_CONTROL]) +
          bits_apart(own, match[EGOSGM_NEAR_CONTROL]) + bits_apart(own, match[EGOSGM_FAR_CONTROL]) -
          4 * bits_apart(own, match[0]);
 }
-static inline int beyond_eight(const CodeRows* rows, const int x, const int at) {
-  const Code own = rows->own[own_place(rows, x)];
-  global const Code* match = rows->other + at;
+static inline int beyond_eight(const Code own, global const Code* match) {
   int beyond = -8 * bits_apart(own, match[0]);
-  for (int i = 0; i < 8; ++i) beyond += bits_apart(own, match[kControls[i]]);
+  for (int i = 0; i < 8; ++i) beyond += bits_apart(own, match[kCoarseControls[i]]);
   return beyond;
 }
 
-// What is asked of a pixel.
-static inline float asked_of(const float predicted, const float measured, const float gate) {
-  const bool has_prediction = predicted > EGOSGM_INVALID_DISPARITY;
-  const bool has_measurement = measured > EGOSGM_INVALID_DISPARITY;
-  return has_prediction && !(has_measurement && fabs(measured - predicted) > gate) ? predicted : measured;
+// What is asked of pixels.
+static inline Floats asked_of(const Floats predicted, const Floats measured, const float gate) {
+  const Ints contradicted = (measured > INVALID) & (fabs(measured - predicted) > gate);
+  return ((predicted > INVALID) & !contradicted) ? predicted : measured;
 }
 
-// The nearest whole number, as rint. REQUIRES: |value| < 2^22.
-static inline int whole(const float value) {
-  const float shift = 12582912.0f;  // 1.5 * 2^23
-  return (int)((value + shift) - shift);
+// The evidence of PIXELS pixels of a row, those whose match lies in the other image; `counts`: 1 of these.
+static inline Ints compared(const CodeRows* rows, const int x, const Floats asked, Ints* counts) {
+  const Ints is_asked = asked > INVALID;
+  const Ints at = x + LANE_INDICES;
+  const Ints own = rows->view == EGOSGM_LEFT ? at : rows->width - 1 - at;
+  const Ints match = rows->width - 1 - own + INTS_OF_FLOATS(nearest(is_asked ? asked : (Floats)(0.0f)));
+  const Ints is_inside = is_asked & (match >= 0) & (match < (Ints)(rows->width));
+  const Ints owns = is_inside ? own : (Ints)(0);
+  const Ints places = is_inside ? match : (Ints)(0);
+  int beyond[PIXELS];
+#pragma unroll
+  for (int i = 0; i < PIXELS; ++i) {
+    beyond[i] = beyond_four(rows->own[LANE(int, owns, i)], rows->other + LANE(int, places, i));
+  }
+  *counts = is_inside ? (Ints)(1) : (Ints)(0);
+#if PIXELS == 1
+  return is_inside ? beyond[0] : 0;
+#else
+  return is_inside ? vload16(0, beyond) : (Ints)(0);
+#endif
 }
 
-// Sums of a block of EGOSGM_COARSE x EGOSGM_COARSE pixels: the evidence of those whose match lies in the other image,
-// and how many these are. `coarse_codes` are those of the image at a quarter of the resolution.
+// Half of the weight of a full pixel, of each of `count` in a block: what the image at a quarter of the resolution says
+// of the disparity in the middle of the block.
+static inline int of_coarse(const CodeRows* coarse, const int block, const float disparity, const int count) {
+  if (!(disparity > EGOSGM_INVALID_DISPARITY)) return 0;
+  const float shift = 12582912.0f;  // 1.5 * 2^23: rounds
+  const int match = place_of_match(coarse, block, (int)((disparity / EGOSGM_COARSE + shift) - shift));
+  if (match < 0 || match >= coarse->width) return 0;
+  return count * beyond_eight(coarse->own[own_place(coarse, block)], coarse->other + match) *
+         (EGOSGM_EVIDENCE_UNITS / 16);
+}
+
+// Sums of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels: the evidence of those that are asked and whose match lies in
+// the other image, and how many these are. `coarse_codes` are those of the image at a quarter of the resolution. A work-item a block, or
+// a row of them.
 COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const float gate, const int padding,
                                global const uint* codes, const int has_coarse, const int coarse_padding,
                                global const uint* coarse_codes, global const float* predicted,
                                global const float* measured, global EvidenceSum* sums) {
   const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
                             (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
-  const int view = at.view;
-  const int y = at.y * EGOSGM_COARSE;
+  const int view = at.view, width = size.width;
+  const int y = at.y * EGOSGM_COARSE, end = min(y + EGOSGM_COARSE, size.height);
   const size_t first = (size_t)view * size.height;
   const CodeRows coarse = code_rows(coarse_codes, blocks, coarse_padding, view, at.y);
-  const int y_of_coarse = min(y + EGOSGM_COARSE / 2, size.height - 1);
-  for (int block = at.x; block < blocks.width; block += at.items) {
-    const int x = block * EGOSGM_COARSE;
-    int sum = 0;
-    int count = 0;
-    for (int v = y; v < min(y + EGOSGM_COARSE, size.height); ++v) {
-      const CodeRows rows = code_rows(codes, size, padding, view, v);
-      global const float* of_prediction = predicted + (first + v) * size.width;
-      global const float* of_measurement = measured + (first + v) * size.width;
-      for (int u = x; u < min(x + EGOSGM_COARSE, size.width); ++u) {
-        const float d = asked_of(of_prediction[u], of_measurement[u], gate);
-        if (!(d > EGOSGM_INVALID_DISPARITY)) continue;
-        const int match = place_of_match(&rows, u, whole(d));
-        if (match < 0 || match >= size.width) continue;
-        sum += beyond_four(&rows, u, match);
-        count += 1;
-      }
+  const int middle = y + EGOSGM_COARSE / 2 < size.height ? y + EGOSGM_COARSE / 2 : y;
+  global EvidenceSum* row = sums + ((size_t)view * blocks.height + at.y) * blocks.width;
+#if PIXELS == 1
+  if (at.x >= blocks.width) return;
+  const int start = at.x * EGOSGM_COARSE, stop = min(start + EGOSGM_COARSE, width);
+  EvidenceSum sum = {0, 0};
+  float of_middle = EGOSGM_INVALID_DISPARITY;
+  for (int v = y; v < end; v += EGOSGM_EVIDENCE_ROW_STEP) {
+    const CodeRows rows = code_rows(codes, size, padding, view, v);
+    for (int x = start; x < stop; ++x) {
+      const size_t i = (first + v) * width + x;
+      const float asked = asked_of(predicted[i], measured[i], gate);
+      int counts;
+      sum.sum += EGOSGM_EVIDENCE_UNITS / 4 * compared(&rows, x, asked, &counts);
+      sum.count += counts;
+      if (v == middle && x == min(start + EGOSGM_COARSE / 2, width - 1)) of_middle = asked;
     }
-    sum *= EGOSGM_EVIDENCE_UNITS / 4;
-    const int x_of_coarse = min(x + EGOSGM_COARSE / 2, size.width - 1);
-    const size_t middle = (first + y_of_coarse) * size.width + x_of_coarse;
-    const float d = asked_of(predicted[middle], measured[middle], gate);
-    if (has_coarse && d > EGOSGM_INVALID_DISPARITY) {
-      const int match = place_of_match(&coarse, block, whole(d / EGOSGM_COARSE));
-      const bool is_inside = match >= 0 && match < blocks.width;
-      // Half of the weight: the mean of eight, in units, halved.
-      if (is_inside) sum += count * beyond_eight(&coarse, block, match) * (EGOSGM_EVIDENCE_UNITS / 16);
-    }
-    const EvidenceSum of_block = {sum, count};
-    sums[((size_t)view * blocks.height + at.y) * blocks.width + block] = of_block;
   }
+  if (has_coarse) sum.sum += of_coarse(&coarse, at.x, of_middle, sum.count);
+  row[at.x] = sum;
+#else
+  FOR_PIXELS(x, width) {
+    Ints evidence = 0, counted = 0;
+    Floats of_middle = INVALID;
+    for (int v = y; v < end; v += EGOSGM_EVIDENCE_ROW_STEP) {
+      const CodeRows rows = code_rows(codes, size, padding, view, v);
+      const size_t i = (first + v) * width;
+      const Floats asked = asked_of(load_pixels(predicted + i, x, width), load_pixels(measured + i, x, width), gate);
+      Ints counts;
+      evidence += compared(&rows, x, asked, &counts);
+      counted += counts;
+      if (v == middle) of_middle = asked;
+    }
+    const int8 evidence8 = evidence.even + evidence.odd, counted8 = counted.even + counted.odd;
+    const int4 evidence4 = evidence8.even + evidence8.odd, counted4 = counted8.even + counted8.odd;
+    for (int i = 0; i < PIXELS / EGOSGM_COARSE && x / EGOSGM_COARSE + i < blocks.width; ++i) {
+      const int block = x / EGOSGM_COARSE + i, lane = min(EGOSGM_COARSE * i + EGOSGM_COARSE / 2, width - 1 - x);
+      EvidenceSum sum = {EGOSGM_EVIDENCE_UNITS / 4 * LANE(int, evidence4, i), LANE(int, counted4, i)};
+      if (has_coarse) sum.sum += of_coarse(&coarse, block, LANE(float, of_middle, lane), sum.count);
+      row[block] = sum;
+    }
+  }
+#endif
 }
 
 KERNEL void compare(const ImageSize size, const float gate, const int padding, global const uint* codes,

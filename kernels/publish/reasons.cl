@@ -128,13 +128,13 @@ static inline Ints has_run(global const ushort* runs, const int x, const int wid
 }
 
 // `all_codes`: Census's, read where they are a census and no grey values. `runs`: SpeckleRemoval's.
-// `doubtful`: KalmanUpdate's. What there is not (has_prediction, has_runs) may be any buffer.
+// `doubtful`, `evidence`: KalmanUpdate's. What there is not (has_prediction, has_runs, has_evidence) may be any buffer.
 COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const int disparities,
                                global const uchar* images, const int has_census, const int padding,
                                global const uint* all_codes, const int has_prediction, global const float* warped,
                                global const uchar* hidden, global const float* measured, const int has_runs,
                                global const ushort* runs, global const float* disparity, global const uchar* doubtful,
-                               global uchar* reasons) {
+                               const int has_evidence, global const uchar* evidence, global uchar* reasons) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -159,7 +159,10 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const in
     const Ints is_speckle = has_runs ? has_run(runs + row, x, width) & !is_measured : (Ints)(0);
     const Ints is_uncovered = has_prediction ? (jump_in_row(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
     const Texture texture = texture_around(size, (global const Pixel*)images, x, y);
-    const Ints is_flat = texture.changes < (Floats)(EGOSGM_LEAST_CHANGE * STEPS_PER_GREY * texture.pixels);
+    const Ints is_weak = (Ints)(has_evidence ? -1 : 0) & has_value &
+                         (load_bytes(evidence + row, x, width) < EGOSGM_EVIDENCE_TRUSTED);
+    const Ints is_flat =
+        (texture.changes < (Floats)(EGOSGM_LEAST_CHANGE * STEPS_PER_GREY * texture.pixels)) | (is_weak != 0);
     const Ints is_saturated = 2.0f * texture.extremes >= (Floats)(texture.pixels);
 
     Ints reason = has_value ? (Ints)(EGOSGM_REASON_TRUSTED) : (Ints)(EGOSGM_REASON_UNCONFIRMED);
@@ -183,7 +186,8 @@ KERNEL void explain(const ImageSize size, const int disparities, global const uc
                     const int padding, global const uint* all_codes, const int has_prediction,
                     global const float* warped, global const uchar* hidden, global const float* measured,
                     const int has_runs, global const ushort* runs, global const float* disparity,
-                    global const uchar* doubtful, global uchar* reasons) {
+                    global const uchar* doubtful, const int has_evidence, global const uchar* evidence,
+                    global uchar* reasons) {
   explain_row(THIS_WORK_ITEM, size, disparities, images, has_census, padding, all_codes, has_prediction, warped, hidden,
-              measured, has_runs, runs, disparity, doubtful, reasons);
+              measured, has_runs, runs, disparity, doubtful, has_evidence, evidence, reasons);
 }

@@ -54,6 +54,8 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   const StereoMaps measured = testing::upload(context, size, {inputs.measured, inputs.measured});
   FlagMap doubtful(context, 2 * pixel_count(size));
   doubtful.write(context, inputs.doubtful);
+  FlagMap evidence(context, 2 * pixel_count(size));
+  if (!inputs.evidence.empty()) evidence.write(context, inputs.evidence);
   std::vector<cl_ushort> begins;
   for (const float d : inputs.consistent) begins.push_back(d == kNone ? 0xffff : 0);
   ocl::Buffer<cl_ushort> runs(context, begins.size());
@@ -62,7 +64,8 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   found.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
   Reasons reasons(context, size, images.type, options, pixels);
   reasons({images, codes, inputs.warped.empty() ? nullptr : &prediction, measured,
-           options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief, doubtful},
+           options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief, doubtful,
+           inputs.evidence.empty() ? nullptr : &evidence},
           found);
   return found.read(context);
 }
@@ -95,6 +98,7 @@ reference::ReasonInputs random_inputs(shared::ImageSize size, int white, unsigne
       inputs.doubtful[i] = 1;
     }
     inputs.hidden.push_back(inputs.belief.disparity[i] == kNone && tenth(random) < 2);
+    inputs.evidence.push_back(static_cast<std::uint8_t>(tenth(random) < 7 ? 128 : 94 + tenth(random) % 4));
   }
   return inputs;
 }
@@ -110,7 +114,7 @@ TEST_P(ReasonsTest, EqualsReference) {
         options.disparities = 21;
         options.banded_sgm.cost = cost;
         reference::ReasonInputs inputs = random_inputs(size, white, 31);
-        if (!has_prediction) inputs.warped.clear(), inputs.hidden.clear();
+        if (!has_prediction) inputs.warped.clear(), inputs.hidden.clear(), inputs.evidence.clear();
         for (const int pixels : {1, 16}) {
           const std::vector<cl_uchar> actual = reasons_of(size, options, inputs, pixels);
           EXPECT_TRUE(testing::same_bits(actual, reference::reasons(size, options, inputs), size))
@@ -197,6 +201,16 @@ TEST(Reasons, TellsWhatIsHiddenByWhatIsNearerThanTheRange) {
   Scene scene;
   scene.inputs.hidden[Scene::kMiddle] = 1;
   EXPECT_EQ(scene.in_the_middle(), Reason::kNearer);
+}
+
+TEST(Reasons, TrustsNothingThatTheImagesHardlySay) {
+  Scene scene;
+  scene.inputs.evidence.assign(scene.inputs.doubtful.size(), 96);
+  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted);
+  scene.inputs.evidence[Scene::kMiddle] = 95;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat);
+  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "what has no value has no evidence either";
 }
 
 TEST(Reasons, TellsWhatTheImageCannotTell) {

@@ -14,6 +14,7 @@ inline constexpr int kEvidenceOfChoice = 48;
 inline constexpr int kEvidenceOfNoise = 24;
 inline constexpr int kFirstEvidence = 48;
 inline constexpr int kMostEvidence = 128;
+inline constexpr int kTrustedEvidence = 96;
 inline constexpr float kDifferencePx = 1.0f;
 inline constexpr int kDynamicMinCount = 9;
 inline constexpr int kDynamicRadius = 4;

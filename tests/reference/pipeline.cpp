@@ -91,7 +91,9 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
                   .consistent = pass.consistent.disparity,
                   .measured = pass.measured.disparity,
                   .belief = {frame.given_out, frame.result.variance},
-                  .doubtful = frame.fused.doubtful});
+                  .doubtful = frame.fused.doubtful,
+                  .evidence = !frame.predicted.disparity.empty() && has_evidence() ? frame.evidence
+                                                                                   : std::vector<std::uint8_t>{}});
 }
 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {

@@ -60,7 +60,7 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
       return asked(gate_px, predicted.disparity[i], measured.disparity[i]);
     };
     std::vector<Sum> sums(static_cast<std::size_t>(rows) * columns);
-    for (int y = 0; y < height; ++y) {
+    for (int y = 0; y < height; y += 2) {  // codes of neighbouring rows are alike
       for (int x = 0; x < width; ++x) {
         const float d = asked_at(x, y);
         if (!is_valid(d)) continue;
@@ -73,7 +73,8 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
     }
     for (int i = 0; coarse && i < rows * columns; ++i) {
       const int x = i % columns, y = i / columns;
-      const float d = asked_at(std::min(kSide * x + kSide / 2, width - 1), std::min(kSide * y + kSide / 2, height - 1));
+      const int middle = kSide * y + kSide / 2 < height ? kSide * y + kSide / 2 : kSide * y;
+      const float d = asked_at(std::min(kSide * x + kSide / 2, width - 1), middle);
       if (!is_valid(d)) continue;
       const std::optional<int> eight = beyond(coarse->codes, kCoarseControls, view, x, y, d / kSide);
       if (eight) sums[i].evidence += sums[i].count * *eight;  // 16 / 8, halved
@@ -92,7 +93,7 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
       const Sum whole = over(2, 2, 2, 2);
       int least = whole.count > 0 ? whole.evidence / whole.count : 0;
       for (const Sum& half : {over(2, 0, 2, 2), over(0, 2, 2, 2), over(2, 2, 2, 0), over(2, 2, 0, 2)}) {
-        if (4 * half.count > 5 * 3 * kSide * kSide) least = std::min(least, half.evidence / half.count);
+        if (4 * half.count > 5 * 3 * kSide * kSide / 2) least = std::min(least, half.evidence / half.count);
       }
       result.evidence.push_back(least);
       const float d = coarse ? coarse->disparity[static_cast<std::size_t>(view) * rows * columns + i]

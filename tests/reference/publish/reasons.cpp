@@ -32,6 +32,7 @@ class Pixels {
     if (static_cast<float>(window.changes) < kLeastChange * static_cast<float>(in_.white / 255 * window.pixels)) {
       return Reason::kFlat;
     }
+    if (d != kNone && !in_.evidence.empty() && in_.evidence[i] < kTrustedEvidence) return Reason::kFlat;
     const bool removes_speckles = options_.speckle_removal.max_size_px > 0;
     if (removes_speckles && d == kNone && z == kNone && in_.consistent[i] != kNone) return Reason::kSpeckle;
     if (d != kNone && z == kNone) return Reason::kPredicted;

@@ -21,6 +21,7 @@ struct ReasonInputs {
   std::vector<float> consistent, measured;  // before and after speckles were dropped
   testing::HostMaps belief;
   std::vector<std::uint8_t> doubtful;  // of the update; not read without a prediction
+  std::vector<std::uint8_t> evidence;  // the same; empty: the method has none
 };
 
 std::vector<std::uint8_t> reasons(shared::ImageSize size, const MethodOptions& options, const ReasonInputs& inputs);
