@@ -13,6 +13,7 @@
 #include "apps/progress.h"
 #include "apps/raw_pairs.h"
 #include "apps/sequence_arguments.h"
+#include "apps/standard_output.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/image_io.h"
@@ -174,7 +175,7 @@ int rectify(const RectifyArguments& arguments) {
     if (pairs->note() != note) progress.note(pairs->note());
   }
   if (interrupted() && folder.frames() == 0) {
-    fmt::print(stderr, "egosgm: interrupted before the first pair\n");
+    say("egosgm: interrupted before the first pair");
     return kInterrupted;
   }
   folder.finish(rectifier);
@@ -189,8 +190,8 @@ int rectify(const RectifyArguments& arguments) {
     fmt::print("egosgm doctor {0}; egosgm run --odometry {0} --out OUT\n", shell_word(arguments.out));
   }
   if (!interrupted()) return kOk;
-  fmt::print(stderr, "egosgm: interrupted after {}: what is in {} is whole\n",
-             counted(static_cast<std::size_t>(folder.frames()), "pair"), arguments.out);
+  say(fmt::format("egosgm: interrupted after {}: what is in {} is whole",
+                  counted(static_cast<std::size_t>(folder.frames()), "pair"), arguments.out));
   return kInterrupted;
 }
 

@@ -186,7 +186,7 @@ int write_files(DrawnSequence& drawn, const ViewArguments& arguments) {
   }
   if (video) video->finish();
   if (i == drawn.frames()) return kOk;
-  fmt::print(stderr, "egosgm: interrupted after {} of {} frames: what was written is whole\n", i, drawn.frames());
+  say(fmt::format("egosgm: interrupted after {} of {} frames: what was written is whole", i, drawn.frames()));
   return kInterrupted;
 }
 

@@ -69,11 +69,11 @@ class ProgramTest(unittest.TestCase):
         shutil.copytree(self.street, copy)
         return copy
 
-    def started(self, *words, lines=1):
+    def started(self, *words, lines=1, stderr=subprocess.PIPE):
         """A command that has printed so many lines and waits to be read before it goes on, however busy the machine is."""
         reading, writing = os.pipe2(os.O_CLOEXEC | os.O_DIRECT)
         fcntl.fcntl(writing, F_SETPIPE_SZ, 4096)  # room for one line: with O_DIRECT, each takes a page
-        process = subprocess.Popen([PROGRAM, *map(str, words)], stdout=writing, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen([PROGRAM, *map(str, words)], stdout=writing, stderr=stderr, text=True)
         os.close(writing)
         process.stdout = os.fdopen(reading)
         for _ in range(lines):
