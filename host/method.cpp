@@ -51,7 +51,8 @@ void Method::refine(const FrameImages& images, const StereoMaps& measured, const
 void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction,
                   const Measurement& measured, Fusion& fusion, Belief& belief) {
   if (plan.predicts()) (*fuse_)(plan, images, prediction, measured, fusion, belief.maps);
-  belief.missing = fuse_ ? Unpredicted::kNo : Unpredicted::kNotTemporal;
+  belief.missing = Unpredicted::kNo;
+  if (!options_.temporal) belief.forget(Unpredicted::kNotTemporal);  // a frame alone leaves nothing to the next one
 }
 
 Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
