@@ -9,6 +9,7 @@
 
 #include "apps/metrics_json.h"
 #include "apps/output_folder.h"
+#include "apps/run_outputs.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "egosgm/vision/disparity_io.h"
@@ -61,8 +62,9 @@ DisparityCounts compare(const SequenceJob& job, fs::path vision::StereoFrame::*t
   DisparityCounts counts;
   for (const vision::StereoFrame& frame : job.sequence.frames) {
     if ((frame.*truth).empty()) continue;
-    counts += vision::compare_disparity(vision::read_disparity(job.out.path() / "disparity" / (frame.name + ".png")),
-                                        vision::read_disparity(frame.*truth));
+    counts += vision::compare_disparity(
+        vision::read_disparity(job.out.path() / output_file("disparity", frame.name, job.options)),
+        vision::read_disparity(frame.*truth));
   }
   return counts;
 }

@@ -244,7 +244,7 @@ class Page {
     const auto file = [&](const char* kind, const char* extension) {
       return folder_ / kind / (frame.name + extension);
     };
-    const fs::path exact = file("pfm", ".pfm");  // keeps negative disparities, which the PNG has no room for
+    const fs::path exact = file("disparity", ".pfm");
     const cv::Mat disparity = vision::read_disparity(fs::exists(exact) ? exact : file("disparity", ".png"));
     cv::Mat variance, search, reasons;
     if (const fs::path path = file("variance", ".pfm"); fs::exists(path)) variance = vision::read_pfm(path);
