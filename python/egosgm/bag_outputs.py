@@ -35,6 +35,7 @@ class McapOutput:
         self._schemas: Dict[str, int] = {}
         self._channels: Dict[str, int] = {}
         self._world_from_camera = np.eye(4)
+        self._last_motion: Optional[NDArray[np.float64]] = None
 
     def _expect_free(self) -> None:
         if os.path.lexists(self._file):
@@ -75,8 +76,10 @@ class McapOutput:
             self._write("/egosgm/reason", "sensor_msgs/msg/Image", self._image(header, reason, "mono8"), time)
         for side, shift in (("left", 0.0), ("right", -calibration.fx * calibration.baseline_m)):
             self._write(f"/egosgm/{side}/camera_info", "sensor_msgs/msg/CameraInfo", self._info(header, calibration, shift, width, height, region), time)
-        if motion is not None:
-            self._world_from_camera = self._world_from_camera @ np.linalg.inv(motion)
+        if motion is not None or frame.starts_anew:
+            self._last_motion = motion
+        if self._last_motion is not None:  # where none was found, the last one is repeated
+            self._world_from_camera = self._world_from_camera @ np.linalg.inv(self._last_motion)
         self._write("/egosgm/odom", "nav_msgs/msg/Odometry", self._odometry(header), time)
 
     def _info(self, header: Any, c: _egosgm.Calibration, shift: float, width: int, height: int, region: Any) -> Any:

@@ -59,8 +59,9 @@ class Disparity : public rclcpp::Node {
   /// lose nothing while the queue holds.
   explicit Disparity(const rclcpp::NodeOptions& options)
       : Node("egosgm", options), device_(egosgm::Device::select(parameter("device", ""))) {
+    egosgm::set_option(options_, "preset", parameter("preset", "default"));  // first: the others begin with its values
     for (const auto& [name, value] : egosgm::list_options(options_)) {
-      egosgm::set_option(options_, name, parameter(name, value));
+      if (name != "preset") egosgm::set_option(options_, name, parameter(name, value));
     }
 
     rclcpp::QoS qos = rclcpp::SensorDataQoS();
