@@ -51,6 +51,7 @@ int estimate(const OdometryArguments& arguments) {
       poses.push_back(motion.first_from_camera);
     }
   }
+  const vision::KeepFiles others;
   if (!poses.empty()) vision::write_poses(arguments.out, poses);
   if (poses.size() == sequence.frames.size()) return kOk;
   say(fmt::format("egosgm: interrupted after {} of {} frames", poses.size(), sequence.frames.size()));

@@ -162,8 +162,9 @@ int rectify(const RectifyArguments& arguments) {
   const std::unique_ptr<RawPairs> pairs = open_pairs(input);
   Rectifier rectifier(arguments);
   SequenceFolder folder(new_folder("--out", arguments.out, inputs_of(arguments)));
+  const vision::KeepFiles others;
   catch_interrupts();
-  {
+  try {
     Progress progress(pairs->count(), arguments.quiet);
     const std::string note = pairs->note();
     if (!note.empty()) progress.note(note);
@@ -173,6 +174,9 @@ int rectify(const RectifyArguments& arguments) {
       progress.done(fmt::format("pair {}", folder.frames()));
     }
     if (pairs->note() != note) progress.note(pairs->note());
+  } catch (const std::exception&) {  // what was written until then is a sequence of its own
+    if (folder.frames() > 0) folder.finish(rectifier);
+    throw;
   }
   if (interrupted() && folder.frames() == 0) {
     say("egosgm: interrupted before the first pair");

@@ -170,6 +170,7 @@ class VideoFile {
 };
 
 int write_files(DrawnSequence& drawn, const ViewArguments& arguments) {
+  const vision::KeepFiles others;
   std::optional<VideoFile> video;
   if (!arguments.video.empty()) video.emplace(arguments.video, arguments.frames_per_second);
   if (!arguments.pictures.empty()) vision::make_folder(arguments.pictures);

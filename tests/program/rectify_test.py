@@ -2,6 +2,7 @@
 """egosgm rectify: raw images of a known rig. Environment as for program_case.py."""
 import csv
 import math
+import os
 import re
 import shutil
 import unittest
@@ -209,6 +210,14 @@ class Rectify(RectifyTest):
         for side in (0, 1):
             self.assertTrue((read_grey(out / f"image_{side}/000000.png") == images[side]).all())
         self.assertIn("rectified already", text)
+
+    def test_a_bad_file_leaves_the_pairs_before_it_as_a_sequence(self):
+        street, out = self.broken_street(), self.new_folder() / "out"
+        os.truncate(street / "image_1/000003.png", 1000)
+        self.assert_refused(["rectify", "--left", street / "image_0/%06d.png", "--right", street / "image_1/%06d.png", "--calib",
+                             street / "calib.txt", "--out", out], "000003.png")
+        self.assert_works("odometry", out, "--quiet", "--out", self.new_folder() / "poses.txt")
+        self.assertEqual(len(list((out / "image_1").iterdir())), 3)
 
     def test_euroc_folders(self):
         out = self.new_folder() / "out"
