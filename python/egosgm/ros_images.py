@@ -24,7 +24,7 @@ def needs(module: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError:
-        raise _egosgm.InvalidArgument('bags need the packages rosbags and mcap: pip install "egosgm[bag]"') from None
+        raise _egosgm.InvalidArgument('bags need the packages rosbags and mcap: pip install rosbags mcap') from None
 
 
 def grey_of(message: Any) -> NDArray[Any]:
