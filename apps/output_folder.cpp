@@ -249,10 +249,8 @@ void OutputFolder::expect_frames_of_earlier() const {
   const std::set<std::string> planned(planned_.begin(), planned_.end());
   for (const auto& [name, digest] : files_) {
     if (!name.starts_with("disparity/") || planned.contains(name)) continue;
-    throw InvalidArgument(fmt::format(
-        "--resume: {} holds {}, which this run would not write: give the frames that it was given, or --overwrite to "
-        "start anew",
-        shown_, name));
+    throw InvalidArgument(fmt::format("--resume: {} holds {}, which this run would not write: give the frames {}",
+                                      shown_, name, "that it was given, or --overwrite to start anew"));
   }
 }
 
@@ -273,9 +271,7 @@ fs::path OutputFolder::named_file(const std::string& option, const std::string& 
   }
   const bool is_new_folders = path.parent_path() == path_ && !is_there(path_);
   if (!is_new_folders && !files_.contains(name)) expect_new_file(option, file);
-  if (name.find('\n') != std::string::npos) {
-    throw InvalidArgument(option + " " + file + ": has a line break, which the list of a run's files has no room for");
-  }
+  if (name.find('\n') != name.npos) throw InvalidArgument(option + " " + file + ": give a name of one line");
   if (!replaced_.insert(name).second) throw InvalidArgument(option + " " + file + ": another option names it, too");
   return path;
 }

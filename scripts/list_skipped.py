@@ -11,7 +11,7 @@ REASONS = re.compile(r"^skipped: (.+)$|\.\.\. skipped ['\"](.+)['\"]$|: Skipped\
 def main(file):
     skipped = [case for case in xml.etree.ElementTree.parse(file).iter("testcase") if case.find("skipped") is not None]
     if skipped:
-        print(f"\n{len(skipped)} tests were skipped, as a whole or in part, which ctest calls passed:")
+        print(f"\n{len(skipped)} tests were skipped, as a whole or in part:")
     for case in skipped:
         found = dict.fromkeys(next(filter(None, match)) for match in REASONS.findall(case.findtext("system-out") or ""))
         print(f"  {case.get('name')}: {'; '.join(found) or 'it does not say why'}")

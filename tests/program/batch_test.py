@@ -79,7 +79,9 @@ class Compile(ProgramTest):
         self.assert_refused([*run, self.new_folder(), "--programs", self.new_folder()], "manifest.json", "egosgm compile")
         (programs / "manifest.json").write_text(json.dumps(dict(manifest, driver="0.0")))
         self.assert_refused([*run, self.new_folder(), "--programs", programs], "driver", "0.0", manifest["driver"], "egosgm compile")
-
+        (programs / "manifest.json").unlink()
+        os.mkfifo(programs / "manifest.json")
+        self.assert_refused([*run, self.new_folder(), "--programs", programs], "manifest.json", "is no file that can be read", "egosgm compile")
 
     def test_spirv_for_every_device_of_the_type_is_refused_where_it_is_not_taken(self):
         version = subprocess.run(["clang", "-dumpversion"], capture_output=True, text=True).stdout.split(".")[0] if shutil.which("clang") else ""

@@ -127,6 +127,16 @@ class EvalPoses(ProgramTest):
         other = self.renumbered(2)
         self.assert_refused(["eval-poses", out, other], other / "poses.txt", "frame 0")
 
+    def test_the_largest_number_of_a_frame_is_one(self):
+        street, out = self.broken_street(), self.new_folder() / "out"
+        (street / "poses.txt").unlink()
+        for side in (0, 1):
+            for image in (street / f"image_{side}").iterdir():
+                image.rename(image.with_stem(str(2**31 - 1 - int(image.stem))))
+        self.assert_works("run", street, "--disparities", 16, "--out", out, "--quiet")
+        self.assert_works("report", out)
+        self.assert_works("eval-poses", out, out / "poses.txt")
+
     def test_a_report_that_was_edited_reads_no_pose_that_is_not_there(self):
         out = self.new_folder() / "out"
         self.assert_works("run", self.street, "--disparities", 16, "--out", out, "--quiet")

@@ -246,7 +246,8 @@ class Rectify(RectifyTest):
         refused(good.replace("data: [ ", "data: [ .Nan, ", 1), file)
         refused(self.opencv_yaml(unit_m=-1, given=False), "exchange left and right")
         refused(self.opencv_yaml(unit_m=1e-3, given=False), "--unit mm")
-        refused(self.opencv_yaml(unit_m=math.inf, given=False), "stand in one place")
+        for unit_m in (math.inf, 1e300):
+            refused(self.opencv_yaml(unit_m=unit_m, given=False), "stand in one place")
         for focal, named in {"0": "M1 is no camera matrix", "-300": "M1 is no camera matrix", "1e300": "none of the left image's pixels"}.items():
             refused(re.sub(r"(M1:.*?data: \[ ?)[^,]*", rf"\g<1>{focal}", good, flags=re.DOTALL), named)
         refused(good + "image_width: 640\nimage_height: 480\n", "640x480 were calibrated")

@@ -329,7 +329,7 @@ class Resume(LongRuns):
 
     def test_names_that_the_record_has_no_room_for(self):
         out = self.new_folder() / "out"
-        self.assert_refused(["run", "--odometry", self.street, "--out", out, "--save-config", f"{out}/a\nb.toml"], "line break")
+        self.assert_refused(["run", "--odometry", self.street, "--out", out, "--save-config", f"{out}/a\nb.toml"], "give a name of one line")
         self.assertFalse(out.exists())
 
     def test_names_that_are_no_utf8(self):

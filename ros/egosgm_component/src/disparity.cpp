@@ -106,6 +106,10 @@ class Disparity : public rclcpp::Node {
     try {
       side == 0 ? process(*image, *other) : process(*other, *image);
     } catch (const std::exception& error) {  // whatever a message held: the next one may be whole
+      if (matching_) {  // one of them may have gone on without the other
+        matching_->pipeline.reset();
+        matching_->odometry.reset();
+      }
       RCLCPP_ERROR_THROTTLE(get_logger(), *get_clock(), 1000, "%s", error.what());
     }
   }

@@ -95,11 +95,11 @@ class EgosgmNode(LifecycleNode):
                 raise ValueError(f"max_skew_ms {self._value('max_skew_ms')}: give 0 for equal stamps, or how far they may differ")
             if self._value("publish_tf") and self._value("motion_frame"):
                 raise ValueError("publish_tf and motion_frame: a motion that comes from tf is not published there again: unset one of them")
-            if self._value("motion_frame"):
-                self._tf = TfMotion(self, self._value("motion_frame"), self._value("tf_wait_s"))
+            egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 32, 0.1), 64, 64, device=self._value("device"), **self._options())
             if self._value("publish_tf"):
                 self._broadcaster = tf2_ros().TransformBroadcaster(self)
-            egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 32, 0.1), 64, 64, device=self._value("device"), **self._options())
+            if self._value("motion_frame"):  # last: what is made here stays
+                self._tf = TfMotion(self, self._value("motion_frame"), self._value("tf_wait_s"))
         except (ValueError, RuntimeError) as error:
             self._problem = str(error)
             self.get_logger().error(self._problem)
@@ -183,6 +183,9 @@ class EgosgmNode(LifecycleNode):
                 self._process(left, right)
                 self._problem = ""
             except Exception as error:  # whatever a message held: the next one may be whole
+                for tool in (self._pipeline, self._odometry):
+                    if tool:
+                        tool.reset()  # one of them may have gone on without the other
                 if str(error) != self._problem:
                     self.get_logger().error(str(error))
                 self._problem = str(error)
