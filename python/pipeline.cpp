@@ -227,8 +227,8 @@ void bind_frame(py::module_& module) {
       .def_readonly("searched_everything", &FrameReport::searched_everything,
                     "The whole range at every pixel: without a prediction, or not trusting it.")
       .def_readonly("search_fraction", &FrameReport::search_fraction,
-                    "All cells that were matched, over those of one match of the full range. More than 1 in a first "
-                    "frame, which is matched twice.")
+                    "All cells that were matched, over those of one match of the full range. More than 1 in a frame "
+                    "that is matched twice: a first one, or one without `temporal`.")
       .def_readonly("predicted_fraction", &FrameReport::predicted_fraction, "Left pixels with a prediction.")
       .def_readonly("density", &FrameReport::density, "Left pixels with a disparity.")
       .def_readonly("vertical_offset_px", &FrameReport::vertical_offset_px)

@@ -117,7 +117,7 @@ class ProgramTest(unittest.TestCase):
         maps = sorted((out / "disparity").glob("*"))
         self.assertGreaterEqual(len(maps), at_least)
         for file in maps:
-            self.assertRegex(file.name, r"^\d{6}\.png$")
+            self.assertRegex(file.name, r"^\d{6}\.(png|pfm)$")
         if maps:
             self.assert_works("eval", "--estimate", out / "disparity", "--truth", out / "disparity")
         return len(maps)
