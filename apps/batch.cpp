@@ -103,8 +103,8 @@ int report_all(const BatchArguments& arguments, const std::vector<BatchEntry>& e
   if (failed == 0) return kOk;
   for (const Json& sequence : report["sequences"]) {
     if (!sequence.contains("failed")) continue;
-    fmt::print(stderr, "egosgm: error: {} of {} sequences are not done, the first is {}: {}; run the batch again\n",
-               failed, entries.size(), sequence["name"].get<std::string>(), sequence["failed"].get<std::string>());
+    say(fmt::format("egosgm: error: {} of {} sequences are not done, the first is {}: {}; run the batch again", failed,
+                    entries.size(), sequence["name"].get<std::string>(), sequence["failed"].get<std::string>()));
     break;
   }
   return kFailed;
@@ -140,8 +140,8 @@ std::filesystem::path timing_file(const BatchArguments& arguments, const Shard& 
 
 int report_shard(const Shard& shard, const std::vector<BatchEntry>& failed) {
   if (failed.empty()) return kOk;
-  fmt::print(stderr, "egosgm: error: {} of shard {}/{} failed, the first is {}: see its failed.json\n",
-             counted(failed.size(), "sequence"), shard.index, shard.count, failed.front().name);
+  say(fmt::format("egosgm: error: {} of shard {}/{} failed, the first is {}: see its failed.json",
+                  counted(failed.size(), "sequence"), shard.index, shard.count, failed.front().name));
   return kFailed;
 }
 

@@ -9,6 +9,7 @@
 
 #include "apps/metrics_json.h"
 #include "apps/output_folder.h"
+#include "apps/run_outputs.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
 #include "egosgm/vision/disparity_io.h"
@@ -61,8 +62,9 @@ DisparityCounts compare(const SequenceJob& job, fs::path vision::StereoFrame::*t
   DisparityCounts counts;
   for (const vision::StereoFrame& frame : job.sequence.frames) {
     if ((frame.*truth).empty()) continue;
-    counts += vision::compare_disparity(vision::read_disparity(job.out.path() / "disparity" / (frame.name + ".png")),
-                                        vision::read_disparity(frame.*truth));
+    counts += vision::compare_disparity(
+        vision::read_disparity(job.out.path() / output_file("disparity", frame.name, job.options)),
+        vision::read_disparity(frame.*truth));
   }
   return counts;
 }
@@ -123,7 +125,7 @@ EarlierRun BatchFolder::treatment_of(const BatchEntry& entry) const {
   if (overwrite_ || !fs::exists(report, none)) return overwrite_ ? EarlierRun::kOverwrite : EarlierRun::kRefuse;
   expect_own_json(report);
   const Json earlier = read(report);
-  const bool is_ours = earlier.value("batch_input", Json()) == Json(entry.arguments);
+  const bool is_ours = earlier.value("batch_input", Json()) == as_in_file(entry.arguments);
   return is_ours ? EarlierRun::kOverwrite : EarlierRun::kRefuse;
 }
 
@@ -131,8 +133,9 @@ bool BatchFolder::is_done(const BatchEntry& entry) const {
   const fs::path file = folder_of(entry) / "done.json";
   if (!fs::exists(file)) return false;
   expect_own_json(file);
-  const std::string before = read(file).value("input", "");
-  if (before == entry.arguments) return true;
+  const Json done = read(file);
+  const std::string before = done.value("input", "");
+  if (Json(before) == as_in_file(entry.arguments)) return done.value("settings", "") == digest_of(dumped(settings_));
   throw InvalidArgument(fmt::format(R"({} holds the results of "{}", the list now says "{}": choose another name)",
                                     folder_of(entry).string(), before, entry.arguments));
 }
@@ -147,6 +150,7 @@ Json BatchFolder::finish(const BatchEntry& entry, const SequenceJob& job) const 
   const Json report = read(job.out.path() / "report.json");
   const Json& frames = report.at("frames");
   Json done{{"input", entry.arguments},
+            {"settings", digest_of(dumped(settings_))},
             {"title", job.sequence.title},
             {"width", report.at("width")},
             {"height", report.at("height")},
@@ -168,11 +172,12 @@ Json BatchFolder::result_of(const BatchEntry& entry) const {
   Json result{{"name", entry.name}};
   if (is_done(entry)) {
     result.update(read(folder_of(entry) / "done.json"));
+    result.erase("settings");
     return result;
   }
   const fs::path failed = folder_of(entry) / "failed.json";
   result["input"] = entry.arguments;
-  result["failed"] = fs::exists(failed) ? read(failed).value("reason", "") : "not run, or not to its end";
+  result["failed"] = fs::exists(failed) ? read(failed).value("reason", "") : "not run to its end with these options";
   return result;
 }
 

@@ -41,7 +41,7 @@ SequenceJob job_of(const BatchArguments& arguments, const PipelineOptions& optio
   inputs.add_folder(arguments.programs);
   inputs.expect_apart(arguments.out);
   job.out = OutputFolder(folder.folder_of(entry).string(), inputs, folder.treatment_of(entry),
-                         output_files(job.kinds, job.sequence));
+                         output_files(job.kinds, job.sequence, job.options));
   job.batch_input = entry.arguments;
   job.quiet = true;
   return job;

@@ -108,6 +108,7 @@ int compile(const CompileArguments& arguments) {
   const Device device = Device::select(arguments.device);
   const std::vector<ProgramFile> files =
       arguments.spirv ? compile_to_spirv(device, options, arguments) : compile_programs(device, options);
+  const vision::KeepFiles others;
   arguments.method.save(options);
   vision::make_folder(folder);
   for (const ProgramFile& file : files) vision::write_file(folder / file.name, file.bytes);  // the manifest last

@@ -133,6 +133,9 @@ class Doctor {
     const Calibration& c = sequence_.calibration;
     const std::string text = fmt::format("fx {:.1f}, fy {:.1f}, cx {:.1f}, cy {:.1f} px, baseline {:.4g} m", c.fx, c.fy,
                                          c.cx, c.cy, c.baseline_m);
+    if (std::min(c.fx, c.fy) < 1 || c.baseline_m < 1e-6) {
+      return problem("calibration", text, "no camera has such a focal length or baseline: give that of these images");
+    }
     if (is_baseline_mistaken(c)) {
       return problem("calibration", text, kMistakenBaseline);
     }

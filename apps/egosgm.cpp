@@ -28,7 +28,7 @@ namespace {
 int fail(int code, std::string message) {
   std::replace_if(
       message.begin(), message.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, ' ');
-  std::fputs(("egosgm: error: " + message + '\n').c_str(), stderr);
+  say("egosgm: error: " + message);
   return code;
 }
 
@@ -166,7 +166,7 @@ int exit_code_of(int argc, char** argv) {
     return fail(kBadInput, error.what());
   } catch (const Error& error) {  // of a file or of the device
     // PoCL's compiler takes an interrupt for itself, too, and then fails.
-    if (interrupted()) return std::fputs("egosgm: interrupted\n", stderr), kInterrupted;
+    if (interrupted()) return say("egosgm: interrupted"), kInterrupted;
     return fail(kFailed, error.what());
   } catch (
       const std::filesystem::filesystem_error& error) {  // a loop of links, a name too long, a folder without rights
@@ -174,7 +174,7 @@ int exit_code_of(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return fail(kFailed, "out of memory: choose smaller images or fewer --disparities");
   } catch (const std::system_error& error) {  // more was printed than the output's buffer holds
-    return error.code().value() == EPIPE ? kOk : fail(kFailed, error.what());
+    return error.code().value() == EPIPE && std::ferror(stdout) ? kOk : fail(kFailed, error.what());
   } catch (const std::exception& error) {
     return fail(kFailed, fmt::format("{} (this is a defect of the program: please report it)", error.what()));
   }
@@ -187,7 +187,7 @@ int main(int argc, char** argv) {
   using namespace egosgm;
   using namespace egosgm::app;
   std::signal(SIGXFSZ, SIG_IGN);  // a file beyond `ulimit -f` is to be an error of its write, as a full disk is
-  open_standard_output();
+  open_standard_streams();
   std::atexit(tell_of_an_end_from_within);
   const int code = exit_code_of(argc, argv);
   is_over = true;

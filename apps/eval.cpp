@@ -16,6 +16,7 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/evaluation.h"
 #include "egosgm/vision/video_evaluation.h"
+#include "host/json_text.h"
 #include "host/vision/pair_with_truth.h"
 #include "host/vision/video_plot.h"
 
@@ -243,7 +244,7 @@ int evaluate(EvalArguments arguments) {
   const Result result = measure(input, arguments);
   write_plots(arguments, result.video);
   if (arguments.json) {
-    fmt::print("{}\n", json_of(input, result).dump(2));
+    fmt::print("{}\n", dumped(json_of(input, result), 2));
     return kOk;
   }
   print_errors(result);

@@ -144,7 +144,7 @@ PosePairs read_pairs(const ComparisonArguments& compared) {
   for (std::size_t i = 0; i < estimate.size(); ++i) {
     if (!is_chosen(frames->frames[i].number)) continue;
     pairs.estimate.push_back(estimate[i]);
-    pairs.truth.push_back(truth[rows[i]]);
+    pairs.truth.push_back(truth.at(rows[i]));
   }
   if (pairs.estimate.size() >= 2) return pairs;
   throw InvalidArgument(fmt::format("{} and {}: {} of the same frames{}: a motion needs two", estimate_file.string(),

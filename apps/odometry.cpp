@@ -10,6 +10,7 @@
 #include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
+#include "apps/standard_output.h"
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/file_io.h"
 
@@ -50,9 +51,10 @@ int estimate(const OdometryArguments& arguments) {
       poses.push_back(motion.first_from_camera);
     }
   }
+  const vision::KeepFiles others;
   if (!poses.empty()) vision::write_poses(arguments.out, poses);
   if (poses.size() == sequence.frames.size()) return kOk;
-  fmt::print(stderr, "egosgm: interrupted after {} of {} frames\n", poses.size(), sequence.frames.size());
+  say(fmt::format("egosgm: interrupted after {} of {} frames", poses.size(), sequence.frames.size()));
   return kInterrupted;
 }
 

@@ -166,6 +166,7 @@ void OptionArguments::expect_saves(const std::string& out) const {
 }
 
 void OptionArguments::save(const PipelineOptions& options) const {
+  const vision::KeepFiles others;
   if (!save_config.empty()) vision::write_file(save_config, config_text(options));
 }
 

@@ -91,7 +91,7 @@ void expect_named(const std::string& option, const std::string& path) {
 
 /// Throws InvalidArgument, naming the first figure in which the run that is recorded in `file` differs.
 void expect_same(const std::string& folder, const Json& earlier, const Json& identity) {
-  const Json flat = identity.flatten(), flat_earlier = earlier.flatten();
+  const Json flat = as_in_file(identity).flatten(), flat_earlier = earlier.flatten();
   for (const auto& [name, value] : flat.items()) {
     const auto found = flat_earlier.find(name);
     const Json before = found == flat_earlier.end() ? Json() : *found;
@@ -195,7 +195,7 @@ bool is_own_page(const fs::path& file) {
 }
 
 std::string signed_json(const Json& json) {
-  std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace);
+  std::string text = dumped(json, 2);
   text.resize(text.size() - 2);  // "\n}"
   return signed_text(text, kJsonDigestBegin, kJsonDigestEnd);
 }
@@ -239,8 +239,19 @@ void OutputFolder::look() {
     throw InvalidArgument(fmt::format(
         "--resume: {} has no report.json, which says how that run was made: give --overwrite to start anew", shown_));
   }
+  if (resumes()) expect_frames_of_earlier();
   expect_unchanged();
   expect_room_for(planned_);
+}
+
+/// A run that goes on loses no frame.
+void OutputFolder::expect_frames_of_earlier() const {
+  const std::set<std::string> planned(planned_.begin(), planned_.end());
+  for (const auto& [name, digest] : files_) {
+    if (!name.starts_with("disparity/") || planned.contains(name)) continue;
+    throw InvalidArgument(fmt::format("--resume: {} holds {}, which this run would not write: give the frames {}",
+                                      shown_, name, "that it was given, or --overwrite to start anew"));
+  }
 }
 
 fs::path OutputFolder::named_file(const std::string& option, const std::string& file) {
@@ -260,6 +271,7 @@ fs::path OutputFolder::named_file(const std::string& option, const std::string& 
   }
   const bool is_new_folders = path.parent_path() == path_ && !is_there(path_);
   if (!is_new_folders && !files_.contains(name)) expect_new_file(option, file);
+  if (name.find('\n') != name.npos) throw InvalidArgument(option + " " + file + ": give a name of one line");
   if (!replaced_.insert(name).second) throw InvalidArgument(option + " " + file + ": another option names it, too");
   return path;
 }

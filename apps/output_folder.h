@@ -94,8 +94,8 @@ class OutputFolder {
   /// report differs in `identity` (RunReport::identity) from the one that is to go on. No other run begins there then.
   void begin(const nlohmann::ordered_json& identity);
 
-  /// To be called before a file is written: the record has it before the disk. Returns whether it is to be written: of a
-  /// run that goes on, what is there stays. Throws InvalidArgument where that has other bytes, and IoError where the
+  /// To be called before a file is written: the record has it before the disk. Returns whether it is to be written: of
+  /// a run that goes on, what is there stays. Throws InvalidArgument where that has other bytes, and IoError where the
   /// file is another's.
   bool record(const std::filesystem::path& file, std::string_view bytes);
   /// To be called once report.json lists all files.
@@ -107,6 +107,7 @@ class OutputFolder {
  private:
   void look();
   void read_report();
+  void expect_frames_of_earlier() const;
   void expect_unchanged() const;
   void expect_room_for(const std::vector<std::string>& planned) const;
   void remove_earlier();

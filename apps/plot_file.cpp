@@ -20,6 +20,7 @@ void require_plot_name(const std::string& option, const std::string& file) {
 
 void write_plot(const std::string& file, const std::function<std::string()>& svg,
                 const std::function<cv::Mat()>& picture) {
+  const vision::KeepFiles others;
   if (std::filesystem::path(file).extension() == ".svg") {
     vision::write_file(file, svg());
   } else {

@@ -33,7 +33,7 @@ Waiting::Waiting(const std::string& what, bool quiet) {
   after_a_while_ = std::jthread([this, what](const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     ended_.wait_for(lock, stop, std::chrono::milliseconds(500), [] { return false; });
-    if (!stop.stop_requested()) fmt::print(stderr, "egosgm: {}\n", what);
+    if (!stop.stop_requested()) say(fmt::format("egosgm: {}", what));
   });
 }
 

@@ -13,6 +13,7 @@
 #include "apps/progress.h"
 #include "apps/raw_pairs.h"
 #include "apps/sequence_arguments.h"
+#include "apps/standard_output.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/image_io.h"
@@ -161,8 +162,9 @@ int rectify(const RectifyArguments& arguments) {
   const std::unique_ptr<RawPairs> pairs = open_pairs(input);
   Rectifier rectifier(arguments);
   SequenceFolder folder(new_folder("--out", arguments.out, inputs_of(arguments)));
+  const vision::KeepFiles others;
   catch_interrupts();
-  {
+  try {
     Progress progress(pairs->count(), arguments.quiet);
     const std::string note = pairs->note();
     if (!note.empty()) progress.note(note);
@@ -172,9 +174,12 @@ int rectify(const RectifyArguments& arguments) {
       progress.done(fmt::format("pair {}", folder.frames()));
     }
     if (pairs->note() != note) progress.note(pairs->note());
+  } catch (const std::exception&) {  // what was written until then is a sequence of its own
+    if (folder.frames() > 0) folder.finish(rectifier);
+    throw;
   }
   if (interrupted() && folder.frames() == 0) {
-    fmt::print(stderr, "egosgm: interrupted before the first pair\n");
+    say("egosgm: interrupted before the first pair");
     return kInterrupted;
   }
   folder.finish(rectifier);
@@ -189,8 +194,8 @@ int rectify(const RectifyArguments& arguments) {
     fmt::print("egosgm doctor {0}; egosgm run --odometry {0} --out OUT\n", shell_word(arguments.out));
   }
   if (!interrupted()) return kOk;
-  fmt::print(stderr, "egosgm: interrupted after {}: what is in {} is whole\n",
-             counted(static_cast<std::size_t>(folder.frames()), "pair"), arguments.out);
+  say(fmt::format("egosgm: interrupted after {}: what is in {} is whole",
+                  counted(static_cast<std::size_t>(folder.frames()), "pair"), arguments.out));
   return kInterrupted;
 }
 

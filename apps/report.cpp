@@ -231,7 +231,7 @@ class Page {
       data["pictures"].push_back({{"frame", frame.number}, {"name", frame.name}, {"layers", std::move(layers)}});
     }
     if (sequence_.frames.front().left.empty()) {
-      notes_.emplace_back("The left images are no longer where the run read them, so they are not shown.");
+      notes_.emplace_back("The left images are not where the report of the run says, so they are not shown.");
     }
     for (const char* kind : {"variance", "search"}) {
       if (!fs::exists(folder_ / kind)) {
@@ -244,7 +244,7 @@ class Page {
     const auto file = [&](const char* kind, const char* extension) {
       return folder_ / kind / (frame.name + extension);
     };
-    const fs::path exact = file("pfm", ".pfm");  // keeps negative disparities, which the PNG has no room for
+    const fs::path exact = file("disparity", ".pfm");
     const cv::Mat disparity = vision::read_disparity(fs::exists(exact) ? exact : file("disparity", ".png"));
     cv::Mat variance, search, reasons;
     if (const fs::path path = file("variance", ".pfm"); fs::exists(path)) variance = vision::read_pfm(path);
@@ -301,7 +301,11 @@ int report(const ReportArguments& arguments) {
   const fs::path file = arguments.out.empty() ? fs::path(arguments.run) / "report.html" : fs::path(arguments.out);
   try {
     Page contents(arguments);
-    if (!is_own_page(file)) expect_new_file("--out", file.string());
+    std::optional<vision::KeepFiles> others;
+    if (!is_own_page(file)) {
+      expect_new_file("--out", file.string());
+      others.emplace();
+    }
     const std::string page = contents.html();
     vision::write_file(file, signed_text(page, kPageDigestBegin, kPageDigestEnd));
     fmt::print("{}: {:.1f} MB, opens in any browser\n", file.string(), static_cast<double>(page.size()) / 1e6);

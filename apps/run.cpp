@@ -23,6 +23,7 @@
 #include "apps/run_outputs.h"
 #include "apps/run_report.h"
 #include "apps/sequence_arguments.h"
+#include "apps/standard_output.h"
 #include "apps/trace.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
@@ -91,7 +92,7 @@ class Run {
         doubt_(sequence_.calibration) {
     folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
-    outputs_.emplace(folder_.path(), job.kinds, size_, job.options.disparities, sequence_.calibration);
+    outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration);
     pipeline_.prepare(type_of(sequence_), outputs_->views());
     waiting_.reset();
     if (job.trace.empty()) return;
@@ -107,8 +108,8 @@ class Run {
       const bool finished = process_all();
       finish(finished, finished ? "" : kInterrupt);
       if (!finished) {
-        fmt::print(stderr, "egosgm: interrupted after {} of {} frames: what is in {} is whole\n", poses_.size(),
-                   sequence_.frames.size(), folder_.path().string());
+        say(fmt::format("egosgm: interrupted after {} of {} frames: what is in {} is whole", poses_.size(),
+                        sequence_.frames.size(), folder_.path().string()));
       }
       return finished;
     } catch (const std::exception& error) {
@@ -293,7 +294,7 @@ SequenceJob job_of(const RunArguments& arguments) {
   Inputs inputs(arguments.input, job.sequence);
   for (const std::string& file : {arguments.poses, arguments.method.config, arguments.tuning}) inputs.add_file(file);
   inputs.add_folder(arguments.programs);
-  job.out = OutputFolder(arguments.out, inputs, earlier, output_files(job.kinds, job.sequence));
+  job.out = OutputFolder(arguments.out, inputs, earlier, output_files(job.kinds, job.sequence, job.options));
   job.trace = job.out.named_file("--trace", arguments.trace);
   job.save_config = job.out.named_file("--save-config", arguments.method.save_config);
   job.quiet = arguments.quiet;
@@ -320,7 +321,9 @@ Command add_run(CLI::App& program) {
   const char* group = "Output";
   command
       ->add_option("--out", arguments->out,
-                   "folder to write: disparity/NNNNNN.png (KITTI's format), poses.txt, report.json")
+                   "folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room for the range), "
+                   "poses.txt, "
+                   "report.json")
       ->type_name("DIR")
       ->group(group)
       ->required();

@@ -29,7 +29,7 @@ fs::path report_of(const fs::path& path) {
   return {};
 }
 
-constexpr int kMaxNumber = std::numeric_limits<int>::max() - 1;
+constexpr int kMaxNumber = std::numeric_limits<int>::max();
 constexpr int kMaxFrames = 2'000'000;  // as many rows as a text of poses may have
 
 /// From 0 to kMaxNumber, or -1.
@@ -45,7 +45,7 @@ std::vector<int> numbers_of(const Json& run) {
   const auto sequence = run.find("sequence");
   if (sequence == run.end() || !sequence->is_object()) return {};
   const int first = integer(*sequence, "first_frame"), frames = integer(*sequence, "frames");
-  if (first < 0 || frames < 1 || frames > kMaxFrames || integer(*sequence, "last_frame") - first + 1 != frames) return {};
+  if (first < 0 || frames < 1 || frames > kMaxFrames || integer(*sequence, "last_frame") - first != frames - 1) return {};
   std::vector<int> numbers(static_cast<std::size_t>(frames));
   std::iota(numbers.begin(), numbers.end(), first);
   return numbers;

@@ -27,8 +27,17 @@ const std::vector<std::string> kKinds{
     "variance", "color", "predicted", "measured", "right", "interpolated", "interpolated_certain", "search", "dynamic",
     "reason",   "pfm",   "overview",  "cloud",    "depth", "depth_m"};
 
-const char* extension_of(const std::string& kind) {
+const std::set<std::string> kDisparities{"disparity", "predicted",    "measured",
+                                         "right",     "interpolated", "interpolated_certain"};
+
+/// KITTI's PNG has values above 0 and below 256 px.
+bool fits_png(const PipelineOptions& options) {
+  return options.min_disparity >= 0 && options.min_disparity + options.disparities <= 256;
+}
+
+const char* extension_of(const std::string& kind, const PipelineOptions& options) {
   if (kind == "variance" || kind == "pfm" || kind == "depth_m") return ".pfm";
+  if (kDisparities.contains(kind) && !fits_png(options)) return ".pfm";
   return kind == "cloud" ? ".ply" : ".png";
 }
 
@@ -44,7 +53,7 @@ const char* const kWriteListHelp =
     "  variance       variance [px^2], PFM\n"
     "  pfm            disparity as float, PFM: also negative ones and those above 256\n"
     "  right, predicted, measured, interpolated\n"
-    "                 these disparity maps, KITTI's PNG\n"
+    "                 these disparity maps, in the format of OUT/disparity\n"
     "  interpolated_certain\n"
     "                 the same, but variances above 6 px^2 become holes before they are filled: of a video a little "
     "better\n"
@@ -82,28 +91,28 @@ std::vector<std::string> output_folders() {
   return folders;
 }
 
-std::vector<std::string> output_files(const std::set<std::string>& kinds, const std::string& frame) {
-  std::vector<std::string> files;
-  for (const std::string& kind : kinds) files.push_back(kind + '/' + frame + extension_of(kind));
-  files.push_back("disparity/" + frame + extension_of("disparity"));
-  return files;
+std::string output_file(const std::string& kind, const std::string& frame, const PipelineOptions& options) {
+  return kind + '/' + frame + extension_of(kind, options);
 }
 
-std::vector<std::string> output_files(const std::set<std::string>& kinds, const vision::StereoSequence& sequence) {
+std::vector<std::string> output_files(const std::set<std::string>& kinds, const vision::StereoSequence& sequence,
+                                      const PipelineOptions& options) {
   std::vector<std::string> files;
   for (const vision::StereoFrame& frame : sequence.frames) {
-    for (std::string& file : output_files(kinds, frame.name)) files.push_back(std::move(file));
+    for (const std::string& kind : kinds) files.push_back(output_file(kind, frame.name, options));
+    files.push_back(output_file("disparity", frame.name, options));
   }
   return files;
 }
 
-RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities,
-                       const Calibration& calibration)
+RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size,
+                       const PipelineOptions& options, const Calibration& calibration)
     : folder_(std::move(folder)),
       kinds_(std::move(kinds)),
+      options_(options),
       calibration_(calibration),
       disparity_(size, CV_32FC1),
-      panels_(disparities) {
+      panels_(options.disparities) {
   vision::make_folder(folder_ / "disparity");
   for (const std::string& kind : kinds_) vision::make_folder(folder_ / kind);
   if (wants("variance") || wants("overview") || wants("cloud") || wants("interpolated_certain"))
@@ -135,9 +144,9 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
   const std::pair<const char*, std::function<void(const Path&)>> writers[] = {
       {"variance", [&](const Path& path) { vision::write_pfm(path, variance_); }},
       {"pfm", [&](const Path& path) { vision::write_pfm(path, disparity_); }},
-      {"predicted", [&](const Path& path) { vision::write_disparity_png(path, predicted_); }},
-      {"measured", [&](const Path& path) { vision::write_disparity_png(path, measured_); }},
-      {"right", [&](const Path& path) { vision::write_disparity_png(path, right_); }},
+      {"predicted", [&](const Path& path) { vision::write_disparity(path, predicted_); }},
+      {"measured", [&](const Path& path) { vision::write_disparity(path, measured_); }},
+      {"right", [&](const Path& path) { vision::write_disparity(path, right_); }},
       {"search", [&](const Path& path) { vision::write_png(path, search_); }},
       {"dynamic", [&](const Path& path) { vision::write_png(path, dynamic_); }},
       {"reason", [&](const Path& path) { vision::write_png(path, reason_); }},
@@ -146,11 +155,11 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
          vision::write_png(path, panels_.overview({frame, left, disparity_, variance_, search_}));
        }},
       {"interpolated",
-       [&](const Path& path) { vision::write_disparity_png(path, vision::interpolate_background(disparity_)); }},
+       [&](const Path& path) { vision::write_disparity(path, vision::interpolate_background(disparity_)); }},
       {"interpolated_certain",
        [&](const Path& path) {
          const cv::Mat certain = vision::drop_uncertain(disparity_, variance_);
-         vision::write_disparity_png(path, vision::interpolate_background(certain));
+         vision::write_disparity(path, vision::interpolate_background(certain));
        }},
       {"color", [&](const Path& path) { vision::write_png(path, panels_.disparity(disparity_)); }},
       {"cloud",
@@ -161,15 +170,10 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
       {"depth", [&](const Path& path) { vision::write_depth_png(path, depth_m()); }},
       {"depth_m", [&](const Path& path) { vision::write_pfm(path, depth_m()); }}};
   for (const auto& [kind, write] : writers) {
-    if (wants(kind)) write(file(kind, frame, extension_of(kind)));
+    if (wants(kind)) write(folder_ / output_file(kind, frame.name, options_));
   }
   // Last: a frame with it is complete.
-  return vision::write_disparity_png(file("disparity", frame, extension_of("disparity")), disparity_);
-}
-
-std::filesystem::path RunOutputs::file(const char* kind, const vision::StereoFrame& frame,
-                                       const char* extension) const {
-  return folder_ / kind / (frame.name + extension);
+  return vision::write_disparity(folder_ / output_file("disparity", frame.name, options_), disparity_);
 }
 
 }  // namespace egosgm::app

@@ -18,9 +18,11 @@ namespace egosgm::app {
 std::set<std::string> parse_write_list(const std::string& list);
 /// The folders that a run may write its maps to.
 std::vector<std::string> output_folders();
-/// The files of one frame, relative to OUT, and those of all frames.
-std::vector<std::string> output_files(const std::set<std::string>& kinds, const std::string& frame);
-std::vector<std::string> output_files(const std::set<std::string>& kinds, const vision::StereoSequence& sequence);
+/// A file of a frame, relative to OUT, and those of all frames. Disparities are KITTI's PNG, or PFM where that has no
+/// room for the searched range.
+std::string output_file(const std::string& kind, const std::string& frame, const PipelineOptions& options);
+std::vector<std::string> output_files(const std::set<std::string>& kinds, const vision::StereoSequence& sequence,
+                                      const PipelineOptions& options);
 const std::vector<std::string>& write_kinds();
 /// The same, as --help and the README describe it.
 extern const char* const kWriteListHelp;
@@ -29,7 +31,7 @@ extern const char* const kWriteListHelp;
 class RunOutputs {
  public:
   /// Makes the folders. Throws IoError.
-  RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, int disparities,
+  RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, const PipelineOptions& options,
              const Calibration& calibration);
 
   /// Where the pipeline is to write; valid as long as this object lives.
@@ -41,10 +43,10 @@ class RunOutputs {
 
  private:
   bool wants(const char* kind) const { return kinds_.contains(kind); }
-  std::filesystem::path file(const char* kind, const vision::StereoFrame& frame, const char* extension = ".png") const;
 
   const std::filesystem::path folder_;
   const std::set<std::string> kinds_;
+  const PipelineOptions options_;
   const Calibration calibration_;
   cv::Mat disparity_, variance_, right_, predicted_, measured_, search_, dynamic_, reason_;
   FramePanels panels_;

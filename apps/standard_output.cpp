@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/standard_output.h"
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -22,7 +23,12 @@ void flush() {
 
 }  // namespace
 
-void open_standard_output() {
+void open_standard_streams() {
+  // In the way in which the stream is not used, so that using it is the error that it was.
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    const int way = stream == STDIN_FILENO ? O_WRONLY : O_RDONLY;
+    if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF) ::open("/dev/null", way);  // takes the lowest that is free
+  }
   std::signal(SIGPIPE, SIG_IGN);
   // What is printed once the work is done fits, so that it fails where the exit code is known.
   if (isatty(STDOUT_FILENO) != 1) std::setvbuf(stdout, nullptr, _IOFBF, kBufferBytes);
@@ -32,6 +38,8 @@ void print_now(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
   flush();
 }
+
+void say(const std::string& line) { std::fputs((line + '\n').c_str(), stderr); }
 
 int standard_output_error() {
   flush();

@@ -149,7 +149,7 @@ int tune(const TuneArguments& arguments) {
     print_now(fmt::format("{}: {:.3f} ms with the defaults\n", fmt::join(trial.stages, " + "), least));
     for (const std::vector<NamedOption>& sizes : trial.candidates) {
       if (interrupted()) {
-        fmt::print(stderr, "egosgm: interrupted: nothing is kept, {} is as it was\n", file.string());
+        say(fmt::format("egosgm: interrupted: nothing is kept, {} is as it was", file.string()));
         return kInterrupted;
       }
       Tuning candidate = best;

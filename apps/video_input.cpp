@@ -13,6 +13,7 @@
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/flow_io.h"
+#include "host/vision/frame_names.h"
 #include "host/vision/pair_with_truth.h"
 #include "host/vision/video_order.h"
 
@@ -100,7 +101,7 @@ void OdometryMotions::run(const std::stop_token& stop, const vision::StereoSeque
 std::optional<Eigen::Isometry3d> OdometryMotions::between(int from, int to) const {
   Motion result = Eigen::Isometry3d::Identity();
   for (int i = from + 1; i <= to; ++i) {
-    const Motion& motion = motions_[i - first_].get();
+    const Motion& motion = motions_.at(i - first_).get();
     if (!motion) return std::nullopt;
     result = *motion * *result;
   }
@@ -153,7 +154,8 @@ void VideoInput::list_frames(const ComparisonArguments& compared) {
   for (const fs::path& estimate : truth_pairs_.without_truth) {
     frames_.emplace_back(estimate.stem().string(), estimate);
   }
-  std::sort(frames_.begin(), frames_.end(), [](const FrameFiles& a, const FrameFiles& b) { return a.name < b.name; });
+  std::sort(frames_.begin(), frames_.end(),
+            [](const FrameFiles& a, const FrameFiles& b) { return vision::is_before(a.name, b.name); });
   std::vector<std::string> names;
   for (const FrameFiles& frame : frames_) names.push_back(frame.name);
   follows_ = vision::find_successors(names);
@@ -204,7 +206,8 @@ void VideoInput::open_sequence() {
 void VideoInput::open_motions() {
   const fs::path file = arguments_.poses.empty() ? sequence_->poses_file : fs::path(arguments_.poses);
   if (file.empty()) {
-    odometry_.emplace(*sequence_, in_sequence_.front(), in_sequence_.back());
+    const auto [first, last] = std::minmax_element(in_sequence_.begin(), in_sequence_.end());
+    odometry_.emplace(*sequence_, *first, *last);
     motion_source_ = "odometry";
   } else {
     poses_ = vision::poses_of_frames(*sequence_, file);

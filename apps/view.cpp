@@ -170,6 +170,7 @@ class VideoFile {
 };
 
 int write_files(DrawnSequence& drawn, const ViewArguments& arguments) {
+  const vision::KeepFiles others;
   std::optional<VideoFile> video;
   if (!arguments.video.empty()) video.emplace(arguments.video, arguments.frames_per_second);
   if (!arguments.pictures.empty()) vision::make_folder(arguments.pictures);
@@ -186,7 +187,7 @@ int write_files(DrawnSequence& drawn, const ViewArguments& arguments) {
   }
   if (video) video->finish();
   if (i == drawn.frames()) return kOk;
-  fmt::print(stderr, "egosgm: interrupted after {} of {} frames: what was written is whole\n", i, drawn.frames());
+  say(fmt::format("egosgm: interrupted after {} of {} frames: what was written is whole", i, drawn.frames()));
   return kInterrupted;
 }
 

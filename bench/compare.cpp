@@ -145,8 +145,8 @@ TurnFunction opencv(const OpencvMode& mode, const Clip& clip, int disparities, i
   };
 }
 
-TurnFunction full_both(const Clip& clip, MethodOptions options, const Device& device) {
-  options.temporal = false;
+/// Without a motion, as a frame that is not a clip's first: the vertical offset is known.
+TurnFunction full_both(const Clip& clip, const MethodOptions& options, const Device& device) {
   const auto matcher = std::make_shared<Matcher>(clip, options, device);
   return [&clip, matcher] {
     const Stopwatch watch;

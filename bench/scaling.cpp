@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 
@@ -39,6 +40,7 @@ struct Point {
   std::string name;
   shared::ImageSize size = kKittiSize;
   MethodOptions options;
+  std::optional<Motion> motion = Motion{};
 };
 
 /// A pipeline with a pair that it sees again and again, and where its maps go.
@@ -47,6 +49,7 @@ class Steady {
   Steady(const Point& point, const Device& device)
       : street_(make_street(point.size, point.options.disparities)),
         pipeline_(street_.calibration, point.size.width, point.size.height, point.options, device),
+        motion_(point.motion),
         disparity_(static_cast<std::size_t>(point.size.width) * point.size.height),
         variance_(disparity_.size()) {
     for (int i = 0; i < 4; ++i) frame();  // finds the rows' offset, then the prediction, then its variance
@@ -56,7 +59,7 @@ class Steady {
     FrameOutputs outputs;
     outputs.disparity = view(disparity_);
     outputs.variance = view(variance_);
-    return pipeline_.process(street_.view(EGOSGM_LEFT), street_.view(EGOSGM_RIGHT), Motion{}, outputs);
+    return pipeline_.process(street_.view(EGOSGM_LEFT), street_.view(EGOSGM_RIGHT), motion_, outputs);
   }
 
   double memory_bytes() const { return static_cast<double>(pipeline_.device_memory_bytes()); }
@@ -69,6 +72,7 @@ class Steady {
 
   Street street_;
   Pipeline pipeline_;
+  const std::optional<Motion> motion_;
   std::vector<float> disparity_, variance_;
 };
 
@@ -107,7 +111,7 @@ void add_both(const std::string& sweep, Point point, std::vector<Point>& points)
   point.name = sweep + "_banded_frame";
   points.push_back(point);
   point.name = sweep + "_full_both";
-  point.options.temporal = false;
+  point.motion.reset();
   points.push_back(point);
 }
 

@@ -3,7 +3,7 @@
 # OpenCL C 1.2, all warnings being errors (a variant may leave a parameter unused). Needs no device.
 find_program(EGOSGM_CLANG NAMES clang clang-19 clang-18 clang-17 clang-16 clang-15 clang-14)
 if(NOT EGOSGM_CLANG)
-  egosgm_skipped_tests("no clang" kernels.lint)
+  egosgm_skipped_tests("no clang: scripts/install-dependencies" kernels.lint)
   return()
 endif()
 

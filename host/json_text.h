@@ -39,4 +39,14 @@ inline nlohmann::ordered_json parse_json(std::string_view text, const std::files
   return Json::parse(text, check, /*allow_exceptions=*/false);
 }
 
+/// JSON as files have it: what is no UTF-8, as some names of files, is replaced.
+inline std::string dumped(const nlohmann::ordered_json& json, int indent = -1) {
+  return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+/// What is read back of a file of this JSON.
+inline nlohmann::ordered_json as_in_file(const nlohmann::ordered_json& json) {
+  return nlohmann::ordered_json::parse(dumped(json));
+}
+
 }  // namespace egosgm

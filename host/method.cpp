@@ -61,7 +61,8 @@ void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction&
   } else if (fuse_ && fuse_->has_evidence()) {
     fuse_->begin(belief);
   }
-  belief.missing = fuse_ ? Unpredicted::kNo : Unpredicted::kNotTemporal;
+  belief.missing = Unpredicted::kNo;
+  if (!options_.temporal) belief.forget(Unpredicted::kNotTemporal);  // a frame alone leaves nothing to the next one
 }
 
 Map Method::confirmed(const Plan& plan, const Belief& belief, Map& published) {

@@ -2,6 +2,7 @@
 #include "egosgm/pipeline.h"
 
 #include <string>
+#include <tuple>
 
 #include "egosgm/error.h"
 #include "host/frame/frame_queue.h"
@@ -35,17 +36,21 @@ Pipeline::Pipeline(const Calibration& calibration, int width, int height, const 
   });
 }
 
-Pipeline::~Pipeline() = default;
+Pipeline::~Pipeline() {
+  if (ocl::is_forked()) std::ignore = impl_.release();  // nothing can be given back to a driver without its threads
+}
 Pipeline::Pipeline(Pipeline&&) noexcept = default;
 Pipeline& Pipeline::operator=(Pipeline&&) noexcept = default;
 
 void Pipeline::prepare(PixelType type, const FrameOutputs& outputs) {
+  ocl::expect_own_process("prepare");
   if (under_way() > 0) throw InvalidArgument("prepare: a frame that was submitted is under way: collect it first");
   ocl::translated(impl_->context(), [&] { impl_->prepare(type, wanted_of(outputs)); });
 }
 
 FrameReport Pipeline::process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
                               const FrameOutputs& outputs) {
+  ocl::expect_own_process("process");
   if (under_way() > 0) throw InvalidArgument("process: a frame that was submitted is under way: collect it first");
   submit(left, right, motion, outputs);
   return collect();
@@ -53,6 +58,7 @@ FrameReport Pipeline::process(const ImageView& left, const ImageView& right, con
 
 void Pipeline::submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
                       const FrameOutputs& outputs) {
+  ocl::expect_own_process("submit");
   if (under_way() == kMaxUnderWay) {
     throw InvalidArgument("submit: " + std::to_string(kMaxUnderWay) + " frames are under way: collect one first");
   }
@@ -62,6 +68,7 @@ void Pipeline::submit(const ImageView& left, const ImageView& right, const std::
 }
 
 FrameReport Pipeline::collect() {
+  ocl::expect_own_process("collect");
   if (under_way() == 0) throw InvalidArgument("collect: no frame is under way: submit one first");
   return ocl::translated(impl_->context(), [&] { return impl_->collect(); });
 }

@@ -8,6 +8,7 @@
 #include "egosgm/vision/render.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "python/other_threads.h"
 
 namespace egosgm::python {
 namespace {
@@ -20,7 +21,7 @@ using vision::SegmentError;
 DisparityCounts compare(const py::object& estimate, const py::object& truth) {
   py::array keep_estimate, keep_truth;
   const cv::Mat estimated = map_of(estimate, "estimate", keep_estimate), wanted = map_of(truth, "truth", keep_truth);
-  const py::gil_scoped_release other_threads_run;
+  const OtherThreadsRun other_threads_run;
   return vision::compare_disparity(estimated, wanted);
 }
 

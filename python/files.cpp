@@ -9,6 +9,7 @@
 #include "egosgm/vision/poses_io.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "python/other_threads.h"
 
 namespace egosgm::python {
 namespace {
@@ -24,7 +25,7 @@ vision::FrameRange range_of(const std::string& frames) {
 py::tuple read_images(const StereoFrame& frame) {
   vision::StereoImages images;
   {
-    const py::gil_scoped_release other_threads_run;
+    const OtherThreadsRun other_threads_run;
     images = vision::read_images(frame);
   }
   return py::make_tuple(array_of(images.left), array_of(images.right));

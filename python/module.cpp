@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <pybind11/numpy.h>
+
 #include "egosgm/error.h"
 #include "egosgm/image.h"
 #include "python/bindings.h"
+#include "python/other_threads.h"
 
 namespace egosgm::python {
 
@@ -29,6 +32,10 @@ PYBIND11_MODULE(_egosgm, module) {
   using namespace egosgm::python;
   module.attr("__version__") = EGOSGM_VERSION;
   module.attr("INVALID_DISPARITY") = egosgm::kInvalidDisparity;
+  // pybind11 asks for NumPy's functions when it first needs them, and two threads that do so at once wait for each
+  // other: before 2.12 with a lock of C++ and Python's.
+  pybind11::dtype::of<float>();
+  bind_end(module);
   bind_errors(module);
   bind_values(module);
   bind_pipeline(module);

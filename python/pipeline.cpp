@@ -2,6 +2,7 @@
 #include "egosgm/pipeline.h"
 
 #include <pybind11/stl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <deque>
@@ -11,6 +12,7 @@
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/option_values.h"
+#include "python/other_threads.h"
 
 namespace egosgm::python {
 namespace {
@@ -121,8 +123,8 @@ class LockedPipeline {
     const FrameOutputs outputs = views_of(frame.maps);
     expect_apart(frame.maps, {});
     {
-      const py::gil_scoped_release other_threads_run;
-      const std::lock_guard one_at_a_time(mutex_);
+      const OtherThreadsRun other_threads_run;
+      const auto one_at_a_time = turn();
       frame.report = pipeline_.process(left_image.view, right_image.view, moved, outputs);
     }
     return frame;
@@ -134,8 +136,8 @@ class LockedPipeline {
     Frame frame{.maps = arrays_to_fill(wanted, width_, height_), .report = {}};
     const FrameOutputs outputs = views_of(frame.maps);
     std::deque<Frame> dropped;  // goes when this thread may touch Python's objects again
-    const py::gil_scoped_release other_threads_run;
-    const std::lock_guard one_at_a_time(mutex_);
+    const OtherThreadsRun other_threads_run;
+    const auto one_at_a_time = turn();
     {
       const py::gil_scoped_acquire python;
       expect_apart(frame.maps, under_way_);
@@ -158,8 +160,8 @@ class LockedPipeline {
     std::deque<Frame> dropped;
     std::optional<Frame> frame;
     {
-      const py::gil_scoped_release other_threads_run;
-      const std::lock_guard one_at_a_time(mutex_);
+      const OtherThreadsRun other_threads_run;
+      const auto one_at_a_time = turn();
       FrameReport report;
       try {
         report = pipeline_.collect();
@@ -175,21 +177,27 @@ class LockedPipeline {
   }
 
   int under_way() {
-    const py::gil_scoped_release other_threads_run;
-    const std::lock_guard one_at_a_time(mutex_);
+    const OtherThreadsRun other_threads_run;
+    const auto one_at_a_time = turn();
     return pipeline_.under_way();
   }
 
   void reset() {
-    const py::gil_scoped_release other_threads_run;
-    const std::lock_guard one_at_a_time(mutex_);
+    const OtherThreadsRun other_threads_run;
+    const auto one_at_a_time = turn();
     pipeline_.reset();
   }
 
   const Pipeline& pipeline() const { return pipeline_; }
 
  private:
+  /// None in a process that was forked, where another thread's turn would never end: the pipeline says what is wrong.
+  std::unique_lock<std::mutex> turn() {
+    return ::getpid() == process_ ? std::unique_lock(mutex_) : std::unique_lock<std::mutex>();
+  }
+
   const int width_, height_;
+  const pid_t process_ = ::getpid();
   std::mutex mutex_;
   std::deque<Frame> under_way_;  // submitted: their arrays are written to
   Pipeline pipeline_;
@@ -201,7 +209,7 @@ std::unique_ptr<LockedPipeline> make_pipeline(const Calibration& calibration, in
   PipelineOptions options = options_of_preset(preset);
   set_options(options, values);
   options.validate();
-  const py::gil_scoped_release other_threads_run;
+  const OtherThreadsRun other_threads_run;
   return std::make_unique<LockedPipeline>(calibration, width, height, options, device);
 }
 
@@ -219,8 +227,8 @@ void bind_frame(py::module_& module) {
       .def_readonly("searched_everything", &FrameReport::searched_everything,
                     "The whole range at every pixel: without a prediction, or not trusting it.")
       .def_readonly("search_fraction", &FrameReport::search_fraction,
-                    "All cells that were matched, over those of one match of the full range. More than 1 in a first "
-                    "frame, which is matched twice.")
+                    "All cells that were matched, over those of one match of the full range. More than 1 in a frame "
+                    "that is matched twice: a first one, or one without `temporal`.")
       .def_readonly("predicted_fraction", &FrameReport::predicted_fraction, "Left pixels with a prediction.")
       .def_readonly("density", &FrameReport::density, "Left pixels with a disparity.")
       .def_readonly("vertical_offset_px", &FrameReport::vertical_offset_px)

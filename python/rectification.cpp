@@ -10,6 +10,7 @@
 #include "egosgm/error.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "python/other_threads.h"
 
 namespace egosgm::python {
 namespace {
@@ -57,7 +58,7 @@ cv::Mat mat_of(const py::object& image, const char* name) {
 py::tuple rectified(const Rectification& rectification, const py::object& left, const py::object& right) {
   cv::Mat both[] = {mat_of(left, "left"), mat_of(right, "right")};
   {
-    const py::gil_scoped_release other_threads_run;
+    const OtherThreadsRun other_threads_run;
     both[0] = vision::rectify(both[0], rectification.left_map);
     both[1] = vision::rectify(both[1], rectification.right_map);
   }
@@ -68,7 +69,7 @@ py::array_t<float> matches_of(const py::object& left, const py::object& right) {
   const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
   std::vector<vision::PairMatch> matches;
   {
-    const py::gil_scoped_release other_threads_run;
+    const OtherThreadsRun other_threads_run;
     matches = vision::match_pair(left_image, right_image);
   }
   py::array_t<float> rows({static_cast<py::ssize_t>(matches.size()), py::ssize_t{4}});
@@ -105,7 +106,7 @@ void bind_rectification(py::module_& module) {
                             "How raw images of a rig, width x height, become rectified ones of the same size. alpha 0: "
                             "only pixels that the raw\nimages have, to 1: all that they have. Threads may share one.")
       .def(py::init([](const StereoRig& rig, int width, int height, double alpha) {
-             const py::gil_scoped_release other_threads_run;
+             const OtherThreadsRun other_threads_run;
              return vision::rectification_of(rig, {width, height}, alpha);
            }),
            py::arg("rig"), py::arg("width"), py::arg("height"), py::arg("alpha") = 0.0)

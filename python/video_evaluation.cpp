@@ -6,6 +6,7 @@
 #include "egosgm/error.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "python/other_threads.h"
 
 namespace egosgm::python {
 namespace {
@@ -118,6 +119,7 @@ py::dict evaluate_video(const py::object& estimates, const py::object& truths, c
   video.frames = static_cast<int>(py::len(estimates));
   video.read = [&](int i) {
     const py::gil_scoped_acquire lock;
+    end_with_interpreter();
     VideoFrame frame;
     cv::Mat* const targets[] = {&frame.estimate, &frame.truth,       &frame.all_truth,
                                 &frame.against,  &frame.uncertainty, &frame.next_truth};
@@ -141,7 +143,7 @@ py::dict evaluate_video(const py::object& estimates, const py::object& truths, c
   }
   vision::VideoEvaluation evaluation;
   {
-    const py::gil_scoped_release other_threads_run;
+    const OtherThreadsRun other_threads_run;
     evaluation = vision::evaluate_video(video, {.near_px = near_px, .threads = threads});
   }
   return dict_of(evaluation);

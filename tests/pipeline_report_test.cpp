@@ -66,7 +66,7 @@ TEST(Pipeline, PredictsAgainAfterAFrameWithoutMotion) {
 TEST(Pipeline, WithoutTimeEveryFrameIsAlone) {
   Setting setting = standard();
   setting.options.temporal = false;
-  setting.options.vertical_alignment.enabled = false;
+  ASSERT_TRUE(setting.options.vertical_alignment.enabled);
   const Video video(setting, 3);
   Pipeline pipeline = make_pipeline(setting), other = make_pipeline(setting);
   process(pipeline, setting, video, 0);

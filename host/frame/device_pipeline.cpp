@@ -57,6 +57,7 @@ DevicePipeline::DevicePipeline(cl_command_queue queue, const Calibration& calibr
 
 DeviceMaps DevicePipeline::enqueue(const DeviceImages& images, const std::optional<Motion>& motion, cl_event* done,
                                    bool wants_dynamic) {
+  ocl::expect_own_process("enqueue");
   FrameQueue& frames = *pipeline_.impl_;
   if (pipeline_.under_way() > 0) {
     throw InvalidArgument("enqueue: a frame that was submitted is under way: collect it first");

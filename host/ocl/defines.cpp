@@ -2,7 +2,9 @@
 #include "host/ocl/defines.h"
 
 #include <algorithm>
-#include <cstdio>
+#include <array>
+#include <charconv>
+#include <cmath>
 
 namespace egosgm::ocl {
 
@@ -20,9 +22,10 @@ bool Defines::agrees_with(const Defines& other) const {
 }
 
 std::string Defines::literal(float value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%af", static_cast<double>(value));
-  return buffer;
+  std::array<char, 32> digits;  // of no locale
+  const auto [end, error] =
+      std::to_chars(digits.data(), digits.data() + digits.size(), std::abs(value), std::chars_format::hex);
+  return (std::signbit(value) ? "-0x" : "0x") + std::string(digits.data(), end) + "f";
 }
 
 }  // namespace egosgm::ocl

@@ -5,12 +5,14 @@
 #include <cctype>
 #include <charconv>
 #include <cstdlib>
+#include <mutex>
 #include <optional>
 #include <string_view>
 
 #include "egosgm/error.h"
 #include "host/ocl/device_handle.h"
 #include "host/ocl/errors.h"
+#include "host/ocl/own_process.h"
 #include "host/ocl/strings.h"
 
 namespace egosgm {
@@ -152,6 +154,10 @@ struct Found {
 };
 
 Found find_devices() {
+  ocl::expect_own_process("devices");
+  // Threads that are the first to ask a driver must not ask at once: PoCL 3.1 crashes.
+  static std::mutex one_at_a_time;
+  const std::lock_guard lock(one_at_a_time);
   std::vector<cl::Platform> platforms;
   try {
     cl::Platform::get(&platforms);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "host/ocl/context.h"
+#include "host/ocl/own_process.h"
 
 namespace egosgm::ocl {
 
@@ -27,9 +28,10 @@ auto translated(const Context& context, F&& f) {
   }
 }
 
-/// The same before there is a context.
+/// The same before there is a context, in a process that may use OpenCL.
 template <typename F>
 auto translated(const std::string& stage, F&& f) {
+  expect_own_process(stage);
   try {
     return std::forward<F>(f)();
   } catch (const cl::Error& error) {

@@ -82,6 +82,10 @@ Json entry_of(const std::string& kernel_file, const std::string& options, const 
 }
 
 std::string read(const std::filesystem::path& file) {
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(file, none)) {  // a pipe would be waited for
+    throw InvalidArgument(file.string() + ": is no file that can be read" + kRemedy);
+  }
   std::ifstream stream(file, std::ios::binary);
   std::string bytes;
   for (std::istreambuf_iterator<char> next(stream), end; next != end; ++next) {

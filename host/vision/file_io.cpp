@@ -145,6 +145,24 @@ int descriptor_named(const fs::path& path) {
   return !none && fs::canonical(folder_of(path), none) == open_ones && !none ? std::stoi(name) : -1;
 }
 
+thread_local const BeforeWrite* before_write = nullptr;
+thread_local bool keeps_files = false;
+
+[[noreturn]] void fail_keeping(const fs::path& file) {
+  throw IoError(file.string() + ": has come there meanwhile, and stays: give another name");
+}
+
+/// Gives a file its name in one step. 0 or errno.
+int give_name(const fs::path& from, const fs::path& to) {
+  if (!keeps_files) return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
+  if (::link(from.c_str(), to.c_str()) == 0) return ::unlink(from.c_str()) == 0 ? 0 : errno;
+  const int error = errno;
+  struct stat status {};
+  if (::lstat(to.c_str(), &status) == 0) fail_keeping(to);
+  if (error == EXDEV) return error;
+  return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;  // a file system without links
+}
+
 /// What a write to a file reaches.
 struct Target {
   fs::path file;  // links are followed, those to nothing too
@@ -232,7 +250,7 @@ class Unfinished {
       }
     }
     if (descriptor_.close() != 0) fail_writing(target_.file, errno);
-    if (::rename(hidden_.c_str(), target_.file.c_str()) != 0) fail_writing(target_.file, errno);
+    if (const int error = give_name(hidden_, target_.file); error != 0) fail_writing(target_.file, error);
     hidden_.clear();
   }
 
@@ -268,9 +286,10 @@ class Unfinished {
   fs::path hidden_;  // its name until it is whole, where it has one
 };
 
-thread_local const BeforeWrite* before_write = nullptr;
-
 }  // namespace
+
+KeepFiles::KeepFiles() : outer_(std::exchange(keeps_files, true)) {}
+KeepFiles::~KeepFiles() { keeps_files = outer_; }
 
 BeforeWrite::BeforeWrite(Function before) : before_(std::move(before)), outer_(before_write) { before_write = this; }
 BeforeWrite::~BeforeWrite() { before_write = outer_; }
@@ -313,8 +332,11 @@ void move_file(const std::filesystem::path& from, const std::filesystem::path& t
   if (const Descriptor descriptor(::open(from.c_str(), O_WRONLY | O_CLOEXEC)); descriptor.is_open()) {
     Unfinished::take_mode(target, descriptor.get());
   }
-  if (!target.is_stream() && ::rename(from.c_str(), target.file.c_str()) == 0) return;
-  if (!target.is_stream() && errno != EXDEV) fail_writing(to, errno);
+  if (!target.is_stream()) {
+    const int error = give_name(from, target.file);
+    if (error == 0) return;
+    if (error != EXDEV) fail_writing(to, error);
+  }
   write_file(to, read_file(from, std::numeric_limits<std::size_t>::max() - 1));  // a pipe, or another file system
   ::unlink(from.c_str());
 }

@@ -42,6 +42,19 @@ class EGOSGM_EXPORT BeforeWrite {
   friend EGOSGM_EXPORT void write_file(const std::filesystem::path& file, std::string_view bytes);
 };
 
+/// While it lives, write_file and move_file of its thread replace no file, and throw IoError where one has come: for
+/// what takes a while after its name was found free. What is no regular file is written through as ever.
+class EGOSGM_EXPORT KeepFiles {
+ public:
+  KeepFiles();
+  ~KeepFiles();
+  KeepFiles(const KeepFiles&) = delete;
+  KeepFiles& operator=(const KeepFiles&) = delete;
+
+ private:
+  const bool outer_;
+};
+
 /// Whether write_file writes through to what stands there, and replaces nothing. Throws IoError. Thread-safe.
 EGOSGM_EXPORT bool is_stream(const std::filesystem::path& file);
 

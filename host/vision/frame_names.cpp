@@ -87,25 +87,6 @@ bool is_smaller_decimal(const std::string& a, const std::string& b) {
   return a.substr(std::min(in_a, a.size())) < b.substr(std::min(in_b, b.size()));
 }
 
-/// Numbers inside by their value: img_9 before img_10.
-bool is_before(const std::string& a, const std::string& b) {
-  constexpr const char* kDigits = "0123456789";
-  std::size_t i = 0, k = 0;
-  while (i < a.size() && k < b.size()) {
-    const std::string x = a.substr(i, std::min(a.find_first_not_of(kDigits, i), a.size()) - i);
-    const std::string y = b.substr(k, std::min(b.find_first_not_of(kDigits, k), b.size()) - k);
-    if (x.empty() || y.empty()) {
-      if (a[i] != b[k]) return a[i] < b[k];
-      ++i, ++k;
-      continue;
-    }
-    if (const int order = compare_digits(x, y); order != 0) return order < 0;
-    i += x.size(), k += y.size();
-  }
-  if ((i == a.size()) != (k == b.size())) return i == a.size();
-  return a.size() != b.size() ? a.size() < b.size() : a < b;  // zeros before a number
-}
-
 std::vector<std::string> in_order(const std::set<std::string>& texts) {
   std::vector<std::string> sorted(texts.begin(), texts.end());
   const bool decimals = std::all_of(sorted.begin(), sorted.end(), is_decimal);
@@ -185,6 +166,24 @@ std::string gap_note(const std::vector<StereoFrame>& frames) {
 }
 
 }  // namespace
+
+bool is_before(const std::string& a, const std::string& b) {
+  constexpr const char* kDigits = "0123456789";
+  std::size_t i = 0, k = 0;
+  while (i < a.size() && k < b.size()) {
+    const std::string x = a.substr(i, std::min(a.find_first_not_of(kDigits, i), a.size()) - i);
+    const std::string y = b.substr(k, std::min(b.find_first_not_of(kDigits, k), b.size()) - k);
+    if (x.empty() || y.empty()) {
+      if (a[i] != b[k]) return a[i] < b[k];
+      ++i, ++k;
+      continue;
+    }
+    if (const int order = compare_digits(x, y); order != 0) return order < 0;
+    i += x.size(), k += y.size();
+  }
+  if ((i == a.size()) != (k == b.size())) return i == a.size();
+  return a.size() != b.size() ? a.size() < b.size() : a < b;  // zeros before a number
+}
 
 bool is_digits(std::string_view text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });

@@ -50,6 +50,9 @@ bool is_image_name(const std::filesystem::path& name);  // .png, .jpg, .jpeg, in
 /// Names in a folder, sorted. Throws InvalidArgument where it cannot be listed.
 std::vector<std::string> list_folder(const std::filesystem::path& folder);
 
+/// The order of names, numbers inside by their value: img_9 before img_10. Thread-safe.
+EGOSGM_EXPORT bool is_before(const std::string& a, const std::string& b);
+
 bool is_digits(std::string_view text);
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);

@@ -82,14 +82,17 @@ struct Numbers {
   float (*load)(const char*, bool);
 };
 
-constexpr std::array<Numbers, 8> kNumbers = {{{"f4", 4, load<float>},
-                                              {"f8", 8, load<double>},
-                                              {"f2", 2, load<cv::float16_t>},
-                                              {"u1", 1, load<std::uint8_t>},
-                                              {"u2", 2, load<std::uint16_t>},
-                                              {"i2", 2, load<std::int16_t>},
-                                              {"i4", 4, load<std::int32_t>},
-                                              {"u4", 4, load<std::uint32_t>}}};
+constexpr std::array<Numbers, 11> kNumbers = {{{"f4", 4, load<float>},
+                                               {"f8", 8, load<double>},
+                                               {"f2", 2, load<cv::float16_t>},
+                                               {"u1", 1, load<std::uint8_t>},
+                                               {"u2", 2, load<std::uint16_t>},
+                                               {"i2", 2, load<std::int16_t>},
+                                               {"i4", 4, load<std::int32_t>},
+                                               {"u4", 4, load<std::uint32_t>},
+                                               {"i8", 8, load<std::int64_t>},
+                                               {"u8", 8, load<std::uint64_t>},
+                                               {"i1", 1, load<std::int8_t>}}};
 
 /// The header's length, and where it begins.
 std::string_view header_of(std::string_view bytes, const std::filesystem::path& file) {

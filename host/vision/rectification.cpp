@@ -72,7 +72,8 @@ void check_rotation(const char* name, const cv::Mat& R) {
 void check_stance(const cv::Mat& T) {
   const double x = T.at<double>(0), y = T.at<double>(1), z = T.at<double>(2);
   const std::string text = "T = (" + short_text(x) + ", " + short_text(y) + ", " + short_text(z) + ") m: ";
-  if (x == 0 && y == 0 && z == 0) {
+  constexpr double kLeastDistance_m = 1e-6;
+  if (!(std::hypot(x, y, z) >= kLeastDistance_m)) {
     throw InvalidArgument(text + "the cameras stand in one place; give the calibration of two");
   }
   if (std::abs(x) < std::abs(y) || std::abs(x) < std::abs(z)) {

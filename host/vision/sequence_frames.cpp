@@ -13,6 +13,14 @@ namespace egosgm::vision {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+std::string range(int first, int last) {
+  return first == last ? std::to_string(first) : std::to_string(first) + ".." + std::to_string(last);
+}
+
+}  // namespace
+
 StereoImages read_images(const StereoFrame& frame) {
   StereoImages images{read_grey_image(frame.left), read_grey_image(frame.right)};
   const auto describe_image = [](const cv::Mat& image) {
@@ -45,9 +53,23 @@ std::vector<std::size_t> rows_of_frames(const StereoSequence& sequence, std::siz
                                         const std::string& what) {
   const std::vector<StereoFrame>& frames = sequence.frames;
   const std::vector<int>& all = sequence.numbers;
+  if (frames.empty()) return {};
+  for (const StereoFrame& frame : frames) {
+    if (all.empty() || std::binary_search(all.begin(), all.end(), frame.number)) continue;
+    throw InvalidArgument(file.string() + ": its " + what + " are of the frames " + range(all.front(), all.back()) +
+                          ", and frame " + std::to_string(frame.number) +
+                          " is none of them: give those of the same frames");
+  }
   const auto by = [&](const auto& row_of) {
     std::vector<std::size_t> found;
-    for (const StereoFrame& frame : frames) found.push_back(static_cast<std::size_t>(row_of(frame)));
+    for (const StereoFrame& frame : frames) {
+      const auto row = static_cast<std::size_t>(row_of(frame));  // a negative number is a large one
+      if (row >= rows) {
+        throw InvalidArgument(file.string() + ": holds " + std::to_string(rows) + " " + what + ", and none of frame " +
+                              std::to_string(frame.number) + ": give those of the same frames");
+      }
+      found.push_back(row);
+    }
     return found;
   };
   const auto number = [](const StereoFrame& frame) { return frame.number; };
@@ -59,9 +81,6 @@ std::vector<std::size_t> rows_of_frames(const StereoSequence& sequence, std::siz
   }
   if (rows == frames.size()) return by([&](const StereoFrame& frame) { return &frame - frames.data(); });
   if (all.empty() && rows > up_to_last) return by(number);
-  const auto range = [](int first, int last) {
-    return first == last ? std::to_string(first) : std::to_string(first) + ".." + std::to_string(last);
-  };
   std::string fitting = std::to_string(up_to_last) + " (each number from 0)";
   if (!all.empty() && all.size() != up_to_last) {
     fitting += ", " + std::to_string(all.size()) + " (each frame of " + range(all.front(), all.back()) + ")";

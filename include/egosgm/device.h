@@ -33,7 +33,8 @@ struct DeviceInfo {
   std::vector<std::string> lacks;
 };
 
-/// An OpenCL device. Copies refer to the same one. Thread-safe.
+/// An OpenCL device. Copies refer to the same one. Thread-safe. In a process that was forked from one that used a
+/// device, all that needs one throws DeviceError: drivers do not survive a fork.
 class EGOSGM_EXPORT Device {
  public:
   /// All devices, in the order of their types; then as the platforms list them.

@@ -28,7 +28,7 @@ enum class Preset { kDefault, kPaper };
 struct EGOSGM_EXPORT PipelineOptions {
   int disparities;          ///< D: number of disparities; the range is [min_disparity, min_disparity + D) px
   int min_disparity;        ///< least disparity [px], of either sign
-  bool temporal;            ///< false: every frame alone, over the full range
+  bool temporal;            ///< false: every frame alone, over the full range; nothing of it is left for the next one
   bool track_right;         ///< predict, match and filter the right view too
   bool keep_predicted;      ///< a pixel without a measurement keeps its prediction
   bool coarse_match;        ///< also match at a quarter of the resolution, without the prediction

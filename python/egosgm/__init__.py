@@ -59,6 +59,10 @@ for _values in (_egosgm.Calibration, _egosgm.DeviceInfo, _egosgm.DisparityCounts
                 _egosgm.PoseEvaluation, _egosgm.SegmentError):
     _as_dataclass(_values)
 
+# Other processes take them: multiprocessing pickles what it sends.
+_egosgm.Calibration.__reduce__ = lambda self: (_egosgm.Calibration, (self.fx, self.fy, self.cx, self.cy, self.baseline_m, self.doffs_px))
+_egosgm.Motion.__reduce__ = lambda self: (_egosgm.Motion, (self.current_from_previous, self.covariance))
+
 
 def _shown(cls, text):
     cls.__repr__ = lambda self: f"<{cls.__name__} {text(self)}>"

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded drives of robots: ROS 2's MCAP and SQLite, and ROS 1's bags, by rosbags."""
+import bisect
 import collections
 import contextlib
 import dataclasses
@@ -176,6 +177,8 @@ class Bag:
         wanted = [(topic, _IMAGES, "images") for topic in self.images] + [(topic, ("sensor_msgs/msg/CameraInfo",), "camera infos") for topic in self.infos]
         if self._pose_topic:
             wanted.append((self._pose_topic, _POSES, "poses"))
+        if self.images[0] == self.images[1]:
+            raise _egosgm.InvalidArgument(f"{self.path}: \"{self.images[0]}\" is given as left and as right: give the topics of both cameras")
         for topic, kinds, what in wanted:
             there = ", ".join(sorted(name for name, kind in types.items() if kind in kinds)) or "none"
             if topic not in types:
@@ -190,11 +193,14 @@ class Bag:
 
     def _find_cameras(self, reader: Any) -> Cameras:
         found = []
+        self._first_infos = {}
         for topic in self.infos or self.images[:1]:
             message = next(self._first_messages(reader, topic), None)
             if message is None:
                 raise _egosgm.InvalidArgument(f"{self.path}: \"{topic}\" has no message")
             found.append(message)
+            if self.infos:
+                self._first_infos[topic] = _values_of(message)
         if self._rig_or_calibration is not None:
             self.is_rectified_here = isinstance(self._rig_or_calibration, _egosgm.StereoRig)
             height, width = grey_of(found[0]).shape
@@ -208,13 +214,14 @@ class Bag:
     def frames(self) -> Iterator[BagFrame]:
         pairing = Pairing(self._bound_ns)
         self.gaps = pairing.gaps
-        poses: List[Tuple[int, NDArray[np.float64]]] = []
+        times: List[int] = []
+        poses: List[NDArray[np.float64]] = []
         with self._opened() as reader:
             self.cameras = self._find_cameras(reader)
             pairing.gaps.has_no_stamps = all(stamp_ns(m) == 0 for m in itertools.islice(self._first_messages(reader, self.images[0]), 2))
             if self._pose_topic:
-                poses = self._read_poses(reader)
-            connections = [c for c in reader.connections if c.topic in self.images]
+                times, poses = self._read_poses(reader)
+            connections = [c for c in reader.connections if c.topic in (*self.images, *self.infos)]
             number, last, interval = 0, None, None
 
             def frame_of(pair: Any) -> Iterator[BagFrame]:
@@ -241,12 +248,17 @@ class Bag:
                 if images[0].dtype != images[1].dtype:
                     raise _egosgm.InvalidArgument(f"{self.images[0]} has {images[0].dtype}, {self.images[1]} has {images[1].dtype}: both need one depth")
                 images = self.cameras.rectified(*images)
-                frame = BagFrame(number, stamp, left.header.frame_id, *images, last is None or steps_back, _pose_at(poses, stamp))
+                frame = BagFrame(number, stamp, left.header.frame_id, *images, last is None or steps_back, _pose_at(times, poses, stamp))
                 number, last = number + 1, stamp
                 yield frame
 
             for connection, time, raw in reader.messages(connections=connections):
                 message = reader.deserialize(raw, connection.msgtype)
+                if connection.topic in self._first_infos:
+                    if _values_of(message) != self._first_infos[connection.topic]:
+                        raise _egosgm.InvalidArgument(f"{connection.topic}: another calibration than at the start, from {stamp_ns(message) / 1e9:.3f} s on: "
+                                                      "cut the bag there, or give one calibration for all of it by --calib")
+                    continue
                 stamp = time if pairing.gaps.has_no_stamps else stamp_ns(message)
                 for pair in pairing.add(self.images.index(connection.topic), stamp, message):
                     yield from frame_of(pair)
@@ -258,7 +270,7 @@ class Bag:
             unset = " (images have no stamps here: the times at which they were recorded are taken)" if pairing.gaps.has_no_stamps else ""
             raise _egosgm.InvalidArgument(f"{self.path}: no left image has a right one of its time; {nearest}{unset}")
 
-    def _read_poses(self, reader: Any) -> List[Tuple[int, NDArray[np.float64]]]:
+    def _read_poses(self, reader: Any) -> Tuple[List[int], List[NDArray[np.float64]]]:
         poses = []
         for connection, _, raw in reader.messages(connections=[c for c in reader.connections if c.topic == self._pose_topic]):
             message = reader.deserialize(raw, connection.msgtype)
@@ -269,7 +281,8 @@ class Bag:
             if not np.isfinite(world_from_body).all():
                 raise _egosgm.InvalidArgument(f"{self._pose_topic}: pose {len(poses)} is not finite")
             poses.append((stamp_ns(message), world_from_body @ BODY_FROM_OPTICAL if self._pose_axes == "body" else world_from_body))
-        return sorted(poses, key=lambda item: item[0])
+        poses.sort(key=lambda item: item[0])
+        return [time for time, _ in poses], [pose for _, pose in poses]
 
 
 def _ms(duration: float) -> str:
@@ -305,6 +318,12 @@ def _read_calibration(path: pathlib.Path) -> "_egosgm.StereoRig | _egosgm.Calibr
     return _egosgm.read_opencv_rig(path) or _egosgm.read_calibration(path)
 
 
+def _values_of(info: Any) -> Tuple[Any, ...]:
+    """All that a camera info says, but when."""
+    of_image = info.width, info.height, info.binning_x, info.binning_y, info.distortion_model
+    return *of_image, *(tuple(np.ravel(getattr(info, name.lower(), None) if hasattr(info, name.lower()) else getattr(info, name))) for name in "DKRP")
+
+
 def _info_topic(image_topic: str) -> str:
     """Where ROS puts the camera info of an image: beside it. A compressed image lies one level deeper."""
     parts = image_topic.rstrip("/").split("/")
@@ -313,16 +332,15 @@ def _info_topic(image_topic: str) -> str:
     return "/".join([*parts[:-1], "camera_info"])
 
 
-def _pose_at(poses: List[Tuple[int, NDArray[np.float64]]], stamp: int) -> Optional[NDArray[np.float64]]:
+def _pose_at(times: List[int], poses: List[NDArray[np.float64]], stamp: int) -> Optional[NDArray[np.float64]]:
     """Between the poses before and after, which lie no further than half a second apart; None elsewhere."""
-    times = [time for time, _ in poses]
-    after = int(np.searchsorted(times, stamp))
+    after = bisect.bisect_left(times, stamp)
     if after < len(poses) and times[after] == stamp:
-        return poses[after][1]
+        return poses[after]
     if after == 0 or after == len(poses) or times[after] - times[after - 1] > 500_000_000:
         return None
-    (before_time, before), (after_time, later) = poses[after - 1], poses[after]
-    part = (stamp - before_time) / (after_time - before_time)
+    before, later = poses[after - 1], poses[after]
+    part = (stamp - times[after - 1]) / (times[after] - times[after - 1])
     a, b = quaternion_of(before[:3, :3]), quaternion_of(later[:3, :3])
     b = b if a @ b >= 0 else -b
     result = np.eye(4)

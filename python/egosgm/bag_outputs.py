@@ -3,6 +3,7 @@
 import contextlib
 import os
 import pathlib
+from time import time_ns
 from typing import Any, Dict, Optional
 
 import numpy as np
@@ -10,21 +11,22 @@ from numpy.typing import NDArray
 
 from . import _egosgm
 from .bag import BagFrame
-from .ros_images import BODY_FROM_OPTICAL, depth_maps, needs, quaternion_of, ros_disparity
+from .ros_images import BODY_FROM_OPTICAL, depth_maps, needs, quaternion_of, ros_disparity, ros_range
 
 
 class McapOutput:
     """Depth, disparity, variance, odometry and camera infos as a ROS 2 MCAP file, which appears when all of it is there."""
 
-    def __init__(self, file: pathlib.Path, disparities: int) -> None:
+    def __init__(self, file: pathlib.Path, options: Dict[str, Any]) -> None:
+        """options: those of the pipeline, by name."""
         writer = needs("mcap.writer")
         typesys = needs("rosbags.typesys")
         if not file.parent.is_dir():
             raise _egosgm.InvalidArgument(f"{file}: {file.parent}: no such folder")
-        self._file, self._disparities = file, disparities
-        self._part = file.with_name(file.name + ".part")
-        for there in (self._file, self._part):
-            self._expect_free(there)
+        self._file, self._options = file, options
+        self._expect_free()
+        # Not the name of another run's, which may have been killed.
+        self._part = file.with_name(f".egosgm-{os.getpid()}-{time_ns()}.part")
         self._store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
         self._types = self._store.types
         self._stream = open(self._part, "xb")
@@ -33,11 +35,11 @@ class McapOutput:
         self._schemas: Dict[str, int] = {}
         self._channels: Dict[str, int] = {}
         self._world_from_camera = np.eye(4)
+        self._last_motion: Optional[NDArray[np.float64]] = None
 
-    @staticmethod
-    def _expect_free(file: pathlib.Path) -> None:
-        if os.path.lexists(file):
-            raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name, or remove it first")
+    def _expect_free(self) -> None:
+        if os.path.lexists(self._file):
+            raise _egosgm.InvalidArgument(f"{self._file}: is there already, and stays: give another name, or remove it first")
 
     def _write(self, topic: str, kind: str, message: Any, time: int) -> None:
         if kind not in self._schemas:
@@ -63,18 +65,21 @@ class McapOutput:
         self._write("/egosgm/depth", "sensor_msgs/msg/Image", self._image(header, depth, "32FC1"), time)
         self._write("/egosgm/variance", "sensor_msgs/msg/Image", self._image(header, variance, "32FC1"), time)
         height, width = depth.shape
+        least, largest = ros_range(self._options, calibration)
         region = types["sensor_msgs/msg/RegionOfInterest"](x_offset=0, y_offset=0, height=height, width=width, do_rectify=False)
         self._write("/egosgm/disparity", "stereo_msgs/msg/DisparityImage", types["stereo_msgs/msg/DisparityImage"](
             header=header, image=self._image(header, ros_disparity(maps.disparity, calibration), "32FC1"), f=calibration.fx,
-            t=calibration.baseline_m, valid_window=region, min_disparity=max(0.0, calibration.doffs_px),
-            max_disparity=self._disparities - 1 + calibration.doffs_px, delta_d=0.0), time)
+            t=calibration.baseline_m, valid_window=region, min_disparity=least,
+            max_disparity=largest, delta_d=0.0), time)
         reason = getattr(maps, "reason", None)
         if reason is not None:
             self._write("/egosgm/reason", "sensor_msgs/msg/Image", self._image(header, reason, "mono8"), time)
         for side, shift in (("left", 0.0), ("right", -calibration.fx * calibration.baseline_m)):
             self._write(f"/egosgm/{side}/camera_info", "sensor_msgs/msg/CameraInfo", self._info(header, calibration, shift, width, height, region), time)
-        if motion is not None:
-            self._world_from_camera = self._world_from_camera @ np.linalg.inv(motion)
+        if motion is not None or frame.starts_anew:
+            self._last_motion = motion
+        if self._last_motion is not None:  # where none was found, the last one is repeated
+            self._world_from_camera = self._world_from_camera @ np.linalg.inv(self._last_motion)
         self._write("/egosgm/odom", "nav_msgs/msg/Odometry", self._odometry(header), time)
 
     def _info(self, header: Any, c: _egosgm.Calibration, shift: float, width: int, height: int, region: Any) -> Any:
@@ -99,8 +104,13 @@ class McapOutput:
     def finish(self) -> None:
         self._writer.finish()
         self._stream.close()
-        self._expect_free(self._file)  # others may have been quicker
-        os.replace(self._part, self._file)
+        try:
+            os.link(self._part, self._file)  # replaces nothing
+        except OSError:  # others were quicker, or the file system has no links
+            self._expect_free()
+            os.rename(self._part, self._file)
+            return
+        self._part.unlink()
 
     def give_up(self) -> None:
         self._part.unlink(missing_ok=True)
@@ -109,10 +119,14 @@ class McapOutput:
 
 
 class FolderOutput:
-    """disparity/NUMBER.png as the program writes them, and the calibration of the rectified images."""
+    """disparity/NUMBER.png as the program writes them, or .pfm where KITTI's PNG has no room for the range; and the calibration of the
+    rectified images."""
 
-    def __init__(self, folder: pathlib.Path) -> None:
+    def __init__(self, folder: pathlib.Path, options: Dict[str, Any]) -> None:
+        """options: those of the pipeline, by name."""
         self._folder = folder
+        fits_png = options["min_disparity"] >= 0 and options["min_disparity"] + options["disparities"] <= 256
+        self._extension = "png" if fits_png else "pfm"
         if os.path.lexists(folder) and not folder.is_dir():
             raise _egosgm.InvalidArgument(f"{folder}: is no folder: give a new one, or a name that ends in .mcap")
         if folder.exists() and any(folder.iterdir()):
@@ -122,7 +136,7 @@ class FolderOutput:
     def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
         if frame.number == 0:
             _egosgm.write_calibration(self._folder / "calibration.txt", calibration)
-        _egosgm.write_disparity(self._folder / "disparity" / f"{frame.number:06d}.png", maps.disparity)
+        _egosgm.write_disparity(self._folder / "disparity" / f"{frame.number:06d}.{self._extension}", maps.disparity)
 
     def finish(self) -> None:
         pass

@@ -3,7 +3,9 @@
 import argparse
 import contextlib
 import pathlib
+import signal
 import sys
+import threading
 from typing import Any, Dict, List, NoReturn, Optional, Sequence
 
 from . import _egosgm
@@ -50,10 +52,13 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """What the program prints and returns."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
     try:
         return _main(_parser().parse_args(arguments))
     except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError, OSError) as error:
-        print(f"egosgm: error: {error}", file=sys.stderr)
+        text = "".join(c if c.isprintable() else " " for c in str(error))  # names may hold anything
+        print(f"egosgm: error: {text}", file=sys.stderr)
         return 2 if isinstance(error, _egosgm.InvalidArgument) else 1
     except KeyboardInterrupt:
         print("egosgm: interrupted", file=sys.stderr)
@@ -65,12 +70,11 @@ def _output_of(out: pathlib.Path, bag: Bag, options: Dict[str, Any], preset: str
         raise _egosgm.InvalidArgument(f"--out {out}: lies in the bag {bag.path}, which is read: give another name")
     if out.suffix == ".rrd":
         return RerunOutput(out)
-    if out.suffix != ".mcap":
-        return FolderOutput(out)
-    disparities = options.get("disparities", _egosgm.pipeline_options(preset)["disparities"])
-    if not isinstance(disparities, int):
-        raise _egosgm.InvalidArgument(f"--set disparities={disparities}: give a whole number")
-    return McapOutput(out, disparities)
+    known = {**_egosgm.pipeline_options(preset), **options}
+    for name in ("disparities", "min_disparity"):
+        if not isinstance(known[name], int):
+            raise _egosgm.InvalidArgument(f"--set {name}={known[name]}: give a whole number")
+    return McapOutput(out, known) if out.suffix == ".mcap" else FolderOutput(out, known)
 
 
 def _main(given: argparse.Namespace) -> int:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows the OpenCL loader the CPU implementation that `pip install "egosgm[cpu]"` brings, which registers itself nowhere."""
+"""Shows the OpenCL loader the CPU implementation of the extra "cpu", which registers itself nowhere."""
 import importlib.metadata
 import os
 from typing import Optional

@@ -74,8 +74,10 @@ class Drive:
         self.calibration = calibration
         self._source, self._outputs, self._options = source, outputs, options
         self._bar = _bar(progress)
-        self._odometry = _egosgm.StereoOdometry(calibration, **(odometry or {})) if motion else None
-        self._pipeline = _egosgm.Pipeline(calibration, *self.sequence.size, **options) if self.sequence is not None else None
+        self._odometry_options = (odometry or {}) if motion else None
+        self._begun = False
+        # What an iteration has of its own, ready for the next one. Made now where the size is known: what is wrong is said at once.
+        self._spare = [self._tools(*(self.sequence.size if self.sequence is not None else ()))]
 
     def __len__(self) -> int:
         return len(self._source)
@@ -83,9 +85,12 @@ class Drive:
     def __repr__(self) -> str:
         name = self.sequence.title if self.sequence is not None else "pairs of images"
         count = f", {len(self)} frames" if hasattr(self._source, "__len__") else ""
-        return f"<Drive {name}{count}{'' if self._odometry else ', no motion'}>"
+        return f"<Drive {name}{count}{', no motion' if self._odometry_options is None else ''}>"
 
     def __iter__(self) -> Iterator[DriveFrame]:
+        if self._begun and hasattr(self._source, "__next__"):
+            raise _egosgm.InvalidArgument("the pairs come from an iterator, which gives them once: give a list, or make a drive of a new iterator")
+        self._begun = True
         return iter(self._bar(self._frames(), len(self) if hasattr(self._source, "__len__") else None))
 
     def _pairs(self) -> Iterator[Tuple[int, str, NDArray[Any], NDArray[Any]]]:
@@ -96,30 +101,46 @@ class Drive:
             for number, pair in enumerate(self._source):
                 if not isinstance(pair, (tuple, list)) or len(pair) != 2:
                     raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}: give (left, right), each an image")
-                yield (number, f"{number:06d}", *pair)
+                # Copies: a camera may use its buffers again before the frame is handed out.
+                yield (number, f"{number:06d}", *(np.array(image) for image in pair))
+
+    def _tools(self, width: int = 0, height: int = 0) -> Tuple[Optional[_egosgm.StereoOdometry], Optional[_egosgm.Pipeline]]:
+        odometry = None if self._odometry_options is None else _egosgm.StereoOdometry(self.calibration, **self._odometry_options)
+        return odometry, _egosgm.Pipeline(self.calibration, width, height, **self._options) if width else None
 
     def _frames(self) -> Iterator[DriveFrame]:
-        """The device matches a frame while the next one is read and its motion is found."""
-        if self._odometry:
-            self._odometry.reset()
-        if self._pipeline:
-            self._pipeline.reset()
-        under_way = None
-        for number, name, left, right in self._pairs():
-            found = self._odometry.process(left, right) if self._odometry else None
-            if self._pipeline is None:
-                height, width = np.shape(left)[:2]
-                self._pipeline = _egosgm.Pipeline(self.calibration, width, height, **self._options)
-            self._pipeline.submit(left, right, found.motion if found else None, self._outputs)
-            if under_way:
-                yield self._collected(*under_way)
-            under_way = number, name, left, right, found
-        if under_way:
-            yield self._collected(*under_way)
-
-    def _collected(self, number: int, name: str, left: NDArray[Any], right: NDArray[Any],
-                   found: Optional[_egosgm.OdometryResult]) -> DriveFrame:
-        return DriveFrame(number, name, left, right, self._pipeline.collect(), found, self.calibration)
+        """The device matches a frame while the next one is read and its motion is found. Iterations share nothing, so that each may end
+        where it likes, and two may run at once."""
+        odometry, pipeline = self._spare.pop() if self._spare else self._tools(*(self.sequence.size if self.sequence is not None else ()))
+        pairs, under_way, failure = self._pairs(), None, None
+        try:
+            while True:
+                next_one = None
+                try:
+                    for number, name, left, right in pairs:
+                        found = odometry.process(left, right) if odometry else None
+                        if pipeline is None:
+                            pipeline = _egosgm.Pipeline(self.calibration, *np.shape(left)[1::-1], **self._options)
+                        pipeline.submit(left, right, found.motion if found else None, self._outputs)
+                        next_one = number, name, left, right, found
+                        break
+                except Exception as error:  # what is under way does not suffer from a next frame that is none
+                    failure = error
+                if under_way and (failure is None or pipeline.under_way):
+                    number, name, left, right, found = under_way
+                    yield DriveFrame(number, name, left, right, pipeline.collect(), found, self.calibration)
+                if failure:
+                    raise failure
+                under_way = next_one
+                if under_way is None:
+                    return
+        finally:
+            while pipeline and pipeline.under_way:
+                pipeline.collect()
+            for tool in (odometry, pipeline):
+                if tool:
+                    tool.reset()
+            self._spare = [(odometry, pipeline)]
 
 
 def _bar(progress: Optional[bool]):

@@ -4,7 +4,7 @@ import importlib
 import pathlib
 import re
 import tempfile
-from typing import Any, Optional, Tuple
+from typing import Any, Dict, Optional, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ def needs(module: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError:
-        raise _egosgm.InvalidArgument('bags need the packages rosbags and mcap: pip install "egosgm[bag]"') from None
+        raise _egosgm.InvalidArgument('bags need the packages rosbags and mcap: pip install rosbags mcap') from None
 
 
 def grey_of(message: Any) -> NDArray[Any]:
@@ -167,6 +167,12 @@ def depth_maps(disparity: NDArray[np.float32], variance: NDArray[np.float32],
     with np.errstate(over="ignore"):  # infinitely uncertain, where the disparity is next to nothing
         of_depth = (depth * depth / np.float32(calibration.fx * calibration.baseline_m)) ** 2 * variance
     return depth, of_depth.astype(np.float32)
+
+
+def ros_range(options: Dict[str, Any], calibration: _egosgm.Calibration) -> Tuple[float, float]:
+    """Least and largest disparity of the searched range, as ros_disparity means them. options: of the pipeline, by name."""
+    least = options["min_disparity"] + calibration.doffs_px
+    return max(0.0, least), least + options["disparities"] - 1
 
 
 def ros_disparity(disparity: NDArray[np.float32], calibration: _egosgm.Calibration) -> NDArray[np.float32]:

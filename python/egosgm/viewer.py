@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames to Rerun, to look at: images, depth, variance, reasons and where the camera was. Needs rerun-sdk (pip install "egosgm[rerun]")."""
+"""Frames to Rerun, to look at: images, depth, variance, reasons and where the camera was. Needs rerun-sdk."""
 import os
 import pathlib
 from typing import Any, Optional
@@ -17,7 +17,7 @@ class RerunOutput:
         try:
             import rerun
         except ImportError:
-            raise _egosgm.InvalidArgument('the viewer Rerun is a package of its own: pip install "egosgm[rerun]"') from None
+            raise _egosgm.InvalidArgument('the viewer Rerun is a package of its own: pip install rerun-sdk') from None
         if file is not None:
             if os.path.lexists(file):
                 raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name")

@@ -5,6 +5,7 @@ import fcntl
 import json
 import math
 import os
+import pathlib
 import re
 import shutil
 import signal
@@ -78,7 +79,9 @@ class Compile(ProgramTest):
         self.assert_refused([*run, self.new_folder(), "--programs", self.new_folder()], "manifest.json", "egosgm compile")
         (programs / "manifest.json").write_text(json.dumps(dict(manifest, driver="0.0")))
         self.assert_refused([*run, self.new_folder(), "--programs", programs], "driver", "0.0", manifest["driver"], "egosgm compile")
-
+        (programs / "manifest.json").unlink()
+        os.mkfifo(programs / "manifest.json")
+        self.assert_refused([*run, self.new_folder(), "--programs", programs], "manifest.json", "is no file that can be read", "egosgm compile")
 
     def test_spirv_for_every_device_of_the_type_is_refused_where_it_is_not_taken(self):
         version = subprocess.run(["clang", "-dumpversion"], capture_output=True, text=True).stdout.split(".")[0] if shutil.which("clang") else ""
@@ -149,6 +152,35 @@ class Batch(BatchTest):
             truth += pixels
         self.assertAlmostEqual(report["pooled"]["noc"]["bad_or_missing"], bad / truth, places=9)
 
+    def test_overwriting_a_part_with_other_options_mixes_nothing(self):
+        out, other = self.new_folder(), ("--set", "p2=20", "--programs", self.new_folder() / "programs")
+        self.assert_works("compile", "--device", "0", "--out", other[-1], *METHOD, "--set", "p2=20")
+        self.assert_works(*self.batch(out))
+        batch = ["batch", self.list, "--out", out, *METHOD, *other]
+        self.assert_works(*batch, "--overwrite", "--shard", "0/2")
+        self.assert_refused([*batch, "--merge"], "2 of 4 sequences are not done", "street-1", "with these options", code=1)
+        self.assert_works(*batch, "--shard", "1/2")
+        self.assert_works(*batch, "--merge")
+        for i in range(SEQUENCES - 1):
+            self.assertEqual(self.report(out / f"street-{i}")["options"]["p2"], 20)
+
+    def test_a_range_beyond_kittis_png_loses_nothing(self):
+        """Seen from the other side, all disparities are negative."""
+        folder = self.new_folder()
+        shutil.copytree(self.folder / "s0", folder / "seen")
+        (folder / "seen/image_0").rename(folder / "left")
+        (folder / "seen/image_1").rename(folder / "seen/image_0")
+        (folder / "left").rename(folder / "seen/image_1")
+        shutil.rmtree(folder / "seen/truth")
+        (folder / "list.txt").write_text(f"seen {folder}/seen\n")
+        method = ("--disparities", 40, "--min-disparity", -39)
+        self.assert_works("batch", folder / "list.txt", "--out", folder / "out", *method, "--write", "right,interpolated")
+        maps = {file.suffix for kind in ("disparity", "right", "interpolated") for file in (folder / f"out/seen/{kind}").iterdir()}
+        self.assertEqual(maps, {".pfm"})
+        text = self.assert_works("eval", folder / "out/seen", folder / "out/seen/disparity", "--json")
+        self.assertGreater(sum(pair["truth_pixels"] for pair in json.loads(text)["pairs"]), 1000)
+        self.assert_works("report", folder / "out/seen")
+
     def test_without_truth_there_are_no_metrics(self):
         plain, out, s0 = self.new_folder() / "list.txt", self.new_folder(), self.folder / "s0"
         plain.write_text(f"plain --left {s0}/image_0/%06d.png --right {s0}/image_1/%06d.png --calib {s0}/calib.txt --frames 0\n")
@@ -214,12 +246,10 @@ class Batch(BatchTest):
     def test_after_a_kill_or_an_interrupt_it_goes_on(self):
         for how, code in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGTERM, 130)):
             out = self.new_folder()
-            with subprocess.Popen([PROGRAM, *map(str, self.batch(out, "--devices", "0"))], stdout=subprocess.DEVNULL,
-                                  stderr=subprocess.DEVNULL) as process:
-                while not (out / "street-0/done.json").exists():
-                    self.assertIsNone(process.poll())
-                    time.sleep(0.002)
-                process.send_signal(how)
+            process = self.started(*self.batch(out, "--devices", "0"))
+            self.assertTrue((out / "street-0/done.json").exists())
+            process.send_signal(how)
+            process.communicate()
             self.assertEqual(process.returncode, code)
             self.assertFalse((out / "more/street-3/done.json").exists())
             self.assert_works(*self.batch(out, "--devices", "0"))
@@ -244,18 +274,13 @@ class Batch(BatchTest):
         self.assertTrue(self.flocked(out, fcntl.LOCK_UN))
 
         out = self.new_folder()
-        with subprocess.Popen([PROGRAM, *map(str, self.batch(out, "--devices", "0"))], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
-            while not (out / "street-0/done.json").exists():
-                self.assertIsNone(process.poll())
-                time.sleep(0.002)
-            process.send_signal(signal.SIGSTOP)
-            self.assertFalse((out / "more/street-3/done.json").exists())
-            self.assertFalse(self.flocked(out, fcntl.LOCK_SH))
-            (out / "more/street-3").mkdir(parents=True, exist_ok=True)
-            (out / "more/street-3/files.part").touch()
-            self.assertTrue(self.flocked(out / "more/street-3/files.part", fcntl.LOCK_EX))  # as the same shard once more
-            process.send_signal(signal.SIGCONT)
-            errors = process.stderr.read()
+        process = self.started(*self.batch(out, "--devices", "0"))
+        self.assertFalse((out / "more/street-3").exists())  # it waits for its lines to be read
+        self.assertFalse(self.flocked(out, fcntl.LOCK_SH))
+        (out / "more/street-3").mkdir(parents=True)
+        (out / "more/street-3/files.part").touch()
+        self.assertTrue(self.flocked(out / "more/street-3/files.part", fcntl.LOCK_EX))  # as the same shard once more
+        _, errors = process.communicate(timeout=600)
         self.assertEqual(process.returncode, 2, errors)
         self.assertIn(f"{out}/more/street-3: another egosgm is writing there", errors)
         self.assertEqual(list(out.rglob("failed.json")), [])
@@ -283,7 +308,8 @@ class Batch(BatchTest):
             with subprocess.Popen([PROGRAM, *command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=lost) as process:
                 writing = os.open(pipe, os.O_WRONLY)  # once it looks at the images' sizes
                 process.send_signal(signal.SIGTERM)
-                time.sleep(0.5)  # a thread that waits for nothing takes the signal
+                while "ShdPnd:\t0000000000000000" not in pathlib.Path(f"/proc/{process.pid}/status").read_text():
+                    time.sleep(0.01)  # until a thread takes the signal
                 os.write(writing, image)
                 os.close(writing)
                 errors = process.stderr.read()

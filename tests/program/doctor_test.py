@@ -68,6 +68,9 @@ class Doctor(InputTest):
         self.assertIn("exchange", self.assert_only_problem("calibration", street)["remedy"])
         (street / "calib.txt").write_text(f"fx = {f}\nfy = {f}\ncx = {cx}\ncy = {cy}\nbaseline_m = {1000 * baseline}\n")
         self.assertIn("millimetres", self.assert_only_problem("calibration", street)["remedy"])
+        for focal, distance in ((1e-30, baseline), (f, 5e-324)):
+            (street / "calib.txt").write_text(f"fx = {focal}\nfy = {focal}\ncx = {cx}\ncy = {cy}\nbaseline_m = {distance}\n")
+            self.assert_only_problem("calibration", street)
         (street / "calib.txt").write_text(f"fx = {2 * f}\nfy = {2 * f}\ncx = {2 * cx}\ncy = {2 * cy}\nbaseline_m = {baseline}\n")
         self.assertIn("scale", self.assert_only_problem("calibration", street)["remedy"])
 

@@ -118,6 +118,44 @@ class EvalPoses(ProgramTest):
         two.write_text("".join(truth.read_text().splitlines(True)[:2]))
         self.assert_refused(["eval-poses", out, two], two, "holds 2 poses", out / "poses.txt")
 
+    def renumbered(self, by):
+        """The sequence with other numbers in its names."""
+        street = self.broken_street()
+        for side in (0, 1):
+            for image in sorted((street / f"image_{side}").iterdir(), reverse=by > 0):
+                image.rename(image.with_stem(f"{int(image.stem) + by:06d}"))
+        return street
+
+    def test_poses_of_other_frames_are_no_truth(self):
+        for by in (100, 9000000):
+            out = self.new_folder() / "out"
+            self.assert_works("run", self.renumbered(by), "--disparities", 16, "--out", out, "--quiet")
+            self.assert_refused(["eval-poses", out, self.street], self.street / "poses.txt", f"frame {by}")
+        out = self.new_folder() / "out"
+        self.assert_works("run", self.street, "--frames", "0:2", "--disparities", 16, "--out", out, "--quiet")
+        other = self.renumbered(2)
+        self.assert_refused(["eval-poses", out, other], other / "poses.txt", "frame 0")
+
+    def test_the_largest_number_of_a_frame_is_one(self):
+        street, out = self.broken_street(), self.new_folder() / "out"
+        (street / "poses.txt").unlink()
+        for side in (0, 1):
+            for image in (street / f"image_{side}").iterdir():
+                image.rename(image.with_stem(str(2**31 - 1 - int(image.stem))))
+        self.assert_works("run", street, "--disparities", 16, "--out", out, "--quiet")
+        self.assert_works("report", out)
+        self.assert_works("eval-poses", out, out / "poses.txt")
+
+    def test_a_report_that_was_edited_reads_no_pose_that_is_not_there(self):
+        out = self.new_folder() / "out"
+        self.assert_works("run", self.street, "--disparities", 16, "--out", out, "--quiet")
+        report = self.report(out)
+        report["frames"][1]["frame"] = 900000000
+        del report["sequence"]
+        (out / "report.json").write_text(json.dumps(report))
+        self.assert_refused(["eval-poses", out, self.street / "poses.txt"], "frame 900000000")
+        self.assert_refused(["report", out, "--pictures", 0, "--poses", self.street / "poses.txt"], "frame 900000000")
+
 
 if __name__ == "__main__":
     unittest.main()

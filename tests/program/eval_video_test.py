@@ -72,6 +72,30 @@ class EvalOverTime(ProgramTest):
         self.assertEqual((figures["frames"], figures["pairs"]), (3, 1))
         self.assertEqual(figures["figures"]["tepe_dynamicstereo_px"], 2)
 
+    def test_names_without_zeros_are_in_the_order_of_their_numbers(self):
+        figures = []
+        for digits in (6, 1):
+            street = self.broken_street()
+            (street / "poses.txt").unlink()
+            maps = self.new_folder()
+            for i, file in enumerate(sorted((street / "truth/left_disp_occ").iterdir())):
+                shutil.copy(file, maps / f"{i + 8:0{digits}}.png")
+            shutil.rmtree(street / "truth")
+            for image in sorted(street.glob("image_*/*.png"), reverse=True):
+                image.rename(image.with_stem(f"{int(image.stem) + 8:0{digits}}"))
+            video = self.evaluate(maps, "--sequence", street)["video"]
+            self.assertEqual((video["pairs"], video["motion"]), (FRAMES - 1, "odometry"))
+            figures.append(video["figures"])
+        self.assertEqual(figures[0], figures[1])
+
+    def test_two_series_of_maps_are_two_videos(self):
+        street = self.broken_street()
+        (street / "poses.txt").unlink()
+        maps = self.new_folder()
+        for name, number in (("a_000002", 2), ("a_000003", 3), ("b_000000", 0), ("b_000001", 1)):
+            shutil.copy(street / f"truth/left_disp_occ/{number:06}.png", maps / f"{name}.png")
+        self.assertEqual(self.evaluate(maps, "--sequence", street)["video"]["pairs"], 2)
+
     def test_pictures_that_are_no_video_give_the_old_table(self):
         folder = self.new_folder()
         for name in ("000000_10", "000001_10"):

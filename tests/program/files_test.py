@@ -167,6 +167,30 @@ class InputFiles(FilesTest):
         self.assertFalse((folder / "programs").exists())
 
 
+class CameMeanwhile(FilesTest):
+    """What others put there while a command works stays."""
+
+    def assert_stays(self, name, *command):
+        out = self.new_folder() / name
+        process = self.started(*command, out)
+        out.parent.mkdir(exist_ok=True)
+        out.write_text("mine")
+        _, errors = process.communicate(timeout=600)
+        self.assertEqual((process.returncode, out.read_text()), (1, "mine"), errors)
+        self.assertIn("has come there meanwhile, and stays", errors)
+        self.assertEqual(sorted(file.name for file in out.parent.iterdir()), [out.name])
+
+    def test_poses(self):
+        self.assert_stays("poses.txt", "odometry", self.street, "--out")
+
+    def test_a_video(self):
+        self.assert_stays("video.avi", "view", self.street, "--disparities", 16, "--video")
+
+    def test_a_stream_is_written_through(self):
+        written = self.assert_works("odometry", self.street, "--quiet", "--out", "/dev/stdout")
+        self.assertEqual(len(written.splitlines()), 4)
+
+
 class OwnFiles(FilesTest):
     """Of what lies in --out, only what its report.json lists is the program's own."""
 

@@ -23,12 +23,25 @@ WIDTH, HEIGHT, FRAMES = 320, 96, 4
 F_SETPIPE_SZ = 1031  # fcntl has it since Python 3.10
 
 
+def without_waiting(errors):
+    """Without the line that comes where compiling takes a while: on a busy machine, or where the driver's cache is empty."""
+    return "".join(line for line in errors.splitlines(True) if not line.startswith("egosgm: compiling the kernels for "))
+
+
 def egosgm(*arguments, cwd=None, **options):
-    """Runs the program. A line on the standard error that comes where the driver's cache is empty is left out."""
+    """Runs the program. Its errors are without_waiting."""
     done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=600, cwd=cwd, **options)
     if isinstance(done.stderr, str):
-        done.stderr = "".join(line for line in done.stderr.splitlines(True) if not line.startswith("egosgm: compiling the kernels for "))
+        done.stderr = without_waiting(done.stderr)
     return done
+
+
+class Started(subprocess.Popen):
+    """The program while it runs. What it says is without_waiting."""
+
+    def communicate(self, *arguments, **options):
+        printed, errors = super().communicate(*arguments, **options)
+        return printed, errors if errors is None else without_waiting(errors)
 
 
 def png(width, height, depth, rows, palette=b""):
@@ -69,11 +82,11 @@ class ProgramTest(unittest.TestCase):
         shutil.copytree(self.street, copy)
         return copy
 
-    def started(self, *words, lines=1):
+    def started(self, *words, lines=1, stderr=subprocess.PIPE):
         """A command that has printed so many lines and waits to be read before it goes on, however busy the machine is."""
         reading, writing = os.pipe2(os.O_CLOEXEC | os.O_DIRECT)
         fcntl.fcntl(writing, F_SETPIPE_SZ, 4096)  # room for one line: with O_DIRECT, each takes a page
-        process = subprocess.Popen([PROGRAM, *map(str, words)], stdout=writing, stderr=subprocess.PIPE, text=True)
+        process = Started([PROGRAM, *map(str, words)], stdout=writing, stderr=stderr, text=True)
         os.close(writing)
         process.stdout = os.fdopen(reading)
         for _ in range(lines):
@@ -104,7 +117,7 @@ class ProgramTest(unittest.TestCase):
         maps = sorted((out / "disparity").glob("*"))
         self.assertGreaterEqual(len(maps), at_least)
         for file in maps:
-            self.assertRegex(file.name, r"^\d{6}\.png$")
+            self.assertRegex(file.name, r"^\d{6}\.(png|pfm)$")
         if maps:
             self.assert_works("eval", "--estimate", out / "disparity", "--truth", out / "disparity")
         return len(maps)

@@ -2,6 +2,7 @@
 """egosgm rectify: raw images of a known rig. Environment as for program_case.py."""
 import csv
 import math
+import os
 import re
 import shutil
 import unittest
@@ -210,6 +211,14 @@ class Rectify(RectifyTest):
             self.assertTrue((read_grey(out / f"image_{side}/000000.png") == images[side]).all())
         self.assertIn("rectified already", text)
 
+    def test_a_bad_file_leaves_the_pairs_before_it_as_a_sequence(self):
+        street, out = self.broken_street(), self.new_folder() / "out"
+        os.truncate(street / "image_1/000003.png", 1000)
+        self.assert_refused(["rectify", "--left", street / "image_0/%06d.png", "--right", street / "image_1/%06d.png", "--calib",
+                             street / "calib.txt", "--out", out], "000003.png")
+        self.assert_works("odometry", out, "--quiet", "--out", self.new_folder() / "poses.txt")
+        self.assertEqual(len(list((out / "image_1").iterdir())), 3)
+
     def test_euroc_folders(self):
         out = self.new_folder() / "out"
         folder = self.euroc()
@@ -237,7 +246,8 @@ class Rectify(RectifyTest):
         refused(good.replace("data: [ ", "data: [ .Nan, ", 1), file)
         refused(self.opencv_yaml(unit_m=-1, given=False), "exchange left and right")
         refused(self.opencv_yaml(unit_m=1e-3, given=False), "--unit mm")
-        refused(self.opencv_yaml(unit_m=math.inf, given=False), "stand in one place")
+        for unit_m in (math.inf, 1e300):
+            refused(self.opencv_yaml(unit_m=unit_m, given=False), "stand in one place")
         for focal, named in {"0": "M1 is no camera matrix", "-300": "M1 is no camera matrix", "1e300": "none of the left image's pixels"}.items():
             refused(re.sub(r"(M1:.*?data: \[ ?)[^,]*", rf"\g<1>{focal}", good, flags=re.DOTALL), named)
         refused(good + "image_width: 640\nimage_height: 480\n", "640x480 were calibrated")

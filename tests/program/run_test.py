@@ -223,16 +223,19 @@ class Run(ProgramTest):
         out = self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", out, "--temporal", "off")
         for frame in self.report(out)["frames"]:
-            matches = 2 if frame["frame"] == 0 else 1
-            self.assertEqual((frame["search_fraction"], frame["searched_everything"], frame["predicted_fraction"]), (matches, True, 0))
+            self.assertEqual((frame["search_fraction"], frame["searched_everything"], frame["predicted_fraction"]), (2, True, 0))
+        alone = self.new_folder()
+        self.assert_works("run", "--odometry", self.street, "--frames", FRAMES - 1, "--out", alone, "--temporal", "off")
+        name = f"disparity/{FRAMES - 1:06d}.png"
+        self.assertEqual((alone / name).read_bytes(), (out / name).read_bytes())
 
     def test_no_more_than_everything_is_told(self):
-        """A first frame is matched twice: its report has 2, and the text says so in words."""
+        """A frame without time is matched twice: its report has 2, and the text says so in words."""
         told = self.assert_works("run", "--odometry", self.street, "--out", self.new_folder(), "--temporal", "off")
         shares = [float(share) for share in re.findall(r"search +([0-9.]+) %", told)]
         self.assertEqual(shares, [100] * (FRAMES + 1), told)
-        self.assertEqual(told.count("(no prediction: not temporal; matched 2 times)"), 1, told)
-        self.assertEqual(told.count("times)"), 1, told)
+        self.assertEqual(told.count("(no prediction: not temporal; matched 2 times)"), FRAMES, told)
+        self.assertEqual(told.count("times)"), FRAMES, told)
 
     def test_search_full_still_predicts(self):
         out = self.new_folder()

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import unittest
 
-from program_case import FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png
+from program_case import FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png, without_waiting
 
 
 class LongRuns(ProgramTest):
@@ -120,7 +120,7 @@ class Disk(LongRuns):
                 process.stdout.readline()
             process.stdout.close()
             errors = process.stderr.read()
-        return process.returncode, errors
+        return process.returncode, without_waiting(errors)
 
     def test_a_reader_that_goes_ends_the_printing_not_the_work(self):
         folder, street = self.new_folder(), self.street
@@ -319,13 +319,41 @@ class Resume(LongRuns):
         broken(lambda: poses.write_text("\n".join([rows[0], rows[2], rows[1], rows[3]]) + "\n"))
         broken(lambda: shutil.copy(street / "image_0/000002.png", street / "image_0/000001.png"))
 
+    def test_fewer_frames_leave_the_run_as_it_is(self):
+        out = self.new_folder()
+        run = ["run", "--odometry", self.street, "--disparities", 16, "--out", out, "--quiet"]
+        self.assert_works(*run)
+        before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+        self.assert_refused([*run, "--frames", "0:1", "--resume"], "--resume", "disparity/000002.png", "--overwrite")
+        self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
+
+    def test_names_that_the_record_has_no_room_for(self):
+        out = self.new_folder() / "out"
+        self.assert_refused(["run", "--odometry", self.street, "--out", out, "--save-config", f"{out}/a\nb.toml"], "give a name of one line")
+        self.assertFalse(out.exists())
+
+    def test_names_that_are_no_utf8(self):
+        name = os.fsencode(self.new_folder()) + b"/b\xffseq"
+        shutil.copytree(os.fsencode(self.street), name)
+        sequence, out = os.fsdecode(name), self.new_folder() / "out"
+        run = ["run", sequence, "--disparities", 16, "--out", out, "--quiet"]
+        self.assert_works(*run)
+        self.assert_works(*run, "--resume")
+        self.assert_works("report", out)
+        batch_list = self.new_folder() / "list"
+        batch_list.write_bytes(b"one " + name + b" --frames 0\n")
+        for _ in range(2):
+            self.assert_works("batch", batch_list, "--out", out.parent / "batch", "--disparities", 16, "--quiet")
+        maps = os.fsdecode(name + b"/truth/left_disp_noc")
+        self.assertEqual(len(json.loads(self.assert_works("eval", maps, maps, "--json"))["pairs"]), FRAMES)
+
     def test_an_earlier_run_is_in_the_way(self):
         out = self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "color")
         before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
         again = ["run", "--odometry", self.street, "--out", out, "--frames", "1:2"]
         self.assert_refused(again, out, "--resume", "--overwrite")
-        self.assert_refused([*again, "--resume"], "first_frame", "--overwrite")
+        self.assert_refused([*again, "--resume"], "disparity/000000.png", "give the frames", "--overwrite")
         self.assert_refused([*again, "--resume", "--overwrite"], "contradict")
         self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
         (out / "color/mine.png").write_text("not a map")

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags of robots in and out: what is read equals the images that were recorded, and what is written says where things are."""
 import os
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -155,8 +157,68 @@ def test_the_written_bag_says_where_things_are(tmp_path, street, frames, shared_
     assert position.x == pytest.approx(2 * 0.8, abs=0.1) and abs(position.y) < 0.1 and abs(position.z) < 0.1
     refused = program("--bag", bag, *TOPICS, "--out", out, *SET)
     assert refused.returncode == 2 and "is there already" in refused.stderr
-    again = bags.Bag(out, "/egosgm/depth", "/egosgm/depth", ["/egosgm/left/camera_info", "/egosgm/right/camera_info"])
+    again = bags.Bag(out, "/egosgm/depth", "/egosgm/variance", ["/egosgm/left/camera_info", "/egosgm/right/camera_info"])
     assert again.count == FRAMES  # a bag as any other
+
+
+def test_a_range_beyond_the_usual_is_said_and_nothing_of_it_is_lost(tmp_path, street, frames):
+    """In a bag, whose messages tell the range, and in a folder, where KITTI's PNG has no room for negative disparities."""
+    moved = [type("Frame", (), dict(left=frame.left, right=np.roll(frame.right, 25, axis=1))) for frame in frames]
+    bag = record("mcap", tmp_path / "drive", street, moved)
+    options = ["--set", "min_disparity=-40", "--set", "disparities=80", "--set", "paths=4", "--quiet"]
+    told = program("--bag", bag, *TOPICS, "--out", tmp_path / "out", *options)
+    assert told.returncode == 0, told.stderr
+    found = [egosgm.read_disparity(tmp_path / f"out/disparity/{i:06d}.pfm") for i in range(FRAMES)]
+    assert all((disparity > egosgm.INVALID_DISPARITY).mean() > 0.5 and (disparity[disparity > egosgm.INVALID_DISPARITY] < 0).any() for disparity in found)
+    for least, disparities in ((-40, 80), (40, 48)):
+        out = tmp_path / f"{least}.mcap"
+        bag = record("mcap", tmp_path / f"drive{least}", street, frames)
+        told = program("--bag", bag, *TOPICS, "--out", out, "--set", f"min_disparity={least}", "--set", f"disparities={disparities}", "--quiet")
+        assert told.returncode == 0, told.stderr
+        with AnyReader([out]) as reader:
+            for connection, _, raw in reader.messages(connections=[c for c in reader.connections if c.topic == "/egosgm/disparity"]):
+                message = reader.deserialize(raw, connection.msgtype)
+                assert (message.min_disparity, message.max_disparity) == (max(0, least), least + disparities - 1)
+
+
+def test_a_calibration_that_changes_is_seen(tmp_path, street, frames):
+    recording = Recording("mcap")
+    c = street.calibration
+    half = egosgm.Calibration(c.fx / 2, c.fy, c.cx, c.cy, c.baseline_m)
+    for i, frame in enumerate(frames):
+        for side, name in enumerate(("left", "right")):
+            recording.info(f"/{name}/camera_info", c if i < 2 else half, side)
+            recording.image(f"/{name}/image_rect", START + i * RATE_NS, (frame.left, frame.right)[side])
+    bag = bags.Bag(recording.write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect")
+    found = []
+    with pytest.raises(egosgm.InvalidArgument, match="/left/camera_info: another calibration than at the start"):
+        for frame in bag.frames():
+            found.append(frame.number)
+    assert found == [0, 1]
+
+
+def test_one_topic_is_no_pair(tmp_path, street, frames):
+    bag = record("mcap", tmp_path / "drive", street, frames)
+    with pytest.raises(egosgm.InvalidArgument, match="given as left and as right"):
+        bags.Bag(bag, "/left/image_rect", "/left/image_rect")
+
+
+def test_what_ends_a_run_leaves_nothing_and_is_in_nobodys_way(tmp_path, street, frames):
+    bag, out = record("mcap", tmp_path / "drive", street, frames * 40, times=[START + i * RATE_NS for i in range(40 * FRAMES)]), tmp_path / "out.mcap"
+    for stop in (signal.SIGTERM, signal.SIGKILL):
+        process = subprocess.Popen([sys.executable, "-B", "-m", "egosgm.bag_program", "--bag", bag, *TOPICS, "--out", out, *SET],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        while not [part for part in tmp_path.glob(".egosgm-*.part") if part.stat().st_size > 100_000]:  # at work
+            assert process.poll() is None, process.stderr.read()
+            time.sleep(0.01)
+        process.send_signal(stop)
+        _, errors = process.communicate(timeout=120)
+        assert not out.exists()
+        if stop == signal.SIGTERM:
+            assert (process.returncode, errors) == (130, "egosgm: interrupted\n")
+            assert sorted(file.name for file in tmp_path.iterdir()) == ["drive"]
+    bag = record("mcap", tmp_path / "short", street, frames)
+    assert program("--bag", bag, *TOPICS, "--out", out, *SET).returncode == 0
 
 
 def test_a_viewer_gets_what_a_file_gets(tmp_path, street, frames, monkeypatch):
@@ -630,19 +692,21 @@ def test_what_is_the_users_stays(tmp_path, street, frames, capsys):
         return {path: path.read_bytes() if path.is_file() else os.path.islink(path) for path in tmp_path.rglob("*")}
 
     before = state()
-    for name in ("mine.mcap", "half.mcap", "link.mcap", "folder.mcap", "file.txt", "drive", "link", "drive/metadata.yaml", bag):
+    for name in ("mine.mcap", "link.mcap", "folder.mcap", "file.txt", "drive", "link", "drive/metadata.yaml", bag):
         refused(capsys, ["--bag", bag, *TOPICS, *SET, "--out", tmp_path / name])
     for name in ("drive", "drive/out", "drive/out.mcap", "link/out", "drive/../drive/out.mcap"):
         refused(capsys, ["--bag", tmp_path / "drive", *TOPICS, *SET, "--out", tmp_path / name], "in the bag")
     refused(capsys, ["--bag", bag, *TOPICS, *SET, "--out", ""], "--out")
     assert state() == before
+    assert bag_program.main([str(word) for word in ["--bag", bag, *TOPICS, *SET, "--out", tmp_path / "half.mcap"]]) == 0
+    assert (tmp_path / "half.mcap.part").read_text() == "mine"
 
 
 def test_a_file_that_comes_while_it_is_written_stays(tmp_path, street, frames):
     out = tmp_path / "out.mcap"
     with pytest.raises(egosgm.InvalidArgument, match="is there already"):
         bag = bags.Bag(record("mcap", tmp_path / "drive", street, frames[:1]), "/left/image_rect", "/right/image_rect")
-        output = bag_outputs.McapOutput(out, 48)
+        output = bag_outputs.McapOutput(out, egosgm.pipeline_options())
         bags.run(bag, [output], False, lambda frame, maps: out.write_text("mine"), **OPTIONS)
         output.finish()
     output.give_up()

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """run(), reports as dataclasses, what repr says, and the stub's parameters."""
 import ast
+import copy
 import dataclasses
 import inspect
 import json
+import os
 import pathlib
+import pickle
 import re
 import sys
 
@@ -42,6 +45,68 @@ def test_a_folder_and_its_pairs_give_the_maps_of_the_pipeline(street_folder, sha
     for a, b, c in zip(found, again, of_pairs, strict=True):
         np.testing.assert_array_equal(a.disparity, b)
         np.testing.assert_array_equal(a.disparity, c)
+
+
+def maps_of(frames):
+    return [frame.disparity for frame in frames]
+
+
+def test_an_iteration_may_end_where_it_likes_and_two_may_run_at_once(street_folder):
+    drive = egosgm.run(street_folder, **OPTIONS)
+    expected = maps_of(drive)
+
+    def ends_early(how):
+        for _ in drive:
+            if how is None:
+                break
+            raise how
+
+    next(iter(drive))
+    ends_early(None)
+    for how in (KeyboardInterrupt(), ValueError("the caller's")):
+        with pytest.raises(type(how)):
+            ends_early(how)
+    kept = iter(drive)
+    next(kept)  # and stays where it is
+    np.testing.assert_array_equal(maps_of(drive), expected)
+    pairs = list(zip(drive, drive, strict=True))
+    for side in (0, 1):
+        np.testing.assert_array_equal([pair[side].disparity for pair in pairs], expected)
+    np.testing.assert_array_equal(maps_of(kept), expected[1:])
+
+
+def test_pairs_of_an_iterator_come_once(street, frames):
+    drive = egosgm.run(((frame.left, frame.right) for frame in frames), street.calibration, **OPTIONS)
+    assert len(list(drive)) == FRAMES
+    with pytest.raises(egosgm.InvalidArgument, match="gives them once: give a list"):
+        list(drive)
+
+
+def test_the_last_good_frame_comes_before_the_error(street, frames, street_folder):
+    pairs = [(frame.left, frame.right) for frame in frames]
+    broken = [*pairs[:2], (pairs[2][0], pairs[2][1][:9])]
+    of_folder, of_pairs = maps_of(egosgm.run(street_folder, **OPTIONS)), maps_of(egosgm.run(pairs, street.calibration, **OPTIONS))
+    os.truncate(street_folder / "image_1/000002.png", 1000)
+    for drive, expected, named in ((egosgm.run(street_folder, **OPTIONS), of_folder, "000002.png"),
+                                   (egosgm.run(broken, street.calibration, **OPTIONS), of_pairs, "right")):
+        found = []
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            for frame in drive:
+                found.append(frame.disparity)
+        np.testing.assert_array_equal(found, expected[:2])
+
+
+def test_a_frame_has_its_own_images(street, frames):
+    buffers = np.zeros_like(frames[0].left), np.zeros_like(frames[0].right)
+
+    def camera():
+        for frame in frames:
+            buffers[0][:], buffers[1][:] = frame.left, frame.right
+            yield buffers
+
+    for found, expected in zip(egosgm.run(camera(), street.calibration, **OPTIONS), frames, strict=True):
+        np.testing.assert_array_equal(found.left, expected.left)
+        np.testing.assert_array_equal(found.right, expected.right)
 
 
 def test_without_motion_every_frame_is_searched_whole(street_folder):
@@ -101,6 +166,14 @@ def test_reports_are_dataclasses(shared_pipeline, street, frames):
     same = egosgm.Calibration(**dataclasses.asdict(street.calibration))
     assert same == street.calibration and same != egosgm.Calibration(1, 1, 1, 1, 1) and same != 3
     assert eval(repr(same), vars(egosgm)) == same
+
+
+def test_what_other_processes_need_is_pickled_and_copied(street):
+    motion = egosgm.Motion(street.motion(1).current_from_previous, np.eye(6))
+    for copied in (copy.deepcopy((street.calibration, motion)), pickle.loads(pickle.dumps((street.calibration, motion)))):
+        assert copied[0] == street.calibration
+        np.testing.assert_array_equal(copied[1].current_from_previous, motion.current_from_previous)
+        np.testing.assert_array_equal(copied[1].covariance, np.eye(6))
 
 
 def test_repr_says_what_it_is(shared_pipeline, street, frames):

@@ -45,5 +45,5 @@ def test_a_recording_holds_what_came(street, frames, tmp_path):
 
 def test_without_the_package_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)
-    with pytest.raises(egosgm.InvalidArgument, match=r"egosgm\[rerun\]"):
+    with pytest.raises(egosgm.InvalidArgument, match="pip install rerun-sdk"):
         RerunOutput()

@@ -65,13 +65,12 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
                                                                              frame.passes.back().measured)
                                                            : frame.result.variance;
   frame.reasons = explain(images, frame);
+  if (!options_.temporal) return frame;
   offset_ = frame.passes.back().offset;
   has_offset_ = true;
-  if (options_.temporal) {
-    belief_ = frame.result;
-    belief_->evidence = frame.evidence;
-    greys_ = images.greys;
-  }
+  belief_ = frame.result;
+  belief_->evidence = frame.evidence;
+  greys_ = images.greys;
   return frame;
 }
 

@@ -253,6 +253,72 @@ class Node(unittest.TestCase):
             node.stderr.close()
 
 
+class Parameters(unittest.TestCase):
+    """A node in this process, which is asked what it would run with."""
+
+    def setUp(self):
+        import rclpy
+        sys.path.insert(0, str(PACKAGE))
+        rclpy.init(domain_id=os.getpid() % 100)
+        self.addCleanup(rclpy.shutdown)
+
+    def node(self, **parameters):
+        from egosgm_ros.node import EgosgmNode
+        from rclpy.parameter import Parameter
+        node = EgosgmNode(parameter_overrides=[Parameter(name, value=value) for name, value in parameters.items()])
+        self.addCleanup(node.destroy_node)
+        return node
+
+    def assert_runs_with(self, node, preset, **changed):
+        import egosgm
+        calibration = egosgm.Calibration(100, 100, 32, 32, 0.1)
+        self.assertEqual(egosgm.Pipeline(calibration, 64, 64, **node._options()).options,
+                         egosgm.Pipeline(calibration, 64, 64, preset=preset, **changed).options)
+
+    def test_a_preset_is_the_presets_and_over_it_is_what_the_user_set(self):
+        from rclpy.parameter import Parameter
+        self.assert_runs_with(self.node(), "default")
+        self.assert_runs_with(self.node(preset="paper"), "paper")
+        defaults = dict(p2=170, gate_px=3.0, coarse_match=True)  # as the default preset has them
+        node = self.node(preset="paper", **defaults)
+        self.assert_runs_with(node, "paper", **defaults)
+        node.set_parameters([Parameter("p2", value=120)])
+        self.assert_runs_with(node, "paper", gate_px=3.0, coarse_match=True)
+        node = self.node()
+        node.set_parameters([Parameter("preset", value="paper")])
+        self.assert_runs_with(node, "paper")
+        node.set_parameters([Parameter("p2", value=170)])
+        self.assert_runs_with(node, "paper", p2=170)
+
+    def test_what_cannot_work_is_not_configured(self):
+        from rclpy.lifecycle import TransitionCallbackReturn
+        for parameters in (dict(queue_size=0), dict(max_skew_ms=-1.0), dict(preset="papr"), dict(p2=-1)):
+            node = self.node(**parameters)
+            self.assertEqual(node.trigger_configure(), TransitionCallbackReturn.FAILURE, parameters)
+            self.assertIn(next(iter(parameters)), node._problem)
+
+    def test_infos_that_change_and_the_range_that_messages_tell(self):
+        from sensor_msgs.msg import CameraInfo, Image
+        node = self.node(min_disparity=4, disparities=16, temporal=False)
+        node.trigger_configure()
+        sent = []
+        node._listened_to = lambda: {"disparity"}
+        node._outputs["disparity"].publish = sent.append
+        grey = np.random.default_rng(1).integers(0, 256, (32, 64), dtype=np.uint8)
+        for i in range(4):
+            focal = 100.0 + i // 2
+            image = Image(height=32, width=64, step=64, encoding="mono8", data=array.array("B", grey.tobytes()))
+            image.header.stamp.sec = i + 1
+            for side in (0, 1):
+                info = CameraInfo(height=32, width=64, distortion_model="plumb_bob", d=[0.0] * 5)
+                info.k = [focal, 0, 32.0, 0, focal, 16.0, 0, 0, 1.0]
+                info.p = [focal, 0, 32.0, -focal * side, 0, focal, 16.0, 0, 0, 0, 1.0, 0]
+                node._on_info(("left", "right")[side], info)
+            node._process(image, image)
+        self.assertEqual([message.f for message in sent], [100, 100, 101, 101])
+        self.assertEqual([(message.min_disparity, message.max_disparity) for message in sent], [(4, 19)] * 4)
+
+
 class Files(unittest.TestCase):
     def test_rviz_shows_what_the_node_publishes(self):
         """By its topics, of the types that the displays take, as reliably as it is published, in a frame that the node knows."""

@@ -454,6 +454,26 @@ TEST_F(DatasetTest, PosesBelongToFrameNumbersOrPositions) {
   EXPECT_EQ(rows_of_frames(part, 8, "times.txt", "times"), (std::vector<std::size_t>{2, 3, 4}));
 }
 
+// Of another numbering, or of a report that somebody edited: never a row of another frame, nor one that is not there.
+TEST_F(DatasetTest, NoRowBelongsToAFrameThatIsNotThere) {
+  const auto sequence = [](std::vector<int> frames, std::vector<int> numbers) {
+    StereoSequence of;
+    for (const int number : frames) of.frames.emplace_back().number = number;
+    of.numbers = std::move(numbers);
+    return of;
+  };
+  const auto refused = [&](const StereoSequence& of, std::size_t rows, const std::string& frame) {
+    expect_refused([&] { rows_of_frames(of, rows, "poses.txt", "poses"); }, {"poses.txt", "frame " + frame});
+  };
+  refused(sequence({100, 101, 102}, {0, 1, 2}), 3, "100");
+  refused(sequence({0, 1, 2}, {2, 3, 4}), 3, "0");
+  refused(sequence({2, 9}, {2, 3, 4}), 5, "9");
+  refused(sequence({0, 900000000, 2}, {}), 3, "900000000");
+  refused(sequence({-1, 2}, {}), 3, "-1");
+  refused(sequence({2147483647, 2}, {}), 3, "2147483647");
+  EXPECT_TRUE(rows_of_frames({}, 3, "poses.txt", "poses").empty());
+}
+
 TEST(RealData, SequencesOpen) {
   EGOSGM_REQUIRE_DATA(data);
   const StereoSequence scene = open_kitti_multiview(data / "kitti2012", "000151", parse_frame_range("7:10"));

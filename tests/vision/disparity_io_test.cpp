@@ -122,8 +122,11 @@ TEST(DisparityIo, NpyOfAnyOrderAndType) {
   const std::string columns("\x01\x04\x00\x05\x03\x06", 6);
   const std::string big("\x00\x01\x00\x00\x00\x03\x00\x04\x00\x05\x00\x06", 12);
   const std::string halves("\x00\x3c\x00\x7e\x00\x42\x00\x44\x00\x45\x00\x46", 12);  // the second is NaN
-  for (const std::string& bytes : {npy("<u2", "False", "(2, 3)", rows), npy("|u1", "True", "(2, 3)", columns),
-                                   npy(">i2", "False", "(2, 3)", big), npy("<f2", "False", "(1, 2, 3, 1)", halves)}) {
+  std::string longs;  // NumPy's whole numbers, where nothing else is asked for
+  for (const char value : {1, 0, 3, 4, 5, 6}) longs += std::string(1, value) + std::string(7, '\0');
+  for (const std::string& bytes : {npy("<i8", "False", "(2, 3)", longs), npy("<u2", "False", "(2, 3)", rows),
+                                   npy("|u1", "True", "(2, 3)", columns), npy(">i2", "False", "(2, 3)", big),
+                                   npy("<f2", "False", "(1, 2, 3, 1)", halves)}) {
     write_file(file, bytes);
     expect_equal(read_disparity(file), expected);
   }

@@ -96,7 +96,7 @@ EGOSGM_EXPORT cv::Size check_image_sizes(const StereoSequence& sequence);
 /// Which of a file's `rows` belongs to each frame. A file has a row for each number from 0 to the sequence's last one
 /// (as KITTI's have), or for each frame of the sequence, or for each chosen frame; where `numbers` is empty (unknown),
 /// for each frame, or for each number up to the last one at least. Throws InvalidArgument, naming the file and `what`
-/// its rows are, where none fits. Thread-safe.
+/// its rows are, where none fits, and where a frame is none of `numbers`. Thread-safe.
 EGOSGM_EXPORT std::vector<std::size_t> rows_of_frames(const StereoSequence& sequence, std::size_t rows,
                                                       const std::filesystem::path& file, const std::string& what);
 

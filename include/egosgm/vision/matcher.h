@@ -14,8 +14,8 @@
 namespace egosgm::vision {
 
 /// What is called as cv::StereoMatcher is, for code that has a cv::StereoSGBM today. Sizes may change between calls;
-/// each new one builds its pipeline. All pairs of a matcher are taken to be of one camera: its vertical offset is
-/// learned from pair to pair, unless options.vertical_alignment is false. Not thread-safe.
+/// each new one builds its pipeline. A pair alone depends on no pair before: where options.vertical_alignment is true,
+/// it is matched twice, first to find the vertical offset. Not thread-safe.
 class EGOSGM_EXPORT Matcher {
  public:
   /// Least value of 16-bit disparities: four bits of a pixel's part.

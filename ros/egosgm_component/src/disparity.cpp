@@ -59,8 +59,9 @@ class Disparity : public rclcpp::Node {
   /// lose nothing while the queue holds.
   explicit Disparity(const rclcpp::NodeOptions& options)
       : Node("egosgm", options), device_(egosgm::Device::select(parameter("device", ""))) {
+    egosgm::set_option(options_, "preset", parameter("preset", "default"));  // first: the others begin with its values
     for (const auto& [name, value] : egosgm::list_options(options_)) {
-      egosgm::set_option(options_, name, parameter(name, value));
+      if (name != "preset") egosgm::set_option(options_, name, parameter(name, value));
     }
 
     rclcpp::QoS qos = rclcpp::SensorDataQoS();
@@ -105,6 +106,10 @@ class Disparity : public rclcpp::Node {
     try {
       side == 0 ? process(*image, *other) : process(*other, *image);
     } catch (const std::exception& error) {  // whatever a message held: the next one may be whole
+      if (matching_) {  // one of them may have gone on without the other
+        matching_->pipeline.reset();
+        matching_->odometry.reset();
+      }
       RCLCPP_ERROR_THROTTLE(get_logger(), *get_clock(), 1000, "%s", error.what());
     }
   }

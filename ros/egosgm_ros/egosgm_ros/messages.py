@@ -10,7 +10,7 @@ from sensor_msgs.msg import Image, PointCloud2, PointField
 from stereo_msgs.msg import DisparityImage
 
 import egosgm
-from egosgm.ros_images import BODY_FROM_OPTICAL, quaternion_of, ros_disparity
+from egosgm.ros_images import BODY_FROM_OPTICAL, quaternion_of, ros_disparity, ros_range
 
 
 def image_of(header: Any, values: Any) -> Image:
@@ -20,12 +20,12 @@ def image_of(header: Any, values: Any) -> Image:
                  step=values.itemsize * width, data=array.array("B", np.ascontiguousarray(values).tobytes()))
 
 
-def disparity_of(header: Any, disparity: Any, calibration: egosgm.Calibration, disparities: int) -> DisparityImage:
+def disparity_of(header: Any, disparity: Any, calibration: egosgm.Calibration, options: Any) -> DisparityImage:
+    """options: of the pipeline, by name."""
     message = DisparityImage(header=header, image=image_of(header, ros_disparity(disparity, calibration)), f=calibration.fx,
                              t=calibration.baseline_m)
     message.valid_window.height, message.valid_window.width = disparity.shape
-    message.min_disparity = max(0.0, calibration.doffs_px)
-    message.max_disparity = disparities - 1 + calibration.doffs_px
+    message.min_disparity, message.max_disparity = ros_range(options, calibration)
     return message
 
 

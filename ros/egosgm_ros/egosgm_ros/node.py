@@ -9,6 +9,7 @@ import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
 from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -28,13 +29,26 @@ OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "queue_size": 4, "
        "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1}
 
 
+def _differ(a: CameraInfo, b: CameraInfo) -> bool:
+    return bool((a.p != b.p).any()) or (a.width, a.height) != (b.width, b.height)
+
+
 class EgosgmNode(LifecycleNode):
     """Parameters: those of OWN, and every option of the pipeline by its name. They are read when the node is configured."""
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__("egosgm", **arguments)
-        for name, value in {**OWN, **egosgm.pipeline_options()}.items():
+        for name, value in OWN.items():
             self.declare_parameter(name, value)
+        try:
+            self._of_preset = egosgm.pipeline_options(self._value("preset"))
+        except ValueError:  # which on_configure says
+            self._of_preset = egosgm.pipeline_options()
+        del self._of_preset["preset"]
+        for name, value in self._of_preset.items():
+            self.declare_parameter(name, value)
+        self._set_later: Set[str] = set()
+        self.add_on_set_parameters_callback(self._on_set)
         self._worker: Optional[threading.Thread] = None
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.create_timer(1.0, self._tell)
@@ -45,7 +59,9 @@ class EgosgmNode(LifecycleNode):
         self._cameras: Optional[Cameras] = None
         self._pipeline: Optional[egosgm.Pipeline] = None
         self._odometry: Optional[egosgm.StereoOdometry] = None
+        self._made_for: Tuple[CameraInfo, ...] = ()
         self._world_from_camera = np.eye(4)
+        self._last_motion: Any = None
         self._queue: Deque[Tuple[Any, Any]] = collections.deque()
         self._wake = threading.Condition()
         self._is_active = False
@@ -62,21 +78,28 @@ class EgosgmNode(LifecycleNode):
         return self.get_parameter(name).value
 
     def _options(self) -> Dict[str, Any]:
-        """What differs from the preset's own values' defaults: a preset stays a preset where nobody changed an option."""
-        defaults = egosgm.pipeline_options()
-        changed = {name: self._value(name) for name, default in defaults.items() if self._value(name) != default and name != "preset"}
+        """The preset, and over it what the user set."""
+        changed = {name: self._value(name) for name, value in self._of_preset.items() if name in self._set_later or self._value(name) != value}
         return {"preset": self._value("preset"), **{name.replace(".", "__"): value for name, value in changed.items()}}
+
+    def _on_set(self, parameters: Any) -> SetParametersResult:
+        self._set_later.update(parameter.name for parameter in parameters)
+        return SetParametersResult(successful=True)
 
     def on_configure(self, state: Any) -> TransitionCallbackReturn:
         self._clear()
         try:
+            if self._value("queue_size") < 1:
+                raise ValueError(f"queue_size {self._value('queue_size')}: give 1 or more")
+            if not self._value("max_skew_ms") >= 0:
+                raise ValueError(f"max_skew_ms {self._value('max_skew_ms')}: give 0 for equal stamps, or how far they may differ")
             if self._value("publish_tf") and self._value("motion_frame"):
                 raise ValueError("publish_tf and motion_frame: a motion that comes from tf is not published there again: unset one of them")
-            if self._value("motion_frame"):
-                self._tf = TfMotion(self, self._value("motion_frame"), self._value("tf_wait_s"))
+            egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 32, 0.1), 64, 64, device=self._value("device"), **self._options())
             if self._value("publish_tf"):
                 self._broadcaster = tf2_ros().TransformBroadcaster(self)
-            egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 32, 0.1), 64, 64, device=self._value("device"), **self._options())
+            if self._value("motion_frame"):  # last: what is made here stays
+                self._tf = TfMotion(self, self._value("motion_frame"), self._value("tf_wait_s"))
         except (ValueError, RuntimeError) as error:
             self._problem = str(error)
             self.get_logger().error(self._problem)
@@ -133,9 +156,6 @@ class EgosgmNode(LifecycleNode):
             self._worker = None
 
     def _on_info(self, side: str, info: CameraInfo) -> None:
-        before = self._infos.get(side)
-        if before is not None and ((before.p != info.p).any() or (before.width, before.height) != (info.width, info.height)):
-            self._cameras = None  # another calibration: all that was made for the old one is dropped with the next frame
         self._infos[side] = info
 
     def _on_lost(self, event: Any) -> None:
@@ -163,6 +183,9 @@ class EgosgmNode(LifecycleNode):
                 self._process(left, right)
                 self._problem = ""
             except Exception as error:  # whatever a message held: the next one may be whole
+                for tool in (self._pipeline, self._odometry):
+                    if tool:
+                        tool.reset()  # one of them may have gone on without the other
                 if str(error) != self._problem:
                     self.get_logger().error(str(error))
                 self._problem = str(error)
@@ -170,11 +193,12 @@ class EgosgmNode(LifecycleNode):
     def _process(self, left: Image, right: Image) -> None:
         if len(self._infos) < 2:
             raise ValueError(f"no camera info yet on {' and '.join(f'{side}/camera_info' for side in SIDES if side not in self._infos)}")
-        if self._cameras is None:
-            self._cameras = Cameras(self._infos["left"], self._infos["right"], False)
+        infos = self._infos["left"], self._infos["right"]
+        if self._cameras is None or any(map(_differ, infos, self._made_for)):
+            self._cameras, self._made_for = Cameras(*infos, False), infos
             self._pipeline = egosgm.Pipeline(self._cameras.calibration, *self._cameras.size, device=self._value("device"), **self._options())
             self._odometry = egosgm.StereoOdometry(self._cameras.calibration)
-            self._last_stamp = None
+            self._last_stamp = self._last_motion = None
         images = grey_of(left), grey_of(right)
         for side, image in zip(SIDES, images):
             if image.shape != (self._cameras.size[1], self._cameras.size[0]):
@@ -184,11 +208,13 @@ class EgosgmNode(LifecycleNode):
         if previous is not None and stamp <= previous:  # a bag that starts over
             self._pipeline.reset()
             self._odometry.reset()
-            previous = None
+            previous = self._last_motion = None
         self._last_stamp = stamp
         motion = self._motion(left.header.frame_id, images, previous, stamp)
         if motion:
-            self._world_from_camera = self._world_from_camera @ np.linalg.inv(motion.current_from_previous)
+            self._last_motion = motion.current_from_previous
+        if self._last_motion is not None:  # where none was found, the last one is repeated
+            self._world_from_camera = self._world_from_camera @ np.linalg.inv(self._last_motion)
         wanted = self._listened_to()
         maps = self._pipeline.process(*images, motion, ("disparity", "variance", "reason") if "reason" in wanted else ("disparity", "variance"))
         self._publish(wanted, left.header, images[0], maps)
@@ -211,7 +237,7 @@ class EgosgmNode(LifecycleNode):
     def _publish(self, wanted: Set[str], header: Any, grey: Any, maps: egosgm.Frame) -> None:
         calibration = self._cameras.calibration
         if "disparity" in wanted:
-            self._outputs["disparity"].publish(disparity_of(header, maps.disparity, calibration, self._pipeline.options["disparities"]))
+            self._outputs["disparity"].publish(disparity_of(header, maps.disparity, calibration, self._pipeline.options))
         if "reason" in wanted:
             self._outputs["reason"].publish(image_of(header, maps.reason))
         if wanted & {"depth", "variance", "points2"}:

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the pages name is there: options, the package's extras, files. EGOSGM_PROGRAM names the program."""
+import os
+import pathlib
+import re
+import sys
+import unittest
+
+SOURCE = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(SOURCE / "tests/program"))
+
+from program_case import ProgramTest  # noqa: E402
+
+PAGES = {page: page.read_text() for page in (*SOURCE.glob("*.md"), *(SOURCE / "docs").glob("*.md")) if page.name != "CHANGELOG.md"}
+FOLDERS = "apps|bench|cmake|docs|examples|host|include|kernels|python|ros|scripts|tests"
+
+
+def of_pages(pattern):
+    """(page's name, what the pattern's groups hold), line by line; not of lines that tell of names of earlier versions."""
+    for page, text in PAGES.items():
+        for line in text.splitlines():
+            if "version 0.1" not in line:
+                yield from ((page.name, match) for match in re.findall(pattern, line))
+
+
+class Pages(ProgramTest):
+    def test_options_are_accepted(self):
+        rooms = "|".join(set(re.findall(r'visit\("(\w+)\.', (SOURCE / "host/method_options.cpp").read_text())))
+        given = {match for _, match in of_pages(r"--set ([\w.]+)=([\w.]+)")}
+        given |= {(name, "1") for _, name in of_pages(rf"`((?:constants\.)?(?:{rooms})\.\w+)`")}
+        self.assertGreater(len(given), 3)
+        for name, value in sorted(given):
+            self.assert_refused(["run", self.street, "--device", "no such device", "--set", f"{name}={value}", "--out", self.new_folder() / "out"],
+                                "no OpenCL device fits")
+
+    def test_extras_exist_and_are_not_asked_of_the_index(self):
+        there = set(re.findall(r"^(\w+) = \[", (SOURCE / "pyproject.toml").read_text().split("[project.optional-dependencies]")[1], re.MULTILINE))
+        for page, (package, extra) in of_pages(r'pip install "([\w./*-]+)\[(\w+)\]'):
+            self.assertIn(extra, there, page)
+            self.assertTrue(package.endswith(".whl"), f"{page}: {package} is on no index")
+
+    def test_files_exist(self):
+        for page, name in of_pages(rf"`((?:{FOLDERS})/[\w./-]+)`"):
+            if "foo" in name or re.search(r"[A-Z]{4}", name) and "README" not in name:
+                continue  # for a name to choose
+            self.assertTrue(os.path.lexists(SOURCE / name.rstrip("/.")), f"{page}: {name}")
+        for page, text in PAGES.items():
+            for name in re.findall(r"\]\(([\w./-]+)(?:#[\w-]*)?\)", text):
+                self.assertTrue((page.parent / name).exists(), f"{page.name}: {name}")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The standard error closed, full or at an end: the work, its files and its exit code are the same. Environment as for program_case.py."""
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import unittest
+
+from program_case import PROGRAM, ProgramTest
+
+
+@contextlib.contextmanager
+def ended_pipe():
+    reading, writing = os.pipe()
+    os.close(reading)
+    yield writing
+    os.close(writing)
+
+
+class StandardError(ProgramTest):
+    """Each in a shell's words, and with a cache of the driver's that is empty: it is said there that the kernels are compiled."""
+
+    def code_of(self, arguments, redirection, **options):
+        """Of the program, whose standard error is led by the shell's `redirection`."""
+        with ended_pipe() as ended:
+            words = ["sh", "-c", f'exec "$@" {redirection.replace("ENDED", str(ended))}', "sh", PROGRAM, *map(str, arguments)]
+            return subprocess.run(words, stdout=subprocess.PIPE, pass_fds=[ended], timeout=600, **options).returncode
+
+    REDIRECTIONS = "2>&ENDED", "2>/dev/full", "2>&-", "2>&- <&-"
+
+    def test_a_first_run_is_like_any_other(self):
+        expected = self.new_folder()
+        run = ["run", "--odometry", self.street, "--frames", "0:1", "--disparities", 16, "--out"]
+        self.assert_works(*run, expected)
+        for redirection in self.REDIRECTIONS:
+            out, cache = self.new_folder(), self.new_folder()
+            with self.subTest(redirection):
+                self.assertEqual(self.code_of([*run, out], redirection, env=dict(os.environ, POCL_CACHE_DIR=str(cache))), 0)
+                self.assertTrue(self.report(out)["finished"])
+                for name in ("disparity/000000.png", "disparity/000001.png", "poses.txt"):
+                    self.assertEqual((out / name).read_bytes(), (expected / name).read_bytes())
+
+    def test_a_batch_that_fails_says_so_by_its_code(self):
+        folder, broken = self.new_folder(), self.broken_street()
+        os.truncate(broken / "image_1/000001.png", 1000)
+        (folder / "list").write_text(f"good {self.street} --frames 0\nbad {broken}\n")
+        for i, redirection in enumerate(self.REDIRECTIONS):
+            for more in (["--quiet"], ["--shard", "0/1"], ["--merge"]):
+                arguments = ["batch", folder / "list", "--out", folder / f"out{i}", "--disparities", 16, *more]
+                self.assertEqual(self.code_of(arguments, redirection), 1, redirection)
+            batch = json.loads((folder / f"out{i}/batch.json").read_text())
+            self.assertEqual((batch["sequences_done"], batch["sequences_failed"]), (1, 1))
+
+    def test_an_interrupt_is_told_by_the_code(self):
+        street = self.street
+        for arguments in (["run", "--odometry", street, "--disparities", 16, "--out"], ["odometry", street, "--out"],
+                          ["rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib", street / "calib.txt", "--out"]):
+            with ended_pipe() as ended:
+                process = self.started(*arguments, self.new_folder() / "out", stderr=ended)
+            process.send_signal(signal.SIGINT)
+            process.stdout.read()
+            self.assertEqual(process.wait(600), 130, arguments)
+            process.stdout.close()
+
+    def test_a_message_does_not_go_into_a_file(self):
+        out = self.new_folder() / "poses.txt"
+        self.assertEqual(self.code_of(["odometry", self.street, "--out", out], "2>&-"), 0)
+        self.assertEqual(len(out.read_text().splitlines()), 4)
+
+
+if __name__ == "__main__":
+    unittest.main()

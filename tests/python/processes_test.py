@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Threads that begin at once, forked processes, and the interpreter's end: each in a process of its own."""
+import subprocess
+import sys
+
+import pytest
+
+BEGIN = """
+import multiprocessing, os, sys, threading, time
+import numpy
+import numpy.core.multiarray
+
+class LetsOthersRun:  # where pybind11 asks for NumPy's functions, which Python may do at any time
+    def __getattr__(self, name, of=numpy.core.multiarray):
+        time.sleep(0.05)
+        return getattr(of, name)
+
+sys.modules["numpy.core.multiarray"] = LetsOthersRun()
+import egosgm
+SIZE = 64, 48
+CALIBRATION = egosgm.Calibration(100, 100, 32, 24, 0.5)
+IMAGE = numpy.random.default_rng(1).integers(0, 256, SIZE[::-1], dtype=numpy.uint8)
+
+def pipeline():
+    return egosgm.Pipeline(CALIBRATION, *SIZE, disparities=16, temporal=False)
+
+def in_threads(work, count=3, daemon=False):
+    threads = [threading.Thread(target=work, daemon=daemon) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    return threads
+"""
+
+
+def run(code, times=1):
+    """In new processes; what the last one printed."""
+    for _ in range(times):
+        done = subprocess.run([sys.executable, "-c", BEGIN + code], capture_output=True, text=True, timeout=30)
+        assert done.returncode == 0 and not done.stderr, (done.returncode, done.stderr)
+    return done.stdout
+
+
+def test_threads_may_hand_over_their_first_arrays_at_once():
+    run("""
+def work():
+    egosgm.StereoOdometry(CALIBRATION).process(IMAGE, IMAGE)
+for thread in in_threads(work):
+    thread.join()
+""")
+
+
+def test_threads_may_make_their_first_pipelines_at_once():
+    printed = run("""
+barrier = threading.Barrier(3)
+def work():
+    barrier.wait()
+    print(int(pipeline().process(IMAGE, IMAGE).disparity.shape == IMAGE.shape), end="", flush=True)
+for thread in in_threads(work):
+    thread.join()
+""", times=5)
+    assert printed == "111"
+
+
+@pytest.mark.parametrize("call", ["pipeline()", "egosgm.devices()", "parents.process(IMAGE, IMAGE)", "parents.submit(IMAGE, IMAGE)", "parents.collect()"])
+def test_a_forked_child_is_told_to_spawn(call):
+    printed = run(f"""
+parents = pipeline()
+parents.process(IMAGE, IMAGE)
+def work():
+    while not is_over:
+        parents.process(IMAGE, IMAGE)  # has its turn when the child is made
+is_over = False
+thread, = in_threads(work, 1)
+child = os.fork()
+if child == 0:
+    try:
+        {call}
+    except egosgm.DeviceError as error:
+        print(error, flush=True)
+    sys.exit(0)
+is_over = True
+assert os.waitpid(child, 0)[1] == 0
+thread.join()
+""")
+    assert 'forked' in printed and '"spawn"' in printed
+
+
+def test_a_pool_of_forked_processes_gets_the_error():
+    printed = run("""
+parents = pipeline()
+def work(number):
+    return pipeline().options["disparities"]
+with multiprocessing.get_context("fork").Pool(2) as pool:
+    try:
+        pool.map(work, range(2))
+    except egosgm.DeviceError as error:
+        print(error)
+""")
+    assert '"spawn"' in printed
+
+
+def test_a_forked_child_may_find_motions_and_begin_with_opencl_itself():
+    run("""
+odometry = egosgm.StereoOdometry(CALIBRATION)
+odometry.process(IMAGE, IMAGE)
+child = os.fork()
+if child == 0:
+    odometry.process(IMAGE, IMAGE)
+    pipeline().process(IMAGE, IMAGE)  # the parent has not used it
+    sys.exit(0)
+assert os.waitpid(child, 0)[1] == 0
+""")
+
+
+@pytest.mark.parametrize("call", ["large.process(image, image)", "egosgm.evaluate_video([maps] * 50, [maps] * 50, threads=2)", "street.render(0)"])
+def test_daemon_threads_end_with_the_interpreter(call):
+    run(f"""
+large = egosgm.Pipeline(CALIBRATION, 640, 480, disparities=16, temporal=False)
+street = egosgm.SyntheticSequence(width=640, height=480, frames=2)
+image, maps = numpy.tile(IMAGE, (10, 10)), numpy.ones((240, 320), numpy.float32)
+class Late:
+    def __del__(self, sleep=time.sleep):
+        sleep(0.3)  # while the interpreter ends
+late = Late()
+begun = threading.Barrier(3)
+def work():
+    begun.wait()
+    while True:
+        {call}
+in_threads(work, 2, daemon=True)
+begun.wait()
+time.sleep(0.1)
+""", times=2)
