@@ -39,7 +39,7 @@
 // has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is given out from CONFIRMED
 // on. A full-range match that both views confirm begins with FIRST. Where a match lies outside of the other image,
 // nothing can be asked, and so many 64ths are kept.
-#define EGOSGM_EVIDENCE_MOST 128
+#define EGOSGM_EVIDENCE_MOST 160
 #define EGOSGM_EVIDENCE_KEPT 45
 #define EGOSGM_EVIDENCE_KEPT_UNSEEN 58
 #define EGOSGM_EVIDENCE_OF_NOISE 24

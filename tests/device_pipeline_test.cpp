@@ -312,7 +312,8 @@ TEST_F(DevicePipelineTest, SharedVirtualMemoryGivesTheBitsOfTheHostsWay) {
       pixels.write(frames.video, index);
       const int transfers = layer_.transfers();
       const DeviceMaps maps =
-          frames.device.enqueue({.type = type, .svm_pixels = pixels.get()}, frames.video.motion(index));
+          frames.device.enqueue({.type = type, .svm_pixels = pixels.get()}, frames.video.motion(index),
+                                /*done=*/nullptr, /*wants_dynamic=*/true);
       EXPECT_EQ(layer_.transfers(), transfers);
       frames.expect_same(maps, index);
     }

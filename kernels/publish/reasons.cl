@@ -159,7 +159,7 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const in
     const Ints is_speckle = has_runs ? has_run(runs + row, x, width) & !is_measured : (Ints)(0);
     const Ints is_uncovered = has_prediction ? (jump_in_row(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
     const Texture texture = texture_around(size, (global const Pixel*)images, x, y);
-    const Ints is_weak = (Ints)(has_evidence ? -1 : 0) & has_value &
+    const Ints is_weak = (Ints)(has_evidence ? -1 : 0) & has_value & is_measured &
                          (load_bytes(evidence + row, x, width) < EGOSGM_EVIDENCE_TRUSTED);
     const Ints is_flat =
         (texture.changes < (Floats)(EGOSGM_LEAST_CHANGE * STEPS_PER_GREY * texture.pixels)) | (is_weak != 0);

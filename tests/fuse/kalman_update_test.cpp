@@ -112,7 +112,7 @@ reference::FrameEvidence random_evidence(shared::ImageSize size, unsigned seed, 
   std::mt19937 random(seed);
   reference::FrameEvidence evidence;
   for (std::size_t i = 0; i < 2 * pixel_count(size); ++i) {
-    evidence.before.push_back(random() % 3 == 0 ? 0 : static_cast<std::uint8_t>(random() % 129));
+    evidence.before.push_back(random() % 3 == 0 ? 0 : static_cast<std::uint8_t>(random() % 161));
   }
   const std::size_t blocks = 2 * static_cast<std::size_t>((size.width + 3) / 4) * ((size.height + 3) / 4);
   for (std::size_t i = 0; i < blocks; ++i) {
@@ -294,24 +294,26 @@ Judged judged(const Pixel& pixel, int x = 12) {
 // In sixteenths of a bit: 1.5 bits a frame must be had, 3 more by what was chosen in this frame alone.
 TEST(KalmanUpdate, EvidenceAddsUpAndDecays) {
   EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40}), (Judged{{5.5f, 0.5f}, 45 + 40 - 24}));
-  EXPECT_EQ(judged({.predicted = 5, .measured = 5, .before = 128, .now = 400}).evidence, 128) << "at most";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 5, .before = 128, .now = 400}).evidence, 160) << "at most";
   EXPECT_EQ(judged({.measured = 5, .now = 72}), (Judged{{5, 1}, 0})) << "chosen: just alive";
   EXPECT_EQ(judged({.measured = 5, .now = 71}), (Judged{kNothing, 0}));
   EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9}), (Judged{{5, 1}, 0})) << "the coarse match found it, too";
   EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9.5f}), (Judged{kNothing, 0})) << "but not that";
   EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 90}).evidence, 90 - 72)
       << "contradicted: what was believed does not count";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 71}), (Judged{{5, 1}, 90 - 24}))
+      << "a measurement without evidence contradicts nothing";
 }
 
 TEST(KalmanUpdate, WithoutEvidenceAPredictionLivesAFewFrames) {
-  int evidence = 128, frames = 0;
+  int evidence = 160, frames = 0;
   for (; frames < 20; ++frames) {
     const Judged now = judged({.predicted = 5, .measured = 6, .before = static_cast<std::uint8_t>(evidence)});
     if (now.estimate.disparity == kNone) break;
     EXPECT_EQ(now.estimate, (Estimate{5, 1})) << "the measurement moves nothing, and no variance falls";
     evidence = now.evidence;
   }
-  EXPECT_EQ(frames, 2);
+  EXPECT_EQ(frames, 3);
 }
 
 TEST(KalmanUpdate, WhereNothingCanBeAskedEvidenceDecaysAlone) {
@@ -322,6 +324,7 @@ TEST(KalmanUpdate, WhereNothingCanBeAskedEvidenceDecaysAlone) {
 TEST(KalmanUpdate, ARepeatedPairMakesNobodySurer) {
   EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 90, .repeats = true}), (Judged{{5, 1}, 64}));
   EXPECT_EQ(judged({.measured = 6, .now = 200, .repeats = true}), (Judged{kNothing, 0}));
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 64, .now = 90, .repeats = true}), (Judged{{5, 1}, 64}));
 }
 
 TEST(KalmanUpdate, NeverClaimsMoreThanTheFloor) {

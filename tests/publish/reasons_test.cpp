@@ -209,6 +209,9 @@ TEST(Reasons, TrustsNothingThatTheImagesHardlySay) {
   EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted);
   scene.inputs.evidence[Scene::kMiddle] = 95;
   EXPECT_EQ(scene.in_the_middle(), Reason::kFlat);
+  scene.inputs.measured[Scene::kMiddle] = kNone;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kPredicted) << "nothing was measured";
+  scene.inputs.measured[Scene::kMiddle] = 10;
   scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
   EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "what has no value has no evidence either";
 }

@@ -115,7 +115,7 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   int before = moved(x, y);
   if (before == 0) before = std::min(moved(x - 1, y), moved(x + 1, y));
   if (before == 0) before = std::min(moved(x, y - 1), moved(x, y + 1));
-  if (frame.repeats) return {before, stays, !stays};
+  if (frame.repeats) return {before, is_valid(predicted), !is_valid(predicted)};
 
   const int columns = (size.width + kSide - 1) / kSide, rows = (size.height + kSide - 1) / kSide;
   const std::size_t block = (static_cast<std::size_t>(view) * rows + y / kSide) * columns + x / kSide;
@@ -126,6 +126,10 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   const bool is_found = is_valid(found) && std::abs(found - measured) <= kSide;
   const int start = stays ? before * 45 / 64 : is_found ? 0 : -kEvidenceOfChoice;
   const int evidence = std::min(start + now - kEvidenceOfNoise, kMostEvidence);
+  if (evidence < 0 && !stays && is_valid(predicted)) {  // what has no evidence contradicts nothing
+    const int left = before * 45 / 64 - kEvidenceOfNoise;
+    return {left, left >= 0, false};
+  }
   return {evidence, evidence >= 0, !stays || now >= kEvidenceOfNoise};
 }
 

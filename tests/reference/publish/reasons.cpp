@@ -32,10 +32,10 @@ class Pixels {
     if (static_cast<float>(window.changes) < kLeastChange * static_cast<float>(in_.white / 255 * window.pixels)) {
       return Reason::kFlat;
     }
-    if (d != kNone && !in_.evidence.empty() && in_.evidence[i] < kTrustedEvidence) return Reason::kFlat;
     const bool removes_speckles = options_.speckle_removal.max_size_px > 0;
     if (removes_speckles && d == kNone && z == kNone && in_.consistent[i] != kNone) return Reason::kSpeckle;
     if (d != kNone && z == kNone) return Reason::kPredicted;
+    if (d != kNone && !in_.evidence.empty() && in_.evidence[i] < kTrustedEvidence) return Reason::kFlat;
     if (!in_.warped.empty() && w == kNone && jump_beside(x, y) > kUncoveredJumpPx) return Reason::kUncovered;
     if (options_.banded_sgm.cost != MatchingCost::kSad3x3 && repeats(x, y)) return Reason::kAmbiguous;
     return d == kNone ? Reason::kUnconfirmed : Reason::kTrusted;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bits set in each lane of a vector of codes. OpenCL C only.
-#ifndef EGOSGM_KERNELS_MATCH_BIT_COUNT_H
-#define EGOSGM_KERNELS_MATCH_BIT_COUNT_H
+#ifndef EGOSGM_KERNELS_BIT_COUNT_H
+#define EGOSGM_KERNELS_BIT_COUNT_H
 
 // Compilers know this form and use what the device has. A product right behind it would melt into it, and they then do
 // not know it any more.
