@@ -31,7 +31,8 @@ class BatchFolder {
 
   std::filesystem::path folder_of(const BatchEntry& entry) const { return folder_ / entry.name; }
 
-  /// Whether its results are complete, and of this batch's settings. Throws InvalidArgument where they are those of another input of the same name.
+  /// Whether its results are complete, and of this batch's settings. Throws InvalidArgument where they are those of
+  /// another input of the same name.
   bool is_done(const BatchEntry& entry) const;
   bool is_to_do(const BatchEntry& entry) const { return overwrite_ || !is_done(entry); }
   /// What becomes of a run in its folder: what this batch began, it does again; another one is in the way, unless it is

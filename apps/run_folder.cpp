@@ -45,7 +45,8 @@ std::vector<int> numbers_of(const Json& run) {
   const auto sequence = run.find("sequence");
   if (sequence == run.end() || !sequence->is_object()) return {};
   const int first = integer(*sequence, "first_frame"), frames = integer(*sequence, "frames");
-  if (first < 0 || frames < 1 || frames > kMaxFrames || integer(*sequence, "last_frame") - first != frames - 1) return {};
+  if (first < 0 || frames < 1 || frames > kMaxFrames || integer(*sequence, "last_frame") - first != frames - 1)
+    return {};
   std::vector<int> numbers(static_cast<std::size_t>(frames));
   std::iota(numbers.begin(), numbers.end(), first);
   return numbers;

@@ -90,22 +90,23 @@ class Frame {
   std::map<std::string, double> bytes() const {
     const double pixels = static_cast<double>(pixel_count(size_));  // of a view; a map of both has two times as many
     const double map = 4 * pixels, maps = 2 * map, band = 12 * pixels, codes = 8 * pixels, grey = 2 * pixels;
-    return {{"ForwardWarp", 4 * maps},
-            {"HoleFill", 8 * maps},
-            {"ConsistencyCheck", 3 * 4 * maps},
-            {"CoarseMatch", grey},
-            {"SearchBand", 2 * (maps + band)},
-            // Resampling both images, and the estimate on every fourth row of the left view.
-            {"VerticalAlignment", 2 * grey + (grey + map) / 4},
-            {"Census", grey + codes},
-            {"StepPenalties", grey + 8 * pixels},
-            {"BandedSgm", 2 * (2 * (codes + band) + maps + cells(Views::kBoth))},
-            {"MedianFilter", 4 * maps},
-            {"SpeckleRemoval", 2 * map},
-            // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.
-            {"Evidence", codes * 17 / 16 + 2 * maps + 2 * map},
-            {"KalmanUpdate", 6 * maps},
-            {"OutputVariance", 11 * map}};
+    return {
+        {"ForwardWarp", 4 * maps},
+        {"HoleFill", 8 * maps},
+        {"ConsistencyCheck", 3 * 4 * maps},
+        {"CoarseMatch", grey},
+        {"SearchBand", 2 * (maps + band)},
+        // Resampling both images, and the estimate on every fourth row of the left view.
+        {"VerticalAlignment", 2 * grey + (grey + map) / 4},
+        {"Census", grey + codes},
+        {"StepPenalties", grey + 8 * pixels},
+        {"BandedSgm", 2 * (2 * (codes + band) + maps + cells(Views::kBoth))},
+        {"MedianFilter", 4 * maps},
+        {"SpeckleRemoval", 2 * map},
+        // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.
+        {"Evidence", codes * 17 / 16 + 2 * maps + 2 * map},
+        {"KalmanUpdate", 6 * maps},
+        {"OutputVariance", 11 * map}};
   }
   /// A checksum (FNV-1a) of what the last steady frame found in the left view.
   std::string bits() const {

@@ -21,15 +21,14 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     in(Room::kRefineAlignment, [&] { refine(images, measured, offset, refined); });
   }
   in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, w.fusion, after); });
-  StereoMaps result{after.maps.disparity, after.maps.variance};
+  StereoMaps result = after.maps;
   in(Room::kPublish, [&] {
-    result.disparity = confirmed(plan, after, given_out.disparity);
+    result = confirmed(plan, after, given_out);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
-    publish_(
-        plan,
-        {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), result, w.fusion.doubtful,
-         plan.predicts() && fuse_->has_evidence() ? &after.evidence : nullptr},
-        {given_out.variance, w.dynamic, w.reasons});
+    publish_(plan,
+             {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), result, w.fusion.doubtful,
+              evidence_of(plan, after)},
+             {given_out.variance, w.dynamic, w.reasons});
   });
   if (plan.wanted.variance) result.variance = given_out.variance;
   return {result, measured, offset, images};
@@ -57,7 +56,8 @@ void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction&
   if (plan.predicts()) {
     std::optional<CoarseView> coarse;
     if (plan.has_coarse_match) coarse.emplace(CoarseView{search_.coarse_images(), work_.coarse.disparity});
-    (*fuse_)(plan, {images, match_.matcher().codes(), coarse ? &*coarse : nullptr}, prediction, measured, fusion, belief);
+    (*fuse_)(plan, {images, match_.matcher().codes(), coarse ? &*coarse : nullptr}, prediction, measured, fusion,
+             belief);
   } else if (fuse_ && fuse_->has_evidence()) {
     fuse_->begin(belief);
   }
@@ -65,10 +65,16 @@ void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction&
   if (!options_.temporal) belief.forget(Unpredicted::kNotTemporal);  // a frame alone leaves nothing to the next one
 }
 
-Map Method::confirmed(const Plan& plan, const Belief& belief, Map& published) {
-  if (!plan.predicts() || !fuse_->has_evidence()) return belief.maps.disparity;
-  fuse_->publish(plan, belief, published);
-  return published;
+/// Null where all of a belief is given out: the method has no evidence, or the frame no prediction.
+const FlagMap* Method::evidence_of(const Plan& plan, const Belief& belief) const {
+  return plan.predicts() && fuse_->has_evidence() ? &belief.evidence : nullptr;
+}
+
+StereoMaps Method::confirmed(const Plan& plan, const Belief& belief, const GivenOut& given_out) {
+  if (!evidence_of(plan, belief)) return belief.maps;
+  const bool has_filters_variance = !options_.output_variance.enabled;  // else PublishRoom writes another one
+  fuse_->publish(plan, belief, has_filters_variance, given_out);
+  return {given_out.disparity, has_filters_variance ? given_out.variance : belief.maps.variance};
 }
 
 Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)

@@ -71,7 +71,8 @@ class Method {
               VerticalOffset& refined);
   void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
             Fusion& fusion, Belief& belief);
-  Map confirmed(const Plan& plan, const Belief& belief, Map& published);
+  StereoMaps confirmed(const Plan& plan, const Belief& belief, const GivenOut& given_out);
+  const FlagMap* evidence_of(const Plan& plan, const Belief& belief) const;
 
   const MethodOptions options_;
   Workspace work_;

@@ -96,7 +96,7 @@ struct OutputVarianceOptions {
 struct MethodOptions {
   int disparities = 128, min_disparity = 0;  // D >= 1 of them, from a first one of either sign on
   SearchMode search = SearchMode::kBand;
-  bool temporal = true;      // false: every frame alone, full range, left-right checked (the plain matcher)
+  bool temporal = true;     // false: every frame alone, full range, left-right checked (the plain matcher)
   bool track_right = true;  // predict, match, filter the right view too; false: it follows from the left one, faster
 
   ForwardWarpOptions forward_warp;

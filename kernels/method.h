@@ -36,9 +36,9 @@
 #define EGOSGM_EVIDENCE_STRIDE(width) (((width) + 15) / 16 * (16 / EGOSGM_COARSE))
 // A pixel's evidence is a sum over frames, at most MOST: of what it was, so many 64ths are kept, and a frame adds what
 // its images say, less what noise must not reach. What was chosen in this frame alone, and not by the coarse match too,
-// has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is given out from CONFIRMED
-// on. A full-range match that both views confirm begins with FIRST. Where a match lies outside of the other image,
-// nothing can be asked, and so many 64ths are kept.
+// has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is given out from
+// CONFIRMED on. A full-range match that both views confirm begins with FIRST. Where a match lies outside of the other
+// image, nothing can be asked, and so many 64ths are kept.
 #define EGOSGM_EVIDENCE_MOST 160
 #define EGOSGM_EVIDENCE_KEPT 45
 #define EGOSGM_EVIDENCE_KEPT_UNSEEN 58

@@ -148,7 +148,8 @@ typedef struct {
 
 #ifdef __cplusplus
 static_assert(sizeof(ImageSize) == 8 && sizeof(DisparityRange) == 8 && sizeof(Band) == 8 && sizeof(RowSum) == 8 &&
-                  sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 52 && sizeof(DisparityMotion) == 84,
+                  sizeof(BlockRange) == 12 && sizeof(EvidenceSum) == 8 && sizeof(SgmParameters) == 52 &&
+                  sizeof(DisparityMotion) == 84,
               "kernels/*.cl read these layouts");
 }  // namespace egosgm::shared
 #endif

@@ -100,10 +100,10 @@ void expect_outputs(const OutputMemory& outputs, const reference::Frame& expecte
   const bool has_prediction = !expected.predicted.disparity.empty();
   const HostMaps predicted = has_prediction ? expected.predicted : empty_maps(size);
   const reference::Pass& pass = expected.passes.back();
-  const std::vector<float> maps[] = {half(expected.given_out, 0),        half(expected.output_variance, 0),
-                                     half(expected.given_out, 1),        half(expected.output_variance, 1),
-                                     half(predicted.disparity, 0),       half(predicted.variance, 0),
-                                     half(pass.measured.disparity, 0),   half(pass.measured.variance, 0)};
+  const std::vector<float> maps[] = {half(expected.given_out, 0),      half(expected.output_variance, 0),
+                                     half(expected.given_out, 1),      half(expected.output_variance, 1),
+                                     half(predicted.disparity, 0),     half(predicted.variance, 0),
+                                     half(pass.measured.disparity, 0), half(pass.measured.variance, 0)};
   const auto actual = outputs.maps();
   for (std::size_t i = 0; i < actual.size(); ++i) {
     EXPECT_TRUE(same_bits(actual[i].second->values(), maps[i], size)) << "output " << actual[i].first;
@@ -191,6 +191,27 @@ TEST(PipelineScene, ReachesEveryStage) {
   EXPECT_TRUE(differ(second.fused, second.fused_smoothed));
   EXPECT_TRUE(differ(second.fused_smoothed, second.fused_consistent));
   EXPECT_NE(second.given_out, second.result.disparity);
+}
+
+// The twin knows a pair again; so does the pipeline, over a reset too.
+TEST(Pipeline, KnowsARepeatedPairAgain) {
+  const Setting setting = standard();
+  const Video video(setting, 2);
+  Pipeline pipeline = make_pipeline(setting);
+  reference::Pipeline twin = make_twin(setting);
+  std::vector<float> densities;
+  for (const int index : {0, 1, 1, 1}) {
+    const Motion motion = densities.size() < 2 ? video.motion(index) : Motion();
+    const reference::Frame expected = twin.process(video.twin_images(index), video.twin_motions(motion));
+    const Result actual = process(pipeline, setting, video, index, motion);
+    expect_outputs(actual.outputs, expected, setting.size);
+    densities.push_back(static_cast<float>(actual.report.density));
+  }
+  EXPECT_LT(densities[2], densities[1] + 0.01f);
+  EXPECT_LT(densities[3], densities[1] + 0.01f);
+  pipeline.reset(), twin.reset();
+  expect_outputs(process(pipeline, setting, video, 1).outputs, twin.process(video.twin_images(1), video.twin_motions(1)),
+                 setting.size);
 }
 
 TEST(Pipeline, RecoversFromAWrongMotion) {

@@ -15,16 +15,20 @@ struct Belief {
   StereoMaps maps;
   FlagMap evidence;  // of each pixel (kernels/method.h); what has enough of it is given out
   VerticalOffset offset;
-  std::shared_ptr<const std::vector<cl_uchar>> images;  // of the frame, where the host has them
+  std::shared_ptr<std::vector<cl_uchar>> images;   // that it is of, both views; empty where the host does not know them
   Unpredicted missing = Unpredicted::kFirstFrame;  // why there are no maps; kNo: there are
 
   /// Of nothing.
-  Belief(ocl::Context& context, shared::ImageSize size) : maps(context, size), evidence(context, 2 * pixel_count(size)), offset(context) {}
+  Belief(ocl::Context& context, shared::ImageSize size)
+      : maps(context, size),
+        evidence(context, 2 * pixel_count(size)),
+        offset(context),
+        images(std::make_shared<std::vector<cl_uchar>>()) {}
 
   /// Forgets all.
   void forget(Unpredicted why) {
     missing = why;
-    images = nullptr;
+    images->clear();
     offset.is_known = false;
   }
 

@@ -11,18 +11,17 @@ namespace {
 /// Of the images that show the driver all kernels: those are as high as others, for every launch.
 constexpr int kRehearsedWidth = 16;
 
-/// The pixels of both views without gaps, behind a byte for their type.
-std::vector<cl_uchar> packed(const ImageView& left, const ImageView& right) {
+/// Writes the pixels of both views without gaps. Allocates only for the first images of a type.
+void pack(const ImageView& left, const ImageView& right, std::vector<cl_uchar>& pixels) {
   const std::size_t bytes = left.type == PixelType::kU8 ? 1 : 2;
-  std::vector<cl_uchar> pixels{static_cast<cl_uchar>(bytes)};
-  pixels.reserve(1 + 2 * bytes * left.width * left.height);
+  pixels.clear();
+  pixels.reserve(2 * bytes * left.width * left.height);
   for (const ImageView* view : {&left, &right}) {
     for (int y = 0; y < view->height; ++y) {
       const auto* row = static_cast<const cl_uchar*>(view->data) + y * view->stride_bytes;
       pixels.insert(pixels.end(), row, row + bytes * view->width);
     }
   }
-  return pixels;
 }
 
 }  // namespace
@@ -80,8 +79,7 @@ void FrameQueue::prepare(PixelType type, const Wanted& wanted) {
   FrameImages images{ocl::Buffer<cl_uchar>(context_, 2 * 2 * pixel_count(narrow)), type};
   images.pixels.write(context_, std::vector<cl_uchar>(images.pixels.size()));
   const ocl::Drain drain{context_};
-  method.frame(plan_of(method_options_, none.missing, false, {}, wanted), images, none, first,
-               {disparity, variance});
+  method.frame(plan_of(method_options_, none.missing, false, {}, wanted), images, none, first, {disparity, variance});
   method.frame(plan_of(method_options_, first.missing, first.offset.is_known, Motion(), wanted), images, first, second,
                {disparity, variance});
   context_.wait();
@@ -96,8 +94,8 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   FrameUnderWay frame{&free_transfer(), belief_, free_memory(), {}, {}, Clock::now()};
   ocl::Drain drain{context_};
   release_results();
-  frame.after.images = std::make_shared<const std::vector<cl_uchar>>(packed(left, right));
-  const bool repeats = belief_.images && *belief_.images == *frame.after.images;
+  if (Evidence::is_of(method_options_)) pack(left, right, *frame.after.images);
+  const bool repeats = !belief_.images->empty() && *belief_.images == *frame.after.images;
   const Plan plan = plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, wanted, repeats);
   const FrameImages& images = frame.transfer->upload(left, right);
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
@@ -133,7 +131,7 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   release_results();
   const Plan plan =
       plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, {Views::kBoth, wants_dynamic});
-  after.images = nullptr;
+  after.images->clear();
   const StereoMaps result = method_.frame(plan, images, belief_, after, transfer.given_out()).given_out;
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
 

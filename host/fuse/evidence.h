@@ -23,8 +23,8 @@ struct CoarseView {
 };
 
 /// Says how much better than chance the images of a frame match, whatever the band was; and what is given out: what has
-/// been confirmed. Source: the existence probability of target tracking (Musicki, Evans, Stankovic 1994) and the sums of
-/// occupancy maps, with the Hamming distances of codes in place of likelihoods.
+/// been confirmed. Source: the existence probability of target tracking (Musicki, Evans, Stankovic 1994) and the sums
+/// of occupancy maps, with the Hamming distances of codes in place of likelihoods.
 class Evidence {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
@@ -37,8 +37,10 @@ class Evidence {
   void operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* coarse, const Map& predicted,
                   const Map& measured, BlockEvidence& blocks, Views views);
 
-  /// Writes what is confirmed of `disparity`. `tracked`: the views that have evidence of their own.
-  void publish(const Map& disparity, const FlagMap& evidence, Map& published, Views views, Views tracked);
+  /// Writes the disparities that are confirmed, and with_variance their variances. `tracked`: the views that have
+  /// evidence of their own.
+  void publish(const StereoMaps& belief, const FlagMap& evidence, bool with_variance, const GivenOut& given_out,
+               Views views, Views tracked);
 
  private:
   using Words = const ocl::Buffer<cl_uint>;
@@ -56,7 +58,8 @@ class Evidence {
               const Map, Sums>
       compare_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const Sums, ocl::Buffer<cl_int>, Map> gather_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const FlagMap, Map> publish_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const FlagMap, Map, const cl_int, const Map, Map>
+      publish_;
 };
 
 }  // namespace egosgm

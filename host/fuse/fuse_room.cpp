@@ -48,8 +48,8 @@ void FuseRoom::begin(Belief& belief) const {
   belief.evidence.fill(context_, EGOSGM_EVIDENCE_FIRST);
 }
 
-void FuseRoom::publish(const Plan& plan, const Belief& belief, Map& published) {
-  evidence_->publish(belief.maps.disparity, belief.evidence, published,
+void FuseRoom::publish(const Plan& plan, const Belief& belief, bool with_variance, const GivenOut& given_out) {
+  evidence_->publish(belief.maps, belief.evidence, with_variance, given_out,
                      plan.wanted.right ? Views::kBoth : Views::kLeft, plan.tracked);
 }
 

@@ -47,8 +47,9 @@ class FuseRoom {
   /// A belief without a prediction: what both views confirm over the full range begins with some evidence.
   void begin(Belief& belief) const;
 
-  /// What is given out of a belief. REQUIRES: the method has evidence.
-  void publish(const Plan& plan, const Belief& belief, Map& published);
+  /// What is given out of a belief: disparities, and with_variance the filter's variances. REQUIRES: the method has
+  /// evidence.
+  void publish(const Plan& plan, const Belief& belief, bool with_variance, const GivenOut& given_out);
   bool has_evidence() const { return evidence_.has_value(); }
 
  private:

@@ -34,8 +34,8 @@ void KalmanUpdate::operator()(const FlagMap& hidden, const StereoMaps& predicted
   update_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, has_gate_, gate_px_,
           keep_predicted_, ask_neighbours_, min_variance_px2_, hidden, predicted.disparity, predicted.variance,
           measured.disparity, measured.variance, measured.doubtful, evidence != nullptr, evidence && evidence->repeats,
-          evidence ? evidence->before : hidden, blocks.evidence, blocks.found, updated.disparity, updated.variance, doubtful,
-          updated_evidence);
+          evidence ? evidence->before : hidden, blocks.evidence, blocks.found, updated.disparity, updated.variance,
+          doubtful, updated_evidence);
 }
 
 }  // namespace egosgm

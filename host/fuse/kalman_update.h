@@ -16,18 +16,17 @@ class KalmanUpdate {
  public:
   /// What is known of a frame before it is fused.
   struct FrameEvidence {
-    const FlagMap& before;         // that moved with the prediction
+    const FlagMap& before;        // that moved with the prediction
     const BlockEvidence& blocks;  // of this frame's images
-    bool repeats;                  // they are those of the frame before, and make nobody surer
+    bool repeats;                 // they are those of the frame before, and make nobody surer
   };
 
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
 
   /// Nothing is believed of what is `hidden`. `doubtful`: 1 where the measurement was taken although the prediction, or
-  /// its own path sums, speak against it. `evidence` is null where the method has none: then all that is updated has the
-  /// most of it.
-  /// REQUIRES: `updated` is neither `predicted` nor `measured`.
+  /// its own path sums, speak against it. `evidence` is null where the method has none: then all that is updated has
+  /// the most of it. REQUIRES: `updated` is neither `predicted` nor `measured`.
   void operator()(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
                   const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful, FlagMap& updated_evidence,
                   Views views);

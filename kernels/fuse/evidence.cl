@@ -60,8 +60,8 @@ static inline int place_of_match(const CodeRows* rows, const int x, const int di
 
 constant int kCoarseControls[8] = EGOSGM_COARSE_CONTROLS;
 
-// The controls' distances less that of the match, times their number: of four controls, and of eight. Loads are volatile
-// lest a compiler makes gather instructions of them, which are slower.
+// The controls' distances less that of the match, times their number: of four controls, and of eight. Loads are
+// volatile lest a compiler makes gather instructions of them, which are slower.
 static inline int beyond_four(const Code own, volatile global const Code* match) {
   return bits_apart(own, match[-EGOSGM_FAR_CONTROL]) + bits_apart(own, match[-EGOSGM_NEAR_CONTROL]) +
          bits_apart(own, match[EGOSGM_NEAR_CONTROL]) + bits_apart(own, match[EGOSGM_FAR_CONTROL]) -
@@ -113,8 +113,8 @@ static inline int of_coarse(const CodeRows* coarse, const int block, const float
 }
 
 // Sums of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels: the evidence of those that are asked and whose match lies in
-// the other image, and how many these are. `coarse_codes` are those of the image at a quarter of the resolution. A work-item a block, or
-// a row of them.
+// the other image, and how many these are. `coarse_codes` are those of the image at a quarter of the resolution. A
+// work-item a block, or a row of them.
 COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const float gate, const int padding,
                                global const uint* codes, const int has_coarse, const int coarse_padding,
                                global const uint* coarse_codes, global const float* predicted,
@@ -183,11 +183,10 @@ static inline int least_evidence(const int evidence, const int2 part) {
 }
 
 // The evidence of each block: the least of the means over a window of blocks and over its four halves, so that a plain
-// place beside a textured one has none. `found`: the disparity that the coarse match found there [px]; rows of both have
-// EGOSGM_EVIDENCE_STRIDE places.
-COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int has_coarse,
-                              global const float* coarse, global const EvidenceSum* sums, global int* evidence,
-                              global float* found) {
+// place beside a textured one has none. `found`: the disparity that the coarse match found there [px]; rows of both
+// have EGOSGM_EVIDENCE_STRIDE places.
+COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int has_coarse, global const float* coarse,
+                              global const EvidenceSum* sums, global int* evidence, global float* found) {
   const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
                             (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
   const int radius = EGOSGM_EVIDENCE_RADIUS;
@@ -228,7 +227,9 @@ KERNEL void gather_evidence(const ImageSize size, const int has_coarse, global c
 // What is given out of a belief: what has been confirmed. Where the left view alone is tracked (by_left), a right pixel
 // has the evidence of the left pixel that it sees.
 COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const int by_left,
-                               global const float* disparity, global const uchar* evidence, global float* published) {
+                               global const float* disparity, global const uchar* evidence, global float* published,
+                               const int with_variance, global const float* variance,
+                               global float* published_variance) {
   const int width = size.width;
   const size_t left_row = (size_t)at.y * width;
   const size_t row = (size_t)at.view * size.height * width + left_row;
@@ -244,11 +245,18 @@ COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const in
     } else {
       of_pixels = load_bytes(evidence + row, x, width);
     }
-    store_pixels(of_pixels >= EGOSGM_EVIDENCE_CONFIRMED ? d : INVALID, published + row, x, width);
+    const Ints is_confirmed = of_pixels >= EGOSGM_EVIDENCE_CONFIRMED;
+    store_pixels(is_confirmed ? d : INVALID, published + row, x, width);
+    if (with_variance) {
+      const Floats p = load_pixels(variance + row, x, width);
+      store_pixels(is_confirmed ? p : (Floats)(0.0f), published_variance + row, x, width);
+    }
   }
 }
 
 KERNEL void publish_confirmed(const ImageSize size, const int by_left, global const float* disparity,
-                              global const uchar* evidence, global float* published) {
-  publish_row(THIS_WORK_ITEM, size, by_left, disparity, evidence, published);
+                              global const uchar* evidence, global float* published, const int with_variance,
+                              global const float* variance, global float* published_variance) {
+  publish_row(THIS_WORK_ITEM, size, by_left, disparity, evidence, published, with_variance, variance,
+              published_variance);
 }

@@ -47,23 +47,14 @@ static Ints move_together(const ImageSize size, const int x, const int y, const 
   return moves;
 }
 
-// Of the blocks of pixels x .. x + PIXELS - 1.
-static inline Ints evidence_of_blocks(global const int* row, const int x) {
+// What is known of the blocks of pixels x .. x + PIXELS - 1, each pixel what its own is.
 #if PIXELS == 1
-  return row[x / EGOSGM_COARSE];
+#define OF_ITS_BLOCK(Values, row, x) ((row)[(x) / EGOSGM_COARSE])
 #else
-  const int4 blocks = vload4(0, row + x / EGOSGM_COARSE);
-  return (Ints)(blocks.xxxx, blocks.yyyy, blocks.zzzz, blocks.wwww);
+#define FOUR_BLOCKS(row, x) vload4(0, (row) + (x) / EGOSGM_COARSE)
+#define OF_ITS_BLOCK(Values, row, x) \
+  ((Values)(FOUR_BLOCKS(row, x).xxxx, FOUR_BLOCKS(row, x).yyyy, FOUR_BLOCKS(row, x).zzzz, FOUR_BLOCKS(row, x).wwww))
 #endif
-}
-static inline Floats found_in_blocks(global const float* row, const int x) {
-#if PIXELS == 1
-  return row[x / EGOSGM_COARSE];
-#else
-  const float4 blocks = vload4(0, row + x / EGOSGM_COARSE);
-  return (Floats)(blocks.xxxx, blocks.yyyy, blocks.zzzz, blocks.wwww);
-#endif
-}
 
 static inline Ints lesser_of(const Ints a, const Ints b) { return a < b ? a : b; }
 
@@ -73,7 +64,8 @@ static inline Ints moved_evidence(const ImageSize size, const int x, const int y
   const Ints own = load_bytes(row, x, size.width);
   const Ints beside = lesser_of(load_bytes(row, x - 1, size.width), load_bytes(row, x + 1, size.width));
   if (y == 0 || y + 1 >= size.height) return own > 0 ? own : beside;
-  const Ints around = lesser_of(load_bytes(row - size.width, x, size.width), load_bytes(row + size.width, x, size.width));
+  const Ints around =
+      lesser_of(load_bytes(row - size.width, x, size.width), load_bytes(row + size.width, x, size.width));
   return own > 0 ? own : beside > 0 ? beside : around;
 }
 
@@ -82,8 +74,8 @@ typedef struct {
   Ints sums, lives, counts;
 } Verdict;
 
-// `now`: of this frame. repeats: whether its images are those of the frame before, which make nobody surer. A prediction
-// is not asked where its match lies outside of the other image.
+// `now`: of this frame. repeats: whether its images are those of the frame before, which make nobody surer. A
+// prediction is not asked where its match lies outside of the other image.
 static inline Verdict judged(const int repeats, const Ints before, const Ints now, const Floats found, const Floats d,
                              const Floats z, const float gate, const int x, const int width, const int view) {
   const Ints has_prediction = d > INVALID;
@@ -129,8 +121,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
   const size_t row = view + (size_t)y * width;
   const Ints is_plain = (Ints)(has_gate ? 0 : -1);
   const int blocks_high = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
-  const size_t row_of_blocks =
-      ((size_t)at.view * blocks_high + y / EGOSGM_COARSE) * EGOSGM_EVIDENCE_STRIDE(size.width);
+  const size_t row_of_blocks = ((size_t)at.view * blocks_high + y / EGOSGM_COARSE) * EGOSGM_EVIDENCE_STRIDE(size.width);
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(predicted + row, x, width);
@@ -140,8 +131,8 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
     Verdict verdict = {(Ints)(EGOSGM_EVIDENCE_MOST), (Ints)(-1), (Ints)(-1)};
     if (has_evidence) {
       verdict = judged(repeats, moved_evidence(size, x, y, evidence_before + row),
-                       evidence_of_blocks(block_evidence + row_of_blocks, x), found_in_blocks(found + row_of_blocks, x), d,
-                       z, gate, x, width, at.view);
+                       OF_ITS_BLOCK(Ints, block_evidence + row_of_blocks, x),
+                       OF_ITS_BLOCK(Floats, found + row_of_blocks, x), d, z, gate, x, width, at.view);
     }
     const Ints has_prediction = d > INVALID;
     const Ints has_measurement =

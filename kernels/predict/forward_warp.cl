@@ -2,11 +2,11 @@
 // Forward warp of both views' disparity maps by the camera's motion (eqs. 1-6), nearest surface first.
 //
 // Several sources may land on one target. The largest disparity wins, of equal ones the one with the largest variance,
-// so the result does not depend on the order in which they come; its evidence is the most that such a source has. What came nearer than the range still hides what is
-// behind it: such a target has no disparity, and is marked as hidden. GPUs, a pixel a work-item: disparities bid by
-// atomic maxima of keys that are ordered as they are, then variances do among the sources that reached the winner.
-// CPUs, where atomics are slow: a work-item owns a band of target rows and looks through the source rows that reach
-// into it.
+// so the result does not depend on the order in which they come; its evidence is the most that such a source has. What
+// came nearer than the range still hides what is behind it: such a target has no disparity, and is marked as hidden.
+// GPUs, a pixel a work-item: disparities bid by atomic maxima of keys that are ordered as they are, then variances do
+// among the sources that reached the winner. CPUs, where atomics are slow: a work-item owns a band of target rows and
+// looks through the source rows that reach into it.
 #include "method.h"
 #include "pixels.h"
 

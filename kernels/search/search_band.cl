@@ -112,9 +112,9 @@ typedef struct {
   float from, to;
 } Span;
 
-// What the predictions in the 3x3 blocks around it and the coarse match span. `found`: what the predictions in the block
-// and in those above and below it, and the coarse match span. Thin things stand upright: where a frame lost a part of
-// one, the parts above and below it say where to search.
+// What the predictions in the 3x3 blocks around it and the coarse match span. `found`: what the predictions in the
+// block and in those above and below it, and the coarse match span. Thin things stand upright: where a frame lost a
+// part of one, the parts above and below it say where to search.
 static inline Span span_around(const ImageSize blocks, const int view, const int x, const int y,
                                const int from_neighbours, const float margin, const int min_count,
                                const float coarse_margin, global const BlockRange* ranges,

@@ -33,17 +33,20 @@ struct Images {
 
   explicit Images(shared::ImageSize size) : size(size) {
     const shared::ImageSize quarter = CoarseMatch::coarse_size(size);
-    for (int view = 0; view < 2; ++view) full[view].resize(pixel_count(size)), coarse[view].resize(pixel_count(quarter));
+    for (int view = 0; view < 2; ++view)
+      full[view].resize(pixel_count(size)), coarse[view].resize(pixel_count(quarter));
   }
   shared::ImageSize coarse_size() const { return CoarseMatch::coarse_size(size); }
 
   reference::ViewCodes codes() const {
-    return {size, {reference::codes(size, full[0], 16, MatchingCost::kCensus9x7),
-                   reference::codes(size, full[1], 16, MatchingCost::kCensus9x7)}};
+    return {size,
+            {reference::codes(size, full[0], 16, MatchingCost::kCensus9x7),
+             reference::codes(size, full[1], 16, MatchingCost::kCensus9x7)}};
   }
   reference::ViewCodes coarse_codes() const {
-    return {coarse_size(), {reference::codes(coarse_size(), coarse[0], 16, MatchingCost::kCensus9x7),
-                            reference::codes(coarse_size(), coarse[1], 16, MatchingCost::kCensus9x7)}};
+    return {coarse_size(),
+            {reference::codes(coarse_size(), coarse[0], 16, MatchingCost::kCensus9x7),
+             reference::codes(coarse_size(), coarse[1], 16, MatchingCost::kCensus9x7)}};
   }
 };
 
@@ -59,7 +62,7 @@ Images noise(shared::ImageSize size, unsigned seed) {
 
 /// The right view of it shows each column `disparity` to the left, at a quarter of the resolution as well.
 Images shifted(Images images, int disparity) {
-  const auto shift = [](std::vector<std::uint16_t> (&views)[2], shared::ImageSize size, int by) {
+  const auto shift = [](std::vector<std::uint16_t>(&views)[2], shared::ImageSize size, int by) {
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x + by < size.width; ++x) views[1][y * size.width + x] = views[0][y * size.width + x + by];
     }
@@ -71,8 +74,8 @@ Images shifted(Images images, int disparity) {
 
 /// What the device says, without the gaps of its rows.
 reference::BlockEvidence evidence_of(const Images& images, bool has_coarse, const std::vector<float>& found,
-                                     const testing::HostMaps& predicted, const testing::HostMaps& measured,
-                                     int pixels, Views views = Views::kBoth) {
+                                     const testing::HostMaps& predicted, const testing::HostMaps& measured, int pixels,
+                                     Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   const shared::ImageSize size = images.size, quarter = images.coarse_size();
   const int padding = BandedSgm::code_padding(range_of(options()));
@@ -83,7 +86,8 @@ reference::BlockEvidence evidence_of(const Images& images, bool has_coarse, cons
   ocl::Buffer<cl_uchar> coarse_images(context, 2 * 2 * pixel_count(quarter));
   std::vector<cl_uchar> bytes;
   for (const auto& view : images.coarse) {
-    for (const std::uint16_t grey : view) bytes.insert(bytes.end(), {static_cast<cl_uchar>(grey), static_cast<cl_uchar>(grey >> 8)});
+    for (const std::uint16_t grey : view)
+      bytes.insert(bytes.end(), {static_cast<cl_uchar>(grey), static_cast<cl_uchar>(grey >> 8)});
   }
   coarse_images.write(context, bytes);
   Map coarse_disparity(context, 2 * pixel_count(quarter));
@@ -229,12 +233,19 @@ TEST(Evidence, GivesOutWhatIsConfirmed) {
       const StereoMaps on_device = testing::upload(context, kSmall, maps);
       FlagMap evidence(context, maps.evidence.size());
       evidence.write(context, maps.evidence);
-      Map published(context, maps.disparity.size());
+      StereoMaps published = testing::upload(context, kSmall, testing::random_maps(kSmall, 0, 9, 0.2, 9));
+      const std::vector<float> before = published.variance.read(context);
       Evidence stage(context, kSmall, options(), pixels);
-      stage.publish(on_device.disparity, evidence, published, Views::kBoth, tracked);
-      const std::vector<float> expected =
-          reference::confirmed(kSmall, maps.disparity, maps.evidence, tracked == Views::kLeft);
-      EXPECT_TRUE(testing::same_bits(published.read(context), expected, kSmall)) << "by " << pixels;
+      const testing::HostMaps expected = reference::confirmed(kSmall, maps, tracked == Views::kLeft);
+      for (const bool with_variance : {false, true}) {
+        stage.publish(on_device, evidence, with_variance, {published.disparity, published.variance}, Views::kBoth,
+                      tracked);
+        EXPECT_TRUE(testing::same_bits(published.disparity.read(context), expected.disparity, kSmall))
+            << "by " << pixels;
+        EXPECT_TRUE(
+            testing::same_bits(published.variance.read(context), with_variance ? expected.variance : before, kSmall))
+            << "by " << pixels;
+      }
     }
   }
 }

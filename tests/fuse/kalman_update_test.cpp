@@ -285,7 +285,9 @@ Judged judged(const Pixel& pixel, int x = 12) {
   testing::HostMaps predicted = testing::empty_maps(kRow), measured = predicted;
   predicted.disparity[x] = pixel.predicted, measured.disparity[x] = pixel.measured;
   predicted.variance[x] = measured.variance[x] = 1;
-  reference::FrameEvidence evidence{std::vector<std::uint8_t>(50, 0), {std::vector<int>(14, pixel.now), std::vector<float>(14, pixel.found)}, pixel.repeats};
+  reference::FrameEvidence evidence{std::vector<std::uint8_t>(50, 0),
+                                    {std::vector<int>(14, pixel.now), std::vector<float>(14, pixel.found)},
+                                    pixel.repeats};
   evidence.before[x] = pixel.before;
   const testing::HostMaps out = update(kRow, {}, predicted, measured, 0, Views::kBoth, &evidence);
   return {{out.disparity[x], out.variance[x], out.doubtful[x] != 0}, out.evidence[x]};
@@ -317,7 +319,8 @@ TEST(KalmanUpdate, WithoutEvidenceAPredictionLivesAFewFrames) {
 }
 
 TEST(KalmanUpdate, WhereNothingCanBeAskedEvidenceDecaysAlone) {
-  EXPECT_EQ(judged({.predicted = 5, .before = 64, .now = -100}, 3).evidence, 58) << "the match lies outside of the image";
+  EXPECT_EQ(judged({.predicted = 5, .before = 64, .now = -100}, 3).evidence, 58)
+      << "the match lies outside of the image";
   EXPECT_EQ(judged({.predicted = 5, .before = 64, .now = -100}, 5), (Judged{kNothing, 0})) << "and inside";
 }
 

@@ -218,7 +218,8 @@ TEST(ForwardWarp, EvidenceGoesWithTheNearest) {
   const testing::HostMaps back = warp(belief, translation(0, 0, 10));
   EXPECT_EQ(*std::max_element(back.evidence.begin() + static_cast<std::ptrdiff_t>(at(kSize, EGOSGM_RIGHT, 0, 0)),
                               back.evidence.end()),
-            30) << "of equal ones, the most";
+            30)
+      << "of equal ones, the most";
 }
 
 TEST(ForwardWarp, PointsBehindTheCameraVanish) {

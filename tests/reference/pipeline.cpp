@@ -6,6 +6,7 @@
 #include "host/method_options.h"
 #include "tests/reference/fuse/evidence.h"
 #include "tests/reference/fuse/kalman_update.h"
+#include "tests/reference/fuse/right_map.h"
 #include "tests/reference/fuse/sad_check.h"
 #include "tests/reference/match/banded_sgm.h"
 #include "tests/reference/match/census.h"
@@ -13,15 +14,14 @@
 #include "tests/reference/match/median_filter.h"
 #include "tests/reference/match/speckle_removal.h"
 #include "tests/reference/match/step_penalties.h"
+#include "tests/reference/method.h"
 #include "tests/reference/predict/edge_rejection.h"
 #include "tests/reference/predict/forward_warp.h"
 #include "tests/reference/predict/hole_fill.h"
-#include "tests/reference/fuse/right_map.h"
 #include "tests/reference/publish/dynamic_map.h"
 #include "tests/reference/publish/output_variance.h"
 #include "tests/reference/publish/reasons.h"
 #include "tests/reference/search/coarse_match.h"
-#include "tests/reference/method.h"
 
 namespace egosgm::reference {
 
@@ -55,15 +55,20 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     frame.dynamic = dynamic_map(size_, frame.predicted, frame.passes.back().measured);
   }
   frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
-  frame.evidence = has_prediction ? frame.fused.evidence
-                                  : std::vector<std::uint8_t>(frame.result.disparity.size(), kFirstEvidence);
-  frame.given_out = has_prediction && has_evidence() ? confirmed(size_, frame.result.disparity,
-                                                                 frame.evidence, !options_.track_right)
-                                                     : frame.result.disparity;
-  const testing::HostMaps given_out{frame.given_out, frame.result.variance};
-  frame.output_variance = options_.output_variance.enabled ? output_variance(size_, options_.output_variance, given_out,
-                                                                             frame.passes.back().measured)
-                                                           : frame.result.variance;
+  frame.evidence =
+      has_prediction ? frame.fused.evidence : std::vector<std::uint8_t>(frame.result.disparity.size(), kFirstEvidence);
+  testing::HostMaps given_out = frame.result;
+  if (has_prediction && has_evidence()) {
+    testing::HostMaps belief = frame.result;
+    belief.evidence = frame.evidence;
+    given_out = confirmed(size_, belief, !options_.track_right);
+  }
+  frame.given_out = given_out.disparity;
+  frame.output_variance =
+      options_.output_variance.enabled
+          ? output_variance(size_, options_.output_variance, {given_out.disparity, frame.result.variance},
+                            frame.passes.back().measured)
+          : given_out.variance;
   frame.reasons = explain(images, frame);
   if (!options_.temporal) return frame;
   offset_ = frame.passes.back().offset;
@@ -184,13 +189,13 @@ void Pipeline::update(const Images& images, Frame& frame) const {
   if (has_evidence()) {
     std::optional<CoarseView> coarse;
     if (!pass.coarse.empty()) coarse = CoarseView{pass.coarse_codes, pass.coarse};
-    evidence = FrameEvidence{frame.warped.evidence,
-                             block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, frame.predicted,
-                                            pass.measured),
-                             images.greys == greys_};
+    evidence = FrameEvidence{
+        frame.warped.evidence,
+        block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, frame.predicted, pass.measured),
+        images.greys == greys_};
   }
-  frame.fused = kalman_update(size_, options_.kalman_update, frame.predicted, pass.measured,
-                              evidence ? &*evidence : nullptr);
+  frame.fused =
+      kalman_update(size_, options_.kalman_update, frame.predicted, pass.measured, evidence ? &*evidence : nullptr);
   frame.fused_smoothed = options_.median_filter.enabled ? median_filter(size_, true, frame.fused) : frame.fused;
   if (!options_.track_right) {
     frame.fused_smoothed =

@@ -17,9 +17,7 @@ namespace {
 constexpr shared::ImageSize kSize{320, 160};
 constexpr shared::DisparityRange kRange{0, 64};
 
-float truth_at(int x, int y) {
-  return 20.0f + 0.021f * static_cast<float>(x) + 0.033f * static_cast<float>(y);
-}
+float truth_at(int x, int y) { return 20.0f + 0.021f * static_cast<float>(x) + 0.033f * static_cast<float>(y); }
 
 /// A slanted surface whose texture is so many grey values strong, with noise of two grey values.
 std::vector<cl_uchar> slanted_pair(double texture, unsigned seed) {

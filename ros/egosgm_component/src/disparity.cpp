@@ -106,7 +106,7 @@ class Disparity : public rclcpp::Node {
     try {
       side == 0 ? process(*image, *other) : process(*other, *image);
     } catch (const std::exception& error) {  // whatever a message held: the next one may be whole
-      if (matching_) {  // one of them may have gone on without the other
+      if (matching_) {                       // one of them may have gone on without the other
         matching_->pipeline.reset();
         matching_->odometry.reset();
       }

@@ -96,8 +96,8 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
         if (4 * half.count > 5 * 3 * kSide * kSide / 2) least = std::min(least, half.evidence / half.count);
       }
       result.evidence.push_back(least);
-      const float d = coarse ? coarse->disparity[static_cast<std::size_t>(view) * rows * columns + i]
-                             : EGOSGM_INVALID_DISPARITY;
+      const float d =
+          coarse ? coarse->disparity[static_cast<std::size_t>(view) * rows * columns + i] : EGOSGM_INVALID_DISPARITY;
       result.found.push_back(is_valid(d) ? kSide * d : EGOSGM_INVALID_DISPARITY);
     }
   }
@@ -105,12 +105,13 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
 }
 
 Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame, int view, int x, int y,
-                             float predicted, float measured) {
+              float predicted, float measured) {
   if (!is_valid(predicted) && !is_valid(measured)) return {0, false, false};
   const bool stays = is_valid(predicted) && !(is_valid(measured) && differ(gate_px, measured, predicted));
   const auto moved = [&](int column, int row) {
     const bool is_inside = column >= 0 && column < size.width && row >= 0 && row < size.height;
-    return is_inside ? int{frame.before[(static_cast<std::size_t>(view) * size.height + row) * size.width + column]} : 0;
+    return is_inside ? int{frame.before[(static_cast<std::size_t>(view) * size.height + row) * size.width + column]}
+                     : 0;
   };
   int before = moved(x, y);
   if (before == 0) before = std::min(moved(x - 1, y), moved(x + 1, y));
@@ -133,19 +134,21 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   return {evidence, evidence >= 0, !stays || now >= kEvidenceOfNoise};
 }
 
-std::vector<float> confirmed(shared::ImageSize size, const std::vector<float>& disparity,
-                             const std::vector<std::uint8_t>& evidence, bool by_left) {
-  std::vector<float> result = disparity;
+testing::HostMaps confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left) {
+  testing::HostMaps result{belief.disparity, belief.variance};
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
-  for (std::size_t i = 0; i < result.size(); ++i) {
-    int of_pixel = evidence[i];
+  for (std::size_t i = 0; i < result.disparity.size(); ++i) {
+    const float d = belief.disparity[i];
+    int of_pixel = belief.evidence[i];
     if (by_left && i >= pixels) {
       const int x = static_cast<int>(i % size.width);
-      const float seen = std::nearbyint(static_cast<float>(x) + disparity[i]);
-      const bool is_inside = is_valid(disparity[i]) && seen >= 0 && seen < static_cast<float>(size.width);
-      of_pixel = is_inside ? evidence[i - pixels - x + static_cast<std::size_t>(seen)] : 0;
+      const float seen = std::nearbyint(static_cast<float>(x) + d);
+      const bool is_inside = is_valid(d) && seen >= 0 && seen < static_cast<float>(size.width);
+      of_pixel = is_inside ? belief.evidence[i - pixels - x + static_cast<std::size_t>(seen)] : 0;
     }
-    if (of_pixel < kConfirmedEvidence) result[i] = EGOSGM_INVALID_DISPARITY;
+    if (of_pixel >= kConfirmedEvidence) continue;
+    result.disparity[i] = EGOSGM_INVALID_DISPARITY;
+    result.variance[i] = 0;
   }
   return result;
 }

@@ -44,10 +44,10 @@ struct Verdict {
   bool lives, counts;
 };
 Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame, int view, int x, int y,
-                             float predicted, float measured);
+              float predicted, float measured);
 
-/// What has been confirmed. `by_left`: a right pixel has the evidence of the left pixel that it sees.
-std::vector<float> confirmed(shared::ImageSize size, const std::vector<float>& disparity,
-                             const std::vector<std::uint8_t>& evidence, bool by_left);
+/// What has been confirmed of a belief with its evidence. `by_left`: a right pixel has the evidence of the left pixel
+/// that it sees.
+testing::HostMaps confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left);
 
 }  // namespace egosgm::reference

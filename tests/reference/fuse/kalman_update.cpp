@@ -99,7 +99,8 @@ testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOption
                             !measured.doubtful.empty() && measured.doubtful[i] != 0};
     Verdict verdict{kMostEvidence, true, true};
     if (evidence) {
-      verdict = judge(size, options.gate_px, *evidence, i / pixels, x, y, predicted.disparity[i], measured.disparity[i]);
+      verdict =
+          judge(size, options.gate_px, *evidence, i / pixels, x, y, predicted.disparity[i], measured.disparity[i]);
     }
     if (!verdict.counts) of_measurement = kNone;
     const bool lives = verdict.lives && !is_hidden;

@@ -63,8 +63,11 @@ testing::HostMaps forward_warp(shared::ImageSize size, shared::DisparityRange ra
                                const shared::DisparityMotion& left, const shared::DisparityMotion& right,
                                float process_noise_px2, const testing::HostMaps& belief) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
-  testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f),
-                        std::vector<std::uint8_t>(2 * pixels, 0), {}, std::vector<std::uint8_t>(2 * pixels, 0)};
+  testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY),
+                        std::vector<float>(2 * pixels, 0.0f),
+                        std::vector<std::uint8_t>(2 * pixels, 0),
+                        {},
+                        std::vector<std::uint8_t>(2 * pixels, 0)};
   const std::vector<std::uint8_t> evidence =
       belief.evidence.empty() ? std::vector<std::uint8_t>(2 * pixels, 0) : belief.evidence;
   warp_view(size, range, left, process_noise_px2, belief.disparity.data(), belief.variance.data(), evidence.data(),
