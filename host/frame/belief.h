@@ -28,7 +28,6 @@ struct Belief {
   /// Forgets all.
   void forget(Unpredicted why) {
     missing = why;
-    images->clear();
     offset.is_known = false;
   }
 
