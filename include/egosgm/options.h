@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -22,9 +20,6 @@ enum class Preset { kDefault, kPaper };
 
 /// What a user can choose. Meaning, unit, range and when to change each: list_options, `egosgm run --help` and
 /// docs/options.md, from one table. Value semantics; not thread-safe.
-///
-/// The layout is fixed: a later version takes new options from `reserved`, and the library's constructor fills them, so
-/// that programs which were compiled with this header go on working.
 struct EGOSGM_EXPORT PipelineOptions {
   int disparities;          ///< D: number of disparities; the range is [min_disparity, min_disparity + D) px
   int min_disparity;        ///< least disparity [px], of either sign
@@ -47,7 +42,6 @@ struct EGOSGM_EXPORT PipelineOptions {
 
   /// Constants of the method that differ from the preset's, as (name, value): for experiments. They may change or go.
   std::vector<std::pair<std::string, std::string>> constants;
-  std::array<std::uint64_t, 16> reserved{};  ///< zero
 
   /// The default preset.
   PipelineOptions();
