@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -108,6 +109,16 @@ TEST(House, EveryRoomSaysWhatComesInAndWhatGoesOut) {
   }
 }
 
+std::string in_pascal_case(const std::string& name) {
+  std::string result;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const bool begins = i == 0 || name[i - 1] == '_';
+    if (name[i] != '_')
+      result += begins ? static_cast<char>(std::toupper(static_cast<unsigned char>(name[i]))) : name[i];
+  }
+  return result;
+}
+
 TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
   ASSERT_GE(kernels().size(), 10u);
   std::set<std::string> names;
@@ -122,6 +133,9 @@ TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
          {host + ".h", host + ".cpp", twin + ".h", twin + ".cpp", "tests/" + room + "/" + stage + "_test.cpp"}) {
       EXPECT_TRUE(fs::exists(kSource / file)) << file;
     }
+    // scripts/check asks for tests by this name.
+    const std::string tests = text_of(kSource / "tests" / room / (stage + "_test.cpp"));
+    EXPECT_TRUE(std::regex_search(tests, std::regex("TEST(_P)?\\(" + in_pascal_case(stage)))) << kernel;
   }
 }
 
