@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "egosgm/motion.h"
-#include "egosgm/vision/dataset.h"
 #include "egosgm/odometry.h"
+#include "egosgm/vision/dataset.h"
 
 namespace egosgm::app {
 

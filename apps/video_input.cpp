@@ -7,9 +7,9 @@
 #include <map>
 
 #include "egosgm/error.h"
+#include "egosgm/odometry.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
-#include "egosgm/odometry.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/flow_io.h"

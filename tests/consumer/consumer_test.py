@@ -5,7 +5,6 @@ EGOSGM_BUILD names the build folder, EGOSGM_CXX the compiler, EGOSGM_HAS_VISION 
 """
 import os
 import pathlib
-import shutil
 import subprocess
 import tempfile
 import unittest

@@ -20,9 +20,9 @@
 #include "egosgm/vision/poses_io.h"
 #include "egosgm/vision/synthetic.h"
 #include "host/odometry/geometry.h"
+#include "tests/odometry/motions.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
-#include "tests/odometry/motions.h"
 
 namespace egosgm::vision {
 namespace {
