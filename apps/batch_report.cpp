@@ -89,7 +89,7 @@ std::string difference(const Json& there, const Json& here) {
 
 }  // namespace
 
-Json batch_settings(const PipelineOptions& options, const vision::StereoOdometryOptions& odometry,
+Json batch_settings(const PipelineOptions& options, const StereoOdometryOptions& odometry,
                     const std::set<std::string>& kinds) {
   Json json{{"version", EGOSGM_VERSION},
             {"write", kinds},

@@ -58,7 +58,7 @@ class BatchFolder {
 };
 
 /// What all sequences of a batch share.
-nlohmann::ordered_json batch_settings(const PipelineOptions& options, const vision::StereoOdometryOptions& odometry,
+nlohmann::ordered_json batch_settings(const PipelineOptions& options, const StereoOdometryOptions& odometry,
                                       const std::set<std::string>& kinds);
 
 }  // namespace egosgm::app

@@ -15,14 +15,14 @@
 #include "apps/option_arguments.h"
 #include "apps/run.h"
 #include "egosgm/device.h"
-#include "egosgm/vision/odometry.h"
+#include "egosgm/odometry.h"
 
 namespace egosgm::app {
 
 struct BatchArguments {
   std::string list, out, devices = "all", programs, write, shard, shards;
   OptionArguments method;
-  vision::StereoOdometryOptions odometry;
+  StereoOdometryOptions odometry;
   bool merge = false, quiet = false, overwrite = false;
 };
 

@@ -8,7 +8,7 @@
 
 namespace egosgm::app {
 
-void add_motion(CLI::App& command, std::string& poses_file, vision::StereoOdometryOptions& options) {
+void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOptions& options) {
   command
       .add_option("--poses", poses_file,
                   "take the motion from KITTI poses (camera-to-world) in place of stereo odometry")
@@ -17,7 +17,7 @@ void add_motion(CLI::App& command, std::string& poses_file, vision::StereoOdomet
   add_motion_bounds(command, options, "Method");
 }
 
-void add_motion_bounds(CLI::App& command, vision::StereoOdometryOptions& options, const std::string& group) {
+void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const std::string& group) {
   command
       .add_option("--max-translation", options.max_translation_m,
                   "odometry: a longer motion between two frames is no motion [m]")
@@ -33,7 +33,7 @@ void add_motion_bounds(CLI::App& command, vision::StereoOdometryOptions& options
 }
 
 MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
-                           const vision::StereoOdometryOptions& options) {
+                           const StereoOdometryOptions& options) {
   options.validate();
   if (poses_file.empty()) {
     odometry_.emplace(sequence.calibration, options);

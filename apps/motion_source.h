@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "egosgm/motion.h"
+#include "egosgm/odometry.h"
 #include "egosgm/vision/dataset.h"
-#include "egosgm/vision/odometry.h"
 
 namespace egosgm::app {
 
@@ -16,16 +16,16 @@ namespace egosgm::app {
 struct FrameMotion {
   std::optional<Motion> motion;  // from the previous frame; none in the first frame
   bool from_file = false;        // else estimated:
-  vision::OdometryResult odometry;
+  OdometryResult odometry;
   double odometry_ms = 0;
   Eigen::Isometry3d first_from_camera = Eigen::Isometry3d::Identity();  // the pose in the first frame's system
 };
 
 /// Adds --poses, --max-translation and --max-rotation to the group "Method".
-void add_motion(CLI::App& command, std::string& poses_file, vision::StereoOdometryOptions& options);
+void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOptions& options);
 
 /// Adds --max-translation and --max-rotation.
-void add_motion_bounds(CLI::App& command, vision::StereoOdometryOptions& options, const std::string& group);
+void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const std::string& group);
 
 /// The motion of one frame after the other: from a file of poses, or by stereo odometry. A frame where odometry found
 /// none repeats the last motion in its pose, and only there. Not thread-safe.
@@ -33,7 +33,7 @@ class MotionSource {
  public:
   /// Reads `poses_file`; empty: estimates. Throws InvalidArgument.
   MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
-               const vision::StereoOdometryOptions& options);
+               const StereoOdometryOptions& options);
 
   /// REQUIRES: called for frames 0, 1, 2, ... of the sequence.
   FrameMotion next(const vision::StereoImages& images);
@@ -43,7 +43,7 @@ class MotionSource {
   void estimate(const vision::StereoImages& images, FrameMotion& result);
 
   std::vector<Eigen::Isometry3d> poses_;
-  std::optional<vision::StereoOdometry> odometry_;
+  std::optional<StereoOdometry> odometry_;
   std::size_t frame_ = 0;
   Eigen::Isometry3d first_from_camera_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d last_motion_ = Eigen::Isometry3d::Identity();

@@ -20,12 +20,12 @@ namespace {
 struct OdometryArguments {
   SequenceArguments input;
   std::string out;
-  vision::StereoOdometryOptions options;
+  StereoOdometryOptions options;
   bool quiet = false;
 };
 
 void tell(const vision::StereoFrame& frame, const FrameMotion& motion, bool first, Progress& progress) {
-  const vision::OdometryResult& odometry = motion.odometry;
+  const OdometryResult& odometry = motion.odometry;
   if (!first && !odometry.motion)
     progress.note(fmt::format("frame {}: no motion ({}): the last one is repeated", frame.name, odometry.reason));
   const double travel_m = odometry.motion ? odometry.motion->current_from_previous.translation().norm() : 0;

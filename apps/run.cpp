@@ -61,7 +61,7 @@ struct RunArguments {
   SequenceArguments input;
   OptionArguments method;
   std::string out, poses, device, programs, tuning, write, trace;
-  vision::StereoOdometryOptions odometry;
+  StereoOdometryOptions odometry;
   bool interpolate = false, quiet = false, resume = false, overwrite = false;
 };
 

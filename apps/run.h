@@ -7,9 +7,9 @@
 
 #include "apps/output_folder.h"
 #include "egosgm/device.h"
+#include "egosgm/odometry.h"
 #include "egosgm/options.h"
 #include "egosgm/vision/dataset.h"
-#include "egosgm/vision/odometry.h"
 
 namespace egosgm::app {
 
@@ -18,8 +18,8 @@ struct SequenceJob {
   vision::StereoSequence sequence;
   std::string input;  // the arguments that named it, for messages
   PipelineOptions options;
-  std::string poses_file;                  // empty: stereo odometry,
-  vision::StereoOdometryOptions odometry;  // with these options
+  std::string poses_file;          // empty: stereo odometry,
+  StereoOdometryOptions odometry;  // with these options
   OutputFolder out;
   std::set<std::string> kinds;  // what is written beside the disparity, see parse_write_list
   // Files that are written as well, where they are not empty: the options in use, and a trace of all commands.

@@ -7,9 +7,9 @@
 #include <map>
 
 #include "egosgm/error.h"
+#include "egosgm/odometry.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
-#include "egosgm/vision/odometry.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/flow_io.h"
@@ -87,7 +87,7 @@ OdometryMotions::OdometryMotions(const vision::StereoSequence& sequence, int fir
 void OdometryMotions::run(const std::stop_token& stop, const vision::StereoSequence& sequence, int first, int last) {
   int i = first;
   try {
-    vision::StereoOdometry odometry(sequence.calibration);
+    StereoOdometry odometry(sequence.calibration);
     for (; i <= last && !stop.stop_requested(); ++i) {
       const vision::StereoImages images = vision::read_images(sequence.frames[i]);
       const auto motion = odometry.process(vision::image_view(images.left), vision::image_view(images.right)).motion;

@@ -32,7 +32,7 @@ namespace {
 struct ViewArguments {
   SequenceArguments input;
   OptionArguments method;
-  vision::StereoOdometryOptions odometry;
+  StereoOdometryOptions odometry;
   std::string poses, device, programs, video, pictures;
   double frames_per_second = 10;
   int cell_width = 620;

@@ -13,8 +13,8 @@
 #include "bench/report.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
+#include "egosgm/odometry.h"
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/odometry.h"
 #include "egosgm/vision/opencv.h"
 #include "host/match/matcher.h"
 #include "host/ocl/device_handle.h"
@@ -198,7 +198,7 @@ class Stream {
 
   const Clip& clip_;
   Matcher matcher_;
-  vision::StereoOdometry odometry_;
+  StereoOdometry odometry_;
 };
 
 TurnFunction video_frame(const Clip& clip, const MethodOptions& options, const Device& device) {

@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <opencv2/imgproc.hpp>
 
+#include "egosgm/odometry.h"
 #include "egosgm/vision/dataset.h"
-#include "egosgm/vision/odometry.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/synthetic.h"
 
@@ -41,7 +41,7 @@ Clip load_kitti(const std::filesystem::path& folder, cv::Size size) {
                    static_cast<double>(size.height) / original.height),
             {}};
   if (original != size) clip.title += ", resized";
-  vision::StereoOdometry odometry(sequence.calibration);
+  StereoOdometry odometry(sequence.calibration);
   for (const vision::StereoFrame& frame : sequence.frames) {
     const vision::StereoImages images = vision::read_images(frame);
     const auto result = odometry.process(vision::image_view(images.left), vision::image_view(images.right));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Stereo odometry alone, frame by frame on one thread, and its steps.
-#include "egosgm/vision/odometry.h"
+#include "egosgm/odometry.h"
 
 #include <cstdio>
 #include <cstdlib>
@@ -56,8 +56,8 @@ Video load_video() {
 
 void play(benchmark::State& state, const Video& video) {
   for (auto _ : state) {
-    vision::StereoOdometry odometry(video.calibration);
-    vision::OdometryTimes sums;
+    StereoOdometry odometry(video.calibration);
+    OdometryTimes sums;
     int motions = 0;
     for (const vision::StereoImages& images : video.frames) {
       const auto result = odometry.process(vision::image_view(images.left), vision::image_view(images.right));

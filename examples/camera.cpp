@@ -17,9 +17,9 @@
 #include <thread>
 #include <utility>
 
+#include "egosgm/odometry.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/calibration_io.h"
-#include "egosgm/vision/odometry.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/render.h"
 #include "egosgm/vision/window.h"
@@ -113,7 +113,7 @@ void run(const std::string& source, const egosgm::Calibration& calibration, cons
   const bool display = vision::has_display([] { cv::namedWindow(kWindow); });
   NewestFrame newest(source);
   std::optional<Pipeline> pipeline;
-  std::optional<vision::StereoOdometry> odometry;
+  std::optional<StereoOdometry> odometry;
   cv::Mat grey;
   Rate rate;
   int matched = 0;

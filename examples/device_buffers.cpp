@@ -10,10 +10,10 @@
 #include <cstdio>
 #include <opencv2/core.hpp>
 
+#include "egosgm/odometry.h"
 #include "egosgm/opencl.h"
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/disparity_io.h"
-#include "egosgm/vision/odometry.h"
 #include "egosgm/vision/opencv.h"
 
 namespace {
@@ -49,7 +49,7 @@ int main(int argc, char** argv) try {
       depth(context, CL_MEM_WRITE_ONLY, pixels * sizeof(float));
 
   DevicePipeline pipeline(queue(), c, size.width, size.height);
-  vision::StereoOdometry odometry(c);
+  StereoOdometry odometry(c);
   cv::Mat picture(size.height, 2 * size.width, CV_8UC1), depth_m(size, CV_32FC1);
   for (const vision::StereoFrame& frame : sequence.frames) {
     const vision::StereoImages images = vision::read_images(frame);

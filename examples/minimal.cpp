@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // minimal SEQUENCE: writes 000000.png, ... (KITTI's disparity format) for a folder in a layout of KITTI's or
 // Middlebury's.
+#include <egosgm/odometry.h>
 #include <egosgm/pipeline.h>
 #include <egosgm/vision/dataset.h>
 #include <egosgm/vision/disparity_io.h>
-#include <egosgm/vision/odometry.h>
 #include <egosgm/vision/opencv.h>
 
 #include <cstdio>
@@ -16,7 +16,7 @@ void run(const char* folder) {
   const vision::StereoSequence sequence = vision::open_folder(folder);
   const cv::Size size = vision::check_image_sizes(sequence);
   Pipeline pipeline(sequence.calibration, size.width, size.height);
-  vision::StereoOdometry odometry(sequence.calibration);
+  StereoOdometry odometry(sequence.calibration);
   for (const vision::StereoFrame& frame : sequence.frames) {
     const auto [left, right] = vision::read_images(frame);
     const auto motion = odometry.process(vision::image_view(left), vision::image_view(right)).motion;

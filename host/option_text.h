@@ -19,8 +19,8 @@ struct Choice {
   Enum value;
 };
 constexpr Choice<MatchingCost> choice(MatchingCost, int i) {
-  constexpr Choice<MatchingCost> choices[] = {{"census13x11", MatchingCost::kCensus13x11},
-                                              {"census9x7", MatchingCost::kCensus9x7},
+  constexpr Choice<MatchingCost> choices[] = {{"census9x7", MatchingCost::kCensus9x7},
+                                              {"learned7x7", MatchingCost::kLearned7x7},
                                               {"census5x5", MatchingCost::kCensus5x5},
                                               {"sad3x3", MatchingCost::kSad3x3}};
   return i < 4 ? choices[i] : Choice<MatchingCost>{nullptr, {}};

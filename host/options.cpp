@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The public options: one table of what each is, and where those of earlier versions went.
+// The public options: one table of what each is.
 #include "egosgm/options.h"
 
 #include <algorithm>
@@ -42,10 +42,10 @@ void for_each(Options& o, Visit&& visit) {
                    "Estimate how far the rows of the two views are off, and resample the right one.", "", "true, false",
                    "Set it to false if your rectification is exact, as for rendered images."},
         o.vertical_alignment);
-  visit(OptionText{"cost",
-                   "Matching cost of a pixel pair: Hamming distance of census codes, or sum of absolute differences.",
-                   "", "census13x11, census9x7, census5x5, sad3x3",
-                   "Set census5x5 if thin objects are lost; sad3x3 needs cameras of equal brightness."},
+  visit(OptionText{"cost", "Matching cost of a pixel pair: Hamming distance of codes, or sum of absolute differences.",
+                   "", "census9x7, learned7x7, census5x5, sad3x3",
+                   "Set learned7x7 for single pairs full of texture, not for noisy or plain scenes; census5x5 if thin "
+                   "objects are lost; sad3x3 needs cameras of equal brightness."},
         o.cost);
   visit(OptionText{"paths", "Paths of the semi-global aggregation.", "", "4, 8",
                    "Set 8 if single pairs count more than time."},
@@ -78,54 +78,6 @@ void for_each(Options& o, Visit&& visit) {
   visit(OptionText{"gate_px", "Where prediction and measurement differ by more, the measurement counts.", "px",
                    "0 (average always) or more", "Lower it if moving objects smear; raise it if the map flickers."},
         o.gate_px);
-}
-
-/// Where the options of version 0.1 went. An empty new name: a constant of the method.
-struct Moved {
-  const char* name;
-  const char* to;
-};
-constexpr Moved kMoved[] = {
-    {"search", ""},
-    {"forward_warp.process_noise_px2", "process_noise_px2"},
-    {"forward_warp.motion_noise", "covariance"},
-    {"consistency.prediction_px", "left_right_px"},
-    {"consistency.measurement_px", "left_right_px"},
-    {"consistency.update_px", "left_right_px"},
-    {"coarse_match.enabled", "coarse_match"},
-    {"search_band.sigmas", "search_sigmas"},
-    {"search_band.min_half_width_px", "min_half_width_px"},
-    {"banded_sgm.cost", "cost"},
-    {"banded_sgm.paths", "paths"},
-    {"banded_sgm.p1", "p1"},
-    {"banded_sgm.p2", "p2"},
-    {"banded_sgm.scheduling", "tuning"},
-    {"banded_sgm.max_memory_mib", "max_memory_mib"},
-    {"vertical_alignment.enabled", "vertical_alignment"},
-    {"speckle_removal.max_size_px", "max_speckle_px"},
-    {"kalman_update.gate_px", "gate_px"},
-    {"kalman_update.keep_predicted", "keep_predicted"},
-    {"dynamic_map.enabled", "output"},
-};
-
-std::string where_it_went(std::string_view name) {
-  std::string to;
-  for (const Moved& moved : kMoved) {
-    if (name == moved.name) to = moved.to;
-  }
-  if (to == "covariance") return "scale the covariance of the motion instead";
-  if (to == "tuning") return "it is a tuning now, `scheduling`, as it changes no result";
-  if (to == "output") return "ask for the output `dynamic` instead";
-  if (to.empty()) return "it is a constant of the method now (docs/options.md)";
-  return "it is called " + to + " now";
-}
-
-bool was_an_option(std::string_view name) {
-  if (name == "dynamic_map.enabled") return true;
-  for (const NamedOption& parameter : list_parameters({})) {
-    if (name == parameter.name) return true;
-  }
-  return false;
 }
 
 /// Before the names of constants, which benches set as they set options.
@@ -219,8 +171,6 @@ void set_option(PipelineOptions& options, std::string_view name, std::string_vie
   if (found && name == "preset")
     options = options.preset == Preset::kPaper ? PipelineOptions::paper() : PipelineOptions();
   if (found) return;
-  if (was_an_option(name))
-    throw InvalidArgument("no option named \"" + std::string(name) + "\": " + where_it_went(name));
   const std::string nearest = nearest_to(options, name);
   throw InvalidArgument("no option named \"" + std::string(name) + "\": " +
                         (nearest.empty() ? "`egosgm run --help` lists them" : "did you mean " + nearest + "?"));

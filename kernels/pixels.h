@@ -68,12 +68,12 @@ static inline int any_of(const Ints condition) {
 #if PIXELS == 1
 #define GATHERED(Values, row, places) ((Values)(VALUE_AT(row, places, 0)))
 #else
-#define GATHERED(Values, row, places)                                                                             \
-  ((Values)(VALUE_AT(row, places, 0), VALUE_AT(row, places, 1), VALUE_AT(row, places, 2), VALUE_AT(row, places, 3), \
-            VALUE_AT(row, places, 4), VALUE_AT(row, places, 5), VALUE_AT(row, places, 6), VALUE_AT(row, places, 7), \
-            VALUE_AT(row, places, 8), VALUE_AT(row, places, 9), VALUE_AT(row, places, 10),                          \
-            VALUE_AT(row, places, 11), VALUE_AT(row, places, 12), VALUE_AT(row, places, 13),                        \
-            VALUE_AT(row, places, 14), VALUE_AT(row, places, 15)))
+#define GATHERED(Values, row, places)                                                                                 \
+  ((Values)(VALUE_AT(row, places, 0), VALUE_AT(row, places, 1), VALUE_AT(row, places, 2), VALUE_AT(row, places, 3),   \
+            VALUE_AT(row, places, 4), VALUE_AT(row, places, 5), VALUE_AT(row, places, 6), VALUE_AT(row, places, 7),   \
+            VALUE_AT(row, places, 8), VALUE_AT(row, places, 9), VALUE_AT(row, places, 10), VALUE_AT(row, places, 11), \
+            VALUE_AT(row, places, 12), VALUE_AT(row, places, 13), VALUE_AT(row, places, 14),                          \
+            VALUE_AT(row, places, 15)))
 #endif
 static inline Floats gather(volatile global const float* row, const Ints* places) {
   return GATHERED(Floats, row, *places);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "egosgm/vision/odometry.h"
+#include "egosgm/odometry.h"
 
 #include <pybind11/stl.h>
 
@@ -11,7 +11,7 @@
 #include "python/option_values.h"
 #include "python/other_threads.h"
 
-namespace egosgm::vision {
+namespace egosgm {
 
 template <typename Visit>
 void for_each_field(StereoOdometryOptions& o, Visit&& visit) {
@@ -29,6 +29,8 @@ void for_each_field(StereoOdometryOptions& o, Visit&& visit) {
   visit("min_inlier_ratio", o.min_inlier_ratio);
   visit("seed", o.seed);
 }
+
+namespace vision {
 
 template <typename Visit>
 void for_each_field(SyntheticOptions& o, Visit&& visit) {
@@ -48,13 +50,12 @@ void for_each_field(SyntheticOptions& o, Visit&& visit) {
   visit("supersampling", o.supersampling);
 }
 
-}  // namespace egosgm::vision
+}  // namespace vision
+}  // namespace egosgm
 
 namespace egosgm::python {
 namespace {
 
-using vision::OdometryResult;
-using vision::StereoOdometry;
 using vision::SyntheticFrame;
 using vision::SyntheticSequence;
 
@@ -68,7 +69,7 @@ Options options_of(const py::kwargs& values) {
 /// One frame after the other, also where several Python threads call.
 class LockedOdometry {
  public:
-  LockedOdometry(const Calibration& calibration, const vision::StereoOdometryOptions& options)
+  LockedOdometry(const Calibration& calibration, const StereoOdometryOptions& options)
       : odometry_(calibration, options) {}
 
   OdometryResult process(const py::object& left, const py::object& right, const py::object& prior) {
@@ -140,7 +141,7 @@ void bind_odometry(py::module_& module) {
                              "Ego-motion from rectified stereo video. Options as keyword arguments: see "
                              "odometry_options(). Threads that share one take turns.")
       .def(py::init([](const Calibration& calibration, const py::kwargs& values) {
-             return std::make_unique<LockedOdometry>(calibration, options_of<vision::StereoOdometryOptions>(values));
+             return std::make_unique<LockedOdometry>(calibration, options_of<StereoOdometryOptions>(values));
            }),
            py::arg("calibration"))
       .def("process", &LockedOdometry::process, py::arg("left"), py::arg("right"), py::arg("prior") = py::none(),
@@ -148,7 +149,7 @@ void bind_odometry(py::module_& module) {
            "guides the search. The first frame has no motion.")
       .def("reset", &LockedOdometry::reset, "Forgets all frames: the next one is a first frame.");
   module.def(
-      "odometry_options", [] { return dict_of_fields(vision::StereoOdometryOptions{}); },
+      "odometry_options", [] { return dict_of_fields(StereoOdometryOptions{}); },
       "All options of StereoOdometry with their defaults.");
   bind_synthetic(module);
 }

@@ -38,9 +38,7 @@ py::object whole(const py::handle& value) {
 
 void set_options(PipelineOptions& options, const py::dict& values) {
   for (const auto& [key, value] : values) {
-    auto name =
-        key.cast<std::string>();  // `stage__name`, as options were called, gets the error that says where it went
-    if (const auto at = name.find("__"); at != std::string::npos) name.replace(at, 2, ".");
+    const auto name = key.cast<std::string>();
     if (!py::isinstance<py::dict>(value)) {
       set_option(options, name, text_of(value));
       continue;

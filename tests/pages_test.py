@@ -16,11 +16,10 @@ FOLDERS = "apps|bench|cmake|docs|examples|host|include|kernels|python|ros|script
 
 
 def of_pages(pattern):
-    """(page's name, what the pattern's groups hold), line by line; not of lines that tell of names of earlier versions."""
+    """(page's name, what the pattern's groups hold), line by line."""
     for page, text in PAGES.items():
         for line in text.splitlines():
-            if "version 0.1" not in line:
-                yield from ((page.name, match) for match in re.findall(pattern, line))
+            yield from ((page.name, match) for match in re.findall(pattern, line))
 
 
 class Pages(ProgramTest):

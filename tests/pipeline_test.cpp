@@ -210,8 +210,8 @@ TEST(Pipeline, KnowsARepeatedPairAgain) {
   EXPECT_LT(densities[2], densities[1] + 0.01f);
   EXPECT_LT(densities[3], densities[1] + 0.01f);
   pipeline.reset(), twin.reset();
-  expect_outputs(process(pipeline, setting, video, 1).outputs, twin.process(video.twin_images(1), video.twin_motions(1)),
-                 setting.size);
+  expect_outputs(process(pipeline, setting, video, 1).outputs,
+                 twin.process(video.twin_images(1), video.twin_motions(1)), setting.size);
 }
 
 TEST(Pipeline, RecoversFromAWrongMotion) {

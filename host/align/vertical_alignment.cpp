@@ -14,11 +14,10 @@ constexpr std::size_t kTerms = EGOSGM_OFFSET_TERMS + 1;
 
 ocl::Program& build(ocl::Context& context, PixelType type, int row_group) {
   context.enter("VerticalAlignment");
-  return context.program("vertical_alignment.cl",
-                         ocl::Defines()
-                             .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
-                             .set("ROW_GROUP", row_group)
-                             .set("PIXELS", row_group == 1 ? 16 : 1));
+  return context.program("vertical_alignment.cl", ocl::Defines()
+                                                      .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
+                                                      .set("ROW_GROUP", row_group)
+                                                      .set("PIXELS", row_group == 1 ? 16 : 1));
 }
 
 int sampled_rows(shared::ImageSize size) {

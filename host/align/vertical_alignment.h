@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {

@@ -106,7 +106,8 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
   while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
   const int least = 3 * BandedSgm::kStripeOverlap;
   if (rows >= least) return rows;
-  const std::uint64_t needed = demand(context, {size.width, std::min(size.height, least)}, range, options, chunks).total;
+  const std::uint64_t needed =
+      demand(context, {size.width, std::min(size.height, least)}, range, options, chunks).total;
   throw DeviceError(
       CL_MEM_OBJECT_ALLOCATION_FAILURE,
       "BandedSgm: a stripe of " + std::to_string(std::min(size.height, least)) + " rows needs " +

@@ -3,8 +3,6 @@
 
 #include <algorithm>
 
-#include "kernels/method.h"
-
 namespace egosgm {
 namespace {
 
@@ -20,8 +18,8 @@ Comparisons comparisons(MatchingCost cost) {
       return {1, 2, 2};
     case MatchingCost::kCensus9x7:
       return {1, 4, 3};
-    case MatchingCost::kCensus13x11:
-      return {2, EGOSGM_CENSUS13X11_RADIUS_X, EGOSGM_CENSUS13X11_RADIUS_Y};
+    case MatchingCost::kLearned7x7:
+      return {2, 4, 4};  // the window, and a pixel around it for sums of 3x3
   }
   return {};
 }

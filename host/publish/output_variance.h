@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/method_options.h"
 #include "host/maps.h"
+#include "host/method_options.h"
 #include "host/ocl/kernel.h"
 
 namespace egosgm {
@@ -11,7 +11,8 @@ namespace egosgm {
 /// measurement's r, which are of a pixel on the right one: s = scale * (mean of (p r^3)^(1/4) over 17x17 pixels)^1.5 +
 /// roughness_weight * (mean over 7x7 pixels of how far the disparity is from a plane's)^2 + jump_weight * (largest
 /// difference to the disparities two pixels off)^2; and of this sum
-/// 0.16 s^2 / (s^2 + 0.06) + 1.2 sqrt(s) s^4 / (s^4 + 1).
+/// RIGHT_SURFACE_PX2 s^2 / (s^2 + RIGHT_SURFACE_HALF) + WRONG_SURFACE_PX2 sqrt(s) s^5 / (s^5 + WRONG_SURFACE_HALF), the
+/// constants EGOSGM_... of kernels/method.h.
 class OutputVariance {
  public:
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.

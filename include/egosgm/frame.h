@@ -61,7 +61,7 @@ struct DeviceCommand {
 struct FrameReport {
   Unpredicted unpredicted = Unpredicted::kNo;  // why nothing was predicted
   bool searched_everything = false;     // the whole range at every pixel: without a prediction, or not trusting it
-  double search_fraction = 0;           // see below
+  double search_fraction = 0;           // see above
   double predicted_fraction = 0;        // left pixels with a prediction
   double density = 0;                   // left pixels with a disparity
   double vertical_offset_px = 0;        // by which the middle of the right image was resampled

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,9 +10,9 @@
 
 namespace egosgm {
 
-/// Matching cost of a pixel pair: Hamming distance of census codes, or the mean absolute difference of a 3x3 window.
-/// kCensus13x11 compares 32 pixels of its window, denser towards the centre, and counts each twice.
-enum class MatchingCost { kCensus13x11, kCensus9x7, kCensus5x5, kSad3x3 };
+/// Matching cost of a pixel pair: Hamming distance of codes, or the mean absolute difference of a 3x3 window.
+/// kLearned7x7: a census of 5x5 and 40 learned comparisons of 3x3 means within 7x7 pixels.
+enum class MatchingCost { kCensus9x7, kLearned7x7, kCensus5x5, kSad3x3 };
 
 /// Where the options start from, and what chooses the constants of the method.
 /// kPaper: the method of Fućek et al. (IFAC 2017), docs/paper.md.
@@ -22,9 +20,6 @@ enum class Preset { kDefault, kPaper };
 
 /// What a user can choose. Meaning, unit, range and when to change each: list_options, `egosgm run --help` and
 /// docs/options.md, from one table. Value semantics; not thread-safe.
-///
-/// The layout is fixed: a later version takes new options from `reserved`, and the library's constructor fills them, so
-/// that programs which were compiled with this header go on working.
 struct EGOSGM_EXPORT PipelineOptions {
   int disparities;          ///< D: number of disparities; the range is [min_disparity, min_disparity + D) px
   int min_disparity;        ///< least disparity [px], of either sign
@@ -47,7 +42,6 @@ struct EGOSGM_EXPORT PipelineOptions {
 
   /// Constants of the method that differ from the preset's, as (name, value): for experiments. They may change or go.
   std::vector<std::pair<std::string, std::string>> constants;
-  std::array<std::uint64_t, 16> reserved{};  ///< zero
 
   /// The default preset.
   PipelineOptions();

@@ -16,8 +16,6 @@
 
 namespace egosgm {
 
-struct ProgramFile;  // egosgm/programs.h
-
 /// Dense disparity from stereo video (Fućek et al. 2017): the last frame's disparity map, moved by the camera's motion,
 /// says where to search, and a Kalman filter per pixel fuses what was predicted with what was measured.
 ///
@@ -72,7 +70,6 @@ class EGOSGM_EXPORT Pipeline {
   std::uint64_t device_memory_bytes() const;  // allocated on the device, constant
 
  private:
-  friend std::vector<ProgramFile> compile_programs(const Device&, const PipelineOptions&);
   friend class DevicePipeline;  // egosgm/opencl.h
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -82,7 +82,8 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
   for (int i = lane; i < SLOT; i += LANES) edges[0][line][i] = edges[1][line][i] = ABSENT << 16 | ABSENT;
   barrier(CLK_LOCAL_MEM_FENCE);
   int longest = 0;
-  _Pragma("unroll 1") for (int i = 0; i < LINES; ++i) longest = max(longest, line_of(q, direction, first_line + i).length);
+  _Pragma("unroll 1") for (int i = 0; i < LINES; ++i) longest =
+      max(longest, line_of(q, direction, first_line + i).length);
   follow_together(q, path, longest, lane, pixels, sums, edges[0][line], minima[0][line]);
 #endif
 }

@@ -31,10 +31,12 @@ typedef ushort Ushorts __attribute__((ext_vector_type(32)));
 #define LEAST_OF_VECTORS(block) min((block).lo, (block).hi)
 
 // Each lane's neighbour; beside the block lies nothing.
-#define LANES_BELOW(block) \
-  __builtin_shufflevector(block, (Block)(255), 32, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30)
-#define LANES_ABOVE(block) \
-  __builtin_shufflevector(block, (Block)(255), 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32)
+#define LANES_BELOW(block)                                                                                           \
+  __builtin_shufflevector(block, (Block)(255), 32, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, \
+                          19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30)
+#define LANES_ABOVE(block)                                                                                            \
+  __builtin_shufflevector(block, (Block)(255), 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, \
+                          21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32)
 
 // In forms that clang turns into one instruction.
 inline Block least_of(const Block a, const Block b) { return a < b ? a : b; }

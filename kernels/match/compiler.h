@@ -14,12 +14,11 @@
 // The least of eight 16-bit lanes, in the first one: an instruction of x86 that paths wait for, in place of six.
 #if defined(__clang__) && defined(__SSE4_1__)
 typedef short ShortsOfX86 __attribute__((vector_size(16)));
-#define LEAST_OF_WORDS(v) \
-  __builtin_astype(__builtin_ia32_phminposuw128(__builtin_astype(v, ShortsOfX86)), ushort8)
+#define LEAST_OF_WORDS(v) __builtin_astype(__builtin_ia32_phminposuw128(__builtin_astype(v, ShortsOfX86)), ushort8)
 #endif
 
-// Functions that must become part of the kernel's loop. Unoptimised code, which oclgrind and valgrind run, needs no such
-// thing, and oclgrind does not know what compilers note where they inline.
+// Functions that must become part of the kernel's loop. Unoptimised code, which oclgrind and valgrind run, needs no
+// such thing, and oclgrind does not know what compilers note where they inline.
 #ifdef __OPTIMIZE__
 #define ALWAYS_INLINE __attribute__((always_inline)) inline
 #else

@@ -8,9 +8,8 @@
 #include "row.h"
 
 // The path costs of a pixel, which it leaves in the slots in place of those before it.
-ALWAYS_INLINE void follow_narrow(const SgmParameters q, const Row* row, const uint extent,
-                                                         const uint steps, const uchar16 absent, const uchar16 cost,
-                                                         Place* place, uchar16* r) {
+ALWAYS_INLINE void follow_narrow(const SgmParameters q, const Row* row, const uint extent, const uint steps,
+                                 const uchar16 absent, const uchar16 cost, Place* place, uchar16* r) {
   const uint lane = (uint)origin_of(extent) - (uint)q.min_disparity,
              moved_lane = place->moved + (uint)origin_of(extent);
   const uchar4 each = as_uchar4(steps);
@@ -38,8 +37,8 @@ ALWAYS_INLINE void follow_narrow(const SgmParameters q, const Row* row, const ui
 }
 
 // Matches a pixel, and leaves its sum, or with the other sweep's its winner.
-ALWAYS_INLINE void match_narrow(const bool meets, const SgmParameters q, const Row* row,
-                                                        const uint extent, const uint steps, Place* place) {
+ALWAYS_INLINE void match_narrow(const bool meets, const SgmParameters q, const Row* row, const uint extent,
+                                const uint steps, Place* place) {
   const int origin = origin_of(extent), lane = (int)((uint)origin - (uint)q.min_disparity);
   const uchar16 absent = lanes_from(EGOSGM_LANES * chunks_of(extent)) | absent_from(q.disparities - lane);
   const uchar16 cost = absent | matching_cost(place->own, place->other + origin, row->row_above, row->row_below);

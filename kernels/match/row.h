@@ -35,7 +35,7 @@ typedef struct {
 #if BLOCK_VECTORS == 2
   Block last_block, least_of_block;  // the same where it takes a block, and what is still to be taken off
 #endif
-  uint moved;     // how far the slots have moved on, less the least disparity
+  uint moved;  // how far the slots have moved on, less the least disparity
 } Place;
 
 // Goes on to the next pixel, but for its sums and `moved`. What was to the upper right is above it.

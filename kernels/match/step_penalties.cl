@@ -3,8 +3,8 @@
 // since that is where surfaces end (Hirschmueller 2008, section 2.3): P2(p, q) = max(least, most - slope |I(p) -
 // I(q)|), grey values of 8 bits.
 //
-// Four bytes a pixel: the steps to the left, to above, to the upper left and to the upper right neighbour. They lie side
-// by side, as what a sweep reads in the short rows of a tile should lie in few places.
+// Four bytes a pixel: the steps to the left, to above, to the upper left and to the upper right neighbour. They lie
+// side by side, as what a sweep reads in the short rows of a tile should lie in few places.
 #include "grey.h"
 #include "pixels.h"
 

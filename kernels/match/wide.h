@@ -101,8 +101,7 @@ inline void find_winner(const Pixel* pixel, const int vectors, const PathCosts* 
   }
 }
 
-ALWAYS_INLINE void match_blocks(const bool meets, const int vectors, const Pixel* pixel,
-                                                        Candidate* candidate) {
+ALWAYS_INLINE void match_blocks(const bool meets, const int vectors, const Pixel* pixel, Candidate* candidate) {
   const int blocks = vectors / BLOCK_VECTORS;
   const bool has_tail = vectors % BLOCK_VECTORS != 0;
   const Block tail = block_from(VECTOR) | absent_in_block(pixel->disparities - BLOCK * blocks);

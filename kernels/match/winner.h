@@ -43,8 +43,8 @@ inline void put_window(const ushort* totals, const int winner_total, Candidate* 
   candidate->rank = winner_total << 4;
 }
 
-// What `leave_winners` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one is
-// missing), steps; 16 bits each.
+// What `leave_winners` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one
+// is missing), steps; 16 bits each.
 inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
   const int here = candidate->rank >> 4;
   const ushort* at = (const ushort*)&candidate->totals + MAX_STEPS + (candidate->rank & 15);

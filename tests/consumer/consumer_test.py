@@ -5,7 +5,6 @@ EGOSGM_BUILD names the build folder, EGOSGM_CXX the compiler, EGOSGM_HAS_VISION 
 """
 import os
 import pathlib
-import shutil
 import subprocess
 import tempfile
 import unittest
@@ -81,6 +80,16 @@ class Installed(unittest.TestCase):
         self.assertIn(" T egosgm::Pipeline::process", shown)
         self.assertNotIn("egosgm::ForwardWarp::", shown)
         self.assertNotIn("egosgm::ocl::", shown)
+
+    def test_the_core_needs_no_opencv(self):
+        flags = self.assert_runs("pkg-config", "--cflags", "--libs", "egosgm", env=dict(
+            os.environ, PKG_CONFIG_PATH=str(self.library_folder() / "pkgconfig"))).split()
+        program = self.folder / "without_opencv"
+        self.assert_runs(CXX, "-std=c++20", SOURCE / "core.cpp", *flags, "-o", program)  # odometry and pipeline
+        needed = self.assert_runs("ldd", program, env=dict(os.environ, LD_LIBRARY_PATH=str(self.library_folder())))
+        self.assertIn("libegosgm.so", needed)
+        for library in ("opencv", "libpng", "libjpeg", "libisal"):
+            self.assertNotIn(library, needed)
 
     @unittest.skipUnless(VISION, "no program without vision")
     def test_the_program_finds_its_libraries(self):

@@ -15,7 +15,8 @@ std::vector<std::string> seeds() {
     const bool bare = option.value.find_first_not_of("+-.0123456789e") == std::string::npos;
     all += option.name + " = " + (bare ? option.value : '"' + option.value + '"') + '\n';
   }
-  return {all, "disparities = 40\np1 = 7\np2 = 77\ncost = \"census5x5\"\n[constants.search_band]\nfrom_neighbours = false\n",
+  return {all,
+          "disparities = 40\np1 = 7\np2 = 77\ncost = \"census5x5\"\n[constants.search_band]\nfrom_neighbours = false\n",
           "[a.b.c.d]\np1 = 7\n[" + deep + "]\n", "[[x.y]]\n[[x.y]]\na.b.c.d.e.f = [1, 2]\n"};
 }
 

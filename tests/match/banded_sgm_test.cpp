@@ -21,7 +21,7 @@ namespace {
 struct Case {
   shared::ImageSize size;
   shared::DisparityRange range;
-  MatchingCost cost = MatchingCost::kCensus13x11;
+  MatchingCost cost = MatchingCost::kCensus5x5;
   int paths = 8;
   bool banded = true;
   Scheduling scheduling = Scheduling::kWavefront;
@@ -204,7 +204,7 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
 
 TEST(BandedSgmStripes, EqualTheTwinOfEach) {
   for (const Scheduling scheduling : {Scheduling::kWavefront, Scheduling::kPaths}) {
-    for (const MatchingCost cost : {MatchingCost::kCensus13x11, MatchingCost::kSad3x3}) {
+    for (const MatchingCost cost : {MatchingCost::kCensus5x5, MatchingCost::kSad3x3}) {
       const bool reads_off = cost == MatchingCost::kSad3x3;
       const Case c{.size = {61, 301},
                    .range = {-5, 37},

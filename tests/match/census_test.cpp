@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <random>
 
 #include "tests/reference/match/census.h"
@@ -18,7 +19,7 @@ std::string name(const ::testing::TestParamInfo<Case>& info) {
   const auto [size, type, cost, pixels] = info.param;
   return std::to_string(size.width) + "x" + std::to_string(size.height) +
          (type == PixelType::kU8 ? "_8bit" : "_16bit") +
-         (cost == MatchingCost::kCensus13x11 ? "_census13x11"
+         (cost == MatchingCost::kLearned7x7  ? "_learned7x7"
           : cost == MatchingCost::kCensus9x7 ? "_census9x7"
           : cost == MatchingCost::kCensus5x5 ? "_census5x5"
                                              : "_grey") +
@@ -55,15 +56,57 @@ TEST_P(CensusTest, EqualsReference) {
                                  {(size.width + 2 * padding) * Census::words(cost), size.height}));
 }
 
+/// The codes of a pair of 16 bits.
+std::vector<cl_uint> codes_of(shared::ImageSize size, const std::vector<std::uint16_t>& greys) {
+  ocl::Context context(testing::any_device());
+  Census census(context, size, PixelType::kU16, MatchingCost::kLearned7x7, 0);
+  ocl::Buffer<cl_uchar> images(context, 2 * greys.size());
+  ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kLearned7x7, size, 0));
+  std::vector<cl_uchar> raw;
+  for (const std::uint16_t grey : greys) {
+    raw.push_back(static_cast<cl_uchar>(grey));
+    raw.push_back(static_cast<cl_uchar>(grey >> 8));
+  }
+  images.write(context, raw);
+  census(images, codes);
+  return codes.read(context);
+}
+
+// Cameras differ in exposure: an offset changes no bit, a gain those alone that a threshold decides.
+TEST(Census, LearnedSeesThroughAnOffsetAndMostOfAGain) {
+  const shared::ImageSize size{67, 41};
+  std::mt19937 random(2);
+  std::uniform_int_distribution<int> grey(0, 20000);
+  std::vector<std::uint16_t> greys(2 * pixel_count(size)), brighter, doubled;
+  for (std::uint16_t& value : greys) value = static_cast<std::uint16_t>(grey(random));
+  for (const std::uint16_t value : greys) {
+    brighter.push_back(static_cast<std::uint16_t>(value + 3000));
+    doubled.push_back(static_cast<std::uint16_t>(2 * value));
+  }
+  const auto codes = codes_of(size, greys), of_doubled = codes_of(size, doubled);
+  EXPECT_EQ(codes_of(size, brighter), codes);
+  std::size_t bits = 0;
+  for (std::size_t word = 0; word < codes.size(); ++word) {
+    const cl_uint differing = codes[word] ^ of_doubled[word];
+    if (word % 2 == 1) {
+      EXPECT_EQ(differing >> 8, 0u) << "the census of 5x5";
+    }
+    bits += static_cast<std::size_t>(std::popcount(differing));
+  }
+  EXPECT_GT(bits, 0u) << "thresholds are grey levels";
+  EXPECT_LT(bits, 64 * codes.size() / 2 / 20);
+}
+
 INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
                          ::testing::Combine(::testing::ValuesIn(testing::kSizes),
                                             ::testing::Values(PixelType::kU8, PixelType::kU16),
-                                            ::testing::Values(MatchingCost::kCensus13x11, MatchingCost::kCensus9x7,
+                                            ::testing::Values(MatchingCost::kLearned7x7, MatchingCost::kCensus9x7,
                                                               MatchingCost::kCensus5x5, MatchingCost::kSad3x3),
                                             ::testing::Values(1, 16)),
                          name);
 INSTANTIATE_TEST_SUITE_P(Large, CensusTest,
-                         ::testing::Values(std::tuple{testing::kLargest, PixelType::kU8, MatchingCost::kCensus13x11, 16}),
+                         ::testing::Values(std::tuple{testing::kLargest, PixelType::kU8, MatchingCost::kLearned7x7,
+                                                      16}),
                          name);
 
 }  // namespace

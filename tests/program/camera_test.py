@@ -7,7 +7,7 @@ import unittest
 import numpy
 
 from input_case import InputTest, read_grey
-from program_case import EXAMPLES, FRAMES, HEIGHT, WIDTH, png
+from program_case import EXAMPLES, FRAMES, HEIGHT, WIDTH
 
 
 class Camera(InputTest):

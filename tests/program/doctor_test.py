@@ -6,7 +6,7 @@ import unittest
 import numpy
 
 from input_case import InputTest, read_grey, sampled, write_grey
-from program_case import DATA, FRAMES, HEIGHT, WIDTH, egosgm, png
+from program_case import DATA, FRAMES, HEIGHT, WIDTH, png
 
 
 class Doctor(InputTest):

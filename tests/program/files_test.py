@@ -2,7 +2,6 @@
 """What the program may write, replace and remove: only what it can prove to be its own. Environment as for program_case.py."""
 import json
 import os
-import pathlib
 import shutil
 import signal
 import stat
@@ -11,7 +10,7 @@ import threading
 import time
 import unittest
 
-from program_case import PROGRAM, ProgramTest, egosgm, grey_png
+from program_case import PROGRAM, ProgramTest, grey_png
 
 METHOD = ("--disparities", 16, "--quiet")
 CALIBRATION = "fx = 100\nfy = 100\ncx = 32\ncy = 15\nbaseline_m = 0.5\n"

@@ -10,7 +10,7 @@ import unittest
 import numpy
 
 from input_case import InputTest, read_grey, rotation, sampled, write_grey
-from program_case import FRAMES, HEIGHT, WIDTH, png
+from program_case import FRAMES, HEIGHT, WIDTH
 
 
 class RectifyTest(InputTest):

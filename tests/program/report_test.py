@@ -8,7 +8,6 @@ import pathlib
 import shutil
 import subprocess
 import tempfile
-import time
 import unittest
 
 from program_case import FRAMES, HEIGHT, WIDTH, ProgramTest

@@ -50,7 +50,6 @@ class WrongArguments(ProgramTest):
             self.assertNotIn("did you mean", done.stderr)
             self.assertNotIn("main function", done.stderr)
         self.assert_refused(self.run_with("--set", "p3=150"), "did you mean p1 or p2?", cwd=folder)
-        self.assert_refused(self.run_with("--set", "banded_sgm.p2=150"), "it is called p2 now", cwd=folder)
         self.assert_refused(self.run_with("--preset", "papr"), "did you mean paper?", cwd=folder)
         config = folder / "config.toml"
         config.write_text("# options\n\n[constants.banded_sgm]\np2 = 150\np9 = 1\n")

@@ -40,8 +40,8 @@ std::vector<T> left_and_right(std::vector<T> left, const std::vector<T>& right) 
   return left;
 }
 
-/// The sizes that every kernel is tested at: nothing is a multiple of anything. The largest stands in suites of its own,
-/// `Large`, which lanes leave out that would take minutes for it.
+/// The sizes that every kernel is tested at: nothing is a multiple of anything. The largest stands in suites of its
+/// own, `Large`, which lanes leave out that would take minutes for it.
 inline const std::vector<shared::ImageSize> kSizes{{1, 1}, {7, 5}, {65, 3}, {127, 33}, {320, 97}};
 inline constexpr shared::ImageSize kLargest{1242, 375};
 

@@ -35,7 +35,7 @@ struct Setting {
 
 // Few speckles are dropped and few pixels a region has, so that small images keep something.
 inline MethodOptions options(int disparities, int min_disparity,
-                               const std::function<void(MethodOptions&)>& change = {}) {
+                             const std::function<void(MethodOptions&)>& change = {}) {
   MethodOptions options;
   options.disparities = disparities;
   options.min_disparity = min_disparity;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Drives, whole images in and motions out.
-#include "egosgm/vision/odometry.h"
+#include "egosgm/odometry.h"
 
 #include <gtest/gtest.h>
 
@@ -19,10 +19,10 @@
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
 #include "egosgm/vision/synthetic.h"
-#include "host/vision/odometry_geometry.h"
+#include "host/odometry/geometry.h"
+#include "tests/odometry/motions.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
-#include "tests/vision/odometry_motions.h"
 
 namespace egosgm::vision {
 namespace {

@@ -22,9 +22,9 @@
 #include "egosgm/device.h"
 #include "egosgm/frame.h"
 #include "egosgm/named_options.h"
+#include "egosgm/odometry.h"
 #include "egosgm/options.h"
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/odometry.h"
 
 namespace egosgm_component {
 
@@ -50,7 +50,7 @@ struct Matching {
   egosgm::Calibration calibration;
   int width, height;
   egosgm::Pipeline pipeline;
-  egosgm::vision::StereoOdometry odometry;
+  egosgm::StereoOdometry odometry;
 };
 
 class Disparity : public rclcpp::Node {

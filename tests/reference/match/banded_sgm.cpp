@@ -51,7 +51,7 @@ struct View {
 
   int cost(int x, int y, int d) const {
     if (options.cost != MatchingCost::kSad3x3) {
-      return (options.cost == MatchingCost::kCensus9x7 ? 1 : 2) *
+      return (options.cost == MatchingCost::kCensus5x5 ? 2 : 1) *
              std::popcount(code(own, x, y) ^ code(other, matched(x, d), y));
     }
     int sum = 0;

@@ -22,13 +22,6 @@ std::vector<Offset> window(int radius_x, int radius_y) {
   return offsets;
 }
 
-std::vector<Offset> sparse_window() {
-  const auto& kOffsets = kSparseWindow;
-  std::vector<Offset> offsets;
-  for (const auto& offset : kOffsets) offsets.push_back({offset[0], offset[1]});
-  return offsets;
-}
-
 }  // namespace
 
 std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::uint16_t>& image, int bits,
@@ -37,20 +30,36 @@ std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::
     return image[static_cast<std::size_t>(std::clamp(y, 0, size.height - 1)) * size.width +
                  std::clamp(x, 0, size.width - 1)];
   };
-  const std::vector<Offset> offsets = cost == MatchingCost::kCensus13x11 ? sparse_window()
-                                      : cost == MatchingCost::kCensus9x7 ? window(4, 3)
-                                      : cost == MatchingCost::kCensus5x5 ? window(2, 2)
-                                                                         : std::vector<Offset>{};
+  const auto sum_around = [&](int x, int y) {
+    int sum = 0;
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) sum += at(x + dx, y + dy);
+    }
+    return sum;
+  };
+  const std::vector<Offset> offsets = cost == MatchingCost::kCensus9x7 ? window(4, 3)
+                                      : cost == MatchingCost::kSad3x3  ? std::vector<Offset>{}
+                                                                       : window(2, 2);
+  const int steps_per_grey = bits == 8 ? 1 : 257;
   std::vector<std::uint64_t> codes;
   codes.reserve(image.size());
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       std::uint64_t code = cost == MatchingCost::kSad3x3 ? at(x, y) >> (bits - 8) : 0;
       for (const Offset& offset : offsets) code = 2 * code + (at(x + offset.dx, y + offset.dy) < at(x, y));
+      if (cost == MatchingCost::kLearned7x7) {
+        for (const auto& [dx1, dy1, dx2, dy2, threshold] : kLearnedComparisons) {
+          code = 2 * code + (sum_around(x + dx1, y + dy1) - sum_around(x + dx2, y + dy2) < steps_per_grey * threshold);
+        }
+      }
       codes.push_back(code);
     }
   }
   return codes;
+}
+
+int word_count(MatchingCost cost) {
+  return cost == MatchingCost::kCensus9x7 || cost == MatchingCost::kLearned7x7 ? 2 : 1;
 }
 
 std::vector<std::uint32_t> padded_codes(shared::ImageSize size, const std::vector<std::uint64_t>& left,
@@ -63,7 +72,7 @@ std::vector<std::uint32_t> padded_codes(shared::ImageSize size, const std::vecto
         const int x = view == EGOSGM_LEFT ? along : size.width - 1 - along;
         const std::uint64_t code = (view == EGOSGM_LEFT ? left : right)[static_cast<std::size_t>(y) * size.width + x];
         words.push_back(static_cast<std::uint32_t>(code));
-        if (cost == MatchingCost::kCensus9x7) words.push_back(static_cast<std::uint32_t>(code >> 32));
+        if (word_count(cost) == 2) words.push_back(static_cast<std::uint32_t>(code >> 32));
       }
     }
   }

@@ -13,6 +13,9 @@ namespace egosgm::reference {
 std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::uint16_t>& image, int bits,
                                  MatchingCost cost);
 
+/// 32-bit words of a code.
+int word_count(MatchingCost cost);
+
 /// Both views' codes as the kernel lays them out: 32-bit words, low word first, in padded rows, the right view's from
 /// right to left.
 std::vector<std::uint32_t> padded_codes(shared::ImageSize size, const std::vector<std::uint64_t>& left,

@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "egosgm/reason.h"
+#include "tests/reference/match/census.h"
 #include "tests/reference/method.h"
 
 namespace egosgm::reference {
@@ -73,7 +74,7 @@ class Pixels {
 
   /// Of the codes at two places of a row, `step` columns and rows off; columns may lie in the padding.
   int distance(int a, int b, int y) const {
-    const int words = options_.banded_sgm.cost == MatchingCost::kCensus9x7 ? 2 : 1;
+    const int words = word_count(options_.banded_sgm.cost);
     const std::size_t row = static_cast<std::size_t>(y) * (size_.width + 2 * in_.code_padding) + in_.code_padding;
     int bits = 0;
     for (int word = 0; word < words; ++word) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/vision/odometry_motion.h"
+#include "host/odometry/motion.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -9,7 +9,7 @@
 #include <limits>
 #include <map>
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 namespace {
 
 // Narrow: patches across a depth edge follow neither surface, and pull all one way.
@@ -295,4 +295,4 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
   return estimate;
 }
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The motion of matches that are given, and what they tell of the rectification.
-#include "host/vision/odometry_motion.h"
+#include "host/odometry/motion.h"
 
 #include <gtest/gtest.h>
 
@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "egosgm/vision/odometry.h"
-#include "host/vision/odometry_rectification.h"
-#include "tests/vision/odometry_motions.h"
+#include "egosgm/odometry.h"
+#include "host/odometry/rectification.h"
+#include "tests/odometry/motions.h"
 
-namespace egosgm::vision {
+namespace egosgm {
 namespace {
 
 using odometry::PointMatch;
@@ -203,4 +203,4 @@ TEST(OdometryRectification, OffsetAndRollOfTheRowsTellNothingOfTheDisparity) {
 }
 
 }  // namespace
-}  // namespace egosgm::vision
+}  // namespace egosgm

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/vision/odometry_rectification.h"
+#include "host/odometry/rectification.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 namespace {
 
 using Terms = RectificationError::Terms;
@@ -141,4 +141,4 @@ void RectificationError::update(const Calibration& calibration, const MatchNoise
   if (terms.allFinite()) terms_ = terms;
 }
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

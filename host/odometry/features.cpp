@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/vision/odometry_features.h"
+#include "host/odometry/features.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 
 #include "host/cpu_clones.h"
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 namespace {
 
 constexpr int kSuppressionRadius = 3;
@@ -251,4 +251,4 @@ void FeatureDetector::detect(const GreyImage& image, int threshold, int per_cell
   }
 }
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "host/vision/odometry_features.h"
+#include "host/odometry/features.h"
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 
 inline constexpr int kPatchRadius = 5;
 inline constexpr int kPatchRows = 2 * kPatchRadius + 1;
@@ -26,4 +26,4 @@ bool make_patch(const GreyImage& image, float x, float y, float scale, Patch& pa
 /// settle, or if the correlation stays below `min_correlation`.
 bool align_patch(const Patch& patch, const GreyImage& image, float min_correlation, float& x, float& y);
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

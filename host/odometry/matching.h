@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "egosgm/calibration.h"
-#include "egosgm/vision/odometry.h"
-#include "host/vision/odometry_features.h"
-#include "host/vision/odometry_motion.h"
+#include "egosgm/odometry.h"
+#include "host/odometry/features.h"
+#include "host/odometry/motion.h"
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 
 /// A frame, and what is known of its left features so far. Stereo matches are found when they are asked for.
 struct TrackedFrame {
@@ -58,4 +58,4 @@ std::vector<PointMatch> refine_matches(const Calibration& calibration, TrackedFr
 std::vector<PointMatch> pixel_matches(const TrackedFrame& previous, const TrackedFrame& current,
                                       const std::vector<CircularMatch>& matches);
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

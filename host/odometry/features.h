@@ -8,7 +8,7 @@
 
 #include "egosgm/image.h"
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 
 /// The working copy of a frame: 8 bit, rows `width` apart.
 struct GreyImage {
@@ -83,4 +83,4 @@ inline int descriptor_distance(const Descriptor& a, const Descriptor& b) {
   return sum;
 }
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/vision/odometry_matching.h"
+#include "host/odometry/matching.h"
 
 #include <algorithm>
 #include <bit>
@@ -7,9 +7,9 @@
 #include <limits>
 
 #include "host/cpu_clones.h"
-#include "host/vision/odometry_subpixel.h"
+#include "host/odometry/subpixel.h"
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 namespace {
 
 constexpr int kMaxDistance = 20 * kDescriptorSize;  // of descriptors; unrelated ones differ by 34 a sample
@@ -218,4 +218,4 @@ std::vector<PointMatch> pixel_matches(const TrackedFrame& previous, const Tracke
   return points;
 }
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

@@ -6,9 +6,9 @@
 #include <random>
 
 #include "egosgm/calibration.h"
-#include "host/vision/odometry_features.h"
+#include "host/odometry/features.h"
 
-namespace egosgm::vision {
+namespace egosgm {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
 
@@ -42,4 +42,4 @@ inline odometry::GreyImage random_image(std::mt19937& generator, int width, int 
   return image;
 }
 
-}  // namespace egosgm::vision
+}  // namespace egosgm

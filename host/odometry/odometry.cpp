@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "egosgm/vision/odometry.h"
+#include "egosgm/odometry.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -11,12 +11,12 @@
 #include <utility>
 
 #include "egosgm/error.h"
-#include "host/vision/odometry_features.h"
-#include "host/vision/odometry_matching.h"
-#include "host/vision/odometry_motion.h"
-#include "host/vision/odometry_rectification.h"
+#include "host/odometry/features.h"
+#include "host/odometry/matching.h"
+#include "host/odometry/motion.h"
+#include "host/odometry/rectification.h"
 
-namespace egosgm::vision {
+namespace egosgm {
 
 using namespace odometry;
 
@@ -243,4 +243,4 @@ void StereoOdometry::reset() {
   state_->rectification = {};
 }
 
-}  // namespace egosgm::vision
+}  // namespace egosgm

@@ -7,7 +7,7 @@
 
 #include "egosgm/calibration.h"
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -106,4 +106,4 @@ inline Residual linearise(const Calibration& c, const MatchNoise& noise, const P
 /// Cauchy's weight of a squared Mahalanobis distance.
 inline double cauchy_weight(double squared, double scale2) { return 1 / (1 + squared / scale2); }
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Features of one image, positions below a pixel, and circles of matches.
-#include "host/vision/odometry_features.h"
+#include "host/odometry/features.h"
 
 #include <gtest/gtest.h>
 
@@ -9,11 +9,11 @@
 #include <random>
 #include <vector>
 
-#include "host/vision/odometry_matching.h"
-#include "host/vision/odometry_subpixel.h"
-#include "tests/vision/odometry_motions.h"
+#include "host/odometry/matching.h"
+#include "host/odometry/subpixel.h"
+#include "tests/odometry/motions.h"
 
-namespace egosgm::vision {
+namespace egosgm {
 namespace {
 
 int filter_response(const odometry::GreyImage& image, int x, int y, bool corner) {
@@ -194,4 +194,4 @@ TEST(OdometryMatching, KeepsClosedCirclesOnly) {
 }
 
 }  // namespace
-}  // namespace egosgm::vision
+}  // namespace egosgm

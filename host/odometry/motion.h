@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "egosgm/calibration.h"
-#include "egosgm/vision/odometry.h"
-#include "host/vision/odometry_geometry.h"
+#include "egosgm/odometry.h"
+#include "host/odometry/geometry.h"
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 
 struct MotionEstimate {
   Motion motion;
@@ -34,4 +34,4 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
 /// Why `motion` is out of the bounds in `options`; empty where it is not.
 std::string out_of_bounds(const StereoOdometryOptions& options, const Eigen::Isometry3d& motion);
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/vision/odometry_subpixel.h"
+#include "host/odometry/subpixel.h"
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -7,7 +7,7 @@
 
 #include "host/cpu_clones.h"
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 namespace {
 
 constexpr int kReach = 4;  // farthest move [px]
@@ -240,4 +240,4 @@ bool align_patch(const Patch& patch, const GreyImage& image, float min_correlati
   return true;
 }
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry

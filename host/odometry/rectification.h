@@ -4,9 +4,9 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "host/vision/odometry_geometry.h"
+#include "host/odometry/geometry.h"
 
-namespace egosgm::vision::odometry {
+namespace egosgm::odometry {
 
 /// What is left of rotation, distortion and principal point between two rectified images, learnt on the way.
 ///
@@ -49,4 +49,4 @@ class RectificationError {
   NormalEquations rows_, residuals_;  // what the rows and what the odometry's residuals have told
 };
 
-}  // namespace egosgm::vision::odometry
+}  // namespace egosgm::odometry
