@@ -10,10 +10,9 @@
 
 namespace egosgm {
 
-const char* to_string(Unpredicted reason) {
-  switch (reason) {
-    case Unpredicted::kNo:
-      return "";
+const char* to_string(std::optional<Unpredicted> why_not) {
+  if (!why_not) return "";
+  switch (*why_not) {
     case Unpredicted::kFirstFrame:
       return "first frame";
     case Unpredicted::kReset:
