@@ -41,10 +41,9 @@ constexpr const char *kKilled = "a kill, or it is still running", *kInterrupt = 
 
 using Clock = std::chrono::steady_clock;
 std::string note_of(const FrameReport& report) {
-  if (!report.searched_everything && report.unpredicted == Unpredicted::kNo) return "";
-  const std::string why = report.unpredicted == Unpredicted::kNo
-                              ? "searched everything"
-                              : fmt::format("no prediction: {}", to_string(report.unpredicted));
+  if (!report.searched_everything && !report.unpredicted) return "";
+  const std::string why =
+      !report.unpredicted ? "searched everything" : fmt::format("no prediction: {}", to_string(report.unpredicted));
   return report.search_fraction < 1.01 ? fmt::format("  ({})", why)
                                        : fmt::format("  ({}; matched {:.2g} times)", why, report.search_fraction);
 }

@@ -227,7 +227,7 @@ class LeftMatcher {
 
   void operator()() {
     images_.pixels.write(context_, pixels_);
-    matcher_(images_, everything_, measured_, Views::kLeft);
+    matcher_.match(images_, everything_, measured_, Views::kLeft);
     const ocl::Drain drain{context_};
     cl::Event done;
     context_.queue().enqueueReadBuffer(measured_.disparity.get(), CL_FALSE, 0, disparity_.size() * sizeof(float),

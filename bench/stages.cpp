@@ -145,7 +145,7 @@ class Frame {
 
   void run(Belief& after, const Belief& before) {
     times_ = {};
-    const Plan plan = plan_of(options_, before.missing, before.offset.is_known, motion_, {Views::kLeft, false, false});
+    const Plan plan = plan_of(options_, before.why_not, before.offset.is_known, motion_, {Views::kLeft, false, false});
     last_ = Clock::now();
     method_.frame(plan, images_, before, after, {disparity_, variance_});
   }

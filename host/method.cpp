@@ -16,8 +16,8 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     if (match > 1) offset = w.first_offset;
     VerticalOffset& refined = match < plan.matches ? w.first_offset : after.offset;
     in(Room::kAlign, [&] { images = align(uploaded, offset, w.aligned); });
-    in(Room::kSearch, [&] { search_(plan, images, w.prediction, w.coarse, w.bands); });
-    in(Room::kMatch, [&] { match_(plan, images, w.bands, w.matching, measured); });
+    in(Room::kSearch, [&] { search_.plan_bands(plan, images, w.prediction, w.coarse, w.bands); });
+    in(Room::kMatch, [&] { match_.measure(plan, images, w.bands, w.matching, measured); });
     in(Room::kRefineAlignment, [&] { refine(images, measured, offset, refined); });
   }
   in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, w.fusion, after); });
@@ -25,17 +25,17 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
   in(Room::kPublish, [&] {
     result = confirmed(plan, after, given_out);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
-    publish_(plan,
-             {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), result,
-              w.fusion.doubtful, evidence_of(plan, after)},
-             {given_out.variance, w.dynamic, w.reasons});
+    publish_.write(plan,
+                   {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), result,
+                    w.fusion.doubtful, evidence_of(plan, after)},
+                   {given_out.variance, w.dynamic, w.reasons});
   });
   if (plan.wanted.variance) result.variance = given_out.variance;
   return {result, measured, offset, images};
 }
 
 void Method::predict(const Plan& plan, const Belief& belief, Prediction& prediction) {
-  if (plan.predicts()) (*predict_)(plan, belief, prediction);
+  if (plan.predicts()) predict_->predict(plan, belief, prediction);
 }
 
 FrameImages Method::align(const FrameImages& uploaded, const VerticalOffset& offset, FrameImages& aligned) {
@@ -56,12 +56,12 @@ void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction&
   if (plan.predicts()) {
     std::optional<CoarseView> coarse;
     if (plan.has_coarse_match) coarse.emplace(CoarseView{search_.coarse_images(), work_.coarse.disparity});
-    (*fuse_)(plan, {images, match_.matcher().codes(), coarse ? &*coarse : nullptr}, prediction, measured, fusion,
-             belief);
+    fuse_->update(plan, {images, match_.matcher().codes(), coarse ? &*coarse : nullptr}, prediction, measured, fusion,
+                  belief);
   } else if (fuse_ && fuse_->has_evidence()) {
     fuse_->begin(belief);
   }
-  belief.missing = Unpredicted::kNo;
+  belief.why_not.reset();
   if (!options_.temporal) belief.forget(Unpredicted::kNotTemporal);  // a frame alone leaves nothing to the next one
 }
 

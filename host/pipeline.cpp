@@ -5,15 +5,15 @@
 #include <tuple>
 
 #include "egosgm/error.h"
+#include "host/frame/check_frame.h"
 #include "host/frame/frame_queue.h"
 #include "host/ocl/errors.h"
 
 namespace egosgm {
 
-const char* to_string(Unpredicted reason) {
-  switch (reason) {
-    case Unpredicted::kNo:
-      return "";
+const char* to_string(std::optional<Unpredicted> why_not) {
+  if (!why_not) return "";
+  switch (*why_not) {
     case Unpredicted::kFirstFrame:
       return "first frame";
     case Unpredicted::kReset:
@@ -30,7 +30,7 @@ Pipeline::Pipeline(const Calibration& calibration, int width, int height, const 
                    const Device& device, PixelType type) {
   calibration.validate();
   options.validate();
-  FrameTransfer::validate_size(width, height);
+  check_size(width, height);
   impl_ = ocl::translated("Pipeline", [&] {
     return std::make_unique<Impl>(calibration, shared::ImageSize{width, height}, options, device, type);
   });
@@ -62,7 +62,7 @@ void Pipeline::submit(const ImageView& left, const ImageView& right, const std::
   if (under_way() == kMaxUnderWay) {
     throw InvalidArgument("submit: " + std::to_string(kMaxUnderWay) + " frames are under way: collect one first");
   }
-  impl_->validate(left, right, outputs);
+  check_frame(impl_->size(), left, right, outputs);
   if (motion) motion->validate();
   ocl::translated(impl_->context(), [&] { impl_->submit(left, right, motion, outputs); });
 }

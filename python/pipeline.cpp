@@ -9,6 +9,7 @@
 #include <mutex>
 
 #include "egosgm/named_options.h"
+#include "host/frame/frame_outputs.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/option_values.h"
@@ -16,22 +17,6 @@
 
 namespace egosgm::python {
 namespace {
-
-/// What a frame can give, by name.
-template <typename Visit>
-void for_each_output(FrameOutputs& outputs, Visit&& visit) {
-  visit("disparity", outputs.disparity);
-  visit("variance", outputs.variance);
-  visit("reason", outputs.reason);
-  visit("right_disparity", outputs.right_disparity);
-  visit("right_variance", outputs.right_variance);
-  visit("predicted", outputs.debug.predicted);
-  visit("predicted_variance", outputs.debug.predicted_variance);
-  visit("measured", outputs.debug.measured);
-  visit("measured_variance", outputs.debug.measured_variance);
-  visit("search_width", outputs.debug.search_width);
-  visit("dynamic", outputs.debug.dynamic);
-}
 
 struct Frame {
   py::dict maps;

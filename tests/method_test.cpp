@@ -79,7 +79,7 @@ TEST(Method, BuildsNothingInAFrame) {
   for (int index = 0; index < video.size(); ++index) {
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
     const Plan plan =
-        plan_of(options(32, 0), before.missing, before.offset.is_known, video.motion(index), {Views::kBoth, true});
+        plan_of(options(32, 0), before.why_not, before.offset.is_known, video.motion(index), {Views::kBoth, true});
     built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.given_out());
     built.context.wait();
     std::swap(before, after);
@@ -95,7 +95,7 @@ TEST(Method, AFrameLeavesTheBeliefBeforeItAsItWas) {
   Belief first(built.context, kSize), second(built.context, kSize), nothing(built.context, kSize);
   const auto frame = [&](int index, const Belief& before, Belief& after) {
     const ImageMemory left = video.image(index, EGOSGM_LEFT), right = video.image(index, EGOSGM_RIGHT);
-    const Plan plan = plan_of(options(32, 0), before.missing, before.offset.is_known, video.motion(index), {});
+    const Plan plan = plan_of(options(32, 0), before.why_not, before.offset.is_known, video.motion(index), {});
     built.method.frame(plan, transfer.upload(left.view(), right.view()), before, after, transfer.given_out());
     built.context.wait();
   };

@@ -21,18 +21,18 @@ TEST(Pipeline, SaysWhyNothingWasPredictedAndWhatWasSearched) {
     const FrameReport report =
         process(pipeline, setting, video, index, has_motion ? std::optional(video.motion(index)) : std::nullopt).report;
     EXPECT_EQ(report.searched_everything,
-              report.unpredicted != Unpredicted::kNo || setting.options.search == SearchMode::kFull);
+              report.unpredicted.has_value() || setting.options.search == SearchMode::kFull);
     EXPECT_EQ(report.searched_everything, report.search_fraction >= 1) << report.search_fraction;
-    EXPECT_EQ(report.predicted_fraction > 0, report.unpredicted == Unpredicted::kNo);
+    EXPECT_EQ(report.predicted_fraction > 0, !report.unpredicted);
     return report.unpredicted;
   };
   EXPECT_EQ(unpredicted(0, true), Unpredicted::kFirstFrame);
-  EXPECT_EQ(unpredicted(1, true), Unpredicted::kNo);
+  EXPECT_EQ(unpredicted(1, true), std::nullopt);
   EXPECT_EQ(unpredicted(2, false), Unpredicted::kNoMotion);
-  EXPECT_EQ(unpredicted(0, true), Unpredicted::kNo);
+  EXPECT_EQ(unpredicted(0, true), std::nullopt);
   pipeline.reset();
   EXPECT_EQ(unpredicted(1, true), Unpredicted::kReset);
-  EXPECT_EQ(unpredicted(2, true), Unpredicted::kNo);
+  EXPECT_EQ(unpredicted(2, true), std::nullopt);
   pipeline.reset();
   pipeline.reset();
   EXPECT_EQ(unpredicted(0, false), Unpredicted::kReset);
@@ -40,7 +40,7 @@ TEST(Pipeline, SaysWhyNothingWasPredictedAndWhatWasSearched) {
   setting.options.search = SearchMode::kFull;
   pipeline = make_pipeline(setting);
   EXPECT_EQ(unpredicted(0, true), Unpredicted::kFirstFrame);
-  EXPECT_EQ(unpredicted(1, true), Unpredicted::kNo);
+  EXPECT_EQ(unpredicted(1, true), std::nullopt);
   setting.options.temporal = false;
   pipeline = make_pipeline(setting);
   EXPECT_EQ(unpredicted(0, true), Unpredicted::kNotTemporal);
@@ -58,7 +58,7 @@ TEST(Pipeline, PredictsAgainAfterAFrameWithoutMotion) {
   EXPECT_EQ(valid_part(gap.outputs.predicted.values()), 0);
   EXPECT_TRUE(same_bits(gap.outputs.disparity.values(), gap.outputs.measured.values(), setting.size));
   const Result after = process(broken, setting, video, 2);
-  EXPECT_EQ(after.report.unpredicted, Unpredicted::kNo);
+  EXPECT_EQ(after.report.unpredicted, std::nullopt);
   EXPECT_GT(after.report.predicted_fraction, 0.5);
   EXPECT_LT(after.report.search_fraction, 0.6);
 }
@@ -114,7 +114,7 @@ TEST(Pipeline, ReportsWhatItDid) {
     }
     EXPECT_EQ(report.stages.front().stage, "upload");
     EXPECT_EQ(report.stages.back().stage, "download");
-    EXPECT_EQ(names.contains("ForwardWarp"), report.unpredicted == Unpredicted::kNo);
+    EXPECT_EQ(names.contains("ForwardWarp"), !report.unpredicted);
     EXPECT_TRUE(names.contains("BandedSgm"));
     EXPECT_GT(report.total_ms, 0);
     EXPECT_GT(report.launches, 0);

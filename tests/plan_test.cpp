@@ -9,16 +9,16 @@
 namespace egosgm {
 namespace {
 
-constexpr const char* kUnpredicted[] = {"-", "first frame", "reset", "no motion", "not temporal"};
-
 std::string text_of(Views views) { return views == Views::kBoth ? "both" : "left"; }
 
 /// What is decided, in a row.
-std::string row(const MethodOptions& options, Unpredicted missing, bool knows_offset, bool has_motion) {
-  const Plan plan = plan_of(options, missing, knows_offset, has_motion ? std::optional(Motion{}) : std::nullopt, {});
+std::string row(const MethodOptions& options, std::optional<Unpredicted> why_no_belief, bool knows_offset,
+                bool has_motion) {
+  const Plan plan =
+      plan_of(options, why_no_belief, knows_offset, has_motion ? std::optional(Motion{}) : std::nullopt, {});
   EXPECT_EQ(plan.motion.has_value(), plan.predicts());
   std::ostringstream text;
-  text << kUnpredicted[static_cast<int>(plan.unpredicted)] << " | "
+  text << (plan.predicts() ? "-" : to_string(plan.why_not)) << " | "
        << (plan.search == Search::kBands ? "bands" : "everything") << " | tracks " << text_of(plan.tracked)
        << " | matches " << text_of(plan.matched) << " x" << plan.matches << (plan.has_coarse_match ? " | coarse" : "");
   return text.str();
@@ -28,35 +28,35 @@ struct Case {
   bool temporal;
   SearchMode search;
   bool track_right;
-  Unpredicted missing;
+  std::optional<Unpredicted> why_no_belief;
   bool has_motion;
   const char* plan;
 };
 
 constexpr SearchMode kBand = SearchMode::kBand, kFull = SearchMode::kFull;
-constexpr Unpredicted kNo = Unpredicted::kNo, kFirstFrame = Unpredicted::kFirstFrame, kReset = Unpredicted::kReset;
+constexpr Unpredicted kFirstFrame = Unpredicted::kFirstFrame, kReset = Unpredicted::kReset;
 
 // All that decides, in all combinations; what a frame without `temporal` has from before does not matter.
 constexpr Case kCases[] = {
-    {true, kBand, false, kNo, true, "- | bands | tracks left | matches left x1 | coarse"},
-    {true, kBand, false, kNo, false, "no motion | everything | tracks left | matches both x1"},
+    {true, kBand, false, {}, true, "- | bands | tracks left | matches left x1 | coarse"},
+    {true, kBand, false, {}, false, "no motion | everything | tracks left | matches both x1"},
     {true, kBand, false, kFirstFrame, true, "first frame | everything | tracks left | matches both x1"},
     {true, kBand, false, kFirstFrame, false, "first frame | everything | tracks left | matches both x1"},
     {true, kBand, false, kReset, true, "reset | everything | tracks left | matches both x1"},
     {true, kBand, false, kReset, false, "reset | everything | tracks left | matches both x1"},
-    {true, kBand, true, kNo, true, "- | bands | tracks both | matches both x1 | coarse"},
-    {true, kBand, true, kNo, false, "no motion | everything | tracks both | matches both x1"},
+    {true, kBand, true, {}, true, "- | bands | tracks both | matches both x1 | coarse"},
+    {true, kBand, true, {}, false, "no motion | everything | tracks both | matches both x1"},
     {true, kBand, true, kFirstFrame, true, "first frame | everything | tracks both | matches both x1"},
     {true, kBand, true, kFirstFrame, false, "first frame | everything | tracks both | matches both x1"},
     {true, kBand, true, kReset, true, "reset | everything | tracks both | matches both x1"},
     {true, kBand, true, kReset, false, "reset | everything | tracks both | matches both x1"},
-    {true, kFull, false, kNo, true, "- | everything | tracks left | matches left x1"},
-    {true, kFull, false, kNo, false, "no motion | everything | tracks left | matches both x1"},
+    {true, kFull, false, {}, true, "- | everything | tracks left | matches left x1"},
+    {true, kFull, false, {}, false, "no motion | everything | tracks left | matches both x1"},
     {true, kFull, false, kFirstFrame, true, "first frame | everything | tracks left | matches both x1"},
     {true, kFull, false, kReset, true, "reset | everything | tracks left | matches both x1"},
-    {true, kFull, true, kNo, true, "- | everything | tracks both | matches both x1"},
-    {true, kFull, true, kNo, false, "no motion | everything | tracks both | matches both x1"},
-    {false, kBand, false, kNo, true, "not temporal | everything | tracks left | matches both x1"},
+    {true, kFull, true, {}, true, "- | everything | tracks both | matches both x1"},
+    {true, kFull, true, {}, false, "no motion | everything | tracks both | matches both x1"},
+    {false, kBand, false, {}, true, "not temporal | everything | tracks left | matches both x1"},
     {false, kBand, true, kFirstFrame, false, "not temporal | everything | tracks both | matches both x1"},
     {false, kFull, false, kReset, true, "not temporal | everything | tracks left | matches both x1"},
 };
@@ -67,9 +67,9 @@ TEST(Plan, DecidesEveryCase) {
     options.temporal = c.temporal;
     options.search = c.search;
     options.track_right = c.track_right;
-    const std::string actual = row(options, c.missing, /*knows_offset=*/true, c.has_motion);
+    const std::string actual = row(options, c.why_no_belief, /*knows_offset=*/true, c.has_motion);
     EXPECT_EQ(actual, c.plan) << (c.temporal ? "temporal, " : "alone, ") << (c.search == kBand ? "band, " : "full, ")
-                              << (c.track_right ? "both views, " : "left view, ") << to_string(c.missing)
+                              << (c.track_right ? "both views, " : "left view, ") << to_string(c.why_no_belief)
                               << (c.has_motion ? ", with a motion" : ", without a motion");
   }
 }
@@ -85,16 +85,16 @@ TEST(Plan, MatchesTwiceWhereTheFirstMatchGivesTheVerticalOffset) {
 TEST(Plan, HasACoarseMatchOnlyWhereItIsOn) {
   MethodOptions options;
   options.coarse_match.enabled = false;
-  EXPECT_EQ(row(options, kNo, true, true), "- | bands | tracks both | matches both x1");
+  EXPECT_EQ(row(options, {}, true, true), "- | bands | tracks both | matches both x1");
 }
 
 TEST(Plan, MakesTheVarianceThatIsGivenOutOnlyWhereItIsOn) {
   MethodOptions options;
-  EXPECT_EQ(plan_of(options, kNo, true, {}, {Views::kBoth, true}).wanted.variance, Views::kBoth);
-  EXPECT_FALSE(plan_of(options, kNo, true, {}, {{}, true}).wanted.variance);
-  EXPECT_TRUE(plan_of(options, kNo, true, {}, {{}, true}).wanted.dynamic);
+  EXPECT_EQ(plan_of(options, {}, true, {}, {Views::kBoth, true}).wanted.variance, Views::kBoth);
+  EXPECT_FALSE(plan_of(options, {}, true, {}, {{}, true}).wanted.variance);
+  EXPECT_TRUE(plan_of(options, {}, true, {}, {{}, true}).wanted.dynamic);
   options.output_variance.enabled = false;
-  EXPECT_FALSE(plan_of(options, kNo, true, {}, {Views::kBoth, true}).wanted.variance);
+  EXPECT_FALSE(plan_of(options, {}, true, {}, {Views::kBoth, true}).wanted.variance);
 }
 
 }  // namespace

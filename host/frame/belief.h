@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "egosgm/pipeline.h"
@@ -15,8 +16,8 @@ struct Belief {
   StereoMaps maps;
   FlagMap evidence;  // of each pixel (kernels/method.h); what has enough of it is given out
   VerticalOffset offset;
-  std::shared_ptr<std::vector<cl_uchar>> images;   // that it is of, both views; empty where the host does not know them
-  Unpredicted missing = Unpredicted::kFirstFrame;  // why there are no maps; kNo: there are
+  std::shared_ptr<std::vector<cl_uchar>> images;  // that it is of, both views; empty where the host does not know them
+  std::optional<Unpredicted> why_not = Unpredicted::kFirstFrame;  // there are no maps
 
   /// Of nothing.
   Belief(ocl::Context& context, shared::ImageSize size)
@@ -27,7 +28,7 @@ struct Belief {
 
   /// Forgets all.
   void forget(Unpredicted why) {
-    missing = why;
+    why_not = why;
     offset.is_known = false;
   }
 

@@ -79,8 +79,8 @@ void FrameQueue::prepare(PixelType type, const Wanted& wanted) {
   FrameImages images{ocl::Buffer<cl_uchar>(context_, 2 * 2 * pixel_count(narrow)), type};
   images.pixels.write(context_, std::vector<cl_uchar>(images.pixels.size()));
   const ocl::Drain drain{context_};
-  method.frame(plan_of(method_options_, none.missing, false, {}, wanted), images, none, first, {disparity, variance});
-  method.frame(plan_of(method_options_, first.missing, first.offset.is_known, Motion(), wanted), images, first, second,
+  method.frame(plan_of(method_options_, none.why_not, false, {}, wanted), images, none, first, {disparity, variance});
+  method.frame(plan_of(method_options_, first.why_not, first.offset.is_known, Motion(), wanted), images, first, second,
                {disparity, variance});
   context_.wait();
 }
@@ -96,7 +96,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   release_results();
   if (Evidence::is_of(method_options_)) pack(left, right, *frame.after.images);
   const bool repeats = !belief_.images->empty() && *belief_.images == *frame.after.images;
-  const Plan plan = plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, wanted, repeats);
+  const Plan plan = plan_of(method_options_, belief_.why_not, belief_.offset.is_known, motion, wanted, repeats);
   const FrameImages& images = frame.transfer->upload(left, right);
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
   const FrameResults results = method_.frame(plan, images, belief_, frame.after, frame.transfer->given_out());
@@ -115,7 +115,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
 
   drain.is_dismissed = true;
   frame.report.stripes = static_cast<int>(method_.matcher().banded_sgm().stripes().size());
-  frame.report.unpredicted = plan.unpredicted;
+  frame.report.unpredicted = plan.why_not;
   frame.commands = context_.take_commands();
   belief_ = frame.after;
   under_way_.push_back(std::move(frame));
@@ -130,7 +130,7 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   ocl::Drain drain{context_};
   release_results();
   const Plan plan =
-      plan_of(method_options_, belief_.missing, belief_.offset.is_known, motion, {Views::kBoth, wants_dynamic});
+      plan_of(method_options_, belief_.why_not, belief_.offset.is_known, motion, {Views::kBoth, wants_dynamic});
   after.images->clear();
   const StereoMaps result = method_.frame(plan, images, belief_, after, transfer.given_out()).given_out;
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
@@ -144,7 +144,7 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   belief_ = after;
   return {.disparity = result.disparity.get()(),
           .variance = result.variance.get()(),
-          .unpredicted = plan.unpredicted,
+          .unpredicted = plan.why_not,
           .dynamic = plan.wanted.dynamic ? method_.workspace().dynamic.get()() : nullptr};
 }
 

@@ -45,10 +45,6 @@ class FrameQueue {
   DeviceMaps enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done,
                      bool wants_dynamic);
 
-  void validate(const ImageView& left, const ImageView& right, const FrameOutputs& outputs) const {
-    transfers_[0].validate(left, right, outputs);
-  }
-
   ocl::Context& context() { return context_; }
   const ocl::Context& context() const { return context_; }
   const PipelineOptions& options() const { return options_; }

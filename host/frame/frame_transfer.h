@@ -7,19 +7,12 @@
 
 #include "egosgm/pipeline.h"
 #include "host/align/vertical_alignment.h"
+#include "host/frame/frame_report.h"
 #include "host/maps.h"
-#include "host/match/stripes.h"
 #include "host/ocl/host_memory.h"
 #include "host/search/search_band.h"
 
 namespace egosgm {
-
-/// What was matched of a frame, apart from which bands.
-struct MatchedParts {
-  int passes;                          // each over all bands
-  const std::vector<Stripe>* stripes;  // in which
-  std::uint64_t coarse_cells;          // and in each pass, these of CoarseMatch
-};
 
 /// What a frame leaves on the device.
 struct FrameOnDevice {
@@ -34,19 +27,14 @@ struct FrameOnDevice {
   const ocl::Buffer<cl_uchar>* reasons = nullptr;  // the same
 };
 
-/// Checks what the caller gave, brings a frame's images to the device and its results back: one for each frame that may
+/// Brings a frame's images to the device and its results back: one for each frame that may
 /// be under way. Transfers have queues of their own; with those of the kernels they are tied here.
 class FrameTransfer {
  public:
   FrameTransfer(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
 
-  /// Throws InvalidArgument for a size that no pipeline can have.
-  static void validate_size(int width, int height);
-  /// Throws InvalidArgument, naming the view and the value.
-  void validate(const ImageView& left, const ImageView& right, const FrameOutputs& outputs) const;
-
   /// Copies the images, enqueues their way to the device, and lets what is enqueued for it from now on wait for them.
-  /// REQUIRES: what `validate` asks; no frame of this transfer is under way.
+  /// REQUIRES: what check_frame asks; no frame of this transfer is under way.
   const FrameImages& upload(const ImageView& left, const ImageView& right);
 
   /// Places for disparity and variance that are given out, of both views; this transfer's until it is released.
@@ -69,8 +57,6 @@ class FrameTransfer {
   using MapReadback = ocl::Readback<float>;
   using Scratch = std::vector<float>;
 
-  double matched_cells() const;
-
   template <typename T>
   void fetch(const ocl::Buffer<T>& buffer, std::size_t count, std::vector<T>& staged);
   void fetch_left(const ocl::Buffer<float>& maps, bool wanted, Scratch& staged);
@@ -92,10 +78,5 @@ class FrameTransfer {
   bool has_prediction_ = false;
   FrameOutputs outputs_;
 };
-
-/// What the report tells of a frame's commands: launches and stages.
-void report_stages(const std::vector<ocl::Context::Finished>& finished, FrameReport& report);
-/// The same: each of them. REQUIRES: they have ended.
-void report_commands(ocl::Context& context, const std::vector<ocl::Command>& commands, FrameReport& report);
 
 }  // namespace egosgm

@@ -4,18 +4,20 @@
 namespace egosgm {
 namespace {
 
-Unpredicted unpredicted(const MethodOptions& options, Unpredicted missing, const std::optional<Motion>& motion) {
+std::optional<Unpredicted> why_not(const MethodOptions& options, std::optional<Unpredicted> why_no_belief,
+                                   const std::optional<Motion>& motion) {
   if (!options.temporal) return Unpredicted::kNotTemporal;
-  if (missing != Unpredicted::kNo) return missing;
-  return motion ? Unpredicted::kNo : Unpredicted::kNoMotion;
+  if (why_no_belief) return why_no_belief;
+  if (!motion) return Unpredicted::kNoMotion;
+  return {};
 }
 
 }  // namespace
 
-Plan plan_of(const MethodOptions& options, Unpredicted missing, bool knows_offset, const std::optional<Motion>& motion,
-             const Wanted& wanted, bool repeats) {
+Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_belief, bool knows_offset,
+             const std::optional<Motion>& motion, const Wanted& wanted, bool repeats) {
   Plan plan{};
-  plan.unpredicted = unpredicted(options, missing, motion);
+  plan.why_not = why_not(options, why_no_belief, motion);
   const bool searches_bands = plan.predicts() && options.search == SearchMode::kBand;
   plan.motion = plan.predicts() ? motion : std::nullopt;
   plan.search = searches_bands ? Search::kBands : Search::kEverything;

@@ -22,8 +22,8 @@ struct Wanted {
 
 /// All that is decided before a frame.
 struct Plan {
-  Unpredicted unpredicted;       // why there is no prediction; kNo: there is one
-  std::optional<Motion> motion;  // by which it is made
+  std::optional<Unpredicted> why_not;  // there is no prediction
+  std::optional<Motion> motion;        // by which it is made
   Search search;
   Views tracked;  // predicted and fused
   Views matched;  // where it is the left one, the right one is read off its match
@@ -32,12 +32,12 @@ struct Plan {
   bool repeats;  // the images are those of the frame before
   Wanted wanted;
 
-  bool predicts() const { return unpredicted == Unpredicted::kNo; }
+  bool predicts() const { return !why_not; }
 };
 
-/// `missing`: why the belief has no maps; kNo: it has. `knows_offset`: whether it has a vertical offset. `repeats`:
-/// whether the images are those of the frame before.
-Plan plan_of(const MethodOptions& options, Unpredicted missing, bool knows_offset, const std::optional<Motion>& motion,
-             const Wanted& wanted, bool repeats = false);
+/// `why_no_belief`: why the belief has no maps, if it has none. `knows_offset`: whether it has a vertical offset.
+/// `repeats`: whether the images are those of the frame before.
+Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_belief, bool knows_offset,
+             const std::optional<Motion>& motion, const Wanted& wanted, bool repeats = false);
 
 }  // namespace egosgm

@@ -47,7 +47,7 @@ Evidence::Evidence(ocl::Context& context, shared::ImageSize size, const MethodOp
 void Evidence::operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* coarse, const Map& predicted,
                           const Map& measured, BlockEvidence& blocks, Views views) {
   const ocl::Context::Within within(context_, "Evidence");
-  if (coarse) coarse_census_(coarse->images, coarse_codes_);
+  if (coarse) coarse_census_.encode(coarse->images, coarse_codes_);
   const ocl::Range each = ocl::every_pixels(context_, coarse_, pixels_, count(views));
   compare_(context_, each, size_, gate_px_, padding_, codes, coarse != nullptr, coarse_padding_, coarse_codes_,
            predicted, measured, sums_);

@@ -24,8 +24,8 @@ void FuseRoom::prepare(PixelType type) {
   if (sad_check_) sad_check_->prepare(type);
 }
 
-void FuseRoom::operator()(const Plan& plan, const Matched& matched, const Prediction& prediction,
-                          const Measurement& measured, Fusion& fusion, Belief& after) {
+void FuseRoom::update(const Plan& plan, const Matched& matched, const Prediction& prediction,
+                      const Measurement& measured, Fusion& fusion, Belief& after) {
   StereoMaps& belief = after.maps;
   StereoMaps fused{fusion.fused, belief.variance};
   if (evidence_) {
@@ -33,14 +33,14 @@ void FuseRoom::operator()(const Plan& plan, const Matched& matched, const Predic
                  plan.tracked);
   }
   const KalmanUpdate::FrameEvidence of_frame{prediction.evidence, fusion.evidence, plan.repeats};
-  kalman_update_(prediction.hidden, prediction.maps, measured, evidence_ ? &of_frame : nullptr, fused, fusion.doubtful,
-                 after.evidence, plan.tracked);
+  kalman_update_.update(prediction.hidden, prediction.maps, measured, evidence_ ? &of_frame : nullptr, fused,
+                        fusion.doubtful, after.evidence, plan.tracked);
   if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
-  if (plan.tracked == Views::kLeft) (*right_map_)(measured, left_right_px_, smoothed, plan.wanted.right);
+  if (plan.tracked == Views::kLeft) right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.right);
   const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
-  consistency_(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
-  if (sad_check_) (*sad_check_)[matched.images.type](matched.images.pixels, belief, checked);
+  consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
+  if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief, checked);
 }
 
 void FuseRoom::begin(Belief& belief) const {

@@ -41,8 +41,8 @@ class FuseRoom {
   };
 
   /// REQUIRES: the plan predicts.
-  void operator()(const Plan& plan, const Matched& matched, const Prediction& prediction, const Measurement& measured,
-                  Fusion& fusion, Belief& belief);
+  void update(const Plan& plan, const Matched& matched, const Prediction& prediction, const Measurement& measured,
+              Fusion& fusion, Belief& belief);
 
   /// A belief without a prediction: what both views confirm over the full range begins with some evidence.
   void begin(Belief& belief) const;

@@ -26,9 +26,9 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
       update_(build(context, pixels_), "update"),
       none_(context, {1, 1}) {}
 
-void KalmanUpdate::operator()(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
-                              const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful,
-                              FlagMap& updated_evidence, Views views) {
+void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
+                          const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful,
+                          FlagMap& updated_evidence, Views views) {
   const BlockEvidence& blocks = evidence ? evidence->blocks : none_;
   context_.enter("KalmanUpdate");
   update_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, has_gate_, gate_px_,

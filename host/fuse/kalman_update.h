@@ -27,9 +27,9 @@ class KalmanUpdate {
   /// Nothing is believed of what is `hidden`. `doubtful`: 1 where the measurement was taken although the prediction, or
   /// its own path sums, speak against it. `evidence` is null where the method has none: then all that is updated has
   /// the most of it. REQUIRES: `updated` is neither `predicted` nor `measured`.
-  void operator()(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
-                  const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful, FlagMap& updated_evidence,
-                  Views views);
+  void update(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
+              const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful, FlagMap& updated_evidence,
+              Views views);
 
  private:
   ocl::Context& context_;

@@ -25,7 +25,7 @@ RightMap::RightMap(ocl::Context& context, shared::ImageSize size, shared::Dispar
       splat_(build(context, pixels_), "splat"),
       decode_(build(context, pixels_), "decode") {}
 
-void RightMap::operator()(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance) {
+void RightMap::complete(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance) {
   context_.enter("RightMap");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, /*views=*/1);
   if (pixels_ == 1) keys_.fill(context_, 0);

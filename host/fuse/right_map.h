@@ -17,7 +17,7 @@ class RightMap {
   /// From the left half of `maps` and the right one of `measured` to the right half of `maps`. What differs by more
   /// than `max_difference_px` contradicts. The variances only where `makes_variance`. REQUIRES: no disparity lies more
   /// than half a pixel below the range.
-  void operator()(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance);
+  void complete(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance);
 
  private:
   ocl::Context& context_;

@@ -16,7 +16,7 @@ class SadCheck {
            int pixels = 0);
 
   /// In place. `images`: the pixels of both views without padding, the left view first, one or two bytes each.
-  void operator()(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps, Views views = Views::kBoth);
+  void check(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps, Views views = Views::kBoth);
 
  private:
   ocl::Context& context_;

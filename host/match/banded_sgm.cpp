@@ -171,7 +171,7 @@ void BandedSgm::prepare_reading_off() {
   read_off_.emplace(context_, size_, parameters_.padding);
 }
 
-void BandedSgm::operator()(const MatchInputs& image, Measurement& measured, Views views) {
+void BandedSgm::match(const MatchInputs& image, Measurement& measured, Views views) {
   match_stripes(image, measured, views, /*reads_off=*/false);
 }
 
@@ -194,14 +194,14 @@ void BandedSgm::match(const MatchInputs& inputs, Measurement& measured, Views vi
   parameters.reads_off = reads_off;
   if (reads_off) read_off_->clear();
   if (paths_) {
-    (*paths_)(parameters, inputs, measured, ranks(), views);
+    paths_->match(parameters, inputs, measured, ranks(), views);
   } else {
     const int at_once = std::min(wavefront_->views, count(views));
     for (parameters.first_view = 0; parameters.first_view < count(views); parameters.first_view += at_once) {
       sweep(parameters, inputs, measured, at_once);
     }
   }
-  if (reads_off) (*read_off_)(parameters, measured);
+  if (reads_off) read_off_->read_off(parameters, measured);
 }
 
 void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,

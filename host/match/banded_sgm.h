@@ -55,7 +55,7 @@ class BandedSgm {
 
   /// Matches `views`. Of the inputs' codes, which Census makes with a padding of `code_padding(range)`, both views' are
   /// read; of penalties and bands, theirs.
-  void operator()(const MatchInputs& image, Measurement& measured, Views views);
+  void match(const MatchInputs& image, Measurement& measured, Views views);
   /// Matches the left view, and reads the right one's disparities off its sums: half of the work, whole disparities.
   /// REQUIRES: that was prepared.
   void reading_off(const MatchInputs& image, Measurement& measured);

@@ -85,8 +85,8 @@ void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, 
                 inputs.bands.cell_offsets, forward_first_, forward_second_, backward_first_, backward_second_);
 }
 
-void BandedSgmPaths::operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs,
-                                Measurement& measured, ocl::Buffer<cl_uint>& ranks, Views views) {
+void BandedSgmPaths::match(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
+                           ocl::Buffer<cl_uint>& ranks, Views views) {
   follow(kStraight, parameters, inputs, views);
   if (paths_ == 8) {
     for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);

@@ -25,8 +25,8 @@ class BandedSgmPaths {
                  const BandedSgmOptions& options, Group group);
 
   /// As BandedSgm.
-  void operator()(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
-                  ocl::Buffer<cl_uint>& ranks, Views views);
+  void match(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
+             ocl::Buffer<cl_uint>& ranks, Views views);
 
   /// On GPUs two quads of disparities a lane (one, where codes of 64 bits take the registers), and a group that fills
   /// the smallest unit, as far as the device allows it; elsewhere work-items of their own, which wait for nobody.

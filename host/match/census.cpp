@@ -46,7 +46,7 @@ Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, Ma
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       census_(build(context, type, cost, pixels_, std::max(words, Census::words(cost))), "census") {}
 
-void Census::operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
+void Census::encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
   context_.enter("Census");
   const ocl::Range range = pixels_ == 1 ? ocl::every_pixel(context_, {size_.width + 2 * padding_, size_.height})
                                         : ocl::every_row(context_, size_);

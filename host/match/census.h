@@ -20,7 +20,7 @@ class Census {
          int words = 0);
 
   /// `images`: both views' pixels, the left view first, without gaps.
-  void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes);
+  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes);
 
   /// 32-bit words of a code, and of all codes.
   static int words(MatchingCost cost) {

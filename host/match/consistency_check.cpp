@@ -19,8 +19,8 @@ ConsistencyCheck::ConsistencyCheck(ocl::Context& context, shared::ImageSize size
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       check_(build(context, pixels_), "check") {}
 
-void ConsistencyCheck::operator()(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept,
-                                  Map& variance, Views views) {
+void ConsistencyCheck::check(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept,
+                             Map& variance, Views views) {
   context_.enter("ConsistencyCheck");
   const cl_int keep_outside = outside == OutsideView::kKeep;
   check_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_difference_px, keep_outside,

@@ -21,8 +21,7 @@ class ConsistencyCheck {
 
   /// Writes what is kept of the `views` of `disparity` to `kept`, which is another map; what is dropped loses its
   /// `variance`. Of `disparity`, both views are read.
-  void operator()(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept, Map& variance,
-                  Views views);
+  void check(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept, Map& variance, Views views);
 
  private:
   ocl::Context& context_;

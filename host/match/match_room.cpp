@@ -25,20 +25,20 @@ MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const Method
   if (options.temporal && !options.track_right) matcher_.prepare_reading_off();
 }
 
-void MatchRoom::operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
-                           Measurement& measured) {
+void MatchRoom::measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
+                        Measurement& measured) {
   const bool reads_off = plan.matched == Views::kLeft;
   Measurement matched{{matching.matched, measured.variance}, measured.doubtful};
   if (reads_off) {
     matcher_.reading_off(images, bands, matched);
   } else {
-    matcher_(images, bands, matched, Views::kBoth);
+    matcher_.match(images, bands, matched, Views::kBoth);
   }
-  if (median_filter_) (*median_filter_)(matching.matched, matching.smoothed, Views::kBoth);
+  if (median_filter_) median_filter_->filter(matching.matched, matching.smoothed, Views::kBoth);
   const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;
-  consistency_(smoothed, reads_off ? left_right_.read_off_px : left_right_.measurement_px, OutsideView::kDrop,
-               measured.disparity, measured.variance, Views::kBoth);
-  if (removes_speckles(plan)) speckle_removal_(measured, plan.matched);
+  consistency_.check(smoothed, reads_off ? left_right_.read_off_px : left_right_.measurement_px, OutsideView::kDrop,
+                     measured.disparity, measured.variance, Views::kBoth);
+  if (removes_speckles(plan)) speckle_removal_.remove(measured, plan.matched);
 }
 
 }  // namespace egosgm

@@ -29,8 +29,8 @@ class MatchRoom {
   /// Builds what images of `type` need.
   void prepare(PixelType type) { matcher_.prepare(type); }
 
-  void operator()(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
-                  Measurement& measured);
+  void measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
+               Measurement& measured);
 
   const Matcher& matcher() const { return matcher_; }
   /// Null where nothing is dropped as a speckle.

@@ -18,8 +18,8 @@ void Matcher::prepare(PixelType type) {
   step_penalties_.prepare(type);
 }
 
-void Matcher::operator()(const FrameImages& images, const SearchBands& bands, Measurement& matched, Views views) {
-  banded_sgm_(inputs(images, bands, views), matched, views);
+void Matcher::match(const FrameImages& images, const SearchBands& bands, Measurement& matched, Views views) {
+  banded_sgm_.match(inputs(images, bands, views), matched, views);
 }
 
 void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, Measurement& matched) {
@@ -27,8 +27,8 @@ void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, M
 }
 
 MatchInputs Matcher::inputs(const FrameImages& images, const SearchBands& bands, Views views) {
-  census_[images.type](images.pixels, codes_);
-  step_penalties_[images.type](images.pixels, penalties_, views);
+  census_[images.type].encode(images.pixels, codes_);
+  step_penalties_[images.type].compute(images.pixels, penalties_, views);
   return {codes_, penalties_, bands};
 }
 

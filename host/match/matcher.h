@@ -26,7 +26,7 @@ class Matcher {
   void prepare_reading_off() { banded_sgm_.prepare_reading_off(); }
 
   /// As BandedSgm. REQUIRES: the images' type was prepared.
-  void operator()(const FrameImages& images, const SearchBands& bands, Measurement& matched, Views views);
+  void match(const FrameImages& images, const SearchBands& bands, Measurement& matched, Views views);
   void reading_off(const FrameImages& images, const SearchBands& bands, Measurement& matched);
 
   const BandedSgm& banded_sgm() const { return banded_sgm_; }

@@ -20,7 +20,7 @@ MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, int pi
       filter_(build(context, pixels_), "filter"),
       filter_and_fill_(build(context, pixels_), "filter_and_fill") {}
 
-void MedianFilter::operator()(const Map& disparity, Map& filtered, Views views) {
+void MedianFilter::filter(const Map& disparity, Map& filtered, Views views) {
   context_.enter("MedianFilter");
   filter_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, disparity, filtered);
 }

@@ -15,7 +15,7 @@ class MedianFilter {
   MedianFilter(ocl::Context& context, shared::ImageSize size, int pixels = 0);
 
   /// A pixel without a disparity stays one.
-  void operator()(const Map& disparity, Map& filtered, Views views);
+  void filter(const Map& disparity, Map& filtered, Views views);
   /// A pixel without a disparity takes the median of its neighbours, with a variance of 1 px^2, if at least six of the
   /// eight have a value.
   void fill(const Map& disparity, Map& filtered, Map& variance, Views views);

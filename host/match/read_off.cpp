@@ -24,7 +24,7 @@ std::size_t ReadOff::bytes(shared::ImageSize size, int code_padding) {
   return rank_count(size, code_padding) * sizeof(cl_uint);
 }
 
-void ReadOff::operator()(const shared::SgmParameters& parameters, Measurement& measured) {
+void ReadOff::read_off(const shared::SgmParameters& parameters, Measurement& measured) {
   read_off_(context_, ocl::every_pixels(context_, size_, ocl::pixels_a_work_item(context_), /*views=*/1), parameters,
             ranks_, measured.disparity, measured.variance, measured.doubtful);
 }

@@ -20,7 +20,7 @@ class ReadOff {
   ocl::Buffer<cl_uint>& ranks() { return ranks_; }
 
   /// Writes the right half of both maps.
-  void operator()(const shared::SgmParameters& parameters, Measurement& measured);
+  void read_off(const shared::SgmParameters& parameters, Measurement& measured);
 
  private:
   ocl::Context& context_;

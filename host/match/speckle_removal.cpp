@@ -32,7 +32,7 @@ SpeckleRemoval::SpeckleRemoval(ocl::Context& context, shared::ImageSize size, co
       measure_(build(context, row_group_), "measure"),
       drop_(build(context, row_group_), "drop") {}
 
-void SpeckleRemoval::operator()(StereoMaps& maps, Views views) {
+void SpeckleRemoval::remove(StereoMaps& maps, Views views) {
   if (options_.max_size_px <= 0) return;
   context_.enter("SpeckleRemoval");
   const int strips = (size_.height + strip_rows_ - 1) / strip_rows_;

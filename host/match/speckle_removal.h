@@ -23,7 +23,7 @@ class SpeckleRemoval {
                  int strip_rows = 0, int row_group = 0);
 
   /// In place. With `max_size_px` 0 nothing is launched. `views`: 1 looks at the left view only.
-  void operator()(StereoMaps& maps, Views views);
+  void remove(StereoMaps& maps, Views views);
 
   /// Of the last maps, before anything was dropped: where each pixel's run of connected ones begins, 65535 without one.
   const Runs& runs() const { return runs_; }

@@ -24,7 +24,7 @@ StepPenalties::StepPenalties(ocl::Context& context, shared::ImageSize size, Pixe
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       penalties_(build(context, type, pixels_), "penalties") {}
 
-void StepPenalties::operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& steps, Views views) {
+void StepPenalties::compute(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& steps, Views views) {
   context_.enter("StepPenalties");
   penalties_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, most_, least_, slope_, images,
              steps);

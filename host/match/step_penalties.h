@@ -16,7 +16,7 @@ class StepPenalties {
 
   /// `images`: both views' pixels. `steps`: `bytes(size)` penalties, a byte each. `views`: 1 writes those of the left
   /// view only.
-  void operator()(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& steps, Views views);
+  void compute(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uchar>& steps, Views views);
 
   static constexpr int kStepsAPixel = 4;
   static std::size_t bytes(shared::ImageSize size) { return kStepsAPixel * 2 * pixel_count(size); }

@@ -21,7 +21,7 @@ EdgeRejection::EdgeRejection(ocl::Context& context, shared::ImageSize size, cons
       max_jump_px_(options.max_jump_px),
       reject_(build(context, pixels_), "reject") {}
 
-void EdgeRejection::operator()(const Map& disparity, Map& kept, Map& variance, Views views) {
+void EdgeRejection::reject(const Map& disparity, Map& kept, Map& variance, Views views) {
   context_.enter("EdgeRejection");
   reject_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_jump_px_, disparity, kept,
           variance);

@@ -16,7 +16,7 @@ class EdgeRejection {
   EdgeRejection(ocl::Context& context, shared::ImageSize size, const EdgeRejectionOptions& options, int pixels = 0);
 
   /// Writes what is kept of `disparity` to `kept`; what is dropped loses its `variance`.
-  void operator()(const Map& disparity, Map& kept, Map& variance, Views views);
+  void reject(const Map& disparity, Map& kept, Map& variance, Views views);
 
  private:
   ocl::Context& context_;

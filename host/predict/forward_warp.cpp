@@ -101,8 +101,8 @@ ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Ca
   }
 }
 
-void ForwardWarp::operator()(const StereoMaps& belief, const FlagMap& evidence, const Motion& current_from_previous,
-                             StereoMaps& predicted, FlagMap& predicted_evidence, Views views) {
+void ForwardWarp::warp(const StereoMaps& belief, const FlagMap& evidence, const Motion& current_from_previous,
+                       StereoMaps& predicted, FlagMap& predicted_evidence, Views views) {
   context_.enter("ForwardWarp");
   Motion motion = current_from_previous;
   motion.covariance *= static_cast<double>(options_.motion_noise);

@@ -30,8 +30,8 @@ class ForwardWarp {
 
   /// `evidence` moves with the belief; it is 0 where nothing lands. REQUIRES: `motion` is valid; `predicted` is not
   /// `belief`.
-  void operator()(const StereoMaps& belief, const FlagMap& evidence, const Motion& current_from_previous,
-                  StereoMaps& predicted, FlagMap& predicted_evidence, Views views);
+  void warp(const StereoMaps& belief, const FlagMap& evidence, const Motion& current_from_previous,
+            StereoMaps& predicted, FlagMap& predicted_evidence, Views views);
 
  private:
   using Size = const shared::ImageSize;

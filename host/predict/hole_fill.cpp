@@ -21,7 +21,7 @@ HoleFill::HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFill
       rows_filled_(Map(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
                    Map(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size))) {}
 
-void HoleFill::operator()(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views) {
+void HoleFill::fill(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views) {
   context_.enter("HoleFill");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, count(views));
   fill_rows_(context_, pixels, size_, max_difference_px_, in.disparity, in.variance, rows_filled_.disparity,

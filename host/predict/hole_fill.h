@@ -16,7 +16,7 @@ class HoleFill {
   HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFillOptions& options, int pixels = 0);
 
   /// Of `views`; what is hidden, in a map of its own. REQUIRES: the outputs are not the inputs.
-  void operator()(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views);
+  void fill(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views);
 
  private:
   ocl::Context& context_;

@@ -13,14 +13,14 @@ PredictRoom::PredictRoom(ocl::Context& context, shared::ImageSize size, const Ca
   if (options.edge_rejection.max_jump_px > 0) edge_rejection_.emplace(context, size, options.edge_rejection);
 }
 
-void PredictRoom::operator()(const Plan& plan, const Belief& belief, Prediction& prediction) {
+void PredictRoom::predict(const Plan& plan, const Belief& belief, Prediction& prediction) {
   auto& [warped, rejected, filled, maps, evidence, hidden] = prediction;
   const bool checks = plan.tracked == Views::kBoth;
-  forward_warp_(belief.maps, belief.evidence, *plan.motion, warped, evidence, plan.tracked);
-  if (edge_rejection_) (*edge_rejection_)(warped.disparity, rejected, warped.variance, plan.tracked);
+  forward_warp_.warp(belief.maps, belief.evidence, *plan.motion, warped, evidence, plan.tracked);
+  if (edge_rejection_) edge_rejection_->reject(warped.disparity, rejected, warped.variance, plan.tracked);
   StereoMaps holes_filled{checks ? filled : maps.disparity, maps.variance};
-  hole_fill_({edge_rejection_ ? rejected : warped.disparity, warped.variance}, holes_filled, hidden, plan.tracked);
-  if (checks) consistency_(filled, left_right_px_, outside_, maps.disparity, maps.variance, plan.tracked);
+  hole_fill_.fill({edge_rejection_ ? rejected : warped.disparity, warped.variance}, holes_filled, hidden, plan.tracked);
+  if (checks) consistency_.check(filled, left_right_px_, outside_, maps.disparity, maps.variance, plan.tracked);
 }
 
 }  // namespace egosgm

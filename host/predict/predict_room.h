@@ -34,7 +34,7 @@ class PredictRoom {
               const MethodOptions& options, const Tuning& tuning);
 
   /// REQUIRES: the plan has a motion.
-  void operator()(const Plan& plan, const Belief& belief, Prediction& prediction);
+  void predict(const Plan& plan, const Belief& belief, Prediction& prediction);
 
  private:
   const float left_right_px_;

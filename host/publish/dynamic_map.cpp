@@ -17,7 +17,7 @@ DynamicMap::DynamicMap(ocl::Context& context, shared::ImageSize size, int pixels
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       mark_(build(context, pixels_), "mark") {}
 
-void DynamicMap::operator()(const Map& predicted, const Map& measured, ocl::Buffer<cl_uchar>& marks) {
+void DynamicMap::mark(const Map& predicted, const Map& measured, ocl::Buffer<cl_uchar>& marks) {
   context_.enter("DynamicMap");
   mark_(context_, ocl::every_pixels(context_, size_, pixels_, /*views=*/1), size_, predicted, measured, marks);
 }

@@ -14,7 +14,7 @@ class DynamicMap {
   DynamicMap(ocl::Context& context, shared::ImageSize size, int pixels = 0);
 
   /// By the disparities `predicted` and `measured`. `marks`: a byte a pixel.
-  void operator()(const Map& predicted, const Map& measured, ocl::Buffer<cl_uchar>& marks);
+  void mark(const Map& predicted, const Map& measured, ocl::Buffer<cl_uchar>& marks);
 
  private:
   ocl::Context& context_;

@@ -24,7 +24,7 @@ OutputVariance::OutputVariance(ocl::Context& context, shared::ImageSize size, co
       row_means_(build(context, pixels_), "row_means"),
       combine_(build(context, pixels_), "combine") {}
 
-void OutputVariance::operator()(const StereoMaps& maps, const StereoMaps& measured, Map& variance, Views views) {
+void OutputVariance::compute(const StereoMaps& maps, const StereoMaps& measured, Map& variance, Views views) {
   context_.enter("OutputVariance");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, count(views));
   of_each_pixel_(context_, pixels, size_, maps.disparity, maps.variance, measured.disparity, measured.variance,

@@ -20,7 +20,7 @@ class OutputVariance {
 
   /// Writes `variance` [px^2], 0 where there is no disparity. `measured`: what the frame of `maps` measured; may be
   /// `maps`.
-  void operator()(const StereoMaps& maps, const StereoMaps& measured, Map& variance, Views views);
+  void compute(const StereoMaps& maps, const StereoMaps& measured, Map& variance, Views views);
 
  private:
   ocl::Context& context_;

@@ -14,14 +14,14 @@ void PublishRoom::prepare(PixelType type, const Wanted& wanted) {
   if (wanted.reasons) reasons_.prepare(type);
 }
 
-void PublishRoom::operator()(const Plan& plan, const Reasons::Inputs& inputs, const Outputs& outputs) {
+void PublishRoom::write(const Plan& plan, const Reasons::Inputs& inputs, const Outputs& outputs) {
   if (plan.wanted.variance) {
-    (*output_variance_)(inputs.belief, inputs.measured, outputs.variance, *plan.wanted.variance);
+    output_variance_->compute(inputs.belief, inputs.measured, outputs.variance, *plan.wanted.variance);
   }
-  if (plan.wanted.reasons) reasons_[inputs.images.type](inputs, outputs.reasons);
+  if (plan.wanted.reasons) reasons_[inputs.images.type].explain(inputs, outputs.reasons);
   if (!plan.wanted.dynamic) return;
   if (inputs.prediction) {
-    (*dynamic_map_)(inputs.prediction->maps.disparity, inputs.measured.disparity, outputs.dynamic);
+    dynamic_map_->mark(inputs.prediction->maps.disparity, inputs.measured.disparity, outputs.dynamic);
   } else {
     context_.enter("DynamicMap");
     outputs.dynamic.fill(context_, 0);

@@ -24,7 +24,7 @@ class PublishRoom {
   };
 
   /// Writes what the plan wants.
-  void operator()(const Plan& plan, const Reasons::Inputs& inputs, const Outputs& outputs);
+  void write(const Plan& plan, const Reasons::Inputs& inputs, const Outputs& outputs);
 
  private:
   ocl::Context& context_;

@@ -65,7 +65,7 @@ Reasons::Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, 
       padding_(BandedSgm::code_padding(range_of(options))),
       explain_(build(context, type, options.banded_sgm, pixels_), "explain") {}
 
-void Reasons::operator()(const Inputs& inputs, Bytes& reasons) {
+void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
   context_.enter("Reasons");
   const cl_int has_prediction = inputs.prediction ? 1 : 0, has_runs = inputs.runs ? 1 : 0;
   const Bytes& bytes = inputs.images.pixels;  // in place of what there is not

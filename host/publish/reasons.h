@@ -29,7 +29,7 @@ class Reasons {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, const MethodOptions& options, int pixels = 0);
 
-  void operator()(const Inputs& inputs, Bytes& reasons);
+  void explain(const Inputs& inputs, Bytes& reasons);
 
  private:
   using In = const ocl::Buffer<float>;

@@ -39,7 +39,7 @@ BandedSgmOptions CoarseMatch::matcher(const MethodOptions& options) {
 Shrink::Shrink(ocl::Context& context, shared::ImageSize size, PixelType type)
     : context_(context), size_(size), shrink_(build(context, type), "shrink") {}
 
-void Shrink::operator()(const FrameImages& images, FrameImages& coarse) {
+void Shrink::shrink(const FrameImages& images, FrameImages& coarse) {
   context_.enter("CoarseMatch");
   const shared::ImageSize coarse_size = CoarseMatch::coarse_size(size_);
   const int at_once = ocl::pixels_a_work_item(context_) == 1 ? 1 : EGOSGM_COARSE;
@@ -70,12 +70,12 @@ CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const Me
   matcher_.prepare(PixelType::kU16);
 }
 
-void CoarseMatch::operator()(const FrameImages& images, Measurement& found) {
+void CoarseMatch::match(const FrameImages& images, Measurement& found) {
   const ocl::Context::Within within(context_, "CoarseMatch");
-  shrink_[images.type](images, images_);
+  shrink_[images.type].shrink(images, images_);
   Measurement matched{{matched_, found.variance}, found.doubtful};
-  matcher_(images_, everything_, matched, Views::kBoth);
-  consistency_(matched_, max_difference_px_, OutsideView::kDrop, found.disparity, found.variance, Views::kBoth);
+  matcher_.match(images_, everything_, matched, Views::kBoth);
+  consistency_.check(matched_, max_difference_px_, OutsideView::kDrop, found.disparity, found.variance, Views::kBoth);
 }
 
 std::uint64_t CoarseMatch::matched_cells() const {

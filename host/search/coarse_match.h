@@ -14,7 +14,7 @@ class Shrink {
  public:
   Shrink(ocl::Context& context, shared::ImageSize size, PixelType type);
 
-  void operator()(const FrameImages& images, FrameImages& coarse);
+  void shrink(const FrameImages& images, FrameImages& coarse);
 
  private:
   ocl::Context& context_;
@@ -35,7 +35,7 @@ class CoarseMatch {
 
   /// Writes the left-right consistent disparities of both views, `coarse_size` of the images' each. REQUIRES: the
   /// images' type was prepared.
-  void operator()(const FrameImages& images, Measurement& found);
+  void match(const FrameImages& images, Measurement& found);
 
   /// Cells that a call matches, of both views.
   std::uint64_t matched_cells() const;

@@ -64,7 +64,7 @@ SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::Di
   }
 }
 
-void SearchBand::operator()(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views) {
+void SearchBand::narrow(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views) {
   context_.enter("SearchBand");
   const int pixels = row_group_ == 1 ? 2 * EGOSGM_BLOCK : 1;
   const ocl::Range blocks = ocl::every_pixels(context_, blocks_, pixels, count(views));

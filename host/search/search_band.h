@@ -31,7 +31,7 @@ class SearchBand {
              const SearchBandOptions& options, int row_group = 0);
 
   /// Bands from the prediction and, unless null, the disparities that CoarseMatch found.
-  void operator()(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views);
+  void narrow(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views);
   /// Every pixel searches everything.
   void full_range(SearchBands& bands, Views views);
   /// The same where there are predicted disparities that are not searched by: `row_sums` counts them.

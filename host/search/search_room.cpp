@@ -16,12 +16,12 @@ void SearchRoom::prepare(PixelType type) {
   if (coarse_match_) coarse_match_->prepare(type);
 }
 
-void SearchRoom::operator()(const Plan& plan, const FrameImages& images, const Prediction& prediction,
+void SearchRoom::plan_bands(const Plan& plan, const FrameImages& images, const Prediction& prediction,
                             Measurement& coarse, SearchBands& bands) {
   if (plan.search == Search::kBands) {
-    if (plan.has_coarse_match) (*coarse_match_)(images, coarse);
+    if (plan.has_coarse_match) coarse_match_->match(images, coarse);
     const Map* found = plan.has_coarse_match ? &coarse.disparity : nullptr;
-    search_band_(prediction.maps, found, bands, plan.matched);
+    search_band_.narrow(prediction.maps, found, bands, plan.matched);
   } else if (plan.predicts()) {
     search_band_.full_range(prediction.maps.disparity, bands, plan.matched);
   } else {

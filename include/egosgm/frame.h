@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,9 +34,10 @@ struct FrameOutputs {
   DebugMaps debug;
 };
 
-/// Why a frame has no prediction; kNo: it has one. By name: "", "first frame", "reset", "no motion", "not temporal".
-enum class Unpredicted { kNo, kFirstFrame, kReset, kNoMotion, kNotTemporal };
-EGOSGM_EXPORT const char* to_string(Unpredicted reason);
+/// Why a frame has no prediction.
+enum class Unpredicted { kFirstFrame, kReset, kNoMotion, kNotTemporal };
+/// "first frame", "reset", "no motion", "not temporal"; "" of a frame that has one.
+EGOSGM_EXPORT const char* to_string(std::optional<Unpredicted> why_not);
 
 /// Device time of a stage in one frame.
 struct StageTime {
@@ -59,17 +61,17 @@ struct DeviceCommand {
 /// that knows no vertical offset, rows that stripes share. 1: as many as one match of the full range has; a first frame
 /// has 2, and a D that fills no whole chunks more.
 struct FrameReport {
-  Unpredicted unpredicted = Unpredicted::kNo;  // why nothing was predicted
-  bool searched_everything = false;     // the whole range at every pixel: without a prediction, or not trusting it
-  double search_fraction = 0;           // see above
-  double predicted_fraction = 0;        // left pixels with a prediction
-  double density = 0;                   // left pixels with a disparity
-  double vertical_offset_px = 0;        // by which the middle of the right image was resampled
-  int launches = 0;                     // kernels enqueued
-  int stripes = 1;                      // in which the image was matched; more than 1 where memory is too small
-  std::vector<StageTime> stages;        // in the order in which they ran
-  std::vector<DeviceCommand> commands;  // each of them, after record_commands(true)
-  double total_ms = 0;                  // wall clock, upload to download, from when the frame before was collected
+  std::optional<Unpredicted> unpredicted;  // why nothing was predicted
+  bool searched_everything = false;        // the whole range at every pixel: without a prediction, or not trusting it
+  double search_fraction = 0;              // see above
+  double predicted_fraction = 0;           // left pixels with a prediction
+  double density = 0;                      // left pixels with a disparity
+  double vertical_offset_px = 0;           // by which the middle of the right image was resampled
+  int launches = 0;                        // kernels enqueued
+  int stripes = 1;                         // in which the image was matched; more than 1 where memory is too small
+  std::vector<StageTime> stages;           // in the order in which they ran
+  std::vector<DeviceCommand> commands;     // each of them, after record_commands(true)
+  double total_ms = 0;                     // wall clock, upload to download, from when the frame before was collected
 };
 
 }  // namespace egosgm

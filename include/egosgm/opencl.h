@@ -31,8 +31,8 @@ struct DeviceImages {
 struct DeviceMaps {
   cl_mem disparity = nullptr;
   cl_mem variance = nullptr;
-  Unpredicted unpredicted = Unpredicted::kNo;  // as in FrameReport
-  cl_mem dynamic = nullptr;                    // bytes, the left view's, as in FrameOutputs; null unless it was wanted
+  std::optional<Unpredicted> unpredicted;  // as in FrameReport
+  cl_mem dynamic = nullptr;                // bytes, the left view's, as in FrameOutputs; null unless it was wanted
 };
 
 /// A Pipeline whose kernels run on the caller's queue, between the caller's own commands, on images that are there

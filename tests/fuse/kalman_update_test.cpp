@@ -31,7 +31,7 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
                          const testing::HostMaps& measured, int pixels = 0, Views views = Views::kBoth,
                          const reference::FrameEvidence* evidence = nullptr) {
   ocl::Context context(testing::any_device());
-  KalmanUpdate update(context, size, options, pixels);
+  KalmanUpdate stage(context, size, options, pixels);
   const StereoMaps prediction = testing::upload(context, size, predicted);
   const Measurement measurement = testing::upload_measurement(context, size, measured);
   StereoMaps out = testing::upload(context, size, before_update(size));
@@ -48,7 +48,7 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
     blocks.found.write(context, in_padded_rows(size, evidence->blocks.found));
   }
   const KalmanUpdate::FrameEvidence of_frame{before, blocks, evidence && evidence->repeats};
-  update(hidden, prediction, measurement, evidence ? &of_frame : nullptr, out, doubtful, after, views);
+  stage.update(hidden, prediction, measurement, evidence ? &of_frame : nullptr, out, doubtful, after, views);
   testing::HostMaps maps = testing::download(context, Measurement{out, doubtful});
   maps.evidence = after.read(context);
   return maps;

@@ -24,9 +24,9 @@ testing::HostMaps right_map(shared::ImageSize size, shared::DisparityRange range
   RightMap right_map(context, size, range, pixels);
   // What an earlier frame had must not shine through.
   StereoMaps earlier = testing::upload(context, size, testing::random_maps(size, 0, 12, 0, 99));
-  right_map(testing::upload(context, size, testing::random_maps(size, 0, 12, 0, 99)), 1, earlier, true);
+  right_map.complete(testing::upload(context, size, testing::random_maps(size, 0, 12, 0, 99)), 1, earlier, true);
   StereoMaps on_device = testing::upload(context, size, maps);
-  right_map(testing::upload(context, size, measured), max_difference_px, on_device, makes_variance);
+  right_map.complete(testing::upload(context, size, measured), max_difference_px, on_device, makes_variance);
   return testing::download(context, on_device);
 }
 

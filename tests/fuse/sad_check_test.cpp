@@ -35,7 +35,7 @@ HostMaps run(shared::ImageSize size, PixelType type, const SadCheckOptions& opti
   ocl::Buffer<cl_uchar> device_images(context, bytes.size());
   device_images.write(context, bytes);
   StereoMaps checked = testing::upload(context, size, maps);
-  stage(device_images, checked);
+  stage.check(device_images, checked);
   return testing::download(context, checked);
 }
 

@@ -103,7 +103,7 @@ void run(std::string_view input) {
   const int reads_off = random() & 1;
   const MatchInputs inputs{m.codes, m.penalties, m.bands};
   if (reads_off) m.sgm.prepare_reading_off();
-  reads_off ? m.sgm.reading_off(inputs, m.measured) : m.sgm(inputs, m.measured, Views::kBoth);
+  reads_off ? m.sgm.reading_off(inputs, m.measured) : m.sgm.match(inputs, m.measured, Views::kBoth);
 
   const BandedSgmOptions& o = m.options;
   const shared::SgmParameters parameters{m.size.width,

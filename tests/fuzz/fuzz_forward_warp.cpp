@@ -64,9 +64,9 @@ void run(std::string_view input) {
   FlagMap evidence(context, belief.evidence.size()), moved(context, belief.evidence.size());
   evidence.write(context, belief.evidence);
   for (const int pixels : {1, 16}) {
-    ForwardWarp warp(context, kSize, calibration, {.process_noise_px2 = kProcessNoisePx2}, range, pixels);
+    ForwardWarp stage(context, kSize, calibration, {.process_noise_px2 = kProcessNoisePx2}, range, pixels);
     StereoMaps predicted(context, kSize);
-    warp(on_device, evidence, motion, predicted, moved, Views::kBoth);
+    stage.warp(on_device, evidence, motion, predicted, moved, Views::kBoth);
     const testing::HostMaps actual = testing::without_marks(testing::download(context, predicted));
     if (moved.read(context) != expected.evidence) throw std::logic_error("by " + std::to_string(pixels) + ": evidence");
     if (actual.hidden != expected.hidden) throw std::logic_error("by " + std::to_string(pixels) + ": hidden");

@@ -112,14 +112,14 @@ Match match(const Case& c, int max_memory_mib = 0) {
     const testing::HostMaps maps = predictions(c);
     predicted.disparity.write(context, maps.disparity);
     predicted.variance.write(context, maps.variance);
-    SearchBand(context, c.size, c.range, {.min_half_width_px = 1})(predicted, {}, bands, Views::kBoth);
+    SearchBand(context, c.size, c.range, {.min_half_width_px = 1}).narrow(predicted, {}, bands, Views::kBoth);
   }
   const auto steps = reference::step_penalties(c.size, m.grey, 8, m.options);
   ocl::Buffer<cl_uchar> penalties(context, steps.size());
   penalties.write(context, {steps.begin(), steps.end()});
   const MatchInputs inputs{device_codes, penalties, bands};
   if (c.reads_off) sgm.prepare_reading_off();
-  c.reads_off ? sgm.reading_off(inputs, measured) : sgm(inputs, measured, Views::kBoth);
+  c.reads_off ? sgm.reading_off(inputs, measured) : sgm.match(inputs, measured, Views::kBoth);
 
   m.parameters = {c.size.width,
                   c.size.height,

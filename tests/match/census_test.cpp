@@ -47,7 +47,7 @@ TEST_P(CensusTest, EqualsReference) {
   ocl::Buffer<cl_uchar> images(context, raw.size());
   ocl::Buffer<cl_uint> codes(context, Census::words(cost, size, padding));
   images.write(context, raw);
-  census(images, codes);
+  census.encode(images, codes);
 
   const auto expected = reference::padded_codes(size, reference::codes(size, views[0], 8 * bytes, cost),
                                                 reference::codes(size, views[1], 8 * bytes, cost), padding, cost);
@@ -68,7 +68,7 @@ std::vector<cl_uint> codes_of(shared::ImageSize size, const std::vector<std::uin
     raw.push_back(static_cast<cl_uchar>(grey >> 8));
   }
   images.write(context, raw);
-  census(images, codes);
+  census.encode(images, codes);
   return codes.read(context);
 }
 

@@ -19,10 +19,10 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 testing::HostMaps check(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps,
                         OutsideView outside = OutsideView::kDrop, int pixels = 0, Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
-  ConsistencyCheck check(context, size, pixels);
+  ConsistencyCheck stage(context, size, pixels);
   StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  check(in.disparity, max_difference_px, outside, out.disparity, in.variance, views);
+  stage.check(in.disparity, max_difference_px, outside, out.disparity, in.variance, views);
   return {out.disparity.read(context), in.variance.read(context)};
 }
 

@@ -21,13 +21,13 @@ enum class Holes { kLeave, kFill };
 testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, Holes holes = Holes::kLeave,
                          int pixels = 0, Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
-  MedianFilter filter(context, size, pixels);
+  MedianFilter stage(context, size, pixels);
   StereoMaps maps = testing::upload(context, size, in);
   Map filtered = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99)).disparity;
   if (holes == Holes::kFill) {
-    filter.fill(maps.disparity, filtered, maps.variance, views);
+    stage.fill(maps.disparity, filtered, maps.variance, views);
   } else {
-    filter(maps.disparity, filtered, views);
+    stage.filter(maps.disparity, filtered, views);
   }
   return {filtered.read(context), maps.variance.read(context)};
 }

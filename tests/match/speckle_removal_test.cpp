@@ -21,7 +21,7 @@ HostMaps run(shared::ImageSize size, const SpeckleRemovalOptions& options, const
   StereoMaps on_device(context, size);
   on_device.disparity.write(context, maps.disparity);
   on_device.variance.write(context, maps.variance);
-  stage(on_device, views);
+  stage.remove(on_device, views);
   return {on_device.disparity.read(context), on_device.variance.read(context)};
 }
 

@@ -26,7 +26,7 @@ std::vector<std::uint8_t> penalties(shared::ImageSize size, const std::vector<st
   ocl::Buffer<cl_uchar> images(context, raw.size()), steps(context, StepPenalties::bytes(size));
   images.write(context, raw);
   steps.write(context, std::vector<cl_uchar>(steps.size(), kUntouched));
-  penalties(images, steps, views);
+  penalties.compute(images, steps, views);
   return steps.read(context);
 }
 

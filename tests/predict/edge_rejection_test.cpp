@@ -15,10 +15,10 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
 testing::HostMaps reject(shared::ImageSize size, float max_jump_px, const testing::HostMaps& maps, int pixels = 0) {
   ocl::Context context(testing::any_device());
-  EdgeRejection reject(context, size, {.max_jump_px = max_jump_px}, pixels);
+  EdgeRejection stage(context, size, {.max_jump_px = max_jump_px}, pixels);
   StereoMaps in = testing::upload(context, size, maps);
   StereoMaps out = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99));  // must not shine through
-  reject(in.disparity, out.disparity, in.variance, Views::kBoth);
+  stage.reject(in.disparity, out.disparity, in.variance, Views::kBoth);
   return {out.disparity.read(context), in.variance.read(context)};
 }
 

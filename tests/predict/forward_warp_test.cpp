@@ -28,13 +28,13 @@ testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, s
                        float process_noise_px2, const testing::HostMaps& belief, const Motion& motion, int pixels = 0,
                        Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
-  ForwardWarp warp(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
+  ForwardWarp stage(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
   StereoMaps out = testing::upload(context, size, before(size));
   FlagMap evidence(context, 2 * pixel_count(size)), moved(context, 2 * pixel_count(size));
   evidence.write(context, belief.evidence.empty() ? std::vector<cl_uchar>(evidence.size()) : belief.evidence);
   moved.write(context, std::vector<cl_uchar>(moved.size(), 77));
-  warp(in, evidence, motion, out, moved, views);
+  stage.warp(in, evidence, motion, out, moved, views);
   testing::HostMaps maps = testing::without_marks(testing::download(context, out));
   maps.evidence = moved.read(context);
   return maps;

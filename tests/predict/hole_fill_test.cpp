@@ -21,12 +21,12 @@ testing::HostMaps before_fill(shared::ImageSize size) { return testing::random_m
 testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps, int pixels = 0,
                        Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
-  HoleFill fill(context, size, {.max_difference_px = max_difference_px}, pixels);
+  HoleFill stage(context, size, {.max_difference_px = max_difference_px}, pixels);
   const StereoMaps in = testing::upload(context, size, testing::with_marks(maps));
   StereoMaps out = testing::upload(context, size, before_fill(size));
   FlagMap hidden(context, in.disparity.size());
   hidden.write(context, std::vector<cl_uchar>(hidden.size(), 9));
-  fill(in, out, hidden, views);
+  stage.fill(in, out, hidden, views);
   testing::HostMaps filled = testing::download(context, out);
   filled.hidden = hidden.read(context);
   return filled;

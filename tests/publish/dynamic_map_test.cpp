@@ -20,7 +20,7 @@ std::vector<cl_uchar> marks_of(shared::ImageSize size, const testing::HostMaps& 
   const StereoMaps first = testing::upload(context, size, predicted), second = testing::upload(context, size, measured);
   ocl::Buffer<cl_uchar> marks(context, pixel_count(size));
   marks.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
-  dynamic_map(first.disparity, second.disparity, marks);
+  dynamic_map.mark(first.disparity, second.disparity, marks);
   return marks.read(context);
 }
 

@@ -26,7 +26,7 @@ std::vector<float> output_variance(shared::ImageSize size, const testing::HostMa
   const StereoMaps maps = testing::upload(context, size, in), measured = testing::upload(context, size, measured_in);
   ocl::Buffer<float> variance(context, in.variance.size());
   variance.write(context, std::vector<float>(in.variance.size(), kUntouched));
-  stage(maps, measured, variance, views);
+  stage.compute(maps, measured, variance, views);
   const testing::HostMaps after = testing::download(context, maps);
   EXPECT_EQ(after.disparity, in.disparity);
   EXPECT_EQ(after.variance, in.variance);

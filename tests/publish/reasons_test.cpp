@@ -43,7 +43,7 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   inputs.code_padding = BandedSgm::code_padding(range_of(options));
   Census census(context, size, images.type, options.banded_sgm.cost, inputs.code_padding);
   ocl::Buffer<cl_uint> codes(context, Census::words(options.banded_sgm.cost, size, inputs.code_padding));
-  census(images.pixels, codes);
+  census.encode(images.pixels, codes);
   const std::vector<cl_uint> made = codes.read(context);
   inputs.codes.assign(made.begin(), made.end());
 
@@ -63,10 +63,10 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   ocl::Buffer<cl_uchar> found(context, pixel_count(size));
   found.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
   Reasons reasons(context, size, images.type, options, pixels);
-  reasons({images, codes, inputs.warped.empty() ? nullptr : &prediction, measured,
-           options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief, doubtful,
-           inputs.evidence.empty() ? nullptr : &evidence},
-          found);
+  reasons.explain({images, codes, inputs.warped.empty() ? nullptr : &prediction, measured,
+                   options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief, doubtful,
+                   inputs.evidence.empty() ? nullptr : &evidence},
+                  found);
   return found.read(context);
 }
 

@@ -63,8 +63,8 @@ double bias(double texture, float half_width_px, int frames, Scheduling scheduli
   Measurement matched(context, kSize);
   for (int frame = 0; frame < frames; ++frame) {
     images.pixels.write(context, slanted_pair(texture, 7 + frame));
-    if (half_width_px > 0) search_band(predicted, nullptr, bands, Views::kBoth);
-    matcher(images, bands, matched, Views::kBoth);
+    if (half_width_px > 0) search_band.narrow(predicted, nullptr, bands, Views::kBoth);
+    matcher.match(images, bands, matched, Views::kBoth);
     predicted.disparity.write(context, matched.disparity.read(context));
   }
   const std::vector<float> disparity = matched.disparity.read(context);

@@ -42,7 +42,7 @@ std::vector<float> run(shared::ImageSize size, const MethodOptions& options, con
   on_device.pixels.write(context, bytes);
   Measurement found(context, CoarseMatch::coarse_size(size));
   stage.prepare(type);
-  stage(on_device, found);
+  stage.match(on_device, found);
   return found.disparity.read(context);
 }
 

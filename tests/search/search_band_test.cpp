@@ -35,7 +35,7 @@ reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range,
   StereoMaps found(context, {(size.width + 3) / 4, (size.height + 3) / 4});
   if (!coarse.empty()) found.disparity.write(context, coarse);
   SearchBands bands(context, size, range);
-  stage(predicted, coarse.empty() ? nullptr : &found.disparity, bands, Views::kBoth);
+  stage.narrow(predicted, coarse.empty() ? nullptr : &found.disparity, bands, Views::kBoth);
   return read(context, bands);
 }
 
@@ -108,14 +108,14 @@ TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
     SearchBand stage(context, size, {-5, 128}, {}, row_group);
     SearchBands bands(context, size, {-5, 128});
     const std::function<void(Views)> ways[] = {
-        [&](Views views) { stage(predicted, &coarse.disparity, bands, views); },
+        [&](Views views) { stage.narrow(predicted, &coarse.disparity, bands, views); },
         [&](Views views) { stage.full_range(bands, views); },
         [&](Views views) { stage.full_range(predicted.disparity, bands, views); },
     };
     for (const auto& search : ways) {
       search(Views::kBoth);
       const reference::SearchBands both = read(context, bands);
-      stage(earlier, nullptr, bands, Views::kBoth);
+      stage.narrow(earlier, nullptr, bands, Views::kBoth);
       const reference::SearchBands before = read(context, bands);
       search(Views::kLeft);
       expect_same(read(context, bands),
@@ -279,7 +279,7 @@ TEST(SearchBand, ReportsAllThatWasMatched) {
   const VerticalOffset offset(context);
   SearchBands bands(context, size, {0, 100});
   const auto report_of = [&](Views views, const MatchedParts& parts) {
-    stage(predicted, {}, bands, views);
+    stage.narrow(predicted, {}, bands, views);
     transfer.download({predicted, &predicted, predicted, bands, views, parts, offset, /*dynamic=*/nullptr}, {});
     context.wait();
     FrameReport report;

@@ -28,7 +28,7 @@ class StageChain {
   reference::Frame process(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion) {
     reference::Frame frame;
     const Plan plan =
-        plan_of(options_, before_.missing, before_.offset.is_known, motion, {Views::kBoth, true, true, true});
+        plan_of(options_, before_.why_not, before_.offset.is_known, motion, {Views::kBoth, true, true, true});
     const FrameImages& uploaded = transfer_.upload(left, right);
     method_.observer = [&](Room room) {
       look(room, plan, uploaded, frame);

@@ -38,7 +38,7 @@ TEST(OpenCv, ProcessGivesTheMapsOfThePipeline) {
     const FrameMaps maps = process(pipeline, left, right, motion);
     EXPECT_TRUE(same_bits(maps.disparity, disparity)) << "frame " << k;
     EXPECT_TRUE(same_bits(maps.variance, variance)) << "frame " << k;
-    EXPECT_EQ(maps.report.unpredicted, k > 0 ? Unpredicted::kNo : Unpredicted::kFirstFrame);
+    EXPECT_EQ(maps.report.unpredicted, k > 0 ? std::nullopt : std::optional(Unpredicted::kFirstFrame));
   }
   expect_refused([&] { process(pipeline, cv::Mat(), cv::Mat(), {}); }, {"left image: no data"});
   expect_refused([&] { process(pipeline, cv::Mat(40, 96, CV_8UC3), cv::Mat(40, 96, CV_8UC3), {}); }, {"CV_8UC1"});

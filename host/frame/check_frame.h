@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "egosgm/pipeline.h"
+#include "kernels/shared.h"
+
+namespace egosgm {
+
+/// Throws InvalidArgument for a size that no pipeline can have.
+void check_size(int width, int height);
+
+/// Throws InvalidArgument, naming the view and the value, for what a pipeline of this size cannot take.
+void check_frame(shared::ImageSize size, const ImageView& left, const ImageView& right, const FrameOutputs& outputs);
+
+}  // namespace egosgm
