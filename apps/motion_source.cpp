@@ -3,6 +3,7 @@
 
 #include <chrono>
 
+#include "egosgm/error.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
 
@@ -35,6 +36,10 @@ void add_motion_bounds(CLI::App& command, vision::StereoOdometryOptions& options
 MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
                            const vision::StereoOdometryOptions& options) {
   options.validate();
+  if (!sequence.has_calibration) {
+    if (poses_file.empty()) return;
+    throw InvalidArgument("--poses " + poses_file + ": a motion predicts nothing without a calibration: give --calib");
+  }
   if (poses_file.empty()) {
     odometry_.emplace(sequence.calibration, options);
   } else {
@@ -46,7 +51,7 @@ FrameMotion MotionSource::next(const vision::StereoImages& images) {
   FrameMotion result;
   if (odometry_) {
     estimate(images, result);
-  } else {
+  } else if (!poses_.empty()) {
     take_from_file(result);
   }
   ++frame_;

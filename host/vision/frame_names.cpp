@@ -324,7 +324,8 @@ void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left,
     }
     StereoFrame frame;
     frame.number = pair.number;
-    frame.name = padded(std::to_string(pair.number), 6);
+    frame.name =
+        parse_frame_number(pair.text) || !is_decimal(pair.text) ? padded(std::to_string(pair.number), 6) : pair.text;
     frame.left = pair.left;
     frame.right = pair.right;
     sequence.frames.push_back(std::move(frame));
