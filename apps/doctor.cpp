@@ -103,9 +103,10 @@ class Doctor {
       reason = result.reason;
     }
     if (2 * without <= tried) return;
-    problem("motion", fmt::format("no motion between {} of {} ({})", without, counted(tried, "pair of frames"), reason),
-            "without a motion nothing is predicted: give frames that follow each other closely, all of one drive, left "
-            "and right of the same moments; or the poses (run --poses)");
+    add(Verdict::kNote, "motion",
+        fmt::format("no motion in {} of {} steps that were looked at ({})", without, tried, reason),
+        "without a motion nothing is predicted: give frames that follow each other closely, all of one drive, left and "
+        "right of the same moments; or the poses (run --poses)");
   }
 
   void check_times() {
@@ -130,6 +131,13 @@ class Doctor {
       first = i;
     }
     const std::string text = fmt::format("{:.4g} s between two frames ({})", usual, times.file.string());
+    constexpr double kUsual_s[] = {1e-4, 20};
+    for (const auto& [unit, seconds] :
+         {std::pair{"milliseconds", 1e-3}, {"microseconds", 1e-6}, {"nanoseconds", 1e-9}}) {
+      if (usual <= kUsual_s[1] || usual * seconds < kUsual_s[0] || usual * seconds > kUsual_s[1]) continue;
+      return problem("times", text,
+                     fmt::format("a time is in seconds: are these {} ({:.4g} s)? Divide them", unit, usual * seconds));
+    }
     if (gaps == 0) return fine("times", text);
     const std::string& before = sequence_.frames[first].name;
     const vision::StereoFrame &last = sequence_.frames[first], &next = sequence_.frames[first + 1];

@@ -87,6 +87,7 @@ class Run {
         input_(job.input),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
+        poses_doubt_(motions_.doubt(sequence_, job.odometry)),
         waiting_(std::in_place,
                  fmt::format("compiling the kernels for {}, which its driver keeps if it can", device.info().name),
                  quiet_),
@@ -137,6 +138,7 @@ class Run {
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
     if (!sequence_.note.empty()) progress.note(sequence_.note);
     if (!sequence_.has_calibration) progress.note(kNoCalibration);
+    if (!poses_doubt_.empty()) progress.note(poses_doubt_);
     const auto prepare_later = [&](std::size_t i) { return std::async(policy, [this, i] { return prepare(i); }); };
     auto next = prepare_later(0);
     for (std::size_t i = 0; i < sequence_.frames.size() && !interrupted(); ++i) {
@@ -223,7 +225,7 @@ class Run {
   }
 
   void finish(bool finished, const std::string& why_not) {
-    report_.set_doubt(doubt_.text());
+    report_.set_doubt(text_of_doubt());
     if (sequence_.has_calibration && !poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
     write_report(finished, why_not);
     if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace, finished, why_not);
@@ -234,6 +236,11 @@ class Run {
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
                100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.path().string());
     if (const std::string advice = advice_of(doubt_.text(), input_); !advice.empty()) fmt::print("{}\n", advice);
+  }
+
+  std::string text_of_doubt() const {
+    const std::string text = doubt_.text();
+    return text.empty() || poses_doubt_.empty() ? text + poses_doubt_ : text + "; " + poses_doubt_;
   }
 
   void write_trace(const Trace& trace, bool finished, const std::string& why_not) {
@@ -266,6 +273,7 @@ class Run {
   const std::string& input_;
   const cv::Size size_;
   MotionSource motions_;
+  const std::string poses_doubt_;
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
   std::optional<Waiting> waiting_;     // until all is built
   Pipeline pipeline_;

@@ -259,6 +259,10 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   StereoSequence sequence;
   sequence.title = left + " and " + right;
   select_frames(pairs, left_pattern, right_pattern, range, left, sequence);
+  if (pair_by == PairBy::kOrder) {
+    const std::string note = order_note(pairs);
+    sequence.note += (sequence.note.empty() || note.empty() ? "" : "; ") + note;
+  }
   sequence.calibration_file = calibration_file;
   sequence.has_calibration = !calibration_file.empty();
   if (sequence.has_calibration) {

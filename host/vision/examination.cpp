@@ -50,8 +50,39 @@ double share(const std::vector<float>& values, const std::function<bool(double)>
   return static_cast<double>(std::count_if(values.begin(), values.end(), which)) / static_cast<double>(values.size());
 }
 
+/// The mean difference [grey levels] of the block around (x, y) and the one `d` to the left in the other image.
+double block_difference(const cv::Mat& left, const cv::Mat& right, int x, int y, int d) {
+  constexpr int kRadius = 3;
+  int sum = 0, count = 0;
+  for (int v = std::max(0, y - kRadius); v <= std::min(left.rows - 1, y + kRadius); ++v) {
+    for (int u = std::max({0, x - kRadius, d}); u <= std::min({left.cols - 1, x + kRadius, right.cols - 1 + d}); ++u) {
+      // To what lies between the neighbours, as a disparity falls between pixels (Birchfield and Tomasi).
+      const auto* row = right.ptr(v);
+      const int here = row[u - d], before = (here + row[std::max(u - d - 1, 0)]) / 2,
+                after = (here + row[std::min(u - d + 1, right.cols - 1)]) / 2;
+      const int value = left.at<std::uint8_t>(v, u);
+      sum += std::max({0, value - std::max({here, before, after}), std::min({here, before, after}) - value});
+      ++count;
+    }
+  }
+  return count == 0 ? 255.0 : static_cast<double>(sum) / count;
+}
+
+/// Whether a disparity in [least, end) explains the images nearly as well as `d`.
+bool is_ambiguous(const cv::Mat& left, const cv::Mat& right, int x, int y, int d, int least, int end) {
+  constexpr double kNoise = 3;  // grey levels
+  const double enough = 1.5 * block_difference(left, right, x, y, d) + kNoise;
+  for (int other = std::max(least, x - right.cols + 1); other < std::min(end, x + 1); ++other) {
+    if (block_difference(left, right, x, y, other) <= enough) return true;
+  }
+  return false;
+}
+
 /// Disparities [px] of a small pair, sought from minus to plus half the width: where nothing is sure, there is none.
-std::vector<float> coarse_disparities(const cv::Mat& left, const cv::Mat& right, double row_offset_px) {
+/// One outside of [least, end) counts only where none in it explains the images nearly as well, as where texture
+/// repeats.
+std::vector<float> coarse_disparities(const cv::Mat& left, const cv::Mat& right, double row_offset_px, int least,
+                                      int end) {
   const int factor = std::max(1, (left.cols + kCoarseWidth - 1) / kCoarseWidth);
   const cv::Size size(left.cols / factor, left.rows / factor);
   if (size.width < 32 || size.height < 16) return {};
@@ -76,9 +107,14 @@ std::vector<float> coarse_disparities(const cv::Mat& left, const cv::Mat& right,
     for (int x = 0; x < size.width; ++x) {
       const float d = static_cast<float>(found.at<std::int16_t>(y, x + half)) / 16;
       const bool is_sure = d > static_cast<float>(-half) - 0.5f && std::abs(edges.at<std::int16_t>(y, x)) >= 24;
-      if (is_sure && x - d >= 0 && x - d < static_cast<float>(size.width)) {
-        disparities.push_back(d * static_cast<float>(factor));
+      if (!is_sure || x - d < 0 || x - d >= static_cast<float>(size.width)) continue;
+      const float full = d * static_cast<float>(factor);
+      const bool is_outside = full < static_cast<float>(least) - 1 || full > static_cast<float>(end);
+      if (is_outside &&
+          is_ambiguous(small[0], small[1], x, y, static_cast<int>(std::lround(d)), least / factor, end / factor)) {
+        continue;
       }
+      disparities.push_back(full);
     }
   }
   if (static_cast<double>(disparities.size()) < kFewestCoarse * size.area()) return {};
@@ -159,7 +195,7 @@ void Examination::add(const cv::Mat& left, const cv::Mat& right) {
   narrow_ += holds_8_bits_in_16(left) && holds_8_bits_in_16(right);
   matches_.insert(matches_.end(), found.begin(), found.end());
   const auto [left_bytes, right_bytes] = bytes_of(left, right);
-  const std::vector<float> coarse = coarse_disparities(left_bytes, right_bytes, median_row_error(found));
+  const std::vector<float> coarse = coarse_disparities(left_bytes, right_bytes, median_row_error(found), least_, end_);
   disparities_.insert(disparities_.end(), coarse.begin(), coarse.end());
 }
 
