@@ -119,10 +119,11 @@ std::vector<std::string> EstimateReader::doubts(double scale) const {
 }
 
 void expect_scaled(const std::string& option, double scale, const std::filesystem::path& file) {
-  if (scale == kKittiScale || file.empty() || is_png(file)) return;
+  if (scale == kKittiScale || file.empty() || is_png(file) || is_whole_npy(file)) return;
   throw InvalidArgument(
-      fmt::format("{} {:g}: is for 16-bit PNG, and {} is none: divide its values, or leave the option out", option,
-                  scale, file.string()));
+      fmt::format("{} {:g}: is for 16-bit PNG and .npy of whole numbers, and {} is neither: divide its values, or "
+                  "leave the option out",
+                  option, scale, file.string()));
 }
 
 }  // namespace egosgm::app

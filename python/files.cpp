@@ -100,7 +100,7 @@ void write_pfm(const path& file, const py::object& map) {
 void bind_files(py::module_& module) {
   bind_sequences(module);
   module.def(
-      "read_calibration", [](const path& file) { return vision::read_calibration(file); }, py::arg("file"),
+      "_read_calibration", [](const path& file) { return vision::read_calibration(file); }, py::arg("file"),
       "Reads KITTI's, Middlebury's or EgoSGM's own format.");
   module.def("write_calibration", &vision::write_calibration, py::arg("file"), py::arg("calibration"));
   module.def(

@@ -353,7 +353,7 @@ def _found(file: pathlib.Path, unit_m: float = 1.0, is_fisheye: bool = False) ->
             return _of_q(array.astype(float), file)
         raise _refuse(file, f"is one NumPy array of the shape {array.shape}: give the folder that holds all of them, or Q")
     errors: List[Exception] = []
-    readers: Tuple[Callable[[], Optional[Found]], ...] = (lambda: _egosgm.read_opencv_rig(file, unit_m, is_fisheye), lambda: _egosgm.read_calibration(file))
+    readers: Tuple[Callable[[], Optional[Found]], ...] = (lambda: _egosgm.read_opencv_rig(file, unit_m, is_fisheye), lambda: _egosgm._read_calibration(file))
     for reader in readers:
         try:
             found = reader()
