@@ -85,7 +85,7 @@ class Rectifier {
         std::isfinite(baseline_m) && baseline_m > 1e-3 ? vision::suspect_baseline(baseline_m) : std::nullopt;
     if (!suspicion) return;
     throw InvalidArgument(
-        fmt::format("{}: T gives {}: {} Give --unit cm or mm, whichever it is, or --unit m where it is "
+        fmt::format("{}: T gives {}: {} Give --unit cm or --unit mm, whichever it is, or --unit m where it is "
                     "right",
                     arguments_.calib, suspicion->what, suspicion->remedy));
   }

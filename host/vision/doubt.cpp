@@ -7,7 +7,7 @@
 namespace egosgm::vision {
 namespace {
 
-constexpr double kMinBaseline_m = 0.002, kMaxBaseline_m = 3.0;
+constexpr double kMinBaseline_m = 0.004, kMaxBaseline_m = 3.0;
 constexpr double kUsualBaseline_m[] = {0.02, 1.5};
 constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
 constexpr double kMinDensity = 0.5;
