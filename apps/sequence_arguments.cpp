@@ -44,7 +44,7 @@ void SequenceArguments::add_to(CLI::App& command) {
       ->type_name("DIR")
       ->group(kGroup);
   command.add_option("RIGHT", other_picture, "where DATASET is the left picture of a pair, the right one")
-      ->type_name("PICTURE")
+      ->type_name("")
       ->group(kGroup);
   command
       .add_option("--odometry", odometry, "KITTI odometry sequence: image_0, image_1 (or image_2, image_3), calib.txt")

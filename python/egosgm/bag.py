@@ -299,7 +299,7 @@ class Bag:
                     return None
 
             def broken(topic: str, stamp: int, error: Exception) -> None:
-                self.gaps.broken.append(f"{topic} at {stamp / 1e9:.9f} s: {str(error).partition(chr(10))[0] or type(error).__name__}")
+                self.gaps.broken.append(f"{topic} at {stamp // 10**9}.{stamp % 10**9:09d} s: {str(error).partition(chr(10))[0] or type(error).__name__}")
                 if number == 0 and len(self.gaps.broken) >= _MOST_BROKEN:
                     raise _egosgm.InvalidArgument(f"{self.path}: {self.gaps.broken[0]}")
 
