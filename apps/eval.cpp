@@ -141,6 +141,7 @@ Json json_of(const VideoInput& input, const Result& result) {
   }
   for (const auto& file : input.truth_pairs().without_estimate) json["without_estimate"].push_back(file.string());
   json["video"] = json_of(input, result.video);
+  if (const auto doubts = input.doubts(); !doubts.empty()) json["doubts"] = doubts;
   return json;
 }
 
@@ -256,6 +257,7 @@ int evaluate(EvalArguments arguments) {
     print_density(total.density);
   }
   print_pairing(input.truth_pairs());
+  for (const std::string& doubt : input.doubts()) fmt::print("{}\n", doubt);
   return kOk;
 }
 

@@ -39,6 +39,9 @@ namespace fs = std::filesystem;
 
 constexpr const char *kKilled = "a kill, or it is still running", *kInterrupt = "an interrupt";
 
+constexpr const char* kNoCalibration =
+    "no calibration was given: disparities are there, but no depth and no odometry; --calib FILE brings both";
+
 using Clock = std::chrono::steady_clock;
 std::string note_of(const FrameReport& report) {
   if (!report.searched_everything && !report.unpredicted) return "";
@@ -83,12 +86,13 @@ class Run {
         input_(job.input),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
+        poses_doubt_(motions_.doubt(sequence_, job.odometry)),
         waiting_(std::in_place,
                  fmt::format("compiling the kernels for {}, which its driver keeps if it can", device.info().name),
                  quiet_),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, type_of(sequence_)),
         report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height, job.batch_input),
-        doubt_(sequence_.calibration) {
+        doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, size_) {
     folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration);
@@ -119,6 +123,7 @@ class Run {
 
  private:
   static std::string motion_of(const SequenceJob& job) {
+    if (!job.sequence.has_calibration) return "none: the images have no calibration";
     if (!job.poses_file.empty()) return "poses of " + job.poses_file;
     return fmt::format("stereo odometry, at most {} m and {} degrees a frame", job.odometry.max_translation_m,
                        job.odometry.max_rotation_deg);
@@ -131,6 +136,8 @@ class Run {
     const auto policy = ahead ? std::launch::async : std::launch::deferred;
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
     if (!sequence_.note.empty()) progress.note(sequence_.note);
+    if (!sequence_.has_calibration) progress.note(kNoCalibration);
+    if (!poses_doubt_.empty()) progress.note(poses_doubt_);
     const auto prepare_later = [&](std::size_t i) { return std::async(policy, [this, i] { return prepare(i); }); };
     auto next = prepare_later(0);
     for (std::size_t i = 0; i < sequence_.frames.size() && !interrupted(); ++i) {
@@ -201,7 +208,7 @@ class Run {
 
   void tell(const vision::StereoFrame& frame, const FrameReport& result, const FrameMotion& motion,
             const HostTimes& times, std::int64_t unstorable, Progress& progress) {
-    if (poses_.size() > 1 && !motion.motion) {
+    if (sequence_.has_calibration && poses_.size() > 1 && !motion.motion) {
       progress.note(
           fmt::format("frame {}: no motion ({}): searched the full range", frame.name, motion.odometry.reason));
     }
@@ -217,8 +224,8 @@ class Run {
   }
 
   void finish(bool finished, const std::string& why_not) {
-    report_.set_doubt(doubt_.text());
-    if (!poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
+    report_.set_doubt(text_of_doubt());
+    if (sequence_.has_calibration && !poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
     write_report(finished, why_not);
     if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace, finished, why_not);
     folder_.end();
@@ -228,6 +235,11 @@ class Run {
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
                100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.path().string());
     if (const std::string advice = advice_of(doubt_.text(), input_); !advice.empty()) fmt::print("{}\n", advice);
+  }
+
+  std::string text_of_doubt() const {
+    const std::string text = doubt_.text();
+    return text.empty() || poses_doubt_.empty() ? text + poses_doubt_ : text + "; " + poses_doubt_;
   }
 
   void write_trace(const Trace& trace, bool finished, const std::string& why_not) {
@@ -260,6 +272,7 @@ class Run {
   const std::string& input_;
   const cv::Size size_;
   MotionSource motions_;
+  const std::string poses_doubt_;
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
   std::optional<Waiting> waiting_;     // until all is built
   Pipeline pipeline_;
@@ -283,13 +296,18 @@ EarlierRun earlier_run_of(const RunArguments& arguments) {
 SequenceJob job_of(const RunArguments& arguments) {
   SequenceJob job;
   const EarlierRun earlier = earlier_run_of(arguments);
-  job.sequence = arguments.input.open();
+  job.sequence = arguments.input.open(/*needs_calibration=*/false);
   job.input = arguments.input.text();
   job.options = arguments.method.options();
   job.poses_file = arguments.poses;
   job.odometry = arguments.odometry;
   job.kinds = parse_write_list(arguments.write);
   if (arguments.interpolate) job.kinds.insert("interpolated");
+  for (const char* kind : {"cloud", "depth", "depth_m"}) {
+    if (job.sequence.has_calibration || !job.kinds.contains(kind)) continue;
+    throw InvalidArgument(
+        fmt::format("--write {}: a disparity is no depth without a calibration: give --calib FILE", kind));
+  }
   Inputs inputs(arguments.input, job.sequence);
   for (const std::string& file : {arguments.poses, arguments.method.config, arguments.tuning}) inputs.add_file(file);
   inputs.add_folder(arguments.programs);

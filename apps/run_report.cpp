@@ -124,6 +124,7 @@ void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report,
                              {"stripes", report.stripes},
                              {"outside_png_range", unstorable},
                              {"ms", times_json(report, motion, times)}});
+  if (frame.name != fmt::format("{:06}", frame.number)) json_["frames"].back()["name"] = frame.name;
 }
 
 void RunReport::add_reasons() {
