@@ -16,7 +16,6 @@ struct Command {
 };
 
 Command add_run(CLI::App& program);
-Command add_batch(CLI::App& program);
 Command add_eval(CLI::App& program);
 Command add_devices(CLI::App& program);
 Command add_compile(CLI::App& program);

@@ -142,9 +142,9 @@ int run_program(int argc, char** argv) {
       "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.\n"
       "Who stops reading the output (`| head`) ends the printing, not the work.");
   const Command commands[] = {
-      add_run(program),        add_batch(program), add_view(program),     add_report(program),     add_eval(program),
-      add_devices(program),    add_synth(program), add_odometry(program), add_eval_poses(program), add_compile(program),
-      add_completion(program), add_tune(program),  add_doctor(program),   add_rectify(program)};
+      add_run(program),   add_view(program),     add_report(program),     add_eval(program),    add_devices(program),
+      add_synth(program), add_odometry(program), add_eval_poses(program), add_compile(program), add_completion(program),
+      add_tune(program),  add_doctor(program),   add_rectify(program)};
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -10,7 +10,7 @@ import unittest
 
 from program_case import PROGRAM, SOURCE, ProgramTest, egosgm
 
-COMMANDS = ("run", "batch", "eval", "devices", "compile", "synth", "odometry", "eval-poses", "tune", "view", "report", "doctor", "rectify",
+COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-poses", "tune", "view", "report", "doctor", "rectify",
             "completion")
 
 

@@ -44,7 +44,7 @@ class WrongArguments(ProgramTest):
             done = egosgm(*self.run_with(*arguments), cwd=folder)
             self.assertEqual(done.returncode, 2, arguments)
             self.assertNotIn("did you mean", done.stderr)
-        for arguments in (["synth", "--out", "never", "--frames", 0], ["completion", "fish"], ["batch", "list", "--out", "never"]):
+        for arguments in (["synth", "--out", "never", "--frames", 0], ["completion", "fish"]):
             done = egosgm(*arguments, cwd=folder)
             self.assertEqual(done.returncode, 2, arguments)
             self.assertNotIn("did you mean", done.stderr)
@@ -192,12 +192,11 @@ class BrokenInput(ProgramTest):
 
     def test_texts_may_begin_with_the_mark_of_utf_8(self):
         street = self.broken_street()
-        files = {name: street / name for name in ("calib.txt", "poses.txt", "config.toml", "list")}
+        files = {name: street / name for name in ("calib.txt", "poses.txt", "config.toml")}
         files["config.toml"].write_text("disparities = 16\r\n")
-        files["list"].write_text(f"a {street} --poses {files['poses.txt']} --frames 0:1\r\n")
         for file in files.values():
             file.write_bytes(b"\xef\xbb\xbf" + file.read_bytes())
-        self.assert_works("batch", files["list"], "--out", self.new_folder(), "--config", files["config.toml"], "--quiet")
+        self.assert_works("run", street, "--poses", files["poses.txt"], "--frames", "0:1", "--out", self.new_folder(), "--config", files["config.toml"], "--quiet")
 
     def test_rows_of_a_configuration_that_say_nothing(self):
         config = self.new_folder() / "config.toml"
