@@ -153,7 +153,7 @@ class Commands:
     def file(self, cwd, *more):
         root = self.tree.root
         names = ["seq/poses.txt", "seq/image_0/000000.png", "drive/calib.txt", "user/poses.txt", "user/left/000000.png", "user/config.toml",
-                 "user/tuning.json", "user/page.html", "user/path.svg", "user/path.png", "user/film.avi", "user/film.mp4", "user/trace.json", "user/hard_link.png",
+                 "user/tuning.json", "user/page.html", "user/path.svg", "user/path.png", "user/trace.json", "user/hard_link.png",
                  "user/empty", "links/poses.txt", "links/image.png", "links/loop", "outs/run/poses.txt", "outs/edited/poses.txt", "outs/run/report.json",
                  "outs/run/notes.txt", "outs/run/report.html", "user", f"outs/new{self.rng.randrange(10**6)}"]
         path = root / self.rng.choice([*names, *more])
@@ -207,13 +207,9 @@ class Commands:
     def compile(self, cwd):
         return ["compile", "--out", self.folder(cwd), *self.maybe(0.3, "--save-config", self.file(cwd)), "--device", "none of them"]
 
-    def view(self, cwd):
-        return ["view", *self.sequence(cwd), *self.rng.choice([["--pictures", self.folder(cwd)], ["--video", self.file(cwd, "user/film.avi", "user/film.mp4")]]),
-                *self.maybe(0.2, "--save-config", self.file(cwd)), "--device", "none of them", "--quiet"]
-
     def draw(self):
         cwd = self.tree.root / self.rng.choice([".", "seq", "user", "user/left", "outs", "links"])
-        kinds = [self.run] * 6 + [self.rectify, self.synth, self.odometry, self.eval_poses, self.report, self.tune, self.compile, self.view]
+        kinds = [self.run] * 6 + [self.rectify, self.synth, self.odometry, self.eval_poses, self.report, self.tune, self.compile]
         return cwd, self.rng.choice(kinds)(cwd)
 
 

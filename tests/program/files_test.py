@@ -133,7 +133,6 @@ class InputFiles(FilesTest):
         street = self.broken_street()
         for out in (user, user / "left", user / "left/new", street):
             self.assert_refused_and_untouched(user, ["rectify", *self.pair(user)[:6], "--out", out])
-            self.assert_refused_and_untouched(user, ["view", *self.pair(user), "--pictures", out])
             if out.exists():
                 self.assert_refused_and_untouched(user, ["compile", "--out", out], "not empty")
                 self.assert_refused_and_untouched(out, ["synth", "--out", out, "--frames", 1], "not empty")
@@ -146,7 +145,6 @@ class InputFiles(FilesTest):
         image, poses, config = user / "left/000000.png", user / "poses.txt", user / "config.toml"
         (user / "page.html").write_text("<html></html>")
         (user / "path.svg").write_text("<svg/>")
-        (user / "film.avi").write_text("film")
         (user / "json.json").write_text('{"a, driver b": 7}')
         (user / "link").symlink_to(image)
         shutil.copy(poses, user / "more.txt")
@@ -155,7 +153,7 @@ class InputFiles(FilesTest):
                           [*run, "--trace", user / "link"], ["odometry", self.street, "--out", user / "more.txt"],
                           ["eval-poses", "--estimate", poses, "--truth", poses, "--plot", user / "path.svg"],
                           ["eval-poses", "--estimate", poses, "--truth", poses, "--plot", image],
-                          ["view", *self.pair(user), "--video", user / "film.avi"], ["report", folder / "out", "--out", image],
+                          ["report", folder / "out", "--out", image],
                           ["report", folder / "out", "--out", user / "page.html"], ["tune", "--file", image], ["tune", "--file", user / "json.json"],
                           ["compile", "--out", folder / "programs", "--save-config", config]):
             with self.subTest(arguments=arguments):
@@ -179,9 +177,6 @@ class CameMeanwhile(FilesTest):
 
     def test_poses(self):
         self.assert_stays("poses.txt", "odometry", self.street, "--out")
-
-    def test_a_video(self):
-        self.assert_stays("video.avi", "view", self.street, "--disparities", 16, "--video")
 
     def test_a_stream_is_written_through(self):
         written = self.assert_works("odometry", self.street, "--quiet", "--out", "/dev/stdout")
@@ -291,7 +286,7 @@ class OwnFiles(FilesTest):
         for option in ("--trace", "--save-config"):
             for name in ("new", "new/out", "new/./out", "new/out/../out"):
                 self.assert_refused_and_untouched(folder, ["run", "--odometry", self.street, *METHOD, "--out", folder / "new/out", option, f"{folder}/{name}"], "is a folder")
-        for command in (["compile", "--out"], ["view", self.street, "--pictures"]):
+        for command in (["compile", "--out"],):
             for name in ("new", "new/out"):
                 self.assert_refused_and_untouched(folder, [*command, folder / "new/out", "--save-config", folder / name], "or is that folder")
         self.assertFalse((folder / "new").exists())

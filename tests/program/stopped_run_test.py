@@ -137,7 +137,7 @@ class Disk(LongRuns):
                                         street / "calib.txt", "--out", folder / "rectified"), (0, ""))
         self.assertEqual(len(list((folder / "rectified/image_0").iterdir())), FRAMES)
         self.assertTrue((folder / "rectified/calib.txt").exists())
-        for command in (["eval", "--estimate", out, "--truth", self.street / "truth/left_disp_noc"], ["run", "--help"], ["completion", "zsh"], ["devices"]):
+        for command in (["eval", "--estimate", out, "--truth", self.street / "truth/left_disp_noc"], ["run", "--help"], ["devices"]):
             self.assertEqual(self.cut_short(*command, lines=0), (0, ""))
 
     def test_an_error_that_no_one_reads_ends_the_program_as_any_other(self):
