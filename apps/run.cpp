@@ -91,7 +91,7 @@ class Run {
                  fmt::format("compiling the kernels for {}, which its driver keeps if it can", device.info().name),
                  quiet_),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, type_of(sequence_)),
-        report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height, job.batch_input),
+        report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height),
         doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, size_) {
     folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();

@@ -77,7 +77,7 @@ nlohmann::ordered_json json_of(const Eigen::Isometry3d& motion) {
 }
 
 RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& motion,
-                     int width, int height, const std::string& batch_input) {
+                     int width, int height) {
   const DeviceInfo& device = pipeline.device().info();
   json_ = {{"program", "egosgm"},
            {"version", EGOSGM_VERSION},
@@ -97,7 +97,6 @@ RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pip
            {"options", json_of(pipeline.options())},
            {"finished", false},
            {"frames", Json::array()}};
-  if (!batch_input.empty()) json_["batch_input"] = batch_input;
 }
 
 Json RunReport::identity() const {

@@ -23,9 +23,9 @@ nlohmann::ordered_json json_of(const DeviceInfo& info);
 /// OUT/report.json: what ran, on what, and what every frame gave.
 class RunReport {
  public:
-  /// `motion`: where the motions come from. `batch_input`: as in SequenceJob.
+  /// `motion`: where the motions come from.
   RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& motion, int width,
-            int height, const std::string& batch_input);
+            int height);
 
   /// All that the maps depend on. Two runs with equal identities give the same maps.
   nlohmann::ordered_json identity() const;

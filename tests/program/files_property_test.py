@@ -62,12 +62,7 @@ class Tree:
             (name / "depth/000000.png").write_text("mine")
             (name / "variance/mine.pfm").write_text("mine")
         (outs / "empty").mkdir()
-        shutil.copytree(templates / "batch", outs / "batch")
-        (outs / "batch/a/notes.txt").write_text("mine")
-        (self.root / "list.txt").write_text("a seq\nb user/../drive --frames 0\n")
-        (self.root / "bad.txt").write_text("drive drive\nseq seq --poses outs/run/poses.txt\n")
-        (self.root / "names.txt").write_text("a seq\na/disparity drive\nsettings.json seq\n")
-        own = [outs / "run", outs / "batch", outs / "linked", outs / "crafted"]
+        own = [outs / "run", outs / "linked", outs / "crafted"]
         mine = {outs / "crafted/report.json"} | {path for name in own for path in name.rglob("*") if path.is_symlink() or
                                                   path.is_file() and path.read_bytes() == b"mine"}
         mine |= {outs / "edited/poses.txt", outs / "edited/disparity/000001.png"}
@@ -150,7 +145,7 @@ class Commands:
         root = self.tree.root
         names = ["seq", "seq/image_0", "seq/truth", "seq/new", "drive", "user", "user/left", "user/right", "user/left/new", "links", "links/seq",
                  "links/left", "links/out", "links/loop", "links/poses.txt", "outs", "outs/run", "outs/edited", "outs/linked", "outs/crafted",
-                 "outs/empty", "outs/batch", "outs/batch/a", "outs/new", "outs/run/disparity", "new/../user", "user/poses.txt", "."]
+                 "outs/empty", "outs/new", "outs/run/disparity", "new/../user", "user/poses.txt", "."]
         if self.rng.random() < 0.02:
             return ""
         return self.spelled(root / self.rng.choice(names), cwd)
@@ -158,9 +153,9 @@ class Commands:
     def file(self, cwd, *more):
         root = self.tree.root
         names = ["seq/poses.txt", "seq/image_0/000000.png", "drive/calib.txt", "user/poses.txt", "user/left/000000.png", "user/config.toml",
-                 "user/tuning.json", "user/page.html", "user/path.svg", "user/path.png", "user/film.avi", "user/film.mp4", "user/trace.json", "user/hard_link.png",
+                 "user/tuning.json", "user/page.html", "user/path.svg", "user/path.png", "user/trace.json", "user/hard_link.png",
                  "user/empty", "links/poses.txt", "links/image.png", "links/loop", "outs/run/poses.txt", "outs/edited/poses.txt", "outs/run/report.json",
-                 "outs/run/notes.txt", "outs/run/report.html", "user", "list.txt", f"outs/new{self.rng.randrange(10**6)}"]
+                 "outs/run/notes.txt", "outs/run/report.html", "user", f"outs/new{self.rng.randrange(10**6)}"]
         path = root / self.rng.choice([*names, *more])
         return os.path.relpath(path, cwd) if self.rng.random() < 0.3 else path
 
@@ -188,13 +183,6 @@ class Commands:
                 *self.maybe(0.2, "--save-config", self.file(cwd)), *self.maybe(0.2, "--config", root / "user/config.toml"),
                 *self.maybe(0.1, "--tuning", self.file(cwd)), *self.maybe(0.1, "--programs", self.folder(cwd)), *self.method(), "--quiet"]
 
-    def batch(self, cwd):
-        device = self.method()
-        device = ["--disparities", 16, *(["--devices", device[3]] if len(device) > 2 else [])]
-        return ["batch", self.tree.root / self.rng.choice(["list.txt", "bad.txt", "names.txt", "user/poses.txt"]), "--out", self.folder(cwd),
-                *self.maybe(0.5, "--overwrite"), *self.maybe(0.1, "--merge"), *self.maybe(0.2, "--write", "variance"),
-                *self.maybe(0.1, "--save-config", self.file(cwd)), *device, "--quiet"]
-
     def rectify(self, cwd):
         root = self.tree.root
         return ["rectify", *self.rng.choice([["--left", root / "user/left/*.png", "--right", root / "user/right/*.png"], ["--side-by-side", root / "user/left"]]),
@@ -219,13 +207,9 @@ class Commands:
     def compile(self, cwd):
         return ["compile", "--out", self.folder(cwd), *self.maybe(0.3, "--save-config", self.file(cwd)), "--device", "none of them"]
 
-    def view(self, cwd):
-        return ["view", *self.sequence(cwd), *self.rng.choice([["--pictures", self.folder(cwd)], ["--video", self.file(cwd, "user/film.avi", "user/film.mp4")]]),
-                *self.maybe(0.2, "--save-config", self.file(cwd)), "--device", "none of them", "--quiet"]
-
     def draw(self):
         cwd = self.tree.root / self.rng.choice([".", "seq", "user", "user/left", "outs", "links"])
-        kinds = [self.run] * 6 + [self.batch] * 3 + [self.rectify, self.synth, self.odometry, self.eval_poses, self.report, self.tune, self.compile, self.view]
+        kinds = [self.run] * 6 + [self.rectify, self.synth, self.odometry, self.eval_poses, self.report, self.tune, self.compile]
         return cwd, self.rng.choice(kinds)(cwd)
 
 
@@ -236,11 +220,9 @@ class RandomCommands(unittest.TestCase):
         cls.folder = pathlib.Path(cls.holder.name).resolve()
         cls.templates = cls.folder / "templates"
         street = cls.templates / "street"
-        (cls.folder / "list.txt").write_text(f"a {street} --frames 0\n")
         method = ("--disparities", 16, "--quiet")
         for arguments in (["synth", "--out", street, "--frames", 3, "--width", 32, "--height", 16, "--quiet"],
-                          ["run", "--odometry", street, "--out", cls.templates / "run", "--write", "variance", *method],
-                          ["batch", cls.folder / "list.txt", "--out", cls.templates / "batch", *method]):
+                          ["run", "--odometry", street, "--out", cls.templates / "run", "--write", "variance", *method]):
             done = egosgm(*arguments)
             assert done.returncode == 0, done.stderr
 
@@ -271,7 +253,7 @@ class RandomCommands(unittest.TestCase):
             self.assertNotIn("please report it", errors, f"command {i}: {history[-1]}")
             self.assertEqual(tree.lost(), [], f"command {i}: {history[-1]}: {code} {errors}")
         self.assertEqual(sum(codes.values()), COMMANDS)
-        self.assertLessEqual({"run", "synth", "batch"}, {command for command, code in codes if code == 0}, codes)
+        self.assertLessEqual({"run", "synth"}, {command for command, code in codes if code == 0}, codes)
         return codes
 
 

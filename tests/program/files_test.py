@@ -100,10 +100,8 @@ class InputFiles(FilesTest):
 
     def test_what_comes_through_a_pipe_is_read(self):
         user = self.user_folder()
-        (user / "list").write_text(f"a {self.street} --frames 0:1\n")
         run = ["run", *self.pair(user), "--out"]
-        for arguments, name in (([*run, user.parent / "a", "--poses"], "poses.txt"), ([*run, user.parent / "b", "--config"], "config.toml"),
-                                (["batch", "--out", user.parent / "c", *METHOD], "list")):
+        for arguments, name in (([*run, user.parent / "a", "--poses"], "poses.txt"), ([*run, user.parent / "b", "--config"], "config.toml")):
             reading, writing = os.pipe()
             os.write(writing, (user / name).read_bytes())
             os.close(writing)
@@ -134,12 +132,10 @@ class InputFiles(FilesTest):
         street = self.broken_street()
         for out in (user, user / "left", user / "left/new", street):
             self.assert_refused_and_untouched(user, ["rectify", *self.pair(user)[:6], "--out", out])
-            self.assert_refused_and_untouched(user, ["view", *self.pair(user), "--pictures", out])
             if out.exists():
                 self.assert_refused_and_untouched(user, ["compile", "--out", out], "not empty")
                 self.assert_refused_and_untouched(out, ["synth", "--out", out, "--frames", 1], "not empty")
-        for command in (["run", *self.pair(user)], ["rectify", *self.pair(user)[:6]], ["synth"], ["compile"], ["odometry", self.street],
-                        ["batch", user / "config.toml"]):
+        for command in (["run", *self.pair(user)], ["rectify", *self.pair(user)[:6]], ["synth"], ["compile"], ["odometry", self.street]):
             self.assert_refused_and_untouched(user, [*command, "--out", ""], "--out", cwd=user)
 
     def test_named_files_replace_none(self):
@@ -148,7 +144,6 @@ class InputFiles(FilesTest):
         image, poses, config = user / "left/000000.png", user / "poses.txt", user / "config.toml"
         (user / "page.html").write_text("<html></html>")
         (user / "path.svg").write_text("<svg/>")
-        (user / "film.avi").write_text("film")
         (user / "json.json").write_text('{"a, driver b": 7}')
         (user / "link").symlink_to(image)
         shutil.copy(poses, user / "more.txt")
@@ -157,7 +152,7 @@ class InputFiles(FilesTest):
                           [*run, "--trace", user / "link"], ["odometry", self.street, "--out", user / "more.txt"],
                           ["eval-poses", "--estimate", poses, "--truth", poses, "--plot", user / "path.svg"],
                           ["eval-poses", "--estimate", poses, "--truth", poses, "--plot", image],
-                          ["view", *self.pair(user), "--video", user / "film.avi"], ["report", folder / "out", "--out", image],
+                          ["report", folder / "out", "--out", image],
                           ["report", folder / "out", "--out", user / "page.html"], ["tune", "--file", image], ["tune", "--file", user / "json.json"],
                           ["compile", "--out", folder / "programs", "--save-config", config]):
             with self.subTest(arguments=arguments):
@@ -181,9 +176,6 @@ class CameMeanwhile(FilesTest):
 
     def test_poses(self):
         self.assert_stays("poses.txt", "odometry", self.street, "--out")
-
-    def test_a_video(self):
-        self.assert_stays("video.avi", "view", self.street, "--disparities", 16, "--video")
 
     def test_a_stream_is_written_through(self):
         written = self.assert_works("odometry", self.street, "--quiet", "--out", "/dev/stdout")
@@ -293,7 +285,7 @@ class OwnFiles(FilesTest):
         for option in ("--trace", "--save-config"):
             for name in ("new", "new/out", "new/./out", "new/out/../out"):
                 self.assert_refused_and_untouched(folder, ["run", "--odometry", self.street, *METHOD, "--out", folder / "new/out", option, f"{folder}/{name}"], "is a folder")
-        for command in (["compile", "--out"], ["view", self.street, "--pictures"], [*BatchFiles.batch(self, folder, f"a {self.street}"), "--out"]):
+        for command in (["compile", "--out"],):
             for name in ("new", "new/out"):
                 self.assert_refused_and_untouched(folder, [*command, folder / "new/out", "--save-config", folder / name], "or is that folder")
         self.assertFalse((folder / "new").exists())
@@ -313,70 +305,17 @@ class OwnFiles(FilesTest):
         self.assertIn("mine", (out / "report.html").read_text())
 
 
-class BatchFiles(FilesTest):
-    def batch(self, folder, *lines):
-        (folder / "list.txt").write_text("\n".join(lines) + "\n")
-        return ["batch", folder / "list.txt", *METHOD]
-
-    def test_the_folder_of_an_input_is_no_output(self):
-        folder = self.new_folder()
-        shutil.copytree(self.street, folder / "drive")
-        (folder / "drive/depth").mkdir()
-        shutil.copy(folder / "drive/image_0/000000.png", folder / "drive/depth/000000.png")
-        for out in (".", folder, "drive", "drive/.."):
-            for overwrite in ([], ["--overwrite"]):
-                self.assert_refused_and_untouched(folder / "drive", [*self.batch(folder, "drive drive"), "--out", out, *overwrite], "input", cwd=folder)
-
-    def test_names_that_meet_and_inputs_that_are_not_there(self):
-        folder = self.new_folder()
-        for lines, named in (([f"settings.json {self.street}"], "settings.json"), ([f"a/Report.JSON {self.street}"], "report.json"),
-                             ([f"a {self.street}", f"a/disparity {self.street}"], "disparity"), ([f"a {self.street}", f"a/b {self.street}"], "a/b"),
-                             ([f"a/b {self.street}", f"A {self.street}"], "a/b"), ([f"a {self.street}", f"A {self.street}"], "twice"),
-                             ([f"a {self.street}", f"b {folder}/nowhere"], "nowhere"), ([f"x/cloud {self.street}"], "cloud"),
-                             ([f"a {self.street}", f"b {self.street} --poses {folder}/out/poses.txt"], "poses.txt"),
-                             ([f"a {self.street}", f"b {self.street} --poses {folder}/nowhere.txt"], "nowhere.txt"), ([f"a/Files.part {self.street}"], "files.part")):
-            with self.subTest(lines=lines):
-                self.assert_refused([*self.batch(folder, *lines), "--out", folder / "out"], named)
-                self.assertFalse((folder / "out").exists())
+class SavedElsewhere(FilesTest):
+    def test_the_configuration_is_saved_elsewhere(self):
+        out = self.new_folder() / "out"
+        out.mkdir()
+        self.assert_refused_and_untouched(out.parent, ["compile", "--out", out, "--save-config", out / "manifest.json"], "lies in")
 
     def test_a_comment_begins_after_a_blank(self):
         folder = self.new_folder()
         shutil.copytree(self.street, folder / "drive#2")
-        self.assert_works(*self.batch(folder, "# drives", f"a {folder}/drive#2 --frames 0 # the second"), "--out", folder / "out")
         (folder / "pairs").write_text("drive#2/image_0/000000.png drive#2/image_1/000000.png # the first\n")
         self.assert_works("rectify", "--list", folder / "pairs", "--calib", self.street / "calib.txt", "--out", self.new_folder() / "out", "--quiet")
-
-    def test_the_configuration_is_saved_elsewhere(self):
-        folder = self.new_folder()
-        out = folder / "out"
-        out.mkdir()
-        for name in ("settings.json", "a", "new.toml", "../out/b"):
-            self.assert_refused_and_untouched(folder, [*self.batch(folder, f"a {self.street}"), "--out", out, "--save-config", f"{out}/{name}"],
-                                              "--save-config", "lies in")
-        self.assert_refused_and_untouched(folder, ["compile", "--out", out, "--save-config", out / "manifest.json"], "lies in")
-        self.assert_refused_and_untouched(folder, ["view", self.street, "--pictures", out, "--save-config", out / "000000.png"], "lies in")
-
-    def test_what_others_left_is_replaced_only_when_told(self):
-        folder = self.new_folder()
-        out = folder / "out"
-        batch = [*self.batch(folder, f"a {self.street} --frames 1"), "--out", out]
-        self.run_into(out / "a", "--write", "cloud")
-        self.assert_refused_and_untouched(out, batch, out / "a", "--overwrite")
-        for name in ("settings.json", "batch.json", "timing.json", "a/done.json", "a/failed.json"):
-            (out / name).write_text('{"mine": 1}')
-            for overwrite in ([], ["--overwrite"]):
-                self.assert_refused_and_untouched(out, [*batch, *overwrite], name)
-            (out / name).unlink()
-        (out / "a/notes.txt").write_text("mine")
-        self.assert_works(*batch, "--overwrite")
-        self.assertEqual(sorted(file.name for file in (out / "a").rglob("*") if file.is_file()),
-                         ["000001.png", "done.json", "notes.txt", "poses.txt", "report.json"])
-        self.assert_works(*batch, "--overwrite")
-        (out / "a/done.json").unlink()
-        self.assert_works(*batch)
-        (out / "a/poses.txt").write_text("mine")
-        (out / "a/done.json").unlink()
-        self.assert_refused_and_untouched(out, batch, "poses.txt")
 
 
 class Streams(FilesTest):

@@ -102,15 +102,6 @@ class Run(ProgramTest):
         rows[1][4] = str(1000 * float(rows[1][4]))
         (wide / "calib.txt").write_text("\n".join(" ".join(row) for row in rows) + "\n")
         self.assert_doubted(["--odometry", wide], "baseline of", "millimetres")
-        pictures = self.new_folder()
-        self.assertIn("egosgm doctor", self.assert_works("view", "--odometry", swapped, "--pictures", pictures).splitlines()[-1])
-        folder = self.new_folder()
-        (folder / "list").write_text(f"good {self.street}\nswapped --odometry \"{swapped}\"\n")
-        lines = self.assert_works("batch", folder / "list", "--out", folder / "out").splitlines()
-        self.assertEqual([line.split()[1] for line in lines if "egosgm doctor" in line], ["swapped:"])
-        good, bad = json.loads((folder / "out/batch.json").read_text())["sequences"]
-        self.assertNotIn("doubt", good)
-        self.assertIn("no motion", bad["doubt"])
 
     def test_interpolate_fills_a_folder_of_its_own(self):
         out = self.new_folder()

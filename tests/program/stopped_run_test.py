@@ -133,14 +133,11 @@ class Disk(LongRuns):
         self.assertEqual(len((folder / "poses.txt").read_text().splitlines()), FRAMES)
         self.assertEqual(self.cut_short("synth", "--out", folder / "synth", "--frames", 3, "--width", 64, "--height", 48), (0, ""))
         self.assertTrue((folder / "synth/poses.txt").exists())
-        (folder / "list").write_text(f"one {street} --frames 0\ntwo {street} --frames 1\n")
-        self.assertEqual(self.cut_short("batch", folder / "list", "--out", folder / "batch"), (0, ""))
-        self.assertEqual(json.loads((folder / "batch/batch.json").read_text())["sequences_done"], 2)
         self.assertEqual(self.cut_short("rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib",
                                         street / "calib.txt", "--out", folder / "rectified"), (0, ""))
         self.assertEqual(len(list((folder / "rectified/image_0").iterdir())), FRAMES)
         self.assertTrue((folder / "rectified/calib.txt").exists())
-        for command in (["eval", "--estimate", out, "--truth", self.street / "truth/left_disp_noc"], ["run", "--help"], ["completion", "zsh"], ["devices"]):
+        for command in (["eval", "--estimate", out, "--truth", self.street / "truth/left_disp_noc"], ["run", "--help"], ["devices"]):
             self.assertEqual(self.cut_short(*command, lines=0), (0, ""))
 
     def test_an_error_that_no_one_reads_ends_the_program_as_any_other(self):
@@ -255,9 +252,6 @@ class Killed(LongRuns):
         process = self.start(street, out, lines=2)
         for how in ([], ["--overwrite"], ["--resume"]):
             self.assert_refused(["run", "--odometry", street, "--out", out, *how], out, "another egosgm is writing there")
-        batch_list = self.new_folder() / "list"
-        batch_list.write_text(f"one {street}\n")
-        self.assert_refused(["batch", batch_list, "--out", out.parent, "--overwrite"], "another egosgm is writing there")
         _, errors = process.communicate(timeout=600)
         self.assertEqual((process.returncode, errors), (0, ""))
         self.assertEqual(self.assert_whole(out), self.LONG)
@@ -340,10 +334,6 @@ class Resume(LongRuns):
         self.assert_works(*run)
         self.assert_works(*run, "--resume")
         self.assert_works("report", out)
-        batch_list = self.new_folder() / "list"
-        batch_list.write_bytes(b"one " + name + b" --frames 0\n")
-        for _ in range(2):
-            self.assert_works("batch", batch_list, "--out", out.parent / "batch", "--disparities", 16, "--quiet")
         maps = os.fsdecode(name + b"/truth/left_disp_noc")
         self.assertEqual(len(json.loads(self.assert_works("eval", maps, maps, "--json"))["pairs"]), FRAMES)
 

@@ -6,7 +6,7 @@
 
 #include "egosgm/image.h"
 
-namespace egosgm::vision {
+namespace egosgm::odometry {
 
 /// How values of 16 bits become 8: what nearly all pixels hold fills the 8 bits. A pedestal below and a few hot pixels
 /// above do not count; where neither is there, values are shifted alone.
@@ -21,4 +21,4 @@ struct GreyLevels {
 /// Of both images of a pair, so that they stay comparable. REQUIRES: both are kU16.
 GreyLevels levels_of(const ImageView& left, const ImageView& right);
 
-}  // namespace egosgm::vision
+}  // namespace egosgm::odometry
