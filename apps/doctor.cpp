@@ -17,7 +17,7 @@
 #include "egosgm/options.h"
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/image_io.h"
-#include "egosgm/vision/odometry.h"
+#include "egosgm/odometry.h"
 #include "egosgm/vision/opencv.h"
 #include "host/vision/examination.h"
 
@@ -91,8 +91,8 @@ class Doctor {
     std::string reason;
     for (const std::size_t at : samples) {
       if (at + 1 >= sequence_.frames.size()) continue;
-      vision::StereoOdometry odometry(sequence_.calibration);
-      vision::OdometryResult result;
+      StereoOdometry odometry(sequence_.calibration);
+      OdometryResult result;
       for (const std::size_t frame : {at, at + 1}) {
         const vision::StereoImages images = vision::read_images(sequence_.frames[frame]);
         result = odometry.process(vision::image_view(images.left), vision::image_view(images.right));

@@ -50,10 +50,10 @@ MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::st
 }
 
 std::string MotionSource::doubt(const vision::StereoSequence& sequence,
-                                const vision::StereoOdometryOptions& options) const {
+                                const StereoOdometryOptions& options) const {
   constexpr std::size_t kFrames = 7;
   if (poses_.size() < 3) return {};
-  vision::StereoOdometry odometry(sequence.calibration, options);
+  StereoOdometry odometry(sequence.calibration, options);
   std::vector<Eigen::Isometry3d> given;
   std::vector<std::optional<Eigen::Isometry3d>> found;
   for (std::size_t i = 0; i < std::min(kFrames, poses_.size()); ++i) {

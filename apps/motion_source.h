@@ -36,7 +36,7 @@ class MotionSource {
                const StereoOdometryOptions& options);
 
   /// What the odometry of the first frames says against poses of a file; empty where nothing, and without such.
-  std::string doubt(const vision::StereoSequence& sequence, const vision::StereoOdometryOptions& options) const;
+  std::string doubt(const vision::StereoSequence& sequence, const StereoOdometryOptions& options) const;
 
   /// REQUIRES: called for frames 0, 1, 2, ... of the sequence.
   FrameMotion next(const vision::StereoImages& images);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "egosgm/export.h"
 #include "egosgm/image.h"
 
 namespace egosgm::odometry {
@@ -19,6 +20,6 @@ struct GreyLevels {
 };
 
 /// Of both images of a pair, so that they stay comparable. REQUIRES: both are kU16.
-GreyLevels levels_of(const ImageView& left, const ImageView& right);
+EGOSGM_EXPORT GreyLevels levels_of(const ImageView& left, const ImageView& right);
 
 }  // namespace egosgm::odometry
