@@ -26,7 +26,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     result = confirmed(plan, after, given_out);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_.write(plan,
-                   {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(), result,
+                   {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), result,
                     w.fusion.doubtful, evidence_of(plan, after)},
                    {given_out.variance, w.dynamic, w.reasons});
   });

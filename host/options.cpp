@@ -56,7 +56,8 @@ void for_each(Options& o, Visit&& visit) {
   visit(OptionText{"p2", "Penalty of a larger step; it is lower where the image has an edge.", "cost", "0 to 190",
                    "Raise it for noisy images; lower it if thin objects are lost."},
         o.p2);
-  visit(OptionText{"max_speckle_px", "Connected regions of at most this size are dropped.", "pixels",
+  visit(OptionText{"max_speckle_px",
+                   "Connected regions of at most this size are dropped, in frames without a prediction.", "pixels",
                    "0 (none) or more", "Raise it if small islands of wrong disparity stay."},
         o.max_speckle_px);
   visit(OptionText{"max_memory_mib", "Device memory for path sums; a larger image is matched in horizontal stripes.",

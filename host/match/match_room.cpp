@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/match/match_room.h"
 
+#include "host/fuse/evidence.h"
+
 namespace egosgm {
 namespace {
 
@@ -17,7 +19,8 @@ MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const Method
                {path_group(tuning), {tuning.tile_width, tuning.tile_height, tuning.block_lanes}}),
       consistency_(context, size),
       speckle_removal_(context, size, options.speckle_removal, tuning.speckle_strip_rows, tuning.row_group),
-      removes_speckles_(options.speckle_removal.max_size_px > 0) {
+      removes_speckles_(options.speckle_removal.max_size_px > 0),
+      judges_by_evidence_(Evidence::is_of(options)) {
   if (options.median_filter.enabled) median_filter_.emplace(context, size);
   if (options.temporal && !options.track_right) matcher_.prepare_reading_off();
 }
@@ -35,7 +38,7 @@ void MatchRoom::measure(const Plan& plan, const FrameImages& images, const Searc
   const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;
   consistency_.check(smoothed, reads_off ? left_right_.read_off_px : left_right_.measurement_px, OutsideView::kDrop,
                      measured.disparity, measured.variance, Views::kBoth);
-  speckle_removal_.remove(measured, plan.matched);
+  if (removes_speckles(plan)) speckle_removal_.remove(measured, plan.matched);
 }
 
 }  // namespace egosgm

@@ -34,15 +34,22 @@ class MatchRoom {
 
   const Matcher& matcher() const { return matcher_; }
   /// Null where nothing is dropped as a speckle.
-  const SpeckleRemoval::Runs* speckle_runs() const { return removes_speckles_ ? &speckle_removal_.runs() : nullptr; }
+  const SpeckleRemoval::Runs* speckle_runs(const Plan& plan) const {
+    return removes_speckles(plan) ? &speckle_removal_.runs() : nullptr;
+  }
 
  private:
+  bool removes_speckles(const Plan& plan) const {
+    return removes_speckles_ && !(judges_by_evidence_ && plan.predicts());
+  }
+
   const ConsistencyCheckOptions left_right_;
   Matcher matcher_;
   std::optional<MedianFilter> median_filter_;
   ConsistencyCheck consistency_;
   SpeckleRemoval speckle_removal_;
-  const bool removes_speckles_;
+  const bool removes_speckles_;    // of measurements that evidence does not judge
+  const bool judges_by_evidence_;  // those with a prediction
 };
 
 }  // namespace egosgm

@@ -12,6 +12,7 @@
 #include "code.h"
 #include "method.h"
 #include "pixels.h"
+#include "supporters.h"
 
 // lint: CODE_BYTES=8 PIXELS=1
 // lint: CODE_BYTES=8 PIXELS=16
@@ -224,8 +225,9 @@ KERNEL void gather_evidence(const ImageSize size, const int has_coarse, global c
   gather_row(THIS_WORK_ITEM, size, has_coarse, coarse, sums, evidence, found);
 }
 
-// What is given out of a belief: what has been confirmed. Where the left view alone is tracked (by_left), a right pixel
-// has the evidence of the left pixel that it sees.
+// What is given out of a belief: what has much evidence, and what has little where confirmed pixels around lie on the
+// same surface. Where the left view alone is tracked (by_left), a right pixel has the evidence of the left pixel that
+// it sees, and must be confirmed itself.
 COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const int by_left,
                                global const float* disparity, global const uchar* evidence, global float* published,
                                const int with_variance, global const float* variance,
@@ -245,11 +247,16 @@ COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const in
     } else {
       of_pixels = load_bytes(evidence + row, x, width);
     }
-    const Ints is_confirmed = of_pixels >= EGOSGM_EVIDENCE_CONFIRMED;
-    store_pixels(is_confirmed ? d : INVALID, published + row, x, width);
+    Ints is_given = (d > INVALID) & (of_pixels >= (asks_left ? EGOSGM_EVIDENCE_CONFIRMED : EGOSGM_EVIDENCE_TRUSTED));
+    if (!asks_left) {
+      const size_t view = row - left_row;
+      is_given |= have_supporters(size, x, at.y, (d > INVALID) & !is_given, EGOSGM_SUPPORTERS_COUNT, d,
+                                  EGOSGM_SAME_SURFACE_PX, disparity + view, evidence + view);
+    }
+    store_pixels(is_given ? d : INVALID, published + row, x, width);
     if (with_variance) {
       const Floats p = load_pixels(variance + row, x, width);
-      store_pixels(is_confirmed ? p : (Floats)(0.0f), published_variance + row, x, width);
+      store_pixels(is_given ? p : (Floats)(0.0f), published_variance + row, x, width);
     }
   }
 }

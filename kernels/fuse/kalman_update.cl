@@ -10,6 +10,7 @@
 // variance.
 #include "method.h"
 #include "pixels.h"
+#include "supporters.h"
 
 // lint: PIXELS=1
 // lint: PIXELS=16
@@ -103,6 +104,16 @@ static inline Verdict judged(const int repeats, const Ints before, const Ints no
   return verdict;
 }
 
+// The measurements without those that no prediction shares and hardly a measurement around.
+static inline Floats without_lone(const ImageSize size, const int x, const int y, const Floats d, const Floats z,
+                                  const float gate, global const float* measured) {
+  const Ints is_shared = (d > INVALID) & (fabs(z - d) <= gate);
+  const Ints is_new = (z > INVALID) & !is_shared;
+  const Ints is_lone =
+      is_new & !have_supporters(size, x, y, is_new, EGOSGM_SUPPORTERS_LEAST, z, EGOSGM_LONE_PX, measured, 0);
+  return is_lone ? INVALID : z;
+}
+
 // `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
 // is taken that differs to the same side as those of EGOSGM_MOVING_COUNT around do. has_gate: else all that is
 // predicted and measured is averaged, and nothing is hidden or doubtful. has_evidence: else `evidence_before`,
@@ -125,11 +136,12 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
 
   FOR_PIXELS(x, width) {
     const Floats d = load_pixels(predicted + row, x, width);
-    const Floats z = load_pixels(measured + row, x, width);
+    Floats z = load_pixels(measured + row, x, width);
     const Floats p = load_pixels(predicted_variance + row, x, width);
     const Floats r = load_pixels(measured_variance + row, x, width);
     Verdict verdict = {(Ints)(EGOSGM_EVIDENCE_MOST), (Ints)(-1), (Ints)(-1)};
     if (has_evidence) {
+      z = without_lone(size, x, y, d, z, gate, measured + view);
       verdict = judged(repeats, moved_evidence(size, x, y, evidence_before + row),
                        OF_ITS_BLOCK(Ints, block_evidence + row_of_blocks, x),
                        OF_ITS_BLOCK(Floats, found + row_of_blocks, x), d, z, gate, x, width, at.view);

@@ -220,12 +220,12 @@ TEST(Evidence, AsksThePredictionUnlessTheMeasurementContradictsIt) {
   EXPECT_EQ(of(none, none), 0);
 }
 
-TEST(Evidence, GivesOutWhatIsConfirmed) {
-  constexpr shared::ImageSize kSmall{65, 3};
+TEST(Evidence, GivesOutWhatHasMuchOrIsSupported) {
+  constexpr shared::ImageSize kSmall{65, 37};
   testing::HostMaps maps = testing::random_maps(kSmall, 0, 9, 0.2, 8);
   maps.disparity[10] = 5.5f;
   for (std::size_t i = 0; i < maps.disparity.size(); ++i) {
-    maps.evidence.push_back(static_cast<std::uint8_t>(28 + i * 5 % 8));
+    maps.evidence.push_back(static_cast<std::uint8_t>(i % 7 < 5 ? 28 + i * 5 % 8 : 94 + i % 4));
   }
   for (const int pixels : {1, 16}) {
     for (const Views tracked : {Views::kBoth, Views::kLeft}) {
@@ -248,6 +248,39 @@ TEST(Evidence, GivesOutWhatIsConfirmed) {
       }
     }
   }
+}
+
+// A pixel without evidence of its own, on the surface of those 8 and 16 px around.
+TEST(Evidence, GivesOutWhatHasLittleWithinASurface) {
+  constexpr shared::ImageSize kSurface{33, 33};
+  constexpr std::size_t kMiddle = 16 * 33 + 16;
+  const auto gives = [&](float d, int supporters, int of_them, int of_pixel) {
+    testing::HostMaps maps = testing::empty_maps(kSurface);
+    maps.evidence.assign(maps.disparity.size(), 0);
+    maps.disparity[kMiddle] = d;
+    maps.evidence[kMiddle] = static_cast<std::uint8_t>(of_pixel);
+    for (int i = 0; i < 25 && supporters > 0; ++i) {
+      const std::size_t pixel = i / 5 * 8 * 33 + i % 5 * 8;
+      if (pixel == kMiddle) continue;
+      maps.disparity[pixel] = 20;
+      maps.evidence[pixel] = static_cast<std::uint8_t>(of_them);
+      --supporters;
+    }
+    ocl::Context context(testing::any_device());
+    FlagMap evidence(context, maps.evidence.size());
+    evidence.write(context, maps.evidence);
+    StereoMaps published(context, kSurface);
+    Evidence(context, kSurface, options())
+        .publish(testing::upload(context, kSurface, maps), evidence, false, {published.disparity, published.variance},
+                 Views::kBoth, Views::kBoth);
+    return published.disparity.read(context)[kMiddle] == d;
+  };
+  EXPECT_TRUE(gives(20, 8, 32, 0));
+  EXPECT_FALSE(gives(20, 7, 32, 95)) << "too few";
+  EXPECT_FALSE(gives(20, 24, 31, 95)) << "not confirmed";
+  EXPECT_TRUE(gives(24, 24, 32, 0)) << "a slope";
+  EXPECT_FALSE(gives(24.5f, 24, 32, 0)) << "another surface";
+  EXPECT_TRUE(gives(20, 0, 0, 96)) << "it has much itself";
 }
 
 TEST(Evidence, NeedsCodesOfTwoWords) {

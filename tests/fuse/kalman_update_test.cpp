@@ -266,13 +266,15 @@ TEST(KalmanUpdate, CountsNoPixelOutsideOfTheImageAmongThoseThatMove) {
   }
 }
 
-/// The left pixel in the middle of 25x1, whose match lies in the image, and its evidence.
+/// The left pixel in the middle of 25x1, whose match lies in the image, and its evidence. `supporters`: how many of the
+/// pixels 8 and 16 px beside were measured the same.
 struct Pixel {
   float predicted = kNone, measured = kNone;
   std::uint8_t before = 0;
   int now = 0;
   float found = kNone;
   bool repeats = false;
+  int supporters = 2;
 };
 struct Judged {
   Estimate estimate;
@@ -284,6 +286,10 @@ Judged judged(const Pixel& pixel, int x = 12) {
   constexpr shared::ImageSize kRow{25, 1};
   testing::HostMaps predicted = testing::empty_maps(kRow), measured = predicted;
   predicted.disparity[x] = pixel.predicted, measured.disparity[x] = pixel.measured;
+  int supporters = pixel.supporters;
+  for (const int away : {8, 16, -8, -16}) {
+    if (x + away >= 0 && x + away < 25 && supporters-- > 0) measured.disparity[x + away] = pixel.measured;
+  }
   predicted.variance[x] = measured.variance[x] = 1;
   reference::FrameEvidence evidence{std::vector<std::uint8_t>(50, 0),
                                     {std::vector<int>(14, pixel.now), std::vector<float>(14, pixel.found)},
@@ -305,6 +311,16 @@ TEST(KalmanUpdate, EvidenceAddsUpAndDecays) {
       << "contradicted: what was believed does not count";
   EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 71}), (Judged{{5, 1}, 90 - 24}))
       << "a measurement without evidence contradicts nothing";
+}
+
+TEST(KalmanUpdate, AMeasurementAloneDoesNotCountUnlessThePredictionSharesIt) {
+  EXPECT_EQ(judged({.measured = 5, .now = 96}), (Judged{{5, 1}, 96 - 72}));
+  EXPECT_EQ(judged({.measured = 5, .now = 96, .supporters = 1}), (Judged{kNothing, 0}));
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 64, .now = 96, .supporters = 1}),
+            (Judged{{5, 1}, 45 + 96 - 24}))
+      << "it contradicts nothing";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40, .supporters = 0}),
+            (Judged{{5.5f, 0.5f}, 45 + 40 - 24}));
 }
 
 TEST(KalmanUpdate, WithoutEvidenceAPredictionLivesAFewFrames) {

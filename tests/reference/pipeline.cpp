@@ -166,7 +166,9 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   const ConsistencyCheckOptions& check = options_.consistency;
   pass.consistent =
       consistency_check(size_, reads_off ? check.read_off_px : check.measurement_px, false, pass.smoothed);
-  pass.measured = speckle_removal(size_, options_.speckle_removal, pass.consistent);
+  const bool judges_by_evidence = !frame.predicted.disparity.empty() && has_evidence();
+  pass.measured =
+      judges_by_evidence ? pass.consistent : speckle_removal(size_, options_.speckle_removal, pass.consistent);
   if (reads_off) {
     const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);
     std::copy(pass.consistent.disparity.begin() + right, pass.consistent.disparity.end(),

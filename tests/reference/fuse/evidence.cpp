@@ -134,19 +134,39 @@ Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame,
   return {evidence, evidence >= 0, !stays || now >= kEvidenceOfNoise};
 }
 
+int supporters_of(shared::ImageSize size, const testing::HostMaps& maps, std::size_t view, int x, int y, float d,
+                  float most) {
+  int supporters = 0;
+  for (const int dy : {-16, -8, 0, 8, 16}) {
+    for (const int dx : {-16, -8, 0, 8, 16}) {
+      const int u = x + dx, v = y + dy;
+      if ((dx == 0 && dy == 0) || u < 0 || v < 0 || u >= size.width || v >= size.height) continue;
+      const std::size_t i = view + static_cast<std::size_t>(v) * size.width + u;
+      const float other = maps.disparity[i];
+      const bool is_confirmed = maps.evidence.empty() || maps.evidence[i] >= kConfirmedEvidence;
+      supporters += is_valid(other) && std::abs(other - d) <= most && is_confirmed;
+    }
+  }
+  return supporters;
+}
+
 testing::HostMaps confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left) {
   testing::HostMaps result{belief.disparity, belief.variance};
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   for (std::size_t i = 0; i < result.disparity.size(); ++i) {
     const float d = belief.disparity[i];
+    const int x = static_cast<int>(i % size.width), y = static_cast<int>(i % pixels / size.width);
     int of_pixel = belief.evidence[i];
+    bool is_given = false;
     if (by_left && i >= pixels) {
-      const int x = static_cast<int>(i % size.width);
       const float seen = std::nearbyint(static_cast<float>(x) + d);
       const bool is_inside = is_valid(d) && seen >= 0 && seen < static_cast<float>(size.width);
       of_pixel = is_inside ? belief.evidence[i - pixels - x + static_cast<std::size_t>(seen)] : 0;
+      is_given = of_pixel >= kConfirmedEvidence;
+    } else {
+      is_given = of_pixel >= kTrustedEvidence || supporters_of(size, belief, i / pixels * pixels, x, y, d, 4) >= 8;
     }
-    if (of_pixel >= kConfirmedEvidence) continue;
+    if (is_valid(d) && is_given) continue;
     result.disparity[i] = EGOSGM_INVALID_DISPARITY;
     result.variance[i] = 0;
   }

@@ -46,8 +46,13 @@ struct Verdict {
 Verdict judge(shared::ImageSize size, float gate_px, const FrameEvidence& frame, int view, int x, int y,
               float predicted, float measured);
 
-/// What has been confirmed of a belief with its evidence. `by_left`: a right pixel has the evidence of the left pixel
-/// that it sees.
+/// How many of the 24 pixels 8 and 16 px around one of the view that begins at `view` differ from `d` by at most
+/// `most`. Where the maps have evidence, those count that are confirmed.
+int supporters_of(shared::ImageSize size, const testing::HostMaps& maps, std::size_t view, int x, int y, float d,
+                  float most);
+
+/// What is given out of a belief with its evidence: what has much, and what confirmed pixels around support. `by_left`:
+/// a right pixel has the evidence of the left pixel that it sees, and must be confirmed itself.
 testing::HostMaps confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left);
 
 }  // namespace egosgm::reference

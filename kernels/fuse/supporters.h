@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether a pixel stands alone on its surface. OpenCL C only.
+#ifndef EGOSGM_KERNELS_SUPPORTERS_H
+#define EGOSGM_KERNELS_SUPPORTERS_H
+
+#include "method.h"
+#include "pixels.h"
+
+// Which pixels of `asked` have `enough` others on a grid around that differ from d by at most `most`. Where there is
+// `evidence`, those count that are confirmed. No row is asked once all have enough: that decides nearly everywhere.
+static inline Ints have_supporters(const ImageSize size, const int x, const int y, const Ints asked, const int enough,
+                                   const Floats d, const float most, global const float* disparity,
+                                   global const uchar* evidence) {
+  Ints supporters = 0;
+  Ints lacks = asked;
+  for (int v = y - EGOSGM_SUPPORTERS_RADIUS; v <= y + EGOSGM_SUPPORTERS_RADIUS && any_of(lacks);
+       v += EGOSGM_SUPPORTERS_STEP) {
+    if (v < 0 || v >= size.height) continue;
+    const size_t row = (size_t)v * size.width;
+    for (int u = x - EGOSGM_SUPPORTERS_RADIUS; u <= x + EGOSGM_SUPPORTERS_RADIUS; u += EGOSGM_SUPPORTERS_STEP) {
+      if (u == x && v == y) continue;
+      const Floats other = load_pixels(disparity + row, u, size.width);
+      Ints counts = (other > INVALID) & (fabs(other - d) <= (Floats)(most));
+      if (evidence) counts &= load_bytes(evidence + row, u, size.width) >= EGOSGM_EVIDENCE_CONFIRMED;
+      supporters += counts ? (Ints)(1) : (Ints)(0);
+    }
+    lacks = asked & (supporters < (Ints)(enough));
+  }
+  return asked & !lacks;
+}
+
+#endif
