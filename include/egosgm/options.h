@@ -29,13 +29,12 @@ struct EGOSGM_EXPORT PipelineOptions {
   bool coarse_match;        ///< also match at a quarter of the resolution, without the prediction
   bool vertical_alignment;  ///< estimate and remove vertical offsets between the views
   MatchingCost cost;
-  int paths;            ///< 4 or 8
-  int p1, p2;           ///< penalties of a step of one disparity, and of a larger one
-  int max_speckle_px;   ///< connected regions of at most this size [pixels] are dropped where nothing is predicted; 0:
-                        ///< none
-  int max_memory_mib;   ///< memory for path sums [MiB]; 0: what the device has
-  float left_right_px;  ///< largest difference between the views' disparities [px]
-  float search_sigmas;  ///< half-width of a predicted pixel's search [standard deviations],
+  int paths;                ///< 4 or 8
+  int p1, p2;               ///< penalties of a step of one disparity, and of a larger one
+  int max_speckle_px;       ///< connected regions of at most this size [pixels] are dropped in unpredicted frames; 0: none
+  int max_memory_mib;       ///< memory for path sums [MiB]; 0: what the device has
+  float left_right_px;      ///< largest difference between the views' disparities [px]
+  float search_sigmas;      ///< half-width of a predicted pixel's search [standard deviations],
   float min_half_width_px;  ///< and at least this [px]
   float process_noise_px2;  ///< q: variance that a frame adds to every prediction [px^2] (eq. 6)
   float gate_px;            ///< a larger difference of prediction and measurement is not averaged [px]; 0: no gate
