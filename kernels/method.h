@@ -37,8 +37,8 @@
 // A pixel's evidence is a sum over frames, at most MOST: of what it was, so many 64ths are kept, and a frame adds what
 // its images say, less what noise must not reach. What was chosen in this frame alone, and not by the coarse match too,
 // has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is confirmed from
-// CONFIRMED on, and given out by itself from TRUSTED on. A full-range match that both views confirm begins with FIRST. Where a match lies outside of the other
-// image, nothing can be asked, and so many 64ths are kept.
+// CONFIRMED on, and given out by itself from TRUSTED on. A full-range match that both views confirm begins with FIRST.
+// Where a match lies outside of the other image, nothing can be asked, and so many 64ths are kept.
 #define EGOSGM_EVIDENCE_MOST 160
 #define EGOSGM_EVIDENCE_KEPT 45
 #define EGOSGM_EVIDENCE_KEPT_UNSEEN 58
@@ -46,9 +46,9 @@
 #define EGOSGM_EVIDENCE_OF_CHOICE 48
 #define EGOSGM_EVIDENCE_CONFIRMED 32
 #define EGOSGM_EVIDENCE_FIRST 48
-// What has less than TRUSTED is given out where COUNT of the pixels on a grid around are confirmed and differ by no more
-// than SAME_SURFACE, and is named flat: the images hardly say that it is there. A measurement that no prediction shares
-// counts where LEAST of them were measured as much, but for LONE.
+// What has less than TRUSTED is given out where COUNT of the pixels on a grid around are confirmed and differ by no
+// more than SAME_SURFACE, and is named flat: the images hardly say that it is there. A measurement that no prediction
+// shares counts where LEAST of them were measured as much, but for LONE.
 #define EGOSGM_EVIDENCE_TRUSTED 96
 #define EGOSGM_SUPPORTERS_RADIUS 16
 #define EGOSGM_SUPPORTERS_STEP 8
