@@ -125,7 +125,8 @@ std::string zsh_action(const CLI::Option& option) {
 std::string zsh_case(const CLI::App& command) {
   std::string specs;
   for (const CLI::Option* option : command.get_options()) {
-    if (option->get_positional()) specs += " \\\n        '*:folder:_files'";
+    if (option->get_positional() && specs.find("'*:folder:") == std::string::npos)
+      specs += " \\\n        '*:folder:_files'";
     for (const std::string& name : option->get_lnames()) {
       const bool flag = option->get_items_expected_max() == 0;
       specs += fmt::format(" \\\n        '*--{}[{}]{}'", name, zsh_text(option->get_description()),
