@@ -118,11 +118,8 @@ std::string suspect_motions(const std::vector<Motion>& given, const std::vector<
     }
   }
   for (const int later : {-1, 1, -2, 2}) {
-    const std::string frames = std::abs(later) == 1 ? "a frame" : "two frames";
-    consider(score(same, later), "they are " + frames +
-                                     (later > 0 ? " too early: the motions of later frames fit"
-                                                : " too late: the motions of "
-                                                  "earlier frames fit"));
+    const std::string frames = std::abs(later) == 1 ? "one frame" : "two frames";
+    consider(score(same, later), "each is the pose of " + frames + (later < 0 ? " later" : " earlier"));
   }
   if (text.empty()) {
     text =

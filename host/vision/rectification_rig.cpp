@@ -247,7 +247,7 @@ StereoRig euroc_rig(const fs::path& mav0) {
     const cv::Mat k = require_matrix(find_matrix(files, {"intrinsics"}), file, "intrinsics", 4);
     const std::string model = files[0]["distortion_model"].string();
     const std::string named = file.string() + ": distortion_model \"" + model + "\": ";
-    if (model != "radial-tangential" && model != "equidistant") {
+    if (model != "radial-tangential" && model != "radtan" && model != "equidistant") {
       throw InvalidArgument(named + "only radial-tangential and equidistant are known");
     }
     const bool is_fisheye = model == "equidistant";

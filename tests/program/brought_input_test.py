@@ -120,6 +120,16 @@ class Doubts(Brought):
         self.assertEqual(self.examine(street)["motion"]["verdict"], "note")
         self.assertNotIn("motion", self.examine(self.street))
 
+    def test_a_pedestal_and_a_hot_pixel_of_16_bits(self):
+        """Motions are found as in 8 bits, and doctor finds points."""
+        street = self.broken_street()
+        for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+            rows = (7000 + 3 * read_grey(file).astype(numpy.uint16)).astype(">u2")
+            rows[HEIGHT // 2, WIDTH // 3] = 65535
+            file.write_bytes(png(WIDTH, HEIGHT, 16, (row.tobytes() for row in rows)))
+        self.assertNotIn("no motion", self.assert_works("run", street, "--out", self.new_folder() / "out"))
+        self.assertEqual(self.examine(street)["rows"]["verdict"], "ok")
+
     def test_times_in_other_units(self):
         street = self.broken_street()
         for unit, factor in (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9)):

@@ -249,6 +249,23 @@ class Rectify(RectifyTest):
         self.assertIn("1 image without the other one", text)
         self.assertEqual(len(list((out.parent / "fewer/image_0").iterdir())), 1)
 
+    def test_euroc_folders_as_others_write_them(self):
+        """The right camera is 12 us late, the header has no mark, and the model has Kalibr's name."""
+        for late_ns in (12_000, 20_000_000):
+            folder = self.euroc()
+            table = folder / "cam1/data.csv"
+            rows = [row.split(",") for row in table.read_text().splitlines()[1:]]
+            table.write_text("timestamp [ns],filename\n" + "".join(f"{int(time) + late_ns},{name}\n" for time, name in rows))
+            for side in (0, 1):
+                sensor = folder / f"cam{side}/sensor.yaml"
+                sensor.write_text(sensor.read_text().replace("radial-tangential", "radtan"))
+            out = self.new_folder() / "out"
+            if late_ns > 2_000_000:
+                self.assert_refused(["rectify", "--euroc", folder, "--out", out], "the nearest are 20.000 ms apart")
+                continue
+            self.assertIn("stamps of a pair differ by up to 0.012 ms", self.assert_works("rectify", "--euroc", folder, "--out", out))
+            self.assertEqual(len(list((out / "image_0").iterdir())), 2)
+
     def test_what_cannot_be_rectified_is_refused(self):
         file, out = self.new_folder() / "stereo.yml", self.folder / "never"
 
