@@ -62,7 +62,7 @@ struct RunArguments {
   OptionArguments method;
   std::string out, poses, device, programs, tuning, write, trace;
   vision::StereoOdometryOptions odometry;
-  bool interpolate = false, quiet = false, resume = false, overwrite = false;
+  bool interpolate = false, quiet = false, resume = false;
 };
 
 /// What a frame needs before the device can start.
@@ -101,10 +101,11 @@ class Run {
   }
 
   bool operator()() {
-    const vision::BeforeWrite recording([this](const auto& file, auto bytes) { return folder_.record(file, bytes); });
+    const vision::BeforeWrite recording(
+        [this](const auto& file, auto bytes) { return folder_.is_to_write(file, bytes); });
     write_report(false, kKilled);
     try {
-      if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
+      save_config();
       const bool finished = process_all();
       finish(finished, finished ? "" : kInterrupt);
       if (!finished) {
@@ -119,6 +120,11 @@ class Run {
   }
 
  private:
+  void save_config() const {
+    const vision::KeepFiles others;
+    if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
+  }
+
   static std::string motion_of(const SequenceJob& job) {
     if (!job.poses_file.empty()) return "poses of " + job.poses_file;
     return fmt::format("stereo odometry, at most {} m and {} degrees a frame", job.odometry.max_translation_m,
@@ -221,8 +227,7 @@ class Run {
     report_.set_doubt(doubt_.text());
     if (!poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
     write_report(finished, why_not);
-    if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace, finished, why_not);
-    folder_.end();
+    if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace);
     if (!finished || quiet_) return;
     fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
                pipeline_.device().info().name);
@@ -231,15 +236,14 @@ class Run {
     if (const std::string advice = advice_of(doubt_.text(), input_); !advice.empty()) fmt::print("{}\n", advice);
   }
 
-  void write_trace(const Trace& trace, bool finished, const std::string& why_not) {
+  void write_trace(const Trace& trace) {
     trace.write();
-    write_report(finished, why_not);  // which lists the trace where it lies in OUT
     if (trace.has_device_times() || quiet_) return;
     fmt::print("{} gives no times of commands: the trace has those of the host only\n", pipeline_.device().info().name);
   }
 
   void write_report(bool finished, const std::string& why_not) {
-    report_.write(folder_.path() / "report.json", folder_.files(), finished, why_not);
+    report_.write(folder_.path() / "report.json", finished, why_not);
   }
 
   /// The first error counts; that something cannot be written either adds nothing.
@@ -274,16 +278,8 @@ class Run {
   bool warned_of_range_ = false;
 };
 
-EarlierRun earlier_run_of(const RunArguments& arguments) {
-  if (arguments.resume && arguments.overwrite) {
-    throw InvalidArgument("--resume and --overwrite contradict each other: give one of them");
-  }
-  return arguments.resume ? EarlierRun::kResume : arguments.overwrite ? EarlierRun::kOverwrite : EarlierRun::kRefuse;
-}
-
 SequenceJob job_of(const RunArguments& arguments) {
   SequenceJob job;
-  const EarlierRun earlier = earlier_run_of(arguments);
   job.sequence = arguments.input.open();
   job.input = arguments.input.text();
   job.options = arguments.method.options();
@@ -291,10 +287,7 @@ SequenceJob job_of(const RunArguments& arguments) {
   job.odometry = arguments.odometry;
   job.kinds = parse_write_list(arguments.write);
   if (arguments.interpolate) job.kinds.insert("interpolated");
-  Inputs inputs(arguments.input, job.sequence);
-  for (const std::string& file : {arguments.poses, arguments.method.config, arguments.tuning}) inputs.add_file(file);
-  inputs.add_folder(arguments.programs);
-  job.out = OutputFolder(arguments.out, inputs, earlier, output_files(job.kinds, job.sequence, job.options));
+  job.out = OutputFolder(arguments.out, arguments.resume, output_files(job.kinds, job.sequence, job.options));
   job.trace = job.out.named_file("--trace", arguments.trace);
   job.save_config = job.out.named_file("--save-config", arguments.method.save_config);
   job.quiet = arguments.quiet;
@@ -321,7 +314,8 @@ Command add_run(CLI::App& program) {
   const char* group = "Output";
   command
       ->add_option("--out", arguments->out,
-                   "folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room for the range), "
+                   "new or empty folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room "
+                   "for the range), "
                    "poses.txt, "
                    "report.json")
       ->type_name("DIR")
@@ -340,10 +334,6 @@ Command add_run(CLI::App& program) {
       ->add_flag("--resume", arguments->resume,
                  "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
                  "before are computed again, for the filter's state")
-      ->group(group);
-  command
-      ->add_flag("--overwrite", arguments->overwrite,
-                 "replace an earlier run: what OUT/report.json says it wrote, and nothing more")
       ->group(group);
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
   arguments->method.add_to(*command);
