@@ -155,18 +155,6 @@ std::string rectangle_text(const cv::Rect& r) {
   return fmt::format("{}x{} from ({}, {})", r.width, r.height, r.x, r.y);
 }
 
-Inputs inputs_of(const RectifyArguments& arguments) {
-  Inputs inputs;
-  for (const std::string& pattern : {arguments.input.left, arguments.input.right, arguments.input.side_by_side}) {
-    if (pattern.empty()) continue;
-    inputs.add_folder(fs::is_directory(pattern) ? fs::path(pattern) : fs::absolute(pattern).parent_path());
-  }
-  inputs.add_file(arguments.input.list);
-  inputs.add_folder(arguments.input.euroc);
-  inputs.add_file(arguments.calib);
-  return inputs;
-}
-
 int rectify(const RectifyArguments& arguments) {
   if (!(arguments.alpha >= 0 && arguments.alpha <= 1)) {
     throw InvalidArgument(fmt::format("--alpha {}: choose from 0 to 1", arguments.alpha));
@@ -176,7 +164,7 @@ int rectify(const RectifyArguments& arguments) {
   if (!input.euroc.empty()) input.euroc = mav0_of(input.euroc);
   const std::unique_ptr<RawPairs> pairs = open_pairs(input);
   Rectifier rectifier(arguments);
-  SequenceFolder folder(new_folder("--out", arguments.out, inputs_of(arguments)));
+  SequenceFolder folder(new_folder("--out", arguments.out));
   const vision::KeepFiles others;
   catch_interrupts();
   try {

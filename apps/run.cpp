@@ -64,7 +64,7 @@ struct RunArguments {
   OptionArguments method;
   std::string out, poses, device, programs, tuning, write, trace;
   StereoOdometryOptions odometry;
-  bool interpolate = false, quiet = false, resume = false, overwrite = false;
+  bool interpolate = false, quiet = false, resume = false;
 };
 
 /// What a frame needs before the device can start.
@@ -104,10 +104,11 @@ class Run {
   }
 
   bool operator()() {
-    const vision::BeforeWrite recording([this](const auto& file, auto bytes) { return folder_.record(file, bytes); });
+    const vision::BeforeWrite recording(
+        [this](const auto& file, auto bytes) { return folder_.is_to_write(file, bytes); });
     write_report(false, kKilled);
     try {
-      if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
+      save_config();
       const bool finished = process_all();
       finish(finished, finished ? "" : kInterrupt);
       if (!finished) {
@@ -122,6 +123,11 @@ class Run {
   }
 
  private:
+  void save_config() const {
+    const vision::KeepFiles others;
+    if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
+  }
+
   static std::string motion_of(const SequenceJob& job) {
     if (!job.sequence.has_calibration) return "none: the images have no calibration";
     if (!job.poses_file.empty()) return "poses of " + job.poses_file;
@@ -227,8 +233,7 @@ class Run {
     report_.set_doubt(text_of_doubt());
     if (sequence_.has_calibration && !poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
     write_report(finished, why_not);
-    if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace, finished, why_not);
-    folder_.end();
+    if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace);
     if (!finished || quiet_) return;
     fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
                pipeline_.device().info().name);
@@ -242,15 +247,14 @@ class Run {
     return text.empty() || poses_doubt_.empty() ? text + poses_doubt_ : text + "; " + poses_doubt_;
   }
 
-  void write_trace(const Trace& trace, bool finished, const std::string& why_not) {
+  void write_trace(const Trace& trace) {
     trace.write();
-    write_report(finished, why_not);  // which lists the trace where it lies in OUT
     if (trace.has_device_times() || quiet_) return;
     fmt::print("{} gives no times of commands: the trace has those of the host only\n", pipeline_.device().info().name);
   }
 
   void write_report(bool finished, const std::string& why_not) {
-    report_.write(folder_.path() / "report.json", folder_.files(), finished, why_not);
+    report_.write(folder_.path() / "report.json", finished, why_not);
   }
 
   /// The first error counts; that something cannot be written either adds nothing.
@@ -286,16 +290,8 @@ class Run {
   bool warned_of_range_ = false;
 };
 
-EarlierRun earlier_run_of(const RunArguments& arguments) {
-  if (arguments.resume && arguments.overwrite) {
-    throw InvalidArgument("--resume and --overwrite contradict each other: give one of them");
-  }
-  return arguments.resume ? EarlierRun::kResume : arguments.overwrite ? EarlierRun::kOverwrite : EarlierRun::kRefuse;
-}
-
 SequenceJob job_of(const RunArguments& arguments) {
   SequenceJob job;
-  const EarlierRun earlier = earlier_run_of(arguments);
   job.sequence = arguments.input.open(/*needs_calibration=*/false);
   job.input = arguments.input.text();
   job.options = arguments.method.options();
@@ -308,10 +304,7 @@ SequenceJob job_of(const RunArguments& arguments) {
     throw InvalidArgument(
         fmt::format("--write {}: a disparity is no depth without a calibration: give --calib FILE", kind));
   }
-  Inputs inputs(arguments.input, job.sequence);
-  for (const std::string& file : {arguments.poses, arguments.method.config, arguments.tuning}) inputs.add_file(file);
-  inputs.add_folder(arguments.programs);
-  job.out = OutputFolder(arguments.out, inputs, earlier, output_files(job.kinds, job.sequence, job.options));
+  job.out = OutputFolder(arguments.out, arguments.resume, output_files(job.kinds, job.sequence, job.options));
   job.trace = job.out.named_file("--trace", arguments.trace);
   job.save_config = job.out.named_file("--save-config", arguments.method.save_config);
   job.quiet = arguments.quiet;
@@ -338,7 +331,8 @@ Command add_run(CLI::App& program) {
   const char* group = "Output";
   command
       ->add_option("--out", arguments->out,
-                   "folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room for the range), "
+                   "new or empty folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room "
+                   "for the range), "
                    "poses.txt, "
                    "report.json")
       ->type_name("DIR")
@@ -357,10 +351,6 @@ Command add_run(CLI::App& program) {
       ->add_flag("--resume", arguments->resume,
                  "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
                  "before are computed again, for the filter's state")
-      ->group(group);
-  command
-      ->add_flag("--overwrite", arguments->overwrite,
-                 "replace an earlier run: what OUT/report.json says it wrote, and nothing more")
       ->group(group);
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
   arguments->method.add_to(*command);

@@ -3,8 +3,9 @@
 
 #include <fmt/core.h>
 
-#include "apps/output_folder.h"
 #include "egosgm/named_options.h"
+#include "host/json_text.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -136,12 +137,11 @@ void RunReport::set_doubt(const std::string& doubt) {
   if (!doubt.empty()) json_["doubt"] = doubt;
 }
 
-void RunReport::write(const std::filesystem::path& file, Json files, bool finished, const std::string& why_not) {
-  json_["files"] = std::move(files);
+void RunReport::write(const std::filesystem::path& file, bool finished, const std::string& why_not) {
   json_["finished"] = finished;
   json_.erase("stopped_by");
   if (!finished) json_["stopped_by"] = why_not;
-  write_own_json(file, json_);
+  vision::write_file(file, dumped(json_, 2) + "\n");
 }
 
 double RunReport::mean(const char* figure) const {

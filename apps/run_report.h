@@ -39,10 +39,8 @@ class RunReport {
   /// What speaks against the input, see Doubt; empty: nothing.
   void set_doubt(const std::string& doubt);
 
-  /// `files`: what OUT holds of the run (OutputFolder::files). `finished`: whether all frames ran; else `why_not` says
-  /// what stopped them. Throws IoError.
-  void write(const std::filesystem::path& file, nlohmann::ordered_json files, bool finished,
-             const std::string& why_not = {});
+  /// `finished`: whether all frames ran; else `why_not` says what stopped them. Throws IoError.
+  void write(const std::filesystem::path& file, bool finished, const std::string& why_not = {});
 
   /// Of a fraction of the frames. One that matched the range more than once counts as 1.
   double mean(const char* figure) const;

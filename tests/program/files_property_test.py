@@ -34,7 +34,7 @@ class Tree:
         (user / "poses.txt").write_text(POSES * 3)
         (user / "config.toml").write_text("# Options of egosgm run: read back with --config.\ndisparities = 16\n")
         (user / "tuning.json").write_text('{"a device": {"tile_width": 32}}')
-        (user / "report.json").write_text('{"program": "egosgm", "files": [["left/000000.png", null], ["poses.txt", null]]}')
+        (user / "report.json").write_text('{"program": "egosgm"}')
         for name in ("page.html", "path.svg", "path.png", "film.avi", "film.mp4", "trace.json", ".hidden", "settings.json", "empty"):
             (user / name).write_text("" if name == "empty" else f"the user's {name}")
         (user / "poses.txt").chmod(0o600)
@@ -46,7 +46,7 @@ class Tree:
                              ("out", "../outs/run"), ("user", str(user)), ("loop", "loop")):
             (links / name).symlink_to(target)
         outs = self.root / "outs"
-        for name in ("run", "edited", "linked", "crafted"):
+        for name in ("run", "edited", "linked"):
             shutil.copytree(templates / "run", outs / name)
         (outs / "edited/poses.txt").write_text(POSES)
         (outs / "edited/disparity/000001.png").write_bytes(grey_png(32, 16))
@@ -54,23 +54,17 @@ class Tree:
         (outs / "linked/disparity").symlink_to(user / "disparity")
         (outs / "linked/variance/000000.pfm").unlink()
         (outs / "linked/variance/000000.pfm").symlink_to(user / "left/000000.png")
-        text = (outs / "crafted/report.json").read_text()
-        (outs / "crafted/report.json").write_text(text.replace('"poses.txt"', '"../../user/poses.txt"', 1))
         for name in outs.iterdir():
             (name / "notes.txt").write_text("mine")
             (name / "depth").mkdir()
             (name / "depth/000000.png").write_text("mine")
             (name / "variance/mine.pfm").write_text("mine")
         (outs / "empty").mkdir()
-        own = [outs / "run", outs / "linked", outs / "crafted"]
-        mine = {outs / "crafted/report.json"} | {path for name in own for path in name.rglob("*") if path.is_symlink() or
-                                                  path.is_file() and path.read_bytes() == b"mine"}
-        mine |= {outs / "edited/poses.txt", outs / "edited/disparity/000001.png"}
         self.sentinels = {}
         for path in self.root.rglob("*"):
             if path.is_dir() and not path.is_symlink():
                 continue
-            if outs in path.parents and path not in mine and path.name not in ("notes.txt", "mine.pfm") and path.parent.name != "depth":
+            if outs in path.parents and path.name in ("report.json", "poses.txt"):  # of a run that goes on
                 continue
             self.keep(path)
 
@@ -144,7 +138,7 @@ class Commands:
     def folder(self, cwd):
         root = self.tree.root
         names = ["seq", "seq/image_0", "seq/truth", "seq/new", "drive", "user", "user/left", "user/right", "user/left/new", "links", "links/seq",
-                 "links/left", "links/out", "links/loop", "links/poses.txt", "outs", "outs/run", "outs/edited", "outs/linked", "outs/crafted",
+                 "links/left", "links/out", "links/loop", "links/poses.txt", "outs", "outs/run", "outs/edited", "outs/linked",
                  "outs/empty", "outs/new", "outs/run/disparity", "new/../user", "user/poses.txt", "."]
         if self.rng.random() < 0.02:
             return ""
@@ -177,7 +171,7 @@ class Commands:
 
     def run(self, cwd):
         root = self.tree.root
-        how = self.rng.choice([[], ["--overwrite"], ["--overwrite"], ["--resume"]])
+        how = self.rng.choice([[], ["--resume"]])
         return ["run", *self.sequence(cwd), "--out", self.folder(cwd), *how, *self.maybe(0.4, "--write", self.rng.choice(["variance", "color,cloud", "depth", "right"])),
                 *self.maybe(0.3, "--poses", self.file(cwd)), *self.maybe(0.3, "--frames", "0:1"), *self.maybe(0.2, "--trace", self.file(cwd)),
                 *self.maybe(0.2, "--save-config", self.file(cwd)), *self.maybe(0.2, "--config", root / "user/config.toml"),
@@ -236,14 +230,14 @@ class RandomCommands(unittest.TestCase):
         tree = Tree(self.folder, self.templates, rng)
         commands = Commands(tree, rng)
         for i in range(COMMANDS):
-            if i % 150 == 149:  # a fresh one, since runs use up what may be overwritten
+            if i % 150 == 149:  # a fresh one, since runs fill the folders that are empty
                 shutil.rmtree(tree.root)
                 tree = commands.tree = Tree(self.folder, self.templates, rng)
             if rng.random() < 0.1:
                 tree.add_a_users_file()
             cwd, command = commands.draw()
             if i % 150 in (75, 76):  # one that nothing is wrong with, and then over itself
-                again = ["--overwrite"] if i % 150 == 76 else []
+                again = ["--resume"] if i % 150 == 76 else []
                 cwd, command = tree.root, ["run", "--odometry", tree.root / "seq", "--out", tree.root / "plain", "--disparities", 16, "--quiet", *again]
             history.append(f"cd {cwd.relative_to(tree.root)} && egosgm {' '.join(map(str, command))}")
             done = egosgm(*command, cwd=cwd)

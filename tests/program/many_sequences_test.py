@@ -145,7 +145,7 @@ class ManySequences(ProgramTest):
         manifest, out, tools = (SOURCE / "examples/cluster/sequences.yaml").read_text(), self.new_folder(), self.new_folder()
         self.assertEqual(int(re.search(r"completions: (\d+)", manifest)[1]), self.SEQUENCES)
         command = json.loads(re.search(r"command: (\[.*\])", manifest)[1])
-        command[2] = command[2].replace("/data/list.txt", f"'{self.list}'").replace("/data/results", f"'{out}'") + " --disparities 32"
+        command[2] = command[2].replace("/data/list.txt", f"'{self.list}'").replace("/data/results", f"'{out}'") + " --disparities 32 --quiet"
         (tools / "run_line").symlink_to(SOURCE / "examples/cluster/run_line")
         reports, pixels, bad = [], 0, 0
         for index, name in enumerate(self.names):
