@@ -32,10 +32,10 @@ class Example(ProgramTest):
         left, right = (self.street / f"image_{side}/000000.png" for side in (0, 1))
         done = self.run_example("opencv_types", left, right, out / "steps.png")
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assert_works("run", "--odometry", self.street, "--frames", "0", "--out", out, "--temporal", "off")
+        self.assert_works("run", "--odometry", self.street, "--frames", "0", "--out", out / "run", "--temporal", "off")
         steps, own = (json.loads(self.assert_works("eval", "--estimate", file, "--truth",
                                                    self.street / "truth/left_disp_noc/000000.png", "--json"))["pooled"]
-                      for file in (out / "steps.png", out / "disparity/000000.png"))
+                      for file in (out / "steps.png", out / "run/disparity/000000.png"))
         self.assertAlmostEqual(steps["bad_of_valid"], own["bad_of_valid"], delta=1)
         self.assertGreater(steps["density"], 90)  # the sky's disparity rounds to no step
         self.assertNotEqual(self.run_example("opencv_types", left, self.street / "calib.txt", out / "no.png").returncode, 0)
