@@ -16,15 +16,12 @@ struct Command {
 };
 
 Command add_run(CLI::App& program);
-Command add_batch(CLI::App& program);
 Command add_eval(CLI::App& program);
 Command add_devices(CLI::App& program);
 Command add_compile(CLI::App& program);
 Command add_synth(CLI::App& program);
 Command add_odometry(CLI::App& program);
 Command add_eval_poses(CLI::App& program);
-Command add_view(CLI::App& program);
-Command add_completion(CLI::App& program);
 Command add_tune(CLI::App& program);
 Command add_report(CLI::App& program);
 Command add_doctor(CLI::App& program);

@@ -102,9 +102,7 @@ std::vector<ProgramFile> compile_to_spirv(const Device& device, const PipelineOp
 int compile(const CompileArguments& arguments) {
   const PipelineOptions options = arguments.method.options();
   arguments.method.expect_saves(arguments.out);
-  Inputs inputs;
-  inputs.add_file(arguments.method.config);
-  const std::filesystem::path folder = new_folder("--out", arguments.out, inputs);
+  const std::filesystem::path folder = new_folder("--out", arguments.out);
   const Device device = Device::select(arguments.device);
   const std::vector<ProgramFile> files =
       arguments.spirv ? compile_to_spirv(device, options, arguments) : compile_programs(device, options);

@@ -72,6 +72,11 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
         kBadInput,
         "--bag: bags are read by the Python package's program: pip install the wheel, with \"[bag]\" (docs/robots.md)");
   }
+  if (typed == "view") {
+    return fail(kBadInput,
+                "view: the Python package shows frames: pip install the wheel, with \"[rerun]\", and see egosgm.viewer "
+                "(docs/python.md); `egosgm run --write overview` draws them into files");
+  }
   const std::string nearest = suggestion(typed, names_known_to(command));
   return fail(kBadInput,
               fmt::format("{} \"{}\": {}see `{}`", typed.starts_with("-") ? "unknown option" : "unexpected argument",
@@ -141,10 +146,9 @@ int run_program(int argc, char** argv) {
       "  egosgm eval --estimate result --truth street/truth/left_disp_noc\n"
       "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.\n"
       "Who stops reading the output (`| head`) ends the printing, not the work.");
-  const Command commands[] = {
-      add_run(program),        add_batch(program), add_view(program),     add_report(program),     add_eval(program),
-      add_devices(program),    add_synth(program), add_odometry(program), add_eval_poses(program), add_compile(program),
-      add_completion(program), add_tune(program),  add_doctor(program),   add_rectify(program)};
+  const Command commands[] = {add_run(program),   add_report(program),   add_eval(program),       add_devices(program),
+                              add_synth(program), add_odometry(program), add_eval_poses(program), add_compile(program),
+                              add_tune(program),  add_doctor(program),   add_rectify(program)};
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

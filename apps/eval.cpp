@@ -17,6 +17,7 @@
 #include "egosgm/vision/evaluation.h"
 #include "egosgm/vision/video_evaluation.h"
 #include "host/json_text.h"
+#include "host/vision/file_io.h"
 #include "host/vision/pair_with_truth.h"
 #include "host/vision/video_plot.h"
 
@@ -28,12 +29,14 @@ using vision::DisparityMetrics;
 using vision::VideoCounts;
 using Json = nlohmann::ordered_json;
 
+constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
 constexpr std::size_t kLongFolder = 20;  // frames; a progress bar from here on
 
 struct EvalArguments {
   ComparisonArguments compared;
   VideoArguments video;
   vision::VideoEvaluationOptions options;
+  std::vector<std::string> reports;  // of --merge
   std::string plot_frames, plot_density;
   bool json = false;
 };
@@ -125,6 +128,25 @@ Json json_of(const VideoInput& input, const vision::VideoEvaluation& video) {
   return json;
 }
 
+template <typename Counts, typename Action>
+void for_each_count(Counts& counts, Action act) {
+  act("truth", counts.truth);
+  act("sky", counts.sky);
+  act("sky_valid", counts.sky_valid);
+  act("valid", counts.valid);
+  act("bad", counts.bad);
+  act("d1", counts.d1);
+  act("bad_interpolated", counts.bad_interpolated);
+  act("d1_interpolated", counts.d1_interpolated);
+  act("absolute_error_px", counts.absolute_error_px);
+}
+
+Json json_of(const DisparityCounts& counts) {
+  Json json;
+  for_each_count(counts, [&](const char* name, auto count) { json[name] = count; });
+  return json;
+}
+
 Json json_of(const VideoInput& input, const Result& result) {
   Json json{{"pairs", Json::array()},
             {"pooled", app::json_of(result.pooled)},
@@ -135,12 +157,14 @@ Json json_of(const VideoInput& input, const Result& result) {
     Json entry{{"name", row.name},
                {"estimate", row.files.estimate.string()},
                {"truth", row.files.truth.string()},
-               {"truth_pixels", row.counts.truth}};
+               {"truth_pixels", row.counts.truth},
+               {"counts", json_of(row.counts)}};
     entry.update(app::json_of(result.each[i]));
     json["pairs"].push_back(std::move(entry));
   }
   for (const auto& file : input.truth_pairs().without_estimate) json["without_estimate"].push_back(file.string());
   json["video"] = json_of(input, result.video);
+  if (const auto doubts = input.doubts(); !doubts.empty()) json["doubts"] = doubts;
   return json;
 }
 
@@ -155,10 +179,14 @@ void print_row(const std::string& name, const DisparityMetrics& m) {
              cell(m.mae_px, 11, "px"));
 }
 
-void print_errors(const Result& result) {
-  if (result.rows.empty()) return;
+void print_header() {
   fmt::print("{:<14}{:>13}{:>14}{:>11}{:>11}{:>16}{:>14}{:>11}{:>17}{:>11}\n", "", "wrong_of_all", "bad_of_valid",
              "filled", "density", "bad_or_missing", "interpolated", "d1", "d1_interpolated", "mae");
+}
+
+void print_errors(const Result& result) {
+  if (result.rows.empty()) return;
+  print_header();
   for (std::size_t i = 0; i < result.rows.size(); ++i) print_row(result.rows[i].name, result.each[i]);
   if (result.rows.size() > 1) {
     print_row("pooled", result.pooled);
@@ -236,7 +264,41 @@ void write_plots(const EvalArguments& arguments, const vision::VideoEvaluation& 
   }
 }
 
+/// The figures of all pairs of the reports, over all their pixels. Throws InvalidArgument and IoError.
+int merge(const EvalArguments& arguments) {
+  Result result;
+  DisparityCounts pooled;
+  for (const std::string& file : arguments.reports) {
+    const Json report = parse_json(vision::read_file(file, kMaxReportBytes), file);
+    try {
+      for (const Json& pair : report.at("pairs")) {
+        DisparityCounts counts;
+        for_each_count(counts, [&](const char* name, auto& count) { pair.at("counts").at(name).get_to(count); });
+        result.each.push_back(vision::metrics_of(counts));
+        pooled += counts;
+      }
+    } catch (const Json::exception&) {
+      throw InvalidArgument(file + ": is no report of `egosgm eval --json`: give --merge such reports");
+    }
+  }
+  result.pooled = vision::metrics_of(pooled);
+  result.mean = vision::mean_of(result.each);
+  if (arguments.json) {
+    const Json json{{"reports", arguments.reports.size()},
+                    {"pairs", result.each.size()},
+                    {"pooled", app::json_of(result.pooled)},
+                    {"mean", app::json_of(result.mean)}};
+    fmt::print("{}\n", dumped(json, 2));
+    return kOk;
+  }
+  print_header();
+  print_row("pooled", result.pooled);
+  print_row("mean", result.mean);
+  return kOk;
+}
+
 int evaluate(EvalArguments arguments) {
+  if (!arguments.reports.empty()) return merge(arguments);
   if (!arguments.plot_frames.empty()) require_plot_name("--plot-frames", arguments.plot_frames);
   if (!arguments.plot_density.empty()) require_plot_name("--plot-density", arguments.plot_density);
   complete_truth(arguments);
@@ -256,6 +318,7 @@ int evaluate(EvalArguments arguments) {
     print_density(total.density);
   }
   print_pairing(input.truth_pairs());
+  for (const std::string& doubt : input.doubts()) fmt::print("{}\n", doubt);
   return kOk;
 }
 
@@ -281,6 +344,11 @@ Command add_eval(CLI::App& program) {
                    "draw the bad pixels against the share of pixels kept: a .png or .svg file; with --variance or "
                    "--confidence")
       ->type_name("FILE");
+  command
+      ->add_option("--merge", arguments->reports,
+                   "pool what `egosgm eval --json` printed for several sequences, over all their pixels")
+      ->type_name("REPORT...")
+      ->excludes("--estimate", "--truth", "ESTIMATE");
   command->add_flag("--json", arguments->json, "print JSON");
   command->footer(
       "In percent of the pixels with truth (bad_of_valid: of those with an estimate too); bad: off by more than 3 px.\n"

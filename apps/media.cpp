@@ -23,18 +23,8 @@ std::unique_ptr<cv::VideoCapture> open_video(const std::string& file) {
   return video->isOpened() ? std::move(video) : nullptr;
 }
 
-std::unique_ptr<cv::VideoWriter> create_video(const std::string& file, const char* codec, double frames_per_second,
-                                              cv::Size size) {
-  quiet_opencv();
-  const int code = cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]);
-  auto video = std::make_unique<cv::VideoWriter>(file, code, frames_per_second, size);
-  return video->isOpened() ? std::move(video) : nullptr;
-}
-
 }  // namespace
 
-extern "C" __attribute__((visibility("default")))
-const Media egosgm_media{cv::imread,       cv::imencode, open_video,    create_video,          cv::namedWindow,
-                         cv::resizeWindow, cv::imshow,   cv::waitKeyEx, cv::getWindowProperty, cv::destroyAllWindows};
+extern "C" __attribute__((visibility("default"))) const Media egosgm_media{cv::imread, cv::imencode, open_video};
 
 }  // namespace egosgm::app

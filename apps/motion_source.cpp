@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/motion_source.h"
 
+#include <algorithm>
 #include <chrono>
 
+#include "egosgm/error.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/vision/pose_doubt.h"
 
 namespace egosgm::app {
 
@@ -35,6 +38,10 @@ void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const 
 MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
                            const StereoOdometryOptions& options) {
   options.validate();
+  if (!sequence.has_calibration) {
+    if (poses_file.empty()) return;
+    throw InvalidArgument("--poses " + poses_file + ": a motion predicts nothing without a calibration: give --calib");
+  }
   if (poses_file.empty()) {
     odometry_.emplace(sequence.calibration, options);
   } else {
@@ -42,11 +49,28 @@ MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::st
   }
 }
 
+std::string MotionSource::doubt(const vision::StereoSequence& sequence,
+                                const StereoOdometryOptions& options) const {
+  constexpr std::size_t kFrames = 7;
+  if (poses_.size() < 3) return {};
+  StereoOdometry odometry(sequence.calibration, options);
+  std::vector<Eigen::Isometry3d> given;
+  std::vector<std::optional<Eigen::Isometry3d>> found;
+  for (std::size_t i = 0; i < std::min(kFrames, poses_.size()); ++i) {
+    const vision::StereoImages images = vision::read_images(sequence.frames[i]);
+    const auto motion = odometry.process(vision::image_view(images.left), vision::image_view(images.right)).motion;
+    if (i == 0) continue;
+    given.push_back(vision::current_from_previous(poses_[i - 1], poses_[i]));
+    found.push_back(motion ? std::optional(motion->current_from_previous) : std::nullopt);
+  }
+  return vision::suspect_motions(given, found);
+}
+
 FrameMotion MotionSource::next(const vision::StereoImages& images) {
   FrameMotion result;
   if (odometry_) {
     estimate(images, result);
-  } else {
+  } else if (!poses_.empty()) {
     take_from_file(result);
   }
   ++frame_;

@@ -35,6 +35,9 @@ class MotionSource {
   MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
                const StereoOdometryOptions& options);
 
+  /// What the odometry of the first frames says against poses of a file; empty where nothing, and without such.
+  std::string doubt(const vision::StereoSequence& sequence, const StereoOdometryOptions& options) const;
+
   /// REQUIRES: called for frames 0, 1, 2, ... of the sequence.
   FrameMotion next(const vision::StereoImages& images);
 

@@ -7,6 +7,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
+#include <iterator>
+#include <limits>
 #include <map>
 #include <sstream>
 
@@ -229,6 +232,8 @@ std::map<std::int64_t, fs::path> euroc_images(const fs::path& camera) {
     const std::string_view time = vision::trim(row.text.substr(0, comma));
     std::int64_t time_ns = 0;
     const auto [end, error] = std::from_chars(time.data(), time.data() + time.size(), time_ns);
+    const bool is_header = images.empty() && !time.empty() && (time.front() < '0' || time.front() > '9');
+    if (is_header) continue;
     if (name.empty() || error != std::errc() || end != time.data() + time.size()) {
       vision::refuse_row(file, row.number, vision::quoted(row.text) + " is not TIME,FILE");
     }
@@ -240,16 +245,42 @@ std::map<std::int64_t, fs::path> euroc_images(const fs::path& camera) {
 std::unique_ptr<RawPairs> open_euroc(const fs::path& mav0) {
   const auto left = euroc_images(mav0 / "cam0"), right = euroc_images(mav0 / "cam1");
   std::vector<ListedPair> pairs;
+  constexpr std::int64_t kMaxSkew_ns = 2'000'000;  // cameras that are triggered together
+  std::int64_t largest_ns = 0, nearest_ns = std::numeric_limits<std::int64_t>::max();
+  const auto nearest = [](const auto& images, std::int64_t time_ns) {
+    const auto after = images.lower_bound(time_ns);
+    if (after == images.begin()) return after;
+    const auto before = std::prev(after);
+    return after == images.end() || time_ns - before->first <= after->first - time_ns ? before : after;
+  };
   for (const auto& [time_ns, file] : left) {
-    const auto other = right.find(time_ns);
-    if (other == right.end()) continue;
+    const auto other = nearest(right, time_ns);
+    if (other == right.end() || nearest(left, other->first)->first != time_ns) continue;
+    const std::int64_t apart_ns = std::abs(other->first - time_ns);
+    if (apart_ns > kMaxSkew_ns) {
+      nearest_ns = std::min(nearest_ns, apart_ns);
+      continue;
+    }
+    largest_ns = std::max(largest_ns, apart_ns);
     const double seconds = 1e-9 * static_cast<double>(time_ns - left.begin()->first);
     pairs.push_back({file, other->second, seconds});
   }
-  if (pairs.empty()) throw InvalidArgument(mav0.string() + ": cam0 and cam1 have no time stamp in common");
+  if (pairs.empty()) {
+    throw InvalidArgument(
+        mav0.string() + ": cam0 and cam1 have no time stamp in common" +
+        (nearest_ns < std::numeric_limits<std::int64_t>::max()
+             ? fmt::format("; the nearest are {:.3f} ms apart, at most {} ms are paired: --left, --right and --pair-by "
+                           "order pair the images as they come",
+                           1e-6 * static_cast<double>(nearest_ns), kMaxSkew_ns / 1'000'000)
+             : ""));
+  }
   const std::size_t alone = left.size() + right.size() - 2 * pairs.size();
   return std::make_unique<Listed>(
-      std::move(pairs), alone > 0 ? fmt::format("{} without the other one left out", counted(alone, "image")) : "");
+      std::move(pairs),
+      (alone > 0 ? fmt::format("{} without the other one left out", counted(alone, "image")) : "") +
+          (largest_ns == 0 ? ""
+                           : fmt::format("{}stamps of a pair differ by up to {:.3f} ms", alone > 0 ? "; " : "",
+                                         1e-6 * static_cast<double>(largest_ns))));
 }
 
 /// Whether it names images, by a pattern or an image's extension; else it is a video.

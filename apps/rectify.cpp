@@ -2,6 +2,7 @@
 // Raw pairs in, a rectified sequence out, in the layout that all other commands read.
 #include <fmt/core.h>
 
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <opencv2/imgproc.hpp>
@@ -18,6 +19,7 @@
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/rectification.h"
+#include "host/vision/doubt.h"
 #include "host/vision/file_io.h"
 
 namespace egosgm::app {
@@ -27,14 +29,14 @@ namespace fs = std::filesystem;
 
 struct RectifyArguments {
   RawPairArguments input;
-  std::string calib, out, unit = "m", pair_by;
+  std::string calib, out, unit, pair_by;
   double alpha = 0;
   bool is_fisheye = false;
   bool quiet = false;
 };
 
 double metres_in(const std::string& unit) {
-  if (unit == "m") return 1;
+  if (unit.empty() || unit == "m") return 1;
   if (unit == "cm") return 0.01;
   if (unit == "mm") return 0.001;
   throw InvalidArgument("--unit " + unit + ": choose m, cm or mm");
@@ -57,6 +59,7 @@ class Rectifier {
       throw InvalidArgument("--fisheye: " + arguments.calib + " is no calibration of OpenCV's (K1, D1, K2, D2, R, T)");
     }
     if (!rig_) calibration_ = vision::read_calibration(arguments.calib);
+    if (rig_ && arguments.unit.empty()) expect_metres();
   }
 
   bool rectifies() const { return rig_.has_value(); }
@@ -75,6 +78,18 @@ class Rectifier {
   const std::optional<vision::Rectification>& rectification() const { return rectification_; }
 
  private:
+  /// Only who names the unit has a baseline that no two cameras have.
+  void expect_metres() const {
+    const double baseline_m = cv::norm(rig_->T);
+    const auto suspicion =
+        std::isfinite(baseline_m) && baseline_m > 1e-3 ? vision::suspect_baseline(baseline_m) : std::nullopt;
+    if (!suspicion) return;
+    throw InvalidArgument(
+        fmt::format("{}: T gives {}: {} Give --unit cm or --unit mm, whichever it is, or --unit m where it is "
+                    "right",
+                    arguments_.calib, suspicion->what, suspicion->remedy));
+  }
+
   const RectifyArguments& arguments_;
   std::optional<vision::StereoRig> rig_;
   std::optional<vision::Rectification> rectification_;
@@ -140,18 +155,6 @@ std::string rectangle_text(const cv::Rect& r) {
   return fmt::format("{}x{} from ({}, {})", r.width, r.height, r.x, r.y);
 }
 
-Inputs inputs_of(const RectifyArguments& arguments) {
-  Inputs inputs;
-  for (const std::string& pattern : {arguments.input.left, arguments.input.right, arguments.input.side_by_side}) {
-    if (pattern.empty()) continue;
-    inputs.add_folder(fs::is_directory(pattern) ? fs::path(pattern) : fs::absolute(pattern).parent_path());
-  }
-  inputs.add_file(arguments.input.list);
-  inputs.add_folder(arguments.input.euroc);
-  inputs.add_file(arguments.calib);
-  return inputs;
-}
-
 int rectify(const RectifyArguments& arguments) {
   if (!(arguments.alpha >= 0 && arguments.alpha <= 1)) {
     throw InvalidArgument(fmt::format("--alpha {}: choose from 0 to 1", arguments.alpha));
@@ -161,7 +164,7 @@ int rectify(const RectifyArguments& arguments) {
   if (!input.euroc.empty()) input.euroc = mav0_of(input.euroc);
   const std::unique_ptr<RawPairs> pairs = open_pairs(input);
   Rectifier rectifier(arguments);
-  SequenceFolder folder(new_folder("--out", arguments.out, inputs_of(arguments)));
+  SequenceFolder folder(new_folder("--out", arguments.out));
   const vision::KeepFiles others;
   catch_interrupts();
   try {
@@ -233,9 +236,7 @@ Command add_rectify(CLI::App& program) {
       ->type_name("FILE");
   command->add_flag("--fisheye", arguments->is_fisheye,
                     "OpenCV's calibration is one of cv::fisheye: D1 and D2 hold four coefficients of the angle");
-  command->add_option("--unit", arguments->unit, "unit of T in OpenCV's calibration")
-      ->type_name("m|cm|mm")
-      ->capture_default_str();
+  command->add_option("--unit", arguments->unit, "unit of T in OpenCV's calibration [m]")->type_name("m|cm|mm");
   command
       ->add_option("--alpha", arguments->alpha,
                    "0: only pixels that the raw images have; 1: all of theirs, with black borders")

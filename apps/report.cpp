@@ -301,13 +301,10 @@ int report(const ReportArguments& arguments) {
   const fs::path file = arguments.out.empty() ? fs::path(arguments.run) / "report.html" : fs::path(arguments.out);
   try {
     Page contents(arguments);
-    std::optional<vision::KeepFiles> others;
-    if (!is_own_page(file)) {
-      expect_new_file("--out", file.string());
-      others.emplace();
-    }
+    expect_new_file("--out", file.string());
     const std::string page = contents.html();
-    vision::write_file(file, signed_text(page, kPageDigestBegin, kPageDigestEnd));
+    const vision::KeepFiles others;
+    vision::write_file(file, page);
     fmt::print("{}: {:.1f} MB, opens in any browser\n", file.string(), static_cast<double>(page.size()) / 1e6);
   } catch (const Json::exception& error) {
     throw InvalidArgument(fmt::format("{}/report.json: not the report of a run: {}", arguments.run, error.what()));

@@ -39,6 +39,9 @@ namespace fs = std::filesystem;
 
 constexpr const char *kKilled = "a kill, or it is still running", *kInterrupt = "an interrupt";
 
+constexpr const char* kNoCalibration =
+    "no calibration was given: disparities are there, but no depth and no odometry; --calib FILE brings both";
+
 using Clock = std::chrono::steady_clock;
 std::string note_of(const FrameReport& report) {
   if (!report.searched_everything && !report.unpredicted) return "";
@@ -61,7 +64,7 @@ struct RunArguments {
   OptionArguments method;
   std::string out, poses, device, programs, tuning, write, trace;
   StereoOdometryOptions odometry;
-  bool interpolate = false, quiet = false, resume = false, overwrite = false;
+  bool interpolate = false, quiet = false, resume = false;
 };
 
 /// What a frame needs before the device can start.
@@ -83,12 +86,13 @@ class Run {
         input_(job.input),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
+        poses_doubt_(motions_.doubt(sequence_, job.odometry)),
         waiting_(std::in_place,
                  fmt::format("compiling the kernels for {}, which its driver keeps if it can", device.info().name),
                  quiet_),
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, type_of(sequence_)),
-        report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height, job.batch_input),
-        doubt_(sequence_.calibration) {
+        report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height),
+        doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, size_) {
     folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration);
@@ -100,10 +104,11 @@ class Run {
   }
 
   bool operator()() {
-    const vision::BeforeWrite recording([this](const auto& file, auto bytes) { return folder_.record(file, bytes); });
+    const vision::BeforeWrite recording(
+        [this](const auto& file, auto bytes) { return folder_.is_to_write(file, bytes); });
     write_report(false, kKilled);
     try {
-      if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
+      save_config();
       const bool finished = process_all();
       finish(finished, finished ? "" : kInterrupt);
       if (!finished) {
@@ -118,7 +123,13 @@ class Run {
   }
 
  private:
+  void save_config() const {
+    const vision::KeepFiles others;
+    if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
+  }
+
   static std::string motion_of(const SequenceJob& job) {
+    if (!job.sequence.has_calibration) return "none: the images have no calibration";
     if (!job.poses_file.empty()) return "poses of " + job.poses_file;
     return fmt::format("stereo odometry, at most {} m and {} degrees a frame", job.odometry.max_translation_m,
                        job.odometry.max_rotation_deg);
@@ -131,6 +142,8 @@ class Run {
     const auto policy = ahead ? std::launch::async : std::launch::deferred;
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
     if (!sequence_.note.empty()) progress.note(sequence_.note);
+    if (!sequence_.has_calibration) progress.note(kNoCalibration);
+    if (!poses_doubt_.empty()) progress.note(poses_doubt_);
     const auto prepare_later = [&](std::size_t i) { return std::async(policy, [this, i] { return prepare(i); }); };
     auto next = prepare_later(0);
     for (std::size_t i = 0; i < sequence_.frames.size() && !interrupted(); ++i) {
@@ -201,7 +214,7 @@ class Run {
 
   void tell(const vision::StereoFrame& frame, const FrameReport& result, const FrameMotion& motion,
             const HostTimes& times, std::int64_t unstorable, Progress& progress) {
-    if (poses_.size() > 1 && !motion.motion) {
+    if (sequence_.has_calibration && poses_.size() > 1 && !motion.motion) {
       progress.note(
           fmt::format("frame {}: no motion ({}): searched the full range", frame.name, motion.odometry.reason));
     }
@@ -217,11 +230,10 @@ class Run {
   }
 
   void finish(bool finished, const std::string& why_not) {
-    report_.set_doubt(doubt_.text());
-    if (!poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
+    report_.set_doubt(text_of_doubt());
+    if (sequence_.has_calibration && !poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
     write_report(finished, why_not);
-    if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace, finished, why_not);
-    folder_.end();
+    if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace);
     if (!finished || quiet_) return;
     fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
                pipeline_.device().info().name);
@@ -230,15 +242,19 @@ class Run {
     if (const std::string advice = advice_of(doubt_.text(), input_); !advice.empty()) fmt::print("{}\n", advice);
   }
 
-  void write_trace(const Trace& trace, bool finished, const std::string& why_not) {
+  std::string text_of_doubt() const {
+    const std::string text = doubt_.text();
+    return text.empty() || poses_doubt_.empty() ? text + poses_doubt_ : text + "; " + poses_doubt_;
+  }
+
+  void write_trace(const Trace& trace) {
     trace.write();
-    write_report(finished, why_not);  // which lists the trace where it lies in OUT
     if (trace.has_device_times() || quiet_) return;
     fmt::print("{} gives no times of commands: the trace has those of the host only\n", pipeline_.device().info().name);
   }
 
   void write_report(bool finished, const std::string& why_not) {
-    report_.write(folder_.path() / "report.json", folder_.files(), finished, why_not);
+    report_.write(folder_.path() / "report.json", finished, why_not);
   }
 
   /// The first error counts; that something cannot be written either adds nothing.
@@ -260,6 +276,7 @@ class Run {
   const std::string& input_;
   const cv::Size size_;
   MotionSource motions_;
+  const std::string poses_doubt_;
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
   std::optional<Waiting> waiting_;     // until all is built
   Pipeline pipeline_;
@@ -273,27 +290,21 @@ class Run {
   bool warned_of_range_ = false;
 };
 
-EarlierRun earlier_run_of(const RunArguments& arguments) {
-  if (arguments.resume && arguments.overwrite) {
-    throw InvalidArgument("--resume and --overwrite contradict each other: give one of them");
-  }
-  return arguments.resume ? EarlierRun::kResume : arguments.overwrite ? EarlierRun::kOverwrite : EarlierRun::kRefuse;
-}
-
 SequenceJob job_of(const RunArguments& arguments) {
   SequenceJob job;
-  const EarlierRun earlier = earlier_run_of(arguments);
-  job.sequence = arguments.input.open();
+  job.sequence = arguments.input.open(/*needs_calibration=*/false);
   job.input = arguments.input.text();
   job.options = arguments.method.options();
   job.poses_file = arguments.poses;
   job.odometry = arguments.odometry;
   job.kinds = parse_write_list(arguments.write);
   if (arguments.interpolate) job.kinds.insert("interpolated");
-  Inputs inputs(arguments.input, job.sequence);
-  for (const std::string& file : {arguments.poses, arguments.method.config, arguments.tuning}) inputs.add_file(file);
-  inputs.add_folder(arguments.programs);
-  job.out = OutputFolder(arguments.out, inputs, earlier, output_files(job.kinds, job.sequence, job.options));
+  for (const char* kind : {"cloud", "depth", "depth_m"}) {
+    if (job.sequence.has_calibration || !job.kinds.contains(kind)) continue;
+    throw InvalidArgument(
+        fmt::format("--write {}: a disparity is no depth without a calibration: give --calib FILE", kind));
+  }
+  job.out = OutputFolder(arguments.out, arguments.resume, output_files(job.kinds, job.sequence, job.options));
   job.trace = job.out.named_file("--trace", arguments.trace);
   job.save_config = job.out.named_file("--save-config", arguments.method.save_config);
   job.quiet = arguments.quiet;
@@ -320,7 +331,8 @@ Command add_run(CLI::App& program) {
   const char* group = "Output";
   command
       ->add_option("--out", arguments->out,
-                   "folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room for the range), "
+                   "new or empty folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room "
+                   "for the range), "
                    "poses.txt, "
                    "report.json")
       ->type_name("DIR")
@@ -339,10 +351,6 @@ Command add_run(CLI::App& program) {
       ->add_flag("--resume", arguments->resume,
                  "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
                  "before are computed again, for the filter's state")
-      ->group(group);
-  command
-      ->add_flag("--overwrite", arguments->overwrite,
-                 "replace an earlier run: what OUT/report.json says it wrote, and nothing more")
       ->group(group);
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
   arguments->method.add_to(*command);

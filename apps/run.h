@@ -24,7 +24,6 @@ struct SequenceJob {
   std::set<std::string> kinds;  // what is written beside the disparity, see parse_write_list
   // Files that are written as well, where they are not empty: the options in use, and a trace of all commands.
   std::filesystem::path save_config, trace;
-  std::string batch_input;  // of a batch: the line of its list that asks for this; else empty
   bool quiet = false;
 };
 

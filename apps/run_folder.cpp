@@ -64,7 +64,8 @@ std::optional<vision::StereoSequence> frames_of_run(const fs::path& path) {
     if (!entry.is_object() || integer(entry, "frame") < 0) return std::nullopt;
     vision::StereoFrame& frame = sequence.frames.emplace_back();
     frame.number = integer(entry, "frame");
-    frame.name = fmt::format("{:06}", frame.number);
+    frame.name = entry.contains("name") && entry["name"].is_string() ? entry["name"].get<std::string>()
+                                                                     : fmt::format("{:06}", frame.number);
     if (entry.contains("left") && entry["left"].is_string()) frame.left = entry["left"].get<std::string>();
   }
   if (sequence.frames.empty()) return std::nullopt;

@@ -3,8 +3,9 @@
 
 #include <fmt/core.h>
 
-#include "apps/output_folder.h"
 #include "egosgm/named_options.h"
+#include "host/json_text.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -77,7 +78,7 @@ nlohmann::ordered_json json_of(const Eigen::Isometry3d& motion) {
 }
 
 RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& motion,
-                     int width, int height, const std::string& batch_input) {
+                     int width, int height) {
   const DeviceInfo& device = pipeline.device().info();
   json_ = {{"program", "egosgm"},
            {"version", EGOSGM_VERSION},
@@ -97,7 +98,6 @@ RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pip
            {"options", json_of(pipeline.options())},
            {"finished", false},
            {"frames", Json::array()}};
-  if (!batch_input.empty()) json_["batch_input"] = batch_input;
 }
 
 Json RunReport::identity() const {
@@ -124,6 +124,7 @@ void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report,
                              {"stripes", report.stripes},
                              {"outside_png_range", unstorable},
                              {"ms", times_json(report, motion, times)}});
+  if (frame.name != fmt::format("{:06}", frame.number)) json_["frames"].back()["name"] = frame.name;
 }
 
 void RunReport::add_reasons() {
@@ -136,12 +137,11 @@ void RunReport::set_doubt(const std::string& doubt) {
   if (!doubt.empty()) json_["doubt"] = doubt;
 }
 
-void RunReport::write(const std::filesystem::path& file, Json files, bool finished, const std::string& why_not) {
-  json_["files"] = std::move(files);
+void RunReport::write(const std::filesystem::path& file, bool finished, const std::string& why_not) {
   json_["finished"] = finished;
   json_.erase("stopped_by");
   if (!finished) json_["stopped_by"] = why_not;
-  write_own_json(file, json_);
+  vision::write_file(file, dumped(json_, 2) + "\n");
 }
 
 double RunReport::mean(const char* figure) const {

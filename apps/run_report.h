@@ -23,9 +23,9 @@ nlohmann::ordered_json json_of(const DeviceInfo& info);
 /// OUT/report.json: what ran, on what, and what every frame gave.
 class RunReport {
  public:
-  /// `motion`: where the motions come from. `batch_input`: as in SequenceJob.
+  /// `motion`: where the motions come from.
   RunReport(const vision::StereoSequence& sequence, const Pipeline& pipeline, const std::string& motion, int width,
-            int height, const std::string& batch_input);
+            int height);
 
   /// All that the maps depend on. Two runs with equal identities give the same maps.
   nlohmann::ordered_json identity() const;
@@ -39,10 +39,8 @@ class RunReport {
   /// What speaks against the input, see Doubt; empty: nothing.
   void set_doubt(const std::string& doubt);
 
-  /// `files`: what OUT holds of the run (OutputFolder::files). `finished`: whether all frames ran; else `why_not` says
-  /// what stopped them. Throws IoError.
-  void write(const std::filesystem::path& file, nlohmann::ordered_json files, bool finished,
-             const std::string& why_not = {});
+  /// `finished`: whether all frames ran; else `why_not` says what stopped them. Throws IoError.
+  void write(const std::filesystem::path& file, bool finished, const std::string& why_not = {});
 
   /// Of a fraction of the frames. One that matched the range more than once counts as 1.
   double mean(const char* figure) const;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <string_view>
+#include <utility>
 
 #include "egosgm/error.h"
 
@@ -42,6 +43,9 @@ void SequenceArguments::add_to(CLI::App& command) {
           "calib.txt")
       ->type_name("DIR")
       ->group(kGroup);
+  command.add_option("RIGHT", other_picture, "where DATASET is the left picture of a pair, the right one")
+      ->type_name("")
+      ->group(kGroup);
   command
       .add_option("--odometry", odometry, "KITTI odometry sequence: image_0, image_1 (or image_2, image_3), calib.txt")
       ->type_name("DIR")
@@ -69,7 +73,17 @@ void SequenceArguments::add_to(CLI::App& command) {
       ->group(kGroup);
 }
 
-vision::StereoSequence SequenceArguments::open() const {
+vision::StereoSequence SequenceArguments::open(bool needs_calibration) const {
+  if (!other_picture.empty()) {
+    if (!is_image(folder) || !left.empty() || !right.empty()) {
+      throw InvalidArgument("more than one input: " + folder + " and " + other_picture +
+                            ": give one folder, or the left and the right picture of a pair");
+    }
+    SequenceArguments pair = *this;
+    pair.left = std::exchange(pair.folder, "");
+    pair.right = std::exchange(pair.other_picture, "");
+    return pair.open(needs_calibration);
+  }
   const bool patterns = !left.empty() || !right.empty() || !calib.empty();
   std::vector<std::string> sources;
   if (!kitti.empty()) sources.push_back("--kitti " + kitti);
@@ -87,7 +101,7 @@ vision::StereoSequence SequenceArguments::open() const {
   }
   if (kitti.empty() && !scene.empty()) throw InvalidArgument("--scene " + scene + ": give --kitti DIR with it");
   if (!kitti.empty() && scene.empty()) throw InvalidArgument("--kitti " + kitti + ": give --scene NUMBER with it");
-  if (patterns && (left.empty() || right.empty() || calib.empty())) {
+  if (patterns && (left.empty() || right.empty() || (needs_calibration && calib.empty()))) {
     throw InvalidArgument("--left, --right and --calib belong together: give all three");
   }
   const vision::PairBy pairing = parse_pair_by(pair_by);
@@ -118,6 +132,7 @@ std::string SequenceArguments::text() const {
     text += (text.empty() ? "" : " ") + std::string(name) + shell_word(value);
   };
   append("", folder);
+  append("", other_picture);
   append("--kitti ", kitti);
   append("--scene ", scene);
   append("--odometry ", odometry);

@@ -10,11 +10,12 @@ namespace egosgm::app {
 
 /// The arguments that say which stereo sequence to read.
 struct SequenceArguments {
-  std::string kitti, scene, odometry, folder, left, right, calib, pair_by, frames;
+  std::string kitti, scene, odometry, folder, other_picture, left, right, calib, pair_by, frames;
 
   void add_to(CLI::App& command);
-  /// Throws InvalidArgument unless exactly one sequence was named, and as the openers do.
-  vision::StereoSequence open() const;
+  /// Throws InvalidArgument unless exactly one sequence was named, and as the openers do, and where the sequence has no
+  /// calibration and `needs_calibration`.
+  vision::StereoSequence open(bool needs_calibration = true) const;
   /// What was given, as a shell takes it for any command that reads a sequence.
   std::string text() const;
 };

@@ -19,7 +19,7 @@ struct SynthArguments {
 
 int render(const SynthArguments& arguments) {
   arguments.options.validate();
-  const std::filesystem::path folder = new_folder("--out", arguments.out, {});
+  const std::filesystem::path folder = new_folder("--out", arguments.out);
   {
     Progress progress(arguments.options.frames, arguments.quiet);
     vision::write_sequence(arguments.options, folder, [&](int done, int frames) {

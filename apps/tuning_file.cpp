@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "apps/output_folder.h"
 #include "egosgm/error.h"
 #include "host/json_text.h"
 #include "host/vision/file_io.h"
@@ -28,7 +27,7 @@ std::string key_of(const DeviceInfo& device) { return device.name + ", driver " 
 Json read(const std::filesystem::path& file) {
   Json json = parse_json(vision::read_file(file, kMaxBytes), file);
   if (!json.is_object()) refuse(file, "not a tuning file");
-  json.erase("digest");
+  json.erase("digest");  // of earlier versions
   return json;
 }
 
@@ -72,10 +71,8 @@ void expect_tuning_file(const std::filesystem::path& file) {
   if (file.has_parent_path()) vision::make_folder(file.parent_path());
   vision::expect_writable(file);
   if (!std::filesystem::is_regular_file(file)) return;
-  if (is_signed_json(vision::read_file(file, kMaxBytes))) return;
-  throw InvalidArgument(file.string() +
-                        ": is not as egosgm tune wrote it, or not its file at all, and stays: give another --file, or "
-                        "move it away");
+  const Json all = read(file);
+  for (const auto& [name, sizes] : all.items()) tuning_of(sizes, file);
 }
 
 void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, const Tuning& tuning) {
@@ -87,7 +84,7 @@ void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, c
     sizes[name] = number.is_discarded() ? Json(value) : number;
   }
   json[key_of(device)] = sizes;
-  vision::write_file(file, signed_json(json));
+  vision::write_file(file, dumped(json, 2) + "\n");
 }
 
 }  // namespace egosgm::app

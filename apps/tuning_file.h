@@ -18,7 +18,7 @@ Device tuned(const Device& device, const std::filesystem::path& file);
 /// What `--tuning` says: a file, "none", or empty for the user's file where there is one.
 Device tuned_by_argument(const Device& device, const std::string& argument);
 
-/// Throws InvalidArgument where the file exists and is not as store_tuning left it, and IoError where it cannot be
+/// Throws InvalidArgument where the file exists and is no tuning file, and IoError where it cannot be
 /// written. Changes no file.
 void expect_tuning_file(const std::filesystem::path& file);
 

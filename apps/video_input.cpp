@@ -126,6 +126,10 @@ VideoInput::VideoInput(const ComparisonArguments& compared, const VideoArguments
   if (!arguments.sequence.empty()) open_sequence();
   pair(!arguments.moving.empty() || arguments.sequence.empty() ? arguments.moving : moving_masks_of(arguments.sequence),
        "", &FrameFiles::moving);
+  for (const FrameFiles& frame : frames_) {
+    expect_scaled("--scale", arguments.scale, frame.estimate);
+    expect_scaled("--truth-scale", arguments.truth_scale, frame.truth);
+  }
 }
 
 /// Every estimate, with its truth where it has one.
@@ -237,15 +241,17 @@ vision::VideoFrame VideoInput::read(int i) const {
   const FrameFiles& files = frames_[i];
   vision::VideoFrame frame;
   const auto disparity = [](double scale) {
-    return [scale](const fs::path& file) { return vision::read_disparity(file, scale); };
+    return [scale](const fs::path& file) { return read_scaled(file, scale); };
   };
   const auto read_into = [&](const fs::path& file, auto&& reader) {
     return read_map(file, frame, files.estimate, reader);
   };
-  frame.estimate = vision::read_disparity(files.estimate, arguments_.scale);
+  frame.estimate = estimates_.read(files.estimate, arguments_.scale);
   frame.truth = read_into(files.truth, disparity(arguments_.truth_scale));
+  estimates_.compare(frame.estimate, frame.truth);
   frame.all_truth = read_into(files.all_truth, disparity(256));
-  frame.against = read_into(files.against, disparity(arguments_.scale));
+  frame.against =
+      read_into(files.against, [&](const fs::path& file) { return estimates_.read(file, arguments_.scale); });
   frame.next_truth = read_into(files.next_truth, disparity(arguments_.truth_scale));
   frame.reason = read_into(files.reason, vision::read_grey_image);
   frame.uncertainty = read_into(files.uncertainty, vision::read_values);

@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "apps/estimate_reader.h"
 #include "apps/truth_pairs.h"
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/video_evaluation.h"
@@ -68,6 +69,8 @@ class VideoInput {
   const vision::EvaluationPairs& truth_pairs() const { return truth_pairs_; }
   /// "poses FILE", "odometry", or empty.
   const std::string& motion_source() const { return motion_source_; }
+  /// What speaks against the estimates that were read.
+  std::vector<std::string> doubts() const { return estimates_.doubts(arguments_.scale); }
 
  private:
   void list_frames(const ComparisonArguments& compared);
@@ -87,6 +90,7 @@ class VideoInput {
   std::vector<Eigen::Isometry3d> poses_;
   std::optional<OdometryMotions> odometry_;
   std::string motion_source_;
+  mutable EstimateReader estimates_;
 };
 
 }  // namespace egosgm::app

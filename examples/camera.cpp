@@ -7,6 +7,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <mutex>
 #include <opencv2/highgui.hpp>
@@ -22,7 +23,6 @@
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/render.h"
-#include "egosgm/vision/window.h"
 
 namespace {
 
@@ -110,7 +110,7 @@ bool show(cv::Mat picture, const std::string& text, bool display) {
 
 void run(const std::string& source, const egosgm::Calibration& calibration, const egosgm::PipelineOptions& options) {
   using namespace egosgm;
-  const bool display = vision::has_display([] { cv::namedWindow(kWindow); });
+  const bool display = std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY");
   NewestFrame newest(source);
   std::optional<Pipeline> pipeline;
   std::optional<StereoOdometry> odometry;

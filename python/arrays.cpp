@@ -76,11 +76,37 @@ void store(const Eigen::Isometry3d& transform, double* to) {
   Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(to, 4, 4) = transform.matrix();
 }
 
+template <typename T>
+void weigh(const py::array& colour, cv::Mat& grey) {
+  const auto channels = colour.shape(2);
+  const auto* pixel = static_cast<const T*>(colour.data());
+  for (int y = 0; y < grey.rows; ++y) {
+    for (int x = 0; x < grey.cols; ++x, pixel += channels) {
+      const std::uint64_t sum = channels == 1 ? std::uint64_t{pixel[0]} << 15
+                                              : std::uint64_t{9798} * pixel[0] + std::uint64_t{19235} * pixel[1] +
+                                                    std::uint64_t{3735} * pixel[2] + (1 << 14);
+      grey.at<T>(y, x) = static_cast<T>(sum >> 15);
+    }
+  }
+}
+
+/// RGB as OpenCV weighs it; what is no image of whole numbers stays as it is.
+py::array grey_of(const py::array& colour) {
+  const bool bytes = colour.dtype().equal(py::dtype::of<std::uint8_t>());
+  if ((!bytes && !colour.dtype().equal(py::dtype::of<std::uint16_t>())) || colour.size() == 0) return colour;
+  const py::array packed = contiguous(colour);
+  expect_indexable(packed, "image");
+  cv::Mat grey(static_cast<int>(packed.shape(0)), static_cast<int>(packed.shape(1)), bytes ? CV_8UC1 : CV_16UC1);
+  bytes ? weigh<std::uint8_t>(packed, grey) : weigh<std::uint16_t>(packed, grey);
+  return array_of(grey);
+}
+
 }  // namespace
 
 ImageArray image_of(const py::object& image, const char* name) {
-  constexpr const char* kWanted = "a grey image, H x W of uint8 or uint16";
+  constexpr const char* kWanted = "a grey image, H x W of uint8 or uint16, or a colour one, H x W x 3 or 4, RGB";
   py::array array = as_array(image, name, kWanted);
+  if (array.ndim() == 3 && (array.shape(2) == 3 || array.shape(2) == 4 || array.shape(2) == 1)) array = grey_of(array);
   const bool bytes = array.dtype().equal(py::dtype::of<std::uint8_t>());
   if (array.ndim() != 2 || (!bytes && !array.dtype().equal(py::dtype::of<std::uint16_t>()))) {
     throw InvalidArgument(std::string(name) + " is " + shape_of(array) + ": give " + kWanted);

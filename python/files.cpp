@@ -45,7 +45,10 @@ void bind_sequences(py::module_& module) {
       .def_readonly("frames", &StereoSequence::frames)
       .def_readonly("numbers", &StereoSequence::numbers, "Of all frames that are there, chosen or not.")
       .def_readonly("note", &StereoSequence::note, "What is unusual, such as gaps in the numbers; empty: nothing.")
-      .def_readonly("calibration", &StereoSequence::calibration)
+      .def_property_readonly(
+          "calibration",
+          [](const StereoSequence& s) { return s.has_calibration ? std::optional(s.calibration) : std::nullopt; },
+          "None where the images came without one.")
       .def_readonly("poses_file", &StereoSequence::poses_file, "The true poses; empty where there are none.")
       .def_property_readonly(
           "size",
@@ -75,7 +78,8 @@ void bind_sequences(py::module_& module) {
         return vision::open_patterns(left, right, calibration, range_of(frames),
                                      by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
       },
-      py::arg("left"), py::arg("right"), py::arg("calibration"), py::arg("frames") = "", py::arg("by_order") = false,
+      py::arg("left"), py::arg("right"), py::arg("calibration") = path(), py::arg("frames") = "",
+      py::arg("by_order") = false,
       "PNG or JPEG files or patterns such as 'left/%06d.png' or 'left/*.jpg'. by_order: the first left image belongs "
       "to\n"
       "the first right one, and so on; else those of equal names belong together.");
@@ -96,7 +100,7 @@ void write_pfm(const path& file, const py::object& map) {
 void bind_files(py::module_& module) {
   bind_sequences(module);
   module.def(
-      "read_calibration", [](const path& file) { return vision::read_calibration(file); }, py::arg("file"),
+      "_read_calibration", [](const path& file) { return vision::read_calibration(file); }, py::arg("file"),
       "Reads KITTI's, Middlebury's or EgoSGM's own format.");
   module.def("write_calibration", &vision::write_calibration, py::arg("file"), py::arg("calibration"));
   module.def(

@@ -8,6 +8,9 @@
 #include <filesystem>
 
 #include "egosgm/error.h"
+#include "host/vision/doubt.h"
+#include "host/vision/examination.h"
+#include "host/vision/pose_doubt.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
@@ -80,6 +83,61 @@ py::array_t<float> matches_of(const py::object& left, const py::object& right) {
   return rows;
 }
 
+using vision::Doubt;
+using vision::Examination;
+
+py::object text_of(const std::optional<vision::Suspicion>& suspicion) {
+  return suspicion ? py::object(py::str(suspicion->what + ": " + suspicion->remedy)) : py::none();
+}
+
+py::list findings_of(const Examination& examination, std::size_t pairs) {
+  py::list list;
+  for (const vision::Finding& finding : examination.findings(pairs)) {
+    const char* verdict = finding.verdict == vision::Verdict::kFine   ? "ok"
+                          : finding.verdict == vision::Verdict::kNote ? "note"
+                                                                      : "problem";
+    list.append(py::make_tuple(verdict, finding.check, finding.text, finding.remedy));
+  }
+  return list;
+}
+
+std::string motions_doubt(const std::vector<py::object>& given, const std::vector<py::object>& found) {
+  std::vector<Eigen::Isometry3d> motions;
+  std::vector<std::optional<Eigen::Isometry3d>> others;
+  for (const py::object& motion : given) motions.push_back(transform_of(motion, "given"));
+  for (const py::object& motion : found) {
+    others.push_back(motion.is_none() ? std::nullopt : std::optional(transform_of(motion, "found")));
+  }
+  return vision::suspect_motions(motions, others);
+}
+
+/// Names with a line before them: the package's own.
+void bind_doubts(py::module_& module) {
+  py::class_<Doubt>(module, "_Doubt")
+      .def(py::init([](const std::optional<Calibration>& calibration, int width, int height) {
+             return Doubt(calibration, {width, height});
+           }),
+           py::arg("calibration"), py::arg("width"), py::arg("height"))
+      .def("add", &Doubt::add, py::arg("density"), py::arg("has_motion"), py::arg("holds_8_bits_in_16"))
+      .def("text", &Doubt::text);
+  py::class_<Examination>(module, "_Examination")
+      .def(py::init<const std::optional<Calibration>&, int, int>(), py::arg("calibration"), py::arg("least"),
+           py::arg("end"))
+      .def("add",
+           [](Examination& self, const py::object& left, const py::object& right) {
+             const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
+             const OtherThreadsRun other_threads_run;
+             self.add(left_image, right_image);
+           })
+      .def("findings", &findings_of, py::arg("pairs"));
+  module.def("_suspect_calibration", [](const Calibration& calibration, int width, int height) {
+    return text_of(vision::suspect_calibration(calibration, {width, height}));
+  });
+  module.def("_suspect_baseline",
+             [](double baseline_m, double fx) { return text_of(vision::suspect_baseline(baseline_m, fx)); });
+  module.def("_suspect_motions", &motions_doubt, py::arg("given"), py::arg("found"));
+}
+
 }  // namespace
 
 void bind_rectification(py::module_& module) {
@@ -120,6 +178,7 @@ void bind_rectification(py::module_& module) {
           "valid_left", [](const Rectification& r) { return tuple_of(r.valid_left); },
           "The largest rectangle of such pixels: x, y, width, height [px].")
       .def_property_readonly("valid_right", [](const Rectification& r) { return tuple_of(r.valid_right); });
+  bind_doubts(module);
   module.def("match_pair", &matches_of, py::arg("left"), py::arg("right"),
              "Points found in both images, in any rows: (N, 4) of x_left, y_left, x_right, y_right [px]. Rectified "
              "images have them in\nequal rows.");

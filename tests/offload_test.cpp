@@ -32,7 +32,7 @@ TEST(ComputeUnits, GiveTheBitsOfTheWholeDevice) {
   const std::vector<OutputMemory> expected = video.through(whole);
   std::vector<std::vector<OutputMemory>> actual(3);
   {
-    std::vector<std::jthread> threads;  // all at once, as a batch uses them
+    std::vector<std::jthread> threads;  // all at once
     threads.emplace_back([&] { actual[0] = video.through(whole.compute_units(0, 0)); });
     threads.emplace_back([&] { actual[1] = video.through(whole.compute_units(units - 1, units - 1)); });
     threads.emplace_back([&] { actual[2] = video.through(whole.compute_units(0, units - 1)); });

@@ -69,7 +69,8 @@ def run(bench, place, arguments=()):
     """The folder of the maps, and its report."""
     out = bench.work / "evidence" / (place.name + ("_single" if arguments else ""))
     if out not in bench.results:
-        bench.egosgm("run", *place.run_arguments, *arguments, "--out", out, "--write", "reason", "--overwrite", "--quiet")
+        shutil.rmtree(out, ignore_errors=True)
+        bench.egosgm("run", *place.run_arguments, *arguments, "--out", out, "--write", "reason", "--quiet")
         bench.results[out] = True
     report = json.loads((out / "report.json").read_text())
     bench.device = report["device"]

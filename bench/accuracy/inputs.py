@@ -157,7 +157,8 @@ class Bench:
 
     def measure(self, source, arguments):
         out = self.out_of(source, arguments)
-        self.egosgm("run", *source.run_arguments, *arguments, "--out", out, "--overwrite", "--quiet")
+        shutil.rmtree(out, ignore_errors=True)
+        self.egosgm("run", *source.run_arguments, *arguments, "--out", out, "--quiet")
         report = json.loads((out / "report.json").read_text())
         self.device = report["device"]
         frames = {frame["frame"]: {"search": 100 * frame["search_fraction"],

@@ -112,18 +112,7 @@ void describe(const GreyImage& smooth, int x, int y, Descriptor& descriptor) {
 
 }  // namespace
 
-int max_value(const ImageView& image) {
-  int largest = 0;
-  for (int y = 0; y < image.height; ++y) {
-    const auto* row = reinterpret_cast<const std::uint16_t*>(view_row(image, y));
-    std::uint16_t row_largest = 0;
-    for (int x = 0; x < image.width; ++x) row_largest = std::max(row_largest, row[x]);
-    largest = std::max<int>(largest, row_largest);
-  }
-  return largest;
-}
-
-void to_grey(const ImageView& image, int shift, GreyImage& grey) {
+void to_grey(const ImageView& image, const GreyLevels& levels, GreyImage& grey) {
   grey.width = image.width;
   grey.height = image.height;
   grey.pixels.resize(static_cast<std::size_t>(image.width) * image.height);
@@ -135,7 +124,7 @@ void to_grey(const ImageView& image, int shift, GreyImage& grey) {
     }
     const auto* wide = reinterpret_cast<const std::uint16_t*>(source);
     std::uint8_t* row = grey.row(y);
-    for (int x = 0; x < image.width; ++x) row[x] = static_cast<std::uint8_t>(wide[x] >> shift);
+    for (int x = 0; x < image.width; ++x) row[x] = levels(wide[x]);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "egosgm/image.h"
+#include "host/odometry/grey_levels.h"
 
 namespace egosgm::odometry {
 
@@ -20,11 +21,8 @@ struct GreyImage {
   std::uint8_t* row(int y) { return pixels.data() + static_cast<std::size_t>(y) * width; }
 };
 
-/// Largest value of a 16-bit image.
-int max_value(const ImageView& image);
-
-/// `image` as 8 bit; 16-bit values are shifted right by `shift`.
-void to_grey(const ImageView& image, int shift, GreyImage& grey);
+/// `image` as 8 bit; values of 16 bits become so by `levels`.
+void to_grey(const ImageView& image, const GreyLevels& levels, GreyImage& grey);
 
 enum FeatureClass : int { kBlobMax, kBlobMin, kCornerMax, kCornerMin, kFeatureClasses };
 

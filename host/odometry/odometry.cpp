@@ -105,13 +105,9 @@ struct StereoOdometry::State {
 };
 
 void StereoOdometry::State::read_frame(const ImageView& left, const ImageView& right) {
-  int shift = 0;
-  if (left.type == PixelType::kU16) {
-    const int largest = std::max(max_value(left), max_value(right));
-    while ((largest >> shift) > 255) ++shift;
-  }
-  to_grey(left, shift, current.left);
-  to_grey(right, shift, current.right);
+  const GreyLevels levels = left.type == PixelType::kU16 ? levels_of(left, right) : GreyLevels{};
+  to_grey(left, levels, current.left);
+  to_grey(right, levels, current.right);
   const double cells = std::ceil(left.width / static_cast<double>(kFeatureCell_px)) *
                        std::ceil(left.height / static_cast<double>(kFeatureCell_px));
   const int per_cell = static_cast<int>(std::ceil(options.max_features / cells));

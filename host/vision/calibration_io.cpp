@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
@@ -114,9 +115,10 @@ void check_same_focal_length(const Entries& entries, const Entry& right, double 
 
 void check_baseline(const Entries& entries, const Entry& entry, double baseline_m) {
   if (baseline_m > 0 && std::isfinite(baseline_m)) return;
-  refuse_row(entries.file(), entry.row,
-             std::string(entry.key) + ": the baseline is " + std::to_string(baseline_m) +
-                 " m; it must be positive (are left and right swapped?)");
+  const std::string text = entries.file().string() + ":" + std::to_string(entry.row) + ": " + std::string(entry.key) +
+                           ": the baseline is " + std::to_string(baseline_m) + " m; it must be positive";
+  if (!(baseline_m < 0)) throw InvalidArgument(text + ", give the distance of the two cameras");
+  throw NegativeBaseline(text + " (are left and right swapped?)");
 }
 
 Calibration from_projections(const Entries& entries, const std::string& left_key, const std::string& right_key) {
@@ -196,10 +198,73 @@ Calibration from_own(const Entries& entries) {
   return calibration;
 }
 
+bool is_zip(std::string_view text) { return text.starts_with("PK\x03\x04"); }
+
+bool has_all(std::string_view text, std::initializer_list<std::string_view> words) {
+  return std::all_of(words.begin(), words.end(),
+                     [&](std::string_view word) { return text.find(word) != std::string_view::npos; });
+}
+
+/// What a file is that is none of the formats here; empty where that is not known.
+std::string_view foreign_format(std::string_view text) {
+  struct Format {
+    std::initializer_list<std::string_view> words;
+    std::string_view name;
+  };
+  static const std::array<Format, 18> kFormats{{
+      {{"T_cn_cnm1"}, "a camera chain of Kalibr"},
+      {{"cam0:", "camera_model:", "intrinsics:"},
+       "a camera chain of Kalibr without T_cn_cnm1, where the second camera stands"},
+      {{"camera_matrix", "projection_matrix"},
+       "a camera of ROS's calibrator, which needs the other one's file beside it"},
+      {{"T_BS", "intrinsics"}, "one camera of EuRoC or Kimera, which needs the other one's file beside it"},
+      {{"disparity_to_depth"}, "DSEC's cam_to_cam.yaml"},
+      {{"Camera1.fx"}, "a file of settings of ORB-SLAM3"},
+      {{"Camera.fx"}, "a file of settings of ORB-SLAM"},
+      {{"\"extrinsic\"", "\"u0\""}, "Cityscapes' camera.json"},
+      {{"LEFT_CAM"}, "a calibration file of a ZED camera"},
+      {{"camera_matrix"}, "OpenCV's calibration of one camera"},
+      {{"intrinsic", "T_"}, "a YAML or JSON file of intrinsics and transformations"},
+      {{"left_camera_matrix"}, "OpenCV's stereo calibration (of raw images)"},
+      {{"M1", "M2"}, "OpenCV's stereo calibration (of raw images)"},
+      {{"K1", "K2"}, "OpenCV's stereo calibration (of raw images)"},
+      {{"Matrix1", "Matrix2"}, "OpenCV's stereo calibration (of raw images)"},
+      {{"MatrixL", "MatrixR"}, "OpenCV's stereo calibration (of raw images)"},
+      {{"Camera list with one line of data"}, "COLMAP's cameras.txt, which does not say how two cameras stand"},
+      {{"Q:"}, "a matrix Q of OpenCV's stereoRectify"},
+  }};
+  if (is_zip(text)) return "an archive of NumPy arrays (.npz)";
+  if (text.starts_with("\x93NUMPY")) return "one NumPy array";
+  for (const Format& format : kFormats) {
+    if (has_all(text, format.words)) return format.name;
+  }
+  if (text.starts_with("%YAML")) return "a YAML file of OpenCV";
+  const std::size_t begin = text.find_first_not_of(" \t\r\n");
+  if (begin == std::string_view::npos) return {};
+  if (text[begin] == '{' || text[begin] == '[') return "JSON";
+  if (text[begin] == '<') return "XML, as OpenCV writes it";
+  const std::vector<std::string_view> numbers = split_tokens(text.substr(0, text.find('\n')));
+  const bool is_matrix = numbers.size() == 9 || numbers.size() == 3;
+  if (is_matrix &&
+      std::all_of(numbers.begin(), numbers.end(), [](auto token) { return parse_number(token).has_value(); }))
+    return "a plain camera matrix, FoundationStereo's K.txt for instance";
+  return {};
+}
+
+[[noreturn]] void refuse_foreign(const std::filesystem::path& file, std::string_view format) {
+  throw InvalidArgument(
+      file.string() + ": is " + std::string(format) +
+      ", not one of EgoSGM's formats for rectified images (fx, fy, cx, cy, baseline_m in rows; KITTI's; "
+      "Middlebury's). A stereo calibration of OpenCV goes to `egosgm rectify`; the Python package "
+      "reads more of them: egosgm.read_calibration, and its `egosgm` command");
+}
+
 }  // namespace
 
 Calibration read_calibration(const std::filesystem::path& file, KittiCameras cameras) {
   const std::string text = read_file(file, kMaxCalibrationBytes);
+  const bool is_own = has_all(text, {"baseline_m"});
+  if (const std::string_view format = is_own ? "" : foreign_format(text); !format.empty()) refuse_foreign(file, format);
   const Entries entries(file, text);
   if (entries.has_prefix("P_rect_")) return from_kitti(entries, cameras, "P_rect_0");
   if (entries.has("cam0") || entries.has("cam1")) return from_middlebury(entries);

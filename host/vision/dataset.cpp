@@ -9,6 +9,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
+#include "egosgm/vision/image_io.h"
 #include "host/vision/folder_contents.h"
 #include "host/vision/frame_names.h"
 #include "host/vision/image_pairs.h"
@@ -258,10 +259,25 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   StereoSequence sequence;
   sequence.title = left + " and " + right;
   select_frames(pairs, left_pattern, right_pattern, range, left, sequence);
+  if (pair_by == PairBy::kOrder) {
+    const std::string note = order_note(pairs);
+    sequence.note += (sequence.note.empty() || note.empty() ? "" : "; ") + note;
+  }
   sequence.calibration_file = calibration_file;
-  sequence.calibration = read_calibration(calibration_file, cameras_of(left_pattern.folder));
+  sequence.has_calibration = !calibration_file.empty();
+  if (sequence.has_calibration) {
+    sequence.calibration = read_calibration(calibration_file, cameras_of(left_pattern.folder));
+  } else {
+    const cv::Size size = read_image_size(sequence.frames.front().left);
+    sequence.calibration = {.fx = static_cast<double>(size.width),
+                            .fy = static_cast<double>(size.width),
+                            .cx = size.width / 2.0,
+                            .cy = size.height / 2.0,
+                            .baseline_m = 1};
+  }
   std::vector<fs::path> own{left_pattern.folder};
-  if (is_parent(calibration_file, left_pattern.folder)) own.push_back(left_pattern.folder / "..");
+  if (sequence.has_calibration && is_parent(calibration_file, left_pattern.folder))
+    own.push_back(left_pattern.folder / "..");
   sequence.times_file = find_times(own);
   return sequence;
 }

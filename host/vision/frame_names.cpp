@@ -288,6 +288,24 @@ std::vector<NamedPair> pair_files(const NamePattern& left, const NamePattern& ri
   return pairs;
 }
 
+std::string order_note(const std::vector<NamedPair>& pairs) {
+  const auto number_of = [](const fs::path& file) {
+    const std::string stem = file.stem().string();
+    const std::size_t last = stem.find_last_not_of("0123456789");
+    return parse_frame_number(stem.substr(last == std::string::npos ? 0 : last + 1));
+  };
+  std::optional<int> first_shift;
+  for (const NamedPair& pair : pairs) {
+    const std::optional<int> left = number_of(pair.left), right = number_of(pair.right);
+    if (!left || !right) return {};
+    if (!first_shift) first_shift = *right - *left;
+    if (*right - *left == *first_shift) continue;
+    return "paired by order, though the numbers in names go apart, first at " + pair.left.filename().string() +
+           " and " + pair.right.filename().string() + ": is a frame missing on one side?";
+  }
+  return {};
+}
+
 std::vector<fs::path> files_in_order(const NamePattern& pattern) {
   const Files files = find_files(pattern);
   std::vector<fs::path> sorted;
@@ -324,7 +342,8 @@ void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left,
     }
     StereoFrame frame;
     frame.number = pair.number;
-    frame.name = padded(std::to_string(pair.number), 6);
+    frame.name =
+        parse_frame_number(pair.text) || !is_decimal(pair.text) ? padded(std::to_string(pair.number), 6) : pair.text;
     frame.left = pair.left;
     frame.right = pair.right;
     sequence.frames.push_back(std::move(frame));

@@ -38,6 +38,10 @@ struct NamedPair {
 /// one camera mean the same frame.
 std::vector<NamedPair> pair_files(const NamePattern& left, const NamePattern& right, PairBy pair_by);
 
+/// What the names of pairs that were made by order say against them: their last numbers go apart, as where a frame is
+/// missing on one side. Empty where they do not.
+std::string order_note(const std::vector<NamedPair>& pairs);
+
 /// The files that match, in order. Throws as pair_files.
 std::vector<std::filesystem::path> files_in_order(const NamePattern& pattern);
 

@@ -81,12 +81,14 @@ void check_stance(const cv::Mat& T) {
   }
   if (x > 0) {
     throw InvalidArgument(text +
-                          "the second camera stands left of the first: exchange left and right, images and "
+                          "the second camera stands left of the first: is this the inverse of the transformation from "
+                          "the first camera's points to the second's? Else exchange left and right, images and "
                           "calibration");
   }
   if (-x > kMaxBaseline_m) {
     throw InvalidArgument("the baseline is " + short_text(-x) +
-                          " m: is T in millimetres? give --unit mm (unit_m 0.001)");
+                          " m: is T in centimetres or millimetres? give --unit cm (unit_m 0.01) or --unit mm (unit_m "
+                          "0.001)");
   }
 }
 

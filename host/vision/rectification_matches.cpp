@@ -5,6 +5,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/rectification.h"
+#include "host/vision/grey_bytes.h"
 
 namespace egosgm::vision {
 namespace {
@@ -15,15 +16,6 @@ constexpr float kMaxDescriptorDistance = 50;  // of 256 bits
 constexpr std::size_t kFewest = 16;           // below this a fundamental matrix says nothing
 constexpr double kEpipolarTolerance_px = 1.5;
 constexpr float kMaxReturn_px = 0.3f;  // a refined point leads back to where it came from
-
-cv::Mat bytes_of(const cv::Mat& image) {
-  if (image.depth() == CV_8U) return image;
-  double highest = 0;
-  cv::minMaxLoc(image, nullptr, &highest);
-  cv::Mat bytes;
-  image.convertTo(bytes, CV_8U, highest > 0 ? 255.0 / highest : 1.0);
-  return bytes;
-}
 
 struct Points {
   std::vector<cv::Point2f> left, right;
@@ -87,7 +79,7 @@ std::vector<PairMatch> match_pair(const cv::Mat& left, const cv::Mat& right) {
       (left.type() != CV_8UC1 && left.type() != CV_16UC1)) {
     throw InvalidArgument("the pair: give grey images of 8 or 16 bits, both of one size and depth");
   }
-  const cv::Mat left_bytes = bytes_of(left), right_bytes = bytes_of(right);
+  const auto [left_bytes, right_bytes] = bytes_of(left, right);
   Points points = match_descriptors(left_bytes, right_bytes);
   if (points.left.size() < kFewest) return {};
   drop_outliers(points);

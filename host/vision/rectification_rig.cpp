@@ -19,6 +19,78 @@ constexpr std::size_t kMaxBytes = std::size_t{1} << 22;
 
 using Names = std::initializer_list<const char*>;
 
+// How programs call the matrices of OpenCV's stereoCalibrate.
+constexpr Names kLeftMatrix = {"M1",
+                               "K1",
+                               "cameraMatrix1",
+                               "camera_matrix_1",
+                               "cameraMatrixL",
+                               "KL",
+                               "K_left",
+                               "Kl",
+                               "left_camera_matrix",
+                               "camera_matrix1",
+                               "mtx1",
+                               "mtxL",
+                               "cameraMatrix_left",
+                               "intrinsic1",
+                               "leftCameraMatrix",
+                               "camera_matrix_left",
+                               "K_l"};
+constexpr Names kRightMatrix = {"M2",
+                                "K2",
+                                "cameraMatrix2",
+                                "camera_matrix_2",
+                                "cameraMatrixR",
+                                "KR",
+                                "K_right",
+                                "Kr",
+                                "right_camera_matrix",
+                                "camera_matrix2",
+                                "mtx2",
+                                "mtxR",
+                                "cameraMatrix_right",
+                                "intrinsic2",
+                                "rightCameraMatrix",
+                                "camera_matrix_right",
+                                "K_r"};
+constexpr Names kLeftDistortion = {"D1",
+                                   "distCoeffs1",
+                                   "dist_coeffs_1",
+                                   "distCoeffsL",
+                                   "DL",
+                                   "D_left",
+                                   "Dl",
+                                   "left_distortion",
+                                   "dist_coeffs1",
+                                   "dist1",
+                                   "distL",
+                                   "distCoeffs_left",
+                                   "distortion1",
+                                   "leftDistCoeffs",
+                                   "left_dist_coeffs",
+                                   "dist_coeffs_left",
+                                   "left_distortion_coefficients",
+                                   "D_l"};
+constexpr Names kRightDistortion = {"D2",
+                                    "distCoeffs2",
+                                    "dist_coeffs_2",
+                                    "distCoeffsR",
+                                    "DR",
+                                    "D_right",
+                                    "Dr",
+                                    "right_distortion",
+                                    "dist_coeffs2",
+                                    "dist2",
+                                    "distR",
+                                    "distCoeffs_right",
+                                    "distortion2",
+                                    "rightDistCoeffs",
+                                    "right_dist_coeffs",
+                                    "dist_coeffs_right",
+                                    "right_distortion_coefficients",
+                                    "D_r"};
+
 /// What OpenCV throws over a file's contents is the file's fault.
 template <typename Read>
 auto blaming(const fs::path& file, Read&& read) {
@@ -67,11 +139,19 @@ cv::Mat matrix_of(const cv::FileNode& node) {
     }
   } else if (node.isSeq()) {
     std::vector<double> numbers;
+    cv::Mat rows;
     for (const cv::FileNode& number : node) {
+      if (number.isSeq()) {  // a row, as Python writes them
+        const cv::Mat row = matrix_of(number);
+        if (row.empty() || (!rows.empty() && row.total() != static_cast<std::size_t>(rows.cols))) return {};
+        rows.push_back(row.reshape(1, 1));
+        continue;
+      }
       if (!number.isInt() && !number.isReal()) return {};
       numbers.push_back(static_cast<double>(number));
     }
-    matrix = cv::Mat(numbers, /*copyData=*/true);
+    if (!rows.empty() && !numbers.empty()) return {};
+    matrix = rows.empty() ? cv::Mat(numbers, /*copyData=*/true) : rows;
   }
   if (!matrix.empty()) matrix.convertTo(matrix, CV_64F);
   return matrix;
@@ -133,7 +213,7 @@ std::optional<StereoRig> opencv_rig(const fs::path& file, double unit_m, bool is
       return std::nullopt;  // one of the formats that are none of OpenCV's
     }
   }
-  const cv::Mat left = find_matrix(files, {"M1", "K1", "cameraMatrix1", "camera_matrix_1", "cameraMatrixL", "KL"});
+  const cv::Mat left = find_matrix(files, kLeftMatrix);
   if (left.empty()) return std::nullopt;
   StereoRig rig;
   rig.is_fisheye = is_fisheye;
@@ -141,16 +221,13 @@ std::optional<StereoRig> opencv_rig(const fs::path& file, double unit_m, bool is
     return require_matrix(find_matrix(files, names), file, name, elements);
   };
   rig.left.matrix = require_matrix(left, file, "M1", 9).reshape(1, 3);
-  rig.right.matrix =
-      matrix("M2", 9, {"M2", "K2", "cameraMatrix2", "camera_matrix_2", "cameraMatrixR", "KR"}).reshape(1, 3);
-  rig.left.distortion = require_distortion(
-      find_matrix(files, {"D1", "distCoeffs1", "dist_coeffs_1", "distCoeffsL", "DL"}), file, "D1", is_fisheye);
-  rig.right.distortion = require_distortion(
-      find_matrix(files, {"D2", "distCoeffs2", "dist_coeffs_2", "distCoeffsR", "DR"}), file, "D2", is_fisheye);
-  rig.R = find_matrix(files, {"R"});
+  rig.right.matrix = matrix("M2", 9, kRightMatrix).reshape(1, 3);
+  rig.left.distortion = require_distortion(find_matrix(files, kLeftDistortion), file, "D1", is_fisheye);
+  rig.right.distortion = require_distortion(find_matrix(files, kRightDistortion), file, "D2", is_fisheye);
+  rig.R = find_matrix(files, {"R", "rotation", "Rot", "om"});
   if (rig.R.total() == 3) cv::Rodrigues(rig.R.clone(), rig.R);
   rig.R = require_matrix(rig.R, file, "R", 9).reshape(1, 3);
-  rig.T = matrix("T", 3, {"T"}).reshape(1, 3) * unit_m;
+  rig.T = matrix("T", 3, {"T", "t", "translation", "Trans"}).reshape(1, 3) * unit_m;
   rig.size = find_size(files);
   const cv::Mat given[4] = {find_matrix(files, {"R1"}), find_matrix(files, {"R2"}), find_matrix(files, {"P1"}),
                             find_matrix(files, {"P2"})};
@@ -170,7 +247,7 @@ StereoRig euroc_rig(const fs::path& mav0) {
     const cv::Mat k = require_matrix(find_matrix(files, {"intrinsics"}), file, "intrinsics", 4);
     const std::string model = files[0]["distortion_model"].string();
     const std::string named = file.string() + ": distortion_model \"" + model + "\": ";
-    if (model != "radial-tangential" && model != "equidistant") {
+    if (model != "radial-tangential" && model != "radtan" && model != "equidistant") {
       throw InvalidArgument(named + "only radial-tangential and equidistant are known");
     }
     const bool is_fisheye = model == "equidistant";

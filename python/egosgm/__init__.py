@@ -25,12 +25,13 @@ _cpu_driver.show()  # before the library is loaded, which asks the loader
 from . import _egosgm
 from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
+from .calibrations import read_calibration
 from .drive import Drive, DriveFrame, run
 from .matcher import Matcher
 from .values import as_dataclass as _as_dataclass
 from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video
 
-__all__ = ["__version__", "Drive", "DriveFrame", "Matcher", "run", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video",
+__all__ = ["__version__", "read_calibration", "Drive", "DriveFrame", "Matcher", "run", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 

@@ -13,10 +13,15 @@ from typing import Any, Callable, Collection, Deque, Dict, Iterator, List, Optio
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _egosgm
-from .ros_images import BODY_FROM_OPTICAL, Cameras, are_raw, grey_of, needs, quaternion_of, rotation_of, stamp_ns
+from . import _egosgm, calibrations
+from .bag_parts import Parts
+from .ros_images import BODY_FROM_OPTICAL, Cameras, are_raw, grey_of, is_set, needs, quaternion_of, rotation_of, stamp_ns
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+# What tells cameras apart in names of topics.
+_SIDES = (("left", "right"), ("Left", "Right"), ("cam0", "cam1"), ("camera0", "camera1"), ("infra1", "infra2"), ("cam_0", "cam_1"),
+          ("camera_0", "camera_1"), ("cam1", "cam2"), ("camera1", "camera2"), ("infra_1", "infra_2"), ("/0/", "/1/"), ("Infrared_1", "Infrared_2"))
+_MOST_BROKEN = 10  # from the start on; then the bag is none that can be read
 _POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
 
 
@@ -33,17 +38,31 @@ class Gaps:
     has_no_stamps: bool = False
     gaps: List[Tuple[int, float]] = dataclasses.field(default_factory=list)
     largest_skew_ms: float = 0.0
+    interval_ms: float = math.inf
+    broken: List[str] = dataclasses.field(default_factory=list)
+    parts: List[str] = dataclasses.field(default_factory=list)
+
+    def are_other_moments(self, apart_ms: float) -> bool:
+        """From about half the time between two frames on, stamps are of other moments, whatever is allowed."""
+        return apart_ms >= 0.35 * self.interval_ms
 
     def text(self) -> str:
-        parts = []
+        parts = list(self.parts)
+        if self.broken:
+            count = f"{len(self.broken)} broken message{'s' if len(self.broken) > 1 else ''}, whose pairs are left out"
+            parts.append(f"{count}: {self.broken[0]}")
         if self.has_no_stamps:
             parts.append("the images have no stamps: the times at which they were recorded are taken")
         if self.unpaired_left or self.unpaired_right:
             parts.append(f"{self.unpaired_left} left and {self.unpaired_right} right images have no partner")
-        if self.unpaired_left and self.unpaired_right and self.nearest_unpaired_ms < math.inf:
+        if self.unpaired_left and self.unpaired_right and self.are_other_moments(self.nearest_unpaired_ms) and self.nearest_unpaired_ms < math.inf:
+            parts[-1] += f": the nearest of them differ by {_ms(self.nearest_unpaired_ms)} at {_ms(self.interval_ms)} a frame: they are of other moments"
+        elif self.unpaired_left and self.unpaired_right and self.nearest_unpaired_ms < math.inf:
             parts[-1] += f": the nearest of them differ by {_ms(self.nearest_unpaired_ms)}, which --max-skew-ms can allow"
         if self.largest_skew_ms:
             parts.append(f"stamps of a pair differ by up to {self.largest_skew_ms:.3f} ms")
+            if self.are_other_moments(self.largest_skew_ms):
+                parts[-1] += f" at {_ms(self.interval_ms)} a frame: those are of other moments; give a smaller --max-skew-ms, and cameras that are triggered together"
         if self.gaps:
             at, longest = max(self.gaps, key=lambda gap: gap[1])
             parts.append(f"{len(self.gaps)} gap{'s' if len(self.gaps) > 1 else ''}, the longest of {longest:.3f} s before frame {at}")
@@ -64,9 +83,14 @@ class Pairing:
         self.bound_ns = bound_ns
         self.gaps = Gaps()
         self._waiting: Tuple[Deque[Tuple[int, Any]], Deque[Tuple[int, Any]]] = (collections.deque(), collections.deque())
+        self._last: List[Optional[int]] = [None, None]
 
     def add(self, side: int, stamp: int, message: Any) -> Iterator[Tuple[Tuple[int, Any], Tuple[int, Any]]]:
         waiting = self._waiting[side]
+        last = self._last[side]
+        if last is not None and stamp > last:
+            self.gaps.interval_ms = min(self.gaps.interval_ms, (stamp - last) / 1e6)
+        self._last[side] = stamp
         if waiting and stamp < waiting[-1][0]:  # a recording that starts over
             yield from self.end()
         waiting.append((stamp, message))
@@ -127,7 +151,7 @@ class BagFrame:
 class Bag:
     """Frames of a bag, from its start each time. `cameras` and `gaps` are known when frames are read."""
 
-    def __init__(self, path: "str | os.PathLike[str]", left_topic: str, right_topic: str, info_topics: Sequence[str] = (),
+    def __init__(self, path: "str | os.PathLike[str]", left_topic: str = "", right_topic: str = "", info_topics: Sequence[str] = (),
                  pose_topic: str = "", max_skew_ms: float = 0.0, rectify: Optional[bool] = None, pose_axes: str = "body",
                  calib: "str | os.PathLike[str]" = "") -> None:
         highlevel = needs("rosbags.highlevel")
@@ -143,11 +167,12 @@ class Bag:
         if calib and (info_topics or rectify is not None):
             raise _egosgm.InvalidArgument(f"calibration {calib}: it says by itself whether images are rectified, and what camera infos would say: "
                                           "give no info topics, and leave rectify out")
-        self._highlevel = highlevel
-        self._default_types = needs("rosbags.typesys")
+        self._parts = Parts(self.path, highlevel, needs("rosbags.typesys"))
+        if not left_topic or not right_topic:
+            left_topic, right_topic = self._find_topics(left_topic, right_topic)
         self.images = left_topic, right_topic
         self.infos = () if calib else tuple(info_topics) or tuple(_info_topic(topic) for topic in self.images)
-        self._rig_or_calibration = _read_calibration(pathlib.Path(calib)) if calib else None
+        self._rig_or_calibration = calibrations.read_calibration(calib) if calib else None
         self._pose_topic, self._bound_ns, self._rectify, self._pose_axes = pose_topic, int(max_skew_ms * 1e6), rectify, pose_axes
         self.cameras: Optional[Cameras] = None
         self.is_rectified_here = False
@@ -161,16 +186,34 @@ class Bag:
 
     @contextlib.contextmanager
     def _opened(self) -> Iterator[Any]:
-        stores = self._default_types
         try:
-            with self._highlevel.AnyReader(_files_of(self.path), default_typestore=stores.get_typestore(stores.Stores.LATEST)) as reader:
+            with self._parts.reader() as reader:
                 yield reader
         except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError):
             raise
         except Exception as error:  # whatever a decoder of what is broken may raise
             reason = str(error).strip().partition("\n")[0] or type(error).__name__
-            remedy = "; its messages are not ROS's" if reason.startswith("Profile is not") else _remedy(self.path)
-            raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {reason}{remedy}") from error
+            raise _egosgm.InvalidArgument(f"{self.path}: cannot be read as a bag: {reason}{_remedy(self.path)}") from error
+
+    def _find_topics(self, left: str, right: str) -> Tuple[str, str]:
+        """The topics of both cameras, where there is one choice; of one camera's raw and rectified images the rectified."""
+        with self._opened() as reader:
+            there = sorted({connection.topic for connection in reader.connections if connection.msgtype in _IMAGES})
+        pairs = []
+        for topic in there:
+            for name, other in _SIDES:
+                partner = topic.replace(name, other)
+                if partner != topic and partner in there and (left in ("", topic)) and (right in ("", partner)):
+                    pairs.append((topic, partner))
+                    break
+        rectified = [pair for pair in pairs if "rect" in pair[0]]
+        chosen = rectified if len(rectified) == 1 else pairs
+        plain = [pair for pair in chosen if not pair[0].endswith(("/compressed", "/compressedDepth", "/theora"))]
+        chosen = plain if len(plain) == 1 else chosen
+        if len(chosen) != 1:
+            what = "more than one pair of cameras" if chosen else "no pair of cameras that names tell"
+            raise _egosgm.InvalidArgument(f"{self.path}: has {what}: give --left-topic and --right-topic; its topics of images: {', '.join(there) or 'none'}")
+        return chosen[0]
 
     def _check_topics(self, reader: Any) -> None:
         types = {connection.topic: connection.msgtype for connection in reader.connections}
@@ -195,18 +238,36 @@ class Bag:
         found = []
         self._first_infos = {}
         for topic in self.infos or self.images[:1]:
-            message = next(self._first_messages(reader, topic), None)
-            if message is None:
-                raise _egosgm.InvalidArgument(f"{self.path}: \"{topic}\" has no message")
-            found.append(message)
+            found.append(self._first_whole(reader, topic))
             if self.infos:
-                self._first_infos[topic] = _values_of(message)
+                self._first_infos[topic] = _values_of(found[-1])
         if self._rig_or_calibration is not None:
             self.is_rectified_here = isinstance(self._rig_or_calibration, _egosgm.StereoRig)
             height, width = grey_of(found[0]).shape
             return Cameras.of_calibration(self._rig_or_calibration, width, height)
         self.is_rectified_here = are_raw(found[0], self.images[0]) if self._rectify is None else self._rectify
-        return Cameras(*found, self.is_rectified_here)
+        return Cameras(*found, self.is_rectified_here, self.infos)
+
+    def _first_whole(self, reader: Any, topic: str) -> Any:
+        """The first camera info that is set, or the first image that can be read."""
+        first, reason = None, None
+        connections = [c for c in reader.connections if c.topic == topic]
+        for connection, _, raw in itertools.islice(reader.messages(connections=connections), 300):
+            try:
+                message = reader.deserialize(raw, connection.msgtype)
+                if self.infos and not is_set(message):
+                    first = message if first is None else first
+                    continue
+                if not self.infos:
+                    grey_of(message)
+                return message
+            except Exception as error:  # of what is broken
+                reason = error
+        if first is not None:
+            return first
+        if isinstance(reason, _egosgm.InvalidArgument):
+            raise _egosgm.InvalidArgument(f"{self.path}: {topic}: {reason}")
+        raise _egosgm.InvalidArgument(f"{self.path}: \"{topic}\" has no message" + (f" that can be read: {reason}" if reason else ""))
 
     def __len__(self) -> int:
         return self.count
@@ -214,6 +275,7 @@ class Bag:
     def frames(self) -> Iterator[BagFrame]:
         pairing = Pairing(self._bound_ns)
         self.gaps = pairing.gaps
+        pairing.gaps.parts = list(self._parts.notes)
         times: List[int] = []
         poses: List[NDArray[np.float64]] = []
         with self._opened() as reader:
@@ -222,7 +284,24 @@ class Bag:
             if self._pose_topic:
                 times, poses = self._read_poses(reader)
             connections = [c for c in reader.connections if c.topic in (*self.images, *self.infos)]
-            number, last, interval = 0, None, None
+            number, last, interval, changed = 0, None, None, ""
+
+            def image_of(message: Any, stamp: int, topic: str) -> Optional[NDArray[Any]]:
+                """None of one that is broken, unless all are."""
+                try:
+                    image = grey_of(message)
+                    if image.shape != (self.cameras.size[1], self.cameras.size[0]):
+                        raise _egosgm.InvalidArgument(f"an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
+                                                      f"{self.cameras.size[0]}x{self.cameras.size[1]}")
+                    return image
+                except (_egosgm.InvalidArgument, ValueError) as error:
+                    broken(topic, stamp, error)
+                    return None
+
+            def broken(topic: str, stamp: int, error: Exception) -> None:
+                self.gaps.broken.append(f"{topic} at {stamp // 10**9}.{stamp % 10**9:09d} s: {str(error).partition(chr(10))[0] or type(error).__name__}")
+                if number == 0 and len(self.gaps.broken) >= _MOST_BROKEN:
+                    raise _egosgm.InvalidArgument(f"{self.path}: {self.gaps.broken[0]}")
 
             def frame_of(pair: Any) -> Iterator[BagFrame]:
                 nonlocal number, last, interval
@@ -240,11 +319,9 @@ class Bag:
                         pairing.gaps.gaps.append((number, (stamp - last) / 1e9))
                     else:
                         interval = stamp - last
-                images = [grey_of(message) for message in (left, right)]
-                for image, topic in zip(images, self.images):
-                    if image.shape != (self.cameras.size[1], self.cameras.size[0]):
-                        raise _egosgm.InvalidArgument(f"{topic}: an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
-                                                      f"{self.cameras.size[0]}x{self.cameras.size[1]}")
+                images = [image_of(message, stamp, topic) for message, topic in zip((left, right), self.images)]
+                if images[0] is None or images[1] is None:
+                    return
                 if images[0].dtype != images[1].dtype:
                     raise _egosgm.InvalidArgument(f"{self.images[0]} has {images[0].dtype}, {self.images[1]} has {images[1].dtype}: both need one depth")
                 images = self.cameras.rectified(*images)
@@ -252,19 +329,37 @@ class Bag:
                 number, last = number + 1, stamp
                 yield frame
 
-            for connection, time, raw in reader.messages(connections=connections):
-                message = reader.deserialize(raw, connection.msgtype)
-                if connection.topic in self._first_infos:
-                    if _values_of(message) != self._first_infos[connection.topic]:
-                        raise _egosgm.InvalidArgument(f"{connection.topic}: another calibration than at the start, from {stamp_ns(message) / 1e9:.3f} s on: "
-                                                      "cut the bag there, or give one calibration for all of it by --calib")
-                    continue
-                stamp = time if pairing.gaps.has_no_stamps else stamp_ns(message)
-                for pair in pairing.add(self.images.index(connection.topic), stamp, message):
+            def stamped() -> Iterator[Tuple[int, int, Any]]:
+                for connection, time, raw in reader.messages(connections=connections):
+                    try:
+                        message = reader.deserialize(raw, connection.msgtype)
+                    except Exception as error:  # whatever a decoder of what is broken may raise
+                        broken(connection.topic, time, error)
+                        continue
+                    if connection.topic in self.images:
+                        stamp = time if pairing.gaps.has_no_stamps else stamp_ns(message)
+                        yield stamp, self.images.index(connection.topic), message
+                        continue
+                    if is_set(message) and _values_of(message) != self._first_infos[connection.topic]:
+                        nonlocal changed  # what was before is a drive of its own
+                        changed = (f"{connection.topic}: another calibration than at the start, from {stamp_ns(message) / 1e9:.3f} s on: cut the bag "
+                                   "there, or give one calibration for all of it by --calib")
+                        return
+
+            for stamp, side, message in _in_order(stamped()):
+                for pair in pairing.add(side, stamp, message):
                     yield from frame_of(pair)
             for pair in pairing.end():
                 yield from frame_of(pair)
+        if changed:
+            raise _egosgm.InvalidArgument(changed)
+        if number == 0 and self.gaps.broken:
+            raise _egosgm.InvalidArgument(f"{self.path}: no pair is whole: {self.gaps.broken[0]}")
         if number == 0:
+            apart = pairing.gaps.nearest_ms
+            if apart is not None and pairing.gaps.are_other_moments(apart):
+                raise _egosgm.InvalidArgument(f"{self.path}: no left image has a right one of its time; the nearest stamps differ by {_ms(apart)} at "
+                                              f"{_ms(pairing.gaps.interval_ms)} a frame: left and right are of other moments, so that nothing can be matched")
             nearest = f"the nearest stamps differ by {_ms(pairing.gaps.nearest_ms)}: allow that by --max-skew-ms" if pairing.gaps.nearest_ms is not None \
                 else "one of the topics has no image"
             unset = " (images have no stamps here: the times at which they were recorded are taken)" if pairing.gaps.has_no_stamps else ""
@@ -290,13 +385,18 @@ def _ms(duration: float) -> str:
     return f"{math.ceil(round(duration * 1000, 6)) / 1000:.3f} ms"
 
 
-def _files_of(path: pathlib.Path) -> List[pathlib.Path]:
-    """A bag's parts in a folder that nothing describes; else the bag itself."""
-    if path.is_dir() and not (path / "metadata.yaml").exists():
-        for suffix in (".mcap", ".db3", ".bag"):
-            if files := sorted(file for file in path.iterdir() if file.suffix == suffix):
-                return files
-    return [path]
+def _in_order(messages: Iterator[Tuple[int, int, Any]]) -> Iterator[Tuple[int, int, Any]]:
+    """By their stamps, where threads recorded neighbours the wrong way round; a recording that starts over by a second and more stays."""
+    held: List[Tuple[int, int, int, Any]] = []
+    for count, (stamp, side, message) in enumerate(messages):
+        if held and stamp < held[-1][0] - 1_000_000_000:
+            yield from ((stamp, side, message) for stamp, _, side, message in held)
+            held = []
+        bisect.insort(held, (stamp, count, side, message))
+        if len(held) > 8:
+            stamp, _, side, message = held.pop(0)
+            yield stamp, side, message
+    yield from ((stamp, side, message) for stamp, _, side, message in held)
 
 
 def _remedy(path: pathlib.Path) -> str:
@@ -310,17 +410,11 @@ def _with_slash(topic: str, there: Collection[str]) -> str:
     return f"/{topic}" if topic and topic not in there and f"/{topic}" in there else topic
 
 
-def _read_calibration(path: pathlib.Path) -> "_egosgm.StereoRig | _egosgm.Calibration":
-    """What `egosgm rectify` takes for raw images, and `egosgm run` for rectified ones."""
-    for mav0 in (path, path / "mav0"):
-        if (mav0 / "cam0/sensor.yaml").exists():
-            return _egosgm.read_euroc_rig(mav0)
-    return _egosgm.read_opencv_rig(path) or _egosgm.read_calibration(path)
-
-
 def _values_of(info: Any) -> Tuple[Any, ...]:
     """All that a camera info says, but when."""
-    of_image = info.width, info.height, info.binning_x, info.binning_y, info.distortion_model
+    roi = getattr(info, "roi", None)
+    region = (roi.x_offset, roi.y_offset, roi.width, roi.height) if roi is not None else ()
+    of_image = info.width, info.height, info.binning_x, info.binning_y, info.distortion_model, region
     return *of_image, *(tuple(np.ravel(getattr(info, name.lower(), None) if hasattr(info, name.lower()) else getattr(info, name))) for name in "DKRP")
 
 
@@ -349,11 +443,26 @@ def _pose_at(times: List[int], poses: List[NDArray[np.float64]], stamp: int) -> 
     return result
 
 
+_LOOKED_AT = 8  # motions that are given, beside those of the odometry
+
+
+def _problems(calibration: _egosgm.Calibration, samples: Sequence[Tuple[NDArray[Any], NDArray[Any]]], options: Dict[str, Any]) -> List[str]:
+    """What `egosgm doctor` says of such pairs."""
+    least = int(options["min_disparity"])
+    examination = _egosgm._Examination(calibration, least, least + int(options["disparities"]))
+    for left, right in samples:
+        examination.add(left, right)
+    return [f"{check}: {text}: {remedy}" for verdict, check, text, remedy in examination.findings(len(samples)) if verdict == "problem"]
+
+
 def run(bag: Bag, outputs: Sequence[Any] = (), progress: Optional[bool] = None,
         on_frame: Optional[Callable[[BagFrame, Any], None]] = None, **options: Any) -> Dict[str, Any]:
     """Matches all frames of a bag. outputs: of bag_outputs or of viewer. options: those of Pipeline. Returns what happened."""
     from .drive import _bar
-    pipeline = odometry = previous = None
+    pipeline = odometry = previous = doubt = None
+    samples: List[Tuple[NDArray[Any], NDArray[Any]]] = []
+    given: List[NDArray[np.float64]] = []
+    found: List[Optional[NDArray[np.float64]]] = []
     density = 0.0
     frames = moved = 0
     for frame in _bar(progress)(bag.frames(), len(bag)):
@@ -361,12 +470,16 @@ def run(bag: Bag, outputs: Sequence[Any] = (), progress: Optional[bool] = None,
         if pipeline is None:
             pipeline = _egosgm.Pipeline(calibration, *bag.cameras.size, **options)
             odometry = _egosgm.StereoOdometry(calibration)
+            doubt = _egosgm._Doubt(calibration, *bag.cameras.size)
         if frame.starts_anew:
             pipeline.reset()
             odometry.reset()
             previous = None
         motion = odometry.process(frame.left, frame.right).motion
         if frame.world_from_camera is not None and previous is not None:
+            if len(given) < _LOOKED_AT:
+                given.append(np.linalg.inv(frame.world_from_camera) @ previous)
+                found.append(motion.current_from_previous if motion else None)
             motion = _egosgm.Motion(np.linalg.inv(frame.world_from_camera) @ previous)
         previous = frame.world_from_camera
         maps = pipeline.process(frame.left, frame.right, motion, ("disparity", "variance", "reason"))
@@ -374,6 +487,12 @@ def run(bag: Bag, outputs: Sequence[Any] = (), progress: Optional[bool] = None,
             output.add(frame, maps, motion.current_from_previous if motion else None, calibration)
         if on_frame:
             on_frame(frame, maps)
+        is_narrow = frame.left.dtype == np.uint16 and int(frame.left.max()) < 256
+        doubt.add(maps.report.density, motion is not None, is_narrow)
+        if frames in (0, 3, 10, 30, 100):
+            samples.append((frame.left, frame.right))
         frames, moved, density = frames + 1, moved + (motion is not None), density + maps.report.density
-    return {"frames": frames, "density": density / max(1, frames), "motions": moved, "calibration": bag.cameras.calibration,
+    said = [text for text in (doubt.text(), _egosgm._suspect_motions(given, found)) if text]
+    problems = _problems(bag.cameras.calibration, samples, pipeline.options) if doubt.text() else []
+    return {"doubt": "; ".join(said), "problems": problems, "frames": frames, "density": density / max(1, frames), "motions": moved, "calibration": bag.cameras.calibration,
             "rectified": bag.is_rectified_here, "device": pipeline.device.name, "gaps": bag.gaps}

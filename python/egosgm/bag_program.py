@@ -30,11 +30,11 @@ def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="egosgm run --bag", description=__doc__, allow_abbrev=False)
     add = parser.add_argument
     add("--bag", required=True, metavar="FILE.mcap|FILE.bag|FOLDER", help="ROS 2 (MCAP, SQLite) or ROS 1")
-    add("--left-topic", required=True, metavar="TOPIC", help="raw or compressed images")
-    add("--right-topic", required=True, metavar="TOPIC")
+    add("--left-topic", default="", metavar="TOPIC", help="raw or compressed images [where names tell, and there is one choice, that one]")
+    add("--right-topic", default="", metavar="TOPIC")
     add("--info-topics", nargs=2, default=(), metavar=("LEFT", "RIGHT"), help="camera infos [camera_info beside the images]")
-    add("--calib", default="", metavar="FILE|FOLDER", help="without camera infos: OpenCV's stereo calibration (T in metres) or EuRoC's mav0, of raw "
-        "images; or what egosgm run --calib reads, of rectified ones")
+    add("--calib", default="", metavar="FILE|FOLDER", help="in place of camera infos: whatever egosgm.read_calibration reads, of raw images (OpenCV, ROS, "
+        "Kalibr, EuRoC) or of rectified ones")
     add("--pose-topic", default="", metavar="TOPIC", help="motion from there (Odometry, PoseStamped) in place of stereo odometry")
     add("--pose-axes", default="body", metavar="body|optical", help="of the poses: x forward, z up, or z forward, y down [body]")
     add("--max-skew-ms", type=float, default=0.0, metavar="MS", help="how far the stamps of a pair may differ [0]")
@@ -109,6 +109,8 @@ def _main(given: argparse.Namespace) -> int:
           f"on {told['device']}; {told['motions']} motions; density {told['density']:.1%} in the mean" + (f": {given.out}" if given.out else ""))
     if told["gaps"].text():
         print(told["gaps"].text())
+    for text in (*([told["doubt"]] if told["doubt"] else []), *told["problems"]):
+        print(f"doubt: {text}")
     return 0
 
 

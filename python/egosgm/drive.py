@@ -2,12 +2,14 @@
 """run(): a drive in, a disparity map for each of its frames out."""
 import dataclasses
 import os
+import warnings
 from typing import Any, Dict, Iterable, Iterator, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
+from .calibrations import read_calibration
 
 
 @dataclasses.dataclass(frozen=True, repr=False, eq=False)
@@ -20,7 +22,7 @@ class DriveFrame:
     right: NDArray[Any]
     maps: _egosgm.Frame
     odometry: Optional[_egosgm.OdometryResult]
-    calibration: _egosgm.Calibration
+    calibration: Optional[_egosgm.Calibration]
 
     @property
     def disparity(self) -> Optional[NDArray[np.float32]]:
@@ -35,6 +37,8 @@ class DriveFrame:
     @property
     def depth(self) -> NDArray[np.float32]:
         """Metres; NaN where there is no disparity."""
+        if self.calibration is None:
+            raise _egosgm.InvalidArgument("depth: a disparity is none without a calibration: give it to run()")
         depth = _egosgm.depth_from_disparity(self.disparity, self.calibration)
         return np.where(depth > 0, depth, np.float32(np.nan))
 
@@ -48,7 +52,7 @@ class DriveFrame:
         return self.maps.report
 
     def __repr__(self) -> str:
-        height, width = self.left.shape
+        height, width = self.left.shape[:2]
         return (f"<DriveFrame {self.name}: {width}x{height}, density {self.report.density:.1%}, "
                 f"search {min(1, self.report.search_fraction):.1%}>")
 
@@ -57,7 +61,7 @@ class Drive:
     """What run() gives: iterate over it, as often as you like."""
 
     def __init__(self, source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
-                 calibration: Optional[_egosgm.Calibration] = None, *, frames: str = "", motion: bool = True,
+                 calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
                  outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None,
                  progress: Optional[bool] = None, **options: Any) -> None:
         if isinstance(source, (str, os.PathLike)):
@@ -65,16 +69,18 @@ class Drive:
         elif frames:
             raise _egosgm.InvalidArgument(f"frames={frames!r}: only a folder's are chosen here")
         self.sequence = source if isinstance(source, _egosgm.StereoSequence) else None
-        if calibration is None:
-            if self.sequence is None:
-                raise _egosgm.InvalidArgument("calibration: pairs of images come without one, give it")
+        if calibration is None and self.sequence is not None:
             calibration = self.sequence.calibration
-        if not isinstance(calibration, _egosgm.Calibration):
+        if isinstance(calibration, (str, os.PathLike)):
+            calibration = read_calibration(calibration)
+        if isinstance(calibration, _egosgm.StereoRig):
+            raise _egosgm.InvalidArgument("calibration: is of raw images: rectify them first (egosgm.Rectification, egosgm rectify)")
+        if calibration is not None and not isinstance(calibration, _egosgm.Calibration):
             raise _egosgm.InvalidArgument(f"calibration: is a {type(calibration).__name__}: give an egosgm.Calibration; read_calibration reads a file")
         self.calibration = calibration
         self._source, self._outputs, self._options = source, outputs, options
         self._bar = _bar(progress)
-        self._odometry_options = (odometry or {}) if motion else None
+        self._odometry_options = (odometry or {}) if motion and calibration is not None else None
         self._begun = False
         # What an iteration has of its own, ready for the next one. Made now where the size is known: what is wrong is said at once.
         self._spare = [self._tools(*(self.sequence.size if self.sequence is not None else ()))]
@@ -106,13 +112,23 @@ class Drive:
 
     def _tools(self, width: int = 0, height: int = 0) -> Tuple[Optional[_egosgm.StereoOdometry], Optional[_egosgm.Pipeline]]:
         odometry = None if self._odometry_options is None else _egosgm.StereoOdometry(self.calibration, **self._odometry_options)
-        return odometry, _egosgm.Pipeline(self.calibration, width, height, **self._options) if width else None
+        return odometry, self._pipeline(width, height) if width else None
+
+    def _pipeline(self, width: int, height: int) -> _egosgm.Pipeline:
+        """Without a calibration, nothing is predicted: any one does."""
+        calibration = self.calibration or _egosgm.Calibration(width, width, width / 2, height / 2, 1)
+        return _egosgm.Pipeline(calibration, width, height, **self._options)
+
+    def _tell(self, doubt: Optional[_egosgm._Doubt]) -> None:
+        text = doubt.text() if doubt else ""
+        if text:
+            warnings.warn(f"{text}: `egosgm doctor` tells why, of images in a folder", UserWarning, stacklevel=4)
 
     def _frames(self) -> Iterator[DriveFrame]:
         """The device matches a frame while the next one is read and its motion is found. Iterations share nothing, so that each may end
         where it likes, and two may run at once."""
         odometry, pipeline = self._spare.pop() if self._spare else self._tools(*(self.sequence.size if self.sequence is not None else ()))
-        pairs, under_way, failure = self._pairs(), None, None
+        pairs, under_way, failure, doubt = self._pairs(), None, None, None
         try:
             while True:
                 next_one = None
@@ -120,7 +136,7 @@ class Drive:
                     for number, name, left, right in pairs:
                         found = odometry.process(left, right) if odometry else None
                         if pipeline is None:
-                            pipeline = _egosgm.Pipeline(self.calibration, *np.shape(left)[1::-1], **self._options)
+                            pipeline = self._pipeline(*np.shape(left)[1::-1])
                         pipeline.submit(left, right, found.motion if found else None, self._outputs)
                         next_one = number, name, left, right, found
                         break
@@ -128,11 +144,17 @@ class Drive:
                     failure = error
                 if under_way and (failure is None or pipeline.under_way):
                     number, name, left, right, found = under_way
-                    yield DriveFrame(number, name, left, right, pipeline.collect(), found, self.calibration)
+                    maps = pipeline.collect()
+                    if doubt is None:
+                        doubt = _egosgm._Doubt(self.calibration if odometry else None, *np.shape(left)[1::-1])
+                    is_narrow = left.dtype == np.uint16 and int(left.max(initial=0)) < 256
+                    doubt.add(maps.report.density, found is not None and found.motion is not None, is_narrow)
+                    yield DriveFrame(number, name, left, right, maps, found, self.calibration)
                 if failure:
                     raise failure
                 under_way = next_one
                 if under_way is None:
+                    self._tell(doubt)
                     return
         finally:
             while pipeline and pipeline.under_way:
@@ -157,7 +179,7 @@ def _bar(progress: Optional[bool]):
 
 
 def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
-        calibration: Optional[_egosgm.Calibration] = None, *, frames: str = "", motion: bool = True,
+        calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
         outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None,
         progress: Optional[bool] = None, **options: Any) -> Drive:
     """Disparity and variance for each frame of a drive:
@@ -165,7 +187,9 @@ def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Iterable[
         for frame in egosgm.run("drive/"):
             print(frame, frame.disparity, frame.depth)
 
-    source: a folder as open_folder takes it, a StereoSequence, or pairs of rectified images, which need `calibration`.
+    source: a folder as open_folder takes it, a StereoSequence, or pairs of rectified images, grey or colour (RGB).
+    calibration: a Calibration, or a file as read_calibration takes it; without any there are disparities, but no depth and
+    no odometry.
     frames: "7:10" of a folder. motion=False: no odometry, so nothing is predicted. outputs: names of maps, found in
     `frame.maps`. odometry: options of StereoOdometry. progress: a bar by tqdm; None: where somebody looks.
     All else is for Pipeline: device, preset and its options.

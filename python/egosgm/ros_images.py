@@ -4,7 +4,7 @@ import importlib
 import pathlib
 import re
 import tempfile
-from typing import Any, Dict, Optional, Tuple
+from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,8 @@ def needs(module: str) -> Any:
 def grey_of(message: Any) -> NDArray[Any]:
     """A sensor_msgs Image or CompressedImage as uint8 or uint16, H x W."""
     if hasattr(message, "format"):
-        return _decompressed(bytes(message.data), message.format)
+        grey = _decompressed(bytes(message.data), message.format)
+        return _of_bayer(grey) if _is_mosaic(message.format) else grey
     height, width, step, encoding = message.height, message.width, message.step, message.encoding
     data = np.frombuffer(message.data, np.uint8) if len(message.data) > 0 else np.empty(0, np.uint8)
     is_16_bit = encoding in _GREY16 or encoding in _BAYER[4:]
@@ -63,6 +64,13 @@ def _of_bayer(pixels: NDArray[Any]) -> NDArray[Any]:
     return ((rows[:, :-2] + 2 * rows[:, 1:-1] + rows[:, 2:] + 8) >> 4).astype(pixels.dtype)
 
 
+def _is_mosaic(kind: str) -> bool:
+    """Whether a compressed image is the mosaic of a sensor: "ENCODING; CODEC compressed ENCODING" names no colour after it."""
+    encoding, _, compression = kind.partition(";")
+    target = compression.rpartition("compressed")[2].strip()
+    return encoding.strip().startswith("bayer_") and (not target or target.startswith("bayer_"))
+
+
 def _decompressed(data: bytes, kind: str) -> NDArray[Any]:
     with tempfile.TemporaryDirectory(prefix="egosgm_") as folder:
         file = pathlib.Path(folder) / "image"
@@ -80,40 +88,87 @@ def stamp_ns(message: Any) -> int:
         stamp.nanosec if hasattr(stamp, "nanosec") else stamp.nsecs)
 
 
+def _values(info: Any, name: str) -> NDArray[np.float64]:
+    return np.array(getattr(info, name.lower(), None) if hasattr(info, name.lower()) else getattr(info, name), dtype=float)
+
+
 def _matrix(info: Any, name: str, rows: int, columns: int) -> NDArray[np.float64]:
-    values = np.array(getattr(info, name.lower(), None) if hasattr(info, name.lower()) else getattr(info, name), dtype=float)
-    return values.reshape(rows, columns)
+    """R is no rotation where nobody set it."""
+    values = _values(info, name)
+    return np.eye(3) if name == "R" and not values.any() else values.reshape(rows, columns)
+
+
+def _distortion(info: Any) -> NDArray[np.float64]:
+    """An empty D is none."""
+    values = _values(info, "D").ravel()
+    return values if values.size else np.zeros(5)
+
+
+def _region(info: Any) -> Tuple[int, int, int, int]:
+    """x, y, width, height of what the image shows of the sensor, in its pixels; all of it where the region is 0."""
+    roi = getattr(info, "roi", None)
+    if roi is None or not (roi.width and roi.height):
+        x, y = (int(roi.x_offset), int(roi.y_offset)) if roi is not None else (0, 0)
+        return x, y, int(info.width), int(info.height)
+    return int(roi.x_offset), int(roi.y_offset), int(roi.width), int(roi.height)
 
 
 def _camera(info: Any, name: str, columns: int) -> NDArray[np.float64]:
-    """K or P, of the pixels that there are: a camera's binning makes one of several."""
-    matrix = _matrix(info, name, 3, columns)
+    """K or P, of the pixels that there are: CameraInfo's are of the whole sensor, of which the image shows a region, and binning makes one pixel of
+    several."""
+    matrix = _matrix(info, name, 3, columns).copy()
+    x, y, _, _ = _region(info)
+    matrix[0] -= x * matrix[2]
+    matrix[1] -= y * matrix[2]
     matrix[:2] /= [[max(1, info.binning_x)], [max(1, info.binning_y)]]
     return matrix
 
 
 def _size(info: Any) -> Tuple[int, int]:
-    return int(info.width) // max(1, info.binning_x), int(info.height) // max(1, info.binning_y)
+    _, _, width, height = _region(info)
+    return width // max(1, info.binning_x), height // max(1, info.binning_y)
+
+
+def is_set(info: Any) -> bool:
+    """Some drivers send infos before they have a calibration."""
+    return bool(_values(info, "P").any()) or bool(_values(info, "K").any())
+
+
+def _check(info: Any, name: str) -> None:
+    for field in "KPRD":
+        values = _values(info, field)
+        if not np.isfinite(values).all():
+            raise _egosgm.InvalidArgument(f"{name}: {field} of the camera info holds a value that is not finite")
+        if field == "D" and values.size not in (0, 4, 5, 8, 12, 14):
+            raise _egosgm.InvalidArgument(f"{name}: D of the camera info has {values.size} values, not 0, 4, 5, 8, 12 or 14")
+    if not _values(info, "P")[0] > 0:
+        raise _egosgm.InvalidArgument(f"{name}: P of the camera info is zero: the cameras are not calibrated as a pair; without a calibration in the "
+                                      "bag give --calib")
+    if abs(_values(info, "P")[1]) > 1e-3 * _values(info, "P")[0]:
+        raise _egosgm.InvalidArgument(f"{name}: P of the camera info has a skew of {_values(info, 'P')[1]:g} px, which no rectified camera has")
 
 
 class Cameras:
     """Two sensor_msgs/CameraInfo: the calibration of rectified images, and how raw ones are rectified."""
 
-    def __init__(self, left: Any, right: Any, rectify: bool) -> None:
-        """Throws InvalidArgument where they are no calibration."""
+    def __init__(self, left: Any, right: Any, rectify: bool, names: Sequence[str] = ("left", "right")) -> None:
+        """Throws InvalidArgument where they are no calibration. names: where they come from, for messages."""
+        for info, name in zip((left, right), names):
+            _check(info, name)
         left_p, right_p = _camera(left, "P", 4), _camera(right, "P", 4)
-        if not left_p[0, 0] > 0 or not right_p[0, 0] > 0:
-            raise _egosgm.InvalidArgument("camera info: P is zero: the cameras are not calibrated")
         shift = (right_p[0, 3] - left_p[0, 3]) / right_p[0, 0]  # both may be told from where a third camera stands, as KITTI's are
         if not shift < 0:
-            raise _egosgm.InvalidArgument("camera info: P of the right camera has no baseline (its Tx is not below the left one's): is it of a "
-                                          "stereo pair, and are left and right not swapped?")
+            hint = "Tx is equal in both: is it of a stereo pair? Give --calib with the baseline" if shift == 0 else \
+                "its Tx is above the left one's: are left and right swapped, or has Tx, which is -fx times the baseline, the wrong sign?"
+            raise _egosgm.InvalidArgument(f"camera info: P of the right camera has no baseline: {hint}")
         if abs(left_p[0, 0] - right_p[0, 0]) > 1e-3 * left_p[0, 0] or abs(left_p[1, 2] - right_p[1, 2]) > 1e-2:
             raise _egosgm.InvalidArgument("camera info: P of both cameras have different focal lengths or rows: they are not of one rectified pair")
         self.size = _size(left)
+        self.rig: Optional[_egosgm.StereoRig] = None
         self._rectification: Optional[_egosgm.Rectification] = None
         if rectify:
-            self._rectification = _egosgm.Rectification(_rig(left, right, shift), *self.size)
+            self.rig = _rig(left, right, shift)
+            self._rectification = _egosgm.Rectification(self.rig, *self.size)
             self.calibration = self._rectification.calibration
         else:
             self.calibration = _egosgm.Calibration(left_p[0, 0], left_p[1, 1], left_p[0, 2], left_p[1, 2],
@@ -123,7 +178,7 @@ class Cameras:
     def of_calibration(cls, rig_or_calibration: "_egosgm.StereoRig | _egosgm.Calibration", width: int, height: int) -> "Cameras":
         """Without infos: of raw images by a rig, of rectified ones by their calibration."""
         cameras = cls.__new__(cls)
-        cameras.size, cameras._rectification = (width, height), None
+        cameras.size, cameras.rig, cameras._rectification = (width, height), None, None
         if isinstance(rig_or_calibration, _egosgm.StereoRig):
             cameras._rectification = _egosgm.Rectification(rig_or_calibration, width, height)
             cameras.calibration = cameras._rectification.calibration
@@ -139,20 +194,20 @@ def are_raw(info: Any, topic: str) -> bool:
     """Whether images of this camera need rectifying, by its name and its distortion."""
     if any(re.search("(^|_)rect", part) for part in topic.split("/")[-2:]):
         return False
-    distortion = np.array(getattr(info, "d", None) if hasattr(info, "d") else info.D, dtype=float)
-    return bool(np.any(distortion != 0)) or not np.allclose(_matrix(info, "R", 3, 3), np.eye(3), atol=1e-9)
+    return bool(np.any(_distortion(info) != 0)) or not np.allclose(_matrix(info, "R", 3, 3), np.eye(3), atol=1e-9)
 
 
 def _rig(left: Any, right: Any, shift: float) -> _egosgm.StereoRig:
     """From where both cameras look after rectification: a point's x differs by `shift` there."""
     names = {"fisheye": "equidistant", "radtan": "plumb_bob"}  # of Kalibr and some drivers
     models = {names.get(info.distortion_model, info.distortion_model) for info in (left, right)}
+    distortions = [_distortion(info) for info in (left, right)]
     fisheye = models == {"equidistant"}
-    if not fisheye and not models <= {"plumb_bob", "rational_polynomial", ""}:
+    has_lens = any(d.any() for d in distortions)  # without distortion, any model says the same
+    if not fisheye and has_lens and not models <= {"plumb_bob", "rational_polynomial", ""}:
         raise _egosgm.InvalidArgument(f"camera info: distortion of the model {' and '.join(sorted(models))} is not known: "
                                       "plumb_bob, rational_polynomial or equidistant is; or give rectified images")
     left_r, right_r = _matrix(left, "R", 3, 3), _matrix(right, "R", 3, 3)
-    distortions = [np.array(getattr(info, "d", None) if hasattr(info, "d") else info.D, dtype=float) for info in (left, right)]
     if fisheye:  # some drivers fill up with zeros
         distortions = [d[:4] if not np.any(d[4:]) else d for d in distortions]
     return _egosgm.StereoRig(_camera(left, "K", 3), distortions[0], _camera(right, "K", 3), distortions[1],

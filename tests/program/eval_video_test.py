@@ -144,7 +144,7 @@ class EvalOverTime(ProgramTest):
 
     def test_variance_and_confidence_are_opposite_orders(self):
         out = self.new_folder()
-        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "variance", "--quiet", "--overwrite")
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "variance", "--quiet")
         truth = self.street / "truth/left_disp_noc"
         result = self.evaluate(out, truth, "--variance", out)["video"]
         wrong_way = self.evaluate(out, truth, "--confidence", out / "variance")["video"]

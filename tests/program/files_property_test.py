@@ -34,7 +34,7 @@ class Tree:
         (user / "poses.txt").write_text(POSES * 3)
         (user / "config.toml").write_text("# Options of egosgm run: read back with --config.\ndisparities = 16\n")
         (user / "tuning.json").write_text('{"a device": {"tile_width": 32}}')
-        (user / "report.json").write_text('{"program": "egosgm", "files": [["left/000000.png", null], ["poses.txt", null]]}')
+        (user / "report.json").write_text('{"program": "egosgm"}')
         for name in ("page.html", "path.svg", "path.png", "film.avi", "film.mp4", "trace.json", ".hidden", "settings.json", "empty"):
             (user / name).write_text("" if name == "empty" else f"the user's {name}")
         (user / "poses.txt").chmod(0o600)
@@ -46,7 +46,7 @@ class Tree:
                              ("out", "../outs/run"), ("user", str(user)), ("loop", "loop")):
             (links / name).symlink_to(target)
         outs = self.root / "outs"
-        for name in ("run", "edited", "linked", "crafted"):
+        for name in ("run", "edited", "linked"):
             shutil.copytree(templates / "run", outs / name)
         (outs / "edited/poses.txt").write_text(POSES)
         (outs / "edited/disparity/000001.png").write_bytes(grey_png(32, 16))
@@ -54,28 +54,17 @@ class Tree:
         (outs / "linked/disparity").symlink_to(user / "disparity")
         (outs / "linked/variance/000000.pfm").unlink()
         (outs / "linked/variance/000000.pfm").symlink_to(user / "left/000000.png")
-        text = (outs / "crafted/report.json").read_text()
-        (outs / "crafted/report.json").write_text(text.replace('"poses.txt"', '"../../user/poses.txt"', 1))
         for name in outs.iterdir():
             (name / "notes.txt").write_text("mine")
             (name / "depth").mkdir()
             (name / "depth/000000.png").write_text("mine")
             (name / "variance/mine.pfm").write_text("mine")
         (outs / "empty").mkdir()
-        shutil.copytree(templates / "batch", outs / "batch")
-        (outs / "batch/a/notes.txt").write_text("mine")
-        (self.root / "list.txt").write_text("a seq\nb user/../drive --frames 0\n")
-        (self.root / "bad.txt").write_text("drive drive\nseq seq --poses outs/run/poses.txt\n")
-        (self.root / "names.txt").write_text("a seq\na/disparity drive\nsettings.json seq\n")
-        own = [outs / "run", outs / "batch", outs / "linked", outs / "crafted"]
-        mine = {outs / "crafted/report.json"} | {path for name in own for path in name.rglob("*") if path.is_symlink() or
-                                                  path.is_file() and path.read_bytes() == b"mine"}
-        mine |= {outs / "edited/poses.txt", outs / "edited/disparity/000001.png"}
         self.sentinels = {}
         for path in self.root.rglob("*"):
             if path.is_dir() and not path.is_symlink():
                 continue
-            if outs in path.parents and path not in mine and path.name not in ("notes.txt", "mine.pfm") and path.parent.name != "depth":
+            if outs in path.parents and path.name in ("report.json", "poses.txt"):  # of a run that goes on
                 continue
             self.keep(path)
 
@@ -149,8 +138,8 @@ class Commands:
     def folder(self, cwd):
         root = self.tree.root
         names = ["seq", "seq/image_0", "seq/truth", "seq/new", "drive", "user", "user/left", "user/right", "user/left/new", "links", "links/seq",
-                 "links/left", "links/out", "links/loop", "links/poses.txt", "outs", "outs/run", "outs/edited", "outs/linked", "outs/crafted",
-                 "outs/empty", "outs/batch", "outs/batch/a", "outs/new", "outs/run/disparity", "new/../user", "user/poses.txt", "."]
+                 "links/left", "links/out", "links/loop", "links/poses.txt", "outs", "outs/run", "outs/edited", "outs/linked",
+                 "outs/empty", "outs/new", "outs/run/disparity", "new/../user", "user/poses.txt", "."]
         if self.rng.random() < 0.02:
             return ""
         return self.spelled(root / self.rng.choice(names), cwd)
@@ -158,9 +147,9 @@ class Commands:
     def file(self, cwd, *more):
         root = self.tree.root
         names = ["seq/poses.txt", "seq/image_0/000000.png", "drive/calib.txt", "user/poses.txt", "user/left/000000.png", "user/config.toml",
-                 "user/tuning.json", "user/page.html", "user/path.svg", "user/path.png", "user/film.avi", "user/film.mp4", "user/trace.json", "user/hard_link.png",
+                 "user/tuning.json", "user/page.html", "user/path.svg", "user/path.png", "user/trace.json", "user/hard_link.png",
                  "user/empty", "links/poses.txt", "links/image.png", "links/loop", "outs/run/poses.txt", "outs/edited/poses.txt", "outs/run/report.json",
-                 "outs/run/notes.txt", "outs/run/report.html", "user", "list.txt", f"outs/new{self.rng.randrange(10**6)}"]
+                 "outs/run/notes.txt", "outs/run/report.html", "user", f"outs/new{self.rng.randrange(10**6)}"]
         path = root / self.rng.choice([*names, *more])
         return os.path.relpath(path, cwd) if self.rng.random() < 0.3 else path
 
@@ -182,18 +171,11 @@ class Commands:
 
     def run(self, cwd):
         root = self.tree.root
-        how = self.rng.choice([[], ["--overwrite"], ["--overwrite"], ["--resume"]])
+        how = self.rng.choice([[], ["--resume"]])
         return ["run", *self.sequence(cwd), "--out", self.folder(cwd), *how, *self.maybe(0.4, "--write", self.rng.choice(["variance", "color,cloud", "depth", "right"])),
                 *self.maybe(0.3, "--poses", self.file(cwd)), *self.maybe(0.3, "--frames", "0:1"), *self.maybe(0.2, "--trace", self.file(cwd)),
                 *self.maybe(0.2, "--save-config", self.file(cwd)), *self.maybe(0.2, "--config", root / "user/config.toml"),
                 *self.maybe(0.1, "--tuning", self.file(cwd)), *self.maybe(0.1, "--programs", self.folder(cwd)), *self.method(), "--quiet"]
-
-    def batch(self, cwd):
-        device = self.method()
-        device = ["--disparities", 16, *(["--devices", device[3]] if len(device) > 2 else [])]
-        return ["batch", self.tree.root / self.rng.choice(["list.txt", "bad.txt", "names.txt", "user/poses.txt"]), "--out", self.folder(cwd),
-                *self.maybe(0.5, "--overwrite"), *self.maybe(0.1, "--merge"), *self.maybe(0.2, "--write", "variance"),
-                *self.maybe(0.1, "--save-config", self.file(cwd)), *device, "--quiet"]
 
     def rectify(self, cwd):
         root = self.tree.root
@@ -219,13 +201,9 @@ class Commands:
     def compile(self, cwd):
         return ["compile", "--out", self.folder(cwd), *self.maybe(0.3, "--save-config", self.file(cwd)), "--device", "none of them"]
 
-    def view(self, cwd):
-        return ["view", *self.sequence(cwd), *self.rng.choice([["--pictures", self.folder(cwd)], ["--video", self.file(cwd, "user/film.avi", "user/film.mp4")]]),
-                *self.maybe(0.2, "--save-config", self.file(cwd)), "--device", "none of them", "--quiet"]
-
     def draw(self):
         cwd = self.tree.root / self.rng.choice([".", "seq", "user", "user/left", "outs", "links"])
-        kinds = [self.run] * 6 + [self.batch] * 3 + [self.rectify, self.synth, self.odometry, self.eval_poses, self.report, self.tune, self.compile, self.view]
+        kinds = [self.run] * 6 + [self.rectify, self.synth, self.odometry, self.eval_poses, self.report, self.tune, self.compile]
         return cwd, self.rng.choice(kinds)(cwd)
 
 
@@ -236,11 +214,9 @@ class RandomCommands(unittest.TestCase):
         cls.folder = pathlib.Path(cls.holder.name).resolve()
         cls.templates = cls.folder / "templates"
         street = cls.templates / "street"
-        (cls.folder / "list.txt").write_text(f"a {street} --frames 0\n")
         method = ("--disparities", 16, "--quiet")
         for arguments in (["synth", "--out", street, "--frames", 3, "--width", 32, "--height", 16, "--quiet"],
-                          ["run", "--odometry", street, "--out", cls.templates / "run", "--write", "variance", *method],
-                          ["batch", cls.folder / "list.txt", "--out", cls.templates / "batch", *method]):
+                          ["run", "--odometry", street, "--out", cls.templates / "run", "--write", "variance", *method]):
             done = egosgm(*arguments)
             assert done.returncode == 0, done.stderr
 
@@ -254,14 +230,14 @@ class RandomCommands(unittest.TestCase):
         tree = Tree(self.folder, self.templates, rng)
         commands = Commands(tree, rng)
         for i in range(COMMANDS):
-            if i % 150 == 149:  # a fresh one, since runs use up what may be overwritten
+            if i % 150 == 149:  # a fresh one, since runs fill the folders that are empty
                 shutil.rmtree(tree.root)
                 tree = commands.tree = Tree(self.folder, self.templates, rng)
             if rng.random() < 0.1:
                 tree.add_a_users_file()
             cwd, command = commands.draw()
             if i % 150 in (75, 76):  # one that nothing is wrong with, and then over itself
-                again = ["--overwrite"] if i % 150 == 76 else []
+                again = ["--resume"] if i % 150 == 76 else []
                 cwd, command = tree.root, ["run", "--odometry", tree.root / "seq", "--out", tree.root / "plain", "--disparities", 16, "--quiet", *again]
             history.append(f"cd {cwd.relative_to(tree.root)} && egosgm {' '.join(map(str, command))}")
             done = egosgm(*command, cwd=cwd)
@@ -271,7 +247,7 @@ class RandomCommands(unittest.TestCase):
             self.assertNotIn("please report it", errors, f"command {i}: {history[-1]}")
             self.assertEqual(tree.lost(), [], f"command {i}: {history[-1]}: {code} {errors}")
         self.assertEqual(sum(codes.values()), COMMANDS)
-        self.assertLessEqual({"run", "synth", "batch"}, {command for command, code in codes if code == 0}, codes)
+        self.assertLessEqual({"run", "synth"}, {command for command, code in codes if code == 0}, codes)
         return codes
 
 

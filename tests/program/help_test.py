@@ -1,17 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Help, completion, devices: what the program says of itself, and what the README and docs/ say of it."""
+"""Help and devices: what the program says of itself, and what the README and docs/ say of it."""
 import json
 import os
-import pty
-import select
 import shutil
 import subprocess
 import unittest
 
 from program_case import PROGRAM, SOURCE, ProgramTest, egosgm
 
-COMMANDS = ("run", "batch", "eval", "devices", "compile", "synth", "odometry", "eval-poses", "tune", "view", "report", "doctor", "rectify",
-            "completion")
+COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-poses", "tune", "report", "doctor", "rectify")
 
 
 class Help(ProgramTest):
@@ -37,66 +34,20 @@ class Help(ProgramTest):
         text = self.assert_works("run", "--help")
         for option in ("--kitti", "--scene", "--odometry", "--left", "--right", "--calib", "--frames", "--out", "--poses", "--preset",
                        "--temporal", "--paths", "--disparities", "--min-disparity", "--device", "--tuning", "--interpolate",
-                       "--write", "--trace", "--resume", "--overwrite", "--set", "--config", "--save-config", "--quiet", "p2 = 170", "gate_px = 3", "Raise it if near objects are cut off"):
+                       "--write", "--trace", "--resume", "--set", "--config", "--save-config", "--quiet", "p2 = 170", "gate_px = 3", "Raise it if near objects are cut off"):
             self.assertIn(option, text)
 
     def test_version(self):
         self.assertRegex(self.assert_works("--version"), r"^egosgm \d+\.\d+\.\d+\n$")
 
-    def test_starts_without_the_libraries_that_read_videos_and_open_windows(self):
+    def test_starts_without_the_libraries_that_read_videos(self):
         loaded = subprocess.run([PROGRAM], env={**os.environ, "LD_TRACE_LOADED_OBJECTS": "1"}, capture_output=True, text=True, check=True).stdout
         if "libegosgm_vision" not in loaded:
             self.skipTest("the program is linked with static libraries")
         self.assertNotRegex(loaded, "opencv_(highgui|imgcodecs|videoio)")
 
-    def complete(self, *words):
-        """What bash offers after these words."""
-        script = self.new_folder() / "completion.bash"
-        script.write_text(self.assert_works("completion", "bash"))
-        line = " ".join(f"'{word}'" for word in ("egosgm", *words))
-        code = f"shopt -s expand_aliases; compopt() {{ :; }}; source {script}; COMP_WORDS=({line}); COMP_CWORD={len(words)}; " \
-               '_egosgm; printf "%s\\n" "${COMPREPLY[@]}"'
-        return subprocess.run(["bash", "-euc", code], capture_output=True, text=True, check=True, cwd=self.folder).stdout.split()
-
-    def test_bash_completes_commands_options_and_values(self):
-        self.assertEqual(self.complete("ru"), ["run"])
-        self.assertIn("eval-poses", self.complete("e"))
-        self.assertEqual(self.complete("run", "--disp"), ["--disparities"])
-        self.assertEqual(self.complete("run", "--preset", "p"), ["paper"])
-        self.assertEqual(self.complete("run", "--odometry", "str"), ["street"])
-        self.assertIn("p2=", self.complete("run", "--set", "p"))
-        self.assertEqual(self.complete("run", "--write", "color,ov"), ["color,overview"])
-        self.assertEqual(self.complete("run", "--disparities", ""), [])
-        self.assertEqual(self.complete("odometry", "str"), ["street"])
-        self.assert_refused(["completion", "fish"], "bash or zsh")
-
-    @unittest.skipUnless(shutil.which("zsh"), "no zsh")
-    def test_zsh_completes_commands_options_and_values(self):
-        script = self.new_folder() / "completion.zsh"
-        script.write_text(self.assert_works("completion", "zsh"))
-        terminal, side = pty.openpty()
-        process = subprocess.Popen(["zsh", "-f", "-i"], stdin=side, stdout=side, stderr=side, cwd=self.folder, start_new_session=True,
-                                   env=dict(os.environ, TERM="dumb", PS1="", HOME=str(self.folder)))
-        os.close(side)
-
-        def wait_for(text):
-            seen = b""
-            while text not in seen:
-                self.assertTrue(select.select([terminal], [], [], 60)[0], f"zsh shows no {text}: {seen}")
-                seen += os.read(terminal, 4096).replace(b"\a", b"")  # it may complete only a part, and beep
-
-        try:
-            os.write(terminal, f"unsetopt zle_bracketed_paste; autoload -U compinit; compinit -u -D; source {script}; echo rea''dy\n".encode())
-            wait_for(b"ready")
-            for typed, completed in (("view --vid", "--video"), ("run --odometry st", "street/"), ("run --preset pap", "paper"),
-                                     ("run --set max_sp", "max_speckle_px="), ("run --write ove", "overview"), ("devi", "devices")):
-                os.write(terminal, f"egosgm {typed}\t".encode())
-                wait_for(completed.encode())
-                os.write(terminal, b"\x15")  # clears the line
-        finally:
-            process.kill()
-            process.wait()
-            os.close(terminal)
+    def test_what_the_python_package_has_is_named(self):
+        self.assert_refused(["view", self.street], "the Python package", "[rerun]", "--write overview")
 
     def test_devices_names_the_default_and_why(self):
         text = self.assert_works("devices")

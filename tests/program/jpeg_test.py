@@ -61,11 +61,6 @@ class Jpeg(ProgramTest):
         self.assertAlmostEqual(one, other, delta=0.1 * one)
         self.assertNotEqual(one, other)
 
-    def test_view_draws_them(self):
-        pictures = self.new_folder() / "pictures"
-        self.assert_works("view", self.jpegs, "--pictures", pictures, "--cell-width", 100, "--quiet")
-        self.assertEqual([file.name for file in sorted(pictures.iterdir())], [f"{i:06}.png" for i in range(FRAMES)])
-
     def test_doctor_finds_nothing_wrong(self):
         findings = {finding["check"]: finding for finding in json.loads(self.assert_works("doctor", self.jpegs, "--json"))}
         self.assertTrue(findings["images"]["text"].startswith(f"{FRAMES} pairs of "), findings)
@@ -76,8 +71,7 @@ class Jpeg(ProgramTest):
         shutil.copytree(self.jpegs, broken)
         file = broken / "image_1/000001.jpg"
         file.write_bytes(file.read_bytes()[:-200])
-        for command in (["run", broken, "--out", broken.parent / "out"], ["view", broken, "--pictures", broken.parent / "pictures"]):
-            self.assert_refused(command, file)
+        self.assert_refused(["run", broken, "--out", broken.parent / "out"], file)
 
 
 if __name__ == "__main__":

@@ -5,12 +5,31 @@ import math
 import os
 import re
 import shutil
+import struct
 import unittest
 
 import numpy
 
 from input_case import InputTest, read_grey, rotation, sampled, write_grey
 from program_case import FRAMES, HEIGHT, WIDTH
+
+
+def write_avi(file, images):
+    """A video of raw frames."""
+    height, width = images[0].shape
+    pad = -3 * width % 4
+    size = height * (3 * width + pad)
+
+    def chunk(name, data):
+        return name + struct.pack("<I", len(data)) + data + b"\0" * (len(data) % 2)
+
+    main = struct.pack("<14I", 100000, 10 * size, 0, 0, len(images), 0, 1, size, width, height, 0, 0, 0, 0)
+    stream = struct.pack("<4s4sIHHIIIIIIIIHHHH", b"vids", b"DIB ", 0, 0, 0, 0, 1, 10, 0, len(images), size, 0, 0, 0, 0, width, height)
+    frame = struct.pack("<IiiHHIIiiII", 40, width, height, 1, 24, 0, size, 0, 0, 0, 0)
+    head = chunk(b"LIST", b"hdrl" + chunk(b"avih", main) + chunk(b"LIST", b"strl" + chunk(b"strh", stream) + chunk(b"strf", frame)))
+    rows = [numpy.pad(numpy.repeat(image[::-1, :, None], 3, 2).reshape(height, -1), ((0, 0), (0, pad))) for image in images]
+    movie = chunk(b"LIST", b"movi" + b"".join(chunk(b"00db", row.tobytes()) for row in rows))
+    file.write_bytes(chunk(b"RIFF", b"AVI " + head + movie))
 
 
 class RectifyTest(InputTest):
@@ -160,9 +179,9 @@ class Rectify(RectifyTest):
     def test_a_video_that_ends_before_the_other_one_is_told_of(self):
         folder = self.new_folder()
         whole, cut = folder / "whole.avi", folder / "cut.avi"
-        self.assert_works("view", self.street, "--video", whole, "--cell-width", 100, "--quiet")
+        write_avi(whole, [read_grey(file) for file in sorted((self.street / "image_0").iterdir())])
         content = whole.read_bytes()
-        cut.write_bytes(content[:content.index(b"00dc", len(content) // 2)])  # its header still counts all frames
+        cut.write_bytes(content[:content.index(b"00db", len(content) // 2)])  # its header still counts all frames
         for left, right, ended, longer in ((whole, cut, f"--right {cut}", f"--left {whole}"), (cut, whole, f"--left {cut}", f"--right {whole}")):
             out = self.new_folder() / "out"
             text = self.assert_works("rectify", "--left", left, "--right", right, "--calib", self.street / "calib.txt", "--out", out)
@@ -229,6 +248,23 @@ class Rectify(RectifyTest):
         text = self.assert_works("rectify", "--euroc", self.euroc(drop=[(1, 0)]), "--out", out.parent / "fewer")
         self.assertIn("1 image without the other one", text)
         self.assertEqual(len(list((out.parent / "fewer/image_0").iterdir())), 1)
+
+    def test_euroc_folders_as_others_write_them(self):
+        """The right camera is 12 us late, the header has no mark, and the model has Kalibr's name."""
+        for late_ns in (12_000, 20_000_000):
+            folder = self.euroc()
+            table = folder / "cam1/data.csv"
+            rows = [row.split(",") for row in table.read_text().splitlines()[1:]]
+            table.write_text("timestamp [ns],filename\n" + "".join(f"{int(time) + late_ns},{name}\n" for time, name in rows))
+            for side in (0, 1):
+                sensor = folder / f"cam{side}/sensor.yaml"
+                sensor.write_text(sensor.read_text().replace("radial-tangential", "radtan"))
+            out = self.new_folder() / "out"
+            if late_ns > 2_000_000:
+                self.assert_refused(["rectify", "--euroc", folder, "--out", out], "the nearest are 20.000 ms apart")
+                continue
+            self.assertIn("stamps of a pair differ by up to 0.012 ms", self.assert_works("rectify", "--euroc", folder, "--out", out))
+            self.assertEqual(len(list((out / "image_0").iterdir())), 2)
 
     def test_what_cannot_be_rectified_is_refused(self):
         file, out = self.new_folder() / "stereo.yml", self.folder / "never"

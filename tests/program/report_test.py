@@ -68,6 +68,7 @@ class Report(ReportTest):
         out = self.new_folder() / "out"
         shutil.copytree(self.out, out)
         report = out / "report.json"
+        (out / "report.html").unlink()
         text = report.read_text().rstrip().removesuffix("}")
         resume = ["run", "--odometry", self.street, "--out", out, "--resume", "--quiet", "--set", "p2=150", "--disparities", 64]
         for extra, named in (('"x": ' + "[" * 200_000 + "]" * 200_000, "nested deeper than 64"),
@@ -102,7 +103,7 @@ class Report(ReportTest):
             self.assertAlmostEqual(mine, own, delta=0.05)
         self.assert_refused(["report", self.out, "--frames", f"{FRAMES}:"], f"--frames {FRAMES}:", f"from 0 to {FRAMES - 1}")
         self.assert_refused(["report", self.out, "--frames", "some"], "FIRST:LAST")
-        self.assert_refused(["report", self.out, "--frames", "1:2", "--pictures", "3"], "--pictures", "from 1 to 2")
+        self.assert_refused(["report", self.out, "--frames", "1:2", "--pictures", "3", "--out", self.folder / "never.html"], "--pictures", "from 1 to 2")
 
     def test_pictures_of_all_layers(self):
         data = self.data(self.page)
@@ -150,16 +151,17 @@ class Report(ReportTest):
         for truth in (kitti, kitti / "disp_noc", kitti / "disp_noc/000007_10.png"):
             own = json.loads(self.assert_works("eval", "--estimate", out, "--truth", truth, "--json"))
             self.assertEqual([pair["truth"] for pair in own["pairs"]], [str(kitti / "disp_noc/000007_10.png")])
-            self.assert_works("report", out, "--truth", truth)
-            data = self.data(out / "report.html")
+            page = self.new_folder() / "page.html"
+            self.assert_works("report", out, "--truth", truth, "--out", page)
+            data = self.data(page)
             self.assertEqual(list(data["metrics"]), ["10"])
             self.assertAlmostEqual(data["metrics"]["10"]["bad_or_missing"], own["pooled"]["bad_or_missing"])
             self.assertEqual(len([note for note in data["notes"] if note.startswith("Compared with")]), 1)
         (kitti / "disp_noc/000007_10.png").unlink()
         for command in (["eval", "--estimate", out], ["report", out]):
             self.assert_refused([*command, "--truth", kitti], "000010.png is of the image 000007_10")
-        self.assert_works("report", self.out, "--truth", self.street)
-        self.assertEqual(len(self.data(self.out / "report.html")["metrics"]), FRAMES)
+        self.assert_works("report", self.out, "--truth", self.street, "--out", page.parent / "whole.html")
+        self.assertEqual(len(self.data(page.parent / "whole.html")["metrics"]), FRAMES)
 
     def test_a_run_of_which_little_is_left(self):
         copy = self.new_folder() / "copy"
@@ -172,6 +174,7 @@ class Report(ReportTest):
             frame["left"] = "/nonexistent/left.png"
         (copy / "report.json").write_text(json.dumps(report))
         (copy / "poses.txt").unlink()
+        (copy / "report.html").unlink()
         self.assert_works("report", copy)
         data = self.data(copy / "report.html")
         self.assertEqual(data["run"]["input"], report["input"])
@@ -183,9 +186,9 @@ class Report(ReportTest):
         shutil.copytree(self.out, copy)
         report = self.report(copy)
         self.assert_refused(["report", self.street], "report.json", "egosgm run")
-        self.assert_refused(["report", self.out, "--pictures", "0,17"], '"17"', "from 0 to 3")
+        self.assert_refused(["report", self.out, "--pictures", "0,17", "--out", self.folder / "never.html"], '"17"', "from 0 to 3")
         self.assert_refused(["report", self.out, "--picture-width", 1], "--picture-width 1")
-        self.assert_refused(["report", self.out, "--truth", self.street / "image_0/calib"], "image_0/calib")
+        self.assert_refused(["report", self.out, "--truth", self.street / "image_0/calib", "--out", self.folder / "never.html"], "image_0/calib")
         for text in ("[]", "{", json.dumps({**report, "frames": []}), json.dumps({**report, "frames": [7]}), json.dumps({**report, "options": 3})):
             (copy / "report.json").write_text(text)
             self.assert_refused(["report", copy], copy / "report.json")
@@ -193,14 +196,9 @@ class Report(ReportTest):
             (copy / "report.json").write_text(text)
             self.assert_refused(["report", copy], copy / "report.json", "is no JSON")
         (copy / "report.json").write_text(json.dumps(report))
+        (copy / "report.html").unlink()
         (copy / "disparity/000003.png").unlink()
         self.assert_refused(["report", copy], "disparity/000003.png")
-
-    def test_replacing_a_run_removes_its_page(self):
-        copy = self.new_folder() / "copy"
-        shutil.copytree(self.out, copy)
-        self.assert_works("run", "--odometry", self.street, "--frames", "0", "--out", copy, "--overwrite", "--quiet", "--disparities", 64)
-        self.assertFalse((copy / "report.html").exists())
 
 
 class Browser:

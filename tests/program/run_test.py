@@ -102,15 +102,6 @@ class Run(ProgramTest):
         rows[1][4] = str(1000 * float(rows[1][4]))
         (wide / "calib.txt").write_text("\n".join(" ".join(row) for row in rows) + "\n")
         self.assert_doubted(["--odometry", wide], "baseline of", "millimetres")
-        pictures = self.new_folder()
-        self.assertIn("egosgm doctor", self.assert_works("view", "--odometry", swapped, "--pictures", pictures).splitlines()[-1])
-        folder = self.new_folder()
-        (folder / "list").write_text(f"good {self.street}\nswapped --odometry \"{swapped}\"\n")
-        lines = self.assert_works("batch", folder / "list", "--out", folder / "out").splitlines()
-        self.assertEqual([line.split()[1] for line in lines if "egosgm doctor" in line], ["swapped:"])
-        good, bad = json.loads((folder / "out/batch.json").read_text())["sequences"]
-        self.assertNotIn("doubt", good)
-        self.assertIn("no motion", bad["doubt"])
 
     def test_interpolate_fills_a_folder_of_its_own(self):
         out = self.new_folder()
@@ -170,8 +161,6 @@ class Run(ProgramTest):
         environment = dict(os.environ, XDG_CONFIG_HOME=str(folder), POCL_MAX_PTHREAD_COUNT="5", POCL_CPU_MAX_CU_COUNT="5")
         self.assert_works("tune", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "SpeckleRemoval", env=environment)
         stored = json.loads(file.read_text())
-        self.assertEqual(list(stored)[1:], ["digest"])
-        del stored["digest"]
         key, sizes = stored.popitem()
         self.assertIn("driver", key)
         self.assertIn("tile_width", sizes)
@@ -384,7 +373,8 @@ class Limits(ProgramTest):
         report = self.report(out)
         self.assertGreater(report["frames"][0]["stripes"], 1)
         self.assertLess(report["device_memory_bytes"], 1 << 30)
-        self.assert_refused([*run, "--overwrite", "--disparities", 64, "--set", "max_memory_mib=3"],
+        run[run.index("--out") + 1] = self.new_folder()
+        self.assert_refused([*run, "--disparities", 64, "--set", "max_memory_mib=3"],
                             "BandedSgm: a stripe of 96 rows needs", "max_memory_mib allows 3 MiB", "fewer disparities", code=1)
 
     def test_stripes_are_almost_as_good(self):

@@ -41,17 +41,6 @@ class StandardError(ProgramTest):
                 for name in ("disparity/000000.png", "disparity/000001.png", "poses.txt"):
                     self.assertEqual((out / name).read_bytes(), (expected / name).read_bytes())
 
-    def test_a_batch_that_fails_says_so_by_its_code(self):
-        folder, broken = self.new_folder(), self.broken_street()
-        os.truncate(broken / "image_1/000001.png", 1000)
-        (folder / "list").write_text(f"good {self.street} --frames 0\nbad {broken}\n")
-        for i, redirection in enumerate(self.REDIRECTIONS):
-            for more in (["--quiet"], ["--shard", "0/1"], ["--merge"]):
-                arguments = ["batch", folder / "list", "--out", folder / f"out{i}", "--disparities", 16, *more]
-                self.assertEqual(self.code_of(arguments, redirection), 1, redirection)
-            batch = json.loads((folder / f"out{i}/batch.json").read_text())
-            self.assertEqual((batch["sequences_done"], batch["sequences_failed"]), (1, 1))
-
     def test_an_interrupt_is_told_by_the_code(self):
         street = self.street
         for arguments in (["run", "--odometry", street, "--disparities", 16, "--out"], ["odometry", street, "--out"],

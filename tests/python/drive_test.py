@@ -116,7 +116,7 @@ def test_without_motion_every_frame_is_searched_whole(street_folder):
 
 
 def test_what_is_wrong_is_said_before_a_frame_is_read(street_folder):
-    for call, named in ((lambda: egosgm.run(street_folder, p22=1), "did you mean p2"), (lambda: egosgm.run([]), "calibration: pairs"),
+    for call, named in ((lambda: egosgm.run(street_folder, p22=1), "did you mean p2"), (lambda: egosgm.run([], 3), "calibration: is a int"),
                         (lambda: egosgm.run([], egosgm.run(street_folder, motion=False).calibration, frames="1:2"), "frames='1:2'"),
                         (lambda: egosgm.run(street_folder, odometry=dict(min_inlier=1)), "min_inliers"),
                         (lambda: next(iter(egosgm.run(street_folder, outputs="disparty", motion=False, **OPTIONS))), 'output "disparty"')):
@@ -240,3 +240,43 @@ def test_the_page_for_those_who_come_from_elsewhere_names_options_that_exist():
     assert all(f"`{name}`" in page or f"`{name} = " in page for name in names)
     for cost in re.findall(r"`((?:census|sad)\d+x\d+)`", page):
         egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 16, 0.1), 64, 32, disparities=16, cost=cost)
+
+
+def test_without_a_calibration_there_are_disparities_alone(street, frames):
+    pairs = [(frame.left, frame.right) for frame in frames[:2]]
+    drive = egosgm.run(pairs, **OPTIONS)
+    assert drive.calibration is None
+    expected = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, temporal=False, **OPTIONS).process(*pairs[0], None, "disparity").disparity
+    found = list(drive)
+    np.testing.assert_array_equal(found[0].disparity, expected)
+    assert all(frame.motion is None for frame in found)
+    with pytest.raises(egosgm.InvalidArgument, match="depth: a disparity is none without a calibration"):
+        found[0].depth
+
+
+def test_colour_is_taken_where_grey_is(street, frames):
+    random = np.random.default_rng(3)
+    colour = random.integers(0, 256, (HEIGHT, WIDTH, 3)).astype(np.uint8)
+    r, g, b = (colour[:, :, i].astype(np.uint32) for i in range(3))
+    grey = ((9798 * r + 19235 * g + 3735 * b + (1 << 14)) >> 15).astype(np.uint8)
+    pipeline = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, **OPTIONS)
+    expected = pipeline.process(grey, grey, None, "disparity").disparity
+    for shown in (colour, np.dstack([colour, grey]), np.asfortranarray(colour)):
+        pipeline.reset()
+        np.testing.assert_array_equal(pipeline.process(shown, shown, None, "disparity").disparity, expected)
+    grey_motion, colour_motion = egosgm.StereoOdometry(street.calibration), egosgm.StereoOdometry(street.calibration)
+    for frame in frames[:2]:
+        of_grey = grey_motion.process(frame.left, frame.right)
+        of_colour = colour_motion.process(*(np.dstack([image] * 3) for image in (frame.left, frame.right)))
+    np.testing.assert_array_equal(of_colour.motion.current_from_previous, of_grey.motion.current_from_previous)
+    with pytest.raises(egosgm.InvalidArgument, match="left is .*: give a grey image"):
+        pipeline.process(np.zeros((3, HEIGHT, WIDTH), np.uint8), frames[0].right)
+
+
+def test_a_doubtful_drive_is_told(street, frames):
+    swapped = [(frame.right, frame.left) for frame in frames]
+    with pytest.warns(UserWarning, match="density|no motion"):
+        list(egosgm.run(swapped, street.calibration, **OPTIONS))
+    far = egosgm.Calibration(street.calibration.fx, street.calibration.fy, 5, street.calibration.cy, 54)
+    with pytest.warns(UserWarning, match="a baseline of 54 m"):
+        list(egosgm.run([(frames[0].left, frames[0].right)], far, **OPTIONS))

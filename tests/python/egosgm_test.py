@@ -126,7 +126,7 @@ def test_wrong_options_are_refused_by_name(street, options, named):
 
 
 @pytest.mark.parametrize("image, named", [
-    (np.zeros((HEIGHT, WIDTH, 3), np.uint8), "left is"), (np.zeros((HEIGHT, WIDTH), np.float32), "uint8 or uint16"),
+    (np.zeros((HEIGHT, WIDTH, 2), np.uint8), "left is"), (np.zeros((HEIGHT, WIDTH), np.float32), "uint8 or uint16"),
     (np.zeros((HEIGHT, WIDTH + 1), np.uint8), str(WIDTH + 1)), (np.zeros((HEIGHT, WIDTH), np.uint16), "type"), (None, "no array"),
     (np.zeros((0, 0), np.uint8), "")])
 def test_wrong_images_are_refused_and_change_nothing(pipeline, street, frames, image, named):

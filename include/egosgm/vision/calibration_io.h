@@ -4,12 +4,19 @@
 #include <filesystem>
 
 #include "egosgm/calibration.h"
+#include "egosgm/error.h"
 #include "egosgm/export.h"
 
 namespace egosgm::vision {
 
 /// Which of KITTI's two stereo pairs: cameras 0 and 1 are grey, 2 and 3 are colour.
 enum class KittiCameras { kAny, kGrey, kColor };
+
+/// The right camera stands left of the left one.
+class EGOSGM_EXPORT NegativeBaseline : public InvalidArgument {
+ public:
+  using InvalidArgument::InvalidArgument;
+};
 
 /// Reads a rectified pair's calibration. The file's keys tell which of the formats it is:
 ///  - KITTI odometry, KITTI 2012:      `P0: <12 numbers>`, `P1: ...` (and P2, P3), 3x4 projection matrices, row-major;
@@ -21,7 +28,7 @@ enum class KittiCameras { kAny, kGrey, kColor };
 /// With P matrices, baseline_m = (P_left[0][3] - P_right[0][3]) / f and doffs_px = cx_right - cx_left. `cameras`
 /// matters only for KITTI's; kAny takes the grey pair where the file has it, else the colour pair. Throws
 /// InvalidArgument with file, row and remedy: too few numbers, not a number, NaN, zero focal length, zero or negative
-/// baseline, no such cameras, unknown key. Thread-safe.
+/// baseline (NegativeBaseline), no such cameras, unknown key, a format that is known and not read here. Thread-safe.
 EGOSGM_EXPORT Calibration read_calibration(const std::filesystem::path& file,
                                            KittiCameras cameras = KittiCameras::kAny);
 

@@ -15,8 +15,8 @@ namespace egosgm::vision {
 
 /// One stereo pair on disk, and its true disparity where the data set has one (else the paths are empty).
 struct StereoFrame {
-  int number = 0;                              // the frame's own number: 10 for 000151_10.png
-  std::string name;                            // the number with six digits: outputs are named NAME.png
+  int number = 0;    // the frame's own number: 10 for 000151_10.png
+  std::string name;  // outputs are named NAME.png: the number with six digits, or a time of more digits than fit there
   std::filesystem::path left, right;           // PNG or JPEG
   std::filesystem::path truth_noc, truth_occ;  // left disparity: non-occluded pixels, all pixels
 };
@@ -26,8 +26,9 @@ struct StereoFrame {
 struct StereoSequence {
   std::string title;  // "KITTI 2012 scene 000151"
   std::vector<StereoFrame> frames;
-  std::vector<int> numbers;  // of all frames that are there, chosen or not, ascending
-  std::string note;          // what is unusual about the frames, for the user; empty where nothing is
+  std::vector<int> numbers;     // of all frames that are there, chosen or not, ascending
+  std::string note;             // what is unusual about the frames, for the user; empty where nothing is
+  bool has_calibration = true;  // else `calibration` stands in for one: there is no depth, and no odometry
   Calibration calibration;
   std::filesystem::path calibration_file;
   std::filesystem::path poses_file;  // the true poses, empty where there are none
@@ -72,7 +73,7 @@ EGOSGM_EXPORT StereoSequence open_middlebury(const std::filesystem::path& folder
 /// PairBy::kOrder, the first ones, the second ones, and so on. The (left) text is the frame's number if all of them are
 /// different numbers, else frames are counted from 0 in the order of names, numbers in them by their value. Without
 /// `%d` or `*` it names one pair, number 0. A left folder called image_2 or image_02 takes the colour cameras of
-/// KITTI's calibration, any other the grey ones.
+/// KITTI's calibration, any other the grey ones. An empty `calibration_file` is none.
 EGOSGM_EXPORT StereoSequence open_patterns(const std::string& left, const std::string& right,
                                            const std::filesystem::path& calibration_file, FrameRange range = {},
                                            PairBy pair_by = PairBy::kName);

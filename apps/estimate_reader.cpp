@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/estimate_reader.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "egosgm/error.h"
+#include "egosgm/vision/disparity_io.h"
+#include "host/vision/file_io.h"
+
+namespace egosgm::app {
+namespace {
+
+constexpr double kKittiScale = 256;
+constexpr double kLeastSigned = 65520;  // -16 in 16 bits
+
+bool is_png(const std::filesystem::path& file) { return vision::read_file_start(file, 4) == "\x89PNG"; }
+
+/// Whether it is a .npy of whole numbers.
+bool is_whole_npy(const std::filesystem::path& file) {
+  const std::string start = vision::read_file_start(file, 128);
+  const std::size_t at = start.find("'descr'"), type = at == std::string::npos ? at : start.find('\'', at + 7);
+  return start.starts_with("\x93NUMPY") && type != std::string::npos && type + 2 < start.size() &&
+         (start[type + 2] == 'i' || start[type + 2] == 'u');
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+cv::Mat read_scaled(const std::filesystem::path& file, double scale) {
+  cv::Mat map = vision::read_disparity(file, scale);
+  if (scale == kKittiScale || !is_whole_npy(file)) return map;
+  map.forEach<float>([&](float& d, const int*) {
+    if (vision::is_valid_disparity(d)) d = static_cast<float>(d / scale);
+  });
+  return map;
+}
+
+cv::Mat EstimateReader::read(const std::filesystem::path& file, double scale) {
+  cv::Mat map = read_scaled(file, scale);
+  const bool png = is_png(file);
+  std::optional<float> marker;
+  bool is_marker = true;
+  std::int64_t values = 0, impossible = 0, markers = 0;
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      const float d = map.at<float>(y, x);
+      if (!vision::is_valid_disparity(d) || d >= 0) continue;
+      is_marker = is_marker && d == marker.value_or(d);
+      marker = d;
+    }
+  }
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      float& d = map.at<float>(y, x);
+      if (!vision::is_valid_disparity(d)) continue;
+      ++values;
+      const bool beyond = d >= static_cast<float>(map.cols) || (png && d * scale >= kLeastSigned);
+      impossible += beyond;
+      markers += d < 0 && is_marker;
+      if (beyond || d == 0 || (d < 0 && is_marker)) d = kInvalidDisparity;
+    }
+  }
+  const std::scoped_lock lock(mutex_);
+  values_ += values;
+  impossible_ += impossible;
+  markers_ += markers;
+  if (markers > 0) marker_ = *marker;
+  if (impossible > 0 && first_impossible_.empty()) first_impossible_ = file.string();
+  return map;
+}
+
+void EstimateReader::compare(const cv::Mat& estimate, const cv::Mat& truth) {
+  if (estimate.size() != truth.size()) return;
+  std::vector<double> ratios;
+  for (int y = 0; y < estimate.rows; ++y) {
+    for (int x = 0; x < estimate.cols; ++x) {
+      const float e = estimate.at<float>(y, x), t = truth.at<float>(y, x);
+      if (vision::is_valid_disparity(e) && e > 0 && vision::is_valid_disparity(t) && t > 1) ratios.push_back(e / t);
+    }
+  }
+  if (ratios.empty()) return;
+  const double ratio = median(std::move(ratios));
+  const std::scoped_lock lock(mutex_);
+  ratios_.push_back(ratio);
+}
+
+std::vector<std::string> EstimateReader::doubts(double scale) const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<std::string> doubts;
+  if (impossible_ > 0) {
+    doubts.push_back(fmt::format(
+        "{} of {} values of estimates are no disparities, as they reach beyond the image's width or are negative ones "
+        "written without a sign: they count as missing; the first are in {}",
+        impossible_, values_, first_impossible_));
+  }
+  if (markers_ > 0) {
+    doubts.push_back(fmt::format("{} values of estimates are {}, below 0: they count as missing", markers_, marker_));
+  }
+  const double ratio = ratios_.empty() ? 1 : median(ratios_);
+  for (const double factor :
+       {2.0, 4.0, 8.0, 16.0, 64.0, 256.0, 1.0 / 2, 1.0 / 4, 1.0 / 8, 1.0 / 16, 1.0 / 64, 1.0 / 256}) {
+    if (std::abs(ratio / factor - 1) > 0.08) continue;
+    doubts.push_back(fmt::format(
+        "estimates are {:.4g} times their truth in the median: is it another scale? A PNG of {:g} steps a pixel "
+        "needs --scale {:g}; maps of images of another width, and other formats, need their values changed",
+        ratio, scale * factor, scale * factor));
+    break;
+  }
+  return doubts;
+}
+
+void expect_scaled(const std::string& option, double scale, const std::filesystem::path& file) {
+  if (scale == kKittiScale || file.empty() || is_png(file) || is_whole_npy(file)) return;
+  throw InvalidArgument(
+      fmt::format("{} {:g}: is for 16-bit PNG and .npy of whole numbers, and {} is neither: divide its values, or "
+                  "leave the option out",
+                  option, scale, file.string()));
+}
+
+}  // namespace egosgm::app

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+namespace egosgm::app {
+
+/// A disparity map; `scale`: steps a pixel of a PNG, and, where it is not KITTI's, of a .npy of whole numbers. Throws
+/// as read_disparity does.
+cv::Mat read_scaled(const std::filesystem::path& file, double scale);
+
+/// Reads disparity maps of other programs, with one rule of what has no value in all formats, and remembers what speaks
+/// against them. No value: 0, infinite, NaN; a negative value that is the same at all pixels that have one, as -1 is,
+/// and every one of .npy; in a PNG 65520 and more, which is -1 to -16 as unsigned; and what is no smaller than the
+/// map's width, which no two images can show. Thread-safe.
+class EstimateReader {
+ public:
+  /// As read_scaled.
+  cv::Mat read(const std::filesystem::path& file, double scale);
+
+  /// Looks at an estimate beside its truth.
+  void compare(const cv::Mat& estimate, const cv::Mat& truth);
+
+  /// A sentence for each thing that was seen. `scale`: as it was given.
+  std::vector<std::string> doubts(double scale) const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::int64_t impossible_ = 0, values_ = 0, markers_ = 0;
+  float marker_ = 0;
+  std::string first_impossible_;
+  std::vector<double> ratios_;  // of an estimate to its truth, in the median of each map
+};
+
+/// Throws InvalidArgument where `option` names another scale than KITTI's, and `file` has none.
+void expect_scaled(const std::string& option, double scale, const std::filesystem::path& file);
+
+}  // namespace egosgm::app

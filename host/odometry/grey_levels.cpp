@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/odometry/grey_levels.h"
+
+#include <vector>
+
+namespace egosgm::odometry {
+namespace {
+
+constexpr std::int64_t kOutliers = 2000;  // one in so many pixels may lie below, and one above
+constexpr int kFewLevels = 64;            // a range that fills no more of the 255 is stretched
+
+}  // namespace
+
+GreyLevels levels_of(const ImageView& left, const ImageView& right) {
+  std::vector<std::int64_t> counts(65536);
+  std::int64_t pixels = 0;
+  for (const ImageView* image : {&left, &right}) {
+    pixels += static_cast<std::int64_t>(image->width) * image->height;
+    for (int y = 0; y < image->height; ++y) {
+      const auto* row =
+          reinterpret_cast<const std::uint16_t*>(static_cast<const char*>(image->data) + y * image->stride_bytes);
+      for (int x = 0; x < image->width; ++x) ++counts[row[x]];
+    }
+  }
+  int low = 0, high = 65535;
+  for (std::int64_t below = counts[0]; below <= pixels / kOutliers && low < high; below += counts[++low]) {
+  }
+  for (std::int64_t above = counts[65535]; above <= pixels / kOutliers && high > low; above += counts[--high]) {
+  }
+  const auto shift_of = [](int largest) {
+    int shift = 0;
+    while ((largest >> shift) > 255) ++shift;
+    return shift;
+  };
+  GreyLevels levels{.shift = shift_of(high)};
+  if ((high - low) >> levels.shift >= kFewLevels || high == low) return levels;
+  levels.pedestal = low;
+  levels.shift = shift_of(high - low);
+  levels.gain = std::max(1, 255 / (high - low));
+  return levels;
+}
+
+}  // namespace egosgm::odometry

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "egosgm/export.h"
+#include "egosgm/image.h"
+
+namespace egosgm::odometry {
+
+/// How values of 16 bits become 8: what nearly all pixels hold fills the 8 bits. A pedestal below and a few hot pixels
+/// above do not count; where neither is there, values are shifted alone.
+struct GreyLevels {
+  int pedestal = 0, gain = 1, shift = 0;
+
+  std::uint8_t operator()(int value) const {
+    return static_cast<std::uint8_t>(std::min(255, (std::max(0, value - pedestal) * gain) >> shift));
+  }
+};
+
+/// Of both images of a pair, so that they stay comparable. REQUIRES: both are kU16.
+EGOSGM_EXPORT GreyLevels levels_of(const ImageView& left, const ImageView& right);
+
+}  // namespace egosgm::odometry

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/vision/doubt.h"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace egosgm::vision {
+namespace {
+
+constexpr double kMinBaseline_m = 0.004, kMaxBaseline_m = 3.0;
+constexpr double kUsualBaseline_m[] = {0.02, 1.5};
+constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
+constexpr double kMinDensity = 0.5;
+
+template <typename... Values>
+std::string formatted(const char* format, Values... values) {
+  char text[200];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+void append(std::string& text, const std::string& part) { text += (text.empty() ? "" : ", ") + part; }
+
+bool is_usual(double baseline_m) { return baseline_m >= kUsualBaseline_m[0] && baseline_m <= kUsualBaseline_m[1]; }
+
+}  // namespace
+
+std::optional<Suspicion> suspect_baseline(double baseline_m, double fx) {
+  const std::string what = formatted("a baseline of %.4g m", baseline_m);
+  if (baseline_m > kMaxBaseline_m) {
+    std::string units;
+    for (const auto& [unit, unit_m] : {std::pair{"centimetres", 0.01}, {"millimetres", 0.001}}) {
+      if (!is_usual(baseline_m * unit_m)) continue;
+      units += formatted("%s%s (%.4g m)", units.empty() ? "" : " or ", unit, baseline_m * unit_m);
+    }
+    return Suspicion{what, "a baseline is in metres: is this one in " +
+                               (units.empty() ? std::string("a chessboard's squares or other units") : units) + "?"};
+  }
+  if (baseline_m < kMinBaseline_m) {
+    const std::string missing = is_usual(baseline_m * fx)
+                                    ? formatted(
+                                          " A camera info's Tx is -fx times the baseline: is fx missing, so that "
+                                          "it is %.4g m?",
+                                          baseline_m * fx)
+                                    : "";
+    return Suspicion{what, "no two cameras stand so close: give the distance of these in metres." + missing};
+  }
+  return std::nullopt;
+}
+
+std::optional<Suspicion> suspect_calibration(const Calibration& c, cv::Size size) {
+  if (auto baseline = suspect_baseline(c.baseline_m, c.fx)) return baseline;
+  if (size.empty()) return std::nullopt;
+  const std::string remedy =
+      "give the calibration of images of this size: scale fx, fy, cx, cy as the images were scaled, and subtract what "
+      "was cropped from cx, cy";
+  const std::string of_size = formatted("%dx%d", size.width, size.height);
+  const bool centred =
+      c.cx > 0.25 * size.width && c.cx < 0.75 * size.width && c.cy > 0.2 * size.height && c.cy < 0.8 * size.height;
+  if (!centred) {
+    return Suspicion{
+        "the principal point is far from the middle of " + of_size + formatted(" (cx %.1f, cy %.1f)", c.cx, c.cy),
+        remedy};
+  }
+  const double least = std::min(c.fx, c.fy), largest = std::max(c.fx, c.fy);
+  if (least < kMinFocal * size.width || largest > kMaxFocal * size.width || largest > 2 * least) {
+    return Suspicion{formatted("focal lengths of %.4g and %.4g px in images of ", c.fx, c.fy) + of_size, remedy};
+  }
+  return std::nullopt;
+}
+
+void Doubt::add(double density, bool has_motion, bool holds_8_bits_in_16) {
+  density_ += density;
+  if (holds_8_bits_in_16) ++narrow_;
+  if (frames_++ > 0 && calibration_ && !has_motion) ++without_motion_;
+}
+
+std::string Doubt::text() const {
+  std::string text;
+  if (frames_ == 0) return text;
+  const double density = density_ / static_cast<double>(frames_);
+  if (density < kMinDensity) append(text, formatted("density %.0f %% in the mean", 100 * density));
+  if (2 * without_motion_ > frames_ - 1)
+    append(text, formatted("no motion in %zu of %zu frames", without_motion_, frames_ - 1));
+  if (narrow_ == frames_) append(text, "values of 8 bits in images of 16");
+  if (!calibration_) return text;
+  if (const auto suspicion = suspect_calibration(*calibration_, size_)) {
+    append(text, suspicion->what + " (" + suspicion->remedy + ")");
+  }
+  return text;
+}
+
+}  // namespace egosgm::vision

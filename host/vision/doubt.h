@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+
+#include "egosgm/calibration.h"
+#include "egosgm/export.h"
+
+namespace egosgm::vision {
+
+/// What speaks against a value, and what to do about it.
+struct Suspicion {
+  std::string what, remedy;
+};
+
+/// A baseline of no rig that carries two cameras: the unit was mistaken, or a factor is missing. `fx`: 0 where it is
+/// not known. Thread-safe.
+EGOSGM_EXPORT std::optional<Suspicion> suspect_baseline(double baseline_m, double fx = 0);
+
+/// The same, and a focal length or a principal point that does not fit images of `size`, where that is known.
+/// Thread-safe.
+EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& calibration, cv::Size size);
+
+/// What speaks against a run's input once it is matched: a mean density below a half (maps of good input keep four
+/// fifths and more), no motion in most frames that have one before them, images of 16 bits that hold 8, a suspected
+/// calibration.
+class EGOSGM_EXPORT Doubt {
+ public:
+  /// `calibration`: none where the images came without one, so that there is no motion either.
+  explicit Doubt(const std::optional<Calibration>& calibration, cv::Size size = {})
+      : calibration_(calibration), size_(size) {}
+
+  void add(double density, bool has_motion, bool holds_8_bits_in_16);
+
+  /// "density 24 % in the mean, no motion in 10 of 11 frames"; empty where nothing does.
+  std::string text() const;
+
+ private:
+  const std::optional<Calibration> calibration_;
+  const cv::Size size_;
+  double density_ = 0;  // of all frames, added up
+  std::size_t frames_ = 0, without_motion_ = 0, narrow_ = 0;
+};
+
+}  // namespace egosgm::vision

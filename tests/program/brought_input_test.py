@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What people bring as it is: pictures alone, calibrations and maps of other programs, doubtful units. Environment as for program_case.py."""
+import json
+import shutil
+import unittest
+
+import numpy
+
+from input_case import InputTest, read_grey, write_grey
+from program_case import FRAMES, HEIGHT, WIDTH, egosgm, png
+
+
+class Brought(InputTest):
+    def pictures(self, i=0):
+        return self.street / f"image_0/{i:06d}.png", self.street / f"image_1/{i:06d}.png"
+
+    def calibrated(self, **changes):
+        """calib.txt with values that are changed."""
+        f, cx, cy, baseline = self.calibration()
+        file = self.new_folder() / "calib.txt"
+        values = {"fx": f, "fy": f, "cx": cx, "cy": cy, "baseline_m": baseline, **changes}
+        file.write_text("".join(f"{name} = {value}\n" for name, value in values.items()))
+        return file
+
+    def with_calibration(self, file):
+        return "--left", self.street / "image_0/%06d.png", "--right", self.street / "image_1/%06d.png", "--calib", file
+
+
+class TwoPictures(Brought):
+    def test_two_pictures_give_disparities_and_one_line(self):
+        for arguments in (self.pictures(), ("--left", self.pictures()[0], "--right", self.pictures()[1])):
+            out = self.new_folder() / "out"
+            said = self.assert_works("run", *arguments, "--out", out)
+            self.assertEqual(said.count("no depth and no odometry"), 1)
+            self.assertNotIn("doctor", said)
+            self.assertEqual(sorted(file.name for file in out.iterdir()), ["disparity", "report.json"])
+        with_calib = self.new_folder() / "out"
+        self.assert_works("run", *self.with_calibration(self.street / "calib.txt"), "--frames", 0, "--out", with_calib)
+        name = "disparity/000000.png"
+        self.assertEqual((out / name).read_bytes(), (with_calib / name).read_bytes())
+
+    def test_a_video_without_a_calibration(self):
+        out = self.new_folder() / "out"
+        patterns = "--left", self.street / "image_0/%06d.png", "--right", self.street / "image_1/%06d.png"
+        self.assertNotIn("doctor", self.assert_works("run", *patterns, "--out", out))
+        self.assertEqual(self.assert_whole(out), FRAMES)
+
+    def test_what_needs_a_calibration_says_so(self):
+        out = self.new_folder() / "out"
+        for kind in ("depth", "depth_m", "cloud"):
+            self.assert_refused(["run", *self.pictures(), "--out", out, "--write", kind], f"--write {kind}", "--calib")
+        self.assert_refused(["run", *self.pictures(), "--out", out, "--poses", self.street / "poses.txt"], "--poses", "--calib")
+        self.assert_refused(["odometry", *self.pictures(), "--out", out], "--calib")
+        self.assertFalse(out.exists())
+
+    def test_doctor_looks_at_two_pictures(self):
+        findings = self.examine(*self.pictures())
+        self.assertEqual(findings["calibration"]["verdict"], "note")
+        self.assertEqual(findings["rows"]["verdict"], "ok")
+
+    def test_a_folder_and_a_picture_are_more_than_one_input(self):
+        self.assert_refused(["run", self.street, self.pictures()[0], "--out", self.new_folder() / "out"], "more than one input")
+
+
+class Doubts(Brought):
+    def test_units_of_a_baseline(self):
+        f, _, _, baseline = self.calibration()
+        for factor, named in ((100, "centimetres (0.54 m)"), (1000, "millimetres (0.54 m)"), (1 / f, "is fx missing, so that it is 0.54 m?")):
+            arguments = self.with_calibration(self.calibrated(baseline_m=factor * baseline))
+            said = self.assert_works("run", *arguments, "--out", self.new_folder() / "out")
+            self.assertIn(named, said)
+            finding = self.assert_only_problem("calibration", *arguments)
+            self.assertIn(named, finding["remedy"])
+
+    def test_a_principal_point_and_a_focal_length_of_other_images(self):
+        f, cx, cy, _ = self.calibration()
+        for changes, named in ((dict(cx=cx / 4, cy=cy / 4), "principal point"), (dict(fx=f / 40, fy=f / 40), "focal lengths")):
+            arguments = self.with_calibration(self.calibrated(**changes))
+            self.assertIn(named, self.assert_works("run", *arguments, "--out", self.new_folder() / "out"))
+            self.assertIn(named, self.assert_only_problem("calibration", *arguments)["text"])
+
+    def test_a_missing_baseline_is_no_reason_to_exchange_cameras(self):
+        f, cx, cy, baseline = self.calibration()
+        for row in ("", f"baseline = {baseline}\n", "baseline_m = 0\n"):
+            file = self.new_folder() / "calib.txt"
+            file.write_text(f"fx = {f}\nfy = {f}\ncx = {cx}\ncy = {cy}\n{row}")
+            done = egosgm("doctor", *self.with_calibration(file))
+            self.assertEqual(done.returncode, 2)
+            self.assertNotIn("exchange", done.stdout + done.stderr)
+            self.assertIn("baseline", done.stdout + done.stderr)
+
+    def test_a_chessboard_is_no_problem(self):
+        """Its squares are mistaken for each other, in rows and along them."""
+        random = numpy.random.default_rng(1)
+        folder = self.new_folder() / "board"
+        for side in ("left", "right"):
+            (folder / side).mkdir(parents=True)
+        (folder / "calib.txt").write_text("fx = 460\nfy = 460\ncx = 319.5\ncy = 239.5\nbaseline_m = 0.06\n")
+        board = numpy.kron(numpy.indices((7, 10)).sum(0) % 2, numpy.ones((36, 36))) * 190 + 30
+        coarse = random.uniform(110, 150, (13, 21))
+        wall = numpy.kron(coarse, numpy.ones((40, 40)))[:480, :800]
+        for i in range(3):
+            x, y, disparity = 160 + 12 * i, 80 + 14 * i, 40 + 8 * i
+            for side, shift in (("left", 0), ("right", 1)):
+                image = wall[:, 20 * shift:20 * shift + 640].copy()
+                at = x - disparity * shift
+                image[y:y + board.shape[0], at:at + board.shape[1]] = board
+                write_grey(folder / side / f"{i}.png", numpy.clip(image + random.normal(0, 2, image.shape), 0, 255))
+        findings = self.examine(folder)
+        self.assertNotIn("problem", [finding["verdict"] for finding in findings.values()], findings)
+
+    def test_a_drive_that_does_not_move_on_is_found_as_run_finds_it(self):
+        street = self.broken_street()
+        for side in (0, 1):  # every other moment is another place: the frames of a mirrored world
+            for i in (1, 3):
+                file = street / f"image_{side}/{i:06d}.png"
+                write_grey(file, read_grey(self.street / f"image_{1 - side}/{i:06d}.png")[:, ::-1])
+        said = self.assert_works("run", street, "--out", self.new_folder() / "out")
+        self.assertIn("no motion in 3 of 3 frames", said)
+        self.assertEqual(self.examine(street)["motion"]["verdict"], "note")
+        self.assertNotIn("motion", self.examine(self.street))
+
+    def test_a_pedestal_and_a_hot_pixel_of_16_bits(self):
+        """Motions are found as in 8 bits, and doctor finds points."""
+        street = self.broken_street()
+        for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+            rows = (7000 + 3 * read_grey(file).astype(numpy.uint16)).astype(">u2")
+            rows[HEIGHT // 2, WIDTH // 3] = 65535
+            file.write_bytes(png(WIDTH, HEIGHT, 16, (row.tobytes() for row in rows)))
+        self.assertNotIn("no motion", self.assert_works("run", street, "--out", self.new_folder() / "out"))
+        self.assertEqual(self.examine(street)["rows"]["verdict"], "ok")
+
+    def test_times_in_other_units(self):
+        street = self.broken_street()
+        for unit, factor in (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9)):
+            (street / "times.txt").write_text("".join(f"{int((100 + 0.1 * i) * factor)}\n" for i in range(FRAMES)))
+            self.assertIn(unit, self.assert_only_problem("times", street)["remedy"])
+
+    def poses(self, change):
+        rows = numpy.loadtxt(self.street / "poses.txt").reshape(-1, 3, 4)
+        poses = numpy.concatenate([rows, numpy.tile([[[0, 0, 0, 1.0]]], (len(rows), 1, 1))], axis=1)
+        file = self.new_folder() / "poses.txt"
+        numpy.savetxt(file, change(poses)[:, :3].reshape(-1, 12))
+        return file
+
+    def test_given_poses_are_looked_at(self):
+        def scaled(poses):
+            changed = poses.copy()
+            changed[:, :3, 3] *= 1000
+            return changed
+
+        ned = numpy.eye(4)
+        ned[:3, :3] = [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
+        cases = ((lambda poses: poses, ""), (scaled, "millimetres"), (numpy.linalg.inv, "inverses"),
+                 (lambda poses: numpy.linalg.inv(ned) @ poses @ ned, "NED's axes"))
+        for change, named in cases:
+            out = self.new_folder() / "out"
+            said = self.assert_works("run", self.street, "--poses", self.poses(change), "--out", out)
+            if named:
+                self.assertIn("the given poses contradict the images", said)
+                self.assertIn(named, said)
+                self.assertIn(named, self.report(out)["doubt"])
+            else:
+                self.assertNotIn("given poses", said)
+
+
+class KnownFormats(Brought):
+    def test_calibrations_that_are_not_read_are_named(self):
+        texts = {"a camera chain of Kalibr": "cam0:\n  camera_model: pinhole\ncam1:\n  T_cn_cnm1:\n  - [1.0, 0.0, 0.0, -0.3]\n",
+                 "ROS's calibrator": "camera_matrix:\n  rows: 3\n  data: [1]\nprojection_matrix:\n  rows: 3\n  data: [1]\n",
+                 "EuRoC or Kimera": "T_BS:\n  rows: 4\n  data: [1]\nintrinsics: [1, 2, 3, 4]\n",
+                 "ORB-SLAM": "%YAML:1.0\nCamera.fx: 460.0\n", "DSEC": "disparity_to_depth:\n  cams_12:\n  - [1.0]\n",
+                 "Cityscapes": '{"extrinsic": {"baseline": 0.3}, "intrinsic": {"fx": 460, "u0": 319.5}}',
+                 "K.txt": "460.0 0.0 319.5 0.0 460.0 239.5 0.0 0.0 1.0\n0.3\n", "JSON": '{"a": 1}', "OpenCV's stereo calibration": '{"K1": [[1]], "K2": [[1]]}'}
+        for named, text in texts.items():
+            file = self.new_folder() / "calib.yaml"
+            file.write_text(text)
+            for command in ("run", "doctor"):
+                out = ["--out", self.new_folder() / "out"] if command == "run" else []
+                self.assert_refused([command, *self.with_calibration(file), *out], named, "EgoSGM's formats")
+
+    def test_nested_lists_and_units_of_opencv(self):
+        f, cx, cy, baseline = self.calibration()
+        k = [[f, 0, cx], [0, f, cy], [0, 0, 1]]
+        for unit, t, fits in ((None, baseline, True), (None, 5.39, False), ("cm", 100 * baseline, True), ("m", 5.39, True)):
+            file = self.new_folder() / "rig.json"
+            file.write_text(json.dumps({"left_camera_matrix": k, "left_distortion": [[0, 0, 0, 0, 0]], "mtx2": k, "dist2": [0, 0, 0, 0, 0],
+                                        "R": numpy.eye(3).tolist(), "T": [[-t], [0], [0]]}))
+            out = self.new_folder() / "out"
+            command = ["rectify", *self.with_calibration(file), "--out", out, *(["--unit", unit] if unit else [])]
+            if fits:
+                self.assert_works(*command)
+            else:
+                self.assert_refused(command, "centimetres (0.0539 m)", "--unit cm", "--unit m")
+
+
+class Names(Brought):
+    def test_names_that_are_times_stay(self):
+        folder = self.new_folder() / "named"
+        times = [1403636579063555584 + 50_000_000 * i for i in range(FRAMES)]
+        for side, source in (("left", "image_0"), ("right", "image_1")):
+            (folder / side).mkdir(parents=True)
+            for i, time in enumerate(times):
+                shutil.copy(self.street / source / f"{i:06d}.png", folder / side / f"{time}.png")
+        shutil.copy(self.calibrated(), folder / "calib.txt")
+        out = self.new_folder() / "out"
+        self.assert_works("run", folder, "--out", out)
+        self.assertEqual(sorted(file.name for file in (out / "disparity").iterdir()), [f"{time}.png" for time in times])
+        self.assertEqual([frame["name"] for frame in self.report(out)["frames"]], [str(time) for time in times])
+        self.assert_works("eval", out / "disparity", out / "disparity")
+
+    def test_pairs_by_order_whose_numbers_go_apart_are_told(self):
+        folder = self.new_folder()
+        for side, source, left_out in (("left", "image_0", 1), ("right", "image_1", 2)):
+            shutil.copytree(self.street / source, folder / side)
+            (folder / side / f"{left_out:06d}.png").unlink()
+        arguments = "--left", folder / "left/*.png", "--right", folder / "right/*.png", "--calib", self.street / "calib.txt", "--pair-by", "order"
+        self.assertIn("is a frame missing on one side?", egosgm("doctor", *arguments).stdout)
+        whole = "--left", self.street / "image_0/*.png", "--right", self.street / "image_1/*.png", "--calib", self.street / "calib.txt", "--pair-by", "order"
+        self.assertNotIn("missing", egosgm("doctor", *whole).stdout)
+
+
+class Maps(Brought):
+    """One map in all formats, with what other programs write where there is nothing."""
+
+    def npy(self, file, values):
+        numpy.save(file, values)
+
+    def pfm(self, file, values):
+        file.write_bytes(f"Pf\n{values.shape[1]} {values.shape[0]}\n-1\n".encode() + values[::-1].astype("<f4").tobytes())
+
+    def png16(self, file, values):
+        file.write_bytes(png(values.shape[1], values.shape[0], 16, (row.astype(">u2").tobytes() for row in values.astype(numpy.int64) % 65536)))
+
+    def setUp(self):
+        self.maps = self.new_folder()
+        random = numpy.random.default_rng(2)
+        self.truth = random.uniform(4, 20, (24, 40)).astype(numpy.float32)
+        self.npy(self.maps / "truth.npy", self.truth)
+        self.missing = random.uniform(size=self.truth.shape) < 0.3
+
+    def figures(self, name, *arguments):
+        said = json.loads(self.assert_works("eval", self.maps / name, self.maps / "truth.npy", "--json", *arguments))
+        return said["pooled"]["density"], said["pooled"]["bad_or_missing"], " ".join(said.get("doubts", []))
+
+    def test_one_rule_of_what_has_no_value(self):
+        sixteenths = numpy.rint(self.truth * 16)
+        for name, nothing in (("minus", -1), ("zero", 0), ("infinite", numpy.inf), ("none", numpy.nan)):
+            values = numpy.where(self.missing, nothing, sixteenths / 16)
+            self.npy(self.maps / f"{name}.npy", values.astype(numpy.float32))
+            self.pfm(self.maps / f"{name}.pfm", values)
+        expected = 100 * (1 - self.missing.mean())
+        for name in ("minus", "zero", "infinite", "none"):
+            for extension in (".npy", ".pfm"):
+                density, bad, _ = self.figures(name + extension)
+                self.assertAlmostEqual(density, expected)
+                self.assertAlmostEqual(bad, 100 - expected)
+        for nothing in (-16, 0):
+            self.png16(self.maps / "map.png", numpy.where(self.missing, nothing, sixteenths))
+            self.npy(self.maps / "map.npy", numpy.where(self.missing, nothing, sixteenths).astype(numpy.int16))
+            for file in ("map.png", "map.npy"):
+                density, bad, doubts = self.figures(file, "--scale", 16)
+                self.assertAlmostEqual(density, expected)
+                self.assertAlmostEqual(bad, 100 - expected)
+                self.assertEqual("no disparities" in doubts, nothing < 0 and file.endswith(".png"))
+
+    def test_negative_disparities_that_differ_are_values(self):
+        self.npy(self.maps / "truth.npy", numpy.abs(self.truth))
+        self.pfm(self.maps / "signed.pfm", numpy.where(self.missing, -self.truth, self.truth))
+        self.assertAlmostEqual(self.figures("signed.pfm")[0], 100)
+
+    def test_what_is_wider_than_the_image_is_no_disparity(self):
+        self.npy(self.maps / "wide.npy", numpy.where(self.missing, 4095, self.truth).astype(numpy.float32))
+        density, _, doubts = self.figures("wide.npy")
+        self.assertAlmostEqual(density, 100 * (1 - self.missing.mean()))
+        self.assertIn("beyond the image's width", doubts)
+        self.assertEqual(self.figures("truth.npy")[2], "")
+
+    def test_another_scale_is_told(self):
+        self.png16(self.maps / "map.png", numpy.rint(self.truth * 16))
+        self.assertIn("needs --scale 16;", self.figures("map.png")[2])
+        self.assertEqual(self.figures("map.png", "--scale", 16)[2], "")
+
+    def test_a_scale_that_does_not_apply_is_refused(self):
+        self.npy(self.maps / "map.npy", self.truth)
+        self.pfm(self.maps / "map.pfm", self.truth)
+        for name in ("map.npy", "map.pfm"):
+            self.assert_refused(["eval", self.maps / name, self.maps / "truth.npy", "--scale", 16], "--scale 16", name)
+        self.png16(self.maps / "map.png", numpy.rint(self.truth * 256))
+        self.assert_refused(["eval", self.maps / "map.png", self.maps / "truth.npy", "--truth-scale", 16], "--truth-scale 16", "truth.npy")
+
+
+if __name__ == "__main__":
+    unittest.main()

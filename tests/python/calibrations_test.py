@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Calibrations of other programs: one rig, written as each of them does."""
+import json
+
+import numpy as np
+import pytest
+
+import egosgm
+from egosgm import calibrations, program
+
+yaml = pytest.importorskip("yaml")
+
+F, CX, CY, B, WIDTH, HEIGHT = 460.0, 319.5, 239.5, 0.3, 640, 480
+K = [[F, 0, CX], [0, F, CY], [0, 0, 1]]
+P = [[F, 0, CX, 0], [0, F, CY, 0], [0, 0, 1, 0]]
+RIGHT_P = [[F, 0, CX, -F * B], [0, F, CY, 0], [0, 0, 1, 0]]
+EYE = np.eye(3).tolist()
+SHIFT = [[1, 0, 0, -B], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+BACK = [[1, 0, 0, B], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+Q = [[1, 0, 0, -CX], [0, 1, 0, -CY], [0, 0, 0, F], [0, 0, 1 / B, 0]]
+LENS = [-0.1, 0.05, 0.001, -0.001]
+
+
+def flat(matrix):
+    return np.ravel(matrix).tolist()
+
+
+def ros(p, lens=(0, 0, 0, 0, 0)):
+    matrix = lambda rows, columns, data: dict(rows=rows, cols=columns, data=flat(data))  # noqa: E731
+    return yaml.safe_dump(dict(image_width=WIDTH, image_height=HEIGHT, camera_name="one", distortion_model="plumb_bob",
+                               camera_matrix=matrix(3, 3, K), distortion_coefficients=matrix(1, 5, lens),
+                               rectification_matrix=matrix(3, 3, EYE), projection_matrix=matrix(3, 4, p)))
+
+
+def kalibr(lens=(0, 0, 0, 0), model="radtan", **second):
+    camera = dict(camera_model="pinhole", distortion_coeffs=list(lens), distortion_model=model, intrinsics=[F, F, CX, CY],
+                  resolution=[WIDTH, HEIGHT])
+    return yaml.safe_dump(dict(cam0=camera, cam1=dict(camera, **(second or dict(T_cn_cnm1=SHIFT)))))
+
+
+def opencv_yaml(**matrices):
+    rows = ["%YAML:1.0", "---"]
+    for name, value in matrices.items():
+        value = np.atleast_2d(value)
+        rows += [f"{name}: !!opencv-matrix", f"   rows: {value.shape[0]}", f"   cols: {value.shape[1]}", "   dt: d", f"   data: {flat(value)}"]
+    return "\n".join(rows) + "\n"
+
+
+RECTIFIED = {
+    "own.txt": f"fx = {F}\nfy = {F}\ncx = {CX}\ncy = {CY}\nbaseline_m = {B}\n",
+    "kitti.txt": f"P0: {' '.join(map(str, flat(P)))}\nP1: {' '.join(map(str, flat(RIGHT_P)))}\n",
+    "camera.json": json.dumps(dict(extrinsic=dict(baseline=B, pitch=0.03), intrinsic=dict(fx=F, fy=F, u0=CX, v0=CY))),
+    "cam_to_cam.yaml": yaml.safe_dump(dict(intrinsics=dict(cam0=dict(camera_matrix=[1, 2, 3, 4])), disparity_to_depth=dict(cams_12=Q))),
+    "K.txt": " ".join(map(str, flat(K))) + f"\n{B}\n",
+    "q.yml": opencv_yaml(Q=Q),
+    "q_of_python.json": json.dumps(dict(Q=Q)),
+    "orb_slam2.yaml": f"%YAML:1.0\nCamera.fx: {F}\nCamera.fy: {F}\nCamera.cx: {CX}\nCamera.cy: {CY}\nCamera.bf: {F * B}\n",
+    "orb_slam3.yaml": f'%YAML:1.0\nFile.version: "1.0"\nCamera.type: "Rectified"\nCamera1.fx: {F}\nCamera1.fy: {F}\nCamera1.cx: {CX}\nCamera1.cy: {CY}\nStereo.b: {B}\n',
+    "kalibr.yaml": kalibr(),
+    "kalibr_imu.yaml": kalibr(T_cam_imu=SHIFT).replace("cam1:", "cam1:", 1).replace("cam0:\n", f"cam0:\n  T_cam_imu: {np.eye(4).tolist()}\n"),
+    "kalibr_none.yaml": kalibr(model="none", lens=()),
+}
+RAW = {
+    "opencv.yml": opencv_yaml(M1=K, D1=LENS, M2=K, D2=LENS, R=EYE, T=[[-B], [0], [0]]),
+    "nested.json": json.dumps(dict(K1=K, D1=[LENS], K2=K, D2=[LENS], R=EYE, T=[[-B], [0], [0]])),
+    "nested.yaml": yaml.safe_dump(dict(K1=K, D1=LENS, K2=K, D2=LENS, R=EYE, T=[-B, 0, 0])),
+    "names.yaml": yaml.safe_dump(dict(left_camera_matrix=K, left_distortion=LENS, right_camera_matrix=K, right_distortion=LENS, R=EYE, T=[-B, 0, 0])),
+    "others.json": json.dumps(dict(mtx_l=K, dist_l=[LENS], mtx_r=K, dist_r=[LENS], rotation_matrix=EYE, translation_vector=[[-B], [0], [0]])),
+    "in_groups.json": json.dumps(dict(left=dict(camera_matrix=K, dist_coeffs=LENS), right=dict(camera_matrix=K, dist_coeffs=LENS),
+                                      stereo=dict(R=EYE, T=[-B, 0, 0]))),
+    "kalibr_lens.yaml": kalibr(LENS),
+    "orb_slam3_raw.yaml": "%YAML:1.0\nCamera.type: \"PinHole\"\n" + "".join(
+        f"{camera}.{name}: {value}\n" for camera in ("Camera1", "Camera2")
+        for name, value in dict(fx=F, fy=F, cx=CX, cy=CY, k1=LENS[0], k2=LENS[1], p1=LENS[2], p2=LENS[3]).items()) + opencv_yaml(
+            **{"Stereo.T_c1_c2": BACK}).partition("---\n")[2],
+}
+
+
+def expect_rectified(found):
+    assert [found.fx, found.fy, found.cx, found.cy, found.baseline_m, found.doffs_px] == pytest.approx([F, F, CX, CY, B, 0], abs=1e-9)
+
+
+def expect_raw(found):
+    assert isinstance(found, egosgm.StereoRig)
+    expected = egosgm.Rectification(egosgm.StereoRig(K, LENS, K, LENS, np.eye(3), [-B, 0, 0]), WIDTH, HEIGHT)
+    same = egosgm.Rectification(found, WIDTH, HEIGHT)
+    assert same.calibration.baseline_m == pytest.approx(B) and same.calibration.fx == pytest.approx(expected.calibration.fx)
+    image = np.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH)).astype(np.uint8)
+    np.testing.assert_array_equal(same.rectify(image, image)[0], expected.rectify(image, image)[0])
+
+
+@pytest.mark.parametrize("name", RECTIFIED)
+def test_of_rectified_images(name, tmp_path):
+    (tmp_path / name).write_text(RECTIFIED[name])
+    expect_rectified(egosgm.read_calibration(tmp_path / name))
+
+
+@pytest.mark.parametrize("name", RAW)
+def test_of_raw_images(name, tmp_path):
+    (tmp_path / name).write_text(RAW[name])
+    expect_raw(egosgm.read_calibration(tmp_path / name))
+
+
+def test_two_files_of_ros_and_of_kimera(tmp_path):
+    (tmp_path / "left.yaml").write_text(ros(P))
+    with pytest.raises(egosgm.InvalidArgument, match="is the calibration of one camera"):
+        egosgm.read_calibration(tmp_path / "left.yaml")
+    (tmp_path / "right.yaml").write_text(ros(RIGHT_P))
+    for given in ("left.yaml", "right.yaml", "."):
+        expect_rectified(egosgm.read_calibration(tmp_path / given))
+    lens = [*LENS, 0]
+    (tmp_path / "left.yaml").write_text(ros(P, lens))
+    (tmp_path / "right.yaml").write_text(ros(RIGHT_P, lens))
+    expect_raw(egosgm.read_calibration(tmp_path))
+    folder = tmp_path / "kimera"
+    folder.mkdir()
+    for name, pose in (("Left", np.eye(4)), ("Right", np.array(BACK))):
+        (folder / f"{name}CameraParams.yaml").write_text("%YAML:1.0\n" + yaml.safe_dump(dict(
+            camera_id=name, T_BS=dict(rows=4, cols=4, data=flat(pose)), intrinsics=[F, F, CX, CY], distortion_model="radial-tangential",
+            distortion_coefficients=LENS, resolution=[WIDTH, HEIGHT])))
+    expect_raw(egosgm.read_calibration(folder / "LeftCameraParams.yaml"))
+
+
+def test_arrays_of_numpy(tmp_path):
+    arrays = dict(cam_mats_left=np.array(K), cam_mats_right=np.array(K), dist_coefs_left=np.array([LENS]), dist_coefs_right=np.array([LENS]),
+                  rot_mat=np.eye(3), trans_vec=np.array([[-B], [0], [0]]))
+    np.savez(tmp_path / "all.npz", **arrays)
+    expect_raw(egosgm.read_calibration(tmp_path / "all.npz"))
+    folder = tmp_path / "arrays"
+    folder.mkdir()
+    for name, array in arrays.items():
+        np.save(folder / name, array)
+    expect_raw(egosgm.read_calibration(folder))
+    np.save(tmp_path / "Q.npy", np.array(Q))
+    expect_rectified(egosgm.read_calibration(tmp_path / "Q.npy"))
+
+
+def test_a_fisheye(tmp_path):
+    (tmp_path / "chain.yaml").write_text(kalibr([0.01, 0, 0, 0], "equidistant"))
+    assert egosgm.read_calibration(tmp_path / "chain.yaml").is_fisheye
+
+
+@pytest.mark.parametrize("text, named", [
+    (kalibr(camera_model="omni", T_cn_cnm1=SHIFT), "a camera chain of Kalibr, and cam1 is of the model \"omni\""),
+    (kalibr(rostopic="/right"), "lacks T_cn_cnm1"), (kalibr(model="fov", lens=[1.0]), "the model \"fov\""),
+    (f"Camera.fx: {F}\nCamera.fy: {F}\nCamera.cx: {CX}\nCamera.cy: {CY}\n", "ORB-SLAM of one camera: it lacks Stereo.b or Camera.bf"),
+    (json.dumps(dict(mtx=K, dist=LENS)), "lacks left_matrix, right_matrix"), ("- 1\n- 2\n", "not `key: value`"), ("a: [1, 2", "no YAML"),
+    (" ".join(map(str, flat(K))), "a camera matrix alone"),
+    (opencv_yaml(M1=K, D1=LENS, R=EYE, T=[[-B], [0], [0]]), "right_matrix"),
+])
+def test_what_is_known_and_not_enough_is_named(text, named, tmp_path):
+    (tmp_path / "calib.yaml").write_text(text)
+    with pytest.raises(egosgm.InvalidArgument) as refused:
+        egosgm.read_calibration(tmp_path / "calib.yaml")
+    assert named in str(refused.value)
+
+
+def test_units_are_never_guessed(tmp_path):
+    (tmp_path / "chain.yaml").write_text(kalibr(LENS, T_cn_cnm1=[[1, 0, 0, -30.0], *SHIFT[1:]]))
+    with pytest.raises(egosgm.InvalidArgument, match="centimetres .0.3 m. or millimetres .0.03 m."):
+        egosgm.read_calibration(tmp_path / "chain.yaml")
+    expect_raw(egosgm.read_calibration(tmp_path / "chain.yaml", unit_m=0.01))
+
+
+def test_the_command_hands_the_program_what_it_reads(tmp_path):
+    folder = tmp_path / "given"
+    folder.mkdir()
+    (tmp_path / "chain.yaml").write_text(kalibr())
+    changed = program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--out", "o"], folder)
+    assert changed == ["run", "--calib", str(folder / "calib.txt"), "--out", "o"]
+    expect_rectified(egosgm.read_calibration(folder / "calib.txt"))
+    (tmp_path / "chain.yaml").write_text(kalibr(LENS, T_cn_cnm1=[[1, 0, 0, -300.0], *SHIFT[1:]]))
+    changed = program.with_calibration(["rectify", f"--calib={tmp_path / 'chain.yaml'}", "--unit", "mm", "--out", "o"], folder)
+    assert changed == ["rectify", f"--calib={folder / 'calib.json'}", "--out", "o", "--unit=m"]
+    expect_raw(egosgm.read_opencv_rig(folder / "calib.json"))
+    with pytest.raises(egosgm.InvalidArgument, match="is of raw images"):
+        program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--unit=mm"], folder)
+    (tmp_path / "own.txt").write_text(RECTIFIED["own.txt"])
+    for arguments in (["run", "--calib", str(tmp_path / "own.txt")], ["run", "folder"], ["run", "--calib"]):
+        assert program.with_calibration(arguments, folder) == arguments
+    assert calibrations.find(tmp_path / "own.txt").fx == F
