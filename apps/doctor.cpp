@@ -14,10 +14,10 @@
 #include "apps/frame_times.h"
 #include "apps/sequence_arguments.h"
 #include "egosgm/error.h"
+#include "egosgm/odometry.h"
 #include "egosgm/options.h"
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/image_io.h"
-#include "egosgm/odometry.h"
 #include "egosgm/vision/opencv.h"
 #include "host/vision/examination.h"
 

@@ -49,8 +49,7 @@ MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::st
   }
 }
 
-std::string MotionSource::doubt(const vision::StereoSequence& sequence,
-                                const StereoOdometryOptions& options) const {
+std::string MotionSource::doubt(const vision::StereoSequence& sequence, const StereoOdometryOptions& options) const {
   constexpr std::size_t kFrames = 7;
   if (poses_.size() < 3) return {};
   StereoOdometry odometry(sequence.calibration, options);

@@ -6,7 +6,8 @@
 
 namespace egosgm::vision {
 
-/// Both images of a pair as CV_8UC1; of 16 bits by odometry::levels_of. REQUIRES: one size, both CV_8UC1 or both CV_16UC1.
+/// Both images of a pair as CV_8UC1; of 16 bits by odometry::levels_of. REQUIRES: one size, both CV_8UC1 or both
+/// CV_16UC1.
 std::pair<cv::Mat, cv::Mat> bytes_of(const cv::Mat& left, const cv::Mat& right);
 
 }  // namespace egosgm::vision

@@ -31,7 +31,7 @@ struct EGOSGM_EXPORT PipelineOptions {
   MatchingCost cost;
   int paths;                ///< 4 or 8
   int p1, p2;               ///< penalties of a step of one disparity, and of a larger one
-  int max_speckle_px;       ///< connected regions of at most this size [pixels] are dropped in unpredicted frames; 0: none
+  int max_speckle_px;       ///< regions of at most this size [pixels] are dropped in unpredicted frames; 0: none
   int max_memory_mib;       ///< memory for path sums [MiB]; 0: what the device has
   float left_right_px;      ///< largest difference between the views' disparities [px]
   float search_sigmas;      ///< half-width of a predicted pixel's search [standard deviations],

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The standard error closed, full or at an end: the work, its files and its exit code are the same. Environment as for program_case.py."""
 import contextlib
-import json
 import os
 import signal
 import subprocess

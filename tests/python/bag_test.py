@@ -788,7 +788,7 @@ def test_doubts_of_a_baseline(tmp_path, street, frames, capsys):
     cases = (("cm", 100, "centimetres (0.54 m)"), ("mm", 1000, "millimetres (0.54 m)"), ("no_fx", 1 / street.calibration.fx, "is fx missing"))
     for name, factor, named in cases:
         said = told_of(capsys, drive_of(street, frames, rescaled(factor)).write(tmp_path / name))
-        assert f"doubt: " in said and named in said
+        assert "doubt: " in said and named in said
 
 
 def test_swapped_sides_are_found(tmp_path, street, frames, capsys):
