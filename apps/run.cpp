@@ -43,6 +43,7 @@ constexpr const char* kNoCalibration =
     "no calibration was given: disparities are there, but no depth and no odometry; --calib FILE brings both";
 
 using Clock = std::chrono::steady_clock;
+constexpr std::size_t kFramesPerLook = 50;  // for what is nearer than the range
 std::string note_of(const FrameReport& report) {
   if (!report.searched_everything && !report.unpredicted) return "";
   const std::string why =
@@ -197,6 +198,11 @@ class Run {
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
     report_.add(frame, result, prepared.motion, times, unstorable);
+    if (poses_.size() % kFramesPerLook == 0) {
+      const PipelineOptions& options = pipeline_.options();
+      doubt_.look_beyond(prepared.images.left, prepared.images.right, options.min_disparity,
+                         options.min_disparity + options.disparities);
+    }
     doubt_.add(result.density, prepared.motion.motion.has_value(), vision::holds_8_bits_in_16(prepared.images.left));
     poses_.push_back(prepared.motion.first_from_camera);
     tell(frame, result, prepared.motion, times, unstorable, progress);

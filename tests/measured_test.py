@@ -88,7 +88,7 @@ class Page(unittest.TestCase):
         self.assertEqual(self.write(), 0)
         page = (self.docs / "measured.md").read_text()
         for text in ("| street | bad_or_missing | 1.25 % | 2.50 | ≤ 1 **missed** |", "- 2012: skipped: not there", "a CPU", "driver 1.0", "0123456789", "2026-01-02",
-                     "| EgoSGM, steady frame, motion given | 320×96, 32 | 1 | 0.990 | 11.00 ms | 0.500 | 13.6 % |",
+                     "| EgoSGM, steady frame, both views, motion given | 320×96, 32 | 1 | 0.990 | 11.00 ms | 0.500 | 13.6 % |",
                      "| OpenCV MODE_HH, 8 paths, left view | 320×96, 32 | 2 | 1.00 | 20.00 ms | 1.00 |  |", "| Census | 320×96, 32 | 1.50 ms | 1.25 ms | 3.50 |", "| room_match | 320×96, 32 | 9.50 ms |  |  |",
                      "| street | EgoSGM | 0.250 | 12.50 |", "| street | EgoSGM, single frame | 1.25 |  |", "- KITTI: skipped: not there",
                      "| street | 1 degree, 0 cm | 3.50 |", "| street | 2 | 4.50 |"):

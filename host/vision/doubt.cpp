@@ -75,6 +75,11 @@ void Doubt::add(double density, bool has_motion, bool holds_8_bits_in_16) {
   if (frames_++ > 0 && calibration_ && !has_motion) ++without_motion_;
 }
 
+void Doubt::look_beyond(const cv::Mat& left, const cv::Mat& right, int least, int end) {
+  const std::optional<Clipped> clipped = clipped_by_range(left, right, least, end);
+  if (clipped && (!clipped_ || clipped->share > clipped_->share)) clipped_ = clipped;
+}
+
 std::string Doubt::text() const {
   std::string text;
   if (frames_ == 0) return text;
@@ -83,6 +88,10 @@ std::string Doubt::text() const {
   if (2 * without_motion_ > frames_ - 1)
     append(text, formatted("no motion in %zu of %zu frames", without_motion_, frames_ - 1));
   if (narrow_ == frames_) append(text, "values of 8 bits in images of 16");
+  if (clipped_) {
+    append(text, formatted("%.0f %% of the image is nearer than the range (--disparities %d)", 100 * clipped_->share,
+                           clipped_->disparities));
+  }
   if (!calibration_) return text;
   if (const auto suspicion = suspect_calibration(*calibration_, size_)) {
     append(text, suspicion->what + " (" + suspicion->remedy + ")");

@@ -8,6 +8,7 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
+#include "host/vision/examination.h"
 
 namespace egosgm::vision {
 
@@ -25,8 +26,8 @@ EGOSGM_EXPORT std::optional<Suspicion> suspect_baseline(double baseline_m, doubl
 EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& calibration, cv::Size size);
 
 /// What speaks against a run's input once it is matched: a mean density below a half (maps of good input keep four
-/// fifths and more), no motion in most frames that have one before them, images of 16 bits that hold 8, a suspected
-/// calibration.
+/// fifths and more), no motion in most frames that have one before them, images of 16 bits that hold 8, what is
+/// nearer than the range, a suspected calibration.
 class EGOSGM_EXPORT Doubt {
  public:
   /// `calibration`: none where the images came without one, so that there is no motion either.
@@ -34,6 +35,8 @@ class EGOSGM_EXPORT Doubt {
       : calibration_(calibration), size_(size) {}
 
   void add(double density, bool has_motion, bool holds_8_bits_in_16);
+  /// Looks whether something is nearer than the range, as clipped_by_range does.
+  void look_beyond(const cv::Mat& left, const cv::Mat& right, int least, int end);
 
   /// "density 24 % in the mean, no motion in 10 of 11 frames"; empty where nothing does.
   std::string text() const;
@@ -43,6 +46,7 @@ class EGOSGM_EXPORT Doubt {
   const cv::Size size_;
   double density_ = 0;  // of all frames, added up
   std::size_t frames_ = 0, without_motion_ = 0, narrow_ = 0;
+  std::optional<Clipped> clipped_;  // of the pair of which the range clips most
 };
 
 }  // namespace egosgm::vision

@@ -121,6 +121,14 @@ std::vector<float> coarse_disparities(const cv::Mat& left, const cv::Mat& right,
   return disparities;
 }
 
+int rounded_up(double value) { return 16 * static_cast<int>(std::ceil(value / 16)); }
+
+std::optional<Clipped> clipped_of(const std::vector<float>& disparities, int least, int end) {
+  const double above = share(disparities, [&](double d) { return d > end - 1; });
+  if (above <= kClippedShare) return std::nullopt;
+  return Clipped{above, rounded_up(1.1 * quantile(disparities, 0.995) - least + 1)};
+}
+
 /// What rows of both images differ by, as a smooth function of the place and of the disparity, which a pair that is not
 /// rectified has; by the matches on which most agree.
 struct RowError {
@@ -197,6 +205,12 @@ void Examination::add(const cv::Mat& left, const cv::Mat& right) {
   const auto [left_bytes, right_bytes] = bytes_of(left, right);
   const std::vector<float> coarse = coarse_disparities(left_bytes, right_bytes, median_row_error(found), least_, end_);
   disparities_.insert(disparities_.end(), coarse.begin(), coarse.end());
+}
+
+std::optional<Clipped> clipped_by_range(const cv::Mat& left, const cv::Mat& right, int least, int end) {
+  const auto [left_bytes, right_bytes] = bytes_of(left, right);
+  const std::vector<float> disparities = coarse_disparities(left_bytes, right_bytes, 0, least, end);
+  return disparities.empty() ? std::nullopt : clipped_of(disparities, least, end);
 }
 
 std::vector<Finding> Examination::findings(std::size_t pairs) const {
@@ -288,15 +302,14 @@ Finding Examination::sides(double behind) const {
 
 Finding Examination::range(std::vector<float> disparities) const {
   const double low = quantile(disparities, 0.005), high = quantile(disparities, 0.995);
-  const double above = share(disparities, [&](double d) { return d > end_ - 1; });
   const double below = share(disparities, [&](double d) { return d < least_ - kBehind_px; });
   const std::string text = formatted("disparities from %.1f to %.1f px (99 %% of the points), the range is [%d, %d)",
                                      low, high, least_, end_);
-  const auto rounded_up = [](double value) { return 16 * static_cast<int>(std::ceil(value / 16)); };
   const double farthest = quantile(disparities, 0.999);
-  if (above > kClippedShare) {
-    return {Verdict::kProblem, "range", text + formatted(": it clips %.1f %% of them, the near ones", 100 * above),
-            formatted("give --disparities %d", rounded_up(1.1 * high - least_ + 1))};
+  if (const auto clipped = clipped_of(disparities, least_, end_)) {
+    return {Verdict::kProblem, "range",
+            text + formatted(": it clips %.1f %% of them, the near ones", 100 * clipped->share),
+            formatted("give --disparities %d", clipped->disparities)};
   }
   if (below > kClippedShare && high > 0) {
     return {Verdict::kProblem, "range", text + formatted(": it clips %.1f %% of them, the far ones", 100 * below),

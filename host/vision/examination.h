@@ -19,6 +19,16 @@ struct Finding {
   std::string check, text, remedy;
 };
 
+/// What of a pair is nearer than the range of disparities ends, by a small map of it that looks beyond.
+struct Clipped {
+  double share;     // of the pixels of which the small map is sure
+  int disparities;  // with which the range would hold nearly all
+};
+
+/// None where hardly anything is nearer, or where the small map is sure of too little. The range that is searched:
+/// [least, end). REQUIRES: rectified images of one size, both CV_8UC1 or both CV_16UC1. Thread-safe.
+EGOSGM_EXPORT std::optional<Clipped> clipped_by_range(const cv::Mat& left, const cv::Mat& right, int least, int end);
+
 /// What is wrong with rectified pairs before they are matched: their images, calibration, rows, sides and range. It
 /// looks at a few pairs, however they came. Not thread-safe.
 class EGOSGM_EXPORT Examination {

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What people bring as it is: pictures alone, calibrations and maps of other programs, doubtful units. Environment as for program_case.py."""
 import json
+import re
 import shutil
 import unittest
 
@@ -71,6 +72,13 @@ class Doubts(Brought):
             self.assertIn(named, said)
             finding = self.assert_only_problem("calibration", *arguments)
             self.assertIn(named, finding["remedy"])
+
+    def test_what_is_nearer_than_the_range_is_said_with_a_range_that_holds_it(self):
+        said = self.assert_works("run", self.street, "--disparities", 16, "--out", self.new_folder() / "out")
+        share, enough = re.search(r"(\d+) % of the image is nearer than the range \(--disparities (\d+)\)", said).groups()
+        self.assertTrue(1 <= int(share) <= 90 and 16 < int(enough) <= 128, said)
+        said = self.assert_works("run", self.street, "--disparities", enough, "--out", self.new_folder() / "out")
+        self.assertNotIn("nearer than the range", said)
 
     def test_a_principal_point_and_a_focal_length_of_other_images(self):
         f, cx, cy, _ = self.calibration()
