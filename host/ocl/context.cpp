@@ -249,7 +249,8 @@ void Context::build() {
   std::vector<Group> groups;
   for (auto& [key, program] : programs_) {
     if (program.is_built()) continue;
-    auto group = std::find_if(groups.begin(), groups.end(), [&](const Group& g) { return g.takes(program); });
+    auto group = std::find_if(groups.begin(), groups.end(),
+                              [&, &program = program](const Group& g) { return g.takes(program); });
     if (folder_ || group == groups.end()) group = groups.insert(groups.end(), Group{});
     group->defines.add(program.defines());
     group->members.push_back(&program);
