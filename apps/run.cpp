@@ -14,7 +14,6 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/device_arguments.h"
-#include "apps/doubt.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
 #include "apps/option_arguments.h"
@@ -30,6 +29,7 @@
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/vision/doubt.h"
 #include "host/vision/file_io.h"
 
 namespace egosgm::app {
@@ -245,7 +245,9 @@ class Run {
                pipeline_.device().info().name);
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
                100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.path().string());
-    if (const std::string advice = advice_of(doubt_.text(), input_); !advice.empty()) fmt::print("{}\n", advice);
+    if (const std::string doubt = doubt_.text(); !doubt.empty()) {
+      fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
+    }
   }
 
   std::string text_of_doubt() const {
@@ -287,7 +289,7 @@ class Run {
   std::optional<Waiting> waiting_;     // until all is built
   Pipeline pipeline_;
   RunReport report_;
-  Doubt doubt_;
+  vision::Doubt doubt_;
   std::optional<Trace> trace_;
   std::deque<PreparedFrame> under_way_;
   Clock::time_point last_written_ = Clock::now();

@@ -48,12 +48,12 @@
 #define EGOSGM_EVIDENCE_FIRST 48
 // What has less than TRUSTED is given out where COUNT of the pixels on a grid around are confirmed and differ by no
 // more than SAME_SURFACE, and is named flat: the images hardly say that it is there. A measurement that no prediction
-// shares counts where LEAST of them were measured as much, but for LONE.
+// shares counts where LEAST of them are measured as much, but for LONE.
 #define EGOSGM_EVIDENCE_TRUSTED 96
 #define EGOSGM_SUPPORTERS_RADIUS 16
 #define EGOSGM_SUPPORTERS_STEP 8
 #define EGOSGM_SUPPORTERS_COUNT 8
-#define EGOSGM_SUPPORTERS_LEAST 2
+#define EGOSGM_SUPPORTERS_LEAST 1
 #define EGOSGM_LONE_PX 2.0f
 #define EGOSGM_SAME_SURFACE_PX 4.0f
 // The coarse match confirms a disparity that differs by no more than one of its pixels.

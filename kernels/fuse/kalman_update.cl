@@ -104,7 +104,7 @@ static inline Verdict judged(const int repeats, const Ints before, const Ints no
   return verdict;
 }
 
-// The measurements without those that no prediction shares and hardly a measurement around.
+// The measurements without those that neither a prediction nor a measurement around shares.
 static inline Floats without_lone(const ImageSize size, const int x, const int y, const Floats d, const Floats z,
                                   const float gate, global const float* measured) {
   const Ints is_shared = (d > INVALID) & (fabs(z - d) <= gate);

@@ -274,7 +274,7 @@ struct Pixel {
   int now = 0;
   float found = kNone;
   bool repeats = false;
-  int supporters = 2;
+  int supporters = 1;
 };
 struct Judged {
   Estimate estimate;
@@ -315,8 +315,8 @@ TEST(KalmanUpdate, EvidenceAddsUpAndDecays) {
 
 TEST(KalmanUpdate, AMeasurementAloneDoesNotCountUnlessThePredictionSharesIt) {
   EXPECT_EQ(judged({.measured = 5, .now = 96}), (Judged{{5, 1}, 96 - 72}));
-  EXPECT_EQ(judged({.measured = 5, .now = 96, .supporters = 1}), (Judged{kNothing, 0}));
-  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 64, .now = 96, .supporters = 1}),
+  EXPECT_EQ(judged({.measured = 5, .now = 96, .supporters = 0}), (Judged{kNothing, 0}));
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 64, .now = 96, .supporters = 0}),
             (Judged{{5, 1}, 45 + 96 - 24}))
       << "it contradicts nothing";
   EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40, .supporters = 0}),
