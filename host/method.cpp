@@ -27,7 +27,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_.write(plan,
                    {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), result,
-                    w.fusion.doubtful, evidence_of(plan, after)},
+                    w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence},
                    {given_out.variance, w.dynamic, w.reasons});
   });
   if (plan.wanted.variance) result.variance = given_out.variance;

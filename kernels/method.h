@@ -37,7 +37,7 @@
 // A pixel's evidence is a sum over frames, at most MOST: of what it was, so many 64ths are kept, and a frame adds what
 // its images say, less what noise must not reach. What was chosen in this frame alone, and not by the coarse match too,
 // has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is confirmed from
-// CONFIRMED on, and given out by itself from TRUSTED on. A full-range match that both views confirm begins with FIRST.
+// CONFIRMED on, and given out by itself from TRUSTED on, with which a full-range match that both views confirm begins.
 // Where a match lies outside of the other image, nothing can be asked, and so many 64ths are kept.
 #define EGOSGM_EVIDENCE_MOST 160
 #define EGOSGM_EVIDENCE_KEPT 45
@@ -45,7 +45,6 @@
 #define EGOSGM_EVIDENCE_OF_NOISE 24
 #define EGOSGM_EVIDENCE_OF_CHOICE 48
 #define EGOSGM_EVIDENCE_CONFIRMED 32
-#define EGOSGM_EVIDENCE_FIRST 48
 // What has less than TRUSTED is given out where COUNT of the pixels on a grid around are confirmed and differ by no
 // more than SAME_SURFACE, and is named flat: the images hardly say that it is there. A measurement that no prediction
 // shares counts where LEAST of them are measured as much, but for LONE.
@@ -97,8 +96,9 @@
 // A pixel that nothing was warped to was uncovered where what was warped this near in its row lies that far apart.
 #define EGOSGM_UNCOVERED_RADIUS 8
 #define EGOSGM_UNCOVERED_JUMP_PX 3.0f
-// A texture repeats where the census code of a pixel, and in the mean the nine of a grid with this step, are found
-// again at least so many pixels off, but for so many bits.
+// The texture of a block repeats where the codes of a grid of this radius and step around its middle are found again in
+// their row, at least so many pixels off, and differ by no more bits in all than those of its match, or than BITS each.
+#define EGOSGM_REPEAT_RADIUS 8
 #define EGOSGM_REPEAT_STEP 4
 #define EGOSGM_LEAST_REPEAT_PX 4
 #define EGOSGM_REPEAT_BITS 3

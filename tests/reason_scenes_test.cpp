@@ -9,6 +9,7 @@
 #include <ostream>
 #include <random>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "egosgm/pipeline.h"
@@ -92,21 +93,22 @@ Point look(const Scenery& scene, int frame, int view, int x, int y) {
   return {0, 0};
 }
 
-/// Both views, with a little noise that no constant has, as 16 bits; and the left view's disparities.
+/// Both views, with noise of `sigma_grey`, as 16 bits; and the left view's disparities.
 struct Pictures {
   std::vector<int> greys;
   std::vector<double> truth;
 };
 
-Pictures render(const Scenery& scene, int frame) {
+Pictures render(const Scenery& scene, int frame, double sigma_grey) {
   Pictures pictures;
   std::mt19937 random(static_cast<unsigned>(frame) + 1);
+  std::normal_distribution<double> noise;
   for (const int view : {EGOSGM_LEFT, EGOSGM_RIGHT}) {
     for (int y = 0; y < kImage.height; ++y) {
       for (int x = 0; x < kImage.width; ++x) {
         const Point point = look(scene, frame, view, x, y);
         if (view == EGOSGM_LEFT) pictures.truth.push_back(point.disparity);
-        double grey = point.grey + static_cast<double>(random() % 100) / 50 - 1;
+        double grey = point.grey + sigma_grey * noise(random);
         const auto& blind = scene.blind;
         const bool is_blind = frame == scene.frames - 1 && blind && x >= blind->left && x < blind->right &&
                               y >= blind->top && y < blind->bottom;
@@ -128,7 +130,7 @@ struct Shares {
   std::string counts;  // of every reason
 };
 
-Shares shares(const Scenery& scene, const PipelineOptions& options, Reason reason) {
+Shares shares(const Scenery& scene, const PipelineOptions& options, Reason reason, double sigma_grey) {
   Pipeline pipeline(kCamera, kImage.width, kImage.height, options);
   OutputMemory outputs(kImage);
   Pictures pictures;
@@ -136,7 +138,7 @@ Shares shares(const Scenery& scene, const PipelineOptions& options, Reason reaso
   motion.current_from_previous.translation() =
       -Eigen::Vector3d(scene.camera_right_a_frame_m, 0, scene.camera_forward_a_frame_m);
   for (int frame = 0; frame < scene.frames; ++frame) {
-    pictures = render(scene, frame);
+    pictures = render(scene, frame, sigma_grey);
     const ImageMemory left(kImage, pictures.greys, EGOSGM_LEFT, PixelType::kU8),
         right(kImage, pictures.greys, EGOSGM_RIGHT, PixelType::kU8);
     pipeline.process(left.view(), right.view(), frame > 0 ? std::optional(motion) : std::nullopt, outputs.views());
@@ -208,26 +210,34 @@ std::vector<Case> cases() {
   const Scenery blind{{leaving, kWall}, 3, 0, 0, Rectangle{50, 22, 135, 88}};
   all.push_back({"predicted", Reason::kPredicted, 400, blind});
   // What the board uncovered while the cameras were blind is missing: nothing is given out there without evidence.
-  all.push_back({"predicted_left_tracked", Reason::kPredicted, 500, blind, track_left, 0.6, 0.21});
+  all.push_back({"predicted_left_tracked", Reason::kPredicted, 500, blind, track_left, 0.6, 0.22});
   return all;
 }
 
-class ReasonScenes : public ::testing::TestWithParam<Case> {};
+constexpr double kNoise_grey[] = {0, 1, 2, 4};
+constexpr double kStrongNoise_grey = 4, kSlackInStrongNoise = 0.06;
+
+class ReasonScenes : public ::testing::TestWithParam<std::tuple<Case, double>> {};
 
 TEST_P(ReasonScenes, OfAReasonsPixelsMostAreWrongOrMissingOfTheOthersFew) {
-  const Case& one = GetParam();
+  const auto& [one, sigma_grey] = GetParam();
   PipelineOptions options;
   options.disparities = kDisparities;
   one.change(options);
-  const Shares found = shares(one.scene, options, one.reason);
+  const Shares found = shares(one.scene, options, one.reason, sigma_grey);
+  const double slack = sigma_grey == kStrongNoise_grey ? kSlackInStrongNoise : 0;
   SCOPED_TRACE(found.counts);
   EXPECT_GE(found.with.pixels, one.least_pixels);
-  EXPECT_GT(found.with.part(), one.least_part) << found.with.pixels << " pixels";
-  EXPECT_LT(found.without.part(), one.most_of_others) << found.without.pixels << " pixels";
+  EXPECT_GT(found.with.part(), one.least_part - slack) << found.with.pixels << " pixels";
+  EXPECT_LT(found.without.part(), one.most_of_others + slack) << found.without.pixels << " pixels";
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, ReasonScenes, ::testing::ValuesIn(cases()),
-                         [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Scenes, ReasonScenes,
+                         ::testing::Combine(::testing::ValuesIn(cases()), ::testing::ValuesIn(kNoise_grey)),
+                         [](const auto& info) {
+                           return std::get<0>(info.param).name + "_noise_" +
+                                  std::to_string(static_cast<int>(std::get<1>(info.param)));
+                         });
 
 }  // namespace
 }  // namespace egosgm::testing

@@ -45,7 +45,7 @@ void FuseRoom::update(const Plan& plan, const Matched& matched, const Prediction
 
 void FuseRoom::begin(Belief& belief) const {
   context_.enter("Evidence");
-  belief.evidence.fill(context_, EGOSGM_EVIDENCE_FIRST);
+  belief.evidence.fill(context_, EGOSGM_EVIDENCE_TRUSTED);
 }
 
 void FuseRoom::publish(const Plan& plan, const Belief& belief, bool with_variance, const GivenOut& given_out) {

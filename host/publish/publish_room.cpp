@@ -4,8 +4,9 @@
 namespace egosgm {
 
 PublishRoom::PublishRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
-    : context_(context),
-      reasons_([&context, size, options](PixelType type) { return Reasons(context, size, type, options); }) {
+    : context_(context), reasons_([&context, size, options, repeats = Reasons::repeats(context, size)](PixelType type) {
+        return Reasons(context, size, type, options, repeats);
+      }) {
   if (options.output_variance.enabled) output_variance_.emplace(context, size, options.output_variance);
   if (options.temporal) dynamic_map_.emplace(context, size);
 }

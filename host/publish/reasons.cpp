@@ -3,6 +3,7 @@
 
 #include "host/match/banded_sgm.h"
 #include "host/match/census.h"
+#include "host/search/coarse_match.h"
 
 namespace egosgm {
 namespace {
@@ -55,14 +56,21 @@ const char* to_string(Reason reason) {
   return "";
 }
 
+Reasons::Bytes Reasons::repeats(ocl::Context& context, shared::ImageSize size) {
+  return Bytes(context, pixel_count(CoarseMatch::coarse_size(size)));
+}
+
 Reasons::Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, const MethodOptions& options,
-                 int pixels)
+                 const Bytes& repeats, int pixels)
     : context_((context.enter("Reasons"), context)),
       size_(size),
+      blocks_(CoarseMatch::coarse_size(size)),
       pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       disparities_(options.disparities),
       has_census_(options.banded_sgm.cost != MatchingCost::kSad3x3),
       padding_(BandedSgm::code_padding(range_of(options))),
+      repeats_(repeats),
+      find_repeats_(build(context, type, options.banded_sgm, pixels_), "find_repeats"),
       explain_(build(context, type, options.banded_sgm, pixels_), "explain") {}
 
 void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
@@ -70,12 +78,15 @@ void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
   const cl_int has_prediction = inputs.prediction ? 1 : 0, has_runs = inputs.runs ? 1 : 0;
   const Bytes& bytes = inputs.images.pixels;  // in place of what there is not
   const ocl::Buffer<cl_ushort> no_runs(bytes.get(), 1);
-  explain_(context_, ocl::every_pixels(context_, size_, pixels_, /*views=*/1), size_, disparities_, bytes, has_census_,
-           padding_, inputs.codes, has_prediction,
-           inputs.prediction ? inputs.prediction->warped.disparity : inputs.measured.disparity,
+  if (has_census_) {
+    find_repeats_(context_, ocl::every_pixels(context_, blocks_, pixels_, /*views=*/1), size_, disparities_, padding_,
+                  inputs.codes, inputs.measured.disparity, repeats_);
+  }
+  explain_(context_, ocl::every_pixels(context_, size_, pixels_, /*views=*/1), size_, bytes, has_census_, repeats_,
+           has_prediction, inputs.prediction ? inputs.prediction->warped.disparity : inputs.measured.disparity,
            inputs.prediction ? inputs.prediction->hidden : bytes, inputs.measured.disparity, has_runs,
            inputs.runs ? *inputs.runs : no_runs, inputs.belief.disparity, inputs.doubtful, inputs.evidence != nullptr,
-           inputs.evidence ? *inputs.evidence : inputs.doubtful, reasons);
+           inputs.evidence ? *inputs.evidence : inputs.doubtful, inputs.block_evidence, reasons);
 }
 
 }  // namespace egosgm

@@ -22,12 +22,18 @@ class Reasons {
     const StereoMaps& measured;
     const ocl::Buffer<cl_ushort>* runs;  // of SpeckleRemoval; null: it is off
     const StereoMaps& belief;
-    const FlagMap& doubtful;  // what KalmanUpdate says; not read without a prediction
-    const FlagMap* evidence;  // the same; null: the method has none
+    const FlagMap& doubtful;                    // what KalmanUpdate says; not read without a prediction
+    const FlagMap* evidence;                    // the same; null: the method has none
+    const ocl::Buffer<cl_int>& block_evidence;  // of Evidence; not read without evidence
   };
 
-  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
-  Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, const MethodOptions& options, int pixels = 0);
+  /// Of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels, a byte each: whether its texture repeats.
+  static Bytes repeats(ocl::Context& context, shared::ImageSize size);
+
+  /// `repeats`: memory that this type of pixels may share with others. `pixels` of a work-item, 1 or 16; 0: by the
+  /// device. Same bits.
+  Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, const MethodOptions& options,
+          const Bytes& repeats, int pixels = 0);
 
   void explain(const Inputs& inputs, Bytes& reasons);
 
@@ -35,12 +41,14 @@ class Reasons {
   using In = const ocl::Buffer<float>;
 
   ocl::Context& context_;
-  const shared::ImageSize size_;
+  const shared::ImageSize size_, blocks_;
   const int pixels_;
   const cl_int disparities_, has_census_, padding_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const Bytes, const cl_int, const cl_int,
-              const ocl::Buffer<cl_uint>, const cl_int, In, const FlagMap, In, const cl_int,
-              const ocl::Buffer<cl_ushort>, In, const FlagMap, const cl_int, const FlagMap, Bytes>
+  Bytes repeats_;  // of blocks
+  ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const ocl::Buffer<cl_uint>, In, Bytes> find_repeats_;
+  ocl::Kernel<const shared::ImageSize, const Bytes, const cl_int, const Bytes, const cl_int, In, const FlagMap, In,
+              const cl_int, const ocl::Buffer<cl_ushort>, In, const FlagMap, const cl_int, const FlagMap,
+              const ocl::Buffer<cl_int>, Bytes>
       explain_;
 };
 

@@ -15,7 +15,7 @@ enum class Reason : std::uint8_t {
   kUncovered,     // came into view only now, from behind something nearer
   kContradicted,  // prediction and measurement contradict each other: it moves, or one of them is wrong
   kNearer,        // no value: nearer than the range, or hidden by something that is
-  kAmbiguous,     // the texture repeats along the row
+  kAmbiguous,     // another place of the row looks as much like it as its match
   kFlat,          // no texture
   kSaturated,     // black or white, beyond what the camera can tell
   kSpeckle,       // no value: what was measured belongs to a small island

@@ -76,44 +76,81 @@ static inline Floats jump_in_row(global const float* warped, const int x, const 
   return most - least;
 }
 
-static inline Ints distances(global const Code* own, global const Code* other) {
-#if PIXELS == 1
-  return convert_int(popcount(*own ^ *other));
-#else
-  return convert_int16(popcount(load_codes(own) ^ load_codes(other)));
-#endif
-}
-
-// Which of `asked` look like the pixels at `other`: their own codes, and in the mean those of a grid around.
-static inline Ints are_alike(const Ints asked, global const Code* own, global const Code* other, const long above,
-                             const long below) {
-  const Ints maybe = asked & (distances(own, other) <= EGOSGM_REPEAT_BITS);
-  if (!any_of(maybe)) return 0;
-  Ints bits = 0;
-  int most = 0;
-  for (int v = -1; v <= 1; ++v) {
-    const long row = v < 0 ? above : v > 0 ? below : 0;
-    if (v != 0 && row == 0) continue;
-    for (int u = -EGOSGM_REPEAT_STEP; u <= EGOSGM_REPEAT_STEP; u += EGOSGM_REPEAT_STEP) {
-      bits += distances(own + row + u, other + row + u);
-      most += EGOSGM_REPEAT_BITS;
+// How many bits the codes of a grid around a pixel differ from those around another place, where columns lead in
+// `direction`, in all; a sum beyond `most` need not be whole. `stride`: of rows of codes.
+static inline int bits_apart_around(global const Code* own, global const Code* other, const int direction,
+                                    const long stride, const int y, const int height, const int most) {
+  int bits = 0;
+  for (int v = -EGOSGM_REPEAT_RADIUS; v <= EGOSGM_REPEAT_RADIUS && bits <= most; v += EGOSGM_REPEAT_STEP) {
+    if (y + v < 0 || y + v >= height) continue;
+    for (int u = -EGOSGM_REPEAT_RADIUS; u <= EGOSGM_REPEAT_RADIUS; u += EGOSGM_REPEAT_STEP) {
+      bits += (int)popcount(own[v * stride + u] ^ other[v * stride + direction * u]);
     }
   }
-  return maybe & (bits <= (Ints)(most));
+  return bits;
 }
 
-// Which pixels of `asked` look like another one of their row that a disparity of the range may take for it. `above`,
-// `below`: from a row of codes to those EGOSGM_REPEAT_STEP away; 0: there is none. REQUIRES: codes with a padding of
-// the number of disparities, of pixels and of steps.
-static inline Ints repeats(const Ints asked, const int disparities, global const Code* codes, const long above,
-                           const long below, const int x, const int width) {
-  const Ints at = x + LANE_INDICES;
-  Ints left = asked;
-  for (int k = EGOSGM_LEAST_REPEAT_PX; k < disparities && any_of(left); ++k) {
-    left &= !are_alike(left & (at >= (Ints)(k)), codes + x, codes + x - k, above, below);
-    left &= !are_alike(left & (at < (Ints)(width - k)), codes + x, codes + x + k, above, below);
+// Whether the pixel in the middle of a block looks like another one of its row that a disparity of the range may take
+// for it: by no more bits than noise makes it differ from its match. `measured`: of the left view. REQUIRES: codes with
+// a padding of the number of disparities and of the grid.
+COMPILED_ONCE void find_repeats_row(const WorkItem at, const ImageSize size, const int disparities, const int padding,
+                                    global const uint* all_codes, global const float* measured, global uchar* repeats) {
+  const int width = size.width, height = size.height;
+  const int columns = (width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int y = min(at.y * EGOSGM_COARSE + EGOSGM_COARSE / 2, height - 1);
+  const long stride = width + 2 * (long)padding;
+  global const Code* left = (global const Code*)all_codes + y * stride + padding;
+  global const Code* right = left + height * stride;  // from right to left
+  int places = 0;
+  for (int v = -EGOSGM_REPEAT_RADIUS; v <= EGOSGM_REPEAT_RADIUS; v += EGOSGM_REPEAT_STEP) {
+    if (y + v >= 0 && y + v < height) places += 2 * EGOSGM_REPEAT_RADIUS / EGOSGM_REPEAT_STEP + 1;
   }
-  return asked & !left;
+  for (int block = at.x; block < columns; block += at.items) {
+    const int x = min(block * EGOSGM_COARSE + EGOSGM_COARSE / 2, width - 1);
+    global const Code* own = left + x;
+    global const float* of_row = measured + (size_t)y * width;
+    float d = of_row[x];  // or that of the first pixel beside it that has one
+    for (int u = x / EGOSGM_COARSE * EGOSGM_COARSE; u < width && u < x + 2 && d <= EGOSGM_INVALID_DISPARITY; ++u) {
+      d = of_row[u];
+    }
+    const int match = width - 1 - x + (int)(d + 0.5f);
+    int most = EGOSGM_REPEAT_BITS * places;
+    if (d > EGOSGM_INVALID_DISPARITY && match >= 0 && match < width) {
+      most = max(most, bits_apart_around(own, right + match, -1, stride, y, height, INT_MAX));
+    }
+    int found = 0;
+    for (int k = EGOSGM_LEAST_REPEAT_PX; k < disparities && !found; ++k) {
+      if (x >= k) found = bits_apart_around(own, own - k, 1, stride, y, height, most) <= most;
+      if (x < width - k) found |= bits_apart_around(own, own + k, 1, stride, y, height, most) <= most;
+    }
+    repeats[(size_t)at.y * columns + block] = (uchar)found;
+  }
+}
+
+KERNEL void find_repeats(const ImageSize size, const int disparities, const int padding, global const uint* all_codes,
+                         global const float* measured, global uchar* repeats) {
+  find_repeats_row(THIS_WORK_ITEM, size, disparities, padding, all_codes, measured, repeats);
+}
+
+// Whether what was matched in the blocks that pixels lie in is no better than the best of many matches of noise. Where
+// nothing was matched, it is not known.
+static inline Ints is_like_noise(global const int* blocks, const int x) {
+#if PIXELS == 1
+  const int evidence = blocks[x / EGOSGM_COARSE];
+#else
+  const int16 evidence = vload4(0, blocks + x / EGOSGM_COARSE).s0000111122223333;
+#endif
+  return (evidence != 0) & (evidence < EGOSGM_EVIDENCE_OF_NOISE + EGOSGM_EVIDENCE_OF_CHOICE);
+}
+
+static inline Ints are_repeated(global const uchar* repeats, const int x, const int width) {
+#if PIXELS == 1
+  return repeats[x / EGOSGM_COARSE];
+#else
+  int lanes[PIXELS];
+  for (int i = 0; i < PIXELS; ++i) lanes[i] = x + i < width && repeats[(x + i) / EGOSGM_COARSE] ? -1 : 0;
+  return vload16(0, lanes);
+#endif
 }
 
 // Whether SpeckleRemoval looked at a pixel.
@@ -127,21 +164,20 @@ static inline Ints has_run(global const ushort* runs, const int x, const int wid
 #endif
 }
 
-// `all_codes`: Census's, read where they are a census and no grey values. `runs`: SpeckleRemoval's.
-// `doubtful`, `evidence`: KalmanUpdate's. What there is not (has_prediction, has_runs, has_evidence) may be any buffer.
-COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const int disparities,
-                               global const uchar* images, const int has_census, const int padding,
-                               global const uint* all_codes, const int has_prediction, global const float* warped,
-                               global const uchar* hidden, global const float* measured, const int has_runs,
-                               global const ushort* runs, global const float* disparity, global const uchar* doubtful,
-                               const int has_evidence, global const uchar* evidence, global uchar* reasons) {
+// `repeats`: of find_repeats. `runs`: of SpeckleRemoval. `doubtful`, `evidence`: of KalmanUpdate. `block_evidence`: of
+// Evidence. What there is not (has_repeats, has_prediction, has_runs, has_evidence) may be any buffer.
+COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, global const uchar* images,
+                               const int has_repeats, global const uchar* repeats, const int has_prediction,
+                               global const float* warped, global const uchar* hidden, global const float* measured,
+                               const int has_runs, global const ushort* runs, global const float* disparity,
+                               global const uchar* doubtful, const int has_evidence, global const uchar* evidence,
+                               global const int* block_evidence, global uchar* reasons) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
-  const long stride = width + 2 * (long)padding;
-  global const Code* codes = (global const Code*)all_codes + y * stride + padding;
-  const long above = y >= EGOSGM_REPEAT_STEP ? -EGOSGM_REPEAT_STEP * stride : 0;
-  const long below = y + EGOSGM_REPEAT_STEP < size.height ? EGOSGM_REPEAT_STEP * stride : 0;
+  const int columns = (width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  global const uchar* repeats_of_blocks = repeats + (size_t)(y / EGOSGM_COARSE) * columns;
+  global const int* evidence_of_blocks = block_evidence + (size_t)(y / EGOSGM_COARSE) * EGOSGM_EVIDENCE_STRIDE(width);
   const Floats jump = EGOSGM_UNCOVERED_JUMP_PX;
   const Floats off = EGOSGM_DIFFERENCE_PX;
 
@@ -159,19 +195,20 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const in
     const Ints is_speckle = has_runs ? has_run(runs + row, x, width) & !is_measured : (Ints)(0);
     const Ints is_uncovered = has_prediction ? (jump_in_row(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
     const Texture texture = texture_around(size, (global const Pixel*)images, x, y);
-    const Ints is_weak = (Ints)(has_evidence ? -1 : 0) & has_value & is_measured &
-                         (load_bytes(evidence + row, x, width) < EGOSGM_EVIDENCE_TRUSTED);
+    Ints is_weak = 0;
+    if (has_evidence) {
+      is_weak = has_value      ? is_measured & (load_bytes(evidence + row, x, width) < EGOSGM_EVIDENCE_TRUSTED)
+                : is_uncovered ? (Ints)(0)
+                               : is_like_noise(evidence_of_blocks, x);
+    }
     const Ints is_flat =
         (texture.changes < (Floats)(EGOSGM_LEAST_CHANGE * STEPS_PER_GREY * texture.pixels)) | (is_weak != 0);
     const Ints is_saturated = 2.0f * texture.extremes >= (Floats)(texture.pixels);
 
     Ints reason = has_value ? (Ints)(EGOSGM_REASON_TRUSTED) : (Ints)(EGOSGM_REASON_UNCONFIRMED);
-    reason = is_uncovered ? (Ints)(EGOSGM_REASON_UNCOVERED) : reason;
-    const Ints is_explained =
-        is_uncovered | is_flat | is_saturated | is_speckle | contradicts | is_hidden | (has_value & !is_measured);
-    const Ints is_ambiguous =
-        has_census ? repeats(!is_explained, disparities, codes, above, below, x, width) : (Ints)(0);
+    const Ints is_ambiguous = has_repeats ? are_repeated(repeats_of_blocks, x, width) : (Ints)(0);
     reason = is_ambiguous ? (Ints)(EGOSGM_REASON_AMBIGUOUS) : reason;
+    reason = is_uncovered ? (Ints)(EGOSGM_REASON_UNCOVERED) : reason;
     reason = (has_value & !is_measured) ? (Ints)(EGOSGM_REASON_PREDICTED) : reason;
     reason = (is_speckle & !has_value) ? (Ints)(EGOSGM_REASON_SPECKLE) : reason;
     reason = is_flat ? (Ints)(EGOSGM_REASON_FLAT) : reason;
@@ -182,12 +219,12 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const in
   }
 }
 
-KERNEL void explain(const ImageSize size, const int disparities, global const uchar* images, const int has_census,
-                    const int padding, global const uint* all_codes, const int has_prediction,
-                    global const float* warped, global const uchar* hidden, global const float* measured,
-                    const int has_runs, global const ushort* runs, global const float* disparity,
-                    global const uchar* doubtful, const int has_evidence, global const uchar* evidence,
+KERNEL void explain(const ImageSize size, global const uchar* images, const int has_repeats,
+                    global const uchar* repeats, const int has_prediction, global const float* warped,
+                    global const uchar* hidden, global const float* measured, const int has_runs,
+                    global const ushort* runs, global const float* disparity, global const uchar* doubtful,
+                    const int has_evidence, global const uchar* evidence, global const int* block_evidence,
                     global uchar* reasons) {
-  explain_row(THIS_WORK_ITEM, size, disparities, images, has_census, padding, all_codes, has_prediction, warped, hidden,
-              measured, has_runs, runs, disparity, doubtful, has_evidence, evidence, reasons);
+  explain_row(THIS_WORK_ITEM, size, images, has_repeats, repeats, has_prediction, warped, hidden, measured, has_runs,
+              runs, disparity, doubtful, has_evidence, evidence, block_evidence, reasons);
 }

@@ -8,6 +8,7 @@
 
 #include "host/match/banded_sgm.h"
 #include "host/match/census.h"
+#include "kernels/method.h"
 #include "tests/reference/publish/reasons.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
@@ -22,7 +23,7 @@ PixelType type_of(const reference::ReasonInputs& inputs) {
   return inputs.white == 255 ? PixelType::kU8 : PixelType::kU16;
 }
 
-/// Of both views, the right one being black.
+/// Of both views; black is what `inputs` does not have.
 FrameImages upload_images(ocl::Context& context, shared::ImageSize size, const reference::ReasonInputs& inputs) {
   FrameImages images{ocl::Buffer<cl_uchar>(context, 4 * pixel_count(size)), type_of(inputs)};
   std::vector<cl_uchar> bytes;
@@ -56,16 +57,23 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   doubtful.write(context, inputs.doubtful);
   FlagMap evidence(context, 2 * pixel_count(size));
   if (!inputs.evidence.empty()) evidence.write(context, inputs.evidence);
+  const int columns = (size.width + 3) / 4, stride = EGOSGM_EVIDENCE_STRIDE(size.width);
+  std::vector<cl_int> blocks(static_cast<std::size_t>(stride) * ((size.height + 3) / 4));
+  for (std::size_t i = 0; i < inputs.block_evidence.size(); ++i) {
+    blocks[i / columns * stride + i % columns] = inputs.block_evidence[i];
+  }
+  ocl::Buffer<cl_int> block_evidence(context, blocks.size());
+  block_evidence.write(context, blocks);
   std::vector<cl_ushort> begins;
   for (const float d : inputs.consistent) begins.push_back(d == kNone ? 0xffff : 0);
   ocl::Buffer<cl_ushort> runs(context, begins.size());
   runs.write(context, begins);
   ocl::Buffer<cl_uchar> found(context, pixel_count(size));
   found.write(context, std::vector<cl_uchar>(pixel_count(size), 99));  // must not shine through
-  Reasons reasons(context, size, images.type, options, pixels);
+  Reasons reasons(context, size, images.type, options, Reasons::repeats(context, size), pixels);
   reasons.explain({images, codes, inputs.warped.empty() ? nullptr : &prediction, measured,
                    options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief, doubtful,
-                   inputs.evidence.empty() ? nullptr : &evidence},
+                   inputs.evidence.empty() ? nullptr : &evidence, block_evidence},
                   found);
   return found.read(context);
 }
@@ -99,7 +107,11 @@ reference::ReasonInputs random_inputs(shared::ImageSize size, int white, unsigne
     }
     inputs.hidden.push_back(inputs.belief.disparity[i] == kNone && tenth(random) < 2);
     inputs.evidence.push_back(static_cast<std::uint8_t>(tenth(random) < 7 ? 128 : 94 + tenth(random) % 4));
+    inputs.block_evidence.push_back(tenth(random) < 7   ? 72 + tenth(random)
+                                    : tenth(random) < 3 ? 0
+                                                        : 71 - 9 * tenth(random));
   }
+  inputs.block_evidence.resize(static_cast<std::size_t>((size.width + 3) / 4) * ((size.height + 3) / 4));
   return inputs;
 }
 
@@ -144,6 +156,7 @@ struct Scene {
     inputs.belief = {ten, std::vector<float>(2 * pixels, 0.5f)};
     inputs.hidden.assign(2 * pixels, 0);
     inputs.doubtful = inputs.hidden;
+    inputs.block_evidence.assign(16 * 10, 72);
     options.disparities = 32;
   }
 
@@ -151,6 +164,8 @@ struct Scene {
     for (int i = 0; i < 64 * 40; ++i) inputs.images[i] = grey_of_column(i % 64, i / 64);
   }
   Reason in_the_middle() {
+    inputs.images.resize(64 * 40);
+    for (int i = 0; i < 64 * 40; ++i) inputs.images.push_back(inputs.images[i / 64 * 64 + std::min(i % 64 + 10, 63)]);
     const std::vector<cl_uchar> found = reasons_of(kSize, options, inputs);
     EXPECT_EQ(reference::reasons(kSize, options, inputs), found);
     return static_cast<Reason>(found[kMiddle]);
@@ -214,6 +229,13 @@ TEST(Reasons, TrustsNothingThatTheImagesHardlySay) {
   scene.inputs.measured[Scene::kMiddle] = 10;
   scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
   EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "what has no value has no evidence either";
+  scene.inputs.block_evidence[5 * 16 + 8] = 0;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kUnconfirmed) << "nothing was matched there";
+  scene.inputs.block_evidence[5 * 16 + 8] = 71;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat) << "no better than noise";
+  scene.inputs.belief.disparity[Scene::kMiddle] = 10;
+  scene.inputs.evidence[Scene::kMiddle] = 96;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "it has a value";
 }
 
 TEST(Reasons, TellsWhatTheImageCannotTell) {

@@ -55,8 +55,9 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
     frame.dynamic = dynamic_map(size_, frame.predicted, frame.passes.back().measured);
   }
   frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
-  frame.evidence =
-      has_prediction ? frame.fused.evidence : std::vector<std::uint8_t>(frame.result.disparity.size(), kFirstEvidence);
+  frame.evidence = has_prediction ? frame.fused.evidence
+                                  : std::vector<std::uint8_t>(frame.result.disparity.size(),
+                                                              static_cast<std::uint8_t>(kTrustedEvidence));
   testing::HostMaps given_out = frame.result;
   if (has_prediction && has_evidence()) {
     testing::HostMaps belief = frame.result;
@@ -85,19 +86,20 @@ bool Pipeline::has_evidence() const {
 
 std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& frame) const {
   const Pass& pass = frame.passes.back();
-  return reasons(size_, options_,
-                 {.images = pass.images,
-                  .white = images.bits == 8 ? 255 : 65535,
-                  .codes = pass.codes,
-                  .code_padding = code_padding_,
-                  .warped = frame.warped.disparity,
-                  .hidden = frame.predicted.hidden,
-                  .consistent = pass.consistent.disparity,
-                  .measured = pass.measured.disparity,
-                  .belief = {frame.given_out, frame.result.variance},
-                  .doubtful = frame.fused.doubtful,
-                  .evidence = !frame.predicted.disparity.empty() && has_evidence() ? frame.evidence
-                                                                                   : std::vector<std::uint8_t>{}});
+  return reasons(
+      size_, options_,
+      {.images = pass.images,
+       .white = images.bits == 8 ? 255 : 65535,
+       .codes = pass.codes,
+       .code_padding = code_padding_,
+       .warped = frame.warped.disparity,
+       .hidden = frame.predicted.hidden,
+       .consistent = pass.consistent.disparity,
+       .measured = pass.measured.disparity,
+       .belief = {frame.given_out, frame.result.variance},
+       .doubtful = frame.fused.doubtful,
+       .evidence = !frame.predicted.disparity.empty() && has_evidence() ? frame.evidence : std::vector<std::uint8_t>{},
+       .block_evidence = frame.block_evidence});
 }
 
 void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
@@ -195,6 +197,7 @@ void Pipeline::update(const Images& images, Frame& frame) const {
         frame.warped.evidence,
         block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, frame.predicted, pass.measured),
         images.greys == greys_};
+    frame.block_evidence = evidence->blocks.evidence;
   }
   frame.fused =
       kalman_update(size_, options_.kalman_update, frame.predicted, pass.measured, evidence ? &*evidence : nullptr);

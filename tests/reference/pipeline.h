@@ -46,7 +46,8 @@ struct Frame {
   testing::HostMaps fused, fused_smoothed, fused_consistent, updated;
   testing::HostMaps result;  // on which the next frame rests
   std::vector<std::uint8_t> evidence;
-  std::vector<float> given_out;  // disparities that are confirmed
+  std::vector<int> block_evidence;  // of both views
+  std::vector<float> given_out;     // disparities that are confirmed
   std::vector<std::uint8_t> dynamic, reasons;
   std::vector<float> output_variance;  // given out in place of the result's
   float vertical_offset_px = 0;        // that the last pass was resampled by in the middle

@@ -33,11 +33,13 @@ class Pixels {
     if (static_cast<float>(window.changes) < kLeastChange * static_cast<float>(in_.white / 255 * window.pixels)) {
       return Reason::kFlat;
     }
+    const bool is_uncovered = !in_.warped.empty() && w == kNone && jump_beside(x, y) > kUncoveredJumpPx;
+    if (d == kNone && !is_uncovered && is_like_noise(x, y)) return Reason::kFlat;
     const bool removes_speckles = options_.speckle_removal.max_size_px > 0;
     if (removes_speckles && d == kNone && z == kNone && in_.consistent[i] != kNone) return Reason::kSpeckle;
     if (d != kNone && z == kNone) return Reason::kPredicted;
     if (d != kNone && !in_.evidence.empty() && in_.evidence[i] < kTrustedEvidence) return Reason::kFlat;
-    if (!in_.warped.empty() && w == kNone && jump_beside(x, y) > kUncoveredJumpPx) return Reason::kUncovered;
+    if (is_uncovered) return Reason::kUncovered;
     if (options_.banded_sgm.cost != MatchingCost::kSad3x3 && repeats(x, y)) return Reason::kAmbiguous;
     return d == kNone ? Reason::kUnconfirmed : Reason::kTrusted;
   }
@@ -72,34 +74,54 @@ class Pixels {
     return *most - *least;
   }
 
-  /// Of the codes at two places of a row, `step` columns and rows off; columns may lie in the padding.
-  int distance(int a, int b, int y) const {
+  bool is_like_noise(int x, int y) const {
+    if (in_.evidence.empty()) return false;
+    const int evidence = in_.block_evidence[(y / 4) * ((size_.width + 3) / 4) + x / 4];
+    return evidence != 0 && evidence < kEvidenceOfNoise + kEvidenceOfChoice;
+  }
+
+  /// How many bits the codes of a grid around a pixel of the left view differ from those around another column, of the
+  /// right view where `view` says so, in all; how many places the grid has. Columns may lie in the padding.
+  struct Bits {
+    int sum = 0, places = 0;
+  };
+  Bits bits_apart(int x, int other, int y, int view) const {
     const int words = word_count(options_.banded_sgm.cost);
-    const std::size_t row = static_cast<std::size_t>(y) * (size_.width + 2 * in_.code_padding) + in_.code_padding;
-    int bits = 0;
-    for (int word = 0; word < words; ++word) {
-      bits += std::popcount(in_.codes[(row + a) * words + word] ^ in_.codes[(row + b) * words + word]);
+    const int stride = size_.width + 2 * in_.code_padding;
+    const auto code = [&](int of_view, int column, int row, int word) {
+      const int place = of_view == EGOSGM_LEFT ? column : size_.width - 1 - column;
+      const long at = static_cast<long>(of_view * size_.height + row) * stride + in_.code_padding + place;
+      return in_.codes[static_cast<std::size_t>(at * words + word)];
+    };
+    Bits bits;
+    for (int v = y - kRepeatRadius; v <= y + kRepeatRadius; v += kRepeatStep) {
+      if (v < 0 || v >= size_.height) continue;
+      for (int u = -kRepeatRadius; u <= kRepeatRadius; u += kRepeatStep) {
+        ++bits.places;
+        for (int word = 0; word < words; ++word) {
+          bits.sum += std::popcount(code(EGOSGM_LEFT, x + u, v, word) ^ code(view, other + u, v, word));
+        }
+      }
     }
     return bits;
   }
 
-  bool is_alike(int x, int other, int y) const {
-    if (distance(x, other, y) > kRepeatBits) return false;
-    int bits = 0, places = 0;
-    for (const int v : {y - kRepeatStep, y, y + kRepeatStep}) {
-      for (const int u : {-kRepeatStep, 0, kRepeatStep}) {
-        if (v < 0 || v >= size_.height) continue;
-        ++places;
-        bits += distance(x + u, other + u, v);
-      }
-    }
-    return bits <= kRepeatBits * places;
+  int most_bits(int x, int y) const {
+    float z = in_.measured[index(x, y)];
+    for (int u = x / 4 * 4; z == kNone && u < std::min(x / 4 * 4 + 4, size_.width); ++u) z = in_.measured[index(u, y)];
+    const int match = x - static_cast<int>(z + 0.5f);
+    const bool is_seen = z != kNone && match >= 0 && match < size_.width;
+    const Bits around = bits_apart(x, is_seen ? match : x, y, is_seen ? EGOSGM_RIGHT : EGOSGM_LEFT);
+    return std::max(around.sum, kRepeatBits * around.places);
   }
 
-  bool repeats(int x, int y) const {
+  /// Of the block of 4x4 pixels around, by the pixel in its middle.
+  bool repeats(int of_x, int of_y) const {
+    const int x = std::min(of_x / 4 * 4 + 2, size_.width - 1), y = std::min(of_y / 4 * 4 + 2, size_.height - 1);
+    const int most = most_bits(x, y);
     for (int k = kLeastRepeatPx; k < options_.disparities; ++k) {
-      if (x - k >= 0 && is_alike(x, x - k, y)) return true;
-      if (x + k < size_.width && is_alike(x, x + k, y)) return true;
+      if (x - k >= 0 && bits_apart(x, x - k, y, EGOSGM_LEFT).sum <= most) return true;
+      if (x + k < size_.width && bits_apart(x, x + k, y, EGOSGM_LEFT).sum <= most) return true;
     }
     return false;
   }

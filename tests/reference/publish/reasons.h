@@ -22,6 +22,7 @@ struct ReasonInputs {
   testing::HostMaps belief;
   std::vector<std::uint8_t> doubtful;  // of the update; not read without a prediction
   std::vector<std::uint8_t> evidence;  // the same; empty: the method has none
+  std::vector<int> block_evidence;     // as block_evidence() has it, of the left view at least
 };
 
 std::vector<std::uint8_t> reasons(shared::ImageSize size, const MethodOptions& options, const ReasonInputs& inputs);
