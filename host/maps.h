@@ -47,8 +47,8 @@ class OfEachType {
 /// A map of both views, the left one first.
 using Map = ocl::Buffer<float>;
 
-/// Disparity [px] and variance [px^2] of both views. Variance is 0 where the disparity is invalid. A copy shares the
-/// device's memory.
+/// Disparity [px] and variance [px^2] of both views. Where there is no disparity, a variance means nothing. A
+/// copy shares the device's memory.
 struct StereoMaps {
   Map disparity, variance;
 
@@ -60,7 +60,7 @@ struct StereoMaps {
 /// Where a frame writes what is given out of its belief.
 struct GivenOut {
   Map& disparity;  // what is confirmed; not written where that is all of the belief
-  Map& variance;   // see PublishRoom
+  Map& variance;   // of what is given out
 };
 
 /// A map of both views of bytes: 1 where something holds, else 0.

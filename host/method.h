@@ -20,7 +20,7 @@ struct Workspace {
   Prediction prediction;
   FrameImages aligned;
   VerticalOffset first_offset;  // found by the first of two matches
-  Measurement coarse;           // what CoarseMatch found
+  Map coarse;                   // disparities that CoarseMatch found
   SearchBands bands;
   Matching matching;
   StereoMaps measured;  // where there is a prediction to fuse it with; else the belief's memory
@@ -71,7 +71,7 @@ class Method {
               VerticalOffset& refined);
   void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
             Fusion& fusion, Belief& belief);
-  StereoMaps confirmed(const Plan& plan, const Belief& belief, const GivenOut& given_out);
+  Map confirmed(const Plan& plan, const Belief& belief, Map& confirmed);
   const FlagMap* evidence_of(const Plan& plan, const Belief& belief) const;
 
   const MethodOptions options_;

@@ -55,11 +55,10 @@ void Evidence::operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* c
           blocks.found);
 }
 
-void Evidence::publish(const StereoMaps& belief, const FlagMap& evidence, bool with_variance, const GivenOut& given_out,
-                       Views views, Views tracked) {
+void Evidence::publish(const Map& disparity, const FlagMap& evidence, Map& confirmed, Views views, Views tracked) {
   context_.enter("Evidence");
   publish_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, tracked == Views::kLeft,
-           belief.disparity, evidence, given_out.disparity, with_variance, belief.variance, given_out.variance);
+           disparity, evidence, confirmed);
 }
 
 }  // namespace egosgm

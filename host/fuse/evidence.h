@@ -37,10 +37,8 @@ class Evidence {
   void operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* coarse, const Map& predicted,
                   const Map& measured, BlockEvidence& blocks, Views views);
 
-  /// Writes the disparities that are confirmed, and with_variance their variances. `tracked`: the views that have
-  /// evidence of their own.
-  void publish(const StereoMaps& belief, const FlagMap& evidence, bool with_variance, const GivenOut& given_out,
-               Views views, Views tracked);
+  /// Writes the disparities that are confirmed. `tracked`: the views that have evidence of their own.
+  void publish(const Map& disparity, const FlagMap& evidence, Map& confirmed, Views views, Views tracked);
 
  private:
   using Words = const ocl::Buffer<cl_uint>;
@@ -58,8 +56,7 @@ class Evidence {
               const Map, Sums>
       compare_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const Sums, ocl::Buffer<cl_int>, Map> gather_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const FlagMap, Map, const cl_int, const Map, Map>
-      publish_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const FlagMap, Map> publish_;
 };
 
 }  // namespace egosgm

@@ -39,8 +39,8 @@ void FuseRoom::update(const Plan& plan, const Matched& matched, const Prediction
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (plan.tracked == Views::kLeft) right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.right);
   const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
-  consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
-  if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief, checked);
+  consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, checked);
+  if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief.disparity, checked);
 }
 
 void FuseRoom::begin(Belief& belief) const {
@@ -48,9 +48,9 @@ void FuseRoom::begin(Belief& belief) const {
   belief.evidence.fill(context_, EGOSGM_EVIDENCE_FIRST);
 }
 
-void FuseRoom::publish(const Plan& plan, const Belief& belief, bool with_variance, const GivenOut& given_out) {
-  evidence_->publish(belief.maps, belief.evidence, with_variance, given_out,
-                     plan.wanted.right ? Views::kBoth : Views::kLeft, plan.tracked);
+void FuseRoom::publish(const Plan& plan, const Belief& belief, Map& confirmed) {
+  evidence_->publish(belief.maps.disparity, belief.evidence, confirmed, plan.wanted.right ? Views::kBoth : Views::kLeft,
+                     plan.tracked);
 }
 
 }  // namespace egosgm

@@ -47,9 +47,8 @@ class FuseRoom {
   /// A belief without a prediction: what both views confirm over the full range begins with some evidence.
   void begin(Belief& belief) const;
 
-  /// What is given out of a belief: disparities, and with_variance the filter's variances. REQUIRES: the method has
-  /// evidence.
-  void publish(const Plan& plan, const Belief& belief, bool with_variance, const GivenOut& given_out);
+  /// Writes which of a belief's disparities are given out. REQUIRES: the method has evidence.
+  void publish(const Plan& plan, const Belief& belief, Map& confirmed);
   bool has_evidence() const { return evidence_.has_value(); }
 
  private:

@@ -22,10 +22,10 @@ SadCheck::SadCheck(ocl::Context& context, shared::ImageSize size, PixelType type
       max_difference_(options.max_difference),
       check_(build(context, type, pixels_), "check_greys") {}
 
-void SadCheck::check(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps, Views views) {
+void SadCheck::check(const ocl::Buffer<cl_uchar>& images, Map& disparity, Views views) {
   context_.enter("SadCheck");
   check_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_difference_, images,
-         maps.disparity, maps.variance);
+         disparity);
 }
 
 }  // namespace egosgm

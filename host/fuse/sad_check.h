@@ -16,14 +16,14 @@ class SadCheck {
            int pixels = 0);
 
   /// In place. `images`: the pixels of both views without padding, the left view first, one or two bytes each.
-  void check(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps, Views views = Views::kBoth);
+  void check(const ocl::Buffer<cl_uchar>& images, Map& disparity, Views views = Views::kBoth);
 
  private:
   ocl::Context& context_;
   const shared::ImageSize size_;
   const int pixels_;
   const float max_difference_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<cl_uchar>, Map, Map> check_;
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<cl_uchar>, Map> check_;
 };
 
 }  // namespace egosgm

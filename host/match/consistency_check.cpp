@@ -20,11 +20,11 @@ ConsistencyCheck::ConsistencyCheck(ocl::Context& context, shared::ImageSize size
       check_(build(context, pixels_), "check") {}
 
 void ConsistencyCheck::check(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept,
-                             Map& variance, Views views) {
+                             Views views) {
   context_.enter("ConsistencyCheck");
   const cl_int keep_outside = outside == OutsideView::kKeep;
   check_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_difference_px, keep_outside,
-         disparity, kept, variance);
+         disparity, kept);
 }
 
 }  // namespace egosgm

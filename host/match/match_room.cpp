@@ -37,8 +37,8 @@ void MatchRoom::measure(const Plan& plan, const FrameImages& images, const Searc
   if (median_filter_) median_filter_->filter(matching.matched, matching.smoothed, Views::kBoth);
   const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;
   consistency_.check(smoothed, reads_off ? left_right_.read_off_px : left_right_.measurement_px, OutsideView::kDrop,
-                     measured.disparity, measured.variance, Views::kBoth);
-  if (removes_speckles(plan)) speckle_removal_.remove(measured, plan.matched);
+                     measured.disparity, Views::kBoth);
+  if (removes_speckles(plan)) speckle_removal_.remove(measured.disparity, plan.matched);
 }
 
 }  // namespace egosgm

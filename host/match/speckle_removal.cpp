@@ -32,23 +32,23 @@ SpeckleRemoval::SpeckleRemoval(ocl::Context& context, shared::ImageSize size, co
       measure_(build(context, row_group_), "measure"),
       drop_(build(context, row_group_), "drop") {}
 
-void SpeckleRemoval::remove(StereoMaps& maps, Views views) {
+void SpeckleRemoval::remove(Map& disparity, Views views) {
   if (options_.max_size_px <= 0) return;
   context_.enter("SpeckleRemoval");
   const int strips = (size_.height + strip_rows_ - 1) / strip_rows_;
   const ocl::Range pixels = ocl::every_pixels(context_, size_, row_group_ == 1 ? 16 : 1, count(views));
-  find_runs_(context_, ocl::group_a_row(size_, row_group_, count(views)), size_, options_.max_difference_px,
-             maps.disparity, runs_, parents_, sizes_);
+  find_runs_(context_, ocl::group_a_row(size_, row_group_, count(views)), size_, options_.max_difference_px, disparity,
+             runs_, parents_, sizes_);
   if (strip_rows_ > 1) {
     join_strips_(context_, ocl::every_row(context_, {1, strips}, count(views)), size_, options_.max_difference_px,
-                 strip_rows_, maps.disparity, runs_, parents_);
+                 strip_rows_, disparity, runs_, parents_);
   }
   if (strips > 1) {
     join_seams_(context_, ocl::every_pixel(context_, {size_.width, strips - 1}, count(views)), size_,
-                options_.max_difference_px, strip_rows_, maps.disparity, runs_, parents_);
+                options_.max_difference_px, strip_rows_, disparity, runs_, parents_);
   }
   measure_(context_, pixels, size_, runs_, parents_, roots_, sizes_);
-  drop_(context_, pixels, size_, max_size_, runs_, roots_, sizes_, maps.disparity, maps.variance);
+  drop_(context_, pixels, size_, max_size_, runs_, roots_, sizes_, disparity);
 }
 
 }  // namespace egosgm

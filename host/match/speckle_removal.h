@@ -23,13 +23,13 @@ class SpeckleRemoval {
                  int strip_rows = 0, int row_group = 0);
 
   /// In place. With `max_size_px` 0 nothing is launched. `views`: 1 looks at the left view only.
-  void remove(StereoMaps& maps, Views views);
+  void remove(Map& disparity, Views views);
 
   /// Of the last maps, before anything was dropped: where each pixel's run of connected ones begins, 65535 without one.
   const Runs& runs() const { return runs_; }
 
  private:
-  using Disparities = const ocl::Buffer<float>;
+  using Disparities = const Map;
   using Indices = ocl::Buffer<cl_uint>;
 
   ocl::Context& context_;
@@ -43,9 +43,7 @@ class SpeckleRemoval {
   ocl::Kernel<const shared::ImageSize, const float, const cl_int, Disparities, const Runs, Indices> join_strips_;
   ocl::Kernel<const shared::ImageSize, const float, const cl_int, Disparities, const Runs, Indices> join_seams_;
   ocl::Kernel<const shared::ImageSize, const Runs, const Indices, Indices, Indices> measure_;
-  ocl::Kernel<const shared::ImageSize, const cl_uint, const Runs, const Indices, const Indices, ocl::Buffer<float>,
-              ocl::Buffer<float>>
-      drop_;
+  ocl::Kernel<const shared::ImageSize, const cl_uint, const Runs, const Indices, const Indices, Map> drop_;
 };
 
 }  // namespace egosgm

@@ -21,10 +21,9 @@ EdgeRejection::EdgeRejection(ocl::Context& context, shared::ImageSize size, cons
       max_jump_px_(options.max_jump_px),
       reject_(build(context, pixels_), "reject") {}
 
-void EdgeRejection::reject(const Map& disparity, Map& kept, Map& variance, Views views) {
+void EdgeRejection::reject(const Map& disparity, Map& kept, Views views) {
   context_.enter("EdgeRejection");
-  reject_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_jump_px_, disparity, kept,
-          variance);
+  reject_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, max_jump_px_, disparity, kept);
 }
 
 }  // namespace egosgm

@@ -22,15 +22,18 @@ OutputVariance::OutputVariance(ocl::Context& context, shared::ImageSize size, co
       mean_roughness_(context, ocl::Scratch::kOfStage2, 2 * pixel_count(size)),
       of_each_pixel_(build(context, pixels_), "of_each_pixel"),
       row_means_(build(context, pixels_), "row_means"),
-      combine_(build(context, pixels_), "combine") {}
+      combine_(build(context, pixels_), "combine"),
+      keep_(build(context, pixels_), "keep") {}
 
-void OutputVariance::compute(const StereoMaps& maps, const StereoMaps& measured, Map& variance, Views views) {
+void OutputVariance::compute(const Map& given_out, const StereoMaps& belief, const StereoMaps& measured, Map& variance,
+                             Views views) {
   context_.enter("OutputVariance");
   const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, count(views));
-  of_each_pixel_(context_, pixels, size_, maps.disparity, maps.variance, measured.disparity, measured.variance,
-                 variance, roughness_);
+  if (!options_.enabled) return keep_(context_, pixels, size_, given_out, belief.variance, variance);
+  of_each_pixel_(context_, pixels, size_, given_out, belief.disparity, belief.variance, measured.disparity,
+                 measured.variance, variance, roughness_);
   row_means_(context_, pixels, size_, variance, roughness_, mean_variance_, mean_roughness_);
-  combine_(context_, pixels, size_, options_.scale, options_.roughness_weight, options_.jump_weight, maps.disparity,
+  combine_(context_, pixels, size_, options_.scale, options_.roughness_weight, options_.jump_weight, given_out,
            mean_variance_, mean_roughness_, variance);
 }
 

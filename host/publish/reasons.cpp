@@ -74,7 +74,7 @@ void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
            padding_, inputs.codes, has_prediction,
            inputs.prediction ? inputs.prediction->warped.disparity : inputs.measured.disparity,
            inputs.prediction ? inputs.prediction->hidden : bytes, inputs.measured.disparity, has_runs,
-           inputs.runs ? *inputs.runs : no_runs, inputs.belief.disparity, inputs.doubtful, inputs.evidence != nullptr,
+           inputs.runs ? *inputs.runs : no_runs, inputs.given_out, inputs.doubtful, inputs.evidence != nullptr,
            inputs.evidence ? *inputs.evidence : inputs.doubtful, reasons);
 }
 

@@ -22,6 +22,7 @@ class Reasons {
     const StereoMaps& measured;
     const ocl::Buffer<cl_ushort>* runs;  // of SpeckleRemoval; null: it is off
     const StereoMaps& belief;
+    const Map& given_out;     // of its disparities
     const FlagMap& doubtful;  // what KalmanUpdate says; not read without a prediction
     const FlagMap* evidence;  // the same; null: the method has none
   };

@@ -66,16 +66,15 @@ CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const Me
       consistency_(context, coarse_),
       everything_(context, coarse_, range_),
       images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(coarse_)), PixelType::kU16},
-      matched_(context, 2 * pixel_count(coarse_)) {
+      matched_(context, coarse_) {
   matcher_.prepare(PixelType::kU16);
 }
 
-void CoarseMatch::match(const FrameImages& images, Measurement& found) {
+void CoarseMatch::match(const FrameImages& images, Map& found) {
   const ocl::Context::Within within(context_, "CoarseMatch");
   shrink_[images.type].shrink(images, images_);
-  Measurement matched{{matched_, found.variance}, found.doubtful};
-  matcher_.match(images_, everything_, matched, Views::kBoth);
-  consistency_.check(matched_, max_difference_px_, OutsideView::kDrop, found.disparity, found.variance, Views::kBoth);
+  matcher_.match(images_, everything_, matched_, Views::kBoth);
+  consistency_.check(matched_.disparity, max_difference_px_, OutsideView::kDrop, found, Views::kBoth);
 }
 
 std::uint64_t CoarseMatch::matched_cells() const {

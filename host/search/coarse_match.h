@@ -35,7 +35,7 @@ class CoarseMatch {
 
   /// Writes the left-right consistent disparities of both views, `coarse_size` of the images' each. REQUIRES: the
   /// images' type was prepared.
-  void match(const FrameImages& images, Measurement& found);
+  void match(const FrameImages& images, Map& found);
 
   /// Cells that a call matches, of both views.
   std::uint64_t matched_cells() const;
@@ -59,7 +59,7 @@ class CoarseMatch {
   ConsistencyCheck consistency_;
   const SearchBands everything_;
   FrameImages images_;
-  Map matched_;
+  Measurement matched_;
 };
 
 }  // namespace egosgm

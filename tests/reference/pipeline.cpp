@@ -57,18 +57,14 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   frame.result = has_prediction ? frame.updated : frame.passes.back().measured;
   frame.evidence =
       has_prediction ? frame.fused.evidence : std::vector<std::uint8_t>(frame.result.disparity.size(), kFirstEvidence);
-  testing::HostMaps given_out = frame.result;
+  frame.given_out = frame.result.disparity;
   if (has_prediction && has_evidence()) {
     testing::HostMaps belief = frame.result;
     belief.evidence = frame.evidence;
-    given_out = confirmed(size_, belief, !options_.track_right);
+    frame.given_out = confirmed(size_, belief, !options_.track_right);
   }
-  frame.given_out = given_out.disparity;
   frame.output_variance =
-      options_.output_variance.enabled
-          ? output_variance(size_, options_.output_variance, {given_out.disparity, frame.result.variance},
-                            frame.passes.back().measured)
-          : given_out.variance;
+      output_variance(size_, options_.output_variance, frame.given_out, frame.result, frame.passes.back().measured);
   frame.reasons = explain(images, frame);
   if (!options_.temporal) return frame;
   offset_ = frame.passes.back().offset;
@@ -173,8 +169,6 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
     const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);
     std::copy(pass.consistent.disparity.begin() + right, pass.consistent.disparity.end(),
               pass.measured.disparity.begin() + right);
-    std::copy(pass.consistent.variance.begin() + right, pass.consistent.variance.end(),
-              pass.measured.variance.begin() + right);
   }
   pass.measured.doubtful = pass.matched.doubtful;
   pass.offset = known;

@@ -54,7 +54,7 @@ class StageChain {
       case Room::kAlign:
         return look_at_images(before_.offset.is_known || frame.passes.size() > 1 ? work.aligned : uploaded, frame);
       case Room::kSearch:
-        if (plan.has_coarse_match) frame.passes.back().coarse = work.coarse.disparity.read(context_);
+        if (plan.has_coarse_match) frame.passes.back().coarse = work.coarse.read(context_);
         frame.passes.back().band = {work.bands.bands.read(context_), work.bands.cell_offsets.read(context_),
                                     work.bands.row_sums.read(context_)};
         return;
@@ -82,10 +82,9 @@ class StageChain {
   void look(const Prediction& prediction, reference::Frame& frame) {
     frame.warped.disparity = prediction.warped.disparity.read(context_);
     if (options_.edge_rejection.max_jump_px > 0) {
-      frame.without_edges =
-          without_marks({prediction.rejected.read(context_), prediction.warped.variance.read(context_)});
+      frame.without_edges = download_marked(context_, prediction.rejected);
     }
-    if (options_.track_right) frame.filled.disparity = prediction.filled.read(context_);
+    if (options_.track_right) frame.filled.disparity = prediction.filled.disparity.read(context_);
     frame.predicted = download(context_, prediction.maps);
     frame.predicted.hidden = prediction.hidden.read(context_);
   }
