@@ -18,6 +18,11 @@ inline shared::DisparityRange range_of(const MethodOptions& options) {
   return {options.min_disparity, options.disparities};
 }
 
+/// What kernels that read images of `type` are built with.
+inline ocl::Defines pixel_define(PixelType type) {
+  return ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2);
+}
+
 /// Both views' pixels on the device, the left view first, without gaps; 1 or 2 bytes each.
 struct FrameImages {
   ocl::Buffer<cl_uchar> pixels;

@@ -57,7 +57,7 @@ void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction&
     if (plan.has_coarse_match) coarse.emplace(CoarseView{search_.coarse_images(), work_.coarse});
     fuse_->update(plan, {images, match_.matcher().codes(), coarse ? &*coarse : nullptr}, prediction, measured, fusion,
                   belief);
-  } else if (fuse_ && fuse_->has_evidence()) {
+  } else if (fuse_) {
     fuse_->begin(belief);
   }
   belief.why_not.reset();

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/fuse/fuse_room.h"
 
-#include "kernels/method.h"
-
 namespace egosgm {
 
 FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : left_right_px_(options.consistency.update_px),
       outside_(outside_view(options.consistency)),
-      context_(context),
       kalman_update_(context, size, options.kalman_update),
       consistency_(context, size) {
   if (Evidence::is_of(options)) evidence_.emplace(context, size, options);
@@ -41,11 +38,6 @@ void FuseRoom::update(const Plan& plan, const Matched& matched, const Prediction
   const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
   consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, checked);
   if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief.disparity, checked);
-}
-
-void FuseRoom::begin(Belief& belief) const {
-  context_.enter("Evidence");
-  belief.evidence.fill(context_, EGOSGM_EVIDENCE_FIRST);
 }
 
 void FuseRoom::publish(const Plan& plan, const Belief& belief, Map& confirmed) {

@@ -4,7 +4,7 @@
 #include "egosgm/image.h"
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -19,9 +19,7 @@ class SadCheck {
   void check(const ocl::Buffer<cl_uchar>& images, Map& disparity, Views views = Views::kBoth);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
+  ocl::Stage stage_;
   const float max_difference_;
   ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<cl_uchar>, Map> check_;
 };

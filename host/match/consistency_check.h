@@ -2,7 +2,7 @@
 #pragma once
 
 #include "host/maps.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -24,9 +24,7 @@ class ConsistencyCheck {
   void check(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept, Views views);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
+  ocl::Stage stage_;
   ocl::Kernel<const shared::ImageSize, const float, const cl_int, const Map, Map> check_;
 };
 

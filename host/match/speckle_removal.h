@@ -3,7 +3,7 @@
 
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 #include "host/tuning_defaults.h"
 
 namespace egosgm {
@@ -32,11 +32,10 @@ class SpeckleRemoval {
   using Disparities = const Map;
   using Indices = ocl::Buffer<cl_uint>;
 
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   const SpeckleRemovalOptions options_;
   const cl_uint max_size_;
-  const int row_group_, strip_rows_;
+  const int strip_rows_;
   Runs runs_;                        // column where the pixel's run begins
   Indices parents_, roots_, sizes_;  // of runs, at the index of their first pixel
   ocl::Kernel<const shared::ImageSize, const float, Disparities, Runs, Indices, Indices> find_runs_;

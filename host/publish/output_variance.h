@@ -3,7 +3,7 @@
 
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -23,10 +23,8 @@ class OutputVariance {
   void compute(const Map& given_out, const StereoMaps& belief, const StereoMaps& measured, Map& variance, Views views);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   const OutputVarianceOptions options_;
-  const int pixels_;
   Map roughness_, mean_variance_, mean_roughness_;
   ocl::Kernel<const shared::ImageSize, const Map, const Map, const Map, const Map, const Map, Map, Map> of_each_pixel_;
   ocl::Kernel<const shared::ImageSize, const Map, const Map, Map, Map> row_means_;

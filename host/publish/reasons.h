@@ -4,7 +4,7 @@
 #include "egosgm/reason.h"
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 #include "host/predict/predict_room.h"
 
 namespace egosgm {
@@ -35,9 +35,7 @@ class Reasons {
  private:
   using In = const ocl::Buffer<float>;
 
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
+  ocl::Stage stage_;
   const cl_int disparities_, has_census_, padding_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const Bytes, const cl_int, const cl_int,
               const ocl::Buffer<cl_uint>, const cl_int, In, const FlagMap, In, const cl_int,

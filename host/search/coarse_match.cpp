@@ -8,13 +8,6 @@ namespace {
 
 int floor_div(int a, int b) { return a / b - (a % b < 0); }
 
-ocl::Program& build(ocl::Context& context, PixelType type) {
-  context.enter("CoarseMatch");
-  return context.program("coarse_match.cl", ocl::Defines()
-                                                .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
-                                                .set("PIXELS", ocl::pixels_a_work_item(context)));
-}
-
 }  // namespace
 
 shared::ImageSize CoarseMatch::coarse_size(shared::ImageSize size) {
@@ -37,14 +30,13 @@ BandedSgmOptions CoarseMatch::matcher(const MethodOptions& options) {
 }
 
 Shrink::Shrink(ocl::Context& context, shared::ImageSize size, PixelType type)
-    : context_(context), size_(size), shrink_(build(context, type), "shrink") {}
+    : stage_(context, "CoarseMatch", "coarse_match.cl", size, 0, pixel_define(type)), shrink_(stage_, "shrink") {}
 
 void Shrink::shrink(const FrameImages& images, FrameImages& coarse) {
-  context_.enter("CoarseMatch");
-  const shared::ImageSize coarse_size = CoarseMatch::coarse_size(size_);
-  const int at_once = ocl::pixels_a_work_item(context_) == 1 ? 1 : EGOSGM_COARSE;
-  shrink_(context_, ocl::every_pixel(context_, {(coarse_size.width + at_once - 1) / at_once, coarse_size.height}),
-          size_, images.pixels, coarse.pixels);
+  const shared::ImageSize coarse_size = CoarseMatch::coarse_size(stage_.size());
+  const int at_once = stage_.pixels() == 1 ? 1 : EGOSGM_COARSE;
+  const shared::ImageSize work_items{(coarse_size.width + at_once - 1) / at_once, coarse_size.height};
+  stage_.launch(shrink_, ocl::every_pixel(stage_.enter(), work_items), stage_.size(), images.pixels, coarse.pixels);
 }
 
 BandedSgm::Tile CoarseMatch::tile(const ocl::Context& context, const MethodOptions& options, BandedSgm::Tile tile) {

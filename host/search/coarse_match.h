@@ -17,8 +17,7 @@ class Shrink {
   void shrink(const FrameImages& images, FrameImages& coarse);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>> shrink_;
 };
 
