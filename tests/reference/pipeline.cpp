@@ -140,24 +140,11 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
                                               codes(size_, {middle, pass.images.end()}, images.bits, sgm.cost)};
   pass.view_codes = {size_, {both[0], both[1]}};
   pass.codes = padded_codes(size_, both[0], both[1], code_padding_, sgm.cost);
-  const shared::SgmParameters parameters{size_.width,
-                                         size_.height,
-                                         range_.min,
-                                         range_.count,
-                                         code_padding_,
-                                         sgm.p1,
-                                         sgm.s_max,
-                                         sgm.variance_floor_px2,
-                                         sgm.variance_per_step_px2,
-                                         sgm.variance_per_square_px2,
-                                         sgm.doubts_band_ends,
-                                         reads_off,
-                                         /*first_view=*/0};
   const std::vector<std::uint16_t> values(pass.images.begin(), pass.images.end());
   pass.penalties = step_penalties(size_, values, images.bits, sgm);
   std::vector<std::uint16_t> grey = values;
   for (std::uint16_t& value : grey) value = static_cast<std::uint16_t>(value >> (images.bits - 8));
-  pass.matched = banded_sgm(parameters, sgm, both, grey, pass.band.bands);
+  pass.matched = banded_sgm(size_, range_, sgm, both, grey, pass.band.bands, reads_off);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
   pass.consistent =
