@@ -93,7 +93,7 @@ class Frame {
     return {
         {"ForwardWarp", 4 * maps},
         {"HoleFill", 8 * maps},
-        {"ConsistencyCheck", 3 * 4 * maps},
+        {"ConsistencyCheck", 3 * 2 * maps},
         {"CoarseMatch", grey},
         {"SearchBand", 2 * (maps + band)},
         // Resampling both images, and the estimate on every fourth row of the left view.
@@ -106,14 +106,18 @@ class Frame {
         // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.
         {"Evidence", codes * 17 / 16 + 2 * maps + 2 * map},
         {"KalmanUpdate", 6 * maps},
-        {"OutputVariance", 11 * map}};
+        {"OutputVariance", 12 * map}};
   }
   /// A checksum (FNV-1a) of what the last steady frame found in the left view.
   std::string bits() const {
     const auto pixels = static_cast<std::ptrdiff_t>(pixel_count(size_));
     std::uint64_t hash = 14695981039346656037u;
-    for (const Map* map : {&disparity_, &after_.maps.variance, &variance_}) {
-      const std::vector<float> values = map->read(context_);
+    const std::vector<float> belief = after_.maps.disparity.read(context_);
+    std::vector<float> filters = after_.maps.variance.read(context_);
+    for (std::size_t i = 0; i < belief.size(); ++i) {
+      if (!(belief[i] > EGOSGM_INVALID_DISPARITY)) filters[i] = 0;  // there it means nothing
+    }
+    for (const std::vector<float>& values : {disparity_.read(context_), filters, variance_.read(context_)}) {
       std::for_each(values.begin(), values.begin() + pixels, [&](float value) {
         for (const auto byte : std::bit_cast<std::array<unsigned char, sizeof value>>(value))
           hash = (hash ^ byte) * 1099511628211u;

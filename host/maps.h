@@ -18,6 +18,11 @@ inline shared::DisparityRange range_of(const MethodOptions& options) {
   return {options.min_disparity, options.disparities};
 }
 
+/// What kernels that read images of `type` are built with.
+inline ocl::Defines pixel_define(PixelType type) {
+  return ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2);
+}
+
 /// Both views' pixels on the device, the left view first, without gaps; 1 or 2 bytes each.
 struct FrameImages {
   ocl::Buffer<cl_uchar> pixels;
@@ -47,20 +52,26 @@ class OfEachType {
 /// A map of both views, the left one first.
 using Map = ocl::Buffer<float>;
 
-/// Disparity [px] and variance [px^2] of both views. Variance is 0 where the disparity is invalid. A copy shares the
-/// device's memory.
+/// Disparity [px] and variance [px^2] of both views. Where there is no disparity, a variance means nothing. A
+/// copy shares the device's memory.
 struct StereoMaps {
   Map disparity, variance;
 
   StereoMaps(Map disparities, Map variances) : disparity(std::move(disparities)), variance(std::move(variances)) {}
   StereoMaps(ocl::Context& context, shared::ImageSize size)
       : disparity(context, 2 * pixel_count(size)), variance(context, 2 * pixel_count(size)) {}
+
+  /// Copies the values of `from` here.
+  void copy(ocl::Context& context, const StereoMaps& from) {
+    disparity.copy(context, 0, from.disparity, 0, disparity.size());
+    variance.copy(context, 0, from.variance, 0, variance.size());
+  }
 };
 
 /// Where a frame writes what is given out of its belief.
 struct GivenOut {
   Map& disparity;  // what is confirmed; not written where that is all of the belief
-  Map& variance;   // see PublishRoom
+  Map& variance;   // of what is given out
 };
 
 /// A map of both views of bytes: 1 where something holds, else 0.

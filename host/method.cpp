@@ -7,7 +7,7 @@ namespace egosgm {
 FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
                            const GivenOut& given_out) {
   Workspace& w = work_;
-  Measurement measured{plan.predicts() ? w.measured : after.maps, w.matching.doubtful};
+  const Measurement& measured = w.matching.measured;
   VerticalOffset offset = before.offset.is_known ? before.offset : unknown_;
   FrameImages images = uploaded;
 
@@ -17,21 +17,20 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     VerticalOffset& refined = match < plan.matches ? w.first_offset : after.offset;
     in(Room::kAlign, [&] { images = align(uploaded, offset, w.aligned); });
     in(Room::kSearch, [&] { search_.plan_bands(plan, images, w.prediction, w.coarse, w.bands); });
-    in(Room::kMatch, [&] { match_.measure(plan, images, w.bands, w.matching, measured); });
+    in(Room::kMatch, [&] { match_.measure(plan, images, w.bands, w.matching); });
     in(Room::kRefineAlignment, [&] { refine(images, measured, offset, refined); });
   }
   in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, w.fusion, after); });
-  StereoMaps result = after.maps;
+  Map result = after.maps.disparity;
   in(Room::kPublish, [&] {
-    result = confirmed(plan, after, given_out);
+    result = confirmed(plan, after, given_out.disparity);
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_.write(plan,
-                   {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), result,
-                    w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence},
+                   {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), after.maps,
+                    result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence},
                    {given_out.variance, w.dynamic, w.reasons});
   });
-  if (plan.wanted.variance) result.variance = given_out.variance;
-  return {result, measured, offset, images};
+  return {{result, given_out.variance}, offset, images};
 }
 
 void Method::predict(const Plan& plan, const Belief& belief, Prediction& prediction) {
@@ -55,11 +54,13 @@ void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction&
                   const Measurement& measured, Fusion& fusion, Belief& belief) {
   if (plan.predicts()) {
     std::optional<CoarseView> coarse;
-    if (plan.has_coarse_match) coarse.emplace(CoarseView{search_.coarse_images(), work_.coarse.disparity});
+    if (plan.has_coarse_match) coarse.emplace(CoarseView{search_.coarse_images(), work_.coarse});
     fuse_->update(plan, {images, match_.matcher().codes(), coarse ? &*coarse : nullptr}, prediction, measured, fusion,
                   belief);
-  } else if (fuse_ && fuse_->has_evidence()) {
-    fuse_->begin(belief);
+  } else {
+    context_.enter("fuse");
+    belief.maps.copy(context_, measured);
+    if (fuse_) fuse_->begin(belief);
   }
   belief.why_not.reset();
   if (!options_.temporal) belief.forget(Unpredicted::kNotTemporal);  // a frame alone leaves nothing to the next one
@@ -70,28 +71,27 @@ const FlagMap* Method::evidence_of(const Plan& plan, const Belief& belief) const
   return plan.predicts() && fuse_->has_evidence() ? &belief.evidence : nullptr;
 }
 
-StereoMaps Method::confirmed(const Plan& plan, const Belief& belief, const GivenOut& given_out) {
-  if (!evidence_of(plan, belief)) return belief.maps;
-  const bool has_filters_variance = !options_.output_variance.enabled;  // else PublishRoom writes another one
-  fuse_->publish(plan, belief, has_filters_variance, given_out);
-  return {given_out.disparity, has_filters_variance ? given_out.variance : belief.maps.variance};
+Map Method::confirmed(const Plan& plan, const Belief& belief, Map& confirmed) {
+  if (!evidence_of(plan, belief)) return belief.maps.disparity;
+  fuse_->publish(plan, belief, confirmed);
+  return confirmed;
 }
 
 Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : prediction(context, size),
       aligned{ocl::Buffer<cl_uchar>(context, options.vertical_alignment.enabled ? 2 * 2 * pixel_count(size) : 0)},
       first_offset(context),
-      coarse(context, CoarseMatch::coarse_size(size)),
+      coarse(context, 2 * pixel_count(CoarseMatch::coarse_size(size))),
       bands(context, size, range_of(options)),
       matching(context, size),
-      measured(context, size),
       fusion(context, size),
       dynamic(context, pixel_count(size)),
       reasons(context, pixel_count(size)) {}
 
 Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
                const MethodOptions& options, const Tuning& tuning)
-    : options_(options),
+    : context_(context),
+      options_(options),
       work_(context, size, options),
       unknown_(context),
       alignment_([=, &context, sums = VerticalAlignment::Sums(context, size),

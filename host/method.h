@@ -20,10 +20,9 @@ struct Workspace {
   Prediction prediction;
   FrameImages aligned;
   VerticalOffset first_offset;  // found by the first of two matches
-  Measurement coarse;           // what CoarseMatch found
+  Map coarse;                   // disparities that CoarseMatch found
   SearchBands bands;
   Matching matching;
-  StereoMaps measured;  // where there is a prediction to fuse it with; else the belief's memory
   Fusion fusion;
   ocl::Buffer<cl_uchar> dynamic, reasons;
 
@@ -33,7 +32,6 @@ struct Workspace {
 /// What a frame left on the device. Handles: it is there until a later frame overwrites it.
 struct FrameResults {
   StereoMaps given_out;
-  StereoMaps measured;
   VerticalOffset offset;  // by which the right image was resampled for the last match
   FrameImages images;     // that were matched
 };
@@ -71,9 +69,10 @@ class Method {
               VerticalOffset& refined);
   void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
             Fusion& fusion, Belief& belief);
-  StereoMaps confirmed(const Plan& plan, const Belief& belief, const GivenOut& given_out);
+  Map confirmed(const Plan& plan, const Belief& belief, Map& confirmed);
   const FlagMap* evidence_of(const Plan& plan, const Belief& belief) const;
 
+  ocl::Context& context_;
   const MethodOptions options_;
   Workspace work_;
   const VerticalOffset unknown_;

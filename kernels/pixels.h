@@ -194,11 +194,6 @@ static inline void store_words(const Ints words, global uchar* row, const int x,
 #endif
 }
 
-// Pixels that are dropped lose their variance. In place: a block without any costs no more than a load and a store.
-static inline void clear_dropped(const Ints dropped, global float* variances, const int x, const int width) {
-  store_pixels(dropped ? (Floats)(0.0f) : load_pixels(variances, x, width), variances, x, width);
-}
-
 // rint below 2^22, in instructions that every compiler vectorises; what is larger stays as large.
 static inline Floats nearest(const Floats value) {
   const Floats shift = 12582912.0f;  // 1.5 * 2^23

@@ -38,8 +38,6 @@ struct Built {
 TEST(Method, BuildsWhatItsOptionsNeed) {
   EXPECT_FALSE(Built().has("sad_check.cl"));
   EXPECT_TRUE(Built([](auto& o) { o.sad_check.max_difference = 9; }).has("sad_check.cl"));
-  EXPECT_TRUE(Built().has("output_variance.cl"));
-  EXPECT_FALSE(Built([](auto& o) { o.output_variance.enabled = false; }).has("output_variance.cl"));
   EXPECT_TRUE(Built().has("dynamic_map.cl"));
   for (const char* file : {"right_map.cl", "read_off.cl"}) {
     EXPECT_FALSE(Built().has(file)) << file;
@@ -47,7 +45,7 @@ TEST(Method, BuildsWhatItsOptionsNeed) {
   }
   const Built paper([](auto& o) { o = MethodOptions(PipelineOptions::paper()); });
   EXPECT_TRUE(paper.has("sad_check.cl"));
-  for (const char* file : {"coarse_match.cl", "median_filter.cl", "vertical_alignment.cl", "output_variance.cl"}) {
+  for (const char* file : {"coarse_match.cl", "median_filter.cl", "vertical_alignment.cl"}) {
     EXPECT_FALSE(paper.has(file)) << file;
   }
   const Built alone([](auto& o) { o.temporal = false; });

@@ -88,13 +88,11 @@ TEST(Plan, HasACoarseMatchOnlyWhereItIsOn) {
   EXPECT_EQ(row(options, {}, true, true), "- | bands | tracks both | matches both x1");
 }
 
-TEST(Plan, MakesTheVarianceThatIsGivenOutOnlyWhereItIsOn) {
-  MethodOptions options;
+TEST(Plan, MakesOnlyWhatIsWanted) {
+  const MethodOptions options;
   EXPECT_EQ(plan_of(options, {}, true, {}, {Views::kBoth, true}).wanted.variance, Views::kBoth);
   EXPECT_FALSE(plan_of(options, {}, true, {}, {{}, true}).wanted.variance);
   EXPECT_TRUE(plan_of(options, {}, true, {}, {{}, true}).wanted.dynamic);
-  options.output_variance.enabled = false;
-  EXPECT_FALSE(plan_of(options, {}, true, {}, {Views::kBoth, true}).wanted.variance);
 }
 
 }  // namespace

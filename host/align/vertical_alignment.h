@@ -3,7 +3,7 @@
 
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -43,10 +43,8 @@ class VerticalAlignment {
                 VerticalOffset& improved);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   const float gain_;
-  const int row_group_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>>
       resample_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, const Map, ocl::Buffer<cl_long>> sum_residuals_;

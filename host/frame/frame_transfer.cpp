@@ -25,6 +25,16 @@ void copy_rows(const T* fetched, const MapView<T>& map) {
   copy_rows(fetched, map, [](T value) { return value; });
 }
 
+/// Where there is no disparity, a variance means nothing.
+void copy_variances(const float* variances, const float* disparities, const MapView<float>& map) {
+  for (int y = 0; map.data && y < map.height; ++y) {
+    float* row = reinterpret_cast<float*>(reinterpret_cast<char*>(map.data) + y * map.stride_bytes);
+    const std::size_t first = static_cast<std::size_t>(y) * map.width;
+    std::transform(variances + first, variances + first + map.width, disparities + first, row,
+                   [](float p, float d) { return d > kInvalidDisparity ? p : 0.0f; });
+  }
+}
+
 template <typename T>
 void fill_rows(T value, const MapView<T>& map) {
   if (!map.data) return;
@@ -89,11 +99,13 @@ void FrameTransfer::download(const FrameOnDevice& frame, const FrameOutputs& out
   parts_ = frame.parts;
   context_.let_wait(ocl::Queue::kDownload, context_.last_kernel());
   if (frame.predicted) {
-    fetch_left(frame.predicted->disparity, outputs.debug.predicted.data, predicted_);
-    fetch_left(frame.predicted->variance, outputs.debug.predicted_variance.data, predicted_variance_);
+    const bool wants_variance = outputs.debug.predicted_variance.data;
+    fetch_left(frame.predicted->disparity, outputs.debug.predicted.data || wants_variance, predicted_);
+    fetch_left(frame.predicted->variance, wants_variance, predicted_variance_);
   }
-  fetch_left(frame.measured.disparity, outputs.debug.measured.data, measured_);
-  fetch_left(frame.measured.variance, outputs.debug.measured_variance.data, measured_variance_);
+  const bool wants_variance = outputs.debug.measured_variance.data;
+  fetch_left(frame.measured.disparity, outputs.debug.measured.data || wants_variance, measured_);
+  fetch_left(frame.measured.variance, wants_variance, measured_variance_);
   if (frame.dynamic) fetch(*frame.dynamic, pixel_count(size_), dynamic_);
   if (frame.reasons) fetch(*frame.reasons, pixel_count(size_), reasons_);
   if (outputs.debug.search_width.data) fetch(frame.bands.bands, pixel_count(size_), bands_);
@@ -113,13 +125,13 @@ void FrameTransfer::collect(FrameReport& report) const {
   copy_rows(right_variance_.data(), outputs_.right_variance);
   if (has_prediction_) {
     copy_rows(predicted_.data(), outputs_.debug.predicted);
-    copy_rows(predicted_variance_.data(), outputs_.debug.predicted_variance);
+    copy_variances(predicted_variance_.data(), predicted_.data(), outputs_.debug.predicted_variance);
   } else {
     fill_rows(kInvalidDisparity, outputs_.debug.predicted);
     fill_rows(0.0f, outputs_.debug.predicted_variance);
   }
   copy_rows(measured_.data(), outputs_.debug.measured);
-  copy_rows(measured_variance_.data(), outputs_.debug.measured_variance);
+  copy_variances(measured_variance_.data(), measured_.data(), outputs_.debug.measured_variance);
   copy_rows(dynamic_.data(), outputs_.debug.dynamic);
   copy_rows(reasons_.data(), outputs_.reason);
   copy_rows(bands_.data(), outputs_.debug.search_width,

@@ -27,7 +27,6 @@ Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_bel
   plan.has_coarse_match = searches_bands && options.coarse_match.enabled;
   plan.repeats = repeats;
   plan.wanted = wanted;
-  if (!options.output_variance.enabled) plan.wanted.variance.reset();
   return plan;
 }
 

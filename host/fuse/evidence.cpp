@@ -10,11 +10,6 @@
 namespace egosgm {
 namespace {
 
-ocl::Program& build(ocl::Context& context, int pixels) {
-  context.enter("Evidence");
-  return context.program("evidence.cl", ocl::Defines().set("CODE_BYTES", 8).set("PIXELS", pixels));
-}
-
 std::size_t places(shared::ImageSize size) {
   return 2 * static_cast<std::size_t>(EGOSGM_EVIDENCE_STRIDE(size.width)) * CoarseMatch::coarse_size(size).height;
 }
@@ -29,10 +24,8 @@ bool Evidence::is_of(const MethodOptions& options) {
 }
 
 Evidence::Evidence(ocl::Context& context, shared::ImageSize size, const MethodOptions& options, int pixels)
-    : context_((context.enter("Evidence"), context)),
-      size_(size),
+    : stage_(context, "Evidence", "evidence.cl", size, pixels, ocl::Defines().set("CODE_BYTES", 8)),
       coarse_(CoarseMatch::coarse_size(size)),
-      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
       gate_px_(options.kalman_update.gate_px > 0 ? options.kalman_update.gate_px
                                                  : std::numeric_limits<float>::infinity()),
       padding_(BandedSgm::code_padding(range_of(options))),
@@ -40,26 +33,25 @@ Evidence::Evidence(ocl::Context& context, shared::ImageSize size, const MethodOp
       coarse_census_(context, coarse_, PixelType::kU16, MatchingCost::kCensus9x7, coarse_padding_, pixels),
       coarse_codes_(context, Census::words(MatchingCost::kCensus9x7, coarse_, coarse_padding_)),
       sums_(context, 2 * pixel_count(coarse_)),
-      compare_(build(context, pixels_), "compare"),
-      gather_(build(context, pixels_), "gather_evidence"),
-      publish_(build(context, pixels_), "publish_confirmed") {}
+      compare_(stage_, "compare"),
+      gather_(stage_, "gather_evidence"),
+      publish_(stage_, "publish_confirmed") {}
 
 void Evidence::operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* coarse, const Map& predicted,
                           const Map& measured, BlockEvidence& blocks, Views views) {
-  const ocl::Context::Within within(context_, "Evidence");
+  const ocl::Context::Within within(stage_.enter(), "Evidence");
   if (coarse) coarse_census_.encode(coarse->images, coarse_codes_);
-  const ocl::Range each = ocl::every_pixels(context_, coarse_, pixels_, count(views));
-  compare_(context_, each, size_, gate_px_, padding_, codes, coarse != nullptr, coarse_padding_, coarse_codes_,
-           predicted, measured, sums_);
-  gather_(context_, each, size_, coarse != nullptr, coarse ? coarse->disparity : blocks.found, sums_, blocks.evidence,
-          blocks.found);
+  const ocl::Range each = ocl::every_pixels(stage_.enter(), coarse_, stage_.pixels(), count(views));
+  stage_.launch(compare_, each, stage_.size(), gate_px_, padding_, codes, coarse != nullptr, coarse_padding_,
+                coarse_codes_, predicted, measured, sums_);
+  stage_.launch(gather_, each, stage_.size(), coarse != nullptr, coarse ? coarse->disparity : blocks.found, sums_,
+                blocks.evidence, blocks.found);
 }
 
-void Evidence::publish(const StereoMaps& belief, const FlagMap& evidence, bool with_variance, const GivenOut& given_out,
-                       Views views, Views tracked) {
-  context_.enter("Evidence");
-  publish_(context_, ocl::every_pixels(context_, size_, pixels_, count(views)), size_, tracked == Views::kLeft,
-           belief.disparity, evidence, given_out.disparity, with_variance, belief.variance, given_out.variance);
+void Evidence::begin(FlagMap& evidence) { evidence.fill(stage_.enter(), EGOSGM_EVIDENCE_TRUSTED); }
+
+void Evidence::publish(const Map& disparity, const FlagMap& evidence, Map& confirmed, Views views, Views tracked) {
+  stage_.launch_pixels(publish_, count(views), tracked == Views::kLeft, disparity, evidence, confirmed);
 }
 
 }  // namespace egosgm

@@ -4,7 +4,7 @@
 #include "host/maps.h"
 #include "host/match/census.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -37,18 +37,17 @@ class Evidence {
   void operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* coarse, const Map& predicted,
                   const Map& measured, BlockEvidence& blocks, Views views);
 
-  /// Writes the disparities that are confirmed, and with_variance their variances. `tracked`: the views that have
-  /// evidence of their own.
-  void publish(const StereoMaps& belief, const FlagMap& evidence, bool with_variance, const GivenOut& given_out,
-               Views views, Views tracked);
+  /// Of a belief without a prediction: what both views confirm over the full range begins with some evidence.
+  void begin(FlagMap& evidence);
+  /// Writes the disparities that are confirmed. `tracked`: the views that have evidence of their own.
+  void publish(const Map& disparity, const FlagMap& evidence, Map& confirmed, Views views, Views tracked);
 
  private:
   using Words = const ocl::Buffer<cl_uint>;
   using Sums = ocl::Buffer<shared::EvidenceSum>;
 
-  ocl::Context& context_;
-  const shared::ImageSize size_, coarse_;
-  const int pixels_;
+  ocl::Stage stage_;
+  const shared::ImageSize coarse_;
   const float gate_px_;
   const cl_int padding_, coarse_padding_;
   Census coarse_census_;
@@ -58,8 +57,7 @@ class Evidence {
               const Map, Sums>
       compare_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const Sums, ocl::Buffer<cl_int>, Map> gather_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const FlagMap, Map, const cl_int, const Map, Map>
-      publish_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const FlagMap, Map> publish_;
 };
 
 }  // namespace egosgm

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/fuse/fuse_room.h"
 
-#include "kernels/method.h"
-
 namespace egosgm {
 
 FuseRoom::FuseRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
     : left_right_px_(options.consistency.update_px),
       outside_(outside_view(options.consistency)),
-      context_(context),
       kalman_update_(context, size, options.kalman_update),
       consistency_(context, size) {
   if (Evidence::is_of(options)) evidence_.emplace(context, size, options);
@@ -39,18 +36,13 @@ void FuseRoom::update(const Plan& plan, const Matched& matched, const Prediction
   StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
   if (plan.tracked == Views::kLeft) right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.right);
   const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
-  consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, belief.variance, checked);
-  if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief, checked);
+  consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, checked);
+  if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief.disparity, checked);
 }
 
-void FuseRoom::begin(Belief& belief) const {
-  context_.enter("Evidence");
-  belief.evidence.fill(context_, EGOSGM_EVIDENCE_TRUSTED);
-}
-
-void FuseRoom::publish(const Plan& plan, const Belief& belief, bool with_variance, const GivenOut& given_out) {
-  evidence_->publish(belief.maps, belief.evidence, with_variance, given_out,
-                     plan.wanted.right ? Views::kBoth : Views::kLeft, plan.tracked);
+void FuseRoom::publish(const Plan& plan, const Belief& belief, Map& confirmed) {
+  evidence_->publish(belief.maps.disparity, belief.evidence, confirmed, plan.wanted.right ? Views::kBoth : Views::kLeft,
+                     plan.tracked);
 }
 
 }  // namespace egosgm

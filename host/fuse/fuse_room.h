@@ -44,18 +44,18 @@ class FuseRoom {
   void update(const Plan& plan, const Matched& matched, const Prediction& prediction, const Measurement& measured,
               Fusion& fusion, Belief& belief);
 
-  /// A belief without a prediction: what both views confirm over the full range begins with some evidence.
-  void begin(Belief& belief) const;
+  /// A belief without a prediction.
+  void begin(Belief& belief) {
+    if (evidence_) evidence_->begin(belief.evidence);
+  }
 
-  /// What is given out of a belief: disparities, and with_variance the filter's variances. REQUIRES: the method has
-  /// evidence.
-  void publish(const Plan& plan, const Belief& belief, bool with_variance, const GivenOut& given_out);
+  /// Writes which of a belief's disparities are given out. REQUIRES: the method has evidence.
+  void publish(const Plan& plan, const Belief& belief, Map& confirmed);
   bool has_evidence() const { return evidence_.has_value(); }
 
  private:
   const float left_right_px_;
   const OutsideView outside_;
-  ocl::Context& context_;
   std::optional<Evidence> evidence_;
   KalmanUpdate kalman_update_;
   std::optional<MedianFilter> median_filter_;

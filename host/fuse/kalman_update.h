@@ -4,7 +4,7 @@
 #include "host/fuse/evidence.h"
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -32,9 +32,7 @@ class KalmanUpdate {
               Views views);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
+  ocl::Stage stage_;
   const cl_int has_gate_;
   const float gate_px_;
   const cl_int keep_predicted_, ask_neighbours_;

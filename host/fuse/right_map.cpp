@@ -4,11 +4,6 @@
 namespace egosgm {
 namespace {
 
-ocl::Program& build(ocl::Context& context, int pixels) {
-  context.enter("RightMap");
-  return context.program("right_map.cl", ocl::Defines().set("PIXELS", pixels));
-}
-
 // Rows of whole blocks, with a place behind the image.
 std::size_t key_count(shared::ImageSize size, int pixels) {
   return pixel_count({(size.width / pixels + 1) * pixels, size.height});
@@ -17,22 +12,17 @@ std::size_t key_count(shared::ImageSize size, int pixels) {
 }  // namespace
 
 RightMap::RightMap(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range, int pixels)
-    : context_((context.enter("RightMap"), context)),
-      size_(size),
+    : stage_(context, "RightMap", "right_map.cl", size, pixels),
       min_disparity_(range.min),
-      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
-      keys_(context, key_count(size, pixels_)),
-      splat_(build(context, pixels_), "splat"),
-      decode_(build(context, pixels_), "decode") {}
+      keys_(context, key_count(size, stage_.pixels())),
+      splat_(stage_, "splat"),
+      decode_(stage_, "decode") {}
 
 void RightMap::complete(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance) {
-  context_.enter("RightMap");
-  const ocl::Range pixels = ocl::every_pixels(context_, size_, pixels_, /*views=*/1);
-  if (pixels_ == 1) keys_.fill(context_, 0);
-  splat_(context_, pixels, size_, min_disparity_, maps.disparity, keys_);
-  const cl_int with_variance = makes_variance ? 1 : 0;
-  decode_(context_, pixels, size_, min_disparity_, max_difference_px, with_variance, keys_, measured.disparity,
-          measured.variance, maps.disparity, maps.variance);
+  if (stage_.pixels() == 1) keys_.fill(stage_.enter(), 0);
+  stage_.launch_pixels(splat_, /*views=*/1, min_disparity_, maps.disparity, keys_);
+  stage_.launch_pixels(decode_, /*views=*/1, min_disparity_, max_difference_px, makes_variance, keys_,
+                       measured.disparity, measured.variance, maps.disparity, maps.variance);
 }
 
 }  // namespace egosgm

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "host/maps.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -20,10 +20,8 @@ class RightMap {
   void complete(const StereoMaps& measured, float max_difference_px, StereoMaps& maps, bool makes_variance);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   const cl_int min_disparity_;
-  const int pixels_;
   ocl::Buffer<cl_int> keys_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<float>, ocl::Buffer<cl_int>> splat_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const ocl::Buffer<cl_int>,

@@ -4,7 +4,7 @@
 #include "egosgm/image.h"
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -16,14 +16,12 @@ class SadCheck {
            int pixels = 0);
 
   /// In place. `images`: the pixels of both views without padding, the left view first, one or two bytes each.
-  void check(const ocl::Buffer<cl_uchar>& images, StereoMaps& maps, Views views = Views::kBoth);
+  void check(const ocl::Buffer<cl_uchar>& images, Map& disparity, Views views = Views::kBoth);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
+  ocl::Stage stage_;
   const float max_difference_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<cl_uchar>, Map, Map> check_;
+  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<cl_uchar>, Map> check_;
 };
 
 }  // namespace egosgm

@@ -40,16 +40,15 @@ int words_of(const BandedSgmOptions& options, BandedSgm::Tile tile) {
   return std::max(Census::words(options.cost), tile.code_words);
 }
 
-ocl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
-                    BandedSgm::Tile tile) {
+ocl::Defines defines(const ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+                     BandedSgm::Tile tile) {
   ocl::Defines defines = sgm_defines(chunks_of(range, tile), words_of(options, tile), options);
   defines.set("PARTIAL_CHUNKS", range.count % (2 * EGOSGM_LANES) != 0)
       .set("TILE_WIDTH", tile.width)
-      .set("TILE_HEIGHT", tile.height)
-      .set("PIXELS", ocl::pixels_a_work_item(context));
+      .set("TILE_HEIGHT", tile.height);
   if (tile.block_lanes > 0) defines.set("BLOCK", tile.block_lanes);
   if (ocl::counts_bits(context)) defines.set("COUNTS_BITS", 1);
-  return context.program("banded_sgm.cl", defines, ocl::Joins::kNo);
+  return defines;
 }
 
 /// Whether the device has no more compute units than sweeps of `views`, each of a work-item.
@@ -122,12 +121,13 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
 
 BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                                 const BandedSgmOptions& options, Tile chosen, int at_once)
-    : tile(chosen),
+    : stage(context, "BandedSgm", "banded_sgm.cl", size, 0, defines(context, range, options, chosen), ocl::Joins::kNo),
+      tile(chosen),
       views(at_once),
       slots(context, slot_bytes(size, chunks_of(range, tile), options.paths, views)),
       sums(context, sum_bytes(size, chunks_of(range, tile), views)),
-      to_middle(build(context, range, options, tile), "sweep_to_middle"),
-      from_middle(build(context, range, options, tile), "sweep_from_middle") {}
+      to_middle(stage, "sweep_to_middle"),
+      from_middle(stage, "sweep_from_middle") {}
 
 BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                      const BandedSgmOptions& options, std::optional<BandedSgmPaths::Group> group)
@@ -139,19 +139,19 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
     : context_((context.enter("BandedSgm"), context)),
       size_{size.width, rows_at_once(context, size, range, options, tile)},
       stripes_(cut_into_stripes(size.height, size_.height, kStripeOverlap)),
-      parameters_{size_.width,
-                  size_.height,
-                  range.min,
-                  range.count,
-                  code_padding(range),
-                  options.p1,
-                  options.s_max,
-                  options.variance_floor_px2,
-                  options.variance_per_step_px2,
-                  options.variance_per_square_px2,
-                  options.doubts_band_ends,
-                  /*reads_off=*/0,
-                  /*first_view=*/0},
+      parameters_{.width = size_.width,
+                  .height = size_.height,
+                  .min_disparity = range.min,
+                  .disparities = range.count,
+                  .padding = code_padding(range),
+                  .p1 = options.p1,
+                  .s_max = options.s_max,
+                  .variance_floor = options.variance_floor_px2,
+                  .variance_per_step = options.variance_per_step_px2,
+                  .variance_per_square = options.variance_per_square_px2,
+                  .doubts_band_ends = options.doubts_band_ends,
+                  .reads_off = 0,
+                  .first_view = 0},
       launches_(launches),
       no_ranks_(context, 1) {
   if (follows_paths(context, options.scheduling)) {
@@ -218,14 +218,15 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
 
   wavefront.slots.fill(context_, 255, wavefront.slots.size() / wavefront.views * views);
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
-    wavefront.to_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
-                        inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
-                        wavefront.sums);
+    wavefront.stage.launch(wavefront.to_middle, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
+                           inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
+                           wavefront.sums);
   }
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
-    wavefront.from_middle(context_, tiles, parameters, wave, tile_columns, inputs.codes, inputs.bands.bands,
-                          inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties, wavefront.slots,
-                          wavefront.sums, ranks(), measured.disparity, measured.variance, measured.doubtful);
+    wavefront.stage.launch(wavefront.from_middle, tiles, parameters, wave, tile_columns, inputs.codes,
+                           inputs.bands.bands, inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties,
+                           wavefront.slots, wavefront.sums, ranks(), measured.disparity, measured.variance,
+                           measured.doubtful);
   }
 }
 

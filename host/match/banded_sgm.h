@@ -8,7 +8,7 @@
 #include "host/match/read_off.h"
 #include "host/match/stripes.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 #include "host/search/search_band.h"
 #include "host/tuning_defaults.h"
 
@@ -80,6 +80,7 @@ class BandedSgm {
     Wavefront(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
               const BandedSgmOptions& options, Tile tile, int views);
 
+    ocl::Stage stage;
     Tile tile;
     int views;                    // at once
     ocl::Buffer<cl_uchar> slots;  // path costs under way, one row of disparities a path, sweep and view

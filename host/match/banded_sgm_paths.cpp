@@ -26,11 +26,12 @@ int vector_of(const ocl::Context& context) { return is_gpu(context) ? kQuad : kV
 /// A pixel's vectors hold so many cells more than its band, which may begin and end within one.
 int spare_cells(int vector) { return vector == kQuad ? kQuad : vector + EGOSGM_LANES; }
 
-ocl::Program& build(ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
-                    BandedSgmPaths::Group group) {
-  ocl::Defines defines = sgm_defines(SearchBand::max_chunks(range), Census::words(options.cost), options);
-  defines.set("LANES", group.lanes).set("LINES", group.lines).set("VECTOR", vector_of(context)).set("PIXELS", 1);
-  return context.program("banded_sgm_paths.cl", defines, ocl::Joins::kNo);
+ocl::Defines defines(const ocl::Context& context, shared::DisparityRange range, const BandedSgmOptions& options,
+                     BandedSgmPaths::Group group) {
+  return sgm_defines(SearchBand::max_chunks(range), Census::words(options.cost), options)
+      .set("LANES", group.lanes)
+      .set("LINES", group.lines)
+      .set("VECTOR", vector_of(context));
 }
 
 }  // namespace
@@ -63,25 +64,26 @@ ocl::Defines sgm_defines(int max_chunks, int code_words, const BandedSgmOptions&
 
 BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                                const BandedSgmOptions& options, Group group)
-    : context_(context),
-      size_(size),
+    : stage_(context, "BandedSgm", "banded_sgm_paths.cl", size, 1, defines(context, range, options, group),
+             ocl::Joins::kNo),
       paths_(options.paths),
       group_(group),
       forward_first_(context, sum_bytes(context, size, range)),
       forward_second_(context, sum_bytes(context, size, range)),
       backward_first_(context, sum_bytes(context, size, range)),
       backward_second_(context, sum_bytes(context, size, range)),
-      follow_paths_(build(context, range, options, group), "follow_paths"),
-      find_winners_(build(context, range, options, group), "find_winners") {}
+      follow_paths_(stage_, "follow_paths"),
+      find_winners_(stage_, "find_winners") {}
 
 void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs,
                             Views views) {
-  const int groups = stage == kStraight ? groups_of(size_.height, group_.lines) + groups_of(size_.width, group_.lines)
-                                        : groups_of(size_.width + size_.height - 1, group_.lines);
+  const int groups = stage == kStraight
+                         ? groups_of(stage_.size().height, group_.lines) + groups_of(stage_.size().width, group_.lines)
+                         : groups_of(stage_.size().width + stage_.size().height - 1, group_.lines);
   const int work_items = group_.lanes * group_.lines;
   const ocl::Range lines{cl::NDRange(work_items, groups, 2 * count(views)), cl::NDRange(work_items, 1, 1)};
   const cl_int view_count = count(views);
-  follow_paths_(context_, lines, parameters, stage, view_count, inputs.codes, inputs.penalties, inputs.bands.bands,
+  stage_.launch(follow_paths_, lines, parameters, stage, view_count, inputs.codes, inputs.penalties, inputs.bands.bands,
                 inputs.bands.cell_offsets, forward_first_, forward_second_, backward_first_, backward_second_);
 }
 
@@ -92,10 +94,11 @@ void BandedSgmPaths::match(const shared::SgmParameters& parameters, const MatchI
     for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);
   }
   const int work_items = group_.lanes * group_.lines;
-  const int groups_a_row = work_items == 1 ? 1 : groups_of(size_.width, group_.lines);
-  const ocl::Range pixels{cl::NDRange(static_cast<std::size_t>(groups_a_row) * work_items, size_.height, count(views)),
-                          cl::NDRange(work_items, 1, 1)};
-  find_winners_(context_, pixels, parameters, inputs.codes, inputs.bands.bands, inputs.bands.cell_offsets,
+  const int groups_a_row = work_items == 1 ? 1 : groups_of(stage_.size().width, group_.lines);
+  const ocl::Range pixels{
+      cl::NDRange(static_cast<std::size_t>(groups_a_row) * work_items, stage_.size().height, count(views)),
+      cl::NDRange(work_items, 1, 1)};
+  stage_.launch(find_winners_, pixels, parameters, inputs.codes, inputs.bands.bands, inputs.bands.cell_offsets,
                 forward_first_, forward_second_, backward_first_, backward_second_, measured.disparity,
                 measured.variance, measured.doubtful, ranks);
 }

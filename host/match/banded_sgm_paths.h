@@ -5,7 +5,7 @@
 #include "host/match/stripes.h"
 #include "host/method_options.h"
 #include "host/ocl/defines.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -46,8 +46,7 @@ class BandedSgmPaths {
 
   void follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs, Views views);
 
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   const int paths_;
   const Group group_;
   Sums forward_first_, forward_second_, backward_first_, backward_second_;  // partial sums of paths

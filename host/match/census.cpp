@@ -24,33 +24,29 @@ Comparisons comparisons(MatchingCost cost) {
   return {};
 }
 
-ocl::Program& build(ocl::Context& context, PixelType type, MatchingCost cost, int pixels, int words) {
-  context.enter("Census");
+ocl::Defines defines(PixelType type, MatchingCost cost, int words) {
   const Comparisons chosen = comparisons(cost);
-  return context.program("census.cl", ocl::Defines()
-                                          .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
-                                          .set("CODE_BYTES", 4 * words)
-                                          .set("PIXELS", pixels)
-                                          .set("COMPARISONS", chosen.kind)
-                                          .set("RADIUS_X", chosen.radius_x)
-                                          .set("RADIUS_Y", chosen.radius_y));
+  return pixel_define(type)
+      .set("CODE_BYTES", 4 * std::max(words, Census::words(cost)))
+      .set("COMPARISONS", chosen.kind)
+      .set("RADIUS_X", chosen.radius_x)
+      .set("RADIUS_Y", chosen.radius_y);
 }
 
 }  // namespace
 
 Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding,
                int pixels, int words)
-    : context_(context),
-      size_(size),
+    : stage_(context, "Census", "census.cl", size, pixels, defines(type, cost, words)),
       padding_(padding),
-      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
-      census_(build(context, type, cost, pixels_, std::max(words, Census::words(cost))), "census") {}
+      census_(stage_, "census") {}
 
 void Census::encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
-  context_.enter("Census");
-  const ocl::Range range = pixels_ == 1 ? ocl::every_pixel(context_, {size_.width + 2 * padding_, size_.height})
-                                        : ocl::every_row(context_, size_);
-  census_(context_, range, size_, padding_, images, codes);
+  const shared::ImageSize size = stage_.size();
+  ocl::Context& context = stage_.enter();
+  const ocl::Range range = stage_.pixels() == 1 ? ocl::every_pixel(context, {size.width + 2 * padding_, size.height})
+                                                : ocl::every_row(context, size);
+  census_(context, range, size, padding_, images, codes);
 }
 
 }  // namespace egosgm

@@ -6,7 +6,7 @@
 #include "egosgm/image.h"
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -34,10 +34,8 @@ class Census {
   using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>>;
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   const cl_int padding_;
-  const int pixels_;
   Kernel census_;
 };
 

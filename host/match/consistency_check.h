@@ -2,7 +2,7 @@
 #pragma once
 
 #include "host/maps.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -19,17 +19,13 @@ class ConsistencyCheck {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   ConsistencyCheck(ocl::Context& context, shared::ImageSize size, int pixels = 0);
 
-  /// Writes what is kept of the `views` of `disparity` to `kept`, which is another map; what is dropped loses its
-  /// `variance`. Of `disparity`, both views are read.
-  void check(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept, Map& variance, Views views);
+  /// Writes what is kept of the `views` of `disparity` to `kept`, which is another map. Of `disparity`, both views are
+  /// read.
+  void check(const Map& disparity, float max_difference_px, OutsideView outside, Map& kept, Views views);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
-  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const ocl::Buffer<float>, ocl::Buffer<float>,
-              ocl::Buffer<float>>
-      check_;
+  ocl::Stage stage_;
+  ocl::Kernel<const shared::ImageSize, const float, const cl_int, const Map, Map> check_;
 };
 
 }  // namespace egosgm

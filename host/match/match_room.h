@@ -9,16 +9,17 @@
 
 namespace egosgm {
 
-/// What matching leaves, beside what it measured.
+/// What matching leaves.
 struct Matching {
-  // Disparities before any was dropped, until the room ends; the latter where the median filter is on.
-  Map matched, smoothed;
-  FlagMap doubtful;  // of the measurement
+  Measurement measured;
+  // Before any disparity was dropped, until the room ends; the latter where the median filter is on.
+  Measurement matched;
+  Map smoothed;
 
   Matching(ocl::Context& context, shared::ImageSize size)
-      : matched(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
-        smoothed(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
-        doubtful(context, 2 * pixel_count(size)) {}
+      : measured(context, size),
+        matched({Map(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)), measured.variance}, measured.doubtful),
+        smoothed(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)) {}
 };
 
 /// Measures disparities and variances within bands, and drops what is doubtful.
@@ -29,8 +30,7 @@ class MatchRoom {
   /// Builds what images of `type` need.
   void prepare(PixelType type) { matcher_.prepare(type); }
 
-  void measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
-               Measurement& measured);
+  void measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching);
 
   const Matcher& matcher() const { return matcher_; }
   /// Null where nothing is dropped as a speckle.

@@ -3,7 +3,7 @@
 
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -21,9 +21,7 @@ class MedianFilter {
   void fill(const Map& disparity, Map& filtered, Map& variance, Views views);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
+  ocl::Stage stage_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, ocl::Buffer<float>> filter_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
       filter_and_fill_;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "host/maps.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -16,15 +16,14 @@ class ReadOff {
   static std::size_t bytes(shared::ImageSize size, int code_padding);
 
   /// For no left pixel to have been there.
-  void clear() { ranks_.fill(context_, ~cl_uint{0}); }
+  void clear() { ranks_.fill(stage_.enter(), ~cl_uint{0}); }
   ocl::Buffer<cl_uint>& ranks() { return ranks_; }
 
   /// Writes the right half of both maps.
   void read_off(const shared::SgmParameters& parameters, Measurement& measured);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   ocl::Buffer<cl_uint> ranks_;
   ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_uint>, Map, Map, FlagMap> read_off_;
 };

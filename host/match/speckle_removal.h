@@ -3,7 +3,7 @@
 
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 #include "host/tuning_defaults.h"
 
 namespace egosgm {
@@ -23,29 +23,26 @@ class SpeckleRemoval {
                  int strip_rows = 0, int row_group = 0);
 
   /// In place. With `max_size_px` 0 nothing is launched. `views`: 1 looks at the left view only.
-  void remove(StereoMaps& maps, Views views);
+  void remove(Map& disparity, Views views);
 
   /// Of the last maps, before anything was dropped: where each pixel's run of connected ones begins, 65535 without one.
   const Runs& runs() const { return runs_; }
 
  private:
-  using Disparities = const ocl::Buffer<float>;
+  using Disparities = const Map;
   using Indices = ocl::Buffer<cl_uint>;
 
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   const SpeckleRemovalOptions options_;
   const cl_uint max_size_;
-  const int row_group_, strip_rows_;
+  const int strip_rows_;
   Runs runs_;                        // column where the pixel's run begins
   Indices parents_, roots_, sizes_;  // of runs, at the index of their first pixel
   ocl::Kernel<const shared::ImageSize, const float, Disparities, Runs, Indices, Indices> find_runs_;
   ocl::Kernel<const shared::ImageSize, const float, const cl_int, Disparities, const Runs, Indices> join_strips_;
   ocl::Kernel<const shared::ImageSize, const float, const cl_int, Disparities, const Runs, Indices> join_seams_;
   ocl::Kernel<const shared::ImageSize, const Runs, const Indices, Indices, Indices> measure_;
-  ocl::Kernel<const shared::ImageSize, const cl_uint, const Runs, const Indices, const Indices, ocl::Buffer<float>,
-              ocl::Buffer<float>>
-      drop_;
+  ocl::Kernel<const shared::ImageSize, const cl_uint, const Runs, const Indices, const Indices, Map> drop_;
 };
 
 }  // namespace egosgm

@@ -3,7 +3,7 @@
 
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -22,10 +22,8 @@ class StepPenalties {
   static std::size_t bytes(shared::ImageSize size) { return kStepsAPixel * 2 * pixel_count(size); }
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   const cl_int most_, least_, slope_;
-  const int pixels_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const cl_int, const ocl::Buffer<cl_uchar>,
               ocl::Buffer<cl_uchar>>
       penalties_;

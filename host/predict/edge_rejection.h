@@ -3,7 +3,7 @@
 
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -15,16 +15,13 @@ class EdgeRejection {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits. REQUIRES: a largest jump above 0.
   EdgeRejection(ocl::Context& context, shared::ImageSize size, const EdgeRejectionOptions& options, int pixels = 0);
 
-  /// Writes what is kept of `disparity` to `kept`; what is dropped loses its `variance`.
-  void reject(const Map& disparity, Map& kept, Map& variance, Views views);
+  /// Writes what is kept of `disparity` to `kept`.
+  void reject(const Map& disparity, Map& kept, Views views);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
+  ocl::Stage stage_;
   const float max_jump_px_;
-  ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, ocl::Buffer<float>, ocl::Buffer<float>>
-      reject_;
+  ocl::Kernel<const shared::ImageSize, const float, const Map, Map> reject_;
 };
 
 }  // namespace egosgm

@@ -4,11 +4,6 @@
 namespace egosgm {
 namespace {
 
-ocl::Program& build(ocl::Context& context, int pixels) {
-  context.enter("ForwardWarp");
-  return context.program("forward_warp.cl", ocl::Defines().set("PIXELS", pixels));
-}
-
 // Gamma of eq. 1: (x - cx, y - cy, d + doffs, 1) ~ Gamma (X, Y, Z, 1).
 Eigen::Matrix4d disparity_from_space(const Calibration& calibration) {
   Eigen::Matrix4d gamma = Eigen::Matrix4d::Zero();
@@ -70,63 +65,62 @@ shared::DisparityMotion disparity_motion(const Calibration& calibration, const M
   return result;
 }
 
-ForwardWarp::Atomics::Atomics(ocl::Context& context, shared::ImageSize size)
-    : move(build(context, 1), "move"),
-      splat_disparity(build(context, 1), "splat_disparity"),
-      splat_variance(build(context, 1), "splat_variance"),
-      decode(build(context, 1), "decode_warped"),
-      landed(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
-      moved_key(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size)),
-      moved_variance(context, ocl::Scratch::kOfStage2, 2 * pixel_count(size)),
-      zbuffer(context, ocl::Scratch::kOfStage3, 2 * pixel_count(size)),
-      most_evidence(context, ocl::Scratch::kOfStage4, 2 * pixel_count(size)) {}
+ForwardWarp::Atomics::Atomics(ocl::Context& context, const ocl::Stage& stage)
+    : move(stage, "move"),
+      splat_disparity(stage, "splat_disparity"),
+      splat_variance(stage, "splat_variance"),
+      decode(stage, "decode_warped"),
+      landed(context, ocl::Scratch::kOfStage0, 2 * pixel_count(stage.size())),
+      moved_key(context, ocl::Scratch::kOfStage1, 2 * pixel_count(stage.size())),
+      moved_variance(context, ocl::Scratch::kOfStage2, 2 * pixel_count(stage.size())),
+      zbuffer(context, ocl::Scratch::kOfStage3, 2 * pixel_count(stage.size())),
+      most_evidence(context, ocl::Scratch::kOfStage4, 2 * pixel_count(stage.size())) {}
 
-ForwardWarp::Bands::Bands(ocl::Context& context, shared::ImageSize size)
-    : find_spans(build(context, 16), "find_spans"),
-      splat_bands(build(context, 16), "splat_bands"),
-      spans(context, 4 * static_cast<std::size_t>(size.height)) {}
+ForwardWarp::Bands::Bands(ocl::Context& context, const ocl::Stage& stage)
+    : find_spans(stage, "find_spans"),
+      splat_bands(stage, "splat_bands"),
+      spans(context, 4 * static_cast<std::size_t>(stage.size().height)) {}
 
 ForwardWarp::ForwardWarp(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
                          const ForwardWarpOptions& options, shared::DisparityRange range, int pixels, int band_rows)
-    : context_((context.enter("ForwardWarp"), context)),
-      size_(size),
+    : stage_(context, "ForwardWarp", "forward_warp.cl", size, pixels),
       calibration_(calibration),
       options_(options),
       range_(range),
       band_rows_(band_rows) {
-  if (pixels == 1 || (pixels == 0 && ocl::pixels_a_work_item(context) == 1)) {
-    atomics_.emplace(context, size);
+  if (stage_.pixels() == 1) {
+    atomics_.emplace(context, stage_);
   } else {
-    bands_.emplace(context, size);
+    bands_.emplace(context, stage_);
   }
 }
 
 void ForwardWarp::warp(const StereoMaps& belief, const FlagMap& evidence, const Motion& current_from_previous,
                        StereoMaps& predicted, FlagMap& predicted_evidence, Views views) {
-  context_.enter("ForwardWarp");
+  ocl::Context& context = stage_.enter();
+  const shared::ImageSize size = stage_.size();
   Motion motion = current_from_previous;
   motion.covariance *= static_cast<double>(options_.motion_noise);
   const shared::DisparityMotion left = disparity_motion(calibration_, motion, EGOSGM_LEFT);
   const shared::DisparityMotion right = disparity_motion(calibration_, motion, EGOSGM_RIGHT);
   if (bands_) {
     auto& [find_spans, splat_bands, spans] = *bands_;
-    const int bands = (size_.height + band_rows_ - 1) / band_rows_;
-    find_spans(context_, ocl::every_row(context_, size_, count(views)), size_, left, right, belief.disparity, spans);
-    splat_bands(context_, ocl::every_row(context_, {1, bands}, count(views)), size_, range_, left, right,
+    const int bands = (size.height + band_rows_ - 1) / band_rows_;
+    find_spans(context, ocl::every_row(context, size, count(views)), size, left, right, belief.disparity, spans);
+    splat_bands(context, ocl::every_row(context, {1, bands}, count(views)), size, range_, left, right,
                 options_.process_noise_px2, band_rows_, spans, belief.disparity, belief.variance, evidence,
                 predicted.disparity, predicted.variance, predicted_evidence);
     return;
   }
-  const ocl::Range pixels = ocl::every_pixel(context_, size_, count(views));
   auto& [move, splat_disparity, splat_variance, decode, landed, moved_key, moved_variance, zbuffer, most_evidence] =
       *atomics_;
-  move(context_, pixels, size_, range_, left, right, options_.process_noise_px2, belief.disparity, belief.variance,
-       landed, moved_key, moved_variance, zbuffer, predicted.variance, most_evidence);
-  splat_disparity(context_, pixels, size_, landed, moved_key, zbuffer);
-  splat_variance(context_, pixels, size_, landed, moved_key, moved_variance, zbuffer, predicted.variance, evidence,
-                 most_evidence);
-  decode(context_, pixels, size_, range_, zbuffer, predicted.disparity, predicted.variance, most_evidence,
-         predicted_evidence);
+  stage_.launch_pixels(move, count(views), range_, left, right, options_.process_noise_px2, belief.disparity,
+                       belief.variance, landed, moved_key, moved_variance, zbuffer, predicted.variance, most_evidence);
+  stage_.launch_pixels(splat_disparity, count(views), landed, moved_key, zbuffer);
+  stage_.launch_pixels(splat_variance, count(views), landed, moved_key, moved_variance, zbuffer, predicted.variance,
+                       evidence, most_evidence);
+  stage_.launch_pixels(decode, count(views), range_, zbuffer, predicted.disparity, predicted.variance, most_evidence,
+                       predicted_evidence);
 }
 
 }  // namespace egosgm

@@ -7,7 +7,7 @@
 #include "egosgm/motion.h"
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 #include "host/tuning_defaults.h"
 
 namespace egosgm {
@@ -53,7 +53,7 @@ class ForwardWarp {
     ocl::Buffer<cl_uint> moved_key;
     ocl::Buffer<float> moved_variance;
     ocl::Buffer<cl_uint> zbuffer, most_evidence;
-    Atomics(ocl::Context& context, shared::ImageSize size);
+    Atomics(ocl::Context& context, const ocl::Stage& stage);
   };
   struct Bands {
     ocl::Kernel<Size, ViewMotion, ViewMotion, In, ocl::Buffer<cl_int>> find_spans;
@@ -61,11 +61,10 @@ class ForwardWarp {
                 const FlagMap, Out, Out, FlagMap>
         splat_bands;
     ocl::Buffer<cl_int> spans;
-    Bands(ocl::Context& context, shared::ImageSize size);
+    Bands(ocl::Context& context, const ocl::Stage& stage);
   };
 
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   const Calibration calibration_;
   const ForwardWarpOptions options_;
   const shared::DisparityRange range_;

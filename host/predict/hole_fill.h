@@ -3,7 +3,7 @@
 
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -19,9 +19,7 @@ class HoleFill {
   void fill(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
+  ocl::Stage stage_;
   const float max_difference_px_;
   ocl::Kernel<const shared::ImageSize, const float, const ocl::Buffer<float>, const ocl::Buffer<float>,
               ocl::Buffer<float>, ocl::Buffer<float>>

@@ -14,13 +14,12 @@ PredictRoom::PredictRoom(ocl::Context& context, shared::ImageSize size, const Ca
 }
 
 void PredictRoom::predict(const Plan& plan, const Belief& belief, Prediction& prediction) {
-  auto& [warped, rejected, filled, maps, evidence, hidden] = prediction;
+  auto& [warped, rejected, maps, filled, evidence, hidden] = prediction;
   const bool checks = plan.tracked == Views::kBoth;
   forward_warp_.warp(belief.maps, belief.evidence, *plan.motion, warped, evidence, plan.tracked);
-  if (edge_rejection_) edge_rejection_->reject(warped.disparity, rejected, warped.variance, plan.tracked);
-  StereoMaps holes_filled{checks ? filled : maps.disparity, maps.variance};
-  hole_fill_.fill({edge_rejection_ ? rejected : warped.disparity, warped.variance}, holes_filled, hidden, plan.tracked);
-  if (checks) consistency_.check(filled, left_right_px_, outside_, maps.disparity, maps.variance, plan.tracked);
+  if (edge_rejection_) edge_rejection_->reject(warped.disparity, rejected.disparity, plan.tracked);
+  hole_fill_.fill(edge_rejection_ ? rejected : warped, checks ? filled : maps, hidden, plan.tracked);
+  if (checks) consistency_.check(filled.disparity, left_right_px_, outside_, maps.disparity, plan.tracked);
 }
 
 }  // namespace egosgm

@@ -12,17 +12,18 @@ namespace egosgm {
 
 /// What the last frame's maps say of this one, of the views that are tracked.
 struct Prediction {
-  StereoMaps warped;     // before anything was dropped; of what EdgeRejection dropped, the variances are gone
-  Map rejected, filled;  // disparities after those stages, where others follow; until the room ends
+  StereoMaps warped;    // before anything was dropped
+  StereoMaps rejected;  // of these, what EdgeRejection keeps; until the room ends
   StereoMaps maps;
-  FlagMap evidence;  // of what was warped
-  FlagMap hidden;    // where a surface that came nearer than the range hides what is behind it
+  StereoMaps filled;  // before they were checked, where they are; until the room ends
+  FlagMap evidence;   // of what was warped
+  FlagMap hidden;     // where a surface that came nearer than the range hides what is behind it
 
   Prediction(ocl::Context& context, shared::ImageSize size)
       : warped(context, size),
-        rejected(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
-        filled(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
+        rejected(Map(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)), warped.variance),
         maps(context, size),
+        filled(Map(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)), maps.variance),
         evidence(context, 2 * pixel_count(size)),
         hidden(context, 2 * pixel_count(size)) {}
 };

@@ -2,24 +2,12 @@
 #include "host/publish/dynamic_map.h"
 
 namespace egosgm {
-namespace {
-
-ocl::Program& build(ocl::Context& context, int pixels) {
-  context.enter("DynamicMap");
-  return context.program("dynamic_map.cl", ocl::Defines().set("PIXELS", pixels));
-}
-
-}  // namespace
 
 DynamicMap::DynamicMap(ocl::Context& context, shared::ImageSize size, int pixels)
-    : context_((context.enter("DynamicMap"), context)),
-      size_(size),
-      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
-      mark_(build(context, pixels_), "mark") {}
+    : stage_(context, "DynamicMap", "dynamic_map.cl", size, pixels), mark_(stage_, "mark") {}
 
 void DynamicMap::mark(const Map& predicted, const Map& measured, ocl::Buffer<cl_uchar>& marks) {
-  context_.enter("DynamicMap");
-  mark_(context_, ocl::every_pixels(context_, size_, pixels_, /*views=*/1), size_, predicted, measured, marks);
+  stage_.launch_pixels(mark_, /*views=*/1, predicted, measured, marks);
 }
 
 }  // namespace egosgm

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "host/maps.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -17,9 +17,7 @@ class DynamicMap {
   void mark(const Map& predicted, const Map& measured, ocl::Buffer<cl_uchar>& marks);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const int pixels_;
+  ocl::Stage stage_;
   ocl::Kernel<const shared::ImageSize, const Map, const Map, ocl::Buffer<cl_uchar>> mark_;
 };
 

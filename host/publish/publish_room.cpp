@@ -4,10 +4,11 @@
 namespace egosgm {
 
 PublishRoom::PublishRoom(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
-    : context_(context), reasons_([&context, size, options, repeats = Reasons::repeats(context, size)](PixelType type) {
+    : context_(context),
+      output_variance_(context, size, options.output_variance),
+      reasons_([&context, size, options, repeats = Reasons::repeats(context, size)](PixelType type) {
         return Reasons(context, size, type, options, repeats);
       }) {
-  if (options.output_variance.enabled) output_variance_.emplace(context, size, options.output_variance);
   if (options.temporal) dynamic_map_.emplace(context, size);
 }
 
@@ -17,7 +18,7 @@ void PublishRoom::prepare(PixelType type, const Wanted& wanted) {
 
 void PublishRoom::write(const Plan& plan, const Reasons::Inputs& inputs, const Outputs& outputs) {
   if (plan.wanted.variance) {
-    output_variance_->compute(inputs.belief, inputs.measured, outputs.variance, *plan.wanted.variance);
+    output_variance_.compute(inputs.given_out, inputs.belief, inputs.measured, outputs.variance, *plan.wanted.variance);
   }
   if (plan.wanted.reasons) reasons_[inputs.images.type].explain(inputs, outputs.reasons);
   if (!plan.wanted.dynamic) return;

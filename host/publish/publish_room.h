@@ -18,7 +18,7 @@ class PublishRoom {
   void prepare(PixelType type, const Wanted& wanted);
 
   struct Outputs {
-    Map& variance;                   // [px^2] of the belief
+    Map& variance;                   // [px^2] of what is given out
     ocl::Buffer<cl_uchar>& dynamic;  // marks of what contradicts a static world
     ocl::Buffer<cl_uchar>& reasons;
   };
@@ -28,7 +28,7 @@ class PublishRoom {
 
  private:
   ocl::Context& context_;
-  std::optional<OutputVariance> output_variance_;
+  OutputVariance output_variance_;
   std::optional<DynamicMap> dynamic_map_;
   OfEachType<Reasons> reasons_;
 };

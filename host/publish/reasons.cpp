@@ -20,14 +20,6 @@ static_assert(static_cast<int>(Reason::kTrusted) == EGOSGM_REASON_TRUSTED &&
               static_cast<int>(Reason::kPredicted) == EGOSGM_REASON_PREDICTED &&
               static_cast<int>(Reason::kPredicted) + 1 == kReasonCount);
 
-ocl::Program& build(ocl::Context& context, PixelType type, const BandedSgmOptions& options, int pixels) {
-  context.enter("Reasons");
-  return context.program("reasons.cl", ocl::Defines()
-                                           .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
-                                           .set("CODE_BYTES", 4 * Census::words(options.cost))
-                                           .set("PIXELS", pixels));
-}
-
 }  // namespace
 
 const char* to_string(Reason reason) {
@@ -62,31 +54,31 @@ Reasons::Bytes Reasons::repeats(ocl::Context& context, shared::ImageSize size) {
 
 Reasons::Reasons(ocl::Context& context, shared::ImageSize size, PixelType type, const MethodOptions& options,
                  const Bytes& repeats, int pixels)
-    : context_((context.enter("Reasons"), context)),
-      size_(size),
-      blocks_(CoarseMatch::coarse_size(size)),
-      pixels_(pixels > 0 ? pixels : ocl::pixels_a_work_item(context)),
+    : stage_(context, "Reasons", "reasons.cl", size, pixels,
+             pixel_define(type).set("CODE_BYTES", 4 * Census::words(options.banded_sgm.cost))),
       disparities_(options.disparities),
       has_census_(options.banded_sgm.cost != MatchingCost::kSad3x3),
       padding_(BandedSgm::code_padding(range_of(options))),
       repeats_(repeats),
-      find_repeats_(build(context, type, options.banded_sgm, pixels_), "find_repeats"),
-      explain_(build(context, type, options.banded_sgm, pixels_), "explain") {}
+      find_repeats_(stage_, "find_repeats"),
+      explain_(stage_, "explain") {}
 
 void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
-  context_.enter("Reasons");
   const cl_int has_prediction = inputs.prediction ? 1 : 0, has_runs = inputs.runs ? 1 : 0;
   const Bytes& bytes = inputs.images.pixels;  // in place of what there is not
   const ocl::Buffer<cl_ushort> no_runs(bytes.get(), 1);
   if (has_census_) {
-    find_repeats_(context_, ocl::every_pixels(context_, blocks_, pixels_, /*views=*/1), size_, disparities_, padding_,
-                  inputs.codes, inputs.measured.disparity, repeats_);
+    const ocl::Range each_block =
+        ocl::every_pixels(stage_.enter(), CoarseMatch::coarse_size(stage_.size()), stage_.pixels(), /*views=*/1);
+    stage_.launch(find_repeats_, each_block, stage_.size(), disparities_, padding_, inputs.codes,
+                  inputs.measured.disparity, repeats_);
   }
-  explain_(context_, ocl::every_pixels(context_, size_, pixels_, /*views=*/1), size_, bytes, has_census_, repeats_,
-           has_prediction, inputs.prediction ? inputs.prediction->warped.disparity : inputs.measured.disparity,
-           inputs.prediction ? inputs.prediction->hidden : bytes, inputs.measured.disparity, has_runs,
-           inputs.runs ? *inputs.runs : no_runs, inputs.belief.disparity, inputs.doubtful, inputs.evidence != nullptr,
-           inputs.evidence ? *inputs.evidence : inputs.doubtful, inputs.block_evidence, reasons);
+  stage_.launch_pixels(explain_, /*views=*/1, bytes, has_census_, repeats_, has_prediction,
+                       inputs.prediction ? inputs.prediction->warped.disparity : inputs.measured.disparity,
+                       inputs.prediction ? inputs.prediction->hidden : bytes, inputs.measured.disparity, has_runs,
+                       inputs.runs ? *inputs.runs : no_runs, inputs.given_out, inputs.doubtful,
+                       inputs.evidence != nullptr, inputs.evidence ? *inputs.evidence : inputs.doubtful,
+                       inputs.block_evidence, reasons);
 }
 
 }  // namespace egosgm

@@ -4,7 +4,7 @@
 #include "egosgm/reason.h"
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 #include "host/predict/predict_room.h"
 
 namespace egosgm {
@@ -22,6 +22,7 @@ class Reasons {
     const StereoMaps& measured;
     const ocl::Buffer<cl_ushort>* runs;  // of SpeckleRemoval; null: it is off
     const StereoMaps& belief;
+    const Map& given_out;                       // of its disparities
     const FlagMap& doubtful;                    // what KalmanUpdate says; not read without a prediction
     const FlagMap* evidence;                    // the same; null: the method has none
     const ocl::Buffer<cl_int>& block_evidence;  // of Evidence; not read without evidence
@@ -40,9 +41,7 @@ class Reasons {
  private:
   using In = const ocl::Buffer<float>;
 
-  ocl::Context& context_;
-  const shared::ImageSize size_, blocks_;
-  const int pixels_;
+  ocl::Stage stage_;
   const cl_int disparities_, has_census_, padding_;
   Bytes repeats_;  // of blocks
   ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const ocl::Buffer<cl_uint>, In, Bytes> find_repeats_;

@@ -8,13 +8,6 @@ namespace {
 
 int floor_div(int a, int b) { return a / b - (a % b < 0); }
 
-ocl::Program& build(ocl::Context& context, PixelType type) {
-  context.enter("CoarseMatch");
-  return context.program("coarse_match.cl", ocl::Defines()
-                                                .set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2)
-                                                .set("PIXELS", ocl::pixels_a_work_item(context)));
-}
-
 }  // namespace
 
 shared::ImageSize CoarseMatch::coarse_size(shared::ImageSize size) {
@@ -37,14 +30,13 @@ BandedSgmOptions CoarseMatch::matcher(const MethodOptions& options) {
 }
 
 Shrink::Shrink(ocl::Context& context, shared::ImageSize size, PixelType type)
-    : context_(context), size_(size), shrink_(build(context, type), "shrink") {}
+    : stage_(context, "CoarseMatch", "coarse_match.cl", size, 0, pixel_define(type)), shrink_(stage_, "shrink") {}
 
 void Shrink::shrink(const FrameImages& images, FrameImages& coarse) {
-  context_.enter("CoarseMatch");
-  const shared::ImageSize coarse_size = CoarseMatch::coarse_size(size_);
-  const int at_once = ocl::pixels_a_work_item(context_) == 1 ? 1 : EGOSGM_COARSE;
-  shrink_(context_, ocl::every_pixel(context_, {(coarse_size.width + at_once - 1) / at_once, coarse_size.height}),
-          size_, images.pixels, coarse.pixels);
+  const shared::ImageSize coarse_size = CoarseMatch::coarse_size(stage_.size());
+  const int at_once = stage_.pixels() == 1 ? 1 : EGOSGM_COARSE;
+  const shared::ImageSize work_items{(coarse_size.width + at_once - 1) / at_once, coarse_size.height};
+  stage_.launch(shrink_, ocl::every_pixel(stage_.enter(), work_items), stage_.size(), images.pixels, coarse.pixels);
 }
 
 BandedSgm::Tile CoarseMatch::tile(const ocl::Context& context, const MethodOptions& options, BandedSgm::Tile tile) {
@@ -66,16 +58,15 @@ CoarseMatch::CoarseMatch(ocl::Context& context, shared::ImageSize size, const Me
       consistency_(context, coarse_),
       everything_(context, coarse_, range_),
       images_{ocl::Buffer<cl_uchar>(context, 2 * 2 * pixel_count(coarse_)), PixelType::kU16},
-      matched_(context, 2 * pixel_count(coarse_)) {
+      matched_(context, coarse_) {
   matcher_.prepare(PixelType::kU16);
 }
 
-void CoarseMatch::match(const FrameImages& images, Measurement& found) {
+void CoarseMatch::match(const FrameImages& images, Map& found) {
   const ocl::Context::Within within(context_, "CoarseMatch");
   shrink_[images.type].shrink(images, images_);
-  Measurement matched{{matched_, found.variance}, found.doubtful};
-  matcher_.match(images_, everything_, matched, Views::kBoth);
-  consistency_.check(matched_, max_difference_px_, OutsideView::kDrop, found.disparity, found.variance, Views::kBoth);
+  matcher_.match(images_, everything_, matched_, Views::kBoth);
+  consistency_.check(matched_.disparity, max_difference_px_, OutsideView::kDrop, found, Views::kBoth);
 }
 
 std::uint64_t CoarseMatch::matched_cells() const {

@@ -17,8 +17,7 @@ class Shrink {
   void shrink(const FrameImages& images, FrameImages& coarse);
 
  private:
-  ocl::Context& context_;
-  const shared::ImageSize size_;
+  ocl::Stage stage_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>> shrink_;
 };
 
@@ -35,7 +34,7 @@ class CoarseMatch {
 
   /// Writes the left-right consistent disparities of both views, `coarse_size` of the images' each. REQUIRES: the
   /// images' type was prepared.
-  void match(const FrameImages& images, Measurement& found);
+  void match(const FrameImages& images, Map& found);
 
   /// Cells that a call matches, of both views.
   std::uint64_t matched_cells() const;
@@ -59,7 +58,7 @@ class CoarseMatch {
   ConsistencyCheck consistency_;
   const SearchBands everything_;
   FrameImages images_;
-  Map matched_;
+  Measurement matched_;
 };
 
 }  // namespace egosgm

@@ -17,12 +17,6 @@ shared::Band whole(shared::DisparityRange range) {
           static_cast<cl_short>(range.min), static_cast<cl_short>(range.min + range.count - 1)};
 }
 
-ocl::Program& build(ocl::Context& context, int row_group) {
-  context.enter("SearchBand");
-  return context.program("search_band.cl",
-                         ocl::Defines().set("ROW_GROUP", row_group).set("PIXELS", row_group == 1 ? 16 : 1));
-}
-
 }  // namespace
 
 SearchBands::SearchBands(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range)
@@ -42,48 +36,45 @@ SearchBands::SearchBands(ocl::Context& context, shared::ImageSize size, shared::
 
 SearchBand::SearchBand(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                        const SearchBandOptions& options, int row_group)
-    : context_((context.enter("SearchBand"), context)),
-      size_(size),
+    : stage_(ocl::Stage::of_row_groups(context, "SearchBand", "search_band.cl", size, row_group)),
       blocks_(blocks_of(size)),
       range_(range),
       options_(options),
-      row_group_(row_group > 0 ? row_group : ocl::row_group(context)),
       block_ranges_(context, 2 * pixel_count(blocks_)),
       coarse_ranges_(context, 2 * pixel_count(blocks_)),
       none_(context, 2 * pixel_count(blocks_)),
       found_(context, 2 * pixel_count(blocks_)),
       block_bands_(context, 2 * pixel_count(blocks_)),
-      gather_blocks_(build(context, row_group_), "gather_blocks"),
-      gather_coarse_(build(context, row_group_), "gather_coarse"),
-      bands_of_blocks_(build(context, row_group_), "bands_of_blocks"),
-      bands_of_pixels_(build(context, row_group_), "bands_of_pixels"),
-      sum_rows_(build(context, row_group_), "sum_rows"),
-      full_range_(build(context, row_group_), "full_range") {
+      gather_blocks_(stage_, "gather_blocks"),
+      gather_coarse_(stage_, "gather_coarse"),
+      bands_of_blocks_(stage_, "bands_of_blocks"),
+      bands_of_pixels_(stage_, "bands_of_pixels"),
+      sum_rows_(stage_, "sum_rows"),
+      full_range_(stage_, "full_range") {
   for (ocl::Buffer<shared::BlockRange>* ranges : {&block_ranges_, &none_}) {
     ranges->write(context, std::vector(ranges->size(), shared::BlockRange{}));
   }
 }
 
 void SearchBand::narrow(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views) {
-  context_.enter("SearchBand");
-  const int pixels = row_group_ == 1 ? 2 * EGOSGM_BLOCK : 1;
-  const ocl::Range blocks = ocl::every_pixels(context_, blocks_, pixels, count(views));
+  ocl::Context& context = stage_.enter();
+  const shared::ImageSize size = stage_.size();
+  const ocl::Range blocks = ocl::every_pixels(context, blocks_, stage_.pixels(), count(views));
   if (coarse)
-    gather_coarse_(context_, ocl::every_pixel(context_, blocks_, count(views)), size_, *coarse, coarse_ranges_);
-  if (options_.from_neighbours) gather_blocks_(context_, blocks, size_, predicted.disparity, block_ranges_);
-  bands_of_blocks_(context_, blocks, size_, range_, options_.from_neighbours, options_.neighbour_margin_px,
-                   options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_,
-                   coarse ? coarse_ranges_ : none_, found_, block_bands_);
-  bands_of_pixels_(context_, ocl::every_pixels(context_, size_, pixels, count(views)), size_, range_, options_.sigmas,
-                   options_.min_half_width_px, predicted.disparity, predicted.variance, options_.coarse_tolerance_px,
-                   options_.coarse_margin_px, found_, block_bands_, bands.bands, bands.cell_offsets, bands.row_sums);
-  if (pixels == 1) sum_rows(predicted.disparity, bands, views);
+    stage_.launch(gather_coarse_, ocl::every_pixel(context, blocks_, count(views)), size, *coarse, coarse_ranges_);
+  if (options_.from_neighbours) stage_.launch(gather_blocks_, blocks, size, predicted.disparity, block_ranges_);
+  stage_.launch(bands_of_blocks_, blocks, size, range_, options_.from_neighbours, options_.neighbour_margin_px,
+                options_.neighbour_min_count, options_.coarse_margin_px, block_ranges_, coarse ? coarse_ranges_ : none_,
+                found_, block_bands_);
+  stage_.launch_pixels(bands_of_pixels_, count(views), range_, options_.sigmas, options_.min_half_width_px,
+                       predicted.disparity, predicted.variance, options_.coarse_tolerance_px, options_.coarse_margin_px,
+                       found_, block_bands_, bands.bands, bands.cell_offsets, bands.row_sums);
+  if (stage_.pixels() == 1) sum_rows(predicted.disparity, bands, views);
 }
 
 void SearchBand::full_range(SearchBands& bands, Views views) {
-  context_.enter("SearchBand");
-  full_range_(context_, ocl::every_pixel(context_, size_, count(views)), size_, whole(range_), bands.bands,
-              bands.cell_offsets, bands.row_sums);
+  stage_.launch(full_range_, ocl::every_pixel(stage_.enter(), stage_.size(), count(views)), stage_.size(),
+                whole(range_), bands.bands, bands.cell_offsets, bands.row_sums);
 }
 
 void SearchBand::full_range(const Map& predicted, SearchBands& bands, Views views) {
@@ -92,8 +83,7 @@ void SearchBand::full_range(const Map& predicted, SearchBands& bands, Views view
 }
 
 void SearchBand::sum_rows(const Map& predicted, SearchBands& bands, Views views) {
-  sum_rows_(context_, ocl::group_a_row(size_, row_group_, count(views)), size_, predicted, bands.bands,
-            bands.cell_offsets, bands.row_sums);
+  stage_.launch_rows(sum_rows_, count(views), predicted, bands.bands, bands.cell_offsets, bands.row_sums);
 }
 
 }  // namespace egosgm

@@ -3,7 +3,7 @@
 
 #include "host/maps.h"
 #include "host/method_options.h"
-#include "host/ocl/kernel.h"
+#include "host/ocl/stage.h"
 
 namespace egosgm {
 
@@ -48,11 +48,10 @@ class SearchBand {
   using Disparities = const ocl::Buffer<float>;
   using Ranges = ocl::Buffer<shared::BlockRange>;
 
-  ocl::Context& context_;
-  const shared::ImageSize size_, blocks_;
+  ocl::Stage stage_;
+  const shared::ImageSize blocks_;
   const shared::DisparityRange range_;
   const SearchBandOptions options_;
-  const int row_group_;
   Ranges block_ranges_, coarse_ranges_, none_, found_;
   ocl::Buffer<shared::Band> block_bands_;
   ocl::Kernel<const shared::ImageSize, Disparities, Ranges> gather_blocks_;

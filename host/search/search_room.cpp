@@ -16,11 +16,11 @@ void SearchRoom::prepare(PixelType type) {
   if (coarse_match_) coarse_match_->prepare(type);
 }
 
-void SearchRoom::plan_bands(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                            Measurement& coarse, SearchBands& bands) {
+void SearchRoom::plan_bands(const Plan& plan, const FrameImages& images, const Prediction& prediction, Map& coarse,
+                            SearchBands& bands) {
   if (plan.search == Search::kBands) {
     if (plan.has_coarse_match) coarse_match_->match(images, coarse);
-    const Map* found = plan.has_coarse_match ? &coarse.disparity : nullptr;
+    const Map* found = plan.has_coarse_match ? &coarse : nullptr;
     search_band_.narrow(prediction.maps, found, bands, plan.matched);
   } else if (plan.predicts()) {
     search_band_.full_range(prediction.maps.disparity, bands, plan.matched);

@@ -17,7 +17,7 @@ class SearchRoom {
 
   /// Writes `coarse`, what CoarseMatch finds in the images, where the plan has one. The prediction is read where the
   /// plan predicts.
-  void plan_bands(const Plan& plan, const FrameImages& images, const Prediction& prediction, Measurement& coarse,
+  void plan_bands(const Plan& plan, const FrameImages& images, const Prediction& prediction, Map& coarse,
                   SearchBands& bands);
 
   /// REQUIRES: the last frame had a coarse match.

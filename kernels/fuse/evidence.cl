@@ -229,9 +229,7 @@ KERNEL void gather_evidence(const ImageSize size, const int has_coarse, global c
 // same surface. Where the left view alone is tracked (by_left), a right pixel has the evidence of the left pixel that
 // it sees, and must be confirmed itself.
 COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const int by_left,
-                               global const float* disparity, global const uchar* evidence, global float* published,
-                               const int with_variance, global const float* variance,
-                               global float* published_variance) {
+                               global const float* disparity, global const uchar* evidence, global float* published) {
   const int width = size.width;
   const size_t left_row = (size_t)at.y * width;
   const size_t row = (size_t)at.view * size.height * width + left_row;
@@ -254,16 +252,10 @@ COMPILED_ONCE void publish_row(const WorkItem at, const ImageSize size, const in
                                   EGOSGM_SAME_SURFACE_PX, disparity + view, evidence + view);
     }
     store_pixels(is_given ? d : INVALID, published + row, x, width);
-    if (with_variance) {
-      const Floats p = load_pixels(variance + row, x, width);
-      store_pixels(is_given ? p : (Floats)(0.0f), published_variance + row, x, width);
-    }
   }
 }
 
 KERNEL void publish_confirmed(const ImageSize size, const int by_left, global const float* disparity,
-                              global const uchar* evidence, global float* published, const int with_variance,
-                              global const float* variance, global float* published_variance) {
-  publish_row(THIS_WORK_ITEM, size, by_left, disparity, evidence, published, with_variance, variance,
-              published_variance);
+                              global const uchar* evidence, global float* published) {
+  publish_row(THIS_WORK_ITEM, size, by_left, disparity, evidence, published);
 }

@@ -177,9 +177,8 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
       variance = moves ? wide : variance;
     }
     const Floats least = min_variance;
-    const Floats bounded = variance < least ? least : variance;
     store_pixels(value, updated + row, x, width);
-    store_pixels(value > INVALID ? bounded : zero, updated_variance + row, x, width);
+    store_pixels(variance < least ? least : variance, updated_variance + row, x, width);
     const Ints contradicted = (has_both & !fuses) | (moves != 0) | (has_measurement & !has_prediction & is_doubtful);
     store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
     store_bytes(value > INVALID ? verdict.sums : (Ints)(0), evidence + row, x, width);

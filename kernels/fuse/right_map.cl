@@ -114,7 +114,7 @@ COMPILED_ONCE void decode_row(const WorkItem at, const ImageSize size, const int
       if (!makes_variance) continue;
       const Floats p = gather(variance + row, &lefts[i]);
       const Floats r = load_pixels(measured_variance + right_row, x, width);
-      store_pixels(agrees ? p : z > INVALID ? r : (Floats)(0.0f), variance + right_row, x, width);
+      store_pixels(agrees ? p : r, variance + right_row, x, width);
     }
   }
 }

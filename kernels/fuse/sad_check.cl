@@ -16,7 +16,7 @@
 #endif
 
 COMPILED_ONCE void check_greys_row(const WorkItem at, const ImageSize size, const float max_difference,
-                                   global const uchar* images, global float* disparity, global float* variance) {
+                                   global const uchar* images, global float* disparity) {
   const int y = at.y;
   const int view = at.view;
   const int width = size.width;
@@ -49,13 +49,11 @@ COMPILED_ONCE void check_greys_row(const WorkItem at, const ImageSize size, cons
     }
     const Ints is_inside = (d > INVALID) & (match >= zero) & (match <= last);
     const Ints is_alike = FLOATS_OF_INTS(sum) <= (Floats)(max_difference)*FLOATS_OF_INTS(count);
-    const Ints drops = (is_inside & is_alike) != 0 ? (Ints)(0) : (Ints)(-1);
-    store_pixels(drops ? INVALID : d, disparity + row, x, width);
-    clear_dropped(drops, variance + row, x, width);
+    store_pixels((is_inside & is_alike) ? d : INVALID, disparity + row, x, width);
   }
 }
 
 KERNEL void check_greys(const ImageSize size, const float max_difference, global const uchar* images,
-                        global float* disparity, global float* variance) {
-  check_greys_row(THIS_WORK_ITEM, size, max_difference, images, disparity, variance);
+                        global float* disparity) {
+  check_greys_row(THIS_WORK_ITEM, size, max_difference, images, disparity);
 }

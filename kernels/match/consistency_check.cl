@@ -7,8 +7,7 @@
 // lint: PIXELS=16
 
 COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const float max_difference,
-                             const int keep_outside, global const float* disparity, global float* kept_disparity,
-                             global float* variance) {
+                             const int keep_outside, global const float* disparity, global float* kept) {
   const int y = at.y;
   const int view = at.view;
   const int width = size.width;
@@ -31,13 +30,12 @@ COMPILED_ONCE void check_row(const WorkItem at, const ImageSize size, const floa
       const Floats other = gather(disparity + other_row, &places[i]);
       const Ints agree = (other > INVALID) & (fabs(other - d) <= max_difference);
       const Ints keeps = is_inside[i] ? agree : (d > INVALID) & ((Ints)(keep_outside) != 0);
-      store_pixels(keeps ? d : INVALID, kept_disparity + row, x, width);
-      clear_dropped(!keeps, variance + row, x, width);
+      store_pixels(keeps ? d : INVALID, kept + row, x, width);
     }
   }
 }
 
 KERNEL void check(const ImageSize size, const float max_difference, const int keep_outside,
-                  global const float* disparity, global float* kept_disparity, global float* variance) {
-  check_row(THIS_WORK_ITEM, size, max_difference, keep_outside, disparity, kept_disparity, variance);
+                  global const float* disparity, global float* kept) {
+  check_row(THIS_WORK_ITEM, size, max_difference, keep_outside, disparity, kept);
 }

@@ -25,7 +25,7 @@ COMPILED_ONCE void read_off_row(const WorkItem at, const SgmParameters q, global
     const Ints is_seen = rank < NO_RANK;
     const Ints disparity = q.min_disparity + q.disparities - 1 - INTS_OF_UINTS(rank & 0xffffu);
     store_pixels(is_seen ? FLOATS_OF_INTS(disparity) : INVALID, disparities + row, x, q.width);
-    store_pixels(is_seen ? (Floats)(q.variance_floor) : (Floats)(0.0f), variances + row, x, q.width);
+    store_pixels((Floats)(q.variance_floor), variances + row, x, q.width);
     store_bytes((Ints)(0), doubtful + row, x, q.width);
   }
 }

@@ -262,8 +262,7 @@ KERNEL void measure(const ImageSize size, global const ushort* runs, global cons
 }
 
 COMPILED_ONCE void drop_row(const WorkItem at, const ImageSize size, const uint max_size, global const ushort* runs,
-                            global const uint* roots, global const uint* sizes, global float* disparity,
-                            global float* variance) {
+                            global const uint* roots, global const uint* sizes, global float* disparity) {
   const int y = at.y;
   const int view = at.view;
   const int width = size.width;
@@ -272,15 +271,12 @@ COMPILED_ONCE void drop_row(const WorkItem at, const ImageSize size, const uint 
     for (uint left = beginnings(runs + row, x, width); left != 0; left &= left - 1) {
       const int run = x + lowest_bit(left);
       if (sizes[min((size_t)roots[row + run], row + run)] > max_size) continue;
-      for (int i = run; i < size.width && runs[row + i] == run; ++i) {
-        disparity[row + i] = EGOSGM_INVALID_DISPARITY;
-        variance[row + i] = 0.0f;
-      }
+      for (int i = run; i < size.width && runs[row + i] == run; ++i) disparity[row + i] = EGOSGM_INVALID_DISPARITY;
     }
   }
 }
 
 KERNEL void drop(const ImageSize size, const uint max_size, global const ushort* runs, global const uint* roots,
-                 global const uint* sizes, global float* disparity, global float* variance) {
-  drop_row(THIS_WORK_ITEM, size, max_size, runs, roots, sizes, disparity, variance);
+                 global const uint* sizes, global float* disparity) {
+  drop_row(THIS_WORK_ITEM, size, max_size, runs, roots, sizes, disparity);
 }

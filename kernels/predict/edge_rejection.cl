@@ -12,7 +12,7 @@ static inline Ints is_jump(const Floats d, const Floats near, const Floats far, 
 }
 
 COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const float max_jump,
-                              global const float* disparity, global float* kept_disparity, global float* variance) {
+                              global const float* disparity, global float* kept) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
@@ -30,12 +30,10 @@ COMPILED_ONCE void reject_row(const WorkItem at, const ImageSize size, const flo
                          is_jump(d, load_pixels(here, x + 1, width), load_pixels(here, x + 2, width), max_jump) |
                          is_jump(d, load_pixels(above, x, width), load_pixels(far_above, x, width), max_jump) |
                          is_jump(d, load_pixels(below, x, width), load_pixels(far_below, x, width), max_jump));
-    store_pixels(jumps ? INVALID : d, kept_disparity + row, x, width);
-    clear_dropped(jumps, variance + row, x, width);
+    store_pixels(jumps ? INVALID : d, kept + row, x, width);
   }
 }
 
-KERNEL void reject(const ImageSize size, const float max_jump, global const float* disparity,
-                   global float* kept_disparity, global float* variance) {
-  reject_row(THIS_WORK_ITEM, size, max_jump, disparity, kept_disparity, variance);
+KERNEL void reject(const ImageSize size, const float max_jump, global const float* disparity, global float* kept) {
+  reject_row(THIS_WORK_ITEM, size, max_jump, disparity, kept);
 }

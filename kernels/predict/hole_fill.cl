@@ -47,7 +47,7 @@ KERNEL void fill_rows(const ImageSize size, const float gamma, global const floa
   fill_row(THIS_WORK_ITEM, size, gamma, disparity, variance, filled_disparity, filled_variance);
 }
 
-// `hidden`: 1 where a pixel is, whose variance is 0.
+// `hidden`: 1 where a pixel is.
 COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, const float gamma,
                                     global const float* disparity, global const float* variance,
                                     global float* filled_disparity, global float* filled_variance,
@@ -69,7 +69,7 @@ COMPILED_ONCE void fill_columns_row(const WorkItem at, const ImageSize size, con
     const Floats p_below = load_pixels(variance + row_below, x, width);
     const Ints hides = fills ? (Ints)(0) : is_hidden(p, p_above, p_below);
     store_pixels(fills ? middle_of(above, below) : hides ? INVALID : d, filled_disparity + row, x, width);
-    store_pixels(fills ? larger_of(p_above, p_below) : hides ? (Floats)(0.0f) : p, filled_variance + row, x, width);
+    store_pixels(fills ? larger_of(p_above, p_below) : p, filled_variance + row, x, width);
     store_bytes(hides & (Ints)(1), hidden + row, x, width);
   }
 }

@@ -15,6 +15,9 @@ static inline Floats cut(const Floats value, const float most) { return value < 
 static inline Floats counted(const Floats value) { return value >= 0.0f ? (Floats)(1.0f) : (Floats)(0.0f); }
 static inline Floats if_inside(const Floats value) { return value >= 0.0f ? value : (Floats)(0.0f); }
 
+// Where there is no disparity, a variance means nothing.
+static inline Floats if_valid(const Floats d, const Floats variance) { return d > INVALID ? variance : (Floats)(0.0f); }
+
 // |before - 2 at + after|; beside a hole as much as can be.
 static inline Floats second_difference(const Floats before, const Floats at, const Floats after) {
   const Ints valid = (before > INVALID) & (at > INVALID) & (after > INVALID);
@@ -33,9 +36,9 @@ static inline Floats blend(const Floats p, const Floats measured, const Floats r
 // Of each pixel: the variances' blend, and the sum of the horizontal and the vertical second difference. A pixel at the
 // image's edge is its own neighbour.
 COMPILED_ONCE void of_each_pixel_row(const WorkItem at, const ImageSize size, global const float* disparity,
-                                     global const float* variance, global const float* measured,
-                                     global const float* measured_variance, global float* blended,
-                                     global float* roughness) {
+                                     global const float* belief, global const float* variance,
+                                     global const float* measured, global const float* measured_variance,
+                                     global float* blended, global float* roughness) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = ((size_t)at.view * size.height + y) * width;
@@ -49,16 +52,16 @@ COMPILED_ONCE void of_each_pixel_row(const WorkItem at, const ImageSize size, gl
     const Floats across = second_difference(left, d, right);
     const Floats down = second_difference(load_pixels(above, x, width), d, load_pixels(below, x, width));
     store_pixels(across + down, roughness + row, x, width);
-    const Floats p = load_pixels(variance + row, x, width);
+    const Floats p = if_valid(load_pixels(belief + row, x, width), load_pixels(variance + row, x, width));
     const Floats r = load_pixels(measured_variance + row, x, width);
     store_pixels(blend(p, load_pixels(measured + row, x, width), r), blended + row, x, width);
   }
 }
 
-KERNEL void of_each_pixel(const ImageSize size, global const float* disparity, global const float* variance,
-                          global const float* measured, global const float* measured_variance, global float* blended,
-                          global float* roughness) {
-  of_each_pixel_row(THIS_WORK_ITEM, size, disparity, variance, measured, measured_variance, blended, roughness);
+KERNEL void of_each_pixel(const ImageSize size, global const float* disparity, global const float* belief,
+                          global const float* variance, global const float* measured,
+                          global const float* measured_variance, global float* blended, global float* roughness) {
+  of_each_pixel_row(THIS_WORK_ITEM, size, disparity, belief, variance, measured, measured_variance, blended, roughness);
 }
 
 // Means along the row: of the variances at every fourth pixel; of the roughness at every pixel.
@@ -155,7 +158,7 @@ COMPILED_ONCE void combine_row(const WorkItem at, const ImageSize size, const fl
     }
     FOR_BLOCKS(x, i, start, width) {
       const Floats d = load_pixels(disparity + row, x, width);
-      store_pixels(d > INVALID ? calibrated(sums[i]) : (Floats)(0.0f), variance + row, x, width);
+      store_pixels(if_valid(d, calibrated(sums[i])), variance + row, x, width);
     }
   }
 }
@@ -165,4 +168,20 @@ KERNEL void combine(const ImageSize size, const float scale, const float roughne
                     global const float* mean_roughness, global float* variance) {
   combine_row(THIS_WORK_ITEM, size, scale, roughness_weight, jump_weight, disparity, mean_variance, mean_roughness,
               variance);
+}
+
+// The filter's own variance.
+COMPILED_ONCE void keep_row(const WorkItem at, const ImageSize size, global const float* disparity,
+                            global const float* variance, global float* kept) {
+  const int width = size.width;
+  const size_t row = ((size_t)at.view * size.height + at.y) * width;
+  FOR_PIXELS(x, width) {
+    const Floats d = load_pixels(disparity + row, x, width);
+    store_pixels(if_valid(d, load_pixels(variance + row, x, width)), kept + row, x, width);
+  }
+}
+
+KERNEL void keep(const ImageSize size, global const float* disparity, global const float* variance,
+                 global float* kept) {
+  keep_row(THIS_WORK_ITEM, size, disparity, variance, kept);
 }

@@ -233,19 +233,11 @@ TEST(Evidence, GivesOutWhatHasMuchOrIsSupported) {
       const StereoMaps on_device = testing::upload(context, kSmall, maps);
       FlagMap evidence(context, maps.evidence.size());
       evidence.write(context, maps.evidence);
-      StereoMaps published = testing::upload(context, kSmall, testing::random_maps(kSmall, 0, 9, 0.2, 9));
-      const std::vector<float> before = published.variance.read(context);
+      Map published = testing::upload(context, kSmall, testing::random_maps(kSmall, 0, 9, 0.2, 9)).disparity;
       Evidence stage(context, kSmall, options(), pixels);
-      const testing::HostMaps expected = reference::confirmed(kSmall, maps, tracked == Views::kLeft);
-      for (const bool with_variance : {false, true}) {
-        stage.publish(on_device, evidence, with_variance, {published.disparity, published.variance}, Views::kBoth,
-                      tracked);
-        EXPECT_TRUE(testing::same_bits(published.disparity.read(context), expected.disparity, kSmall))
-            << "by " << pixels;
-        EXPECT_TRUE(
-            testing::same_bits(published.variance.read(context), with_variance ? expected.variance : before, kSmall))
-            << "by " << pixels;
-      }
+      const std::vector<float> expected = reference::confirmed(kSmall, maps, tracked == Views::kLeft);
+      stage.publish(on_device.disparity, evidence, published, Views::kBoth, tracked);
+      EXPECT_TRUE(testing::same_bits(published.read(context), expected, kSmall)) << "by " << pixels;
     }
   }
 }
@@ -269,11 +261,10 @@ TEST(Evidence, GivesOutWhatHasLittleWithinASurface) {
     ocl::Context context(testing::any_device());
     FlagMap evidence(context, maps.evidence.size());
     evidence.write(context, maps.evidence);
-    StereoMaps published(context, kSurface);
+    Map published(context, maps.disparity.size());
     Evidence(context, kSurface, options())
-        .publish(testing::upload(context, kSurface, maps), evidence, false, {published.disparity, published.variance},
-                 Views::kBoth, Views::kBoth);
-    return published.disparity.read(context)[kMiddle] == d;
+        .publish(testing::upload(context, kSurface, maps).disparity, evidence, published, Views::kBoth, Views::kBoth);
+    return published.read(context)[kMiddle] == d;
   };
   EXPECT_TRUE(gives(20, 8, 32, 0));
   EXPECT_FALSE(gives(20, 7, 32, 95)) << "too few";

@@ -105,21 +105,7 @@ void run(std::string_view input) {
   if (reads_off) m.sgm.prepare_reading_off();
   reads_off ? m.sgm.reading_off(inputs, m.measured) : m.sgm.match(inputs, m.measured, Views::kBoth);
 
-  const BandedSgmOptions& o = m.options;
-  const shared::SgmParameters parameters{m.size.width,
-                                         m.size.height,
-                                         m.range.min,
-                                         m.range.count,
-                                         BandedSgm::code_padding(m.range),
-                                         o.p1,
-                                         o.s_max,
-                                         o.variance_floor_px2,
-                                         o.variance_per_step_px2,
-                                         o.variance_per_square_px2,
-                                         o.doubts_band_ends,
-                                         reads_off,
-                                         /*first_view=*/0};
-  const testing::HostMaps expected = reference::banded_sgm(parameters, o, codes, grey, bands);
+  const testing::HostMaps expected = reference::banded_sgm(m.size, m.range, m.options, codes, grey, bands, reads_off);
   const testing::HostMaps actual = testing::download(m.context, m.measured);
   for (const auto& same : {testing::same_bits(actual.disparity, expected.disparity, m.size),
                            testing::same_bits(actual.variance, expected.variance, m.size)}) {

@@ -67,7 +67,7 @@ void run(std::string_view input) {
     ForwardWarp stage(context, kSize, calibration, {.process_noise_px2 = kProcessNoisePx2}, range, pixels);
     StereoMaps predicted(context, kSize);
     stage.warp(on_device, evidence, motion, predicted, moved, Views::kBoth);
-    const testing::HostMaps actual = testing::without_marks(testing::download(context, predicted));
+    const testing::HostMaps actual = testing::download_marked(context, predicted);
     if (moved.read(context) != expected.evidence) throw std::logic_error("by " + std::to_string(pixels) + ": evidence");
     if (actual.hidden != expected.hidden) throw std::logic_error("by " + std::to_string(pixels) + ": hidden");
     for (const auto& same : {testing::same_bits(actual.disparity, expected.disparity, kSize),

@@ -86,7 +86,8 @@ struct Match {
   std::vector<shared::Band> bands;
   testing::HostMaps measured;
   std::vector<Stripe> stripes;
-  shared::SgmParameters parameters;
+  shared::DisparityRange range;
+  bool reads_off = false;
   BandedSgmOptions options;
 };
 
@@ -121,19 +122,8 @@ Match match(const Case& c, int max_memory_mib = 0) {
   if (c.reads_off) sgm.prepare_reading_off();
   c.reads_off ? sgm.reading_off(inputs, measured) : sgm.match(inputs, measured, Views::kBoth);
 
-  m.parameters = {c.size.width,
-                  c.size.height,
-                  c.range.min,
-                  c.range.count,
-                  padding,
-                  m.options.p1,
-                  m.options.s_max,
-                  m.options.variance_floor_px2,
-                  m.options.variance_per_step_px2,
-                  m.options.variance_per_square_px2,
-                  m.options.doubts_band_ends,
-                  c.reads_off,
-                  /*first_view=*/0};
+  m.range = c.range;
+  m.reads_off = c.reads_off;
   m.bands = bands.bands.read(context);
   m.measured = testing::download(context, measured);
   m.stripes = sgm.stripes();
@@ -163,7 +153,7 @@ TEST_P(BandedSgmTest, EqualsReference) {
   if (c.tile.block_lanes > 16 && refuses_blocks(c)) GTEST_SKIP() << "the compiler has no vectors of 32 lanes";
   const Match m = match(c);
   ASSERT_EQ(m.stripes.size(), 1u);
-  const auto expected = reference::banded_sgm(m.parameters, m.options, m.codes, m.grey, m.bands);
+  const auto expected = reference::banded_sgm(c.size, m.range, m.options, m.codes, m.grey, m.bands, m.reads_off);
   expect_same(m.measured, expected, c.size);
 }
 
@@ -186,9 +176,8 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
       return rows_of(values, planes, size, stripe.first_row, stripe.rows);
     };
     const std::vector<std::uint64_t> codes[2] = {cut(m.codes[0], 1), cut(m.codes[1], 1)};
-    shared::SgmParameters parameters = m.parameters;
-    parameters.height = stripe.rows;
-    const auto maps = reference::banded_sgm(parameters, m.options, codes, cut(m.grey, 2), cut(m.bands, 2));
+    const auto maps = reference::banded_sgm({size.width, stripe.rows}, m.range, m.options, codes, cut(m.grey, 2),
+                                            cut(m.bands, 2), m.reads_off);
     for (int view = 0; view < 2; ++view) {
       const std::ptrdiff_t kept = static_cast<std::ptrdiff_t>(stripe.kept_end - stripe.kept_begin) * size.width;
       const std::ptrdiff_t to = (static_cast<std::ptrdiff_t>(view) * size.height + stripe.kept_begin) * size.width;

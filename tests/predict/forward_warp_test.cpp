@@ -35,7 +35,7 @@ testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, s
   evidence.write(context, belief.evidence.empty() ? std::vector<cl_uchar>(evidence.size()) : belief.evidence);
   moved.write(context, std::vector<cl_uchar>(moved.size(), 77));
   stage.warp(in, evidence, motion, out, moved, views);
-  testing::HostMaps maps = testing::without_marks(testing::download(context, out));
+  testing::HostMaps maps = testing::download_marked(context, out);
   maps.evidence = moved.read(context);
   return maps;
 }

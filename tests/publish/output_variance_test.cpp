@@ -18,25 +18,27 @@ namespace {
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 constexpr float kUntouched = -77;
 
-std::vector<float> output_variance(shared::ImageSize size, const testing::HostMaps& in,
-                                   const testing::HostMaps& measured_in, const OutputVarianceOptions& options,
-                                   int pixels = 0, Views views = Views::kBoth) {
+std::vector<float> output_variance(shared::ImageSize size, const std::vector<float>& given_out,
+                                   const testing::HostMaps& in, const testing::HostMaps& measured_in,
+                                   const OutputVarianceOptions& options, int pixels = 0, Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   OutputVariance stage(context, size, options, pixels);
   const StereoMaps maps = testing::upload(context, size, in), measured = testing::upload(context, size, measured_in);
   ocl::Buffer<float> variance(context, in.variance.size());
   variance.write(context, std::vector<float>(in.variance.size(), kUntouched));
-  stage.compute(maps, measured, variance, views);
+  Map given(context, given_out.size());
+  given.write(context, given_out);
+  stage.compute(given, maps, measured, variance, views);
   const testing::HostMaps after = testing::download(context, maps);
   EXPECT_EQ(after.disparity, in.disparity);
-  EXPECT_EQ(after.variance, in.variance);
+  EXPECT_EQ(after.variance, testing::masked(in).variance);
   return variance.read(context);
 }
 
 /// Of what was just measured, as in the first frame.
 std::vector<float> output_variance(shared::ImageSize size, const testing::HostMaps& measured,
                                    const OutputVarianceOptions& options, int pixels = 0, Views views = Views::kBoth) {
-  return output_variance(size, measured, measured, options, pixels, views);
+  return output_variance(size, measured.disparity, measured, measured, options, pixels, views);
 }
 
 class OutputVarianceTest : public ::testing::TestWithParam<shared::ImageSize> {};
@@ -44,12 +46,17 @@ class OutputVarianceTest : public ::testing::TestWithParam<shared::ImageSize> {}
 TEST_P(OutputVarianceTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   for (const double holes : {0.0, 0.3, 0.98}) {
-    const testing::HostMaps maps = testing::random_maps(size, -40, 90, holes, 7);
+    const testing::HostMaps belief = testing::random_maps(size, -40, 90, holes, 7);
     const testing::HostMaps measured = testing::random_maps(size, -40, 90, 0.3, 8);
-    const std::vector<float> expected = reference::output_variance(size, {}, maps, measured);
-    for (const int pixels : {1, 16}) {
-      EXPECT_TRUE(testing::same_bits(output_variance(size, maps, measured, {}, pixels), expected, size))
-          << holes << " holes, by " << pixels;
+    std::vector<float> given_out = belief.disparity;
+    for (std::size_t i = 0; i < given_out.size(); i += 3) given_out[i] = kNone;
+    for (const OutputVarianceOptions& options : {OutputVarianceOptions{}, {.enabled = false}}) {
+      const std::vector<float> expected = reference::output_variance(size, options, given_out, belief, measured);
+      for (const int pixels : {1, 16}) {
+        EXPECT_TRUE(
+            testing::same_bits(output_variance(size, given_out, belief, measured, options, pixels), expected, size))
+            << holes << " holes, enabled " << options.enabled << ", by " << pixels;
+      }
     }
   }
 }
@@ -160,7 +167,8 @@ TEST(OutputVariance, RestsOnTheMeasurementMoreThanOnTheFilter) {
         {9, 1}, [=](int, int) { return disparity; }, [=](int, int) { return variance; });
   };
   const auto expect_mean = [&](float mean, const testing::HostMaps& measured, const char* what) {
-    const std::vector<float> out = output_variance({9, 1}, row_of(5, 1.0f / 16), measured, {.scale = 1});
+    const testing::HostMaps filter = row_of(5, 1.0f / 16);
+    const std::vector<float> out = output_variance({9, 1}, filter.disparity, filter, measured, {.scale = 1});
     EXPECT_FLOAT_EQ(out[0], given_for(std::pow(mean, 1.5f))) << what;
   };
   expect_mean(0.5f, row_of(7, 1), "(1/16 * 1^3)^(1/4)");
@@ -168,6 +176,20 @@ TEST(OutputVariance, RestsOnTheMeasurementMoreThanOnTheFilter) {
   const float of_the_most = std::pow(most * most * most / 16, 0.25f);
   expect_mean(of_the_most, row_of(7, reference::kDoubtfulVariancePx2), "cut");
   expect_mean(of_the_most, row_of(kNone, 0), "nothing measured");
+}
+
+TEST(OutputVariance, IsTheFiltersWhereTheOptionsSaySo) {
+  const testing::HostMaps belief{{5, 6, kNone, 5, 6, kNone}, {1, 2, 3, 4, 5, 6}};
+  EXPECT_EQ(output_variance({3, 1}, {5, kNone, kNone, kNone, 6, kNone}, belief, belief, {.enabled = false}),
+            (std::vector<float>{1, 0, 0, 0, 5, 0}));
+}
+
+TEST(OutputVariance, RestsOnABeliefThatIsNotGivenOut) {
+  const testing::HostMaps belief{{5, 5, 5, 5, 5, kNone, kNone, kNone, kNone, kNone}, std::vector<float>(10, 0.25f)};
+  std::vector<float> given_out(10, kNone);
+  given_out[4] = 5;
+  const OutputVarianceOptions only_filter{.scale = 1, .roughness_weight = 0, .jump_weight = 0};
+  EXPECT_FLOAT_EQ(output_variance({5, 1}, given_out, belief, belief, only_filter)[4], given_for(0.125f));
 }
 
 TEST(OutputVariance, KnowsNoSumThatIsTooSmallOrTooLarge) {

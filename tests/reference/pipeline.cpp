@@ -58,18 +58,14 @@ Frame Pipeline::process(const Images& images, const std::optional<ViewMotions>& 
   frame.evidence = has_prediction ? frame.fused.evidence
                                   : std::vector<std::uint8_t>(frame.result.disparity.size(),
                                                               static_cast<std::uint8_t>(kTrustedEvidence));
-  testing::HostMaps given_out = frame.result;
+  frame.given_out = frame.result.disparity;
   if (has_prediction && has_evidence()) {
     testing::HostMaps belief = frame.result;
     belief.evidence = frame.evidence;
-    given_out = confirmed(size_, belief, !options_.track_right);
+    frame.given_out = confirmed(size_, belief, !options_.track_right);
   }
-  frame.given_out = given_out.disparity;
   frame.output_variance =
-      options_.output_variance.enabled
-          ? output_variance(size_, options_.output_variance, {given_out.disparity, frame.result.variance},
-                            frame.passes.back().measured)
-          : given_out.variance;
+      output_variance(size_, options_.output_variance, frame.given_out, frame.result, frame.passes.back().measured);
   frame.reasons = explain(images, frame);
   if (!options_.temporal) return frame;
   offset_ = frame.passes.back().offset;
@@ -146,24 +142,11 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
                                               codes(size_, {middle, pass.images.end()}, images.bits, sgm.cost)};
   pass.view_codes = {size_, {both[0], both[1]}};
   pass.codes = padded_codes(size_, both[0], both[1], code_padding_, sgm.cost);
-  const shared::SgmParameters parameters{size_.width,
-                                         size_.height,
-                                         range_.min,
-                                         range_.count,
-                                         code_padding_,
-                                         sgm.p1,
-                                         sgm.s_max,
-                                         sgm.variance_floor_px2,
-                                         sgm.variance_per_step_px2,
-                                         sgm.variance_per_square_px2,
-                                         sgm.doubts_band_ends,
-                                         reads_off,
-                                         /*first_view=*/0};
   const std::vector<std::uint16_t> values(pass.images.begin(), pass.images.end());
   pass.penalties = step_penalties(size_, values, images.bits, sgm);
   std::vector<std::uint16_t> grey = values;
   for (std::uint16_t& value : grey) value = static_cast<std::uint16_t>(value >> (images.bits - 8));
-  pass.matched = banded_sgm(parameters, sgm, both, grey, pass.band.bands);
+  pass.matched = banded_sgm(size_, range_, sgm, both, grey, pass.band.bands, reads_off);
   pass.smoothed = options_.median_filter.enabled ? median_filter(size_, false, pass.matched) : pass.matched;
   const ConsistencyCheckOptions& check = options_.consistency;
   pass.consistent =
@@ -175,8 +158,6 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
     const std::ptrdiff_t right = static_cast<std::ptrdiff_t>(pass.measured.disparity.size() / 2);
     std::copy(pass.consistent.disparity.begin() + right, pass.consistent.disparity.end(),
               pass.measured.disparity.begin() + right);
-    std::copy(pass.consistent.variance.begin() + right, pass.consistent.variance.end(),
-              pass.measured.variance.begin() + right);
   }
   pass.measured.doubtful = pass.matched.doubtful;
   pass.offset = known;

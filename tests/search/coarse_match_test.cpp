@@ -40,10 +40,10 @@ std::vector<float> run(shared::ImageSize size, const MethodOptions& options, con
   }
   FrameImages on_device{ocl::Buffer<cl_uchar>(context, bytes.size()), type};
   on_device.pixels.write(context, bytes);
-  Measurement found(context, CoarseMatch::coarse_size(size));
+  Map found(context, 2 * pixel_count(CoarseMatch::coarse_size(size)));
   stage.prepare(type);
   stage.match(on_device, found);
-  return found.disparity.read(context);
+  return found.read(context);
 }
 
 using Case = std::tuple<shared::ImageSize, PixelType>;

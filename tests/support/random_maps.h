@@ -17,6 +17,14 @@ struct HostMaps {
   std::vector<std::uint8_t> hidden = {}, doubtful = {}, evidence = {};
 };
 
+/// With variances of 0 where there is no disparity, as they mean nothing there.
+inline HostMaps masked(HostMaps maps) {
+  for (std::size_t i = 0; i < maps.variance.size(); ++i) {
+    if (!(maps.disparity[i] > EGOSGM_INVALID_DISPARITY)) maps.variance[i] = 0;
+  }
+  return maps;
+}
+
 /// Piecewise smooth disparities in [min, max] with jumps, noise and about `holes` of the pixels invalid.
 inline HostMaps random_maps(shared::ImageSize size, float min, float max, double holes, unsigned seed) {
   std::mt19937 random(seed);

@@ -54,12 +54,12 @@ class StageChain {
       case Room::kAlign:
         return look_at_images(before_.offset.is_known || frame.passes.size() > 1 ? work.aligned : uploaded, frame);
       case Room::kSearch:
-        if (plan.has_coarse_match) frame.passes.back().coarse = work.coarse.disparity.read(context_);
+        if (plan.has_coarse_match) frame.passes.back().coarse = work.coarse.read(context_);
         frame.passes.back().band = {work.bands.bands.read(context_), work.bands.cell_offsets.read(context_),
                                     work.bands.row_sums.read(context_)};
         return;
       case Room::kMatch:
-        return look(work.matching, plan.predicts() ? work.measured : after_.maps, frame.passes.back());
+        return look(work.matching, frame.passes.back());
       case Room::kFuse:
         if (plan.predicts()) look(work.fusion, frame);
         return;
@@ -82,10 +82,9 @@ class StageChain {
   void look(const Prediction& prediction, reference::Frame& frame) {
     frame.warped.disparity = prediction.warped.disparity.read(context_);
     if (options_.edge_rejection.max_jump_px > 0) {
-      frame.without_edges =
-          without_marks({prediction.rejected.read(context_), prediction.warped.variance.read(context_)});
+      frame.without_edges = download_marked(context_, prediction.rejected);
     }
-    if (options_.track_right) frame.filled.disparity = prediction.filled.read(context_);
+    if (options_.track_right) frame.filled.disparity = prediction.filled.disparity.read(context_);
     frame.predicted = download(context_, prediction.maps);
     frame.predicted.hidden = prediction.hidden.read(context_);
   }
@@ -99,14 +98,14 @@ class StageChain {
     }
   }
 
-  void look(const Matching& matching, const StereoMaps& measured, reference::Pass& pass) {
+  void look(const Matching& matching, reference::Pass& pass) {
     const std::vector<cl_uint> codes = method_.matcher().codes().read(context_);
     const std::vector<cl_uchar> penalties = method_.matcher().penalties().read(context_);
     pass.codes.assign(codes.begin(), codes.end());
     pass.penalties.assign(penalties.begin(), penalties.end());
-    pass.matched.disparity = matching.matched.read(context_);
+    pass.matched.disparity = matching.matched.disparity.read(context_);
     if (options_.median_filter.enabled) pass.smoothed.disparity = matching.smoothed.read(context_);
-    pass.measured = download(context_, Measurement{measured, matching.doubtful});
+    pass.measured = download(context_, matching.measured);
   }
 
   void look(const Fusion& fusion, reference::Frame& frame) {

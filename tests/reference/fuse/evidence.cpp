@@ -150,10 +150,10 @@ int supporters_of(shared::ImageSize size, const testing::HostMaps& maps, std::si
   return supporters;
 }
 
-testing::HostMaps confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left) {
-  testing::HostMaps result{belief.disparity, belief.variance};
+std::vector<float> confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left) {
+  std::vector<float> result = belief.disparity;
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
-  for (std::size_t i = 0; i < result.disparity.size(); ++i) {
+  for (std::size_t i = 0; i < result.size(); ++i) {
     const float d = belief.disparity[i];
     const int x = static_cast<int>(i % size.width), y = static_cast<int>(i % pixels / size.width);
     int of_pixel = belief.evidence[i];
@@ -166,9 +166,7 @@ testing::HostMaps confirmed(shared::ImageSize size, const testing::HostMaps& bel
     } else {
       is_given = of_pixel >= kTrustedEvidence || supporters_of(size, belief, i / pixels * pixels, x, y, d, 4) >= 8;
     }
-    if (is_valid(d) && is_given) continue;
-    result.disparity[i] = EGOSGM_INVALID_DISPARITY;
-    result.variance[i] = 0;
+    if (!is_valid(d) || !is_given) result[i] = EGOSGM_INVALID_DISPARITY;
   }
   return result;
 }

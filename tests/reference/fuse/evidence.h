@@ -53,6 +53,6 @@ int supporters_of(shared::ImageSize size, const testing::HostMaps& maps, std::si
 
 /// What is given out of a belief with its evidence: what has much, and what confirmed pixels around support. `by_left`:
 /// a right pixel has the evidence of the left pixel that it sees, and must be confirmed itself.
-testing::HostMaps confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left);
+std::vector<float> confirmed(shared::ImageSize size, const testing::HostMaps& belief, bool by_left);
 
 }  // namespace egosgm::reference

@@ -31,7 +31,7 @@ testing::HostMaps sad_check(shared::ImageSize size, const SadCheckOptions& optio
         const bool keeps =
             is_inside(match, y) &&
             static_cast<float>(sum) <= options.max_difference * static_cast<float>(count * steps_per_grey);
-        if (!keeps) out.disparity[index(view, x, y)] = EGOSGM_INVALID_DISPARITY, out.variance[index(view, x, y)] = 0;
+        if (!keeps) out.disparity[index(view, x, y)] = EGOSGM_INVALID_DISPARITY;
       }
     }
   }

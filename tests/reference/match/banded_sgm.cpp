@@ -154,9 +154,22 @@ void read_off(const View& left, const shared::Band* bands, Cells& sums, testing:
 
 }  // namespace
 
-testing::HostMaps banded_sgm(const shared::SgmParameters& q, const BandedSgmOptions& options,
+testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
                              const std::vector<std::uint64_t> (&codes)[2], const std::vector<std::uint16_t>& grey,
-                             const std::vector<shared::Band>& bands) {
+                             const std::vector<shared::Band>& bands, bool reads_off) {
+  const shared::SgmParameters q{.width = size.width,
+                                .height = size.height,
+                                .min_disparity = range.min,
+                                .disparities = range.count,
+                                .padding = 0,
+                                .p1 = options.p1,
+                                .s_max = options.s_max,
+                                .variance_floor = options.variance_floor_px2,
+                                .variance_per_step = options.variance_per_step_px2,
+                                .variance_per_square = options.variance_per_square_px2,
+                                .doubts_band_ends = options.doubts_band_ends,
+                                .reads_off = reads_off,
+                                .first_view = 0};
   testing::HostMaps maps;
   for (int view = 0; view < 2; ++view) {
     const View v{q,           view,

@@ -11,9 +11,10 @@
 namespace egosgm::reference {
 
 /// Disparity and matching variance of both views. `codes`: what reference::codes gives, per view. `bands`: per view and
-/// pixel. `grey`: both views' grey values of 8 bits, for the penalties of `options`.
-testing::HostMaps banded_sgm(const shared::SgmParameters& parameters, const BandedSgmOptions& options,
+/// pixel. `grey`: both views' grey values of 8 bits, for the penalties of `options`. reads_off: whether the right
+/// view's disparities are read off the left view's match.
+testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange range, const BandedSgmOptions& options,
                              const std::vector<std::uint64_t> (&codes)[2], const std::vector<std::uint16_t>& grey,
-                             const std::vector<shared::Band>& bands);
+                             const std::vector<shared::Band>& bands, bool reads_off = false);
 
 }  // namespace egosgm::reference

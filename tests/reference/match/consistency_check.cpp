@@ -8,8 +8,7 @@ namespace egosgm::reference {
 testing::HostMaps consistency_check(shared::ImageSize size, float max_difference_px, bool keep_outside,
                                     const testing::HostMaps& in) {
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
-  testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), std::vector<float>(2 * pixels, 0.0f),
-                        in.hidden};
+  testing::HostMaps out{std::vector<float>(2 * pixels, EGOSGM_INVALID_DISPARITY), in.variance, in.hidden};
   for (std::size_t i = 0; i < 2 * pixels; ++i) {
     const bool is_left = i < pixels;
     const std::size_t x = i % size.width, y = i % pixels / size.width;
@@ -23,7 +22,6 @@ testing::HostMaps consistency_check(shared::ImageSize size, float max_difference
       if (other == EGOSGM_INVALID_DISPARITY || std::abs(other - d) > max_difference_px) continue;
     }
     out.disparity[i] = d;
-    out.variance[i] = in.variance[i];
   }
   return out;
 }

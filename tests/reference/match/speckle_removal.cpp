@@ -30,7 +30,7 @@ testing::HostMaps speckle_removal(shared::ImageSize size, const SpeckleRemovalOp
       if (y + 1 < static_cast<std::size_t>(size.height)) visit(i, i + width);
     }
     if (region.size() > static_cast<std::size_t>(options.max_size_px)) continue;
-    for (const std::size_t i : region) out.disparity[i] = EGOSGM_INVALID_DISPARITY, out.variance[i] = 0;
+    for (const std::size_t i : region) out.disparity[i] = EGOSGM_INVALID_DISPARITY;
   }
   return out;
 }

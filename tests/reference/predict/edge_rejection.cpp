@@ -24,10 +24,7 @@ testing::HostMaps edge_rejection(shared::ImageSize size, float max_jump_px, cons
         if (nx < 0 || nx >= size.width || ny < 0 || ny >= size.height) break;
         const float neighbour = in.disparity[i / pixels * pixels + static_cast<std::size_t>(ny) * size.width + nx];
         if (neighbour == EGOSGM_INVALID_DISPARITY) continue;
-        if (std::abs(neighbour - in.disparity[i]) > max_jump_px) {
-          out.disparity[i] = EGOSGM_INVALID_DISPARITY;
-          out.variance[i] = 0;
-        }
+        if (std::abs(neighbour - in.disparity[i]) > max_jump_px) out.disparity[i] = EGOSGM_INVALID_DISPARITY;
         break;
       }
     }

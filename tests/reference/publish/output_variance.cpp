@@ -74,13 +74,15 @@ float jump_beside(const Plane& disparity, int x, int y) {
 }
 
 /// (p r^3)^(1/4) of every pixel of both views, each cut.
-std::vector<float> blends(const testing::HostMaps& maps, const testing::HostMaps& measured) {
+std::vector<float> blends(const testing::HostMaps& belief, const testing::HostMaps& measured) {
   std::vector<float> out;
-  for (std::size_t i = 0; i < maps.variance.size(); ++i) {
+  for (std::size_t i = 0; i < belief.variance.size(); ++i) {
     const float most = kMaxMeanVariancePx2;
     const bool is_measured = measured.disparity[i] != EGOSGM_INVALID_DISPARITY;
     const float r = is_measured ? std::min(measured.variance[i], most) : most;
-    out.push_back(std::sqrt(r * std::sqrt(r * std::min(maps.variance[i], most))));
+    const bool is_there = belief.disparity[i] != EGOSGM_INVALID_DISPARITY;
+    const float p = is_there ? std::min(belief.variance[i], most) : 0;
+    out.push_back(std::sqrt(r * std::sqrt(r * p)));
   }
   return out;
 }
@@ -93,12 +95,14 @@ float calibrated(float sum) {
 }  // namespace
 
 std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
-                                   const testing::HostMaps& maps, const testing::HostMaps& measured) {
+                                   const std::vector<float>& given_out, const testing::HostMaps& belief,
+                                   const testing::HostMaps& measured) {
+  if (!options.enabled) return testing::masked({given_out, belief.variance}).variance;
   std::vector<float> out;
-  const std::vector<float> variances = blends(maps, measured);
+  const std::vector<float> variances = blends(belief, measured);
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
   for (std::size_t view = 0; view < 2; ++view) {
-    const Plane disparity{size, maps.disparity.data() + view * pixels};
+    const Plane disparity{size, given_out.data() + view * pixels};
     const Plane variance{size, variances.data() + view * pixels};
     const std::vector<float> rough = roughness(disparity);
     for (int y = 0; y < size.height; ++y) {

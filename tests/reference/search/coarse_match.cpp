@@ -51,20 +51,7 @@ std::vector<float> coarse_match(shared::ImageSize size, const MethodOptions& opt
   std::vector<std::uint16_t> grey = shrunken;
   for (std::uint16_t& value : grey) value /= 256;
   const shared::DisparityRange range{first, last - first + 1};
-  const shared::SgmParameters parameters{coarse.width,
-                                         coarse.height,
-                                         range.min,
-                                         range.count,
-                                         0,
-                                         sgm.p1,
-                                         sgm.s_max,
-                                         sgm.variance_floor_px2,
-                                         sgm.variance_per_step_px2,
-                                         sgm.variance_per_square_px2,
-                                         sgm.doubts_band_ends,
-                                         /*reads_off=*/0,
-                                         /*first_view=*/0};
-  const testing::HostMaps matched = banded_sgm(parameters, sgm, both, grey, full_range(coarse, range).bands);
+  const testing::HostMaps matched = banded_sgm(coarse, range, sgm, both, grey, full_range(coarse, range).bands);
   return consistency_check(coarse, options.coarse_match.max_difference_px, false, matched).disparity;
 }
 
