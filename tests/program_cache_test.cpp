@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Programs that are kept on the disk: the same bits without a compiler, and no broken file or folder ends the work.
+#include "host/ocl/program_cache.h"
+
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -15,7 +17,6 @@
 #include <vector>
 
 #include "egosgm/error.h"
-#include "host/ocl/program_cache.h"
 #include "host/ocl/sha256.h"
 #include "tests/support/device.h"
 #include "tests/support/fault_layer.h"
@@ -50,7 +51,8 @@ void write(const fs::path& file, const std::string& bytes) { std::ofstream(file,
 class Program {
  public:
   static ocl::ProgramSource source(int number) {
-    return {"f.cl", "kernel void f(global int* a) { a[0] = " + std::to_string(number % 10) + "; }", "-cl-std=CL1.2", ""};
+    return {"f.cl", "kernel void f(global int* a) { a[0] = " + std::to_string(number % 10) + "; }", "-cl-std=CL1.2",
+            ""};
   }
   void built() const { context_->built(source(0)); }
   /// Whatever is kept.
@@ -130,7 +132,8 @@ TEST_F(KeptTest, NothingWhereItIsOff) {
 TEST_F(KeptTest, WhereNothingIsSaidOnlyForDriversThatKeepNone) {
   const cl::Device device = testing::any_device();
   ::unsetenv("EGOSGM_CACHE");
-  if (!Device::select().info().platform.starts_with("Portable")) GTEST_SKIP() << "not PoCL, which keeps programs itself";
+  if (!Device::select().info().platform.starts_with("Portable"))
+    GTEST_SKIP() << "not PoCL, which keeps programs itself";
   EXPECT_FALSE(ProgramCache::of(device));
 }
 
@@ -141,14 +144,27 @@ TEST_F(KeptTest, BrokenFilesAreBuiltAnew) {
   std::string flipped = whole, of_another = whole, longer = whole + '\0';
   flipped.back() ^= 1;
   of_another.replace(of_another.find(kept[0].filename().string()), 64, std::string(64, '0'));
-  for (const std::string& broken : {std::string(), whole.substr(0, 20), whole.substr(0, 144), whole.substr(0, whole.size() / 2),
-                                    flipped, of_another, longer, std::string("no program")}) {
+  for (const std::string& broken :
+       {std::string(), whole.substr(0, 20), whole.substr(0, 144), whole.substr(0, whole.size() / 2), flipped,
+        of_another, longer, std::string("no program")}) {
     write(kept[0], broken);
     EXPECT_FALSE(builds_without_a_compiler()) << broken.size() << " bytes were taken";
     expect_same_outputs(expected);
     EXPECT_EQ(read(kept[0]), whole);
     EXPECT_TRUE(builds_without_a_compiler());
   }
+}
+
+// A process that reads it meanwhile has the old one or the new one.
+TEST_F(KeptTest, AFileIsReplacedAndNotWrittenInto) {
+  outputs();
+  const fs::path file = files()[0], other_name = folder_.parent_path() / "read meanwhile";
+  const std::string whole = read(file);
+  write(file, "old");
+  fs::create_hard_link(file, other_name);
+  outputs();
+  EXPECT_EQ(read(file), whole);
+  EXPECT_EQ(read(other_name), "old");
 }
 
 // Whole by its header, but nothing that the driver takes.

@@ -27,11 +27,12 @@ constexpr std::size_t kDigits = 64;  // of a file's name
 /// Platforms whose drivers keep what they compiled on the disk: a second copy would bring nothing.
 bool keeps_programs(const std::string& platform) {
   static const std::set<std::string> keeping = {
-      "Portable Computing Language",      // PoCL: POCL_CACHE_DIR
-      "NVIDIA CUDA",                      // CUDA_CACHE_PATH
-      "Intel(R) OpenCL Graphics",         // NEO: NEO_CACHE_DIR
-      "Intel(R) OpenCL HD Graphics",      // its earlier name
-      "rusticl", "Clover",                // Mesa: MESA_SHADER_CACHE_DIR
+      "Portable Computing Language",  // PoCL: POCL_CACHE_DIR
+      "NVIDIA CUDA",                  // CUDA_CACHE_PATH
+      "Intel(R) OpenCL Graphics",     // NEO: NEO_CACHE_DIR
+      "Intel(R) OpenCL HD Graphics",  // its earlier name
+      "rusticl",
+      "Clover",  // Mesa: MESA_SHADER_CACHE_DIR
   };
   return keeping.contains(platform);
 }
@@ -166,7 +167,7 @@ void ProgramCache::keep(const ProgramSource& source, const cl::Program& program)
     binary = binary_of(program);
   } catch (const cl::Error&) {
   }
-  if (binary.empty() || binary.size() > max_bytes_) return;
+  if (binary.empty()) return;
   const fs::path path = file_of(source);
   std::error_code none;
   if (folder_.has_parent_path()) fs::create_directories(folder_.parent_path(), none);
