@@ -54,7 +54,7 @@ class Program {
     return {"f.cl", "kernel void f(global int* a) { a[0] = " + std::to_string(number % 10) + "; }", "-cl-std=CL1.2",
             ""};
   }
-  void built() const { context_->built(source(0)); }
+  cl::Program built() const { return context_->built(source(0)); }
   /// Whatever is kept.
   cl::Program compiled(int number) const {
     cl::Program program(context_->get(), source(number).text);
@@ -214,7 +214,10 @@ TEST_F(KeptTest, FaultsOfItsCallsAreNoErrors) {
   for (int at = 0; at < calls; ++at) {
     for (const int code : {CL_OUT_OF_RESOURCES, CL_OUT_OF_HOST_MEMORY, CL_INVALID_BINARY}) {
       layer_.arm(at, code, testing::FaultLayer::kAtOnce);
-      EXPECT_NO_THROW(program.built()) << at;
+      cl::Program built;
+      EXPECT_NO_THROW(built = program.built()) << at;
+      layer_.disarm();
+      EXPECT_NO_THROW(cl::Kernel(built, "f")) << at;
     }
   }
   // A binary that cannot be had of what was built.
