@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program: arguments in, files out. One file a subcommand.
 #include <fmt/core.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
@@ -13,6 +15,7 @@
 #include <new>
 #include <optional>
 #include <set>
+#include <string_view>
 
 #include "apps/command.h"
 #include "apps/interrupt.h"
@@ -115,13 +118,14 @@ void refuse_odd_values(const CLI::App& command) {
 }
 
 /// Whether main() is left by its own way. A driver may end the whole program: PoCL's compiler does on a full disk.
-bool is_over = false;
+std::atomic<bool> is_over = false;
 
 void tell_of_an_end_from_within() {
-  if (is_over) return;
-  fail(kFailed,
-       "the OpenCL driver ended the program, for what it says above: where that is its cache, make room or set "
-       "POCL_CACHE_DIR to another folder");
+  if (is_over.exchange(true)) return;
+  constexpr std::string_view kMessage =
+      "egosgm: error: the OpenCL driver ended the program, for what it says above: where that is its cache, make room, "
+      "delete the cache, or set POCL_CACHE_DIR to another folder\n";
+  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, kMessage.data(), kMessage.size());
 }
 
 /// A result that the standard output did not take, for example for a full disk, is no result.
@@ -186,6 +190,15 @@ int exit_code_of(int argc, char** argv) {
 
 }  // namespace
 }  // namespace egosgm::app
+
+/// In place of the C library's, for drivers too: PoCL ends the program where a file of its cache is cut. A handler of
+/// SIGABRT would not do, as PoCL's compiler sets its own.
+extern "C" void abort() noexcept {
+  egosgm::app::tell_of_an_end_from_within();
+  std::signal(SIGABRT, SIG_DFL);
+  ::raise(SIGABRT);
+  ::_exit(128 + SIGABRT);
+}
 
 int main(int argc, char** argv) {
   using namespace egosgm;

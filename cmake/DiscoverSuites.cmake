@@ -4,7 +4,7 @@
 # suite, and starting the program hundreds of times takes longer than most tests. The output names the tests that fail. FILTER: GoogleTest's.
 # REQUIRES: none of its tests is ever skipped, since a suite would not say so. This file is also the script that lists the suites after a build.
 if(CMAKE_SCRIPT_MODE_FILE STREQUAL CMAKE_CURRENT_LIST_FILE)
-  execute_process(COMMAND ${PROGRAM} --gtest_list_tests --gtest_filter=${FILTER} OUTPUT_VARIABLE list RESULT_VARIABLE status)
+  execute_process(COMMAND ${EMULATOR} ${PROGRAM} --gtest_list_tests --gtest_filter=${FILTER} OUTPUT_VARIABLE list RESULT_VARIABLE status)
   if(NOT status EQUAL 0)
     message(FATAL_ERROR "${PROGRAM} --gtest_list_tests: ${status}")
   endif()
@@ -25,7 +25,7 @@ function(egosgm_discover_suites target filter)
   set(tests ${CMAKE_CURRENT_BINARY_DIR}/${target}_suites.cmake)
   string(JOIN " " properties ${ARGN})
   add_custom_command(TARGET ${target} POST_BUILD BYPRODUCTS ${tests} VERBATIM
-    COMMAND ${CMAKE_COMMAND} -DPROGRAM=$<TARGET_FILE:${target}> -DOUTPUT=${tests} "-DFILTER=${filter}" "-DPROPERTIES=${properties}" -P ${EGOSGM_DISCOVER_SUITES})
+    COMMAND ${CMAKE_COMMAND} "-DEMULATOR=${CMAKE_CROSSCOMPILING_EMULATOR}" -DPROGRAM=$<TARGET_FILE:${target}> -DOUTPUT=${tests} "-DFILTER=${filter}" "-DPROPERTIES=${properties}" -P ${EGOSGM_DISCOVER_SUITES})
   set(include ${CMAKE_CURRENT_BINARY_DIR}/${target}_include.cmake)
   file(WRITE ${include} "if(EXISTS \"${tests}\")\n  include(\"${tests}\")\nelse()\n  add_test(${target}_NOT_BUILT ${target}_NOT_BUILT)\nendif()\n")
   set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${include})

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Loops that are worth a version of their own for CPUs with wider vectors than every x86-64 has. All versions give the
-// same bits: contraction is off, and no compiler reorders sums.
+// same bits: contraction is off, and no compiler reorders sums. Every aarch64 has NEON, which the one version uses.
 #pragma once
 
 #include <cstddef>  // __GLIBC__

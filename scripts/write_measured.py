@@ -17,6 +17,7 @@ DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs"
 FILES = ("accuracy", "video", "compare", "stages")
 EVIDENCE = "evidence"  # may be missing
 DRIVERS = "drivers"  # of scripts/drivers, which runs apart: each row has a commit of its own, and all may be missing
+DEVICES = "devices"  # a folder of what scripts/bench-device wrote on other machines; may be missing
 CONTENDERS = {
     "opencv_hh": "OpenCV MODE_HH, 8 paths, left view",
     "opencv_hh4": "OpenCV MODE_HH4, 4 paths, left view",
@@ -49,11 +50,16 @@ def read(folder):
     missing = [name for name in FILES if not (folder / f"{name}.json").exists()]
     if missing:
         raise FileNotFoundError(", ".join(f"{folder / name}.json" for name in missing))
-    others = sorted(file.name for file in folder.iterdir() if file.stem not in (*FILES, EVIDENCE, DRIVERS))
+    others = sorted(file.name for file in folder.iterdir() if file.stem not in (*FILES, EVIDENCE, DRIVERS, DEVICES))
     if others:
         raise Refused(f"{folder}: the page is not made from {', '.join(others)}: remove what is left of other runs")
     present = [name for name in (*FILES, EVIDENCE, DRIVERS) if (folder / f"{name}.json").exists()]
-    return {name: json.loads((folder / f"{name}.json").read_text()) for name in present}
+    found = {name: json.loads((folder / f"{name}.json").read_text()) for name in present}
+    machines = [(file, json.loads(file.read_text())) for file in sorted((folder / DEVICES).glob("*.json"))]
+    for file, machine in machines:
+        if not {"device", "driver", "compute_units", "copy_gb_s", "commit", "date", "rows"} <= machine.keys() or not is_clean(machine["commit"]):
+            raise Refused(f"{file}: is not what scripts/bench-device wrote at a commit without changes: run it there on a clean checkout")
+    return {**found, DEVICES: [machine for _, machine in machines]}
 
 
 def is_clean(commit):
@@ -63,7 +69,7 @@ def is_clean(commit):
 def expect_one_commit(found):
     if DRIVERS in found and not all(is_clean(row[-1]) for row in found[DRIVERS]["rows"]):
         raise Refused(f"{DRIVERS}.json: not of a commit without changes: run scripts/drivers on a clean checkout")
-    found = {name: content for name, content in found.items() if name != DRIVERS}
+    found = {name: content for name, content in found.items() if name not in (DRIVERS, DEVICES)}
     commits = {name: content["commit"] for name, content in found.items()}
     if len(set(commits.values())) != 1 or not all(map(is_clean, commits.values())):
         raise Refused(f"not of one commit without changes: {commits}: run scripts/measure on a clean checkout")
@@ -155,6 +161,17 @@ def stages(content):
     return "## Stages\n\nOf a steady frame, stage by stage, and by rooms.\n\n" + table(["stage", "size, D", "time", "on the device", "GB/s"], rows)
 
 
+def machines(found):
+    """A row for each that sent its figures, beside this one's."""
+    rows = []
+    for machine in (found["stages"], *found[DEVICES]):
+        ms = {row["name"]: row["median_ms"] for row in machine["rows"] if (row["width"], row["disparities"]) == (1242, 128)}
+        rows.append([machine["device"], machine["driver"], str(machine["compute_units"]), number(machine.get("copy_gb_s")),
+                     *(number(ms.get(name), "ms") for name in ("BandedSgm_full", "full_frame", "steady_frame")), machine["commit"], machine["date"][:10]])
+    return ("## Devices\n\nBy `scripts/bench-device` at 1242×375, D = 128: this machine's, and those that came ([send yours](send-your-device.md)).\n\n" +
+            table(["device", "driver", "compute units", "copy, GB/s", "full search", "full frame", "steady frame", "commit", "date"], rows))
+
+
 def drivers(content):
     text = ("## Other drivers\n\nBy `scripts/drivers`. Maps are those of whole runs. A run is that of a short street, its time that of the clock; the first "
             "one compiles. The ratio is that of the stages of a steady frame, of turns: the median, and the least and the largest.\n\n")
@@ -171,7 +188,7 @@ def page(found):
             f"{machine['date'][:10]}. Speed on {machine['input']}.\n`scripts/measure` runs all of it again. \"Search\" counts every cell that is matched "
             "([how much is searched](how-it-works.md#how-much-is-searched)).\n")
     places = [evidence(found[EVIDENCE])] if EVIDENCE in found else []
-    parts = [head, accuracy(found["accuracy"]), video(found["video"]), *places, speed(found["compare"]), stages(found["stages"])]
+    parts = [head, accuracy(found["accuracy"]), video(found["video"]), *places, speed(found["compare"]), stages(found["stages"]), machines(found)]
     return "\n".join(parts + ([drivers(found[DRIVERS])] if DRIVERS in found else []))
 
 

@@ -119,6 +119,22 @@ class Page(unittest.TestCase):
         file.write_text(json.dumps({**found, "rows": [["PoCL 9", "11 pass", "9876543210-dirty"]]}))
         self.assertEqual(self.write("--check"), 1)
 
+    def test_machines_that_sent_their_figures(self):
+        self.put()
+        sent = {**MACHINE, "device": "a GPU", "commit": "9876543210", "copy_gb_s": 250.5,
+                "rows": [{"name": "steady_frame", "width": 1242, "height": 375, "disparities": 128, "median_ms": 1.75}]}
+        folder = self.docs / "measured/devices"
+        folder.mkdir()
+        file = folder / "a-gpu.json"
+        file.write_text(json.dumps(sent))
+        self.assertEqual(self.write(), 0)
+        page = (self.docs / "measured.md").read_text()
+        self.assertIn("| a GPU | 1.0 | 2 | 250.50 |  |  | 1.75 ms | 9876543210 | 2026-01-02 |", page)
+        self.assertIn("| a CPU | 1.0 | 2 |  |", page)
+        for broken in ({**sent, "commit": "9876543210-dirty"}, {"rows": []}):
+            file.write_text(json.dumps(broken))
+            self.assertEqual(self.write("--check"), 1)
+
     def test_places_without_evidence_where_they_were_measured(self):
         self.put()
         self.assertEqual(self.write(), 0)

@@ -94,6 +94,15 @@ TEST_F(Signatures, AKernelWithAWorkGroupOfItsOwnKeepsIt) {
   EXPECT_EQ(out.read(context_), std::vector<cl_int>(2 * limit, 1));
 }
 
+TEST(CountsBits, OnThisMachinesCpuAlone) {
+  EXPECT_TRUE(ocl::is_this_cpu_by_pocl("OpenCL 3.0 PoCL HSTR: pthread-x86_64-pc-linux-gnu-skylake-avx512"));
+  EXPECT_TRUE(ocl::is_this_cpu_by_pocl("OpenCL 3.0 PoCL HSTR: cpu-x86_64-pc-linux-gnu-znver4"));
+  EXPECT_FALSE(ocl::is_this_cpu_by_pocl("OpenCL 3.0 PoCL HSTR: pocl-remote"));
+  EXPECT_FALSE(ocl::is_this_cpu_by_pocl("OpenCL 3.0 PoCL HSTR: pthread-aarch64-unknown-linux-gnu-cortex-a76"));
+  EXPECT_FALSE(ocl::is_this_cpu_by_pocl("OpenCL 3.0 PoCL HSTR: CUDA-sm_90"));
+  EXPECT_FALSE(ocl::is_this_cpu_by_pocl("OpenCL 3.0 -x86_64-"));
+}
+
 TEST(Times, ThatADriverLeavesOutAreThoseOfTheNextStep) {
   using Times = ocl::Context::Times;
   const auto completed = [](Times answered) {

@@ -121,7 +121,8 @@ Context::Context(const cl::Device& device, const cl::Context& context, const cl:
       max_allocation_bytes_(device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()),
       shares_host_memory_(device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>()),
       profiles_kernels_(queue().getInfo<CL_QUEUE_PROPERTIES>() & CL_QUEUE_PROFILING_ENABLE),
-      folder_(std::move(programs)) {}
+      folder_(std::move(programs)),
+      cache_(folder_ ? std::nullopt : ProgramCache::of(device)) {}
 
 Context::Apart::Apart(Context& context)
     : context_(context), kernels_(context.queue()), allocated_bytes_(context.allocated_bytes_), stage_(context.stage_) {
@@ -263,9 +264,7 @@ void Context::build_together(const Group& group) {
   if (group.members.size() == 1) return build_alone(*group.members.front());
   enter(group.members.front()->stage());
   const ProgramSource source{"kernels", joined(group.members), build_options_ + group.defines.text(), build_options_};
-  const cl::Program program(context_, source.text);
-  ++builds_;
-  const cl_int status = ::clBuildProgram(program(), 1, &device_(), source.options.c_str(), nullptr, nullptr);
+  const auto [program, status] = compiled(source);
   if (status == CL_BUILD_PROGRAM_FAILURE) {  // an error names the file
     for (Program* member : group.members) build_alone(*member);
     return;
@@ -283,12 +282,23 @@ void Context::build_alone(Program& program) {
 }
 
 cl::Program Context::built(const ProgramSource& source) {
-  const cl::Program program =
-      folder_ ? folder_->program(context_, device_, source) : cl::Program(context_, source.text);
-  // cl::Program::build asks for the log whatever went wrong, and reports that there is none instead of why.
-  const std::string options = folder_ ? folder_->options(source) : source.options;
+  const auto [program, status] =
+      folder_ ? build(folder_->program(context_, device_, source), folder_->options(source)) : compiled(source);
+  return expect_built(source, program, status);
+}
+
+std::pair<cl::Program, cl_int> Context::compiled(const ProgramSource& source) {
+  if (!cache_) return build(cl::Program(context_, source.text), source.options);
+  if (const cl::Program kept = cache_->built(context_, device_, source); kept()) return {kept, CL_SUCCESS};
+  const auto made = build(cl::Program(context_, source.text), source.options);
+  if (made.second == CL_SUCCESS) cache_->keep(source, made.first);
+  return made;
+}
+
+std::pair<cl::Program, cl_int> Context::build(const cl::Program& program, const std::string& options) {
   ++builds_;
-  return expect_built(source, program, ::clBuildProgram(program(), 1, &device_(), options.c_str(), nullptr, nullptr));
+  // cl::Program::build asks for the log whatever went wrong, and reports that there is none instead of why.
+  return {program, ::clBuildProgram(program(), 1, &device_(), options.c_str(), nullptr, nullptr)};
 }
 
 cl::Program Context::expect_built(const ProgramSource& source, const cl::Program& program, cl_int status) const {

@@ -7,12 +7,14 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "egosgm/device.h"
 #include "host/ocl/program.h"
+#include "host/ocl/program_cache.h"
 #include "host/ocl/program_folder.h"
 
 namespace egosgm::ocl {
@@ -47,7 +49,7 @@ class Context {
   /// Builds what was asked for since the last call: what joins, and whose defines agree, together. Programs that come
   /// from a folder are those of a file each. Throws BuildError, or InvalidArgument as ProgramFolder does.
   void build();
-  /// How often a compiler was called.
+  /// How often a compiler was called, or given the binary of a folder of programs.
   int builds() const { return builds_; }
   /// All files that were asked for, as a compiler gets each of them alone.
   std::vector<ProgramSource> sources() const;
@@ -160,6 +162,9 @@ class Context {
   struct Group;
   void build_together(const Group& group);
   void build_alone(Program& program);
+  /// What the cache of programs has, or what the compiler makes; and the compiler's status.
+  std::pair<cl::Program, cl_int> compiled(const ProgramSource& source);
+  std::pair<cl::Program, cl_int> build(const cl::Program& program, const std::string& options);
   ProgramSource source_of(const Program& program) const;
   /// Throws BuildError.
   cl::Program expect_built(const ProgramSource& source, const cl::Program& program, cl_int status) const;
@@ -176,6 +181,7 @@ class Context {
   const char* stage_ = "setup";
   const char* whole_ = nullptr;
   std::shared_ptr<const ProgramFolder> folder_;
+  std::optional<ProgramCache> cache_;
   std::map<std::pair<std::string, std::string>, Program> programs_;  // by file and defines
   int builds_ = 0;
   std::multimap<Scratch, cl::Buffer> scratch_;

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "egosgm/error.h"
-#include "host/ocl/strings.h"
 
 namespace egosgm::ocl {
 namespace {
@@ -24,11 +23,14 @@ std::size_t work_items(const cl::NDRange& local) {
 
 }  // namespace
 
+bool is_this_cpu_by_pocl(const std::string& version) {
+  return version.find(" PoCL HSTR: ") != std::string::npos && version.find("-x86_64-") != std::string::npos;
+}
+
 bool counts_bits(const Context& context) {
   const cl::Device& device = context.device();
-  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
   return this_cpu_counts_bits() && device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_CPU &&
-         trimmed(platform.getInfo<CL_PLATFORM_NAME>()) == "Portable Computing Language";
+         is_this_cpu_by_pocl(device.getInfo<CL_DEVICE_VERSION>());
 }
 
 MadeKernel::MadeKernel(const cl::Program& program, const char* name, const std::vector<std::string>& signature)

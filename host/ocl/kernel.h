@@ -54,6 +54,10 @@ inline int pixels_a_work_item(const Context& context) {
   return context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU ? 1 : 16;
 }
 
+/// Whether a device of this version is the CPU that this program runs on, by PoCL. Its remote driver gives devices of
+/// other machines with the same platform, type and name, but "pocl-remote" in place of what it compiles for.
+bool is_this_cpu_by_pocl(const std::string& version);
+
 /// Whether the device is this machine's CPU, which counts the bits of each lane of a vector in one instruction, and its
 /// compiler is one that may be told so (kernels/match/banded_sgm.cl).
 bool counts_bits(const Context& context);

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Programs that are kept on the disk, by EGOSGM_CACHE and by PoCL: processes side by side, and folders that do not do."""
+import os
+import shutil
+import signal
+import subprocess
+import unittest
+
+from program_case import PROGRAM, ProgramTest, egosgm
+
+
+class ProgramCaches(ProgramTest):
+    def run_command(self, out):
+        return ["run", "--quiet", "--tuning", "none", "--odometry", self.street, "--frames", "0:2", "--disparities", "32", "--out", out]
+
+    def maps_of(self, out):
+        return {file.name: file.read_bytes() for file in sorted((out / "disparity").iterdir())}
+
+    def without_cache(self):
+        out = self.new_folder()
+        self.assert_works(*self.run_command(out), env=dict(os.environ, EGOSGM_CACHE="off"))
+        return self.maps_of(out)
+
+    def test_processes_at_once(self):
+        expected = self.without_cache()
+        cache, outs = self.new_folder() / "kept", [self.new_folder() for _ in range(4)]
+        environment = dict(os.environ, EGOSGM_CACHE=str(cache))
+        for _ in range(2):  # into an empty folder, and from a full one
+            started = [subprocess.Popen([PROGRAM, *map(str, self.run_command(out))], env=environment) for out in outs]
+            self.assertEqual([process.wait(timeout=600) for process in started], [0] * len(outs))
+            for out in outs:
+                self.assertEqual(self.maps_of(out), expected)
+                shutil.rmtree(out)
+        names = [file.name for file in cache.iterdir()]
+        self.assertTrue(names)
+        for name in names:
+            self.assertRegex(name, "^[0-9a-f]{64}$")  # nothing that is half written stays
+
+    @unittest.skipUnless(os.geteuid() == 0, "rights are taken from another user: needs root")
+    def test_a_folder_that_may_not_be_written(self):
+        expected = self.without_cache()
+        cache, own, out = self.new_folder(), self.new_folder(), self.new_folder()
+        for folder in (self.folder, cache):
+            folder.chmod(0o755)
+        for folder in (own, out):
+            shutil.chown(folder, "nobody")
+        nobody = {"user": "nobody", "env": dict(os.environ, POCL_CACHE_DIR=str(own), HOME=str(own), EGOSGM_CACHE=str(cache))}
+        try:
+            egosgm("--version", **nobody)
+        except PermissionError:
+            self.skipTest("another user cannot run the program where it lies")
+        self.assert_works(*self.run_command(out / "result"), **nobody)
+        self.assertEqual(self.maps_of(out / "result"), expected)
+        self.assertEqual(list(cache.iterdir()), [])
+
+    def test_a_full_disk(self):
+        expected = self.without_cache()
+        cache, out = self.new_folder(), self.new_folder()
+        mounted = f"mount -t tmpfs -o size=8k tmpfs '{cache}' && \"$@\" && ls -A '{cache}' || exit 77"
+        if shutil.which("unshare") is None:
+            self.skipTest("no small file system can be mounted here")
+        done = subprocess.run(["unshare", "--map-root-user", "--mount", "sh", "-c", mounted, "sh", PROGRAM, *map(str, self.run_command(out))],
+                              capture_output=True, text=True, timeout=600, env=dict(os.environ, EGOSGM_CACHE=str(cache)))
+        if "mount" in done.stderr or "unshare" in done.stderr:
+            self.skipTest("no small file system can be mounted here")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.maps_of(out), expected)
+        self.assertEqual(done.stdout, "", "a file that found no room stays")
+
+    def test_a_cut_file_of_pocls_own_cache_is_told_of_with_its_remedy(self):
+        cache = self.new_folder()
+        environment = dict(os.environ, POCL_CACHE_DIR=str(cache), EGOSGM_CACHE="off")
+        self.assert_works(*self.run_command(self.new_folder()), env=environment)
+        made = list(cache.rglob("*.so"))
+        if not made:
+            self.skipTest("a driver that needs no such cache")
+        for file in made:
+            os.truncate(file, 100)
+        done = egosgm(*self.run_command(self.new_folder()), env=environment)
+        self.assertIn(done.returncode, (1, -signal.SIGABRT))
+        last = done.stderr.splitlines()[-1]
+        self.assertTrue(last.startswith("egosgm: error: "), done.stderr)
+        self.assertIn("delete the cache", last)
+        self.assertIn("POCL_CACHE_DIR", last)
+
+
+if __name__ == "__main__":
+    unittest.main()
