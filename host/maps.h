@@ -60,12 +60,6 @@ struct StereoMaps {
   StereoMaps(Map disparities, Map variances) : disparity(std::move(disparities)), variance(std::move(variances)) {}
   StereoMaps(ocl::Context& context, shared::ImageSize size)
       : disparity(context, 2 * pixel_count(size)), variance(context, 2 * pixel_count(size)) {}
-
-  /// Copies the values of `from` here.
-  void copy(ocl::Context& context, const StereoMaps& from) {
-    disparity.copy(context, 0, from.disparity, 0, disparity.size());
-    variance.copy(context, 0, from.variance, 0, variance.size());
-  }
 };
 
 /// Where a frame writes what is given out of its belief.

@@ -7,7 +7,7 @@ namespace egosgm {
 FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
                            const GivenOut& given_out) {
   Workspace& w = work_;
-  const Measurement& measured = w.matching.measured;
+  Measurement measured{plan.predicts() ? w.measured : after.maps, w.matching.doubtful};
   VerticalOffset offset = before.offset.is_known ? before.offset : unknown_;
   FrameImages images = uploaded;
 
@@ -17,7 +17,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     VerticalOffset& refined = match < plan.matches ? w.first_offset : after.offset;
     in(Room::kAlign, [&] { images = align(uploaded, offset, w.aligned); });
     in(Room::kSearch, [&] { search_.plan_bands(plan, images, w.prediction, w.coarse, w.bands); });
-    in(Room::kMatch, [&] { match_.measure(plan, images, w.bands, w.matching); });
+    in(Room::kMatch, [&] { match_.measure(plan, images, w.bands, w.matching, measured); });
     in(Room::kRefineAlignment, [&] { refine(images, measured, offset, refined); });
   }
   in(Room::kFuse, [&] { fuse(plan, images, w.prediction, measured, w.fusion, after); });
@@ -30,7 +30,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
                     result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence},
                    {given_out.variance, w.dynamic, w.reasons});
   });
-  return {{result, given_out.variance}, offset, images};
+  return {{result, given_out.variance}, measured, offset, images};
 }
 
 void Method::predict(const Plan& plan, const Belief& belief, Prediction& prediction) {
@@ -57,10 +57,8 @@ void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction&
     if (plan.has_coarse_match) coarse.emplace(CoarseView{search_.coarse_images(), work_.coarse});
     fuse_->update(plan, {images, match_.matcher().codes(), coarse ? &*coarse : nullptr}, prediction, measured, fusion,
                   belief);
-  } else {
-    context_.enter("fuse");
-    belief.maps.copy(context_, measured);
-    if (fuse_) fuse_->begin(belief);
+  } else if (fuse_) {
+    fuse_->begin(belief);
   }
   belief.why_not.reset();
   if (!options_.temporal) belief.forget(Unpredicted::kNotTemporal);  // a frame alone leaves nothing to the next one
@@ -84,14 +82,14 @@ Workspace::Workspace(ocl::Context& context, shared::ImageSize size, const Method
       coarse(context, 2 * pixel_count(CoarseMatch::coarse_size(size))),
       bands(context, size, range_of(options)),
       matching(context, size),
+      measured(context, size),
       fusion(context, size),
       dynamic(context, pixel_count(size)),
       reasons(context, pixel_count(size)) {}
 
 Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
                const MethodOptions& options, const Tuning& tuning)
-    : context_(context),
-      options_(options),
+    : options_(options),
       work_(context, size, options),
       unknown_(context),
       alignment_([=, &context, sums = VerticalAlignment::Sums(context, size),

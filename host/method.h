@@ -23,6 +23,7 @@ struct Workspace {
   Map coarse;                   // disparities that CoarseMatch found
   SearchBands bands;
   Matching matching;
+  StereoMaps measured;  // where there is a prediction to fuse it with; else the belief's memory
   Fusion fusion;
   ocl::Buffer<cl_uchar> dynamic, reasons;
 
@@ -32,6 +33,7 @@ struct Workspace {
 /// What a frame left on the device. Handles: it is there until a later frame overwrites it.
 struct FrameResults {
   StereoMaps given_out;
+  StereoMaps measured;
   VerticalOffset offset;  // by which the right image was resampled for the last match
   FrameImages images;     // that were matched
 };
@@ -72,7 +74,6 @@ class Method {
   Map confirmed(const Plan& plan, const Belief& belief, Map& confirmed);
   const FlagMap* evidence_of(const Plan& plan, const Belief& belief) const;
 
-  ocl::Context& context_;
   const MethodOptions options_;
   Workspace work_;
   const VerticalOffset unknown_;

@@ -103,7 +103,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   const Workspace& workspace = method_.workspace();
   frame.transfer->download({.result = results.given_out,
                             .predicted = plan.predicts() ? &workspace.prediction.maps : nullptr,
-                            .measured = workspace.matching.measured,
+                            .measured = results.measured,
                             .bands = workspace.bands,
                             .matched = plan.matched,
                             .parts = {plan.matches, &method_.matcher().banded_sgm().stripes(),

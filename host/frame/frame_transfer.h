@@ -18,7 +18,7 @@ namespace egosgm {
 struct FrameOnDevice {
   const StereoMaps& result;     // that is given out; no later frame writes it before this one is collected
   const StereoMaps* predicted;  // null where there is no prediction. From here on, the next frame writes them:
-  const StereoMaps& measured;
+  const StereoMaps& measured;   // (or they are the result)
   const SearchBands& bands;
   Views matched;  // they are of these
   MatchedParts parts;

@@ -25,18 +25,20 @@ MatchRoom::MatchRoom(ocl::Context& context, shared::ImageSize size, const Method
   if (options.temporal && !options.track_right) matcher_.prepare_reading_off();
 }
 
-void MatchRoom::measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching) {
+void MatchRoom::measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
+                        Measurement& measured) {
   const bool reads_off = plan.matched == Views::kLeft;
+  Measurement matched{{matching.matched, measured.variance}, measured.doubtful};
   if (reads_off) {
-    matcher_.reading_off(images, bands, matching.matched);
+    matcher_.reading_off(images, bands, matched);
   } else {
-    matcher_.match(images, bands, matching.matched, Views::kBoth);
+    matcher_.match(images, bands, matched, Views::kBoth);
   }
-  if (median_filter_) median_filter_->filter(matching.matched.disparity, matching.smoothed, Views::kBoth);
-  const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched.disparity;
+  if (median_filter_) median_filter_->filter(matching.matched, matching.smoothed, Views::kBoth);
+  const Map& smoothed = median_filter_ ? matching.smoothed : matching.matched;
   consistency_.check(smoothed, reads_off ? left_right_.read_off_px : left_right_.measurement_px, OutsideView::kDrop,
-                     matching.measured.disparity, Views::kBoth);
-  if (removes_speckles(plan)) speckle_removal_.remove(matching.measured.disparity, plan.matched);
+                     measured.disparity, Views::kBoth);
+  if (removes_speckles(plan)) speckle_removal_.remove(measured.disparity, plan.matched);
 }
 
 }  // namespace egosgm

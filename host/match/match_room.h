@@ -9,17 +9,16 @@
 
 namespace egosgm {
 
-/// What matching leaves.
+/// What matching leaves, beside what it measured.
 struct Matching {
-  Measurement measured;
-  // Before any disparity was dropped, until the room ends; the latter where the median filter is on.
-  Measurement matched;
-  Map smoothed;
+  // Disparities before any was dropped, until the room ends; the latter where the median filter is on.
+  Map matched, smoothed;
+  FlagMap doubtful;  // of the measurement
 
   Matching(ocl::Context& context, shared::ImageSize size)
-      : measured(context, size),
-        matched({Map(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)), measured.variance}, measured.doubtful),
-        smoothed(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)) {}
+      : matched(context, ocl::Scratch::kOfRoom0, 2 * pixel_count(size)),
+        smoothed(context, ocl::Scratch::kOfRoom1, 2 * pixel_count(size)),
+        doubtful(context, 2 * pixel_count(size)) {}
 };
 
 /// Measures disparities and variances within bands, and drops what is doubtful.
@@ -30,7 +29,8 @@ class MatchRoom {
   /// Builds what images of `type` need.
   void prepare(PixelType type) { matcher_.prepare(type); }
 
-  void measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching);
+  void measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
+               Measurement& measured);
 
   const Matcher& matcher() const { return matcher_; }
   /// Null where nothing is dropped as a speckle.

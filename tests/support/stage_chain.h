@@ -59,7 +59,7 @@ class StageChain {
                                     work.bands.row_sums.read(context_)};
         return;
       case Room::kMatch:
-        return look(work.matching, frame.passes.back());
+        return look(work.matching, plan.predicts() ? work.measured : after_.maps, frame.passes.back());
       case Room::kFuse:
         if (plan.predicts()) look(work.fusion, frame);
         return;
@@ -98,14 +98,14 @@ class StageChain {
     }
   }
 
-  void look(const Matching& matching, reference::Pass& pass) {
+  void look(const Matching& matching, const StereoMaps& measured, reference::Pass& pass) {
     const std::vector<cl_uint> codes = method_.matcher().codes().read(context_);
     const std::vector<cl_uchar> penalties = method_.matcher().penalties().read(context_);
     pass.codes.assign(codes.begin(), codes.end());
     pass.penalties.assign(penalties.begin(), penalties.end());
-    pass.matched.disparity = matching.matched.disparity.read(context_);
+    pass.matched.disparity = matching.matched.read(context_);
     if (options_.median_filter.enabled) pass.smoothed.disparity = matching.smoothed.read(context_);
-    pass.measured = download(context_, matching.measured);
+    pass.measured = download(context_, Measurement{measured, matching.doubtful});
   }
 
   void look(const Fusion& fusion, reference::Frame& frame) {
