@@ -51,6 +51,7 @@ set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_SECTION python)
 math(EXPR next_python "0${Python_VERSION_MINOR} + 1")
 set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_DEPENDS
     "${same_version}, python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next_python}), python3-numpy, python3-yaml")
+set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_SUGGESTS "python3-matplotlib, python3-opencv")
 set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/python3-egosgm/prerm)
 set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_COMPONENT_PYTHON3-EGOSGM_DESCRIPTION "The Python module.")

@@ -8,7 +8,7 @@ import unittest
 
 from program_case import PROGRAM, SOURCE, ProgramTest, egosgm
 
-COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-poses", "tune", "report", "doctor", "rectify")
+COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-poses", "tune", "report", "doctor", "rectify")
 
 
 class Help(ProgramTest):
@@ -21,7 +21,8 @@ class Help(ProgramTest):
         for command in COMMANDS:
             text = self.assert_works(command, "--help")
             self.assertNotRegex(text, r"\(\d+x\)|\[\w+\.\.\.\]|\[\[")
-        for command in ("eval", "eval-poses"):
+        self.assertIn("egosgm eval [OPTIONS] [ESTIMATE] [TRUTH]\n", self.assert_works("eval", "--help"))
+        for command in ("eval-video", "eval-poses"):
             self.assertIn(f"egosgm {command} [OPTIONS] [ESTIMATE] [TRUTH]\n", self.assert_works(command, "--help"))
 
     def test_the_page_names_every_subcommand_and_exit_code(self):
@@ -48,6 +49,15 @@ class Help(ProgramTest):
 
     def test_what_the_python_package_has_is_named(self):
         self.assert_refused(["view", self.street], "the Python package", "[rerun]", "--write overview")
+
+    def test_without_the_package_its_commands_name_it(self):
+        alone = self.new_folder() / "bin"
+        alone.mkdir()
+        shutil.copy(PROGRAM, alone)
+        for command in ("eval-video", "eval-poses"):
+            done = subprocess.run([alone / "egosgm", command, "a", "b"], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(f"error: {command}: the Python package has this command: pip install", done.stderr)
 
     def test_devices_names_the_default_and_why(self):
         text = self.assert_works("devices")

@@ -60,7 +60,7 @@ class WrongArguments(ProgramTest):
     def test_numbers_are_decimal(self):
         commands = (self.run_with("--max-translation"), self.run_with("--max-rotation"), self.run_with("--disparities"), self.run_with("--min-disparity"),
                     *(["synth", "--out", self.folder / "never", option] for option in ("--frames", "--width", "--seed", "--speed", "--noise")),
-                    ["eval", "--estimate", self.street, "--truth", self.street, "--near"], ["eval", "--estimate", self.street, "--truth", self.street, "--truth-scale"], ["tune", "--rounds"], ["tune", "--width"],
+                    ["eval-video", self.street, self.street, "--near"], ["eval", "--estimate", self.street, "--truth", self.street, "--truth-scale"], ["tune", "--rounds"], ["tune", "--width"],
                     ["report", self.street, "--picture-width"],
                     ["rectify", "--alpha"], ["doctor", self.street, "--disparities"])
         for command in commands:
