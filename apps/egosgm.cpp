@@ -16,7 +16,6 @@
 
 #include "apps/command.h"
 #include "apps/interrupt.h"
-#include "apps/python_command.h"
 #include "apps/standard_output.h"
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
@@ -147,11 +146,9 @@ int run_program(int argc, char** argv) {
       "  egosgm eval --estimate result --truth street/truth/left_disp_noc\n"
       "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.\n"
       "Who stops reading the output (`| head`) ends the printing, not the work.");
-  const Command commands[] = {add_run(program),    add_report(program),   add_eval(program),    add_devices(program),
-                              add_synth(program),  add_odometry(program), add_compile(program), add_tune(program),
-                              add_doctor(program), add_rectify(program)};
-  for (const PythonCommand& command : kPythonCommands) program.add_subcommand(command.name, command.help);
-  if (argc > 1 && is_python_command(argv[1])) start_python_command(argv + 1);
+  const Command commands[] = {add_run(program),   add_report(program),   add_eval(program),       add_devices(program),
+                              add_synth(program), add_odometry(program), add_compile(program),
+                              add_tune(program),  add_doctor(program),   add_rectify(program)};
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

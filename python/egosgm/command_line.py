@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the package's commands share: how they read arguments, print, and fail."""
+"""What the commands of the evaluation share: how they read arguments, and print."""
 import argparse
-import contextlib
 import json
 import math
-import os
 import re
-import sys
-from typing import Any, Callable, NoReturn, Optional, Sequence
+from typing import Any, NoReturn
 
 from . import _egosgm
 
@@ -46,12 +43,6 @@ def decimal(text: str) -> float:
     return float(text)
 
 
-def _say(line: str) -> None:
-    """On the standard error, whether anyone reads it or not."""
-    with contextlib.suppress(OSError):
-        print(line, file=sys.stderr, flush=True)
-
-
 def counted(number: int, thing: str) -> str:
     """1 pair, 2 pairs."""
     return f"{number} {thing}{'' if number == 1 else 's'}"
@@ -66,25 +57,3 @@ def json_text(value: Any) -> str:
             return [plain(part) for part in value]
         return None if isinstance(value, float) and not math.isfinite(value) else value
     return json.dumps(plain(value), indent=2, ensure_ascii=False)
-
-
-def run(work: Callable[[Sequence[str]], str], arguments: Optional[Sequence[str]]) -> int:
-    """Prints what `work` returns. Gives the exit code: 0 done, 1 the disk failed, 2 wrong arguments or input, 130 interrupted."""
-    try:
-        text = work(sys.argv[1:] if arguments is None else arguments)
-    except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError, OSError) as error:
-        line = "".join(c if c.isprintable() else " " for c in str(error))  # names may hold anything
-        _say(f"egosgm: error: {line}")
-        return 2 if isinstance(error, _egosgm.InvalidArgument) else 1
-    except KeyboardInterrupt:
-        _say("egosgm: interrupted")
-        return 130
-    try:
-        print(text, flush=True)
-    except BrokenPipeError:  # nobody reads on
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except OSError as error:
-        _say(f"egosgm: error: the standard output cannot be written: {error.strerror}")
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    return 0

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `egosgm` of a wheel: the program, and what only Python reads."""
-import importlib
 import os
 import pathlib
 import subprocess
@@ -8,7 +7,6 @@ import sys
 import tempfile
 from typing import List, Tuple
 
-COMMANDS = {"eval-video": "video_program", "eval-poses": "pose_program"}  # those of the package, by their modules
 _RAW = "rectify"  # the command that takes raw cameras; all others take rectified ones
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
@@ -71,8 +69,6 @@ def with_calibration(arguments: List[str], folder: pathlib.Path) -> List[str]:
 
 def main() -> None:
     arguments = sys.argv[1:]
-    if arguments and arguments[0] in COMMANDS:
-        sys.exit(importlib.import_module(f".{COMMANDS[arguments[0]]}", __package__).main(arguments[1:]))
     if arguments[:1] == ["run"] and any(a.split("=")[0] == "--bag" for a in arguments):
         from . import bag_program
         sys.exit(bag_program.main(arguments[1:]))

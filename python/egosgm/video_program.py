@@ -327,5 +327,6 @@ def _work(arguments: Sequence[str]) -> str:
     return command_line.json_text(_json_of(found, over_frames, total)) if given.json else _text_of(found, total)
 
 
-def main(arguments: Optional[Sequence[str]] = None) -> int:
-    return command_line.run(_work, arguments)
+def main(arguments: Sequence[str]) -> int:
+    print(_work(arguments))
+    return 0

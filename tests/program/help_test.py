@@ -50,15 +50,6 @@ class Help(ProgramTest):
     def test_what_the_python_package_has_is_named(self):
         self.assert_refused(["view", self.street], "the Python package", "[rerun]", "--write overview")
 
-    def test_without_the_package_its_commands_name_it(self):
-        alone = self.new_folder() / "bin"
-        alone.mkdir()
-        shutil.copy(PROGRAM, alone)
-        for command in ("eval-video", "eval-poses"):
-            done = subprocess.run([alone / "egosgm", command, "a", "b"], capture_output=True, text=True)
-            self.assertEqual(done.returncode, 2)
-            self.assertIn(f"error: {command}: the Python package has this command: pip install", done.stderr)
-
     def test_devices_names_the_default_and_why(self):
         text = self.assert_works("devices")
         self.assertIn("* 0", text)
