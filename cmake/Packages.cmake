@@ -44,6 +44,7 @@ set(CPACK_COMPONENT_LIBEGOSGM-DEV_DESCRIPTION "Headers, static libraries, and fi
 set(CPACK_DEBIAN_EGOSGM_PACKAGE_NAME egosgm)
 set(CPACK_DEBIAN_EGOSGM_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_EGOSGM_PACKAGE_DEPENDS "${same_version}")
+set(CPACK_DEBIAN_EGOSGM_PACKAGE_RECOMMENDS python3-egosgm)  # has the tools that are written in Python
 set(CPACK_COMPONENT_EGOSGM_DESCRIPTION "The command-line program.")
 
 set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_NAME python3-egosgm)

@@ -20,8 +20,6 @@ class WrongArguments(ProgramTest):
         self.assert_refused(["--versoin"], "--version")
         self.assert_refused(self.run_with("--disparites", 64), "--disparites", "did you mean --disparities?")
         self.assert_refused(self.run_with("--disparites=64"), "did you mean --disparities?")
-        self.assert_refused(["run", "--bag", "drive.mcap", "--left-topic", "l", "--right-topic", "r"], "Python package", "[bag]")
-        self.assert_refused(["run", "--bag=drive.mcap", "--out", self.folder / "never"], "Python package")
         self.assert_refused(self.run_with("--set", "p_2=64"), "p_2", "p2")
         self.assert_refused(self.run_with("--write", "colour"), "colour", "did you mean color?")
 
