@@ -2,7 +2,7 @@
 """Compare poses with the true ones, as KITTI's odometry kit does."""
 import math
 import pathlib
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import Any, List, Sequence, Tuple
 
 import numpy as np
 
