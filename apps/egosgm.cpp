@@ -19,6 +19,7 @@
 
 #include "apps/command.h"
 #include "apps/interrupt.h"
+#include "apps/python_tools.h"
 #include "apps/standard_output.h"
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
@@ -70,11 +71,6 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
                                        unknown.front(), std::filesystem::path(unknown.front()).extension().string()));
   }
   const std::string typed = unknown.front().substr(0, unknown.front().find('='));
-  if (typed == "--bag") {
-    return fail(
-        kBadInput,
-        "--bag: bags are read by the Python package's program: pip install the wheel, with \"[bag]\" (docs/robots.md)");
-  }
   if (typed == "view") {
     return fail(kBadInput,
                 "view: the Python package shows frames: pip install the wheel, with \"[rerun]\", and see egosgm.viewer "
@@ -136,6 +132,7 @@ int flushed(int code) {
 }
 
 int run_program(int argc, char** argv) {
+  if (is_for_python(argc, argv)) become_python(argc, argv);
   CLI::App program(
       "Dense disparity from stereo video: predicts each frame's disparity from the last one and the camera's motion,\n"
       "searches only where the prediction says, and runs on any OpenCL device.",
@@ -150,9 +147,10 @@ int run_program(int argc, char** argv) {
       "  egosgm eval --estimate result --truth street/truth/left_disp_noc\n"
       "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.\n"
       "Who stops reading the output (`| head`) ends the printing, not the work.");
-  const Command commands[] = {add_run(program),   add_report(program),   add_eval(program),       add_devices(program),
-                              add_synth(program), add_odometry(program), add_eval_poses(program), add_compile(program),
-                              add_tune(program),  add_doctor(program),   add_rectify(program)};
+  const Command commands[] = {add_run(program),    add_report(program),   add_eval(program),    add_devices(program),
+                              add_synth(program),  add_odometry(program), add_compile(program), add_tune(program),
+                              add_doctor(program), add_rectify(program)};
+  for (const auto& [name, help] : python_tools()) program.add_subcommand(name, help);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

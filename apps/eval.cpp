@@ -9,24 +9,20 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/metrics_json.h"
-#include "apps/plot_file.h"
 #include "apps/progress.h"
 #include "apps/truth_pairs.h"
-#include "apps/video_input.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/evaluation.h"
-#include "egosgm/vision/video_evaluation.h"
+#include "egosgm/vision/image_io.h"
 #include "host/json_text.h"
+#include "host/vision/estimate_reader.h"
 #include "host/vision/file_io.h"
-#include "host/vision/pair_with_truth.h"
-#include "host/vision/video_plot.h"
 
 namespace egosgm::app {
 namespace {
 
 using vision::DisparityCounts;
 using vision::DisparityMetrics;
-using vision::VideoCounts;
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
@@ -34,17 +30,15 @@ constexpr std::size_t kLongFolder = 20;  // frames; a progress bar from here on
 
 struct EvalArguments {
   ComparisonArguments compared;
-  VideoArguments video;
-  vision::VideoEvaluationOptions options;
+  std::string mask;
+  double scale = 256, truth_scale = 256;
   std::vector<std::string> reports;  // of --merge
-  std::string plot_frames, plot_density;
   bool json = false;
 };
 
-/// A frame that has truth.
+/// An estimate that has truth.
 struct Row {
-  std::string name;
-  FrameFiles files;
+  vision::EvaluationPair files;
   DisparityCounts counts;
 };
 
@@ -52,80 +46,53 @@ struct Result {
   std::vector<Row> rows;
   std::vector<DisparityMetrics> each;  // of the rows
   DisparityMetrics pooled, mean;
-  vision::VideoEvaluation video;
+  std::vector<std::string> doubts;  // what speaks against the estimates that were read
 };
 
-const DisparityCounts& errors_of(const VideoCounts& counts) { return counts.region(vision::Region::kAll).errors; }
+/// Throws InvalidArgument, naming both files, where `map` has another size than the estimate.
+void expect_size(const cv::Mat& estimate, const std::filesystem::path& file, const cv::Mat& map,
+                 const std::filesystem::path& its_file) {
+  if (map.size() == estimate.size()) return;
+  throw InvalidArgument(fmt::format("{} is {}x{}, {} is {}x{}: give maps of one size", file.string(), estimate.cols,
+                                    estimate.rows, its_file.string(), map.cols, map.rows));
+}
 
-Result measure(const VideoInput& input, const EvalArguments& arguments) {
-  Result result;
-  {
-    const bool show = !arguments.json && isatty(STDOUT_FILENO) == 1 && input.frames().size() >= kLongFolder;
-    Progress progress(static_cast<int>(input.frames().size()), !show);
-    result.video =
-        vision::evaluate_video(input.video(), arguments.options, [&](int i) { progress.done(input.frames()[i].name); });
+DisparityCounts compare(const vision::EvaluationPair& pair, const EvalArguments& arguments,
+                        vision::EstimateReader& estimates) {
+  const cv::Mat estimate = estimates.read(pair.estimate, arguments.scale);
+  cv::Mat truth = vision::read_scaled(pair.truth, arguments.truth_scale);
+  expect_size(estimate, pair.estimate, truth, pair.truth);
+  estimates.compare(estimate, truth);
+  if (!arguments.mask.empty()) {
+    std::filesystem::path file = arguments.mask;
+    if (is_directory(file)) file /= pair.truth.filename().replace_extension(".png");
+    const cv::Mat kept = vision::read_grey_image(file);
+    expect_size(estimate, pair.estimate, kept, file);
+    truth.setTo(kInvalidDisparity, kept == 0);
   }
+  return vision::compare_disparity(estimate, truth);
+}
+
+Result measure(const vision::EvaluationPairs& found, const EvalArguments& arguments) {
+  Result result;
   DisparityCounts pooled;
-  for (std::size_t i = 0; i < input.frames().size(); ++i) {
-    if (input.frames()[i].truth.empty()) continue;
-    const DisparityCounts& counts = errors_of(result.video.frames[i]);
-    result.rows.push_back({input.frames()[i].name, input.frames()[i], counts});
-    result.each.push_back(vision::metrics_of(counts));
-    pooled += counts;
+  vision::EstimateReader estimates;
+  for (const vision::EvaluationPair& pair : found.pairs) {
+    vision::expect_scaled("--scale", arguments.scale, pair.estimate);
+    vision::expect_scaled("--truth-scale", arguments.truth_scale, pair.truth);
+  }
+  const bool show = !arguments.json && isatty(STDOUT_FILENO) == 1 && found.pairs.size() >= kLongFolder;
+  Progress progress(static_cast<int>(found.pairs.size()), !show);
+  for (const vision::EvaluationPair& pair : found.pairs) {
+    result.rows.push_back({pair, compare(pair, arguments, estimates)});
+    result.each.push_back(vision::metrics_of(result.rows.back().counts));
+    pooled += result.rows.back().counts;
+    progress.done(pair.name);
   }
   result.pooled = vision::metrics_of(pooled);
   result.mean = vision::mean_of(result.each);
+  result.doubts = estimates.doubts(arguments.scale);
   return result;
-}
-
-Json json_of(const std::vector<vision::NamedFigure>& figures) {
-  Json json = Json::object();
-  for (const vision::NamedFigure& figure : figures) json[figure.name] = figure.value;
-  return json;
-}
-
-Json json_of_regions(const VideoCounts& counts) {
-  Json json = Json::object();
-  for (std::size_t r = 0; r < counts.regions.size(); ++r) {
-    const vision::RegionCounts& region = counts.regions[r];
-    if (region.errors.truth == 0) continue;
-    Json entry{{"truth_pixels", region.errors.truth}};
-    entry.update(json_of(figures_of(region)));
-    json[vision::kRegionNames[r]] = std::move(entry);
-  }
-  return json;
-}
-
-double mean(double sum, std::int64_t count) { return count > 0 ? sum / static_cast<double>(count) : std::nan(""); }
-
-Json json_of(const vision::DensityCounts& counts) {
-  Json at_density = Json::array(), kept = Json::array();
-  for (const vision::DensityPoint& point : densities_of(counts)) {
-    at_density.push_back({{"density_percent", point.density_percent},
-                          {"reached_percent", point.reached_percent},
-                          {"bad_percent", point.bad_percent}});
-  }
-  for (const vision::SparsificationPoint& point : sparsification_of(counts)) {
-    kept.push_back({{"kept_percent", point.kept_percent},
-                    {"bad_percent", point.bad_percent},
-                    {"oracle_bad_percent", point.oracle_bad_percent},
-                    {"mae", point.mae_px},
-                    {"oracle_mae", point.oracle_mae_px}});
-  }
-  return {{"at_density", at_density}, {"sparsification", kept}};
-}
-
-Json json_of(const VideoInput& input, const vision::VideoEvaluation& video) {
-  Json json{{"frames", input.frames().size()},         {"pairs", input.successors()},
-            {"motion", input.motion_source()},         {"figures", json_of(figures_of(video.total))},
-            {"regions", json_of_regions(video.total)}, {"over_frames", Json::array()}};
-  for (std::size_t i = 0; i < video.frames.size(); ++i) {
-    Json entry{{"name", input.frames()[i].name}};
-    entry.update(json_of(figures_of(video.frames[i])));
-    json["over_frames"].push_back(std::move(entry));
-  }
-  if (video.total.density.truth > 0) json["density"] = json_of(video.total.density);
-  return json;
 }
 
 template <typename Counts, typename Action>
@@ -147,14 +114,14 @@ Json json_of(const DisparityCounts& counts) {
   return json;
 }
 
-Json json_of(const VideoInput& input, const Result& result) {
+Json json_of(const vision::EvaluationPairs& found, const Result& result) {
   Json json{{"pairs", Json::array()},
             {"pooled", app::json_of(result.pooled)},
             {"mean", app::json_of(result.mean)},
             {"without_estimate", Json::array()}};
   for (std::size_t i = 0; i < result.rows.size(); ++i) {
     const Row& row = result.rows[i];
-    Json entry{{"name", row.name},
+    Json entry{{"name", row.files.name},
                {"estimate", row.files.estimate.string()},
                {"truth", row.files.truth.string()},
                {"truth_pixels", row.counts.truth},
@@ -162,9 +129,8 @@ Json json_of(const VideoInput& input, const Result& result) {
     entry.update(app::json_of(result.each[i]));
     json["pairs"].push_back(std::move(entry));
   }
-  for (const auto& file : input.truth_pairs().without_estimate) json["without_estimate"].push_back(file.string());
-  json["video"] = json_of(input, result.video);
-  if (const auto doubts = input.doubts(); !doubts.empty()) json["doubts"] = doubts;
+  for (const auto& file : found.without_estimate) json["without_estimate"].push_back(file.string());
+  if (!result.doubts.empty()) json["doubts"] = result.doubts;
   return json;
 }
 
@@ -185,48 +151,11 @@ void print_header() {
 }
 
 void print_errors(const Result& result) {
-  if (result.rows.empty()) return;
   print_header();
-  for (std::size_t i = 0; i < result.rows.size(); ++i) print_row(result.rows[i].name, result.each[i]);
+  for (std::size_t i = 0; i < result.rows.size(); ++i) print_row(result.rows[i].files.name, result.each[i]);
   if (result.rows.size() > 1) {
     print_row("pooled", result.pooled);
     print_row("mean", result.mean);
-  }
-}
-
-void print_over_time(const VideoInput& input, const VideoCounts& total) {
-  bool first = true;
-  for (const vision::NamedFigure& figure : figures_of(total)) {
-    if (std::isnan(figure.value)) continue;
-    if (first) {
-      fmt::print("\nover time, {} of frames{}{}\n", counted(input.successors(), "pair"),
-                 input.motion_source().empty() ? "" : ", ", input.motion_source());
-    }
-    first = false;
-    fmt::print("  {:<46}{:>12.4f}\n", figure.name, figure.value);
-  }
-}
-
-void print_regions(const VideoCounts& total) {
-  fmt::print("\n{:<12}{:>12}{:>13}{:>14}{:>11}{:>11}{:>16}{:>14}{:>12}{:>12}\n", "region", "truth", "wrong_of_all",
-             "bad_of_valid", "filled", "density", "bad_or_missing", "interpolated", "mae", "tepe");
-  for (std::size_t r = 0; r < total.regions.size(); ++r) {
-    const vision::RegionCounts& region = total.regions[r];
-    if (region.errors.truth == 0) continue;
-    const DisparityMetrics m = vision::metrics_of(region.errors);
-    fmt::print("{:<12}{:>12}{}{}{}{}{}{}{}{}\n", vision::kRegionNames[r], region.errors.truth,
-               cell(m.wrong_of_all, 13, " %"), cell(m.bad_of_valid, 14, " %"), cell(m.filled, 11, " %"),
-               cell(m.density, 11, " %"), cell(m.bad_or_missing, 16, " %"), cell(m.interpolated, 14, " %"),
-               cell(m.mae_px, 12, "px"), cell(mean(region.tepe.sum_px, region.tepe.pixels), 12, "px"));
-  }
-}
-
-void print_density(const vision::DensityCounts& counts) {
-  if (counts.truth == 0) return;
-  fmt::print("\n{:<12}{:>12}{:>12}\n", "density", "reached", "bad");
-  for (const vision::DensityPoint& point : densities_of(counts)) {
-    fmt::print("{:<12}{}{}\n", fmt::format("{:.0f} %", point.density_percent), cell(point.reached_percent, 12, " %"),
-               cell(point.bad_percent, 12, " %"));
   }
 }
 
@@ -240,27 +169,6 @@ void print_pairing(const vision::EvaluationPairs& found) {
   if (!found.without_estimate.empty()) {
     fmt::print("{} without an estimate, the first is {}\n", counted(found.without_estimate.size(), "truth file"),
                found.without_estimate.front().string());
-  }
-}
-
-/// The sequence's own truth stands for one that is not given, where it has any.
-void complete_truth(EvalArguments& arguments) {
-  arguments.compared.resolve(arguments.video.sequence.empty());
-  if (!arguments.compared.truth.empty()) return;
-  const std::filesystem::path sequence = arguments.video.sequence;
-  if (is_directory(sequence / "truth") || !arguments.video.scene.empty()) arguments.compared.truth = sequence;
-}
-
-void write_plots(const EvalArguments& arguments, const vision::VideoEvaluation& video) {
-  if (!arguments.plot_frames.empty()) {
-    write_plot(
-        arguments.plot_frames, [&] { return vision::over_frames_svg(video.frames); },
-        [&] { return vision::draw_over_frames(video.frames); });
-  }
-  if (!arguments.plot_density.empty()) {
-    write_plot(
-        arguments.plot_density, [&] { return vision::density_svg(video.total.density); },
-        [&] { return vision::draw_density(video.total.density); });
   }
 }
 
@@ -299,51 +207,39 @@ int merge(const EvalArguments& arguments) {
 
 int evaluate(EvalArguments arguments) {
   if (!arguments.reports.empty()) return merge(arguments);
-  if (!arguments.plot_frames.empty()) require_plot_name("--plot-frames", arguments.plot_frames);
-  if (!arguments.plot_density.empty()) require_plot_name("--plot-density", arguments.plot_density);
-  complete_truth(arguments);
-  const VideoInput input(arguments.compared, arguments.video);
-  const Result result = measure(input, arguments);
-  write_plots(arguments, result.video);
+  arguments.compared.resolve();
+  const vision::EvaluationPairs found =
+      find_truth_pairs(arguments.compared.estimate, arguments.compared.truth, arguments.compared.frames);
+  const Result result = measure(found, arguments);
   if (arguments.json) {
-    fmt::print("{}\n", dumped(json_of(input, result), 2));
+    fmt::print("{}\n", dumped(json_of(found, result), 2));
     return kOk;
   }
   print_errors(result);
-  const VideoCounts& total = result.video.total;
-  if (input.successors() > 0 || !arguments.video.against.empty() || total.density.truth > 0 ||
-      total.region(vision::Region::kAll).trust.valid > 0) {
-    print_over_time(input, total);
-    if (!result.rows.empty()) print_regions(total);
-    print_density(total.density);
-  }
-  print_pairing(input.truth_pairs());
-  for (const std::string& doubt : input.doubts()) fmt::print("{}\n", doubt);
+  print_pairing(found);
+  for (const std::string& doubt : result.doubts) fmt::print("{}\n", doubt);
   return kOk;
 }
 
 }  // namespace
 
 Command add_eval(CLI::App& program) {
-  CLI::App* command = program.add_subcommand(
-      "eval", "Compare disparity maps with their truth, as KITTI's development kits do, and with each other over time");
+  CLI::App* command =
+      program.add_subcommand("eval", "Compare disparity maps with their truth, as KITTI's development kits do");
   auto arguments = std::make_shared<EvalArguments>();
   arguments->compared.add_to(
       *command, "disparity map (KITTI PNG, 16-bit PNG with --scale, PFM, .npy), a folder of them, or a folder of `run`",
-      "true disparity, or a folder of files with equal names; not needed with --sequence");
-  arguments->video.add_to(*command);
+      "true disparity, or a folder of files with equal names");
   command
-      ->add_option("--near", arguments->options.near_px,
-                   "the region `near` begins at this true disparity [px]; the rest is `far`")
-      ->type_name("PX")
+      ->add_option("--mask", arguments->mask,
+                   "compare only where this grey PNG, or the one of the truth's name in this folder, is not 0")
+      ->type_name("FILE|DIR");
+  command->add_option("--scale", arguments->scale, "steps a pixel of 16-bit PNG in --estimate; KITTI's have 256")
+      ->type_name("STEPS")
       ->capture_default_str();
-  command->add_option("--plot-frames", arguments->plot_frames, "draw the figures over the frames: a .png or .svg file")
-      ->type_name("FILE");
-  command
-      ->add_option("--plot-density", arguments->plot_density,
-                   "draw the bad pixels against the share of pixels kept: a .png or .svg file; with --variance or "
-                   "--confidence")
-      ->type_name("FILE");
+  command->add_option("--truth-scale", arguments->truth_scale, "the same of the truth")
+      ->type_name("STEPS")
+      ->capture_default_str();
   command
       ->add_option("--merge", arguments->reports,
                    "pool what `egosgm eval --json` printed for several sequences, over all their pixels")
@@ -362,7 +258,7 @@ Command add_eval(CLI::App& program) {
       "pooled: over all pixels (KITTI 2015); mean: of the images' figures (KITTI 2012).\n"
       "A truth of 1/256 px (1 in KITTI's PNG) or less says that nothing is there, the sky for instance: a hole is "
       "right.\n"
-      "Beside --against, among pixels that `run --write reason` trusts, and over time: docs/evaluation.md has the "
+      "Over time and beside another method: `egosgm eval-video`, of the Python package. docs/evaluation.md has the "
       "formula, the source and the pixels of every figure.");
   return {command, [arguments] { return evaluate(*arguments); }};
 }

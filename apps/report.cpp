@@ -12,8 +12,8 @@
 #include "apps/media.h"
 #include "apps/metrics_json.h"
 #include "apps/output_folder.h"
+#include "apps/python_tools.h"
 #include "apps/run_folder.h"
-#include "apps/templates.h"
 #include "apps/truth_pairs.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
@@ -165,7 +165,7 @@ class Page {
     std::string json = data.dump(-1, ' ', false, Json::error_handler_t::replace);
     // Nothing in a text may end the script element.
     for (std::size_t at = 0; (at = json.find('<', at)) != std::string::npos;) json.replace(at, 1, "\\u003c");
-    std::string page(templates().at("report.html"));
+    std::string page(embedded_files().at("report.html"));
     constexpr std::string_view place = "@DATA@";
     return page.replace(page.find(place), place.size(), json);
   }

@@ -10,8 +10,9 @@ import pathlib
 import numpy as np
 
 import egosgm
+from egosgm.pose_evaluation import inverse
+from egosgm.video_evaluation import BAD_PX, is_valid, move
 
-BAD_PX = 3.0
 SINGLE_FRAME = {"temporal": False}
 
 
@@ -82,31 +83,16 @@ def play(video, numbers=None, wrong=None, outputs=("disparity", "variance"), **o
         since = k
 
 
-def is_valid(disparity):
-    return disparity > egosgm.INVALID_DISPARITY
-
-
 def bad_or_missing(disparity, truth, where=None):
     """(bad or missing, all) pixels that have truth."""
-    known = is_valid(truth) if where is None else is_valid(truth) & where
-    d, t = disparity[known], truth[known]
-    return int(np.sum(~is_valid(d) | (np.abs(d - t) > BAD_PX))), int(known.sum())
+    counts = egosgm.compare_disparity(disparity, truth if where is None else np.where(where, truth, egosgm.INVALID_DISPARITY))
+    return counts.bad + (counts.truth - counts.sky) - (counts.valid - counts.sky_valid), counts.truth
 
 
 def share(counts):
     """Percent, of a list of (part, all)."""
     parts = np.sum(np.reshape(counts, (-1, 2)), axis=0)
     return float(100 * parts[0] / parts[1]) if parts[1] else float("nan")
-
-
-def moved(calibration, x, y, d, motion):
-    """Points of disparity space (x, y, d) after a motion; NaN behind the camera."""
-    z = calibration.fx * calibration.baseline_m / (d + calibration.doffs_px)
-    points = np.stack([(x - calibration.cx) * z / calibration.fx, (y - calibration.cy) * z / calibration.fy, z])
-    points = motion[:3, :3] @ points + motion[:3, 3:]
-    z = np.where(points[2] > 1e-3, points[2], np.nan)
-    return (calibration.fx * points[0] / z + calibration.cx, calibration.fy * points[1] / z + calibration.cy,
-            calibration.fx * calibration.baseline_m / z - calibration.doffs_px)
 
 
 def flicker(video, first, **options):
@@ -165,16 +151,12 @@ def uncovered_ages(video, oldest):
     for k in video.numbers:
         ages = np.full(video.all_truth(k).shape, -1, np.int32)
         if previous is not None:
-            static = ~video.moving(k)
-            y, x = np.nonzero(static)
-            d = video.all_truth(k)[y, x].astype(float)
-            then_x, then_y, then_d = moved(video.calibration, x, y, d, np.linalg.inv(video.motion(k, k - 1)))
-            column, row = np.rint(np.nan_to_num(then_x, nan=-1)).astype(int), np.rint(np.nan_to_num(then_y, nan=-1)).astype(int)
-            inside = (row >= 0) & (row < ages.shape[0]) & (column >= 0) & (column < ages.shape[1])
-            y, x, row, column, then_d = (values[inside] for values in (y, x, row, column, then_d))
-            behind = video.moving(k - 1)[row, column] & (video.all_truth(k - 1)[row, column] > then_d + 1)
-            age = np.where(behind, 0, np.where(previous[row, column] >= 0, previous[row, column] + 1, -1))
-            ages[y, x] = np.where(age > oldest, -1, age)
+            static = np.where(video.moving(k), egosgm.INVALID_DISPARITY, video.all_truth(k))
+            inside, place, then = move(static, video.calibration, inverse(video.motion(k, k - 1)))
+            behind = inside & video.moving(k - 1).ravel()[place] & (video.all_truth(k - 1).ravel()[place] > then + 1)
+            before = np.where(inside, previous.ravel()[place], -1)
+            ages = np.where(behind, 0, np.where(before >= 0, before + 1, -1))
+            ages[ages > oldest] = -1
         previous = ages
         yield k, ages
 

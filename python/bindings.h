@@ -12,6 +12,5 @@ void bind_odometry(pybind11::module_& module);
 void bind_rectification(pybind11::module_& module);
 void bind_files(pybind11::module_& module);
 void bind_evaluation(pybind11::module_& module);
-void bind_video_evaluation(pybind11::module_& module);
 
 }  // namespace egosgm::python

@@ -3,9 +3,12 @@
 
 #include <pybind11/operators.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
-#include "egosgm/vision/pose_evaluation.h"
+#include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/render.h"
+#include "host/vision/estimate_reader.h"
+#include "host/vision/pair_with_truth.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
@@ -15,8 +18,6 @@ namespace {
 
 using vision::DisparityCounts;
 using vision::DisparityMetrics;
-using vision::PoseEvaluation;
-using vision::SegmentError;
 
 DisparityCounts compare(const py::object& estimate, const py::object& truth) {
   py::array keep_estimate, keep_truth;
@@ -72,39 +73,81 @@ void bind_disparity(py::module_& module) {
   module.def("mean_of", &vision::mean_of, py::arg("images"), "The mean of each image's figures (KITTI 2012).");
 }
 
-void bind_poses(py::module_& module) {
-  py::class_<SegmentError>(module, "SegmentError")
-      .def_readonly("length_m", &SegmentError::length_m)
-      .def_readonly("segments", &SegmentError::segments)
-      .def_readonly("translation_percent", &SegmentError::translation_percent)
-      .def_readonly("rotation_deg_per_m", &SegmentError::rotation_deg_per_m);
-  py::class_<PoseEvaluation>(module, "PoseEvaluation")
-      .def_readonly("translation_mean_m", &PoseEvaluation::translation_mean_m)
-      .def_readonly("rotation_mean_rad", &PoseEvaluation::rotation_mean_rad)
-      .def_readonly("translation_rmse_m", &PoseEvaluation::translation_rmse_m)
-      .def_readonly("rotation_rmse_rad", &PoseEvaluation::rotation_rmse_rad)
-      .def_readonly("path_length_m", &PoseEvaluation::path_length_m)
-      .def_readonly("end_drift_m", &PoseEvaluation::end_drift_m)
-      .def_readonly("end_drift_percent", &PoseEvaluation::end_drift_percent)
-      .def_readonly("rotation_end_drift_deg", &PoseEvaluation::rotation_end_drift_deg)
-      .def_readonly("segments", &PoseEvaluation::segments)
-      .def_readonly("short_segments", &PoseEvaluation::short_segments)
-      .def_readonly("segment_translation_percent", &PoseEvaluation::segment_translation_percent)
-      .def_readonly("segment_rotation_deg_per_m", &PoseEvaluation::segment_rotation_deg_per_m);
+vision::FrameRange range_of(const std::string& frames) {
+  return frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(frames);
+}
+
+/// What the commands eval-video and eval-poses share with eval: which files belong together, and what they hold.
+void bind_estimates(py::module_& module) {
+  using std::filesystem::path;
+  using vision::EstimateReader;
+  py::class_<vision::EvaluationPair>(module, "_EvaluationPair")
+      .def_readonly("estimate", &vision::EvaluationPair::estimate)
+      .def_readonly("truth", &vision::EvaluationPair::truth)
+      .def_readonly("name", &vision::EvaluationPair::name)
+      .def_readonly("same_name", &vision::EvaluationPair::same_name);
   module.def(
-      "evaluate_poses",
-      [](const py::object& estimate, const py::object& truth) {
-        return vision::evaluate_poses(transforms_of(estimate, "estimate"), transforms_of(truth, "truth"));
+      "_pair_with_truth",
+      [](const path& estimate, const path& truth, const std::string& frames,
+         const std::map<std::string, std::string>& image_names) {
+        const auto found = vision::pair_with_truth(estimate, truth, {range_of(frames), image_names});
+        return py::make_tuple(found.pairs, found.without_estimate, found.without_truth);
       },
-      py::arg("estimate"), py::arg("truth"),
-      "Compares camera-to-world poses, (N, 4, 4), as KITTI's odometry kit does.");
+      py::arg("estimate"), py::arg("truth"), py::arg("frames"), py::arg("image_names"));
+  module.def(
+      "_list_maps",
+      [](const path& estimate, const std::string& frames) { return vision::list_maps(estimate, range_of(frames)); },
+      py::arg("estimate"), py::arg("frames"));
+  py::class_<EstimateReader>(module, "_EstimateReader")
+      .def(py::init<>())
+      .def(
+          "read",
+          [](EstimateReader& reader, const path& file, double scale) { return array_of(reader.read(file, scale)); },
+          py::arg("file"), py::arg("scale"))
+      .def(
+          "compare",
+          [](EstimateReader& reader, const py::object& estimate, const py::object& truth) {
+            py::array keep_estimate, keep_truth;
+            reader.compare(map_of(estimate, "estimate", keep_estimate), map_of(truth, "truth", keep_truth));
+          },
+          py::arg("estimate"), py::arg("truth"))
+      .def("doubts", &EstimateReader::doubts, py::arg("scale"));
+  module.def(
+      "_parse_frame_range",
+      [](const std::string& frames) {
+        const vision::FrameRange range = range_of(frames);
+        return std::pair(range.first, range.last);
+      },
+      py::arg("frames"));
+  module.def("_expect_scaled", &vision::expect_scaled, py::arg("option"), py::arg("scale"), py::arg("file"));
+  module.def(
+      "_read_scaled", [](const path& file, double scale) { return array_of(vision::read_scaled(file, scale)); },
+      py::arg("file"), py::arg("scale"));
+  module.def(
+      "_read_values", [](const path& file) { return array_of(vision::read_values(file)); }, py::arg("file"));
+  module.def(
+      "_poses_of_frames",
+      [](const vision::StereoSequence& sequence, const path& file) {
+        return array_of(vision::poses_of_frames(sequence, file));
+      },
+      py::arg("sequence"), py::arg("file"));
+  module.def(
+      "_rows_of_frames",
+      [](const std::vector<int>& frames, const std::vector<int>& numbers, std::size_t rows, const path& file,
+         const std::string& what) {
+        vision::StereoSequence sequence;
+        for (const int number : frames) sequence.frames.emplace_back().number = number;
+        sequence.numbers = numbers;
+        return vision::rows_of_frames(sequence, rows, file, what);
+      },
+      py::arg("frames"), py::arg("numbers"), py::arg("rows"), py::arg("file"), py::arg("what"));
 }
 
 }  // namespace
 
 void bind_evaluation(py::module_& module) {
   bind_disparity(module);
-  bind_poses(module);
+  bind_estimates(module);
   module.def(
       "interpolate_background", [](const py::object& map) { return of_map(map, vision::interpolate_background); },
       py::arg("disparity"), "Fills the holes from the background, as KITTI's development kit does.");

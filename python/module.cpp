@@ -43,5 +43,4 @@ PYBIND11_MODULE(_egosgm, module) {
   bind_rectification(module);
   bind_files(module);
   bind_evaluation(module);
-  bind_video_evaluation(module);
 }

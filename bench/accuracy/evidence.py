@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Places without evidence: sky, plain walls and ground, texture that repeats, thin poles. What a video's map has there that a single frame's has
-not, and how much of it is right, by `egosgm run` and `egosgm eval`."""
+not, and how much of it is right, by `egosgm run` and `egosgm eval-video`."""
 import json
 import shutil
 import statistics
@@ -79,8 +79,8 @@ def run(bench, place, arguments=()):
 
 def figures_of(bench, estimate, truth, frame, *arguments):
     """Of one frame, by name."""
-    found = json.loads(bench.egosgm("eval", "--estimate", estimate, "--truth", truth, "--frames", f"{frame}:{frame}", *arguments, "--json"))
-    return {**found["pooled"], **found["video"]["figures"]}
+    found = json.loads(bench.egosgm("eval-video", "--estimate", estimate, "--truth", truth, "--frames", f"{frame}:{frame}", *arguments, "--json"))
+    return {**found["regions"]["all"], **found["figures"]}
 
 
 def ratio(ours, single):

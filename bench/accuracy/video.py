@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""EgoSGM over time beside the single frame, OpenCV, and OpenCV with the temporal filters that cameras ship, by `egosgm eval`; and what a wrong
+"""EgoSGM over time beside the single frame, OpenCV, and OpenCV with the temporal filters that cameras ship, by `egosgm eval-video`; and what a wrong
 motion or missing frames cost. All maps stay in the work folder, for other evaluators.
 
 The filters are those of RealSense cameras with their defaults: where a pixel's disparity differs by less than a step of 20 from what it was, it
@@ -32,7 +32,7 @@ OPENCV_DISPARITIES = 128
 
 
 class Video:
-    """A sequence and what `egosgm run` and `egosgm eval` are told of it."""
+    """A sequence and what `egosgm run` and `egosgm eval-video` are told of it."""
 
     def __init__(self, title, folder, scene=None, frames=None, truth=None, first_scored=STEADY_FROM, odometry_judges=False):
         self.title, self.folder, self.scene, self.frames, self.truth = title, folder, scene, frames, truth
@@ -139,9 +139,8 @@ def averaged(figures, before, now, along_motion, step_px):
 def row_of(bench, maps, method):
     ours, single = maps.of(OURS), maps.of(SINGLE)
     bench.device = json.loads((ours / "report.json").read_text())["device"]
-    result = json.loads(bench.egosgm("eval", "--estimate", maps.of(method), *maps.video.eval_arguments(ours), "--against", single, "--json"))
-    video = result["video"]
-    regions, figures, pooled = video["regions"], video["figures"], result["pooled"]
+    video = json.loads(bench.egosgm("eval-video", "--estimate", maps.of(method), *maps.video.eval_arguments(ours), "--against", single, "--json"))
+    regions, figures, pooled = video["regions"], video["figures"], video["regions"]["all"]
     bad = [regions.get(region, {}).get("bad_or_missing") for region in ("uncovered", "moving")]
     harm, gain = [None] * 2, [None] * 3
     if method != SINGLE:
@@ -231,9 +230,9 @@ def pose_noise(bench, only):
                 poses = maps.folder / f"{out.name}.txt"
                 maps.egosgm.write_poses(poses, disturbed(maps.figures.np, truth, degrees, metres))
                 bench.egosgm("run", *maps.video.run_arguments(), "--poses", poses, "--out", out, "--quiet")
-            result = json.loads(bench.egosgm("eval", "--estimate", out, *maps.video.eval_arguments(out), "--json"))
-            figures = result["video"]["figures"]
-            rows.append([maps.video.title, f"{degrees} degrees, {100 * metres:.0f} cm", result["pooled"]["bad_or_missing"],
+            result = json.loads(bench.egosgm("eval-video", "--estimate", out, *maps.video.eval_arguments(out), "--json"))
+            figures = result["figures"]
+            rows.append([maps.video.title, f"{degrees} degrees, {100 * metres:.0f} cm", result["regions"]["all"]["bad_or_missing"],
                          figures["tepe_dynamicstereo_px"], figures["flicker_px"], single[2], single[7], single[12]])
             print_row(rows[-1])
     return {"headings": ["video", "each motion is off by", "bad or missing", "TEPE, same pixel [px]", "flicker [px]", "single frame: bad or missing",

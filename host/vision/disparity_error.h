@@ -20,11 +20,6 @@ inline bool is_d1(float estimate, float truth) {
   return error > kBad_px && error > kBadRelative * std::abs(truth);
 }
 
-/// An estimate that is not bad, or none where nothing is.
-inline bool is_right(float estimate, float truth) {
-  return is_valid_disparity(estimate) ? !is_bad(estimate, truth) : is_sky(truth);
-}
-
 /// One pixel that has truth; `filled` is its estimate after interpolate_background.
 inline void count_pixel(float estimate, float filled, float truth, DisparityCounts& counts) {
   const bool valid = is_valid_disparity(estimate), sky = is_sky(truth);

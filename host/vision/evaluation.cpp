@@ -7,7 +7,6 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
-#include "host/vision/add_members.h"
 #include "host/vision/disparity_error.h"
 
 namespace egosgm::vision {
@@ -61,9 +60,16 @@ class Mean {
 }  // namespace
 
 DisparityCounts& DisparityCounts::operator+=(const DisparityCounts& other) {
-  return add_members(*this, other, &DisparityCounts::truth, &DisparityCounts::valid, &DisparityCounts::bad,
-                     &DisparityCounts::d1, &DisparityCounts::bad_interpolated, &DisparityCounts::d1_interpolated,
-                     &DisparityCounts::absolute_error_px, &DisparityCounts::sky, &DisparityCounts::sky_valid);
+  truth += other.truth;
+  valid += other.valid;
+  bad += other.bad;
+  d1 += other.d1;
+  bad_interpolated += other.bad_interpolated;
+  d1_interpolated += other.d1_interpolated;
+  absolute_error_px += other.absolute_error_px;
+  sky += other.sky;
+  sky_valid += other.sky_valid;
+  return *this;
 }
 
 DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth) {

@@ -28,10 +28,11 @@ from ._egosgm import __version__
 from .calibrations import read_calibration
 from .drive import Drive, DriveFrame, run
 from .matcher import Matcher
+from .pose_evaluation import MotionError, PoseEvaluation, SegmentError, evaluate_poses
 from .values import as_dataclass as _as_dataclass
-from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video
+from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video, move_map
 
-__all__ = ["__version__", "read_calibration", "Drive", "DriveFrame", "Matcher", "run", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video",
+__all__ = ["__version__", "read_calibration", "Drive", "DriveFrame", "Matcher", "run", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 
@@ -56,8 +57,7 @@ _egosgm.Pipeline.__signature__ = _signature(("calibration", "width", "height"),
 _egosgm.StereoOdometry.__signature__ = _signature(("calibration",), _egosgm.odometry_options())
 _egosgm.SyntheticSequence.__signature__ = _signature((), _egosgm.synthetic_options())
 
-for _values in (_egosgm.Calibration, _egosgm.DeviceInfo, _egosgm.DisparityCounts, _egosgm.DisparityMetrics, _egosgm.FrameReport,
-                _egosgm.PoseEvaluation, _egosgm.SegmentError):
+for _values in (_egosgm.Calibration, _egosgm.DeviceInfo, _egosgm.DisparityCounts, _egosgm.DisparityMetrics, _egosgm.FrameReport):
     _as_dataclass(_values)
 
 # Other processes take them: multiprocessing pickles what it sends.

@@ -1,13 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `egosgm` of a wheel: the program, and what only Python reads."""
+"""The command `egosgm`: tools in Python (tools.json lists them), and the program in C++ for all others."""
+import contextlib
+import importlib
+import json
 import os
 import pathlib
+import signal
 import subprocess
 import sys
 import tempfile
-from typing import List, Tuple
+import threading
+from typing import List, Optional, Sequence, Tuple
 
 _RAW = "rectify"  # the command that takes raw cameras; all others take rectified ones
+_PACKAGES = {  # what brings a module
+    "cv2": "pip install opencv-python-headless, or apt install python3-opencv",
+    "jinja2": "pip install jinja2, or apt install python3-jinja2",
+    "matplotlib": "pip install matplotlib, or apt install python3-matplotlib",
+    "rosbags": 'pip install the wheel with "[bag]" (docs/robots.md)',
+}
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
@@ -67,14 +78,84 @@ def with_calibration(arguments: List[str], folder: pathlib.Path) -> List[str]:
     return changed + rest
 
 
+def _module_of(arguments: Sequence[str]) -> Optional[str]:
+    """The package's module whose main(arguments) does what is asked for; None where the C++ program does it."""
+    if arguments[:1] == ["run"] and any(a.split("=")[0] == "--bag" for a in arguments):
+        return "bag_program"
+    tools = json.loads(pathlib.Path(__file__).with_name("tools.json").read_text())
+    return tools[arguments[0]]["module"] if arguments and arguments[0] in tools else None
+
+
+def _say(text: str) -> None:
+    """On one line, whatever a name in it holds."""
+    with contextlib.suppress(OSError, AttributeError):  # the standard error may be full or closed
+        print("egosgm: " + "".join(c if c.isprintable() else " " for c in text), file=sys.stderr, flush=True)
+
+
+def _flushed(code: int) -> int:
+    """A result that the standard output did not take is none; a reader that goes has read enough."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            _say(f"error: the standard output cannot be written: {error.strerror}")
+            return 1
+    return code
+
+
+def run_tool(arguments: Sequence[str]) -> int:
+    """Runs a tool that is written in Python, and returns its exit code. Never calls the C++ program."""
+    from . import _egosgm
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
+    module = _module_of(arguments)
+    if module is None:
+        _say(f"error: {' '.join(arguments[:1])}: this version of the Python package has no such tool: install the program's own version")
+        return 1
+    try:
+        return _flushed(importlib.import_module("." + module, __package__).main(list(arguments[1:])))
+    except SystemExit as end:  # of --help
+        return _flushed(int(end.code or 0))
+    except ModuleNotFoundError as error:
+        package = error.name or ""
+        if package.startswith("egosgm"):
+            raise
+        remedy = _PACKAGES.get(package, f"pip install {package}")
+        _say(f"error: {arguments[0]}: needs the Python module {package}, which {sys.executable} does not find: {remedy}")
+        return 1
+    except BrokenPipeError:
+        return _flushed(0)
+    except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError, OSError) as error:
+        _say(f"error: {error}")
+        return 2 if isinstance(error, _egosgm.InvalidArgument) else 1
+    except KeyboardInterrupt:
+        _say("interrupted")
+        return 130
+
+
+def _program() -> Optional[pathlib.Path]:
+    """The C++ program that came with the package, or that was built or installed beside it."""
+    package = pathlib.Path(__file__).resolve().parent
+    places = [package / "bin/egosgm", package.parents[1] / "apps/egosgm"]
+    if package.parent.name == "dist-packages":
+        places.append(package.parents[3] / "bin/egosgm")
+    for place in places:
+        with contextlib.suppress(OSError):
+            with place.open("rb") as file:
+                if file.read(4) == b"\x7fELF":  # no script, which could be this one
+                    return place
+    return None
+
+
 def main() -> None:
     arguments = sys.argv[1:]
-    if arguments[:1] == ["run"] and any(a.split("=")[0] == "--bag" for a in arguments):
-        from . import bag_program
-        sys.exit(bag_program.main(arguments[1:]))
-    program = pathlib.Path(__file__).with_name("bin") / "egosgm"
-    if not program.exists():
-        sys.exit(f"egosgm: error: {program}: no such file: this package came without the program; it is the wheel that has it")
+    if _module_of(arguments):
+        sys.exit(run_tool(arguments))
+    program = _program()
+    if program is None:
+        sys.exit("egosgm: error: the program is neither in this package nor beside it: pip install the wheel, which has it (docs/python.md)")
     if not any(a.split("=")[0] == "--calib" for a in arguments):
         os.execv(program, ["egosgm", *arguments])
     from . import _egosgm

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""egosgm eval over time."""
+"""egosgm eval-video."""
 import json
 import shutil
 import struct
@@ -15,7 +15,7 @@ def constant_png(value, width=WIDTH, height=HEIGHT):
 
 class EvalOverTime(ProgramTest):
     def evaluate(self, *arguments):
-        return json.loads(self.assert_works("eval", *arguments, "--json"))
+        return json.loads(self.assert_works("eval-video", *arguments, "--json"))
 
     def maps(self, values, write=constant_png, suffix="png"):
         folder = self.new_folder()
@@ -24,7 +24,7 @@ class EvalOverTime(ProgramTest):
         return folder
 
     def test_the_truth_itself_is_calm(self):
-        video = self.evaluate("--estimate", self.street / "truth/left_disp_occ", "--sequence", self.street)["video"]
+        video = self.evaluate("--estimate", self.street / "truth/left_disp_occ", "--sequence", self.street)
         self.assertEqual((video["frames"], video["pairs"]), (FRAMES, FRAMES - 1))
         self.assertEqual(video["motion"], f"poses {self.street / 'poses.txt'}")
         figures = video["figures"]
@@ -40,35 +40,34 @@ class EvalOverTime(ProgramTest):
         street = self.broken_street()
         (street / "poses.txt").unlink()
         arguments = ("--estimate", self.street / "truth/left_disp_occ", "--sequence")
-        found, given = self.evaluate(*arguments, street)["video"], self.evaluate(*arguments, self.street)["video"]
+        found, given = self.evaluate(*arguments, street), self.evaluate(*arguments, self.street)
         self.assertEqual(found["motion"], "odometry")
         self.assertAlmostEqual(found["figures"]["flicker_px"], given["figures"]["flicker_px"], delta=0.1)
-        again = self.evaluate(*arguments, street, "--poses", self.street / "poses.txt")["video"]
+        again = self.evaluate(*arguments, street, "--poses", self.street / "poses.txt")
         self.assertEqual(again["figures"], given["figures"])
 
     def test_one_truth_file_leaves_the_other_frames_in_the_video(self):
         maps, truth = self.street / "truth/left_disp_occ", self.street / "truth/left_disp_noc/000002.png"
         result = self.evaluate("--estimate", maps, "--truth", truth, "--sequence", self.street)
-        self.assertEqual([pair["name"] for pair in result["pairs"]], ["000002"])
-        self.assertEqual(result["video"]["frames"], FRAMES)
-        self.assertEqual(self.evaluate("--estimate", maps, "--truth", truth)["video"]["frames"], 1)
+        self.assertEqual((result["frames"], result["regions"]["all"]["truth_pixels"]), (FRAMES, self.evaluate(truth, truth)["regions"]["all"]["truth_pixels"]))
+        self.assertEqual(self.evaluate("--estimate", maps, "--truth", truth)["frames"], 1)
 
     def test_two_folders_are_enough_for_a_jump(self):
         estimate, truth = self.maps([10, 12, 10.5]), self.maps([10, 10, 10])
         result = self.evaluate(estimate, truth)
-        figures = result["video"]["figures"]
+        figures = result["figures"]
         self.assertEqual(figures["tepe_dynamicstereo_px"], 1.75)
         self.assertEqual(figures["tepe_dynamicstereo_above_1px_percent"], 100)
-        self.assertEqual([frame["tepe_dynamicstereo_px"] for frame in result["video"]["over_frames"]], [None, 2, 1.5])
-        self.assertEqual(self.evaluate(estimate, truth, "--frames", "1:2")["video"]["figures"]["tepe_dynamicstereo_px"], 1.5)
-        table = self.assert_works("eval", estimate, truth)
+        self.assertEqual([frame["tepe_dynamicstereo_px"] for frame in result["over_frames"]], [None, 2, 1.5])
+        self.assertEqual(self.evaluate(estimate, truth, "--frames", "1:2")["figures"]["tepe_dynamicstereo_px"], 1.5)
+        table = self.assert_works("eval-video", estimate, truth)
         self.assertIn("2 pairs of frames", table)
         self.assertRegex(table, r"tepe_dynamicstereo_px +1\.7500")
 
     def test_a_gap_is_no_pair(self):
         estimate, truth = self.maps([10, 12, 30, 11]), self.maps([10, 10, 10, 10])
         (estimate / "000002.png").unlink()
-        figures = self.evaluate(estimate, truth)["video"]
+        figures = self.evaluate(estimate, truth)
         self.assertEqual((figures["frames"], figures["pairs"]), (3, 1))
         self.assertEqual(figures["figures"]["tepe_dynamicstereo_px"], 2)
 
@@ -83,7 +82,7 @@ class EvalOverTime(ProgramTest):
             shutil.rmtree(street / "truth")
             for image in sorted(street.glob("image_*/*.png"), reverse=True):
                 image.rename(image.with_stem(f"{int(image.stem) + 8:0{digits}}"))
-            video = self.evaluate(maps, "--sequence", street)["video"]
+            video = self.evaluate(maps, "--sequence", street)
             self.assertEqual((video["pairs"], video["motion"]), (FRAMES - 1, "odometry"))
             figures.append(video["figures"])
         self.assertEqual(figures[0], figures[1])
@@ -94,44 +93,44 @@ class EvalOverTime(ProgramTest):
         maps = self.new_folder()
         for name, number in (("a_000002", 2), ("a_000003", 3), ("b_000000", 0), ("b_000001", 1)):
             shutil.copy(street / f"truth/left_disp_occ/{number:06}.png", maps / f"{name}.png")
-        self.assertEqual(self.evaluate(maps, "--sequence", street)["video"]["pairs"], 2)
+        self.assertEqual(self.evaluate(maps, "--sequence", street)["pairs"], 2)
 
-    def test_pictures_that_are_no_video_give_the_old_table(self):
+    def test_pictures_that_are_no_video_have_their_regions(self):
         folder = self.new_folder()
         for name in ("000000_10", "000001_10"):
             (folder / f"{name}.png").write_bytes(constant_png(9))
-        table = self.assert_works("eval", folder, folder)
-        self.assertNotIn("over time", table)
-        self.assertIn("mean", table)
+        table = self.assert_works("eval-video", folder, folder)
+        self.assertIn("2 frames, 0 pairs of frames", table)
+        self.assertRegex(table, r"\nall +\d+ ")
 
     def test_against_counts_harm_and_help(self):
         estimate, against, truth = self.maps([10, 13]), self.maps([12, 10]), self.maps([10, 10])
-        figures = self.evaluate(estimate, truth, "--against", against)["video"]["figures"]
+        figures = self.evaluate(estimate, truth, "--against", against)["figures"]
         self.assertEqual((figures["changed_percent"], figures["harm_percent"], figures["help_percent"]), (100, 50, 50))
 
     def test_against_counts_what_was_gained_and_lost(self):
         estimate, against, truth = self.maps([10, 0, 14]), self.maps([0, 10, 10]), self.maps([10, 10, 10])
-        figures = self.evaluate(estimate, truth, "--against", against)["video"]["figures"]
+        figures = self.evaluate(estimate, truth, "--against", against)["figures"]
         for name, value in {"gained_percent": 100 / 3, "gained_right_percent": 100, "lost_right_percent": 200 / 3}.items():
             self.assertAlmostEqual(figures[name], value, msg=name)
-        self.assertRegex(self.assert_works("eval", estimate, truth, "--against", against), r"lost_right_percent +66\.6667")
+        self.assertRegex(self.assert_works("eval-video", estimate, truth, "--against", against), r"lost_right_percent +66\.6667")
 
     def test_a_truth_of_one_step_says_that_nothing_is_there(self):
         sky, hole_and_surface = self.maps([1 / 256, 1 / 256]), self.maps([0, 4])
         for estimate, wrong, filled in ((sky, 0, 100), (hole_and_surface, 50, 50)):
-            pooled = self.evaluate(estimate, sky)["pooled"]
-            self.assertEqual([pooled[name] for name in ("wrong_of_all", "bad_or_missing", "interpolated", "d1", "filled")], [wrong] * 4 + [filled])
-            self.assertIsNone(pooled["density"])
+            regions = self.evaluate(estimate, sky)["regions"]
+            self.assertEqual([regions["sky"][name] for name in ("wrong_of_all", "bad_or_missing", "interpolated", "filled")], [wrong] * 3 + [filled])
+            self.assertIsNone(regions["all"]["density"])
 
     def test_reasons_of_a_run_tell_what_was_trusted(self):
         out, truth = self.new_folder() / "out", self.street / "truth/left_disp_noc"
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "reason", "--quiet")
-        figures = self.evaluate(out, truth)["video"]["figures"]
+        figures = self.evaluate(out, truth)["figures"]
         self.assertLess(figures["wrong_of_trusted_percent"], 5)
-        self.assertEqual(self.evaluate(out / "disparity", truth)["video"]["figures"], figures)
-        self.assertIn("wrong_of_trusted_percent", self.assert_works("eval", out / "disparity/000001.png", truth / "000001.png"))
+        self.assertEqual(self.evaluate(out / "disparity", truth)["figures"], figures)
+        self.assertIn("wrong_of_trusted_percent", self.assert_works("eval-video", out / "disparity/000001.png", truth / "000001.png"))
         (out / "report.json").unlink()
-        self.assertIsNone(self.evaluate(out / "disparity", truth)["video"]["figures"]["wrong_of_trusted_percent"])
+        self.assertIsNone(self.evaluate(out / "disparity", truth)["figures"]["wrong_of_trusted_percent"])
 
     def test_formats_of_others(self):
         def npy(value):
@@ -139,15 +138,15 @@ class EvalOverTime(ProgramTest):
             return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode() + struct.pack("<f", value) * (WIDTH * HEIGHT)
         truth = self.maps([8, 8])
         for folder, scale in ((self.maps([8.5, 9], npy, "npy"), ()), (self.maps([4.25, 4.5]), ("--scale", 128))):
-            figures = self.evaluate(folder, truth, *scale)["video"]["figures"]
+            figures = self.evaluate(folder, truth, *scale)["figures"]
             self.assertEqual(figures["tepe_dynamicstereo_px"], 0.5)
 
     def test_variance_and_confidence_are_opposite_orders(self):
         out = self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "variance", "--quiet")
         truth = self.street / "truth/left_disp_noc"
-        result = self.evaluate(out, truth, "--variance", out)["video"]
-        wrong_way = self.evaluate(out, truth, "--confidence", out / "variance")["video"]
+        result = self.evaluate(out, truth, "--variance", out)
+        wrong_way = self.evaluate(out, truth, "--confidence", out / "variance")
         self.assertGreater(wrong_way["figures"]["ause_px"], 2 * result["figures"]["ause_px"])
         at = result["density"]["at_density"]
         self.assertEqual([entry["density_percent"] for entry in at], list(range(50, 101, 5)))
@@ -159,18 +158,18 @@ class EvalOverTime(ProgramTest):
     def test_plots(self):
         estimate, truth = self.maps([10, 12, 10.5]), self.maps([10, 10, 10])
         out = self.new_folder()
-        self.assert_works("eval", estimate, truth, "--plot-frames", out / "frames.svg", "--variance", estimate, "--plot-density", out / "density.png")
+        self.assert_works("eval-video", estimate, truth, "--plot-frames", out / "frames.svg", "--variance", estimate, "--plot-density", out / "density.png")
         self.assertIn("TEPE same pixel", (out / "frames.svg").read_text())
         self.assertTrue((out / "density.png").read_bytes().startswith(b"\x89PNG"))
-        self.assert_refused(["eval", estimate, truth, "--plot-frames", out / "frames.gif"], "--plot-frames", ".svg")
-        self.assert_refused(["eval", estimate, truth, "--plot-density", out / "none.svg"], "variance")
+        self.assert_refused(["eval-video", estimate, truth, "--plot-frames", out / "frames.gif"], "--plot-frames", ".svg")
+        self.assert_refused(["eval-video", estimate, truth, "--plot-density", out / "none.svg"], "variance")
         self.assertFalse((out / "none.svg").exists())
 
     def test_wrong_input_gives_one_line_and_no_table(self):
         truth = self.street / "truth/left_disp_occ"
 
         def refused(arguments, *named):
-            self.assert_refused(["eval", *arguments], *named)
+            self.assert_refused(["eval-video", *arguments], *named)
         refused(["--estimate", truth], "no truth")
         refused([truth, truth, "--poses", self.street / "poses.txt"], "--sequence")
         refused([truth, truth, "--variance", truth, "--confidence", truth], "give one of them")

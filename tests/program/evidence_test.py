@@ -37,7 +37,7 @@ class Evidence(ProgramTest):
     def evaluated(self, folder, *arguments):
         """Of the last frame."""
         frames = f"{FRAMES - 1}:{FRAMES - 1}"
-        said = self.assert_works("eval", "--estimate", self.work / "evidence" / folder, "--truth", self.work / "evidence/truth_sky", "--frames", frames, *arguments, "--json")
+        said = self.assert_works("eval-video", "--estimate", self.work / "evidence" / folder, "--truth", self.work / "evidence/truth_sky", "--frames", frames, *arguments, "--json")
         return json.loads(said)
 
     def test_what_is_missing_is_skipped(self):
@@ -49,16 +49,16 @@ class Evidence(ProgramTest):
         row = dict(zip(self.found["places"]["headings"], self.row("places", "sky")))
         video, single = self.evaluated("sky", "--against", self.work / "evidence/sky_single"), self.evaluated("sky_single")
         for name, heading in (("filled", "filled"), ("bad_of_valid", "bad of valid"), ("wrong_of_all", "wrong of all")):
-            self.assertEqual(row[f"{heading}, last frame"], video["pooled"][name])
-            self.assertEqual(row[f"{heading}, single frame"], single["pooled"][name])
+            self.assertEqual(row[f"{heading}, last frame"], video["regions"]["all"][name])
+            self.assertEqual(row[f"{heading}, single frame"], single["regions"]["all"][name])
         for name, heading in (("gained", "gained"), ("gained_right", "gained, right"), ("lost_right", "lost, right"), ("wrong_of_trusted", "wrong of trusted"),
                               ("trusted_of_wrong", "trusted of wrong")):
-            self.assertEqual(row[heading], video["video"]["figures"][f"{name}_percent"], heading)
+            self.assertEqual(row[heading], video["figures"][f"{name}_percent"], heading)
         self.assertEqual(row["bad of valid / single frame's"], row["bad of valid, last frame"] / row["bad of valid, single frame"])
         self.assertNotEqual(row["filled, first frame"], row["filled, last frame"])
 
     def test_a_truth_of_0_is_the_sky(self):
-        sky = self.evaluated("sky")["video"]["regions"]["sky"]
+        sky = self.evaluated("sky")["regions"]["sky"]
         self.assertEqual(sky["truth_pixels"], WIDTH * HEIGHT // 2)
         self.assertGreater(sky["bad_of_valid"], 50)
 

@@ -2,13 +2,16 @@
 """Help and devices: what the program says of itself, and what the README and docs/ say of it."""
 import json
 import os
+import pathlib
+import re
 import shutil
 import subprocess
+import sys
 import unittest
 
 from program_case import PROGRAM, SOURCE, ProgramTest, egosgm
 
-COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-poses", "tune", "report", "doctor", "rectify")
+COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-poses", "tune", "report", "doctor", "rectify")
 
 
 class Help(ProgramTest):
@@ -21,7 +24,8 @@ class Help(ProgramTest):
         for command in COMMANDS:
             text = self.assert_works(command, "--help")
             self.assertNotRegex(text, r"\(\d+x\)|\[\w+\.\.\.\]|\[\[")
-        for command in ("eval", "eval-poses"):
+        self.assertIn("egosgm eval [OPTIONS] [ESTIMATE] [TRUTH]\n", self.assert_works("eval", "--help"))
+        for command in ("eval-video", "eval-poses"):
             self.assertIn(f"egosgm {command} [OPTIONS] [ESTIMATE] [TRUTH]\n", self.assert_works(command, "--help"))
 
     def test_the_page_names_every_subcommand_and_exit_code(self):
@@ -48,6 +52,43 @@ class Help(ProgramTest):
 
     def test_what_the_python_package_has_is_named(self):
         self.assert_refused(["view", self.street], "the Python package", "[rerun]", "--write overview")
+
+    def test_a_tool_in_python_names_the_package_where_it_is_not_there(self):
+        """By a copy of the program, beside which there is none."""
+        loaded = subprocess.run([PROGRAM], env={**os.environ, "LD_TRACE_LOADED_OBJECTS": "1"}, capture_output=True, text=True, check=True).stdout
+        folders = {os.path.dirname(path) for path in re.findall(r"=> (/\S*libegosgm\S*)", loaded)}
+        folder = self.new_folder()
+        copy = shutil.copy(PROGRAM, folder / "egosgm")
+        for path, code, named in ((str(folder), 1, "python3 cannot be started"), (os.environ["PATH"], 1, "needs the Python package egosgm, which")):
+            done = subprocess.run([copy, "run", "--bag", "drive.mcap", "--out", folder / "out"], capture_output=True, text=True, timeout=600,
+                                  env={"PATH": path, "LD_LIBRARY_PATH": ":".join(folders), "PYTHONNOUSERSITE": "1"})
+            if path != str(folder) and "drive.mcap" in done.stderr.split("egosgm")[-1]:
+                self.skipTest("the package is installed here")
+            self.assertEqual(done.returncode, code, done.stderr)
+            self.assertRegex(done.stderr, r"^egosgm: error: run: [^\n]*pip install[^\n]*\n$")
+            self.assertIn(named, done.stderr)
+
+    def test_a_tool_in_python_is_the_one_beside_the_program(self):
+        """Whatever lies in the current folder, and with the exit code and the messages of Python's."""
+        folder = self.new_folder()
+        for name in ("egosgm.py", "numpy.py", "json.py"):
+            (folder / name).write_text("raise SystemExit(77)")
+        if not (pathlib.Path(PROGRAM).parents[1] / "python/egosgm/program.py").exists():
+            self.skipTest("built without the Python package")
+        self.assert_refused(["run", "--bag"], "--bag", "expected one argument", cwd=folder)
+        self.assertIn("--left-topic", self.assert_works("run", "--bag=x", "--help", cwd=folder))
+        with open("/dev/full", "w") as full:
+            done = subprocess.run([PROGRAM, "run", "--bag=x", "--help"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=600)
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"^egosgm: error: [^\n]*No space left on device\n$")
+        package = pathlib.Path(PROGRAM).parents[1] / "python"
+        module = [sys.executable, "-m", "egosgm"]
+        if subprocess.run([sys.executable, "-c", "import egosgm"], capture_output=True, cwd=package).returncode:
+            self.skipTest("the package is of another Python")
+        for arguments in (["--help"], ["run", "--bag=x", "--help"], ["rnu"]):
+            done = subprocess.run([*module, *arguments], capture_output=True, text=True, timeout=600, cwd=package)
+            own = egosgm(*arguments)
+            self.assertEqual((done.returncode, done.stdout, done.stderr), (own.returncode, own.stdout, own.stderr), arguments)
 
     def test_devices_names_the_default_and_why(self):
         text = self.assert_works("devices")

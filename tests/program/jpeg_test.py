@@ -54,7 +54,7 @@ class Jpeg(ProgramTest):
 
     def test_eval_finds_the_motion_in_them(self):
         truth = self.street / "truth/left_disp_noc"
-        of_pngs, of_jpegs = (json.loads(self.assert_works("eval", truth, truth, "--sequence", sequence, "--json"))["video"]
+        of_pngs, of_jpegs = (json.loads(self.assert_works("eval-video", truth, truth, "--sequence", sequence, "--json"))
                              for sequence in (self.street, self.jpegs))
         self.assertEqual(of_jpegs["motion"], "odometry")
         one, other = (video["figures"]["tae_vda_percent"] for video in (of_pngs, of_jpegs))

@@ -20,8 +20,6 @@ class WrongArguments(ProgramTest):
         self.assert_refused(["--versoin"], "--version")
         self.assert_refused(self.run_with("--disparites", 64), "--disparites", "did you mean --disparities?")
         self.assert_refused(self.run_with("--disparites=64"), "did you mean --disparities?")
-        self.assert_refused(["run", "--bag", "drive.mcap", "--left-topic", "l", "--right-topic", "r"], "Python package", "[bag]")
-        self.assert_refused(["run", "--bag=drive.mcap", "--out", self.folder / "never"], "Python package")
         self.assert_refused(self.run_with("--set", "p_2=64"), "p_2", "p2")
         self.assert_refused(self.run_with("--write", "colour"), "colour", "did you mean color?")
 
@@ -60,7 +58,7 @@ class WrongArguments(ProgramTest):
     def test_numbers_are_decimal(self):
         commands = (self.run_with("--max-translation"), self.run_with("--max-rotation"), self.run_with("--disparities"), self.run_with("--min-disparity"),
                     *(["synth", "--out", self.folder / "never", option] for option in ("--frames", "--width", "--seed", "--speed", "--noise")),
-                    ["eval", "--estimate", self.street, "--truth", self.street, "--near"], ["eval", "--estimate", self.street, "--truth", self.street, "--truth-scale"], ["tune", "--rounds"], ["tune", "--width"],
+                    ["eval-video", self.street, self.street, "--near"], ["eval", "--estimate", self.street, "--truth", self.street, "--truth-scale"], ["tune", "--rounds"], ["tune", "--width"],
                     ["report", self.street, "--picture-width"],
                     ["rectify", "--alpha"], ["doctor", self.street, "--disparities"])
         for command in commands:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""egosgm.evaluate_video against each formula in a few lines of NumPy, on maps whose answers are known and on random ones."""
+"""egosgm.evaluate_video against each formula in other lines of NumPy, and against answers that are known by hand."""
 import dataclasses
 import math
 import os
@@ -366,6 +366,104 @@ def test_known_answers():
     still = egosgm.evaluate_video(square, square, calibration=CAMERA, world_from_camera=poses(0, 0)).figures
     assert still.flicker_px == pytest.approx(2 * 20 * 15 / (HEIGHT * WIDTH)), "flicker knows nothing of what moves"
     assert still.tepe_dynamicstereo_px == 0 and still.tepe_codd_px == 0
+
+
+def changed(map_, row, column, height, width, value):
+    """A copy with a block of another value."""
+    copy = map_.copy()
+    copy[row:row + height, column:column + width] = value
+    return copy
+
+
+def test_a_jump_and_a_hole():
+    """The second map is 2 px too large in a block of 20 pixels and 4 px in one of 5, and has a hole of 10."""
+    second = changed(changed(changed(maps(10)[0], 2, 2, 4, 5, 12), 2, 10, 1, 5, 14), 6, 12, 1, 10, NO)
+    figures = egosgm.evaluate_video([*maps(10), second, *maps(10)], maps(10, 10, 10)).figures
+    pixels = HEIGHT * WIDTH
+    assert figures.tepe_dynamicstereo_px == pytest.approx(60 / (pixels - 10))
+    assert figures.tepe_dynamicstereo_above_1px_percent == pytest.approx(100 * 25 / (pixels - 10))
+    assert figures.tepe_dynamicstereo_above_3px_percent == pytest.approx(100 * 5 / (pixels - 10))
+    assert figures.tepe_dynamicstereo_filled_px == pytest.approx(60 / pixels), "the hole is filled from beside"
+    assert egosgm.evaluate_video(maps(10, 11), maps(10, 10)).figures.tepe_dynamicstereo_above_1px_percent == 0, "exactly 1 px is not above it"
+
+
+def test_tae_is_relative_to_the_targets_depth():
+    """Depths 2 m and 1 m: |1 - 2| / 1 there, |2 - 1| / 2 back."""
+    figures = egosgm.evaluate_video(maps(7.5, 15), calibration=CAMERA, world_from_camera=poses(0, 0)).figures
+    assert figures.tae_vda_percent == pytest.approx((100 + 50) / 2)
+
+
+def test_what_moves_or_is_hidden_is_not_along_the_motion():
+    moving = [np.zeros((HEIGHT, WIDTH), bool) for _ in range(2)]
+    moving[0][0, :4] = True
+    moving[1][1, :2] = True
+    hidden = changed(maps(10)[0], 5, 10, 1, 3, 15)  # something new in front
+    figures = egosgm.evaluate_video([maps(10)[0], changed(maps(11)[0], 8, 8, 2, 10, 14)], [maps(10)[0], hidden], moving=moving, calibration=CAMERA,
+                                    world_from_camera=poses(0, 0)).figures
+    pixels = HEIGHT * WIDTH - 4 - 2 - 3
+    assert figures.tepe_codd_px == pytest.approx((pixels + 20 * 3) / pixels)
+    assert figures.tepe_codd_above_3px_percent == pytest.approx(100 * 20 / pixels)
+
+
+def test_a_given_next_truth_stands_for_the_next_frames_own():
+    """A square of 4x3 pixels moves by (3, 1) and comes nearer by 2 px; its estimate by 5."""
+    square = [changed(maps(5)[0], 2, 2, 3, 4, 20), changed(maps(5)[0], 3, 5, 3, 4, 22), changed(maps(5)[0], 3, 5, 3, 4, 25)]
+    flow = np.full((HEIGHT, WIDTH, 2), np.nan, np.float32)
+    flow[2:5, 2:6] = 3.4, 0.6
+    estimates, truths = [square[0], square[2]], [square[0], square[1]]
+    own = egosgm.evaluate_video(estimates, truths, flows=[flow, None]).figures
+    assert (own.tepe_codd_px, own.tepe_codd_above_3px_percent, own.tepe_codd_relative_above_1_percent) == (3, 0, 100)
+    for second in (truths[1], None):
+        given = egosgm.evaluate_video(estimates, [truths[0], second], flows=[flow, None], next_truths=[maps(24)[0], None]).figures
+        assert given.tepe_codd_px == 1, "disp_1 needs no truth of the next frame's own"
+
+
+def test_opw_leaves_out_what_does_not_look_alike():
+    flow = np.zeros((HEIGHT, WIDTH, 2), np.float32)
+
+    def opw(grey, disparity):
+        images = [np.full((HEIGHT, WIDTH), 100, np.uint8), changed(np.full((HEIGHT, WIDTH), 100, np.uint8), 0, 0, 10, WIDTH, grey)]
+        return egosgm.evaluate_video([maps(10)[0], changed(maps(12)[0], 0, 0, 10, WIDTH, disparity)], flows=[flow, None], images=images).figures.opw_nvds_px
+    assert opw(113, 50) == (2 + 40) / 2, "sqrt(3) * 13 / 255 = 0.0883: exp(-4.4) = 0.012"
+    assert opw(114, 50) == 2, "0.0951: exp(-4.75) = 0.0086"
+    far = flow.copy()
+    far[0, :2, 0] = 250.5
+    assert egosgm.evaluate_video(maps(10, 12), flows=[far, None]).figures.opw_nvds_px == 2
+
+
+def test_the_most_certain_are_kept():
+    """Of 800 pixels with truth 700 have an estimate, of which the 140 least certain ones are off by 5 px."""
+    estimate, variance = changed(maps(10)[0], 0, 0, HEIGHT, 5, NO), changed(maps(1)[0], 0, 5, HEIGHT, 7, 2)
+    estimate[:, 5:12] = 15
+    good = egosgm.evaluate_video([estimate], maps(10), uncertainties=[variance])
+    assert good.density.kept_bad_percent[39:41] == pytest.approx([0, 100 * 14 / 574]), "80 and 82 %"
+    assert (good.density.reached_percent[0], good.density.reached_percent[-1], good.density.bad_percent[-1]) == (50, 87.5, 20)
+    assert good.figures.ause_px == 0, "the order is the oracle's"
+    worst = egosgm.evaluate_video([estimate], maps(10), uncertainties=[-variance])
+    assert worst.density.kept_bad_percent[0] == 100 and worst.figures.ause_px > 1
+    assert worst.figures.ause_bad_percent == pytest.approx(20 * worst.figures.ause_px), "each bad pixel is off by 5 px"
+
+
+def test_the_order_is_that_of_a_stable_sort():
+    from egosgm import video_evaluation
+    values = np.random.default_rng(8).normal(0, 1e3, 5000).round().astype(np.float32)
+    values[::7], values[::11] = 0.0, -0.0
+    np.testing.assert_array_equal(video_evaluation._order(values), np.argsort(values, kind="stable"))
+
+
+def test_regions_by_hand():
+    """The camera moves to the right: a wall of 10 px goes 5 px to the left, what stands before it (40 px) 20 px."""
+    before, now = changed(maps(10)[0], 2, 24, 4, 3, 40), changed(maps(10)[0], 2, 4, 4, 3, 40)
+    moving = np.zeros((HEIGHT, WIDTH), bool)
+    moving[15, :7] = True
+    world_from_camera = np.stack([np.eye(4)] * 2)
+    world_from_camera[1, 0, 3] = 0.15
+    regions = egosgm.evaluate_video([maps(10)[0]] * 2, [before, now], moving=[None, moving], calibration=CAMERA, world_from_camera=world_from_camera).regions
+    pixels = {name: region.truth_pixels for name, region in regions.items()}
+    # Five columns enter on the right; behind the near thing, columns 19 to 21 of rows 2 to 5 were hidden. Within 3 pixels of the
+    # jumps, which have no corners, are 11 columns of rows 0 to 8, and 9 of row 9.
+    assert pixels == {"all": 2 * 800, "near": 2 * 12, "far": 2 * 788, "moving": 7, "still": 793, "uncovered": 5 * HEIGHT + 12,
+                      "edges": 2 * (11 * 9 + 9)}
 
 
 def test_maps_may_be_read_when_they_are_needed():

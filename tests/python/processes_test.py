@@ -112,7 +112,7 @@ assert os.waitpid(child, 0)[1] == 0
 """)
 
 
-@pytest.mark.parametrize("call", ["large.process(image, image)", "egosgm.evaluate_video([maps] * 50, [maps] * 50, threads=2)", "street.render(0)"])
+@pytest.mark.parametrize("call", ["large.process(image, image)", "egosgm.compare_disparity(maps, maps)", "street.render(0)"])
 def test_daemon_threads_end_with_the_interpreter(call):
     run(f"""
 large = egosgm.Pipeline(CALIBRATION, 640, 480, disparities=16, temporal=False)

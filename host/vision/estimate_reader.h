@@ -8,17 +8,19 @@
 #include <string>
 #include <vector>
 
-namespace egosgm::app {
+#include "egosgm/export.h"
+
+namespace egosgm::vision {
 
 /// A disparity map; `scale`: steps a pixel of a PNG, and, where it is not KITTI's, of a .npy of whole numbers. Throws
 /// as read_disparity does.
-cv::Mat read_scaled(const std::filesystem::path& file, double scale);
+EGOSGM_EXPORT cv::Mat read_scaled(const std::filesystem::path& file, double scale);
 
 /// Reads disparity maps of other programs, with one rule of what has no value in all formats, and remembers what speaks
 /// against them. No value: 0, infinite, NaN; a negative value that is the same at all pixels that have one, as -1 is,
 /// and every one of .npy; in a PNG 65520 and more, which is -1 to -16 as unsigned; and what is no smaller than the
 /// map's width, which no two images can show. Thread-safe.
-class EstimateReader {
+class EGOSGM_EXPORT EstimateReader {
  public:
   /// As read_scaled.
   cv::Mat read(const std::filesystem::path& file, double scale);
@@ -38,6 +40,6 @@ class EstimateReader {
 };
 
 /// Throws InvalidArgument where `option` names another scale than KITTI's, and `file` has none.
-void expect_scaled(const std::string& option, double scale, const std::filesystem::path& file);
+EGOSGM_EXPORT void expect_scaled(const std::string& option, double scale, const std::filesystem::path& file);
 
-}  // namespace egosgm::app
+}  // namespace egosgm::vision

@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/estimate_reader.h"
-
-#include <fmt/core.h>
+#include "host/vision/estimate_reader.h"
 
 #include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <optional>
+#include <sstream>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "host/vision/file_io.h"
 
-namespace egosgm::app {
+namespace egosgm::vision {
 namespace {
 
 constexpr double kKittiScale = 256;
 constexpr double kLeastSigned = 65520;  // -16 in 16 bits
 
-bool is_png(const std::filesystem::path& file) { return vision::read_file_start(file, 4) == "\x89PNG"; }
+bool is_png(const std::filesystem::path& file) { return read_file_start(file, 4) == "\x89PNG"; }
 
 /// Whether it is a .npy of whole numbers.
 bool is_whole_npy(const std::filesystem::path& file) {
-  const std::string start = vision::read_file_start(file, 128);
+  const std::string start = read_file_start(file, 128);
   const std::size_t at = start.find("'descr'"), type = at == std::string::npos ? at : start.find('\'', at + 7);
   return start.starts_with("\x93NUMPY") && type != std::string::npos && type + 2 < start.size() &&
          (start[type + 2] == 'i' || start[type + 2] == 'u');
@@ -36,10 +36,10 @@ double median(std::vector<double> values) {
 }  // namespace
 
 cv::Mat read_scaled(const std::filesystem::path& file, double scale) {
-  cv::Mat map = vision::read_disparity(file, scale);
+  cv::Mat map = read_disparity(file, scale);
   if (scale == kKittiScale || !is_whole_npy(file)) return map;
   map.forEach<float>([&](float& d, const int*) {
-    if (vision::is_valid_disparity(d)) d = static_cast<float>(d / scale);
+    if (is_valid_disparity(d)) d = static_cast<float>(d / scale);
   });
   return map;
 }
@@ -53,7 +53,7 @@ cv::Mat EstimateReader::read(const std::filesystem::path& file, double scale) {
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.cols; ++x) {
       const float d = map.at<float>(y, x);
-      if (!vision::is_valid_disparity(d) || d >= 0) continue;
+      if (!is_valid_disparity(d) || d >= 0) continue;
       is_marker = is_marker && d == marker.value_or(d);
       marker = d;
     }
@@ -61,7 +61,7 @@ cv::Mat EstimateReader::read(const std::filesystem::path& file, double scale) {
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.cols; ++x) {
       float& d = map.at<float>(y, x);
-      if (!vision::is_valid_disparity(d)) continue;
+      if (!is_valid_disparity(d)) continue;
       ++values;
       const bool beyond = d >= static_cast<float>(map.cols) || (png && d * scale >= kLeastSigned);
       impossible += beyond;
@@ -84,7 +84,7 @@ void EstimateReader::compare(const cv::Mat& estimate, const cv::Mat& truth) {
   for (int y = 0; y < estimate.rows; ++y) {
     for (int x = 0; x < estimate.cols; ++x) {
       const float e = estimate.at<float>(y, x), t = truth.at<float>(y, x);
-      if (vision::is_valid_disparity(e) && e > 0 && vision::is_valid_disparity(t) && t > 1) ratios.push_back(e / t);
+      if (is_valid_disparity(e) && e > 0 && is_valid_disparity(t) && t > 1) ratios.push_back(e / t);
     }
   }
   if (ratios.empty()) return;
@@ -96,23 +96,26 @@ void EstimateReader::compare(const cv::Mat& estimate, const cv::Mat& truth) {
 std::vector<std::string> EstimateReader::doubts(double scale) const {
   const std::scoped_lock lock(mutex_);
   std::vector<std::string> doubts;
+  const auto add = [&](const auto&... parts) {
+    std::ostringstream text;
+    (text << ... << parts);
+    doubts.push_back(text.str());
+  };
   if (impossible_ > 0) {
-    doubts.push_back(fmt::format(
-        "{} of {} values of estimates are no disparities, as they reach beyond the image's width or are negative ones "
-        "written without a sign: they count as missing; the first are in {}",
-        impossible_, values_, first_impossible_));
+    add(impossible_, " of ", values_,
+        " values of estimates are no disparities, as they reach beyond the image's width or are negative ones written "
+        "without a sign: they count as missing; the first are in ",
+        first_impossible_);
   }
-  if (markers_ > 0) {
-    doubts.push_back(fmt::format("{} values of estimates are {}, below 0: they count as missing", markers_, marker_));
-  }
+  if (markers_ > 0) add(markers_, " values of estimates are ", marker_, ", below 0: they count as missing");
   const double ratio = ratios_.empty() ? 1 : median(ratios_);
   for (const double factor :
        {2.0, 4.0, 8.0, 16.0, 64.0, 256.0, 1.0 / 2, 1.0 / 4, 1.0 / 8, 1.0 / 16, 1.0 / 64, 1.0 / 256}) {
     if (std::abs(ratio / factor - 1) > 0.08) continue;
-    doubts.push_back(fmt::format(
-        "estimates are {:.4g} times their truth in the median: is it another scale? A PNG of {:g} steps a pixel "
-        "needs --scale {:g}; maps of images of another width, and other formats, need their values changed",
-        ratio, scale * factor, scale * factor));
+    add(std::setprecision(4), "estimates are ", ratio, std::setprecision(6),
+        " times their truth in the median: is it another scale? A PNG of ", scale * factor,
+        " steps a pixel needs --scale ", scale * factor,
+        "; maps of images of another width, and other formats, need their values changed");
     break;
   }
   return doubts;
@@ -120,10 +123,10 @@ std::vector<std::string> EstimateReader::doubts(double scale) const {
 
 void expect_scaled(const std::string& option, double scale, const std::filesystem::path& file) {
   if (scale == kKittiScale || file.empty() || is_png(file) || is_whole_npy(file)) return;
-  throw InvalidArgument(
-      fmt::format("{} {:g}: is for 16-bit PNG and .npy of whole numbers, and {} is neither: divide its values, or "
-                  "leave the option out",
-                  option, scale, file.string()));
+  std::ostringstream text;
+  text << option << ' ' << scale << ": is for 16-bit PNG and .npy of whole numbers, and " << file.string()
+       << " is neither: divide its values, or leave the option out";
+  throw InvalidArgument(text.str());
 }
 
-}  // namespace egosgm::app
+}  // namespace egosgm::vision
