@@ -2,4 +2,5 @@
 """python3 -m egosgm COMMAND: the command `egosgm`."""
 from .program import main
 
-main()
+if __name__ == "__main__":
+    main()

@@ -14,9 +14,9 @@ RUNNING = pathlib.Path(egosgm.__file__).parents[1]
 KNOWN = re.compile(r"is inconsistent, metaclass differs$|\.__init__ is inconsistent, stub does not have \*args parameter \"args\"$"
                    r"|\.(__match_args__|__signature__|__all__) is not present in stub$|^egosgm\._options failed to import\.")
 CONFIGURATION = """[mypy]
-[mypy-egosgm.bag,egosgm.bag_outputs,egosgm.bag_parts,egosgm.bag_program,egosgm.calibrations,egosgm.cpu_driver,egosgm.drive,egosgm.matcher,egosgm.program,egosgm.ros_images,egosgm.values,egosgm.video_evaluation,egosgm.viewer]
+[mypy-egosgm.__main__,egosgm.arguments,egosgm.report,egosgm.bag,egosgm.bag_outputs,egosgm.bag_parts,egosgm.bag_program,egosgm.calibrations,egosgm.cpu_driver,egosgm.drive,egosgm.matcher,egosgm.program,egosgm.ros_images,egosgm.values,egosgm.video_evaluation,egosgm.viewer]
 ignore_errors = True
-[mypy-tqdm.*,rerun.*,yaml.*]
+[mypy-cv2.*,tqdm.*,rerun.*,yaml.*]
 ignore_missing_imports = True
 """
 
