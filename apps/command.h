@@ -22,7 +22,6 @@ Command add_compile(CLI::App& program);
 Command add_synth(CLI::App& program);
 Command add_odometry(CLI::App& program);
 Command add_tune(CLI::App& program);
-Command add_report(CLI::App& program);
 Command add_doctor(CLI::App& program);
 Command add_rectify(CLI::App& program);
 

@@ -52,7 +52,7 @@ Package package_beside_program() {
 
 std::map<std::string, std::string> python_tools() {
   std::map<std::string, std::string> tools;
-  const auto listed = nlohmann::json::parse(embedded_files().at("tools.json"));
+  const nlohmann::json listed = nlohmann::json::parse(embedded_files().at("tools.json"));
   for (const auto& [name, tool] : listed.items()) tools[name] = tool.at("help").get<std::string>();
   return tools;
 }

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "apps/frame_panels.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/dataset.h"
+#include "host/vision/frame_panels.h"
 
 namespace egosgm::app {
 
@@ -49,7 +49,7 @@ class RunOutputs {
   const PipelineOptions options_;
   const Calibration calibration_;
   cv::Mat disparity_, variance_, right_, predicted_, measured_, search_, dynamic_, reason_;
-  FramePanels panels_;
+  vision::FramePanels panels_;
 };
 
 }  // namespace egosgm::app

@@ -44,7 +44,7 @@ set(CPACK_COMPONENT_LIBEGOSGM-DEV_DESCRIPTION "Headers, static libraries, and fi
 set(CPACK_DEBIAN_EGOSGM_PACKAGE_NAME egosgm)
 set(CPACK_DEBIAN_EGOSGM_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_EGOSGM_PACKAGE_DEPENDS "${same_version}")
-set(CPACK_DEBIAN_EGOSGM_PACKAGE_RECOMMENDS python3-egosgm)  # has the tools that are written in Python
+set(CPACK_DEBIAN_EGOSGM_PACKAGE_SUGGESTS python3-egosgm)  # has the tools that are written in Python
 set(CPACK_COMPONENT_EGOSGM_DESCRIPTION "The command-line program.")
 
 set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_NAME python3-egosgm)
@@ -52,7 +52,7 @@ set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_SECTION python)
 math(EXPR next_python "0${Python_VERSION_MINOR} + 1")
 set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_DEPENDS
     "${same_version}, python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${next_python}), python3-numpy, python3-yaml")
-set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_SUGGESTS "python3-matplotlib, python3-opencv")
+set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_RECOMMENDS "python3-matplotlib, python3-opencv")  # of the tools
 set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/python3-egosgm/prerm)
 set(CPACK_DEBIAN_PYTHON3-EGOSGM_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_COMPONENT_PYTHON3-EGOSGM_DESCRIPTION "The Python module.")

@@ -7,6 +7,9 @@
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/poses_io.h"
+#include "host/vision/file_io.h"
+#include "host/vision/frame_panels.h"
+#include "host/vision/pair_with_truth.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
@@ -85,6 +88,56 @@ void bind_sequences(py::module_& module) {
       "the first right one, and so on; else those of equal names belong together.");
 }
 
+/// (estimate, truth, name, whether the names are equal) of each pair, and how many estimates have no truth.
+py::tuple pair_with_truth(const path& estimate, const path& truth, const std::string& frames,
+                          const std::map<std::string, std::string>& image_names) {
+  const vision::EvaluationPairs found =
+      vision::pair_with_truth(estimate, truth, {.frames = range_of(frames), .image_names = image_names});
+  py::list pairs;
+  for (const vision::EvaluationPair& pair : found.pairs)
+    pairs.append(py::make_tuple(pair.estimate, pair.truth, pair.name, pair.same_name));
+  return py::make_tuple(pairs, found.without_truth.size());
+}
+
+/// Of each of a run's `frames`, which are some of `numbers`.
+py::array poses_of_frames(const std::vector<int>& frames, const std::vector<int>& numbers, const path& poses) {
+  StereoSequence sequence;
+  sequence.numbers = numbers;
+  for (const int number : frames) sequence.frames.emplace_back().number = number;
+  return array_of(vision::poses_of_frames(sequence, poses));
+}
+
+cv::Mat read_if_there(const path& file, cv::Mat (*read)(const path&)) {
+  return std::filesystem::exists(file) ? read(file) : cv::Mat();
+}
+
+/// (name, picture, colour bar or None) of each map that the run in `folder` wrote of a frame, of its left image and of
+/// the error, where `left` and `truth` are not empty.
+py::list layers_of_run(vision::FramePanels& panels, const path& folder, const std::string& name, const path& left,
+                       const path& truth) {
+  StereoFrame frame;
+  frame.name = name, frame.left = left, frame.truth_noc = truth;
+  const auto file = [&](const char* kind, const char* extension) { return folder / kind / (name + extension); };
+  const auto grey = [](const path& of) { return vision::read_grey_image(of); };
+  const path exact = file("disparity", ".pfm");
+  const cv::Mat disparity = vision::read_disparity(std::filesystem::exists(exact) ? exact : file("disparity", ".png"));
+  const cv::Mat variance = read_if_there(file("variance", ".pfm"), [](const path& of) { return vision::read_pfm(of); });
+  const cv::Mat search = read_if_there(file("search", ".png"), grey);
+  const cv::Mat reasons = read_if_there(file("reason", ".png"), grey);
+  py::list layers;
+  for (const vision::Layer& layer : panels.layers({frame, {}, disparity, variance, search, reasons})) {
+    const py::object bar = layer.bar.empty() ? py::object(py::none()) : py::object(array_of(layer.bar));
+    layers.append(py::make_tuple(layer.name, array_of(layer.picture), bar));
+  }
+  return layers;
+}
+
+/// Throws IoError where a file has come there meanwhile.
+void write_new_file(const path& file, const py::bytes& bytes) {
+  const vision::KeepFiles others;
+  vision::write_file(file, static_cast<std::string>(bytes));
+}
+
 std::int64_t write_disparity(const path& file, const py::object& map) {
   py::array keep;
   return vision::write_disparity(file, map_of(map, "disparity", keep));
@@ -99,6 +152,19 @@ void write_pfm(const path& file, const py::object& map) {
 
 void bind_files(py::module_& module) {
   bind_sequences(module);
+  py::class_<vision::FramePanels>(module, "_FramePanels")
+      .def(py::init<int>(), py::arg("disparities"))
+      .def("layers", &layers_of_run, py::arg("folder"), py::arg("name"), py::arg("left"), py::arg("truth"));
+  module.def("_pair_with_truth", &pair_with_truth, py::arg("estimate"), py::arg("truth"), py::arg("frames"),
+             py::arg("image_names"));
+  module.def("_poses_of_frames", &poses_of_frames, py::arg("frames"), py::arg("numbers"), py::arg("poses"));
+  module.def("_write_new_file", &write_new_file, py::arg("file"), py::arg("bytes"));
+  module.def("_expect_writable", &vision::expect_writable, py::arg("file"));
+  module.def("_is_stream", &vision::is_stream, py::arg("file"));
+  module.def("_frame_range", [](const std::string& frames) {
+    const vision::FrameRange range = range_of(frames);
+    return std::make_pair(range.first, range.last);
+  });
   module.def(
       "_read_calibration", [](const path& file) { return vision::read_calibration(file); }, py::arg("file"),
       "Reads KITTI's, Middlebury's or EgoSGM's own format.");

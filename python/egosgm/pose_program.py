@@ -6,8 +6,8 @@ from typing import Any, List, Sequence, Tuple
 
 import numpy as np
 
-from . import _egosgm, command_line, plots
-from .command_line import counted
+from . import _egosgm, plots
+from .arguments import comparison_parser, counted, json_text, resolve_comparison
 from .pose_evaluation import PoseEvaluation, evaluate_poses
 from .run_folder import frames_of_run
 
@@ -79,21 +79,20 @@ def _text_of(e: PoseEvaluation) -> str:
 
 
 def _work(arguments: Sequence[str]) -> str:
-    parser = command_line.Parser("eval-poses", __doc__)
-    command_line.add_comparison(parser, "KITTI poses, or a folder of `run`",
+    parser = comparison_parser("eval-poses", __doc__, "KITTI poses, or a folder of `run`",
                                 "the true ones, of the same frames or of the whole sequence, or the sequence's folder")
     parser.add_argument("--plot", action="append", default=[], metavar="FILE", help="draw both paths from above, in metres: a new .png or .svg file; "
                         "may be repeated")
     parser.add_argument("--json", action="store_true", help="print JSON")
     given = parser.parse_intermixed_args(arguments)
-    command_line.resolve_comparison(given)
+    resolve_comparison(given)
     for file in given.plot:
         plots.expect_plot("--plot", file)
     estimate, truth = read_pairs(given.estimate, given.truth, given.frames)
     evaluation = evaluate_poses(estimate, truth)
     for file in given.plot:
         plots.write_plot(file, plots.paths(estimate, truth))
-    return command_line.json_text(_json_of(evaluation)) if given.json else _text_of(evaluation)
+    return json_text(_json_of(evaluation)) if given.json else _text_of(evaluation)
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -15,7 +15,6 @@ from typing import List, Optional, Sequence, Tuple
 _RAW = "rectify"  # the command that takes raw cameras; all others take rectified ones
 _PACKAGES = {  # what brings a module
     "cv2": "pip install opencv-python-headless, or apt install python3-opencv",
-    "jinja2": "pip install jinja2, or apt install python3-jinja2",
     "matplotlib": "pip install matplotlib, or apt install python3-matplotlib",
     "rosbags": 'pip install the wheel with "[bag]" (docs/robots.md)',
 }

@@ -10,8 +10,8 @@ from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import _egosgm, command_line, plots
-from .command_line import counted
+from . import _egosgm, plots
+from .arguments import comparison_parser, counted, decimal, json_text, Parser, resolve_comparison
 from .pose_evaluation import inverse
 from .run_folder import frames_of_run
 from .video_evaluation import Frame, VideoCounts, VideoFigures, count_frames, density_of, figures_of, regions_of
@@ -237,15 +237,14 @@ class VideoInput:
         return count_frames(map(self._read, self.frames), calibration, self.motion, lambda i: self.follows[i], near_px)
 
 
-def _parser() -> command_line.Parser:
-    parser = command_line.Parser("eval-video", __doc__)
-    parser.epilog = "docs/evaluation.md has the formula, the source and the pixels of every figure. `egosgm eval` compares maps with their truth frame by frame."
-    command_line.add_comparison(parser, "disparity map (KITTI PNG, 16-bit PNG with --scale, PFM, .npy), a folder of them, or a folder of `run`",
+def _parser() -> Parser:
+    parser = comparison_parser("eval-video", __doc__, "disparity map (KITTI PNG, 16-bit PNG with --scale, PFM, .npy), a folder of them, or a folder of `run`",
                                 "true disparity, or a folder of files with equal names; not needed with --sequence")
+    parser.epilog = "docs/evaluation.md has the formula, the source and the pixels of every figure. `egosgm eval` compares maps with their truth frame by frame."
     add = parser.add_argument
     add("--mask", default="", metavar="FILE|DIR", help="compare only where this grey PNG, or the one of the truth's name in this folder, is not 0")
-    add("--scale", type=command_line.decimal, default=256.0, metavar="STEPS", help="steps a pixel of 16-bit PNG in --estimate and --against [256, KITTI's]")
-    add("--truth-scale", type=command_line.decimal, default=256.0, metavar="STEPS", help="the same of the truth [256]")
+    add("--scale", type=decimal, default=256.0, metavar="STEPS", help="steps a pixel of 16-bit PNG in --estimate and --against [256, KITTI's]")
+    add("--truth-scale", type=decimal, default=256.0, metavar="STEPS", help="the same of the truth [256]")
     add("--sequence", default="", metavar="DIR", help="the stereo sequence that the maps are of (KITTI odometry or raw, egosgm synth, with --scene KITTI "
         "multi-view): calibration, poses, images, and truth where --truth is not given")
     add("--scene", default="", metavar="NUMBER", help="scene of --sequence, for example 000151")
@@ -256,7 +255,7 @@ def _parser() -> command_line.Parser:
     add("--moving", default="", metavar="DIR", help="masks of what moves by itself, not 0; without: those in --sequence")
     add("--flow", default="", metavar="DIR", help="true optical flow from each frame to the next (KITTI PNG, .flo)")
     add("--next-truth", default="", metavar="DIR", help="the next frame's true disparity at each frame's pixels (KITTI 2015: disp_occ_1)")
-    add("--near", type=command_line.decimal, default=32.0, metavar="PX", help="the region `near` begins at this true disparity, the rest is `far` [32]")
+    add("--near", type=decimal, default=32.0, metavar="PX", help="the region `near` begins at this true disparity, the rest is `far` [32]")
     add("--plot-frames", default="", metavar="FILE", help="draw the figures over the frames: a new .png or .svg file")
     add("--plot-density", default="", metavar="FILE", help="draw the bad pixels against the share of pixels kept: a new .png or .svg file; with --variance or "
         "--confidence")
@@ -309,7 +308,7 @@ def _work(arguments: Sequence[str]) -> str:
     for option, file in (("--plot-frames", given.plot_frames), ("--plot-density", given.plot_density)):
         if file:
             plots.expect_plot(option, file)
-    command_line.resolve_comparison(given, truth_is_needed=not given.sequence)
+    resolve_comparison(given, truth_is_needed=not given.sequence)
     if not given.truth and (given.scene or _Path(given.sequence, "truth").is_dir()):
         given.truth = given.sequence  # its own
     found = VideoInput(given)
@@ -324,7 +323,7 @@ def _work(arguments: Sequence[str]) -> str:
         plots.write_plot(given.plot_frames, plots.over_frames([*curves, ("absolute error", errors)]))
     if given.plot_density:
         plots.write_plot(given.plot_density, plots.against_density(density_of(total)))
-    return command_line.json_text(_json_of(found, over_frames, total)) if given.json else _text_of(found, total)
+    return json_text(_json_of(found, over_frames, total)) if given.json else _text_of(found, total)
 
 
 def main(arguments: Sequence[str]) -> int:

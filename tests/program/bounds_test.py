@@ -22,6 +22,8 @@ class Bounds(ProgramTest):
             line = program.stderr.read().decode()
             _, status, usage = os.wait4(program.pid, 0)
             program.returncode = os.waitstatus_to_exitcode(status)
+        if "needs the Python package egosgm, which" in line:
+            self.skipTest("built without the Python package, which has this tool")
         self.assertEqual(program.returncode, 2, line)
         self.assertEqual(line.count("\n"), 1, line)
         return usage.ru_maxrss / 1024, line

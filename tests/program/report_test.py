@@ -72,6 +72,7 @@ class Report(ReportTest):
         text = report.read_text().rstrip().removesuffix("}")
         resume = ["run", "--odometry", self.street, "--out", out, "--resume", "--quiet", "--set", "p2=150", "--disparities", 64]
         for extra, named in (('"x": ' + "[" * 200_000 + "]" * 200_000, "nested deeper than 64"),
+                             ('"x": ' + "[" * 64 + "]" * 64, "nested deeper than 64"),
                              ('"x": ' + '{"a":' * 200_000 + "1" + "}" * 200_000, "nested deeper than 64"),
                              ('"x": {' + ",".join(f'"k{i}": 0' for i in range(200_000)) + "}", "more than 2000 keys")):
             report.write_text(text + ", " + extra + "}")

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/frame_panels.h"
+#include "host/vision/frame_panels.h"
 
 #include <algorithm>
 
@@ -7,12 +7,12 @@
 #include "egosgm/vision/image_io.h"
 #include "host/vision/picture_sheet.h"
 
-namespace egosgm::app {
+namespace egosgm::vision {
 namespace {
 
 constexpr int kOverviewCellWidth = 800;
 
-vision::CaptionedPicture panel(const Layer& layer) {
+CaptionedPicture panel(const Layer& layer) {
   if (layer.bar.empty()) return {layer.picture, layer.name};
   cv::Mat both;
   cv::vconcat(layer.picture, layer.bar, both);
@@ -20,65 +20,65 @@ vision::CaptionedPicture panel(const Layer& layer) {
 }
 
 Layer variance_layer(const ShownFrame& shown) {
-  return {"variance", vision::color_variance(shown.variance, shown.disparity),
-          vision::color_bar(shown.variance.cols, vision::kVarianceRange, "px^2")};
+  return {"variance", color_variance(shown.variance, shown.disparity),
+          color_bar(shown.variance.cols, kVarianceRange, "px^2")};
 }
 
 Layer error_layer(const ShownFrame& shown) {
-  const cv::Mat truth = vision::read_disparity(shown.frame.truth_noc);
-  return {"error [px]", vision::color_error(shown.disparity, truth), vision::error_bar(truth.cols)};
+  const cv::Mat truth = read_disparity(shown.frame.truth_noc);
+  return {"error [px]", color_error(shown.disparity, truth), error_bar(truth.cols)};
 }
 
 }  // namespace
 
-const vision::ColorRange& FramePanels::disparity_range(const cv::Mat& disparity) {
+const ColorRange& FramePanels::disparity_range(const cv::Mat& disparity) {
   if (!range_) range_ = vision::disparity_range(disparity);
   return *range_;
 }
 
 cv::Mat FramePanels::disparity(const cv::Mat& disparity) {
-  return vision::color_disparity(disparity, disparity_range(disparity));
+  return color_disparity(disparity, disparity_range(disparity));
 }
 
 Layer FramePanels::disparity_layer(const ShownFrame& shown) {
   return {"disparity", disparity(shown.disparity),
-          vision::color_bar(shown.disparity.cols, disparity_range(shown.disparity), "px")};
+          color_bar(shown.disparity.cols, disparity_range(shown.disparity), "px")};
 }
 
 Layer FramePanels::search_layer(const ShownFrame& shown) const {
   cv::Mat searched;
   shown.search_width.convertTo(searched, CV_32F);
-  const vision::ColorRange widths{1, std::max(2.0, static_cast<double>(disparities_)), true};
-  return {"disparities searched", vision::color_map(searched, widths), vision::color_bar(searched.cols, widths, "")};
+  const ColorRange widths{1, std::max(2.0, static_cast<double>(disparities_)), true};
+  return {"disparities searched", color_map(searched, widths), color_bar(searched.cols, widths, "")};
 }
 
 cv::Mat FramePanels::overview(const ShownFrame& shown) {
   const bool truth = !shown.frame.truth_noc.empty();
-  return vision::compose({{vision::color_grey(shown.left), "left image, frame " + shown.frame.name},
-                          panel(disparity_layer(shown)),
-                          panel(search_layer(shown)),
-                          panel(truth ? error_layer(shown) : variance_layer(shown))},
-                         2, kOverviewCellWidth);
+  return compose({{color_grey(shown.left), "left image, frame " + shown.frame.name},
+                  panel(disparity_layer(shown)),
+                  panel(search_layer(shown)),
+                  panel(truth ? error_layer(shown) : variance_layer(shown))},
+                 2, kOverviewCellWidth);
 }
 
 std::vector<Layer> FramePanels::layers(const ShownFrame& shown) {
   std::vector<Layer> layers;
-  if (!shown.frame.left.empty()) layers.push_back({"left image", vision::read_color_image(shown.frame.left), {}});
+  if (!shown.frame.left.empty()) layers.push_back({"left image", read_color_image(shown.frame.left), {}});
   layers.push_back(disparity_layer(shown));
   if (!shown.variance.empty()) layers.push_back(variance_layer(shown));
   if (!shown.search_width.empty()) layers.push_back(search_layer(shown));
   if (!shown.reasons.empty()) {
-    layers.push_back({"reason", vision::color_reasons(shown.reasons), vision::reason_bar(shown.reasons.cols)});
+    layers.push_back({"reason", color_reasons(shown.reasons), reason_bar(shown.reasons.cols)});
   }
   if (!shown.frame.truth_noc.empty()) layers.push_back(error_layer(shown));
   return layers;
 }
 
 cv::Mat FramePanels::all(const ShownFrame& shown, int cell_width) {
-  std::vector<vision::CaptionedPicture> pictures;
+  std::vector<CaptionedPicture> pictures;
   for (const Layer& layer : layers(shown)) pictures.push_back(panel(layer));
   pictures.front().caption += ", frame " + shown.frame.name;
-  return vision::compose(pictures, 2, cell_width);
+  return compose(pictures, 2, cell_width);
 }
 
-}  // namespace egosgm::app
+}  // namespace egosgm::vision

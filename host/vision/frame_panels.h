@@ -6,15 +6,16 @@
 #include <string>
 #include <vector>
 
+#include "egosgm/export.h"
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/render.h"
 
-namespace egosgm::app {
+namespace egosgm::vision {
 
 /// A frame and what the pipeline made of it: disparity, variance CV_32FC1, search width CV_16UC1, reasons CV_8UC1.
 /// `frame.truth_noc` and `reasons` may be empty.
 struct ShownFrame {
-  const vision::StereoFrame& frame;
+  const StereoFrame& frame;
   const cv::Mat& left;
   const cv::Mat &disparity, &variance, &search_width;
   const cv::Mat reasons = {};
@@ -28,12 +29,12 @@ struct Layer {
 
 /// A sequence's maps as pictures with their scales. Colours stand for the same values in all frames: the first one's
 /// range. Not thread-safe.
-class FramePanels {
+class EGOSGM_EXPORT FramePanels {
  public:
   explicit FramePanels(int disparities) : disparities_(disparities) {}
 
   /// The range of the first map that it is asked for.
-  const vision::ColorRange& disparity_range(const cv::Mat& disparity);
+  const ColorRange& disparity_range(const cv::Mat& disparity);
   cv::Mat disparity(const cv::Mat& disparity);
   /// Left image, disparity, search width, and the error where there is truth, else the variance.
   cv::Mat overview(const ShownFrame& shown);
@@ -48,7 +49,7 @@ class FramePanels {
   Layer search_layer(const ShownFrame& shown) const;
 
   const int disparities_;
-  std::optional<vision::ColorRange> range_;
+  std::optional<ColorRange> range_;
 };
 
-}  // namespace egosgm::app
+}  // namespace egosgm::vision

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tools in Python share: arguments, JSON, new files, numbers in words. Errors are InvalidArgument and IoError."""
+import argparse
+import difflib
+import json
+import math
+import os
+import pathlib
+import re
+from typing import Any, NoReturn
+
+from . import _egosgm
+
+_MOST_BYTES, _MOST_LEVELS, _MOST_KEYS = 256 << 20, 64, 2000
+
+
+class Parser(argparse.ArgumentParser):
+    def __init__(self, command: str, **options: Any) -> None:
+        super().__init__(prog=f"egosgm {command}", allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+
+    def error(self, message: str) -> NoReturn:
+        raise _egosgm.InvalidArgument(f"{message}: see `{self.prog} --help`")
+
+    def parse(self, arguments: Any) -> argparse.Namespace:
+        """The values. An empty one is refused, as it is a variable of the shell that was not set."""
+        given, unknown = self.parse_known_args(arguments)
+        if unknown:
+            name = unknown[0].split("=")[0]
+            near = difflib.get_close_matches(name, self._option_string_actions, 1)
+            kind = "unknown option" if name.startswith("-") else "unexpected argument"
+            self.error(f'{kind} "{name}"' + (f": did you mean {near[0]}?" if near else ""))
+        for name, value in vars(given).items():
+            if value == "":
+                raise _egosgm.InvalidArgument(f'{name.replace("_", "-")} "": is empty: give a value, or leave it out')
+        return given
+
+
+def whole_number(text: str) -> int:
+    if not re.fullmatch(r"-?(0|[1-9][0-9]*)", text):
+        raise argparse.ArgumentTypeError(f'"{text}": write a decimal number without blanks, plus or leading zeros')
+    return int(text)
+
+
+def read_json(file: pathlib.Path) -> Any:
+    """The file's JSON, which is bounded as in C++ (host/json_text.h)."""
+    def finite(text: str) -> float:
+        value = float(text)
+        if not math.isfinite(value):
+            raise ValueError
+        return value
+
+    def refuse(why: str) -> NoReturn:
+        raise _egosgm.InvalidArgument(f"{file}: {why}: is it the right file?")
+
+    def few_keys(pairs: Any) -> Any:
+        if len(pairs) > _MOST_KEYS:
+            refuse(f"has an object of more than {_MOST_KEYS} keys")
+        return dict(pairs)
+
+    def check_levels(part: Any, levels: int) -> None:
+        if isinstance(part, (dict, list)):
+            if levels >= _MOST_LEVELS:
+                raise RecursionError
+            for inner in part.values() if isinstance(part, dict) else part:
+                check_levels(inner, levels + 1)
+
+    if file.stat().st_size > _MOST_BYTES:
+        refuse("is longer than 256 MiB")
+    try:
+        found = json.loads(file.read_bytes(), object_pairs_hook=few_keys, parse_float=finite, parse_constant=finite)
+        check_levels(found, 0)
+        return found
+    except RecursionError:
+        refuse(f"is nested deeper than {_MOST_LEVELS} levels")
+    except _egosgm.InvalidArgument:
+        raise
+    except ValueError:  # JSONDecodeError, or no UTF-8
+        raise _egosgm.InvalidArgument(f"{file}: is no JSON: it was cut or edited; run it again") from None
+
+
+def expect_new_file(option: str, file: pathlib.Path) -> None:
+    """Refuses a file that is there, a folder, and what cannot be written. Pipes and devices are written through."""
+    if file.is_dir():
+        raise _egosgm.InvalidArgument(f"{option} {file}: is a folder: give the name of a file")
+    if file.is_file() and not _egosgm._is_stream(os.fspath(file)):
+        raise _egosgm.InvalidArgument(f"{option} {file}: is there already: give another name, or remove it first")
+    _egosgm._expect_writable(os.fspath(file))
+
+
+def comparison_parser(command: str, description: str, estimate_help: str, truth_help: str) -> Parser:
+    """COMMAND ESTIMATE TRUTH, or --estimate and --truth, or one of each kind; and --frames."""
+    parser = Parser(command, usage=f"egosgm {command} [OPTIONS] [ESTIMATE] [TRUTH]", description=description)
+    parser.add_argument("positional", nargs="*", metavar="ESTIMATE, TRUTH", help="what --estimate and --truth take")
+    parser.add_argument("--estimate", default="", metavar="FILE|DIR", help=estimate_help)
+    parser.add_argument("--truth", default="", metavar="FILE|DIR", help=truth_help)
+    parser.add_argument("--frames", default="", metavar="FIRST:LAST", help="only these frame numbers, both ends included: 7:10, 7:, :10 or 7")
+    return parser
+
+
+def resolve_comparison(given: argparse.Namespace, truth_is_needed: bool = True) -> None:
+    """Fills `estimate` and `truth` from the positional arguments. Throws InvalidArgument unless both are given once."""
+    for argument in given.positional:
+        if given.estimate and given.truth:
+            raise _egosgm.InvalidArgument(f'unexpected argument "{argument}": --estimate and --truth are given already')
+        setattr(given, "truth" if given.estimate else "estimate", argument)
+    for name in ("estimate", "truth"):
+        if not getattr(given, name) and (name == "estimate" or truth_is_needed):
+            raise _egosgm.InvalidArgument(f"no {name}: give ESTIMATE TRUTH, or --estimate and --truth")
+
+
+def decimal(text: str) -> float:
+    """A finite number, for argparse. Python also takes 1_000, 010 and nan."""
+    if not re.fullmatch(r"-?(0|[1-9][0-9]*)?(\.[0-9]*)?([eE][-+]?[0-9]+)?", text) or not math.isfinite(float(text)):
+        raise ValueError(text)
+    return float(text)
+
+
+def counted(number: int, thing: str) -> str:
+    """1 pair, 2 pairs."""
+    return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+def json_text(value: Any) -> str:
+    """NaN becomes null."""
+    def plain(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: plain(part) for name, part in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [plain(part) for part in value]
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json.dumps(plain(value), indent=2, ensure_ascii=False)

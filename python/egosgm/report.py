@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm report: one HTML page of a run, with everything that it shows in it."""
+import argparse
+import base64
+import json
+import pathlib
+import re
+from typing import Any, Dict, List, Sequence
+
+import cv2
+import numpy
+
+from . import _egosgm
+from .arguments import Parser, expect_new_file, read_json, whole_number
+
+_PICTURES = 6
+_MOST_FRAMES = 2_000_000  # as many rows as a text of poses may have
+_LARGEST = 2**31 - 1
+_MOST_SIDE = 16384
+_FIGURES = ("bad_or_missing", "bad_of_valid", "density", "interpolated", "d1", "d1_interpolated", "mae_px", "filled", "wrong_of_all")
+
+
+def _parser() -> Parser:
+    parser = Parser("report", description="Make one HTML page of a run: pictures, charts, path, options",
+                    epilog="The page holds everything that it shows: it needs no network and no other file. Variance and the width of the\n"
+                    "search are shown where the run wrote them: egosgm run --write variance,search")
+    add = parser.add_argument
+    add("run", metavar="OUT", help="the folder that `egosgm run` wrote")
+    add("positional_truth", metavar="TRUTH", nargs="?", help="what --truth takes")
+    add("--truth", metavar="FILE|DIR", help="true disparity: a file, a folder, or a data set's folder")
+    add("--poses", metavar="FILE", help="true KITTI poses, drawn beside the estimated path")
+    add("--frames", metavar="FIRST:LAST", help="only these frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all")
+    add("--pictures", metavar="LIST", help="numbers of the frames to show, separated by commas; without: six, from the first to the last")
+    add("--picture-width", metavar="N", type=whole_number, default=1242, help="wider pictures are scaled down to this [px, %(default)s]")
+    add("--out", metavar="FILE.html", help="the page: a new file; without: OUT/report.html")
+    return parser
+
+
+def _number(entry: Any, key: str) -> int:
+    """From 0 to 2^31 - 1, or -1."""
+    value = entry.get(key) if isinstance(entry, dict) else None
+    return value if type(value) is int and 0 <= value <= _LARGEST else -1
+
+
+def _read_run(folder: pathlib.Path) -> Dict[str, Any]:
+    file = folder / "report.json"
+    if not file.exists():
+        raise _egosgm.InvalidArgument(f"{file}: no such file: give the folder that `egosgm run --out` wrote")
+    run = read_json(file)
+    for key in ("input", "version", "device", "calibration", "options", "frames"):
+        if not isinstance(run, dict) or key not in run:
+            raise _egosgm.InvalidArgument(f'{file}: not the report of a run: it has no "{key}"')
+    if not run["frames"]:
+        raise _egosgm.InvalidArgument(f"{file}: lists no frame, as the run was killed, is under way, or was stopped before its first: "
+                                      "let it end, or run it again with --resume")
+    if any(_number(entry, "frame") < 0 for entry in run["frames"]):
+        raise _egosgm.InvalidArgument(f"{file}: not the report of a run: its frames have no numbers")
+    return run
+
+
+def _short(text: str) -> str:
+    """With the last folder and the name of each path in it: a page that is passed on tells nothing of the machine."""
+    parts = []
+    for part in text.split(" and "):
+        root = 0 if part.startswith("/") else part.find(" /") + 1
+        if part[root:].startswith("/"):
+            part = part[:root] + "/".join(pathlib.PurePath(part[root:]).parts[-2:])
+        parts.append(part)
+    return " and ".join(parts)
+
+
+def _with_short_paths(part: Any) -> Any:
+    if isinstance(part, str):
+        return _short(part)
+    if isinstance(part, dict):
+        return {key: _with_short_paths(inner) for key, inner in part.items()}
+    return [_with_short_paths(inner) for inner in part] if isinstance(part, list) else part
+
+
+def _data_uri(picture: numpy.ndarray, kind: str) -> str:
+    encoded = cv2.imencode("." + kind, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 92] if kind == "jpeg" else [])[1]
+    return f"data:image/{kind};base64,{base64.b64encode(encoded.tobytes()).decode()}"
+
+
+def _narrowed(picture: numpy.ndarray, width: int) -> numpy.ndarray:
+    height, own = picture.shape[:2]
+    return picture if own <= width else cv2.resize(picture, (width, max(1, height * width // own)), interpolation=cv2.INTER_AREA)
+
+
+def _figures(counts: Any) -> Dict[str, Any]:
+    values = {name: getattr(counts.metrics, name) for name in _FIGURES}
+    return {name.replace("mae_px", "mae"): None if value != value else value for name, value in values.items()}
+
+
+class _Frame:
+    def __init__(self, place: int, entry: Dict[str, Any]) -> None:
+        self.place = place  # among all of the run
+        self.entry = entry
+        self.number = entry["frame"]
+        self.name = entry["name"] if isinstance(entry.get("name"), str) else f"{self.number:06}"
+        self.image = pathlib.Path(entry["left"]).stem if isinstance(entry.get("left"), str) else ""
+        self.left = entry["left"] if self.image and pathlib.Path(entry["left"]).exists() else ""
+        self.truth = ""
+
+
+class _Page:
+    """What the page shows; its script reads it."""
+
+    def __init__(self, given: argparse.Namespace) -> None:
+        self._given = given
+        self._folder = pathlib.Path(given.run)
+        self._run = _read_run(self._folder)
+        self._of_run = [_Frame(place, entry) for place, entry in enumerate(self._run["frames"])]
+        self._panels = _egosgm._FramePanels(int(self._run["options"].get("disparities", 128)))
+        self._notes: List[str] = []
+        first, last = _egosgm._frame_range(given.frames or "")
+        self._frames = [f for f in self._of_run if (first is None or f.number >= first) and (last is None or f.number <= last)]
+        if not self._frames:
+            raise _egosgm.InvalidArgument(f"--frames {given.frames}: the run has none of them: choose from {self._of_run[0].number} to "
+                                          f"{self._of_run[-1].number}")
+
+    def html(self) -> str:
+        data: Dict[str, Any] = {**self._truth(), **self._pictures(), **self._paths()}
+        data["changed"] = self._changed_options()
+        data["notes"] = self._notes
+        data["run"] = _with_short_paths({**self._run, "frames": [frame.entry for frame in self._frames]})
+        text = json.dumps(data).replace("<", "\\u003c")  # nothing in a text may end the script element
+        return pathlib.Path(__file__).with_name("report.html").read_text().replace("@DATA@", text, 1)
+
+    def _truth(self) -> Dict[str, Any]:
+        if not self._given.truth:
+            self._notes.append("Without truth there are no errors: egosgm report OUT TRUTH compares.")
+            return {"metrics": {}}
+        images = {frame.name: frame.image for frame in self._of_run if frame.image}
+        pairs, without_truth = _egosgm._pair_with_truth(self._given.run, self._given.truth, self._given.frames or "", images)
+        truths = [pathlib.Path(truth) for _, truth, _, _ in pairs]
+        note = f"Compared with {(truths[0] if len(truths) == 1 else truths[0].parent).name}."
+        for estimate, truth, _, same_name in pairs:
+            if not same_name:
+                note += f" {pathlib.Path(estimate).name} and {pathlib.Path(truth).name} belong together by their number only."
+                break
+        if without_truth:
+            note += f" {without_truth} frame{'s' if without_truth > 1 else ''} without truth."
+        self._notes.append(note)
+        frames = {frame.name: frame for frame in self._frames}
+        pooled, metrics = _egosgm.DisparityCounts(), {}
+        for estimate, truth, name, _ in pairs:
+            if name in frames:
+                frames[name].truth = truth
+                counts = _egosgm.compare_disparity(_egosgm.read_disparity(estimate), _egosgm.read_disparity(truth))
+                pooled = pooled + counts
+                metrics[str(frames[name].number)] = _figures(counts)
+        return {"metrics": metrics, "pooled": _figures(pooled)}
+
+    def _shown(self) -> List[_Frame]:
+        count = len(self._frames)
+        if not self._given.pictures:
+            wanted = min(_PICTURES, count)
+            return [self._frames[i * (count - 1) // max(wanted - 1, 1)] for i in range(wanted)]
+        chosen = set()
+        for text in str(self._given.pictures).split(","):
+            found = [frame.place for frame in self._frames if text in (str(frame.number), frame.name)]
+            if not found:
+                raise _egosgm.InvalidArgument(f'--pictures "{text}": the run has no such frame: choose from {self._frames[0].number} to '
+                                              f"{self._frames[-1].number}")
+            chosen.add(found[0])
+        return [self._of_run[place] for place in sorted(chosen)]
+
+    def _pictures(self) -> Dict[str, Any]:
+        pictures, bars = [], {}
+        for frame in self._shown():
+            layers = []
+            for name, picture, bar in self._panels.layers(self._folder, frame.name, frame.left, frame.truth):
+                has_edges = name.startswith("error") or name == "reason"  # ten colours
+                layers.append({"name": name, "picture": _data_uri(_narrowed(picture, self._given.picture_width), "png" if has_edges else "jpeg")})
+                if bar is not None:
+                    bars[name] = _data_uri(bar, "png")
+            pictures.append({"frame": frame.number, "name": frame.name, "layers": layers})
+        if not self._frames[0].left:
+            self._notes.append("The left images are not where the report of the run says, so they are not shown.")
+        for kind in ("variance", "search"):
+            if not (self._folder / kind).exists():
+                self._notes.append(f'The run did not write "{kind}": egosgm run --write variance,search does.')
+        return {"pictures": pictures, "bars": bars}
+
+    def _paths(self) -> Dict[str, Any]:
+        def from_above(poses: Any) -> List[List[float]]:
+            return [(numpy.linalg.inv(poses[0]) @ pose)[[0, 2], 3].tolist() for pose in poses]
+
+        estimated, true = [], []
+        file = self._folder / "poses.txt"
+        if file.exists():
+            poses = _egosgm.read_poses(file)
+            estimated = [poses[frame.place] for frame in self._frames if frame.place < len(poses)]
+        if self._given.poses:
+            true = _egosgm._poses_of_frames([frame.number for frame in self._frames], self._numbers(), self._given.poses)
+        return {"path": from_above(estimated), "true_path": from_above(true)}
+
+    def _numbers(self) -> Sequence[int]:
+        """All numbers of the sequence that the run's were chosen from, where they have no gaps."""
+        sequence = self._run.get("sequence")
+        first, last, count = (_number(sequence, key) for key in ("first_frame", "last_frame", "frames"))
+        return range(first, last + 1) if first >= 0 and 1 <= count <= _MOST_FRAMES and last - first == count - 1 else []
+
+    def _changed_options(self) -> List[str]:
+        used = self._run["options"]
+        return [name for name, value in _egosgm.pipeline_options().items() if name in used and used[name] != value]
+
+
+def main(arguments: Sequence[str]) -> int:
+    given = _parser().parse(arguments)
+    if given.positional_truth:
+        if given.truth:
+            raise _egosgm.InvalidArgument(f'unexpected argument "{given.positional_truth}": --truth is given already')
+        given.truth = given.positional_truth
+    if not 16 <= given.picture_width <= _MOST_SIDE:
+        raise _egosgm.InvalidArgument(f"--picture-width {given.picture_width}: choose from 16 to {_MOST_SIDE}")
+    file = pathlib.Path(given.out) if given.out else pathlib.Path(given.run) / "report.html"
+    try:
+        page = _Page(given)
+        expect_new_file("--out", file)
+        text = page.html().encode(errors="replace")
+    except (AttributeError, KeyError, TypeError) as error:
+        raise _egosgm.InvalidArgument(f"{given.run}/report.json: not the report of a run: {re.sub(r'_egosgm[.]', '', str(error))}") from error
+    _egosgm._write_new_file(file, text)
+    print(f"{file}: {len(text) / 1e6:.1f} MB, opens in any browser")
+    return 0
