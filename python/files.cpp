@@ -9,7 +9,6 @@
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/file_io.h"
 #include "host/vision/frame_panels.h"
-#include "host/vision/pair_with_truth.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
@@ -88,17 +87,6 @@ void bind_sequences(py::module_& module) {
       "the first right one, and so on; else those of equal names belong together.");
 }
 
-/// (estimate, truth, name, whether the names are equal) of each pair, and how many estimates have no truth.
-py::tuple pair_with_truth(const path& estimate, const path& truth, const std::string& frames,
-                          const std::map<std::string, std::string>& image_names) {
-  const vision::EvaluationPairs found =
-      vision::pair_with_truth(estimate, truth, {.frames = range_of(frames), .image_names = image_names});
-  py::list pairs;
-  for (const vision::EvaluationPair& pair : found.pairs)
-    pairs.append(py::make_tuple(pair.estimate, pair.truth, pair.name, pair.same_name));
-  return py::make_tuple(pairs, found.without_truth.size());
-}
-
 /// Of each of a run's `frames`, which are some of `numbers`.
 py::array poses_of_frames(const std::vector<int>& frames, const std::vector<int>& numbers, const path& poses) {
   StereoSequence sequence;
@@ -155,16 +143,10 @@ void bind_files(py::module_& module) {
   py::class_<vision::FramePanels>(module, "_FramePanels")
       .def(py::init<int>(), py::arg("disparities"))
       .def("layers", &layers_of_run, py::arg("folder"), py::arg("name"), py::arg("left"), py::arg("truth"));
-  module.def("_pair_with_truth", &pair_with_truth, py::arg("estimate"), py::arg("truth"), py::arg("frames"),
-             py::arg("image_names"));
   module.def("_poses_of_frames", &poses_of_frames, py::arg("frames"), py::arg("numbers"), py::arg("poses"));
   module.def("_write_new_file", &write_new_file, py::arg("file"), py::arg("bytes"));
   module.def("_expect_writable", &vision::expect_writable, py::arg("file"));
   module.def("_is_stream", &vision::is_stream, py::arg("file"));
-  module.def("_frame_range", [](const std::string& frames) {
-    const vision::FrameRange range = range_of(frames);
-    return std::make_pair(range.first, range.last);
-  });
   module.def(
       "_read_calibration", [](const path& file) { return vision::read_calibration(file); }, py::arg("file"),
       "Reads KITTI's, Middlebury's or EgoSGM's own format.");

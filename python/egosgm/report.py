@@ -11,7 +11,7 @@ import cv2
 import numpy
 
 from . import _egosgm
-from .arguments import Parser, expect_new_file, read_json, whole_number
+from .arguments import Parser, counted, expect_new_file, read_json, whole_number
 
 _PICTURES = 6
 _MOST_FRAMES = 2_000_000  # as many rows as a text of poses may have
@@ -113,7 +113,7 @@ class _Page:
         self._of_run = [_Frame(place, entry) for place, entry in enumerate(self._run["frames"])]
         self._panels = _egosgm._FramePanels(int(self._run["options"].get("disparities", 128)))
         self._notes: List[str] = []
-        first, last = _egosgm._frame_range(given.frames or "")
+        first, last = _egosgm._parse_frame_range(given.frames or "")
         self._frames = [f for f in self._of_run if (first is None or f.number >= first) and (last is None or f.number <= last)]
         if not self._frames:
             raise _egosgm.InvalidArgument(f"--frames {given.frames}: the run has none of them: choose from {self._of_run[0].number} to "
@@ -132,24 +132,24 @@ class _Page:
             self._notes.append("Without truth there are no errors: egosgm report OUT TRUTH compares.")
             return {"metrics": {}}
         images = {frame.name: frame.image for frame in self._of_run if frame.image}
-        pairs, without_truth = _egosgm._pair_with_truth(self._given.run, self._given.truth, self._given.frames or "", images)
-        truths = [pathlib.Path(truth) for _, truth, _, _ in pairs]
+        pairs, _, alone = _egosgm._pair_with_truth(self._given.run, self._given.truth, self._given.frames or "", images)
+        truths = [pair.truth for pair in pairs]
         note = f"Compared with {(truths[0] if len(truths) == 1 else truths[0].parent).name}."
-        for estimate, truth, _, same_name in pairs:
-            if not same_name:
-                note += f" {pathlib.Path(estimate).name} and {pathlib.Path(truth).name} belong together by their number only."
+        for pair in pairs:
+            if not pair.same_name:
+                note += f" {pair.estimate.name} and {pair.truth.name} belong together by their number only."
                 break
-        if without_truth:
-            note += f" {without_truth} frame{'s' if without_truth > 1 else ''} without truth."
+        if alone:
+            note += f" {counted(len(alone), 'frame')} without truth."
         self._notes.append(note)
         frames = {frame.name: frame for frame in self._frames}
         pooled, metrics = _egosgm.DisparityCounts(), {}
-        for estimate, truth, name, _ in pairs:
-            if name in frames:
-                frames[name].truth = truth
-                counts = _egosgm.compare_disparity(_egosgm.read_disparity(estimate), _egosgm.read_disparity(truth))
+        for pair in pairs:
+            if pair.name in frames:
+                frames[pair.name].truth = pair.truth
+                counts = _egosgm.compare_disparity(_egosgm.read_disparity(pair.estimate), _egosgm.read_disparity(pair.truth))
                 pooled = pooled + counts
-                metrics[str(frames[name].number)] = _figures(counts)
+                metrics[str(frames[pair.name].number)] = _figures(counts)
         return {"metrics": metrics, "pooled": _figures(pooled)}
 
     def _shown(self) -> List[_Frame]:
