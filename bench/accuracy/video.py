@@ -140,14 +140,15 @@ def row_of(bench, maps, method):
     ours, single = maps.of(OURS), maps.of(SINGLE)
     bench.device = json.loads((ours / "report.json").read_text())["device"]
     video = json.loads(bench.egosgm("eval-video", "--estimate", maps.of(method), *maps.video.eval_arguments(ours), "--against", single, "--json"))
-    regions, figures, pooled = video["regions"], video["figures"], video["regions"]["all"]
+    regions, figures = video["regions"], video["figures"]
+    pooled = regions.get("all", {})  # none without truth
     bad = [regions.get(region, {}).get("bad_or_missing") for region in ("uncovered", "moving")]
     harm, gain = [None] * 2, [None] * 3
     if method != SINGLE:
         harm, gain = ([figures[f"{name}_percent"] for name in names] for names in (("harm", "help"), ("gained", "gained_right", "lost_right")))
-    return [maps.video.title, method, *(pooled[name] for name in ("bad_or_missing", "bad_of_valid", "density", "interpolated", "mae")),
+    return [maps.video.title, method, *(pooled.get(name) for name in ("bad_or_missing", "bad_of_valid", "density", "interpolated", "mae")),
             *(figures[name] for name in FIGURES), *bad, *harm, *(certainty(maps, method) if method in (OURS, SINGLE) else [None, None]),
-            pooled["wrong_of_all"], *gain]
+            pooled.get("wrong_of_all"), *gain]
 
 
 def certainty(maps, method):
