@@ -65,23 +65,23 @@ std::string MotionSource::doubt(const vision::StereoSequence& sequence, const St
   return vision::suspect_motions(given, found);
 }
 
-FrameMotion MotionSource::next(const vision::StereoImages& images) {
+FrameMotion MotionSource::next(const vision::StereoImages& images, std::size_t frame) {
   FrameMotion result;
   if (odometry_) {
     estimate(images, result);
   } else if (!poses_.empty()) {
-    take_from_file(result);
+    take_from_file(frame, result);
   }
-  ++frame_;
+  last_frame_ = frame;
   return result;
 }
 
-void MotionSource::take_from_file(FrameMotion& result) {
+void MotionSource::take_from_file(std::size_t frame, FrameMotion& result) {
   result.from_file = true;
-  result.first_from_camera = poses_.front().inverse() * poses_[frame_];
-  if (frame_ == 0) return;
+  result.first_from_camera = poses_.front().inverse() * poses_[frame];
+  if (!last_frame_) return;
   result.motion.emplace();
-  result.motion->current_from_previous = vision::current_from_previous(poses_[frame_ - 1], poses_[frame_]);
+  result.motion->current_from_previous = vision::current_from_previous(poses_[*last_frame_], poses_[frame]);
 }
 
 void MotionSource::estimate(const vision::StereoImages& images, FrameMotion& result) {
@@ -90,7 +90,7 @@ void MotionSource::estimate(const vision::StereoImages& images, FrameMotion& res
   result.odometry_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   result.motion = result.odometry.motion;
   if (result.motion) last_motion_ = result.motion->current_from_previous;
-  if (frame_ > 0) first_from_camera_ = first_from_camera_ * last_motion_.inverse();
+  if (last_frame_) first_from_camera_ = first_from_camera_ * last_motion_.inverse();
   result.first_from_camera = first_from_camera_;
 }
 

@@ -38,16 +38,16 @@ class MotionSource {
   /// What the odometry of the first frames says against poses of a file; empty where nothing, and without such.
   std::string doubt(const vision::StereoSequence& sequence, const StereoOdometryOptions& options) const;
 
-  /// REQUIRES: called for frames 0, 1, 2, ... of the sequence.
-  FrameMotion next(const vision::StereoImages& images);
+  /// The motion from the frame of the last call. REQUIRES: `frame`, a place in the sequence, grows from call to call.
+  FrameMotion next(const vision::StereoImages& images, std::size_t frame);
 
  private:
-  void take_from_file(FrameMotion& result);
+  void take_from_file(std::size_t frame, FrameMotion& result);
   void estimate(const vision::StereoImages& images, FrameMotion& result);
 
   std::vector<Eigen::Isometry3d> poses_;
   std::optional<StereoOdometry> odometry_;
-  std::size_t frame_ = 0;
+  std::optional<std::size_t> last_frame_;
   Eigen::Isometry3d first_from_camera_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d last_motion_ = Eigen::Isometry3d::Identity();
 };

@@ -75,6 +75,7 @@ struct PreparedFrame {
   FrameMotion motion;
   Clock::time_point read_start, odometry_start;
   double read_ms = 0;
+  std::string unreadable;  // why there are no images; empty: there are
 };
 
 class Run {
@@ -149,7 +150,12 @@ class Run {
     auto next = prepare_later(0);
     for (std::size_t i = 0; i < sequence_.frames.size() && !interrupted(); ++i) {
       try {
-        submit(next.get());
+        PreparedFrame frame = next.get();
+        if (frame.unreadable.empty()) {
+          submit(std::move(frame));
+        } else {
+          leave_out(frame, progress);
+        }
         if (i + 1 < sequence_.frames.size()) next = prepare_later(i + 1);
       } catch (const DeviceError&) {
         throw;
@@ -161,14 +167,24 @@ class Run {
     }
     while (!under_way_.empty()) collect(progress);
     if (!quiet_) summary_ = fmt::format("{:.1f} frames/s", progress.frames_per_second());
-    return poses_.size() == sequence_.frames.size();
+    if (interrupted() && poses_.size() + left_out_ < sequence_.frames.size()) return false;
+    if (2 * left_out_ > sequence_.frames.size()) {
+      throw InvalidArgument(fmt::format("{} of {} could not be read, which is too many to go on: {}", left_out_,
+                                        counted(sequence_.frames.size(), "pair"), first_left_out_));
+    }
+    return true;
   }
 
   PreparedFrame prepare(std::size_t i) {
     PreparedFrame frame;
     frame.index = i;
     frame.read_start = Clock::now();
-    frame.images = vision::read_images(sequence_.frames[i]);
+    try {
+      frame.images = vision::read_images(sequence_.frames[i]);
+    } catch (const Error& error) {
+      frame.unreadable = error.what();
+      return frame;
+    }
     frame.read_ms = ms_since(frame.read_start);
     if (frame.images.left.size() != size_) {
       throw InvalidArgument(fmt::format("{} is {}x{} and the sequence {}x{}: all frames need one size",
@@ -176,8 +192,17 @@ class Run {
                                         frame.images.left.rows, size_.width, size_.height));
     }
     frame.odometry_start = Clock::now();
-    frame.motion = motions_.next(frame.images);
+    frame.motion = motions_.next(frame.images, i);
     return frame;
+  }
+
+  /// A pair that cannot be read costs itself alone: the next motion is over two intervals.
+  void leave_out(const PreparedFrame& prepared, Progress& progress) {
+    const vision::StereoFrame& frame = sequence_.frames[prepared.index];
+    if (left_out_++ == 0) first_left_out_ = prepared.unreadable;
+    report_.leave_out(frame, prepared.unreadable);
+    progress.note(fmt::format("frame {}: left out: {}", frame.name, prepared.unreadable));
+    progress.done(fmt::format("frame {}  left out", frame.name));
   }
 
   void submit(PreparedFrame frame) {
@@ -245,6 +270,10 @@ class Run {
                pipeline_.device().info().name);
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
                100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.path().string());
+    if (left_out_ > 0) {
+      fmt::print("{} of {} could not be read and {} left out: {}\n", left_out_,
+                 counted(sequence_.frames.size(), "pair"), left_out_ == 1 ? "is" : "are", first_left_out_);
+    }
     if (const std::string doubt = doubt_.text(); !doubt.empty()) {
       fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
     }
@@ -295,6 +324,8 @@ class Run {
   Clock::time_point last_written_ = Clock::now();
   std::vector<Eigen::Isometry3d> poses_;
   std::string summary_;
+  std::size_t left_out_ = 0;
+  std::string first_left_out_;  // why
   bool warned_of_range_ = false;
 };
 

@@ -133,6 +133,10 @@ void RunReport::add_reasons() {
   }
 }
 
+void RunReport::leave_out(const vision::StereoFrame& frame, const std::string& why) {
+  json_["left_out"].push_back({{"frame", frame.number}, {"name", frame.name}, {"why", why}});
+}
+
 void RunReport::set_doubt(const std::string& doubt) {
   if (!doubt.empty()) json_["doubt"] = doubt;
 }

@@ -37,6 +37,8 @@ class RunReport {
   void add_reasons();
 
   /// What speaks against the input, see Doubt; empty: nothing.
+  /// A pair that could not be read.
+  void leave_out(const vision::StereoFrame& frame, const std::string& why);
   void set_doubt(const std::string& doubt);
 
   /// `finished`: whether all frames ran; else `why_not` says what stopped them. Throws IoError.

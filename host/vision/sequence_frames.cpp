@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What belongs to the frames of an opened sequence: images, rows of files, poses.
 #include <algorithm>
+#include <exception>
 #include <optional>
 #include <string>
 
@@ -36,9 +37,16 @@ StereoImages read_images(const StereoFrame& frame) {
 
 cv::Size check_image_sizes(const StereoSequence& sequence) {
   std::optional<cv::Size> expected;
+  std::exception_ptr unreadable;
   for (const StereoFrame& frame : sequence.frames) {
     for (const fs::path& file : {frame.left, frame.right}) {
-      const cv::Size size = read_image_size(file);
+      cv::Size size;
+      try {
+        size = read_image_size(file);
+      } catch (const Error&) {
+        if (!unreadable) unreadable = std::current_exception();
+        continue;
+      }
       if (!expected) expected = size;
       if (size == *expected) continue;
       throw InvalidArgument(file.string() + ": " + std::to_string(size.width) + "x" + std::to_string(size.height) +
@@ -46,6 +54,7 @@ cv::Size check_image_sizes(const StereoSequence& sequence) {
                             std::to_string(expected->height) + "; select frames of one size with --frames");
     }
   }
+  if (!expected && unreadable) std::rethrow_exception(unreadable);
   return expected.value_or(cv::Size());
 }
 

@@ -101,8 +101,17 @@ class Drive:
 
     def _pairs(self) -> Iterator[Tuple[int, str, NDArray[Any], NDArray[Any]]]:
         if self.sequence is not None:
+            left_out = 0
             for frame in self.sequence.frames:
-                yield (frame.number, frame.name, *frame.read())
+                try:
+                    images = frame.read()
+                except _egosgm.Error as error:  # a pair that cannot be read costs itself alone
+                    left_out += 1
+                    if 2 * left_out > len(self):
+                        raise
+                    warnings.warn(f"frame {frame.name}: left out: {error}", UserWarning, stacklevel=5)
+                    continue
+                yield (frame.number, frame.name, *images)
         else:
             for number, pair in enumerate(self._source):
                 if not isinstance(pair, (tuple, list)) or len(pair) != 2:

@@ -128,14 +128,16 @@ class ManySequences(ProgramTest):
         self.run_line(0, out)
         self.assertEqual(report.stat().st_mtime_ns, times)
         whole = last.read_bytes()
-        stopped, image = self.new_folder(), self.folder / "s 0/image_0/000002.png"
-        pixels = image.read_bytes()
-        os.truncate(image, 500)
+        stopped, images = self.new_folder(), [self.folder / f"s 0/image_0/00000{i}.png" for i in (1, 2)]
+        pixels = [image.read_bytes() for image in images]
+        for image in images:
+            os.truncate(image, 500)
         try:
-            self.assertIn("000002.png", self.run_line(0, stopped, code=2))
+            self.assertIn("000001.png", self.run_line(0, stopped, code=2))
             self.assertFalse(self.report(stopped / "street-0")["finished"])
         finally:
-            image.write_bytes(pixels)
+            for image, whole_image in zip(images, pixels):
+                image.write_bytes(whole_image)
         self.run_line(0, stopped)
         self.assertEqual((stopped / "street-0/disparity/000002.png").read_bytes(), whole)
         self.assertTrue(self.report(stopped / "street-0")["finished"])

@@ -36,6 +36,47 @@ class Run(ProgramTest):
             self.assertEqual((maps / f"steps/disparity/{10 * i:06}.png").read_bytes(), expected)
             self.assertEqual((maps / f"ordered/disparity/00000{i}.png").read_bytes(), expected)
 
+    def test_a_pair_that_cannot_be_read_costs_itself_alone(self):
+        poses = ("--poses", self.street / "poses.txt", "--disparities", 48)
+        for broken, left in ((2, 60), (0, 20)):  # in the pixels; in the header, of the first one
+            street, out = self.broken_street(), self.new_folder() / "out"
+            file = street / f"image_1/00000{broken}.png"
+            os.truncate(file, left)
+            text = self.assert_works("run", street, "--out", out, *poses)
+            self.assertIn(f"frame 00000{broken}: left out: {file}", text)
+            self.assertIn(f"1 of {FRAMES} pairs could not be read and is left out: {file}", text)
+            report, others = self.report(out), [i for i in range(FRAMES) if i != broken]
+            self.assertTrue(report["finished"])
+            self.assertEqual([(one["frame"], one["name"]) for one in report["left_out"]], [(broken, f"00000{broken}")])
+            self.assertEqual([frame["frame"] for frame in report["frames"]], others)
+            self.assertEqual([file.stem for file in sorted((out / "disparity").iterdir())], [f"00000{i}" for i in others])
+            # The motion is that over two intervals, so the poses are those of the frames.
+            rows = (self.street / "poses.txt").read_text().splitlines()
+            for found, i in zip((out / "poses.txt").read_text().splitlines(), others, strict=True):
+                for a, b in zip(found.split(), rows[i].split()):
+                    self.assertAlmostEqual(float(a), float(b), delta=1e-6)
+            again = self.new_folder() / "without"  # the same maps as without the frame
+            for side in (0, 1):
+                (street / f"image_{side}/00000{broken}.png").unlink()
+            self.assert_works("run", street, "--out", again, *poses)
+            for i in others:
+                self.assertEqual((again / f"disparity/00000{i}.png").read_bytes(), (out / f"disparity/00000{i}.png").read_bytes(), i)
+
+    def test_pairs_of_which_most_cannot_be_read_are_no_drive(self):
+        street, out = self.broken_street(), self.new_folder() / "out"
+        for i in range(1, FRAMES):
+            os.truncate(street / f"image_0/00000{i}.png", 60)
+        self.assert_refused(["run", street, "--out", out, "--quiet"], street / "image_0/000001.png", f"{FRAMES - 1} of {FRAMES} pairs")
+        self.assertFalse(self.report(out)["finished"])
+        self.assertEqual([file.name for file in (out / "disparity").iterdir()], ["000000.png"])
+        os.truncate(street / "image_0/000000.png", 10)
+        for i in range(1, FRAMES):
+            os.truncate(street / f"image_0/00000{i}.png", 10)
+        for i in range(FRAMES):
+            os.truncate(street / f"image_1/00000{i}.png", 10)
+        self.assert_refused(["run", street, "--out", out.parent / "none"], "000000.png")
+        self.assertFalse((out.parent / "none").exists())
+
     def test_writes_maps_poses_and_report(self):
         out = self.new_folder()
         text = self.assert_works("run", "--odometry", self.street, "--out", out)
