@@ -46,7 +46,7 @@ int estimate(const OdometryArguments& arguments) {
     if (!sequence.note.empty()) progress.note(sequence.note);
     for (const vision::StereoFrame& frame : sequence.frames) {
       if (interrupted()) break;
-      const FrameMotion motion = motions.next(vision::read_images(frame));
+      const FrameMotion motion = motions.next(vision::read_images(frame), poses.size());
       tell(frame, motion, poses.empty(), progress);
       poses.push_back(motion.first_from_camera);
     }

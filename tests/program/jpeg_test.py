@@ -72,7 +72,7 @@ class Jpeg(ProgramTest):
         file = broken / "image_1/000001.jpg"
         file.write_bytes(file.read_bytes()[:-200])
         self.assertIn(str(file), self.assert_works("run", broken, "--out", broken.parent / "out"))
-        self.assert_refused(["odometry", broken], file)
+        self.assert_refused(["odometry", broken, "--out", broken.parent / "poses.txt"], file)
 
 
 if __name__ == "__main__":
