@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ROS node as a robot has it: a publisher, the node and a subscriber are three processes. Needs rclpy (scripts/install-dependencies --ros).
-EGOSGM_ROS_FRAMES [100] frames of 640x480 at EGOSGM_ROS_RATE [5] Hz. What concerns tf needs tf2_ros, what concerns the launch file launch_ros.
+EGOSGM_ROS_FRAMES [100] frames of 640x480. What concerns tf needs tf2_ros, what concerns the launch file launch_ros.
 EGOSGM_ROS_COMPONENT: the node that ros/egosgm_component builds, egosgm_component_node; tried where it is named."""
 import array
 import importlib.util
@@ -15,16 +15,16 @@ import unittest
 import numpy as np
 
 WIDTH, HEIGHT, RENDERED = 640, 480, 6
-FRAMES, RATE = int(os.environ.get("EGOSGM_ROS_FRAMES", "100")), float(os.environ.get("EGOSGM_ROS_RATE", "5"))
+FRAMES, RATE = int(os.environ.get("EGOSGM_ROS_FRAMES", "100")), 5.0
 PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "ros/egosgm_ros"
 HAS_TF = importlib.util.find_spec("tf2_ros") is not None
 TOPICS = ("disparity", "depth", "variance", "reason", "points2", "odom")
 STREET = dict(frames=RENDERED, width=WIDTH, height=HEIGHT, seed=1, speed_m=0.1, turn_deg=0, supersampling=1)
 
 
-def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True):
+def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True, waits=False):
     """Forwards and backwards through the street, once the node has its listeners; tells: its diagnostics name them. tf: where the camera truly
-    is, in the frame odom."""
+    is, in the frame odom. waits: for the disparities of each pair before the next one, so that the machine may be slow."""
     import egosgm
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
@@ -42,6 +42,10 @@ def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True
         from egosgm_ros.messages import transform_of
         from tf2_ros import TransformBroadcaster
         broadcaster = TransformBroadcaster(node)
+    matched = set()
+    if waits:
+        from stereo_msgs.msg import DisparityImage
+        node.create_subscription(DisparityImage, "disparity", lambda message: matched.add((message.header.stamp.sec, message.header.stamp.nanosec)), qos)
     ready = [] if tells else [True]
     listened_to = " ".join(sorted(TOPICS))
     node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: ready.extend(
@@ -70,6 +74,9 @@ def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True
             if tf and side == 0:
                 broadcaster.sendTransform(transform_of(image.header, "odom", frame.world_from_camera))
             images[side].publish(image)
+        end = time.monotonic() + 60
+        while waits and i >= 0 and (stamp.sec, stamp.nanosec) not in matched and time.monotonic() < end:
+            rclpy.spin_once(node, timeout_sec=0.1)
         time.sleep(1 / rate)
     time.sleep(2)
 
@@ -143,11 +150,11 @@ def subscribe(frames, seconds, reliable=True, tf=False):
 
 class Node(unittest.TestCase):
     def run_three(self, frames, rate, seconds=None, parameters=(), reliable=True, right_width=WIDTH, tf=False, listens_to_tf=False,
-                  component=None):
+                  component=None, waits=True):
         environment = {**os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
                        "PYTHONPATH": f"{PACKAGE}:{os.environ.get('PYTHONPATH', '')}"}
         seconds = seconds or 60 + 2 * frames / rate
-        ros = ["-p", "reliable:=true", "-p", "queue_size:=100"] if reliable else []
+        ros = ["-p", "reliable:=true"] if reliable else []
         ros += [word for p in parameters for word in ("-p", p)]
         start = [sys.executable, "-B", __file__]
         program = [component] if component else [sys.executable, "-B", "-m", "egosgm_ros.node"]
@@ -155,7 +162,7 @@ class Node(unittest.TestCase):
         subscriber = subprocess.Popen([*start, "subscribe", json.dumps(dict(frames=frames, seconds=seconds, reliable=reliable, tf=listens_to_tf))],
                                       env=environment, stdout=subprocess.PIPE, text=True)
         publisher = subprocess.Popen([*start, "publish", json.dumps(dict(frames=frames, rate=rate, right_width=right_width, reliable=reliable, tf=tf,
-                                                                          tells=not component))],
+                                                                          tells=not component, waits=waits))],
                                      env=environment)
         try:
             output, _ = subscriber.communicate(timeout=seconds + 60)
@@ -170,7 +177,7 @@ class Node(unittest.TestCase):
     def test_nothing_is_lost_and_the_maps_are_right(self):
         told = self.run_three(FRAMES, RATE)
         latencies, last = np.array(told["latencies_ms"]), told["active"][-1]
-        print(f"{len(told['stamps'])} of {FRAMES} frames at {RATE} Hz, {np.median([float(values['rate_hz']) for values in told['active']]):.1f} Hz matched; latency: median {np.median(latencies):.1f} ms, 95 % {np.percentile(latencies, 95):.1f} ms; "
+        print(f"{len(told['stamps'])} of {FRAMES} frames, {np.median([float(values['rate_hz']) for values in told['active']]):.1f} Hz matched; latency: median {np.median(latencies):.1f} ms, 95 % {np.percentile(latencies, 95):.1f} ms; "
               f"last diagnostics: {last}")
         self.assertEqual(len(told["stamps"]), FRAMES)
         self.assertEqual(told["stamps"], sorted(set(told["stamps"])))
@@ -194,7 +201,7 @@ class Node(unittest.TestCase):
 
     def test_what_is_too_fast_is_dropped_and_told(self):
         frames = 150
-        told = self.run_three(frames, 100.0, reliable=False, parameters=("queue_size:=2",), seconds=40)
+        told = self.run_three(frames, 100.0, reliable=False, seconds=40, waits=False)
         last = told["active"][-1]
         lost = int(last["lost_in_queue"]) + int(last["lost_on_the_way"]) + int(last["unpaired_left"]) + int(last["unpaired_right"])
         print(f"of {frames} frames at once: {last}")
@@ -204,13 +211,13 @@ class Node(unittest.TestCase):
         self.assertTrue(any(level == 1 and "dropped" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
 
     def test_wrong_images_are_told_on_diagnostics(self):
-        told = self.run_three(5, 5.0, right_width=WIDTH - 8, seconds=30)
+        told = self.run_three(5, 5.0, right_width=WIDTH - 8, seconds=30, waits=False)
         self.assertEqual(told["stamps"], [])
         self.assertTrue(any(level == 2 and "632" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
 
     def test_a_silent_camera_is_told(self):
         """Of the other one few images are kept, however long it lasts."""
-        told = self.run_three(90, 30.0, right_width=0, seconds=30)
+        told = self.run_three(90, 30.0, right_width=0, seconds=30, waits=False)
         self.assertTrue(any(level == 1 and "right/image_rect is silent" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
         self.assertGreater(max(int(values["unpaired_left"]) for _, _, values in told["diagnostics"] if "unpaired_left" in values), 0)
 
@@ -292,10 +299,28 @@ class Parameters(unittest.TestCase):
 
     def test_what_cannot_work_is_not_configured(self):
         from rclpy.lifecycle import TransitionCallbackReturn
-        for parameters in (dict(queue_size=0), dict(max_skew_ms=-1.0), dict(preset="papr"), dict(p2=-1)):
+        for parameters in (dict(max_skew_ms=-1.0), dict(preset="papr"), dict(p2=-1)):
             node = self.node(**parameters)
             self.assertEqual(node.trigger_configure(), TransitionCallbackReturn.FAILURE, parameters)
             self.assertIn(next(iter(parameters)), node._problem)
+
+    def test_the_newest_pair_comes_next(self):
+        """Whatever waited meanwhile."""
+        from sensor_msgs.msg import Image
+        node = self.node(reliable=True)
+        node.trigger_configure()
+        node._is_active = True
+        for i in range(1, 4):
+            image = Image()
+            image.header.stamp.sec = i
+            for index in (0, 1):
+                node._on_image(index, image)
+        self.assertEqual([image.header.stamp.sec for image in node._newest], [3, 3])
+        self.assertEqual(node._lost, 2)
+        processed = []
+        node._process = lambda left, right: (processed.append(left.header.stamp.sec), setattr(node, "_is_active", False))
+        node._work()
+        self.assertEqual((processed, node._newest), ([3], None))
 
     def test_infos_that_change_and_the_range_that_messages_tell(self):
         from sensor_msgs.msg import CameraInfo, Image
@@ -362,7 +387,7 @@ class Files(unittest.TestCase):
             source = launch.launch_description_sources.PythonLaunchDescriptionSource(str(PACKAGE / "launch/egosgm.launch.py"))
             context = launch.LaunchContext()
             description = source.get_launch_description(context)
-        given = dict(device="0", max_skew_ms="3", queue_size="7", reliable="true", motion_frame="odom", namespace="/stereo")
+        given = dict(device="0", max_skew_ms="3", reliable="true", motion_frame="odom", namespace="/stereo")
         context.launch_configurations.update(given)
         for entity in description.entities:
             if isinstance(entity, launch.actions.DeclareLaunchArgument):
@@ -370,7 +395,7 @@ class Files(unittest.TestCase):
         node, viewer = (entity for entity in description.entities if isinstance(entity, launch_ros.actions.Node))
         self.assertFalse(viewer.condition.evaluate(context))
         parameters = launch_ros.utilities.evaluate_parameters(context, node._Node__parameters)[0]
-        self.assertEqual(parameters, dict(device="0", preset="default", max_skew_ms=3.0, queue_size=7, reliable=True, motion_frame="odom", publish_tf=False))
+        self.assertEqual(parameters, dict(device="0", preset="default", max_skew_ms=3.0, reliable=True, motion_frame="odom", publish_tf=False))
         sys.path.insert(0, str(PACKAGE))
         from egosgm_ros.node import OWN
         for name, value in parameters.items():

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node egosgm: rectified pairs in, disparity, depth, its variance, points and odometry out, by stereo_image_proc's names."""
-import collections
 import threading
 import time
-from typing import Any, Deque, Dict, Optional, Set, Tuple
+from typing import Any, Dict, Optional, Set, Tuple
 
 import numpy as np
 import rclpy
@@ -25,8 +24,9 @@ from egosgm_ros.tf_motion import TfMotion, tf2_ros
 
 SIDES = ("left", "right")
 OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2}
-OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "queue_size": 4, "reliable": False, "auto_start": True, "odom_frame": "odom",
+OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False, "auto_start": True, "odom_frame": "odom",
        "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1}
+QUEUE_SIZE = 5  # of the middleware, as topics of sensors have it: the node empties it at once, and keeps the newest pair
 
 
 def _differ(a: CameraInfo, b: CameraInfo) -> bool:
@@ -62,7 +62,7 @@ class EgosgmNode(LifecycleNode):
         self._made_for: Tuple[CameraInfo, ...] = ()
         self._world_from_camera = np.eye(4)
         self._last_motion: Any = None
-        self._queue: Deque[Tuple[Any, Any]] = collections.deque()
+        self._newest: Optional[Tuple[Any, Any]] = None  # the pair that is matched next
         self._wake = threading.Condition()
         self._is_active = False
         self._count = self._lost = self._lost_on_the_way = self._frames_told = self._lost_told = 0
@@ -89,8 +89,6 @@ class EgosgmNode(LifecycleNode):
     def on_configure(self, state: Any) -> TransitionCallbackReturn:
         self._clear()
         try:
-            if self._value("queue_size") < 1:
-                raise ValueError(f"queue_size {self._value('queue_size')}: give 1 or more")
             if not self._value("max_skew_ms") >= 0:
                 raise ValueError(f"max_skew_ms {self._value('max_skew_ms')}: give 0 for equal stamps, or how far they may differ")
             if self._value("publish_tf") and self._value("motion_frame"):
@@ -105,9 +103,9 @@ class EgosgmNode(LifecycleNode):
             self.get_logger().error(self._problem)
             return TransitionCallbackReturn.FAILURE
         self._pairing = Pairing(int(self._value("max_skew_ms") * 1e6))
-        qos = QoSProfile(depth=self._value("queue_size"), reliability=ReliabilityPolicy.RELIABLE) if self._value("reliable") else qos_profile_sensor_data
+        qos = QoSProfile(depth=QUEUE_SIZE, reliability=ReliabilityPolicy.RELIABLE) if self._value("reliable") else qos_profile_sensor_data
         self._outputs = {name: self.create_lifecycle_publisher(kind, name, qos) for name, kind in OUTPUTS.items()}
-        self._outputs["odom"] = self.create_lifecycle_publisher(Odometry, "odom", self._value("queue_size"))
+        self._outputs["odom"] = self.create_lifecycle_publisher(Odometry, "odom", QUEUE_SIZE)
         self._inputs = []
         for index, side in enumerate(SIDES):
             self._inputs.append(self.create_subscription(CameraInfo, f"{side}/camera_info", lambda info, side=side: self._on_info(side, info), qos))
@@ -124,7 +122,7 @@ class EgosgmNode(LifecycleNode):
 
     def on_activate(self, state: Any) -> TransitionCallbackReturn:
         self._is_active = True
-        self._queue.clear()
+        self._newest = None
         self._worker = threading.Thread(target=self._work, daemon=True)
         self._worker.start()
         return super().on_activate(state)
@@ -166,19 +164,17 @@ class EgosgmNode(LifecycleNode):
             return
         for (_, left), (_, right) in self._pairing.add(index, stamp_ns(image), image):
             with self._wake:
-                self._queue.append((left, right))
-                if len(self._queue) > self._value("queue_size"):
-                    self._queue.popleft()
-                    self._lost += 1
+                self._lost += self._newest is not None
+                self._newest = left, right
                 self._wake.notify()
 
     def _work(self) -> None:
         while True:
             with self._wake:
-                self._wake.wait_for(lambda: self._queue or not self._is_active)
+                self._wake.wait_for(lambda: self._newest or not self._is_active)
                 if not self._is_active:
                     return
-                left, right = self._queue.popleft()
+                (left, right), self._newest = self._newest, None
             try:
                 self._process(left, right)
                 self._problem = ""

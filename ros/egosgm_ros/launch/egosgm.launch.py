@@ -15,7 +15,6 @@ PARAMETERS = (
     ("device", str, "", "as egosgm run --device"),
     ("preset", str, "default", "as egosgm run --preset"),
     ("max_skew_ms", float, "0.0", "how far the stamps of a pair may differ"),
-    ("queue_size", int, "4", "pairs that may wait"),
     ("reliable", bool, "false", "reliable topics in place of those of sensors"),
     ("motion_frame", str, "", "the frame in which tf knows where the camera is, such as odom; else motion is found in the images"),
     ("publish_tf", bool, "false", "the camera's pose to tf"),
