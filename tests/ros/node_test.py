@@ -188,7 +188,7 @@ class Node(unittest.TestCase):
         self.assertGreater(max(largest for _, largest in told["reason"]), 0)
         self.assertLess(max(told["bad"]), 0.1)
         self.assertAlmostEqual(told["f_t"] / told["expected_f_t"], 1, places=5)
-        self.assertEqual([last[name] for name in ("lost_in_queue", "lost_on_the_way", "unpaired_left", "unpaired_right")], ["0"] * 4)
+        self.assertEqual([last[name] for name in ("replaced", "lost_on_the_way", "unpaired_left", "unpaired_right")], ["0"] * 4)
         self.assertLess(abs(float(last["vertical_offset_px"])), 0.5)
 
     @unittest.skipUnless("EGOSGM_ROS_COMPONENT" in os.environ, "no component is named")
@@ -203,12 +203,14 @@ class Node(unittest.TestCase):
         frames = 150
         told = self.run_three(frames, 100.0, reliable=False, seconds=40, waits=False)
         last = told["active"][-1]
-        lost = int(last["lost_in_queue"]) + int(last["lost_on_the_way"]) + int(last["unpaired_left"]) + int(last["unpaired_right"])
+        lost = int(last["replaced"]) + int(last["lost_on_the_way"]) + int(last["unpaired_left"]) + int(last["unpaired_right"])
         print(f"of {frames} frames at once: {last}")
         self.assertGreater(int(last["frames"]), 0)
         self.assertLess(int(last["frames"]), frames)
         self.assertGreaterEqual(int(last["frames"]) + lost, frames)  # nothing goes untold
-        self.assertTrue(any(level == 1 and "dropped" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
+        messages = " ".join(message for level, message, _ in told["diagnostics"] if level == 1)
+        self.assertEqual("LARGE_DATA" in messages, int(last["lost_on_the_way"]) > 0, told["diagnostics"])
+        self.assertEqual("replaced by newer" in messages, int(last["replaced"]) > 0, told["diagnostics"])
 
     def test_wrong_images_are_told_on_diagnostics(self):
         told = self.run_three(5, 5.0, right_width=WIDTH - 8, seconds=30, waits=False)
@@ -316,11 +318,30 @@ class Parameters(unittest.TestCase):
             for index in (0, 1):
                 node._on_image(index, image)
         self.assertEqual([image.header.stamp.sec for image in node._newest], [3, 3])
-        self.assertEqual(node._lost, 2)
+        self.assertEqual(node._replaced, 2)
         processed = []
         node._process = lambda left, right: (processed.append(left.header.stamp.sec), setattr(node, "_is_active", False))
         node._work()
         self.assertEqual((processed, node._newest), ([3], None))
+
+    def test_each_kind_of_loss_has_its_own_words(self):
+        node = self.node()
+        node.trigger_configure()
+        node._is_active = True
+        said, warned = [], []
+        node._diagnostics.publish = lambda message: said.append(message.status[0].message)
+        node._listened_to = lambda: set()
+        node._warn = lambda cause, text: warned.append(text)
+        for on_the_way, replaced in ((3, 0), (0, 2), (4, 1), (0, 0)):
+            node._lost_on_the_way += on_the_way
+            node._replaced += replaced
+            node._count += 1
+            node._tell()
+        for index, (on_the_way, replaced) in enumerate((("3 images lost on the way", ""), ("", "2 pairs replaced"), ("4 images lost on the way", "1 pairs replaced"))):
+            self.assertIn(on_the_way, said[index])
+            self.assertIn(replaced, said[index])
+        self.assertEqual([("LARGE_DATA" in text, "replaced by newer" in text) for text in said], [(True, False), (False, True), (True, True), (False, False)])
+        self.assertEqual(len(warned), 4)
 
     def test_infos_that_change_and_the_range_that_messages_tell(self):
         from sensor_msgs.msg import CameraInfo, Image

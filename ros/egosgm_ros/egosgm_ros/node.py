@@ -26,6 +26,9 @@ SIDES = ("left", "right")
 OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2}
 OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False, "auto_start": True, "odom_frame": "odom",
        "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1}
+LOST_ON_THE_WAY = ("images lost on the way: the middleware's memory does not hold them: set FASTDDS_BUILTIN_TRANSPORTS=LARGE_DATA for the driver and for "
+                   "this node, or reliable:=true where the driver is reliable")
+REPLACED = "pairs replaced by newer ones: more come than are matched in time"
 QUEUE_SIZE = 5  # of the middleware, as topics of sensors have it: the node empties it at once, and keeps the newest pair
 
 
@@ -65,7 +68,8 @@ class EgosgmNode(LifecycleNode):
         self._newest: Optional[Tuple[Any, Any]] = None  # the pair that is matched next
         self._wake = threading.Condition()
         self._is_active = False
-        self._count = self._lost = self._lost_on_the_way = self._frames_told = self._lost_told = 0
+        self._count = self._replaced = self._lost_on_the_way = self._frames_told = 0
+        self._lost_told = [0, 0]
         self._problem = self._doubt = ""
         self._tf: Optional[TfMotion] = None
         self._broadcaster: Any = None
@@ -73,6 +77,7 @@ class EgosgmNode(LifecycleNode):
         self._report: Optional[egosgm.FrameReport] = None
         self._latency_ms = 0.0
         self._told_at = time.monotonic()
+        self._warned_at: Dict[str, float] = {}
 
     def _value(self, name: str) -> Any:
         return self.get_parameter(name).value
@@ -164,7 +169,7 @@ class EgosgmNode(LifecycleNode):
             return
         for (_, left), (_, right) in self._pairing.add(index, stamp_ns(image), image):
             with self._wake:
-                self._lost += self._newest is not None
+                self._replaced += self._newest is not None
                 self._newest = left, right
                 self._wake.notify()
 
@@ -249,11 +254,18 @@ class EgosgmNode(LifecycleNode):
         if self._broadcaster:
             self._broadcaster.sendTransform(transform_of(header, self._value("odom_frame"), self._world_from_camera))
 
+    def _warn(self, cause: str, text: str) -> None:
+        """At most once a minute for each cause."""
+        now = time.monotonic()
+        if now - self._warned_at.get(cause, -60) >= 60:
+            self._warned_at[cause] = now
+            self.get_logger().warning(text)
+
     def _tell(self) -> None:
         now = time.monotonic()
         rate = (self._count - self._frames_told) / max(1e-3, now - self._told_at)
-        lost = self._lost + self._lost_on_the_way
-        newly_lost = lost - self._lost_told
+        lost = [self._lost_on_the_way, self._replaced]
+        losses = [f"{count - told} {what}" for count, told, what in zip(lost, self._lost_told, (LOST_ON_THE_WAY, REPLACED)) if count > told]
         self._told_at, self._frames_told, self._lost_told = now, self._count, lost
         status = DiagnosticStatus(name=f"{self.get_fully_qualified_name()}: stereo", hardware_id="", level=DiagnosticStatus.OK, message="matching")
         gaps = self._pairing.gaps if hasattr(self, "_pairing") else None
@@ -262,17 +274,19 @@ class EgosgmNode(LifecycleNode):
         elif rate == 0 and self._is_active:
             status.level = DiagnosticStatus.WARN
             status.message = "no pairs of images"
-            if gaps and gaps.nearest_ms is None and gaps.unpaired_left + gaps.unpaired_right > 0:
+            if losses:
+                status.message += "; " + "; ".join(losses)
+            elif gaps and gaps.nearest_ms is None and gaps.unpaired_left + gaps.unpaired_right > 0:
                 status.message += f": {SIDES[gaps.unpaired_left > 0]}/image_rect is silent"
             elif gaps and gaps.unpaired_left + gaps.unpaired_right > 0:
                 status.message += f": the nearest stamps differ by {gaps.nearest_ms:.3f} ms, max_skew_ms is {self._value('max_skew_ms')}"
         elif not self._is_active:
             status.message = "not active"
-        elif newly_lost:
-            status.level, status.message = DiagnosticStatus.WARN, f"{newly_lost} dropped: more images come than are matched in time"
+        elif losses:
+            status.level, status.message = DiagnosticStatus.WARN, "; ".join(losses)
         elif self._doubt:
             status.level, status.message = DiagnosticStatus.WARN, self._doubt
-        values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "lost_in_queue": str(self._lost), "lost_on_the_way": str(self._lost_on_the_way)}
+        values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "replaced": str(self._replaced), "lost_on_the_way": str(self._lost_on_the_way)}
         if self._is_active:
             values["listened_to"] = " ".join(sorted(self._listened_to()))
         if gaps:
@@ -281,6 +295,8 @@ class EgosgmNode(LifecycleNode):
             values.update(density=f"{self._report.density:.4f}", search_fraction=f"{self._report.search_fraction:.4f}",
                           vertical_offset_px=f"{self._report.vertical_offset_px:.3f}", latency_ms=f"{self._latency_ms:.1f}",
                           device=self._pipeline.device.name)
+        for loss in losses:
+            self._warn(loss.partition(" ")[2], loss)
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
