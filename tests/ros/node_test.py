@@ -299,6 +299,10 @@ class Parameters(unittest.TestCase):
         node.set_parameters([Parameter("p2", value=170)])
         self.assert_runs_with(node, "paper", p2=170)
 
+    def test_whole_numbers_are_texts_and_fractions_too(self):
+        node = self.node(device=0, max_skew_ms=5, gate_px=3)
+        self.assertEqual([repr(node._value(name)) for name in ("device", "max_skew_ms", "gate_px")], ["'0'", "5.0", "3.0"])
+
     def test_what_cannot_work_is_not_configured(self):
         from rclpy.lifecycle import TransitionCallbackReturn
         for parameters in (dict(max_skew_ms=-1.0), dict(preset="papr"), dict(p2=-1)):
@@ -363,6 +367,33 @@ class Parameters(unittest.TestCase):
             node._process(image, image)
         self.assertEqual([message.f for message in sent], [100, 100, 101, 101])
         self.assertEqual([(message.min_disparity, message.max_disparity) for message in sent], [(4, 19)] * 4)
+
+
+class Started(unittest.TestCase):
+    """The node's process: what it says, and how it ends."""
+
+    def start(self, *parameters):
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "PYTHONPATH": f"{PACKAGE}:{os.environ.get('PYTHONPATH', '')}"}
+        words = [word for parameter in parameters for word in ("-p", parameter)]
+        node = subprocess.Popen([sys.executable, "-B", "-W", "ignore", "-m", "egosgm_ros.node", "--ros-args", "-r", "__ns:=/stereo", *words], env=environment,
+                                stderr=subprocess.PIPE, text=True)
+        self.addCleanup(lambda: (node.kill(), node.wait(), node.stderr.close()))
+        return node
+
+    def test_what_cannot_work_ends_it_with_one_line(self):
+        for parameter, words in (("disparity:=64", " or disparities?"), ("disparities:=64.0", "disparities"), ("preset:=papr", "papr"),
+                                 ("device:=no such one", "no such one")):
+            node = self.start(parameter)
+            _, said = node.communicate(timeout=60)
+            self.assertEqual(node.returncode, 1, said)
+            self.assertEqual(len(said.splitlines()), 1, said)
+            self.assertIn(words, said)
+
+    def test_it_tells_what_it_waits_for(self):
+        node = self.start()
+        self.assertIn("active: waits for /stereo/left/camera_info /stereo/left/image_rect /stereo/right/camera_info /stereo/right/image_rect (best effort)",
+                      node.stderr.readline())
+        self.assertIn("no pairs of images", node.stderr.readline())
 
 
 class Files(unittest.TestCase):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node egosgm: rectified pairs in, disparity, depth, its variance, points and odometry out, by stereo_image_proc's names."""
+import difflib
+import sys
 import threading
 import time
 from typing import Any, Dict, Optional, Set, Tuple
@@ -10,8 +12,10 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from stereo_msgs.msg import DisparityImage
@@ -42,14 +46,18 @@ class EgosgmNode(LifecycleNode):
     def __init__(self, **arguments: Any) -> None:
         super().__init__("egosgm", **arguments)
         for name, value in OWN.items():
-            self.declare_parameter(name, value)
+            self._declare(name, value)
         try:
             self._of_preset = egosgm.pipeline_options(self._value("preset"))
         except ValueError:  # which on_configure says
             self._of_preset = egosgm.pipeline_options()
         del self._of_preset["preset"]
         for name, value in self._of_preset.items():
-            self.declare_parameter(name, value)
+            self._declare(name, value)
+        for name in self._parameter_overrides:
+            if not self.has_parameter(name) and not name.startswith("qos_overrides."):
+                near = difflib.get_close_matches(name, [*OWN, *self._of_preset])
+                raise egosgm.InvalidArgument(f"no parameter named {name}" + (f": did you mean {' or '.join(near)}?" if near else ": docs/robots.md lists them"))
         self._set_later: Set[str] = set()
         self.add_on_set_parameters_callback(self._on_set)
         self._worker: Optional[threading.Thread] = None
@@ -78,6 +86,14 @@ class EgosgmNode(LifecycleNode):
         self._latency_ms = 0.0
         self._told_at = time.monotonic()
         self._warned_at: Dict[str, float] = {}
+        self._waits_since = self._told_at  # for a pair
+
+    def _declare(self, name: str, default: Any) -> None:
+        """A whole number is a text or a fraction where one is wanted: device:=0, max_skew_ms:=5."""
+        given = self._parameter_overrides.get(name)
+        if given is not None and type(given.value) is int and type(default) in (str, float):
+            self._parameter_overrides[name] = Parameter(name, value=type(default)(given.value))
+        self.declare_parameter(name, default)
 
     def _value(self, name: str) -> Any:
         return self.get_parameter(name).value
@@ -130,6 +146,9 @@ class EgosgmNode(LifecycleNode):
         self._newest = None
         self._worker = threading.Thread(target=self._work, daemon=True)
         self._worker.start()
+        self._waits_since = time.monotonic()
+        topics = " ".join(subscription.topic_name for subscription in self._inputs)
+        self.get_logger().info(f"active: waits for {topics} ({'reliable' if self._value('reliable') else 'best effort'})")
         return super().on_activate(state)
 
     def on_deactivate(self, state: Any) -> TransitionCallbackReturn:
@@ -168,6 +187,7 @@ class EgosgmNode(LifecycleNode):
         if not self._is_active:
             return
         for (_, left), (_, right) in self._pairing.add(index, stamp_ns(image), image):
+            self._waits_since = time.monotonic()
             with self._wake:
                 self._replaced += self._newest is not None
                 self._newest = left, right
@@ -221,6 +241,9 @@ class EgosgmNode(LifecycleNode):
         self._publish(wanted, left.header, images[0], maps)
         self._report, self._count = maps.report, self._count + 1
         self._latency_ms = self.get_clock().now().nanoseconds / 1e6 - stamp / 1e6
+        if self._count == 1:
+            width, height = self._cameras.size
+            self.get_logger().info(f"first pair: {width}x{height} px, matched by {self._pipeline.device.name}")
 
     def _motion(self, frame_id: str, images: Any, previous: Optional[int], stamp: int) -> Optional[egosgm.Motion]:
         if self._tf is None:
@@ -280,6 +303,8 @@ class EgosgmNode(LifecycleNode):
                 status.message += f": {SIDES[gaps.unpaired_left > 0]}/image_rect is silent"
             elif gaps and gaps.unpaired_left + gaps.unpaired_right > 0:
                 status.message += f": the nearest stamps differ by {gaps.nearest_ms:.3f} ms, max_skew_ms is {self._value('max_skew_ms')}"
+            if now - self._waits_since >= 2:
+                self._warn("no pairs", status.message)
         elif not self._is_active:
             status.message = "not active"
         elif losses:
@@ -303,19 +328,27 @@ class EgosgmNode(LifecycleNode):
         self._diagnostics.publish(message)
 
 
-def main() -> None:
+def main() -> int:
     rclpy.init()
-    node = EgosgmNode()
-    if node._value("auto_start") and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
-        node.trigger_activate()
     try:
-        rclpy.spin(node)
+        node = EgosgmNode()
+    except (ParameterException, ValueError) as error:
+        rclpy.try_shutdown()
+        print(f"egosgm_node: {error}", file=sys.stderr)
+        return 1
+    configured = not node._value("auto_start") or node.trigger_configure() == TransitionCallbackReturn.SUCCESS  # which says why not
+    try:
+        if configured:
+            if node._value("auto_start"):
+                node.trigger_activate()
+            rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     node._stop()
     node.destroy_node()
     rclpy.try_shutdown()
+    return 0 if configured else 1
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
