@@ -18,7 +18,7 @@ WIDTH, HEIGHT, RENDERED = 640, 480, 6
 FRAMES, RATE = int(os.environ.get("EGOSGM_ROS_FRAMES", "100")), 5.0
 PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "ros/egosgm_ros"
 HAS_TF = importlib.util.find_spec("tf2_ros") is not None
-TOPICS = ("disparity", "depth", "variance", "reason", "points2", "odom")
+TOPICS = ("camera_info", "disparity", "depth", "variance", "reason", "points2", "odom")
 STREET = dict(frames=RENDERED, width=WIDTH, height=HEIGHT, seed=1, speed_m=0.1, turn_deg=0, supersampling=1)
 
 
@@ -88,13 +88,13 @@ def subscribe(frames, seconds, reliable=True, tf=False):
     from diagnostic_msgs.msg import DiagnosticArray
     from nav_msgs.msg import Odometry
     from rclpy.qos import QoSProfile, qos_profile_sensor_data
-    from sensor_msgs.msg import Image, PointCloud2
+    from sensor_msgs.msg import CameraInfo, Image, PointCloud2
     from stereo_msgs.msg import DisparityImage
     street = egosgm.SyntheticSequence(**STREET)
     truth = street.render(0).left_disparity
     rclpy.init()
     node = rclpy.create_node("subscriber")
-    told = dict(stamps=[], latencies_ms=[], depth=0, variance=0, reason=[], points2=0, odom=[], tf=[], bad=[], diagnostics=[])
+    told = dict(stamps=[], latencies_ms=[], depth=0, variance=0, camera_info=0, reason=[], points2=0, odom=[], tf=[], bad=[], diagnostics=[])
 
     def on_disparity(message):
         now = node.get_clock().now().nanoseconds
@@ -124,7 +124,7 @@ def subscribe(frames, seconds, reliable=True, tf=False):
 
     qos = QoSProfile(depth=100) if reliable else qos_profile_sensor_data
     node.create_subscription(DisparityImage, "disparity", on_disparity, qos)
-    for kind, topic in ((Image, "depth"), (Image, "variance"), (PointCloud2, "points2")):
+    for kind, topic in ((Image, "depth"), (Image, "variance"), (PointCloud2, "points2"), (CameraInfo, "camera_info")):
         node.create_subscription(kind, topic, count(topic), qos)
     node.create_subscription(Image, "reason", on_reason, qos)
     node.create_subscription(Odometry, "odom", on_odom, QoSProfile(depth=100))
@@ -151,7 +151,7 @@ def subscribe(frames, seconds, reliable=True, tf=False):
 class Node(unittest.TestCase):
     def run_three(self, frames, rate, seconds=None, parameters=(), reliable=True, right_width=WIDTH, tf=False, listens_to_tf=False,
                   component=None, waits=True):
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        environment = {"FASTDDS_BUILTIN_TRANSPORTS": "LARGE_DATA", **os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
                        "PYTHONPATH": f"{PACKAGE}:{os.environ.get('PYTHONPATH', '')}"}
         seconds = seconds or 60 + 2 * frames / rate
         ros = ["-p", "reliable:=true"] if reliable else []
@@ -181,7 +181,7 @@ class Node(unittest.TestCase):
               f"last diagnostics: {last}")
         self.assertEqual(len(told["stamps"]), FRAMES)
         self.assertEqual(told["stamps"], sorted(set(told["stamps"])))
-        for name in ("depth", "variance", "points2"):
+        for name in ("depth", "variance", "points2", "camera_info"):
             self.assertEqual(told[name], FRAMES, name)
         self.assertEqual([len(told["odom"]), len(told["reason"])], [FRAMES, FRAMES])
         self.assertEqual({encoding for encoding, _ in told["reason"]}, {"mono8"})
@@ -305,10 +305,34 @@ class Parameters(unittest.TestCase):
 
     def test_what_cannot_work_is_not_configured(self):
         from rclpy.lifecycle import TransitionCallbackReturn
-        for parameters in (dict(max_skew_ms=-1.0), dict(preset="papr"), dict(p2=-1)):
+        for parameters in (dict(max_skew_ms=-1.0), dict(preset="papr"), dict(p2=-1), dict(max_depth_sigma=0.0), dict(point_reasons="trused")):
             node = self.node(**parameters)
             self.assertEqual(node.trigger_configure(), TransitionCallbackReturn.FAILURE, parameters)
             self.assertIn(next(iter(parameters)), node._problem)
+
+    def test_points_are_certain_of_chosen_reasons_and_coloured(self):
+        import egosgm
+        from egosgm.ros_images import rgb_of
+        from egosgm_ros.messages import points_of
+        from sensor_msgs.msg import Image
+        from std_msgs.msg import Header
+        node = self.node(max_depth_sigma=0.1, point_reasons="trusted, flat")
+        node.trigger_configure()
+        depth = np.array([[2.0, 2.0, 2.0, np.nan]], np.float32)
+        flat, ambiguous = (egosgm.REASONS.index(name) for name in ("flat", "ambiguous"))
+        maps = type("Maps", (), dict(reason=np.array([[0, flat, ambiguous, 0]], np.uint8)))
+        variance = np.array([[0.03, 0.05, 0.01, 0.01]], np.float32)  # a sigma of 0.2 m is the bound
+        np.testing.assert_array_equal(node._certain(depth, variance, maps), [[2, np.nan, np.nan, np.nan]])
+        np.testing.assert_array_equal(node._certain(depth, variance * 0.1, maps), [[2, 2, np.nan, np.nan]])
+        for encoding, colours in (("rgb8", [1, 2, 3]), ("bgra8", [3, 2, 1, 9])):
+            image = Image(height=1, width=4, step=20, encoding=encoding, data=array.array("B", (colours * 4 + [7] * 20)[:20]))
+            cloud = points_of(Header(), depth, np.full((1, 4), 5, np.uint8), rgb_of(image), egosgm.Calibration(100, 100, 2, 0, 0.1))
+            points = np.frombuffer(cloud.data, np.float32).reshape(4, -1)
+            self.assertEqual([field.name for field in cloud.fields], ["x", "y", "z", "intensity", "rgb"])
+            self.assertEqual(cloud.row_step, 4 * cloud.point_step)
+            self.assertEqual(set(points[:, 4].copy().view(np.uint32)), {0x010203})
+            np.testing.assert_allclose(points[0, :4], [-0.04, 0, 2, 5], rtol=1e-6)
+        self.assertIsNone(rgb_of(Image(encoding="mono8")))
 
     def test_the_newest_pair_comes_next(self):
         """Whatever waited meanwhile."""
@@ -367,6 +391,53 @@ class Parameters(unittest.TestCase):
             node._process(image, image)
         self.assertEqual([message.f for message in sent], [100, 100, 101, 101])
         self.assertEqual([(message.min_disparity, message.max_disparity) for message in sent], [(4, 19)] * 4)
+
+
+class Odometry(unittest.TestCase):
+    def setUp(self):
+        sys.path.insert(0, str(PACKAGE))
+
+    @staticmethod
+    def transform(xi):
+        import cv2
+        result = np.eye(4)
+        result[:3, :3], result[:3, 3] = cv2.Rodrigues(np.array(xi[3:], float))[0], xi[:3]
+        return result
+
+    def test_a_path_is_as_uncertain_as_its_motions_make_it(self):
+        """Against poses of motions that are disturbed at random."""
+        import egosgm
+        from egosgm_ros.messages import Path, odometry_of
+        from std_msgs.msg import Header
+        random = np.random.default_rng(1)
+        moved = self.transform([0.1, 0.05, -1.0, 0.05, 0.3, -0.1])
+        sigmas = np.array([0.01, 0.02, 0.03, 0.004, 0.01, 0.006])
+        path, ends = Path(), []
+        for _ in range(5):
+            path.add(egosgm.Motion(moved, np.diag(sigmas**2)), 0.1)
+        for _ in range(3000):
+            pose = np.eye(4)
+            for _ in range(5):
+                pose = pose @ np.linalg.inv(self.transform(random.normal(size=6) * sigmas) @ moved)
+            ends.append(pose[[2, 0, 1], 3] * [1, -1, -1])  # x forward, y left, z up
+        message = odometry_of(Header(), "odom", path)
+        covariance = np.reshape(message.pose.covariance, (6, 6))
+        np.testing.assert_allclose(covariance[:3, :3], np.cov(np.array(ends).T), atol=0.08 * covariance[:3, :3].max())
+        self.assertTrue((np.linalg.eigvalsh(covariance) > 0).all())
+        path.add(None, 0.1)
+        self.assertGreater(np.trace(np.reshape(odometry_of(Header(), "odom", path).twist.covariance, (6, 6))), 100)  # as uncertain as it is large
+
+    def test_the_twist_is_the_motion_in_its_time(self):
+        import egosgm
+        from egosgm_ros.messages import Path, odometry_of
+        from std_msgs.msg import Header
+        path = Path()
+        # The camera goes 0.2 m ahead and turns to the left by 0.1 rad in half a second.
+        path.add(egosgm.Motion(self.transform([0, 0, -0.2, 0, 0.1, 0]), np.diag([1, 4, 9, 16, 25, 36.0])), 0.5)
+        message = odometry_of(Header(), "odom", path)
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        np.testing.assert_allclose([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z], [0.4, 0, 0, 0, 0, 0.2], atol=1e-9)
+        np.testing.assert_allclose(np.diag(np.reshape(message.twist.covariance, (6, 6))), 4 * np.array([9, 1, 4, 36, 16, 25.0]))
 
 
 class Started(unittest.TestCase):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node egosgm: rectified pairs in, disparity, depth, its variance, points and odometry out, by stereo_image_proc's names."""
+import copy
 import difflib
 import sys
 import threading
@@ -17,19 +18,19 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from stereo_msgs.msg import DisparityImage
 
 import egosgm
 from egosgm.bag import Pairing
-from egosgm.ros_images import Cameras, depth_maps, grey_of, stamp_ns
-from egosgm_ros.messages import disparity_of, image_of, odometry_of, points_of, transform_of
+from egosgm.ros_images import Cameras, depth_maps, grey_of, rgb_of, stamp_ns
+from egosgm_ros.messages import Path, disparity_of, image_of, odometry_of, points_of, transform_of
 from egosgm_ros.tf_motion import TfMotion, tf2_ros
 
 SIDES = ("left", "right")
-OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2}
+OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2, "camera_info": CameraInfo}
 OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False, "auto_start": True, "odom_frame": "odom",
-       "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1}
+       "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1, "compressed": False, "max_depth_sigma": 0.1, "point_reasons": ""}
 LOST_ON_THE_WAY = ("images lost on the way: the middleware's memory does not hold them: set FASTDDS_BUILTIN_TRANSPORTS=LARGE_DATA for the driver and for "
                    "this node, or reliable:=true where the driver is reliable")
 REPLACED = "pairs replaced by newer ones: more come than are matched in time"
@@ -71,8 +72,7 @@ class EgosgmNode(LifecycleNode):
         self._pipeline: Optional[egosgm.Pipeline] = None
         self._odometry: Optional[egosgm.StereoOdometry] = None
         self._made_for: Tuple[CameraInfo, ...] = ()
-        self._world_from_camera = np.eye(4)
-        self._last_motion: Any = None
+        self._path = Path()
         self._newest: Optional[Tuple[Any, Any]] = None  # the pair that is matched next
         self._wake = threading.Condition()
         self._is_active = False
@@ -112,6 +112,13 @@ class EgosgmNode(LifecycleNode):
         try:
             if not self._value("max_skew_ms") >= 0:
                 raise ValueError(f"max_skew_ms {self._value('max_skew_ms')}: give 0 for equal stamps, or how far they may differ")
+            if not self._value("max_depth_sigma") > 0:
+                raise ValueError(f"max_depth_sigma {self._value('max_depth_sigma')}: give the largest sigma of a point's depth as a part of the depth, 0.1 or .inf")
+            names = self._value("point_reasons").replace(",", " ").split()
+            for name in names:
+                if name not in egosgm.REASONS:
+                    raise ValueError(f"point_reasons {name}: give some of {', '.join(egosgm.REASONS)}, or none for all")
+            self._point_reasons = [egosgm.REASONS.index(name) for name in names]
             if self._value("publish_tf") and self._value("motion_frame"):
                 raise ValueError("publish_tf and motion_frame: a motion that comes from tf is not published there again: unset one of them")
             egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 32, 0.1), 64, 64, device=self._value("device"), **self._options())
@@ -135,9 +142,10 @@ class EgosgmNode(LifecycleNode):
 
     def _image_subscription(self, index: int, qos: QoSProfile) -> Any:
         """Whose middleware tells what it dropped, where it can."""
+        kind, topic = (CompressedImage, "image_rect/compressed") if self._value("compressed") else (Image, "image_rect")
         for events in (SubscriptionEventCallbacks(message_lost=self._on_lost), None):
             try:
-                return self.create_subscription(Image, f"{SIDES[index]}/image_rect", lambda image: self._on_image(index, image), qos, event_callbacks=events)
+                return self.create_subscription(kind, f"{SIDES[index]}/{topic}", lambda image: self._on_image(index, image), qos, event_callbacks=events)
             except UnsupportedEventTypeError:
                 continue
 
@@ -219,7 +227,7 @@ class EgosgmNode(LifecycleNode):
             self._cameras, self._made_for = Cameras(*infos, False), infos
             self._pipeline = egosgm.Pipeline(self._cameras.calibration, *self._cameras.size, device=self._value("device"), **self._options())
             self._odometry = egosgm.StereoOdometry(self._cameras.calibration)
-            self._last_stamp = self._last_motion = None
+            self._last_stamp = self._path.motion = None
         images = grey_of(left), grey_of(right)
         for side, image in zip(SIDES, images):
             if image.shape != (self._cameras.size[1], self._cameras.size[0]):
@@ -229,16 +237,14 @@ class EgosgmNode(LifecycleNode):
         if previous is not None and stamp <= previous:  # a bag that starts over
             self._pipeline.reset()
             self._odometry.reset()
-            previous = self._last_motion = None
+            previous = self._path.motion = None
         self._last_stamp = stamp
         motion = self._motion(left.header.frame_id, images, previous, stamp)
-        if motion:
-            self._last_motion = motion.current_from_previous
-        if self._last_motion is not None:  # where none was found, the last one is repeated
-            self._world_from_camera = self._world_from_camera @ np.linalg.inv(self._last_motion)
+        if previous is not None:
+            self._path.add(motion, (stamp - previous) / 1e9)
         wanted = self._listened_to()
-        maps = self._pipeline.process(*images, motion, ("disparity", "variance", "reason") if "reason" in wanted else ("disparity", "variance"))
-        self._publish(wanted, left.header, images[0], maps)
+        maps = self._pipeline.process(*images, motion, ("disparity", "variance", "reason") if "reason" in wanted or self._point_reasons else ("disparity", "variance"))
+        self._publish(wanted, left, images[0], maps)
         self._report, self._count = maps.report, self._count + 1
         self._latency_ms = self.get_clock().now().nanoseconds / 1e6 - stamp / 1e6
         if self._count == 1:
@@ -255,11 +261,18 @@ class EgosgmNode(LifecycleNode):
             self._doubt = f"{error}; such frames are searched whole"
             return None
 
+    def _certain(self, depth: Any, variance: Any, maps: egosgm.Frame) -> Any:
+        """The depth of which points are made, NaN elsewhere."""
+        is_certain = variance <= (self._value("max_depth_sigma") * depth) ** 2
+        if self._point_reasons:
+            is_certain &= np.isin(maps.reason, self._point_reasons)
+        return np.where(is_certain, depth, np.float32(np.nan))
+
     def _listened_to(self) -> Set[str]:
         return {name for name, publisher in self._outputs.items() if publisher.get_subscription_count() > 0}
 
-    def _publish(self, wanted: Set[str], header: Any, grey: Any, maps: egosgm.Frame) -> None:
-        calibration = self._cameras.calibration
+    def _publish(self, wanted: Set[str], left: Any, grey: Any, maps: egosgm.Frame) -> None:
+        calibration, header = self._cameras.calibration, left.header
         if "disparity" in wanted:
             self._outputs["disparity"].publish(disparity_of(header, maps.disparity, calibration, self._pipeline.options))
         if "reason" in wanted:
@@ -271,11 +284,15 @@ class EgosgmNode(LifecycleNode):
             if "variance" in wanted:
                 self._outputs["variance"].publish(image_of(header, variance))
             if "points2" in wanted:
-                self._outputs["points2"].publish(points_of(header, depth, grey, calibration))
+                self._outputs["points2"].publish(points_of(header, self._certain(depth, variance, maps), grey, rgb_of(left), calibration))
+        if "camera_info" in wanted:
+            info = copy.copy(self._infos["left"])
+            info.header = header
+            self._outputs["camera_info"].publish(info)
         if "odom" in wanted:
-            self._outputs["odom"].publish(odometry_of(header, self._value("odom_frame"), self._world_from_camera))
+            self._outputs["odom"].publish(odometry_of(header, self._value("odom_frame"), self._path))
         if self._broadcaster:
-            self._broadcaster.sendTransform(transform_of(header, self._value("odom_frame"), self._world_from_camera))
+            self._broadcaster.sendTransform(transform_of(header, self._value("odom_frame"), self._path.world_from_camera))
 
     def _warn(self, cause: str, text: str) -> None:
         """At most once a minute for each cause."""
