@@ -334,6 +334,22 @@ class Parameters(unittest.TestCase):
             np.testing.assert_allclose(points[0, :4], [-0.04, 0, 2, 5], rtol=1e-6)
         self.assertIsNone(rgb_of(Image(encoding="mono8")))
 
+    def test_what_is_nearer_than_the_range_is_told(self):
+        import egosgm
+        street = egosgm.SyntheticSequence(**STREET)
+        frame, told = street.render(0), []
+        for disparities in (16, 128):
+            node = self.node(disparities=disparities)
+            node._pipeline = type("Pipeline", (), dict(options=dict(min_disparity=0, disparities=disparities)))
+            warned = []
+            node.get_logger().warning = warned.append
+            for _ in range(2):
+                node._look_beyond(frame.left, frame.right)
+            told.append((node._nearer, len(warned)))
+            node.destroy_node()
+        self.assertRegex(told[0][0], r"^\d+ % of the image is nearer than the range: disparities \d+$")
+        self.assertEqual([told[0][1], *told[1]], [1, "", 0])
+
     def test_the_newest_pair_comes_next(self):
         """Whatever waited meanwhile."""
         from sensor_msgs.msg import Image
@@ -370,6 +386,26 @@ class Parameters(unittest.TestCase):
             self.assertIn(replaced, said[index])
         self.assertEqual([("LARGE_DATA" in text, "replaced by newer" in text) for text in said], [(True, False), (False, True), (True, True), (False, False)])
         self.assertEqual(len(warned), 4)
+
+    def test_stamps_that_do_not_pair_are_told_once_a_minute(self):
+        from sensor_msgs.msg import Image
+        node = self.node()
+        node.trigger_configure()
+        node._is_active = True
+        node._listened_to = lambda: set()
+        warned = []
+        node.get_logger().warning = warned.append
+        for i in range(3):
+            for index in (0, 1):
+                image = Image()
+                image.header.stamp.sec, image.header.stamp.nanosec = i, 385000 * index
+                node._on_image(index, image)
+            node._waits_since = time.monotonic() - 1 - i
+            node._tell()
+        self.assertEqual(warned, ["no pairs of images: the nearest stamps differ by 0.385 ms, max_skew_ms is 0.0"])
+        node._warned_at = {cause: at - 60 for cause, at in node._warned_at.items()}
+        node._tell()
+        self.assertEqual(len(warned), 2)
 
     def test_infos_that_change_and_the_range_that_messages_tell(self):
         from sensor_msgs.msg import CameraInfo, Image

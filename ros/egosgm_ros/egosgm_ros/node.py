@@ -34,6 +34,7 @@ OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False,
 LOST_ON_THE_WAY = ("images lost on the way: the middleware's memory does not hold them: set FASTDDS_BUILTIN_TRANSPORTS=LARGE_DATA for the driver and for "
                    "this node, or reliable:=true where the driver is reliable")
 REPLACED = "pairs replaced by newer ones: more come than are matched in time"
+PAIRS_PER_LOOK = 50  # for what is nearer than the range
 QUEUE_SIZE = 5  # of the middleware, as topics of sensors have it: the node empties it at once, and keeps the newest pair
 
 
@@ -84,6 +85,7 @@ class EgosgmNode(LifecycleNode):
         self._last_stamp: Optional[int] = None
         self._report: Optional[egosgm.FrameReport] = None
         self._latency_ms = 0.0
+        self._nearer, self._nearer_told = "", False
         self._told_at = time.monotonic()
         self._warned_at: Dict[str, float] = {}
         self._waits_since = self._told_at  # for a pair
@@ -247,9 +249,21 @@ class EgosgmNode(LifecycleNode):
         self._publish(wanted, left, images[0], maps)
         self._report, self._count = maps.report, self._count + 1
         self._latency_ms = self.get_clock().now().nanoseconds / 1e6 - stamp / 1e6
+        if self._count % PAIRS_PER_LOOK == 1:
+            self._look_beyond(*images)
         if self._count == 1:
             width, height = self._cameras.size
             self.get_logger().info(f"first pair: {width}x{height} px, matched by {self._pipeline.device.name}")
+
+    def _look_beyond(self, left: Any, right: Any) -> None:
+        options = self._pipeline.options
+        clipped = egosgm._egosgm._clipped_by_range(left, right, options["min_disparity"], options["min_disparity"] + options["disparities"])
+        self._nearer = ""
+        if clipped:
+            self._nearer = f"{clipped[0]:.0%} of the image is nearer than the range: disparities {clipped[1]}".replace("%", " %")
+            if not self._nearer_told:
+                self.get_logger().warning(self._nearer)
+            self._nearer_told = True
 
     def _motion(self, frame_id: str, images: Any, previous: Optional[int], stamp: int) -> Optional[egosgm.Motion]:
         if self._tf is None:
@@ -312,22 +326,22 @@ class EgosgmNode(LifecycleNode):
         if self._problem:
             status.level, status.message = DiagnosticStatus.ERROR, self._problem
         elif rate == 0 and self._is_active:
-            status.level = DiagnosticStatus.WARN
-            status.message = "no pairs of images"
-            if losses:
-                status.message += "; " + "; ".join(losses)
-            elif gaps and gaps.nearest_ms is None and gaps.unpaired_left + gaps.unpaired_right > 0:
-                status.message += f": {SIDES[gaps.unpaired_left > 0]}/image_rect is silent"
-            elif gaps and gaps.unpaired_left + gaps.unpaired_right > 0:
-                status.message += f": the nearest stamps differ by {gaps.nearest_ms:.3f} ms, max_skew_ms is {self._value('max_skew_ms')}"
+            text = "no pairs of images"
+            if gaps and gaps.nearest_ms is None and gaps.unpaired_left + gaps.unpaired_right > 0:
+                text += f": {SIDES[gaps.unpaired_left > 0]}/image_rect is silent"
+            elif gaps and gaps.nearest_ms is not None and gaps.nearest_ms > self._value("max_skew_ms"):
+                text += f": the nearest stamps differ by {gaps.nearest_ms:.3f} ms, max_skew_ms is {self._value('max_skew_ms')}"
             if now - self._waits_since >= 2:
-                self._warn("no pairs", status.message)
+                self._warn(text.partition("differ")[0], text)
+            status.level, status.message = DiagnosticStatus.WARN, "; ".join([text, *losses])
         elif not self._is_active:
             status.message = "not active"
         elif losses:
             status.level, status.message = DiagnosticStatus.WARN, "; ".join(losses)
         elif self._doubt:
             status.level, status.message = DiagnosticStatus.WARN, self._doubt
+        elif self._nearer:
+            status.level, status.message = DiagnosticStatus.WARN, self._nearer
         values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "replaced": str(self._replaced), "lost_on_the_way": str(self._lost_on_the_way)}
         if self._is_active:
             values["listened_to"] = " ".join(sorted(self._listened_to()))
