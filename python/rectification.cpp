@@ -140,7 +140,8 @@ void bind_doubts(py::module_& module) {
         return clipped ? py::object(py::make_tuple(clipped->share, clipped->disparities)) : py::none();
       },
       py::arg("left"), py::arg("right"), py::arg("least"), py::arg("end"),
-      "The share of the image that is nearer than [least, end), and the number of disparities that would do; None where hardly anything is.");
+      "The share of the image that is nearer than [least, end), and the number of disparities that would do; None "
+      "where hardly anything is.");
   py::class_<Examination>(module, "_Examination")
       .def(py::init<const std::optional<Calibration>&, int, int>(), py::arg("calibration"), py::arg("least"),
            py::arg("end"))

@@ -72,8 +72,9 @@ class Disparity : public rclcpp::Node {
       const std::string name = side == 0 ? "left" : "right";
       infos_in_.push_back(create_subscription<CameraInfo>(
           name + "/camera_info", qos, [this, side](CameraInfo::ConstSharedPtr info) { on_info(side, *info); }));
-      images_in_.push_back(create_subscription<Image>(
-          name + "/image_rect", newest, [this, side](Image::ConstSharedPtr image) { on_image(side, std::move(image)); }));
+      images_in_.push_back(
+          create_subscription<Image>(name + "/image_rect", newest,
+                                     [this, side](Image::ConstSharedPtr image) { on_image(side, std::move(image)); }));
     }
   }
 
