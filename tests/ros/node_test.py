@@ -387,6 +387,30 @@ class Parameters(unittest.TestCase):
         self.assertEqual([("LARGE_DATA" in text, "replaced by newer" in text) for text in said], [(True, False), (False, True), (True, True), (False, False)])
         self.assertEqual(len(warned), 4)
 
+    def test_compressed_images_are_matched_and_the_info_goes_with_them(self):
+        import cv2
+        from sensor_msgs.msg import CameraInfo, CompressedImage
+        node = self.node(compressed=True, disparities=16, temporal=False)
+        node.trigger_configure()
+        self.assertEqual([subscription.topic_name for subscription in node._inputs],
+                         ["/left/camera_info", "/left/image_rect/compressed", "/right/camera_info", "/right/image_rect/compressed"])
+        for side in (0, 1):
+            info = CameraInfo(height=32, width=64, distortion_model="plumb_bob", d=[0.0] * 5)
+            info.k = [100.0, 0, 32.0, 0, 100.0, 16.0, 0, 0, 1.0]
+            info.p = [100.0, 0, 32.0, -100.0 * side, 0, 100.0, 16.0, 0, 0, 0, 1.0, 0]
+            node._on_info(("left", "right")[side], info)
+        sent = []
+        node._listened_to = lambda: {"camera_info", "depth", "points2"}
+        for name in node._listened_to():
+            node._outputs[name].publish = sent.append
+        grey = np.random.default_rng(1).integers(0, 256, (32, 64), dtype=np.uint8)
+        image = CompressedImage(format="mono8; png compressed", data=array.array("B", cv2.imencode(".png", grey)[1].tobytes()))
+        image.header.stamp.sec, image.header.frame_id = 7, "left_optical"
+        node._process(image, image)
+        self.assertEqual(sorted(type(message).__name__ for message in sent), ["CameraInfo", "Image", "PointCloud2"])
+        self.assertEqual({(message.header.stamp.sec, message.header.frame_id, message.width) for message in sent}, {(7, "left_optical", 64)})
+        self.assertEqual([message.p[0] for message in sent if isinstance(message, CameraInfo)], [100.0])
+
     def test_stamps_that_do_not_pair_are_told_once_a_minute(self):
         from sensor_msgs.msg import Image
         node = self.node()
