@@ -119,7 +119,29 @@ void bind_doubts(py::module_& module) {
            }),
            py::arg("calibration"), py::arg("width"), py::arg("height"))
       .def("add", &Doubt::add, py::arg("density"), py::arg("has_motion"), py::arg("holds_8_bits_in_16"))
+      .def(
+          "look_beyond",
+          [](Doubt& self, const py::object& left, const py::object& right, int least, int end) {
+            const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
+            const OtherThreadsRun other_threads_run;
+            self.look_beyond(left_image, right_image, least, end);
+          },
+          py::arg("left"), py::arg("right"), py::arg("least"), py::arg("end"))
       .def("text", &Doubt::text);
+  module.def(
+      "_clipped_by_range",
+      [](const py::object& left, const py::object& right, int least, int end) {
+        const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
+        std::optional<vision::Clipped> clipped;
+        {
+          const OtherThreadsRun other_threads_run;
+          clipped = vision::clipped_by_range(left_image, right_image, least, end);
+        }
+        return clipped ? py::object(py::make_tuple(clipped->share, clipped->disparities)) : py::none();
+      },
+      py::arg("left"), py::arg("right"), py::arg("least"), py::arg("end"),
+      "The share of the image that is nearer than [least, end), and the number of disparities that would do; None "
+      "where hardly anything is.");
   py::class_<Examination>(module, "_Examination")
       .def(py::init<const std::optional<Calibration>&, int, int>(), py::arg("calibration"), py::arg("least"),
            py::arg("end"))

@@ -458,7 +458,7 @@ def _problems(calibration: _egosgm.Calibration, samples: Sequence[Tuple[NDArray[
 def run(bag: Bag, outputs: Sequence[Any] = (), progress: Optional[bool] = None,
         on_frame: Optional[Callable[[BagFrame, Any], None]] = None, **options: Any) -> Dict[str, Any]:
     """Matches all frames of a bag. outputs: of bag_outputs or of viewer. options: those of Pipeline. Returns what happened."""
-    from .drive import _bar
+    from .drive import FRAMES_PER_LOOK, _bar
     pipeline = odometry = previous = doubt = None
     samples: List[Tuple[NDArray[Any], NDArray[Any]]] = []
     given: List[NDArray[np.float64]] = []
@@ -487,6 +487,9 @@ def run(bag: Bag, outputs: Sequence[Any] = (), progress: Optional[bool] = None,
             output.add(frame, maps, motion.current_from_previous if motion else None, calibration)
         if on_frame:
             on_frame(frame, maps)
+        if frames % FRAMES_PER_LOOK == 0:
+            least = pipeline.options["min_disparity"]
+            doubt.look_beyond(frame.left, frame.right, least, least + pipeline.options["disparities"])
         is_narrow = frame.left.dtype == np.uint16 and int(frame.left.max()) < 256
         doubt.add(maps.report.density, motion is not None, is_narrow)
         if frames in (0, 3, 10, 30, 100):

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from . import _egosgm
 from .calibrations import read_calibration
 
+FRAMES_PER_LOOK = 50  # for what is nearer than the range
+
 
 @dataclasses.dataclass(frozen=True, repr=False, eq=False)
 class DriveFrame:
@@ -137,7 +139,7 @@ class Drive:
         """The device matches a frame while the next one is read and its motion is found. Iterations share nothing, so that each may end
         where it likes, and two may run at once."""
         odometry, pipeline = self._spare.pop() if self._spare else self._tools(*(self.sequence.size if self.sequence is not None else ()))
-        pairs, under_way, failure, doubt = self._pairs(), None, None, None
+        pairs, under_way, failure, doubt, looked = self._pairs(), None, None, None, 0
         try:
             while True:
                 next_one = None
@@ -157,6 +159,11 @@ class Drive:
                     if doubt is None:
                         doubt = _egosgm._Doubt(self.calibration if odometry else None, *np.shape(left)[1::-1])
                     is_narrow = left.dtype == np.uint16 and int(left.max(initial=0)) < 256
+                    if looked % FRAMES_PER_LOOK == 0:
+                        options = pipeline.options
+                        least = options["min_disparity"]
+                        doubt.look_beyond(left, right, least, least + options["disparities"])
+                    looked += 1
                     doubt.add(maps.report.density, found is not None and found.motion is not None, is_narrow)
                     yield DriveFrame(number, name, left, right, maps, found, self.calibration)
                 if failure:

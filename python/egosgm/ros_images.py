@@ -54,6 +54,15 @@ def grey_of(message: Any) -> NDArray[Any]:
     return ((9798 * red + 19235 * green + 3735 * blue + (1 << 14)) >> 15).astype(np.uint8)  # as OpenCV weighs and rounds
 
 
+def rgb_of(message: Any) -> Optional[NDArray[np.uint8]]:
+    """A sensor_msgs Image as H x W x 3; None where its encoding has no colours."""
+    pixel_bytes, channels = _COLOURS.get(getattr(message, "encoding", ""), (0, ()))
+    if not pixel_bytes:
+        return None
+    rows = np.frombuffer(message.data, np.uint8)[:message.height * message.step].reshape(message.height, message.step)
+    return rows[:, :message.width * pixel_bytes].reshape(message.height, message.width, pixel_bytes)[:, :, channels]
+
+
 def _of_bayer(pixels: NDArray[Any]) -> NDArray[Any]:
     """The mean of the 3x3 neighbourhood weighed by 1 2 1 has a quarter of red, half of green and a quarter of blue at each pixel, whatever
     the order of the colours."""

@@ -282,6 +282,13 @@ def test_colour_is_taken_where_grey_is(street, frames):
         pipeline.process(np.zeros((3, HEIGHT, WIDTH), np.uint8), frames[0].right)
 
 
+def test_what_is_nearer_than_the_range_is_told():
+    street = egosgm.SyntheticSequence(frames=1, width=640, height=480, seed=1)
+    pairs = [(street.render(0).left, street.render(0).right)]
+    with pytest.warns(UserWarning, match="of the image is nearer than the range"):
+        list(egosgm.run(pairs, street.calibration, disparities=16, temporal=False))
+
+
 def test_a_doubtful_drive_is_told(street, frames):
     swapped = [(frame.right, frame.left) for frame in frames]
     with pytest.warns(UserWarning, match="density|no motion"):

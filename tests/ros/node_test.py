@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ROS node as a robot has it: a publisher, the node and a subscriber are three processes. Needs rclpy (scripts/install-dependencies --ros).
-EGOSGM_ROS_FRAMES [100] frames of 640x480 at EGOSGM_ROS_RATE [5] Hz. What concerns tf needs tf2_ros, what concerns the launch file launch_ros.
+EGOSGM_ROS_FRAMES [100] frames of 640x480. What concerns tf needs tf2_ros, what concerns the launch file launch_ros.
 EGOSGM_ROS_COMPONENT: the node that ros/egosgm_component builds, egosgm_component_node; tried where it is named."""
 import array
 import importlib.util
@@ -15,16 +15,16 @@ import unittest
 import numpy as np
 
 WIDTH, HEIGHT, RENDERED = 640, 480, 6
-FRAMES, RATE = int(os.environ.get("EGOSGM_ROS_FRAMES", "100")), float(os.environ.get("EGOSGM_ROS_RATE", "5"))
+FRAMES, RATE = int(os.environ.get("EGOSGM_ROS_FRAMES", "100")), 5.0
 PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "ros/egosgm_ros"
 HAS_TF = importlib.util.find_spec("tf2_ros") is not None
-TOPICS = ("disparity", "depth", "variance", "reason", "points2", "odom")
+TOPICS = ("camera_info", "disparity", "depth", "variance", "reason", "points2", "odom")
 STREET = dict(frames=RENDERED, width=WIDTH, height=HEIGHT, seed=1, speed_m=0.1, turn_deg=0, supersampling=1)
 
 
-def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True):
+def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True, waits=False):
     """Forwards and backwards through the street, once the node has its listeners; tells: its diagnostics name them. tf: where the camera truly
-    is, in the frame odom."""
+    is, in the frame odom. waits: for the disparities of each pair before the next one, so that the machine may be slow."""
     import egosgm
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
@@ -42,6 +42,10 @@ def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True
         from egosgm_ros.messages import transform_of
         from tf2_ros import TransformBroadcaster
         broadcaster = TransformBroadcaster(node)
+    matched = set()
+    if waits:
+        from stereo_msgs.msg import DisparityImage
+        node.create_subscription(DisparityImage, "disparity", lambda message: matched.add((message.header.stamp.sec, message.header.stamp.nanosec)), qos)
     ready = [] if tells else [True]
     listened_to = " ".join(sorted(TOPICS))
     node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: ready.extend(
@@ -70,6 +74,9 @@ def publish(frames, rate, right_width=WIDTH, reliable=True, tf=False, tells=True
             if tf and side == 0:
                 broadcaster.sendTransform(transform_of(image.header, "odom", frame.world_from_camera))
             images[side].publish(image)
+        end = time.monotonic() + 60
+        while waits and i >= 0 and (stamp.sec, stamp.nanosec) not in matched and time.monotonic() < end:
+            rclpy.spin_once(node, timeout_sec=0.1)
         time.sleep(1 / rate)
     time.sleep(2)
 
@@ -81,13 +88,13 @@ def subscribe(frames, seconds, reliable=True, tf=False):
     from diagnostic_msgs.msg import DiagnosticArray
     from nav_msgs.msg import Odometry
     from rclpy.qos import QoSProfile, qos_profile_sensor_data
-    from sensor_msgs.msg import Image, PointCloud2
+    from sensor_msgs.msg import CameraInfo, Image, PointCloud2
     from stereo_msgs.msg import DisparityImage
     street = egosgm.SyntheticSequence(**STREET)
     truth = street.render(0).left_disparity
     rclpy.init()
     node = rclpy.create_node("subscriber")
-    told = dict(stamps=[], latencies_ms=[], depth=0, variance=0, reason=[], points2=0, odom=[], tf=[], bad=[], diagnostics=[])
+    told = dict(stamps=[], latencies_ms=[], depth=0, variance=0, camera_info=0, reason=[], points2=0, odom=[], tf=[], bad=[], diagnostics=[])
 
     def on_disparity(message):
         now = node.get_clock().now().nanoseconds
@@ -117,7 +124,7 @@ def subscribe(frames, seconds, reliable=True, tf=False):
 
     qos = QoSProfile(depth=100) if reliable else qos_profile_sensor_data
     node.create_subscription(DisparityImage, "disparity", on_disparity, qos)
-    for kind, topic in ((Image, "depth"), (Image, "variance"), (PointCloud2, "points2")):
+    for kind, topic in ((Image, "depth"), (Image, "variance"), (PointCloud2, "points2"), (CameraInfo, "camera_info")):
         node.create_subscription(kind, topic, count(topic), qos)
     node.create_subscription(Image, "reason", on_reason, qos)
     node.create_subscription(Odometry, "odom", on_odom, QoSProfile(depth=100))
@@ -143,11 +150,11 @@ def subscribe(frames, seconds, reliable=True, tf=False):
 
 class Node(unittest.TestCase):
     def run_three(self, frames, rate, seconds=None, parameters=(), reliable=True, right_width=WIDTH, tf=False, listens_to_tf=False,
-                  component=None):
-        environment = {**os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+                  component=None, waits=True):
+        environment = {"FASTDDS_BUILTIN_TRANSPORTS": "LARGE_DATA", **os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
                        "PYTHONPATH": f"{PACKAGE}:{os.environ.get('PYTHONPATH', '')}"}
         seconds = seconds or 60 + 2 * frames / rate
-        ros = ["-p", "reliable:=true", "-p", "queue_size:=100"] if reliable else []
+        ros = ["-p", "reliable:=true"] if reliable else []
         ros += [word for p in parameters for word in ("-p", p)]
         start = [sys.executable, "-B", __file__]
         program = [component] if component else [sys.executable, "-B", "-m", "egosgm_ros.node"]
@@ -155,7 +162,7 @@ class Node(unittest.TestCase):
         subscriber = subprocess.Popen([*start, "subscribe", json.dumps(dict(frames=frames, seconds=seconds, reliable=reliable, tf=listens_to_tf))],
                                       env=environment, stdout=subprocess.PIPE, text=True)
         publisher = subprocess.Popen([*start, "publish", json.dumps(dict(frames=frames, rate=rate, right_width=right_width, reliable=reliable, tf=tf,
-                                                                          tells=not component))],
+                                                                          tells=not component, waits=waits))],
                                      env=environment)
         try:
             output, _ = subscriber.communicate(timeout=seconds + 60)
@@ -170,18 +177,18 @@ class Node(unittest.TestCase):
     def test_nothing_is_lost_and_the_maps_are_right(self):
         told = self.run_three(FRAMES, RATE)
         latencies, last = np.array(told["latencies_ms"]), told["active"][-1]
-        print(f"{len(told['stamps'])} of {FRAMES} frames at {RATE} Hz, {np.median([float(values['rate_hz']) for values in told['active']]):.1f} Hz matched; latency: median {np.median(latencies):.1f} ms, 95 % {np.percentile(latencies, 95):.1f} ms; "
+        print(f"{len(told['stamps'])} of {FRAMES} frames, {np.median([float(values['rate_hz']) for values in told['active']]):.1f} Hz matched; latency: median {np.median(latencies):.1f} ms, 95 % {np.percentile(latencies, 95):.1f} ms; "
               f"last diagnostics: {last}")
         self.assertEqual(len(told["stamps"]), FRAMES)
         self.assertEqual(told["stamps"], sorted(set(told["stamps"])))
-        for name in ("depth", "variance", "points2"):
+        for name in ("depth", "variance", "points2", "camera_info"):
             self.assertEqual(told[name], FRAMES, name)
         self.assertEqual([len(told["odom"]), len(told["reason"])], [FRAMES, FRAMES])
         self.assertEqual({encoding for encoding, _ in told["reason"]}, {"mono8"})
         self.assertGreater(max(largest for _, largest in told["reason"]), 0)
         self.assertLess(max(told["bad"]), 0.1)
         self.assertAlmostEqual(told["f_t"] / told["expected_f_t"], 1, places=5)
-        self.assertEqual([last[name] for name in ("lost_in_queue", "lost_on_the_way", "unpaired_left", "unpaired_right")], ["0"] * 4)
+        self.assertEqual([last[name] for name in ("replaced", "lost_on_the_way", "unpaired_left", "unpaired_right")], ["0"] * 4)
         self.assertLess(abs(float(last["vertical_offset_px"])), 0.5)
 
     @unittest.skipUnless("EGOSGM_ROS_COMPONENT" in os.environ, "no component is named")
@@ -194,23 +201,25 @@ class Node(unittest.TestCase):
 
     def test_what_is_too_fast_is_dropped_and_told(self):
         frames = 150
-        told = self.run_three(frames, 100.0, reliable=False, parameters=("queue_size:=2",), seconds=40)
+        told = self.run_three(frames, 100.0, reliable=False, seconds=40, waits=False)
         last = told["active"][-1]
-        lost = int(last["lost_in_queue"]) + int(last["lost_on_the_way"]) + int(last["unpaired_left"]) + int(last["unpaired_right"])
+        lost = int(last["replaced"]) + int(last["lost_on_the_way"]) + int(last["unpaired_left"]) + int(last["unpaired_right"])
         print(f"of {frames} frames at once: {last}")
         self.assertGreater(int(last["frames"]), 0)
         self.assertLess(int(last["frames"]), frames)
         self.assertGreaterEqual(int(last["frames"]) + lost, frames)  # nothing goes untold
-        self.assertTrue(any(level == 1 and "dropped" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
+        messages = " ".join(message for level, message, _ in told["diagnostics"] if level == 1)
+        self.assertEqual("LARGE_DATA" in messages, int(last["lost_on_the_way"]) > 0, told["diagnostics"])
+        self.assertEqual("replaced by newer" in messages, int(last["replaced"]) > 0, told["diagnostics"])
 
     def test_wrong_images_are_told_on_diagnostics(self):
-        told = self.run_three(5, 5.0, right_width=WIDTH - 8, seconds=30)
+        told = self.run_three(5, 5.0, right_width=WIDTH - 8, seconds=30, waits=False)
         self.assertEqual(told["stamps"], [])
         self.assertTrue(any(level == 2 and "632" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
 
     def test_a_silent_camera_is_told(self):
         """Of the other one few images are kept, however long it lasts."""
-        told = self.run_three(90, 30.0, right_width=0, seconds=30)
+        told = self.run_three(90, 30.0, right_width=0, seconds=30, waits=False)
         self.assertTrue(any(level == 1 and "right/image_rect is silent" in message for level, message, _ in told["diagnostics"]), told["diagnostics"])
         self.assertGreater(max(int(values["unpaired_left"]) for _, _, values in told["diagnostics"] if "unpaired_left" in values), 0)
 
@@ -290,12 +299,137 @@ class Parameters(unittest.TestCase):
         node.set_parameters([Parameter("p2", value=170)])
         self.assert_runs_with(node, "paper", p2=170)
 
+    def test_whole_numbers_are_texts_and_fractions_too(self):
+        node = self.node(device=0, max_skew_ms=5, gate_px=3)
+        self.assertEqual([repr(node._value(name)) for name in ("device", "max_skew_ms", "gate_px")], ["'0'", "5.0", "3.0"])
+
     def test_what_cannot_work_is_not_configured(self):
         from rclpy.lifecycle import TransitionCallbackReturn
-        for parameters in (dict(queue_size=0), dict(max_skew_ms=-1.0), dict(preset="papr"), dict(p2=-1)):
+        for parameters in (dict(max_skew_ms=-1.0), dict(preset="papr"), dict(p2=-1), dict(max_depth_sigma=0.0), dict(point_reasons="trused")):
             node = self.node(**parameters)
             self.assertEqual(node.trigger_configure(), TransitionCallbackReturn.FAILURE, parameters)
             self.assertIn(next(iter(parameters)), node._problem)
+
+    def test_points_are_certain_of_chosen_reasons_and_coloured(self):
+        import egosgm
+        from egosgm.ros_images import rgb_of
+        from egosgm_ros.messages import points_of
+        from sensor_msgs.msg import Image
+        from std_msgs.msg import Header
+        node = self.node(max_depth_sigma=0.1, point_reasons="trusted, flat")
+        node.trigger_configure()
+        depth = np.array([[2.0, 2.0, 2.0, np.nan]], np.float32)
+        flat, ambiguous = (egosgm.REASONS.index(name) for name in ("flat", "ambiguous"))
+        maps = type("Maps", (), dict(reason=np.array([[0, flat, ambiguous, 0]], np.uint8)))
+        variance = np.array([[0.03, 0.05, 0.01, 0.01]], np.float32)  # a sigma of 0.2 m is the bound
+        np.testing.assert_array_equal(node._certain(depth, variance, maps), [[2, np.nan, np.nan, np.nan]])
+        np.testing.assert_array_equal(node._certain(depth, variance * 0.1, maps), [[2, 2, np.nan, np.nan]])
+        for encoding, colours in (("rgb8", [1, 2, 3]), ("bgra8", [3, 2, 1, 9])):
+            image = Image(height=1, width=4, step=20, encoding=encoding, data=array.array("B", (colours * 4 + [7] * 20)[:20]))
+            cloud = points_of(Header(), depth, np.full((1, 4), 5, np.uint8), rgb_of(image), egosgm.Calibration(100, 100, 2, 0, 0.1))
+            points = np.frombuffer(cloud.data, np.float32).reshape(4, -1)
+            self.assertEqual([field.name for field in cloud.fields], ["x", "y", "z", "intensity", "rgb"])
+            self.assertEqual(cloud.row_step, 4 * cloud.point_step)
+            self.assertEqual(set(points[:, 4].copy().view(np.uint32)), {0x010203})
+            np.testing.assert_allclose(points[0, :4], [-0.04, 0, 2, 5], rtol=1e-6)
+        self.assertIsNone(rgb_of(Image(encoding="mono8")))
+
+    def test_what_is_nearer_than_the_range_is_told(self):
+        import egosgm
+        street = egosgm.SyntheticSequence(**STREET)
+        frame, told = street.render(0), []
+        for disparities in (16, 128):
+            node = self.node(disparities=disparities)
+            node._pipeline = type("Pipeline", (), dict(options=dict(min_disparity=0, disparities=disparities)))
+            warned = []
+            node.get_logger().warning = warned.append
+            for _ in range(2):
+                node._look_beyond(frame.left, frame.right)
+            told.append((node._nearer, len(warned)))
+            node.destroy_node()
+        self.assertRegex(told[0][0], r"^\d+ % of the image is nearer than the range: disparities \d+$")
+        self.assertEqual([told[0][1], *told[1]], [1, "", 0])
+
+    def test_the_newest_pair_comes_next(self):
+        """Whatever waited meanwhile."""
+        from sensor_msgs.msg import Image
+        node = self.node(reliable=True)
+        node.trigger_configure()
+        node._is_active = True
+        for i in range(1, 4):
+            image = Image()
+            image.header.stamp.sec = i
+            for index in (0, 1):
+                node._on_image(index, image)
+        self.assertEqual([image.header.stamp.sec for image in node._newest], [3, 3])
+        self.assertEqual(node._replaced, 2)
+        processed = []
+        node._process = lambda left, right: (processed.append(left.header.stamp.sec), setattr(node, "_is_active", False))
+        node._work()
+        self.assertEqual((processed, node._newest), ([3], None))
+
+    def test_each_kind_of_loss_has_its_own_words(self):
+        node = self.node()
+        node.trigger_configure()
+        node._is_active = True
+        said, warned = [], []
+        node._diagnostics.publish = lambda message: said.append(message.status[0].message)
+        node._listened_to = lambda: set()
+        node._warn = lambda cause, text: warned.append(text)
+        for on_the_way, replaced in ((3, 0), (0, 2), (4, 1), (0, 0)):
+            node._lost_on_the_way += on_the_way
+            node._replaced += replaced
+            node._count += 1
+            node._tell()
+        for index, (on_the_way, replaced) in enumerate((("3 images lost on the way", ""), ("", "2 pairs replaced"), ("4 images lost on the way", "1 pairs replaced"))):
+            self.assertIn(on_the_way, said[index])
+            self.assertIn(replaced, said[index])
+        self.assertEqual([("LARGE_DATA" in text, "replaced by newer" in text) for text in said], [(True, False), (False, True), (True, True), (False, False)])
+        self.assertEqual(len(warned), 4)
+
+    def test_compressed_images_are_matched_and_the_info_goes_with_them(self):
+        import cv2
+        from sensor_msgs.msg import CameraInfo, CompressedImage
+        node = self.node(compressed=True, disparities=16, temporal=False)
+        node.trigger_configure()
+        self.assertEqual([subscription.topic_name for subscription in node._inputs],
+                         ["/left/camera_info", "/left/image_rect/compressed", "/right/camera_info", "/right/image_rect/compressed"])
+        for side in (0, 1):
+            info = CameraInfo(height=32, width=64, distortion_model="plumb_bob", d=[0.0] * 5)
+            info.k = [100.0, 0, 32.0, 0, 100.0, 16.0, 0, 0, 1.0]
+            info.p = [100.0, 0, 32.0, -100.0 * side, 0, 100.0, 16.0, 0, 0, 0, 1.0, 0]
+            node._on_info(("left", "right")[side], info)
+        sent = []
+        node._listened_to = lambda: {"camera_info", "depth", "points2"}
+        for name in node._listened_to():
+            node._outputs[name].publish = sent.append
+        grey = np.random.default_rng(1).integers(0, 256, (32, 64), dtype=np.uint8)
+        image = CompressedImage(format="mono8; png compressed", data=array.array("B", cv2.imencode(".png", grey)[1].tobytes()))
+        image.header.stamp.sec, image.header.frame_id = 7, "left_optical"
+        node._process(image, image)
+        self.assertEqual(sorted(type(message).__name__ for message in sent), ["CameraInfo", "Image", "PointCloud2"])
+        self.assertEqual({(message.header.stamp.sec, message.header.frame_id, message.width) for message in sent}, {(7, "left_optical", 64)})
+        self.assertEqual([message.p[0] for message in sent if isinstance(message, CameraInfo)], [100.0])
+
+    def test_stamps_that_do_not_pair_are_told_once_a_minute(self):
+        from sensor_msgs.msg import Image
+        node = self.node()
+        node.trigger_configure()
+        node._is_active = True
+        node._listened_to = lambda: set()
+        warned = []
+        node.get_logger().warning = warned.append
+        for i in range(3):
+            for index in (0, 1):
+                image = Image()
+                image.header.stamp.sec, image.header.stamp.nanosec = i, 385000 * index
+                node._on_image(index, image)
+            node._waits_since = time.monotonic() - 1 - i
+            node._tell()
+        self.assertEqual(warned, ["no pairs of images: the nearest stamps differ by 0.385 ms, max_skew_ms is 0.0"])
+        node._warned_at = {cause: at - 60 for cause, at in node._warned_at.items()}
+        node._tell()
+        self.assertEqual(len(warned), 2)
 
     def test_infos_that_change_and_the_range_that_messages_tell(self):
         from sensor_msgs.msg import CameraInfo, Image
@@ -317,6 +451,80 @@ class Parameters(unittest.TestCase):
             node._process(image, image)
         self.assertEqual([message.f for message in sent], [100, 100, 101, 101])
         self.assertEqual([(message.min_disparity, message.max_disparity) for message in sent], [(4, 19)] * 4)
+
+
+class Odometry(unittest.TestCase):
+    def setUp(self):
+        sys.path.insert(0, str(PACKAGE))
+
+    @staticmethod
+    def transform(xi):
+        import cv2
+        result = np.eye(4)
+        result[:3, :3], result[:3, 3] = cv2.Rodrigues(np.array(xi[3:], float))[0], xi[:3]
+        return result
+
+    def test_a_path_is_as_uncertain_as_its_motions_make_it(self):
+        """Against poses of motions that are disturbed at random."""
+        import egosgm
+        from egosgm_ros.messages import Path, odometry_of
+        from std_msgs.msg import Header
+        random = np.random.default_rng(1)
+        moved = self.transform([0.1, 0.05, -1.0, 0.05, 0.3, -0.1])
+        sigmas = np.array([0.01, 0.02, 0.03, 0.004, 0.01, 0.006])
+        path, ends = Path(), []
+        for _ in range(5):
+            path.add(egosgm.Motion(moved, np.diag(sigmas**2)), 0.1)
+        for _ in range(3000):
+            pose = np.eye(4)
+            for _ in range(5):
+                pose = pose @ np.linalg.inv(self.transform(random.normal(size=6) * sigmas) @ moved)
+            ends.append(pose[[2, 0, 1], 3] * [1, -1, -1])  # x forward, y left, z up
+        message = odometry_of(Header(), "odom", path)
+        covariance = np.reshape(message.pose.covariance, (6, 6))
+        np.testing.assert_allclose(covariance[:3, :3], np.cov(np.array(ends).T), atol=0.08 * covariance[:3, :3].max())
+        self.assertTrue((np.linalg.eigvalsh(covariance) > 0).all())
+        path.add(None, 0.1)
+        self.assertGreater(np.trace(np.reshape(odometry_of(Header(), "odom", path).twist.covariance, (6, 6))), 100)  # as uncertain as it is large
+
+    def test_the_twist_is_the_motion_in_its_time(self):
+        import egosgm
+        from egosgm_ros.messages import Path, odometry_of
+        from std_msgs.msg import Header
+        path = Path()
+        # The camera goes 0.2 m ahead and turns to the left by 0.1 rad in half a second.
+        path.add(egosgm.Motion(self.transform([0, 0, -0.2, 0, 0.1, 0]), np.diag([1, 4, 9, 16, 25, 36.0])), 0.5)
+        message = odometry_of(Header(), "odom", path)
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        np.testing.assert_allclose([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z], [0.4, 0, 0, 0, 0, 0.2], atol=1e-9)
+        np.testing.assert_allclose(np.diag(np.reshape(message.twist.covariance, (6, 6))), 4 * np.array([9, 1, 4, 36, 16, 25.0]))
+
+
+class Started(unittest.TestCase):
+    """The node's process: what it says, and how it ends."""
+
+    def start(self, *parameters):
+        environment = {**os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "PYTHONPATH": f"{PACKAGE}:{os.environ.get('PYTHONPATH', '')}"}
+        words = [word for parameter in parameters for word in ("-p", parameter)]
+        node = subprocess.Popen([sys.executable, "-B", "-W", "ignore", "-m", "egosgm_ros.node", "--ros-args", "-r", "__ns:=/stereo", *words], env=environment,
+                                stderr=subprocess.PIPE, text=True)
+        self.addCleanup(lambda: (node.kill(), node.wait(), node.stderr.close()))
+        return node
+
+    def test_what_cannot_work_ends_it_with_one_line(self):
+        for parameter, words in (("disparity:=64", " or disparities?"), ("disparities:=64.0", "disparities"), ("preset:=papr", "papr"),
+                                 ("device:=no such one", "no such one")):
+            node = self.start(parameter)
+            _, said = node.communicate(timeout=60)
+            self.assertEqual(node.returncode, 1, said)
+            self.assertEqual(len(said.splitlines()), 1, said)
+            self.assertIn(words, said)
+
+    def test_it_tells_what_it_waits_for(self):
+        node = self.start()
+        self.assertIn("active: waits for /stereo/left/camera_info /stereo/left/image_rect /stereo/right/camera_info /stereo/right/image_rect (best effort)",
+                      node.stderr.readline())
+        self.assertIn("no pairs of images", node.stderr.readline())
 
 
 class Files(unittest.TestCase):
@@ -362,7 +570,7 @@ class Files(unittest.TestCase):
             source = launch.launch_description_sources.PythonLaunchDescriptionSource(str(PACKAGE / "launch/egosgm.launch.py"))
             context = launch.LaunchContext()
             description = source.get_launch_description(context)
-        given = dict(device="0", max_skew_ms="3", queue_size="7", reliable="true", motion_frame="odom", namespace="/stereo")
+        given = dict(device="0", max_skew_ms="3", reliable="true", motion_frame="odom", namespace="/stereo")
         context.launch_configurations.update(given)
         for entity in description.entities:
             if isinstance(entity, launch.actions.DeclareLaunchArgument):
@@ -370,7 +578,7 @@ class Files(unittest.TestCase):
         node, viewer = (entity for entity in description.entities if isinstance(entity, launch_ros.actions.Node))
         self.assertFalse(viewer.condition.evaluate(context))
         parameters = launch_ros.utilities.evaluate_parameters(context, node._Node__parameters)[0]
-        self.assertEqual(parameters, dict(device="0", preset="default", max_skew_ms=3.0, queue_size=7, reliable=True, motion_frame="odom", publish_tf=False))
+        self.assertEqual(parameters, dict(device="0", preset="default", max_skew_ms=3.0, reliable=True, motion_frame="odom", publish_tf=False))
         sys.path.insert(0, str(PACKAGE))
         from egosgm_ros.node import OWN
         for name, value in parameters.items():

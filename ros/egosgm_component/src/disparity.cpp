@@ -55,8 +55,7 @@ struct Matching {
 
 class Disparity : public rclcpp::Node {
  public:
-  /// Parameters: the options of the pipeline by their names, `device`, and `reliable` with `queue_size` for topics that
-  /// lose nothing while the queue holds.
+  /// Parameters: the options of the pipeline by their names, `device`, and `reliable` for reliable topics.
   explicit Disparity(const rclcpp::NodeOptions& options)
       : Node("egosgm", options), device_(egosgm::Device::select(parameter("device", ""))) {
     egosgm::set_option(options_, "preset", parameter("preset", "default"));  // first: the others begin with its values
@@ -65,15 +64,17 @@ class Disparity : public rclcpp::Node {
     }
 
     rclcpp::QoS qos = rclcpp::SensorDataQoS();
-    if (parameter("reliable", "false") == "true") qos = rclcpp::QoS(std::stoi(parameter("queue_size", "4")));
+    if (parameter("reliable", "false") == "true") qos.reliable();
+    const rclcpp::QoS newest = rclcpp::QoS(qos).keep_last(1);  // what waits while a pair is matched is replaced
     disparity_ = create_publisher<DisparityImage>("disparity", qos);
     depth_ = create_publisher<Image>("depth", qos);
     for (const int side : {0, 1}) {
       const std::string name = side == 0 ? "left" : "right";
       infos_in_.push_back(create_subscription<CameraInfo>(
           name + "/camera_info", qos, [this, side](CameraInfo::ConstSharedPtr info) { on_info(side, *info); }));
-      images_in_.push_back(create_subscription<Image>(
-          name + "/image_rect", qos, [this, side](Image::ConstSharedPtr image) { on_image(side, std::move(image)); }));
+      images_in_.push_back(
+          create_subscription<Image>(name + "/image_rect", newest,
+                                     [this, side](Image::ConstSharedPtr image) { on_image(side, std::move(image)); }));
     }
   }
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps, points and poses as messages."""
 import array
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 from geometry_msgs.msg import TransformStamped
@@ -29,24 +29,80 @@ def disparity_of(header: Any, disparity: Any, calibration: egosgm.Calibration, o
     return message
 
 
-def points_of(header: Any, depth: Any, grey: Any, calibration: egosgm.Calibration) -> PointCloud2:
-    """In rows and columns as the image, NaN where there is no depth."""
+def points_of(header: Any, depth: Any, grey: Any, rgb: Any, calibration: egosgm.Calibration) -> PointCloud2:
+    """In rows and columns as the image, NaN where there is no depth. rgb: None of grey images."""
     height, width = depth.shape
-    points = np.empty((height, width, 4), np.float32)
+    names = ("x", "y", "z", "intensity") if rgb is None else ("x", "y", "z", "intensity", "rgb")
+    points = np.empty((height, width, len(names)), np.float32)
     points[..., 0] = (np.arange(width, dtype=np.float32) - np.float32(calibration.cx)) / np.float32(calibration.fx) * depth
     points[..., 1] = (np.arange(height, dtype=np.float32)[:, None] - np.float32(calibration.cy)) / np.float32(calibration.fy) * depth
     points[..., 2] = depth
     points[..., 3] = grey
-    fields = [PointField(name=name, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, name in enumerate(("x", "y", "z", "intensity"))]
-    return PointCloud2(header=header, height=height, width=width, fields=fields, is_bigendian=False, point_step=16, row_step=16 * width,
+    if rgb is not None:  # as PCL packs it: three bytes of a float
+        points[..., 4] = (rgb.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)).astype(np.uint32).view(np.float32)
+    fields = [PointField(name=name, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, name in enumerate(names)]
+    step = 4 * len(names)
+    return PointCloud2(header=header, height=height, width=width, fields=fields, is_bigendian=False, point_step=step, row_step=step * width,
                        data=array.array("B", points.tobytes()), is_dense=False)
 
 
-def odometry_of(header: Any, frame_id: str, world_from_camera: Any) -> Odometry:
-    """Of the camera's body, x forward, y left, z up."""
+class Path:
+    """Motions added up: the camera's pose, and how uncertain it is."""
+
+    def __init__(self) -> None:
+        self.world_from_camera = np.eye(4)
+        self.covariance = np.zeros((6, 6))  # of the pose's right perturbation, (translation [m], rotation [rad]) in the camera's axes
+        self.motion: Optional[egosgm.Motion] = None
+        self.interval_s = 0.0
+
+    def add(self, motion: Optional[egosgm.Motion], interval_s: float) -> None:
+        """None: the last motion is repeated, and is as uncertain as it is large."""
+        self.interval_s = interval_s
+        if motion is None:
+            if self.motion is None:
+                return
+            moved = self.motion.current_from_previous
+            size = np.concatenate([moved[:3, 3], _rotation_vector(moved[:3, :3])])
+            motion = egosgm.Motion(moved, np.diag(size**2))
+        self.motion = motion
+        self.covariance = _moved(self.covariance, motion.current_from_previous) + motion.covariance
+        self.world_from_camera = self.world_from_camera @ np.linalg.inv(motion.current_from_previous)
+
+
+def _moved(covariance: Any, current_from_previous: Any) -> Any:
+    """By the motion's adjoint: a turn that is uncertain makes what comes after it uncertain."""
+    rotation, (x, y, z) = current_from_previous[:3, :3], current_from_previous[:3, 3]
+    adjoint = np.zeros((6, 6))
+    adjoint[:3, :3] = adjoint[3:, 3:] = rotation
+    adjoint[:3, 3:] = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) @ rotation
+    return adjoint @ covariance @ adjoint.T
+
+
+def _rotation_vector(rotation: Any) -> Any:
+    """Axis times angle [rad]."""
+    q = quaternion_of(rotation)
+    sine = np.linalg.norm(q[:3])
+    return 2 * q[:3] if sine < 1e-12 else 2 * np.arctan2(sine, q[3]) / sine * q[:3]
+
+
+def _turned(covariance: Any, rotation: Any) -> Any:
+    both = np.kron(np.eye(2), rotation)
+    return (both @ covariance @ both.T).ravel()
+
+
+def odometry_of(header: Any, frame_id: str, path: Path) -> Odometry:
+    """Of the camera's body, x forward, y left, z up; the twist is in the body's axes."""
     message = Odometry(child_frame_id="egosgm_camera")
     message.header.stamp, message.header.frame_id = header.stamp, frame_id
-    _put(BODY_FROM_OPTICAL @ world_from_camera @ BODY_FROM_OPTICAL.T, message.pose.pose.position, message.pose.pose.orientation)
+    pose, body = BODY_FROM_OPTICAL @ path.world_from_camera, BODY_FROM_OPTICAL[:3, :3]
+    _put(pose @ BODY_FROM_OPTICAL.T, message.pose.pose.position, message.pose.pose.orientation)
+    message.pose.covariance = _turned(path.covariance, pose[:3, :3])
+    if path.motion is not None and path.interval_s > 0:
+        moved, twist = path.motion.current_from_previous, message.twist.twist
+        linear, angular = (-body @ change / path.interval_s for change in (moved[:3, 3], _rotation_vector(moved[:3, :3])))
+        twist.linear.x, twist.linear.y, twist.linear.z = (float(value) for value in linear)
+        twist.angular.x, twist.angular.y, twist.angular.z = (float(value) for value in angular)
+        message.twist.covariance = _turned(path.motion.covariance / path.interval_s**2, body)
     return message
 
 

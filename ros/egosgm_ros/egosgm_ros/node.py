@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node egosgm: rectified pairs in, disparity, depth, its variance, points and odometry out, by stereo_image_proc's names."""
-import collections
+import copy
+import difflib
+import sys
 import threading
 import time
-from typing import Any, Deque, Dict, Optional, Set, Tuple
+from typing import Any, Dict, Optional, Set, Tuple
 
 import numpy as np
 import rclpy
@@ -11,22 +13,29 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image, PointCloud2
 from stereo_msgs.msg import DisparityImage
 
 import egosgm
 from egosgm.bag import Pairing
-from egosgm.ros_images import Cameras, depth_maps, grey_of, stamp_ns
-from egosgm_ros.messages import disparity_of, image_of, odometry_of, points_of, transform_of
+from egosgm.ros_images import Cameras, depth_maps, grey_of, rgb_of, stamp_ns
+from egosgm_ros.messages import Path, disparity_of, image_of, odometry_of, points_of, transform_of
 from egosgm_ros.tf_motion import TfMotion, tf2_ros
 
 SIDES = ("left", "right")
-OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2}
-OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "queue_size": 4, "reliable": False, "auto_start": True, "odom_frame": "odom",
-       "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1}
+OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2, "camera_info": CameraInfo}
+OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False, "auto_start": True, "odom_frame": "odom",
+       "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1, "compressed": False, "max_depth_sigma": 0.1, "point_reasons": ""}
+LOST_ON_THE_WAY = ("images lost on the way: the middleware's memory does not hold them: set FASTDDS_BUILTIN_TRANSPORTS=LARGE_DATA for the driver and for "
+                   "this node, or reliable:=true where the driver is reliable")
+REPLACED = "pairs replaced by newer ones: more come than are matched in time"
+PAIRS_PER_LOOK = 50  # for what is nearer than the range
+QUEUE_SIZE = 5  # of the middleware, as topics of sensors have it: the node empties it at once, and keeps the newest pair
 
 
 def _differ(a: CameraInfo, b: CameraInfo) -> bool:
@@ -39,14 +48,18 @@ class EgosgmNode(LifecycleNode):
     def __init__(self, **arguments: Any) -> None:
         super().__init__("egosgm", **arguments)
         for name, value in OWN.items():
-            self.declare_parameter(name, value)
+            self._declare(name, value)
         try:
             self._of_preset = egosgm.pipeline_options(self._value("preset"))
         except ValueError:  # which on_configure says
             self._of_preset = egosgm.pipeline_options()
         del self._of_preset["preset"]
         for name, value in self._of_preset.items():
-            self.declare_parameter(name, value)
+            self._declare(name, value)
+        for name in self._parameter_overrides:
+            if not self.has_parameter(name) and not name.startswith("qos_overrides."):
+                near = difflib.get_close_matches(name, [*OWN, *self._of_preset])
+                raise egosgm.InvalidArgument(f"no parameter named {name}" + (f": did you mean {' or '.join(near)}?" if near else ": docs/robots.md lists them"))
         self._set_later: Set[str] = set()
         self.add_on_set_parameters_callback(self._on_set)
         self._worker: Optional[threading.Thread] = None
@@ -60,19 +73,29 @@ class EgosgmNode(LifecycleNode):
         self._pipeline: Optional[egosgm.Pipeline] = None
         self._odometry: Optional[egosgm.StereoOdometry] = None
         self._made_for: Tuple[CameraInfo, ...] = ()
-        self._world_from_camera = np.eye(4)
-        self._last_motion: Any = None
-        self._queue: Deque[Tuple[Any, Any]] = collections.deque()
+        self._path = Path()
+        self._newest: Optional[Tuple[Any, Any]] = None  # the pair that is matched next
         self._wake = threading.Condition()
         self._is_active = False
-        self._count = self._lost = self._lost_on_the_way = self._frames_told = self._lost_told = 0
+        self._count = self._replaced = self._lost_on_the_way = self._frames_told = 0
+        self._lost_told = [0, 0]
         self._problem = self._doubt = ""
         self._tf: Optional[TfMotion] = None
         self._broadcaster: Any = None
         self._last_stamp: Optional[int] = None
         self._report: Optional[egosgm.FrameReport] = None
         self._latency_ms = 0.0
+        self._nearer, self._nearer_told = "", False
         self._told_at = time.monotonic()
+        self._warned_at: Dict[str, float] = {}
+        self._waits_since = self._told_at  # for a pair
+
+    def _declare(self, name: str, default: Any) -> None:
+        """A whole number is a text or a fraction where one is wanted: device:=0, max_skew_ms:=5."""
+        given = self._parameter_overrides.get(name)
+        if given is not None and type(given.value) is int and type(default) in (str, float):
+            self._parameter_overrides[name] = Parameter(name, value=type(default)(given.value))
+        self.declare_parameter(name, default)
 
     def _value(self, name: str) -> Any:
         return self.get_parameter(name).value
@@ -89,10 +112,15 @@ class EgosgmNode(LifecycleNode):
     def on_configure(self, state: Any) -> TransitionCallbackReturn:
         self._clear()
         try:
-            if self._value("queue_size") < 1:
-                raise ValueError(f"queue_size {self._value('queue_size')}: give 1 or more")
             if not self._value("max_skew_ms") >= 0:
                 raise ValueError(f"max_skew_ms {self._value('max_skew_ms')}: give 0 for equal stamps, or how far they may differ")
+            if not self._value("max_depth_sigma") > 0:
+                raise ValueError(f"max_depth_sigma {self._value('max_depth_sigma')}: give the largest sigma of a point's depth as a part of the depth, 0.1 or .inf")
+            names = self._value("point_reasons").replace(",", " ").split()
+            for name in names:
+                if name not in egosgm.REASONS:
+                    raise ValueError(f"point_reasons {name}: give some of {', '.join(egosgm.REASONS)}, or none for all")
+            self._point_reasons = [egosgm.REASONS.index(name) for name in names]
             if self._value("publish_tf") and self._value("motion_frame"):
                 raise ValueError("publish_tf and motion_frame: a motion that comes from tf is not published there again: unset one of them")
             egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 32, 0.1), 64, 64, device=self._value("device"), **self._options())
@@ -105,9 +133,9 @@ class EgosgmNode(LifecycleNode):
             self.get_logger().error(self._problem)
             return TransitionCallbackReturn.FAILURE
         self._pairing = Pairing(int(self._value("max_skew_ms") * 1e6))
-        qos = QoSProfile(depth=self._value("queue_size"), reliability=ReliabilityPolicy.RELIABLE) if self._value("reliable") else qos_profile_sensor_data
+        qos = QoSProfile(depth=QUEUE_SIZE, reliability=ReliabilityPolicy.RELIABLE) if self._value("reliable") else qos_profile_sensor_data
         self._outputs = {name: self.create_lifecycle_publisher(kind, name, qos) for name, kind in OUTPUTS.items()}
-        self._outputs["odom"] = self.create_lifecycle_publisher(Odometry, "odom", self._value("queue_size"))
+        self._outputs["odom"] = self.create_lifecycle_publisher(Odometry, "odom", QUEUE_SIZE)
         self._inputs = []
         for index, side in enumerate(SIDES):
             self._inputs.append(self.create_subscription(CameraInfo, f"{side}/camera_info", lambda info, side=side: self._on_info(side, info), qos))
@@ -116,17 +144,21 @@ class EgosgmNode(LifecycleNode):
 
     def _image_subscription(self, index: int, qos: QoSProfile) -> Any:
         """Whose middleware tells what it dropped, where it can."""
+        kind, topic = (CompressedImage, "image_rect/compressed") if self._value("compressed") else (Image, "image_rect")
         for events in (SubscriptionEventCallbacks(message_lost=self._on_lost), None):
             try:
-                return self.create_subscription(Image, f"{SIDES[index]}/image_rect", lambda image: self._on_image(index, image), qos, event_callbacks=events)
+                return self.create_subscription(kind, f"{SIDES[index]}/{topic}", lambda image: self._on_image(index, image), qos, event_callbacks=events)
             except UnsupportedEventTypeError:
                 continue
 
     def on_activate(self, state: Any) -> TransitionCallbackReturn:
         self._is_active = True
-        self._queue.clear()
+        self._newest = None
         self._worker = threading.Thread(target=self._work, daemon=True)
         self._worker.start()
+        self._waits_since = time.monotonic()
+        topics = " ".join(subscription.topic_name for subscription in self._inputs)
+        self.get_logger().info(f"active: waits for {topics} ({'reliable' if self._value('reliable') else 'best effort'})")
         return super().on_activate(state)
 
     def on_deactivate(self, state: Any) -> TransitionCallbackReturn:
@@ -165,20 +197,19 @@ class EgosgmNode(LifecycleNode):
         if not self._is_active:
             return
         for (_, left), (_, right) in self._pairing.add(index, stamp_ns(image), image):
+            self._waits_since = time.monotonic()
             with self._wake:
-                self._queue.append((left, right))
-                if len(self._queue) > self._value("queue_size"):
-                    self._queue.popleft()
-                    self._lost += 1
+                self._replaced += self._newest is not None
+                self._newest = left, right
                 self._wake.notify()
 
     def _work(self) -> None:
         while True:
             with self._wake:
-                self._wake.wait_for(lambda: self._queue or not self._is_active)
+                self._wake.wait_for(lambda: self._newest or not self._is_active)
                 if not self._is_active:
                     return
-                left, right = self._queue.popleft()
+                (left, right), self._newest = self._newest, None
             try:
                 self._process(left, right)
                 self._problem = ""
@@ -198,7 +229,7 @@ class EgosgmNode(LifecycleNode):
             self._cameras, self._made_for = Cameras(*infos, False), infos
             self._pipeline = egosgm.Pipeline(self._cameras.calibration, *self._cameras.size, device=self._value("device"), **self._options())
             self._odometry = egosgm.StereoOdometry(self._cameras.calibration)
-            self._last_stamp = self._last_motion = None
+            self._last_stamp = self._path.motion = None
         images = grey_of(left), grey_of(right)
         for side, image in zip(SIDES, images):
             if image.shape != (self._cameras.size[1], self._cameras.size[0]):
@@ -208,18 +239,31 @@ class EgosgmNode(LifecycleNode):
         if previous is not None and stamp <= previous:  # a bag that starts over
             self._pipeline.reset()
             self._odometry.reset()
-            previous = self._last_motion = None
+            previous = self._path.motion = None
         self._last_stamp = stamp
         motion = self._motion(left.header.frame_id, images, previous, stamp)
-        if motion:
-            self._last_motion = motion.current_from_previous
-        if self._last_motion is not None:  # where none was found, the last one is repeated
-            self._world_from_camera = self._world_from_camera @ np.linalg.inv(self._last_motion)
+        if previous is not None:
+            self._path.add(motion, (stamp - previous) / 1e9)
         wanted = self._listened_to()
-        maps = self._pipeline.process(*images, motion, ("disparity", "variance", "reason") if "reason" in wanted else ("disparity", "variance"))
-        self._publish(wanted, left.header, images[0], maps)
+        maps = self._pipeline.process(*images, motion, ("disparity", "variance", "reason") if "reason" in wanted or self._point_reasons else ("disparity", "variance"))
+        self._publish(wanted, left, images[0], maps)
         self._report, self._count = maps.report, self._count + 1
         self._latency_ms = self.get_clock().now().nanoseconds / 1e6 - stamp / 1e6
+        if self._count % PAIRS_PER_LOOK == 1:
+            self._look_beyond(*images)
+        if self._count == 1:
+            width, height = self._cameras.size
+            self.get_logger().info(f"first pair: {width}x{height} px, matched by {self._pipeline.device.name}")
+
+    def _look_beyond(self, left: Any, right: Any) -> None:
+        options = self._pipeline.options
+        clipped = egosgm._egosgm._clipped_by_range(left, right, options["min_disparity"], options["min_disparity"] + options["disparities"])
+        self._nearer = ""
+        if clipped:
+            self._nearer = f"{clipped[0]:.0%} of the image is nearer than the range: disparities {clipped[1]}".replace("%", " %")
+            if not self._nearer_told:
+                self.get_logger().warning(self._nearer)
+            self._nearer_told = True
 
     def _motion(self, frame_id: str, images: Any, previous: Optional[int], stamp: int) -> Optional[egosgm.Motion]:
         if self._tf is None:
@@ -231,11 +275,18 @@ class EgosgmNode(LifecycleNode):
             self._doubt = f"{error}; such frames are searched whole"
             return None
 
+    def _certain(self, depth: Any, variance: Any, maps: egosgm.Frame) -> Any:
+        """The depth of which points are made, NaN elsewhere."""
+        is_certain = variance <= (self._value("max_depth_sigma") * depth) ** 2
+        if self._point_reasons:
+            is_certain &= np.isin(maps.reason, self._point_reasons)
+        return np.where(is_certain, depth, np.float32(np.nan))
+
     def _listened_to(self) -> Set[str]:
         return {name for name, publisher in self._outputs.items() if publisher.get_subscription_count() > 0}
 
-    def _publish(self, wanted: Set[str], header: Any, grey: Any, maps: egosgm.Frame) -> None:
-        calibration = self._cameras.calibration
+    def _publish(self, wanted: Set[str], left: Any, grey: Any, maps: egosgm.Frame) -> None:
+        calibration, header = self._cameras.calibration, left.header
         if "disparity" in wanted:
             self._outputs["disparity"].publish(disparity_of(header, maps.disparity, calibration, self._pipeline.options))
         if "reason" in wanted:
@@ -247,36 +298,51 @@ class EgosgmNode(LifecycleNode):
             if "variance" in wanted:
                 self._outputs["variance"].publish(image_of(header, variance))
             if "points2" in wanted:
-                self._outputs["points2"].publish(points_of(header, depth, grey, calibration))
+                self._outputs["points2"].publish(points_of(header, self._certain(depth, variance, maps), grey, rgb_of(left), calibration))
+        if "camera_info" in wanted:
+            info = copy.copy(self._infos["left"])
+            info.header = header
+            self._outputs["camera_info"].publish(info)
         if "odom" in wanted:
-            self._outputs["odom"].publish(odometry_of(header, self._value("odom_frame"), self._world_from_camera))
+            self._outputs["odom"].publish(odometry_of(header, self._value("odom_frame"), self._path))
         if self._broadcaster:
-            self._broadcaster.sendTransform(transform_of(header, self._value("odom_frame"), self._world_from_camera))
+            self._broadcaster.sendTransform(transform_of(header, self._value("odom_frame"), self._path.world_from_camera))
+
+    def _warn(self, cause: str, text: str) -> None:
+        """At most once a minute for each cause."""
+        now = time.monotonic()
+        if now - self._warned_at.get(cause, -60) >= 60:
+            self._warned_at[cause] = now
+            self.get_logger().warning(text)
 
     def _tell(self) -> None:
         now = time.monotonic()
         rate = (self._count - self._frames_told) / max(1e-3, now - self._told_at)
-        lost = self._lost + self._lost_on_the_way
-        newly_lost = lost - self._lost_told
+        lost = [self._lost_on_the_way, self._replaced]
+        losses = [f"{count - told} {what}" for count, told, what in zip(lost, self._lost_told, (LOST_ON_THE_WAY, REPLACED)) if count > told]
         self._told_at, self._frames_told, self._lost_told = now, self._count, lost
         status = DiagnosticStatus(name=f"{self.get_fully_qualified_name()}: stereo", hardware_id="", level=DiagnosticStatus.OK, message="matching")
         gaps = self._pairing.gaps if hasattr(self, "_pairing") else None
         if self._problem:
             status.level, status.message = DiagnosticStatus.ERROR, self._problem
         elif rate == 0 and self._is_active:
-            status.level = DiagnosticStatus.WARN
-            status.message = "no pairs of images"
+            text = "no pairs of images"
             if gaps and gaps.nearest_ms is None and gaps.unpaired_left + gaps.unpaired_right > 0:
-                status.message += f": {SIDES[gaps.unpaired_left > 0]}/image_rect is silent"
-            elif gaps and gaps.unpaired_left + gaps.unpaired_right > 0:
-                status.message += f": the nearest stamps differ by {gaps.nearest_ms:.3f} ms, max_skew_ms is {self._value('max_skew_ms')}"
+                text += f": {SIDES[gaps.unpaired_left > 0]}/image_rect is silent"
+            elif gaps and gaps.nearest_ms is not None and gaps.nearest_ms > self._value("max_skew_ms"):
+                text += f": the nearest stamps differ by {gaps.nearest_ms:.3f} ms, max_skew_ms is {self._value('max_skew_ms')}"
+            if now - self._waits_since >= 2:
+                self._warn(text.partition("differ")[0], text)
+            status.level, status.message = DiagnosticStatus.WARN, "; ".join([text, *losses])
         elif not self._is_active:
             status.message = "not active"
-        elif newly_lost:
-            status.level, status.message = DiagnosticStatus.WARN, f"{newly_lost} dropped: more images come than are matched in time"
+        elif losses:
+            status.level, status.message = DiagnosticStatus.WARN, "; ".join(losses)
         elif self._doubt:
             status.level, status.message = DiagnosticStatus.WARN, self._doubt
-        values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "lost_in_queue": str(self._lost), "lost_on_the_way": str(self._lost_on_the_way)}
+        elif self._nearer:
+            status.level, status.message = DiagnosticStatus.WARN, self._nearer
+        values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "replaced": str(self._replaced), "lost_on_the_way": str(self._lost_on_the_way)}
         if self._is_active:
             values["listened_to"] = " ".join(sorted(self._listened_to()))
         if gaps:
@@ -285,25 +351,35 @@ class EgosgmNode(LifecycleNode):
             values.update(density=f"{self._report.density:.4f}", search_fraction=f"{self._report.search_fraction:.4f}",
                           vertical_offset_px=f"{self._report.vertical_offset_px:.3f}", latency_ms=f"{self._latency_ms:.1f}",
                           device=self._pipeline.device.name)
+        for loss in losses:
+            self._warn(loss.partition(" ")[2], loss)
         status.values = [KeyValue(key=key, value=value) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
 
-def main() -> None:
+def main() -> int:
     rclpy.init()
-    node = EgosgmNode()
-    if node._value("auto_start") and node.trigger_configure() == TransitionCallbackReturn.SUCCESS:
-        node.trigger_activate()
     try:
-        rclpy.spin(node)
+        node = EgosgmNode()
+    except (ParameterException, ValueError) as error:
+        rclpy.try_shutdown()
+        print(f"egosgm_node: {error}", file=sys.stderr)
+        return 1
+    configured = not node._value("auto_start") or node.trigger_configure() == TransitionCallbackReturn.SUCCESS  # which says why not
+    try:
+        if configured:
+            if node._value("auto_start"):
+                node.trigger_activate()
+            rclpy.spin(node)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     node._stop()
     node.destroy_node()
     rclpy.try_shutdown()
+    return 0 if configured else 1
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
