@@ -87,6 +87,16 @@ def expect_new_file(option: str, file: pathlib.Path) -> None:
     _egosgm._expect_writable(os.fspath(file))
 
 
+def expect_new_folder(option: str, folder: pathlib.Path) -> None:
+    """Refuses what is neither new nor an empty folder."""
+    if not folder.is_symlink() and not folder.exists():
+        return
+    if not folder.is_dir():
+        raise _egosgm.InvalidArgument(f"{option} {folder}: is no folder: give a new folder")
+    if any(folder.iterdir()):
+        raise _egosgm.InvalidArgument(f"{option} {folder}: is not empty: give a new folder")
+
+
 def comparison_parser(command: str, description: str, estimate_help: str, truth_help: str) -> Parser:
     """COMMAND ESTIMATE TRUTH, or --estimate and --truth, or one of each kind; and --frames."""
     parser = Parser(command, usage=f"egosgm {command} [OPTIONS] [ESTIMATE] [TRUTH]", description=description)
