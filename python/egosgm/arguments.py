@@ -28,10 +28,14 @@ class Parser(argparse.ArgumentParser):
             name = unknown[0].split("=")[0]
             near = difflib.get_close_matches(name, self._option_string_actions, 1)
             kind = "unknown option" if name.startswith("-") else "unexpected argument"
+            if pathlib.Path(name).suffix and pathlib.Path(name).is_file():
+                self.error(f'{kind} "{name}", a file: did the shell expand a pattern? quote it: \'*.png\'')
             self.error(f'{kind} "{name}"' + (f": did you mean {near[0]}?" if near else ""))
         for name, value in vars(given).items():
             if value == "":
-                raise _egosgm.InvalidArgument(f'{name.replace("_", "-")} "": is empty: give a value, or leave it out')
+                shown = name.replace("_", "-")
+                shown = f"--{shown}" if f"--{shown}" in self._option_string_actions else shown
+                raise _egosgm.InvalidArgument(f'{shown} "": is empty: give a value, or leave it out')
         return given
 
 
