@@ -23,6 +23,5 @@ Command add_synth(CLI::App& program);
 Command add_odometry(CLI::App& program);
 Command add_tune(CLI::App& program);
 Command add_doctor(CLI::App& program);
-Command add_rectify(CLI::App& program);
 
 }  // namespace egosgm::app

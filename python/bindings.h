@@ -9,7 +9,7 @@ void bind_errors(pybind11::module_& module);
 void bind_values(pybind11::module_& module);
 void bind_pipeline(pybind11::module_& module);
 void bind_odometry(pybind11::module_& module);
-void bind_rectification(pybind11::module_& module);
+void bind_examination(pybind11::module_& module);
 void bind_files(pybind11::module_& module);
 void bind_evaluation(pybind11::module_& module);
 

@@ -9,6 +9,7 @@
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/file_io.h"
 #include "host/vision/frame_panels.h"
+#include "host/vision/image_pairs.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
@@ -126,6 +127,18 @@ void write_new_file(const path& file, const py::bytes& bytes) {
   vision::write_file(file, static_cast<std::string>(bytes));
 }
 
+void write_new_calibration(const path& file, const Calibration& calibration) {
+  const vision::KeepFiles others;
+  vision::write_calibration(file, calibration);
+}
+
+/// (pairs of files, files without one of the other camera).
+py::tuple find_pairs(const std::string& left, const std::string& right, bool by_order) {
+  const vision::ImagePairs found =
+      vision::find_pairs(left, right, by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
+  return py::make_tuple(py::cast(found.pairs), py::cast(found.alone));
+}
+
 std::int64_t write_disparity(const path& file, const py::object& map) {
   py::array keep;
   return vision::write_disparity(file, map_of(map, "disparity", keep));
@@ -145,6 +158,12 @@ void bind_files(py::module_& module) {
       .def("layers", &layers_of_run, py::arg("folder"), py::arg("name"), py::arg("left"), py::arg("truth"));
   module.def("_poses_of_frames", &poses_of_frames, py::arg("frames"), py::arg("numbers"), py::arg("poses"));
   module.def("_write_new_file", &write_new_file, py::arg("file"), py::arg("bytes"));
+  module.def("_write_new_calibration", &write_new_calibration, py::arg("file"), py::arg("calibration"));
+  module.def("_find_pairs", &find_pairs, py::arg("left"), py::arg("right"), py::arg("by_order"));
+  module.def("_find_images", &vision::find_images, py::arg("pattern"));
+  module.def(
+      "_read_stored_image", [](const path& file) { return array_of(vision::read_stored_image(file)); },
+      py::arg("file"));
   module.def("_expect_writable", &vision::expect_writable, py::arg("file"));
   module.def("_is_stream", &vision::is_stream, py::arg("file"));
   module.def(

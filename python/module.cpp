@@ -40,7 +40,7 @@ PYBIND11_MODULE(_egosgm, module) {
   bind_values(module);
   bind_pipeline(module);
   bind_odometry(module);
-  bind_rectification(module);
+  bind_examination(module);
   bind_files(module);
   bind_evaluation(module);
 }

@@ -8,7 +8,7 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
-#include "egosgm/vision/rectification.h"
+#include "host/vision/pair_matches.h"
 
 namespace egosgm::vision {
 

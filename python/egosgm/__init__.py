@@ -25,14 +25,15 @@ _cpu_driver.show()  # before the library is loaded, which asks the loader
 from . import _egosgm
 from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
-from .calibrations import read_calibration
+from .calibrations import read_calibration, read_euroc_rig, read_opencv_rig
 from .drive import Drive, DriveFrame, run
 from .matcher import Matcher
 from .pose_evaluation import MotionError, PoseEvaluation, SegmentError, evaluate_poses
+from .rectification import Rectification, StereoRig
 from .values import as_dataclass as _as_dataclass
 from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video, move_map
 
-__all__ = ["__version__", "read_calibration", "Drive", "DriveFrame", "Matcher", "run", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
+__all__ = ["__version__", "read_calibration", "read_euroc_rig", "read_opencv_rig", "Rectification", "StereoRig", "Drive", "DriveFrame", "Matcher", "run", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 

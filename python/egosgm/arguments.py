@@ -28,10 +28,14 @@ class Parser(argparse.ArgumentParser):
             name = unknown[0].split("=")[0]
             near = difflib.get_close_matches(name, self._option_string_actions, 1)
             kind = "unknown option" if name.startswith("-") else "unexpected argument"
+            if pathlib.Path(name).suffix and pathlib.Path(name).is_file():
+                self.error(f'{kind} "{name}", a file: did the shell expand a pattern? quote it: \'*.png\'')
             self.error(f'{kind} "{name}"' + (f": did you mean {near[0]}?" if near else ""))
         for name, value in vars(given).items():
             if value == "":
-                raise _egosgm.InvalidArgument(f'{name.replace("_", "-")} "": is empty: give a value, or leave it out')
+                shown = name.replace("_", "-")
+                shown = f"--{shown}" if f"--{shown}" in self._option_string_actions else shown
+                raise _egosgm.InvalidArgument(f'{shown} "": is empty: give a value, or leave it out')
         return given
 
 
@@ -85,6 +89,16 @@ def expect_new_file(option: str, file: pathlib.Path) -> None:
     if file.is_file() and not _egosgm._is_stream(os.fspath(file)):
         raise _egosgm.InvalidArgument(f"{option} {file}: is there already: give another name, or remove it first")
     _egosgm._expect_writable(os.fspath(file))
+
+
+def expect_new_folder(option: str, folder: pathlib.Path) -> None:
+    """Refuses what is neither new nor an empty folder."""
+    if not folder.is_symlink() and not folder.exists():
+        return
+    if not folder.is_dir():
+        raise _egosgm.InvalidArgument(f"{option} {folder}: is no folder: give a new folder")
+    if any(folder.iterdir()):
+        raise _egosgm.InvalidArgument(f"{option} {folder}: is not empty: give a new folder")
 
 
 def comparison_parser(command: str, description: str, estimate_help: str, truth_help: str) -> Parser:

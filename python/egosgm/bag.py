@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from . import _egosgm, calibrations
 from .bag_parts import Parts
+from .rectification import StereoRig
 from .ros_images import BODY_FROM_OPTICAL, Cameras, are_raw, grey_of, is_set, needs, quaternion_of, rotation_of, stamp_ns
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
@@ -242,7 +243,7 @@ class Bag:
             if self.infos:
                 self._first_infos[topic] = _values_of(found[-1])
         if self._rig_or_calibration is not None:
-            self.is_rectified_here = isinstance(self._rig_or_calibration, _egosgm.StereoRig)
+            self.is_rectified_here = isinstance(self._rig_or_calibration, StereoRig)
             height, width = grey_of(found[0]).shape
             return Cameras.of_calibration(self._rig_or_calibration, width, height)
         self.is_rectified_here = are_raw(found[0], self.images[0]) if self._rectify is None else self._rectify

@@ -2,55 +2,36 @@
 """Calibrations as other programs write them, told apart by what they hold: the one place that reads them."""
 import dataclasses
 import json
+import math
 import os
 import pathlib
 import re
-from typing import Any, Callable, Dict, List, Optional, Tuple, Union
+import xml.etree.ElementTree as ElementTree
+from typing import Any, Dict, List, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
+from .rectification import StereoRig
 
 _Path = Union[str, "os.PathLike[str]"]
 _Matrix = NDArray[np.float64]
 
 
-@dataclasses.dataclass
-class Rig:
-    """Two raw cameras, as StereoRig; this one can be written."""
-
-    left_matrix: _Matrix
-    left_distortion: _Matrix
-    right_matrix: _Matrix
-    right_distortion: _Matrix
-    R: _Matrix
-    T: _Matrix
-    is_fisheye: bool = False
-    size: Optional[Tuple[int, int]] = None
-
-    def stereo_rig(self) -> _egosgm.StereoRig:
-        return _egosgm.StereoRig(self.left_matrix, self.left_distortion, self.right_matrix, self.right_distortion, self.R, self.T,
-                                 self.is_fisheye, self.size)
-
-    def rectified(self) -> Optional[_egosgm.Calibration]:
-        """The calibration of images that need no rectification; None where they need one."""
-        k, other = self.left_matrix, self.right_matrix
-        is_level = np.allclose(self.R, np.eye(3), atol=1e-6) and np.allclose(self.T[1:], 0, atol=1e-6 * abs(self.T[0]))
-        if np.any(self.left_distortion) or np.any(self.right_distortion) or not is_level or not self.T[0] < 0:
-            return None
-        if not np.allclose([k[0, 0], k[1, 1], k[1, 2]], [other[0, 0], other[1, 1], other[1, 2]], rtol=1e-6):
-            return None
-        return _egosgm.Calibration(k[0, 0], k[1, 1], k[0, 2], k[1, 2], -self.T[0], other[0, 2] - k[0, 2])
-
-    def text(self) -> str:
-        """As `egosgm rectify` reads it."""
-        values = {"K1": self.left_matrix, "D1": self.left_distortion, "K2": self.right_matrix, "D2": self.right_distortion, "R": self.R,
-                  "T": self.T, **({"image_size": np.array(self.size)} if self.size else {})}
-        return json.dumps({name: np.asarray(value).tolist() for name, value in values.items()})
+_MOST_BYTES, _MOST_PARTS = 1 << 22, 2000
+Found = Union[StereoRig, _egosgm.Calibration]
 
 
-Found = Union[Rig, _egosgm.StereoRig, _egosgm.Calibration]
+def _without_rectification(rig: StereoRig) -> Optional[_egosgm.Calibration]:
+    """The calibration of images that need no rectification; None where they need one."""
+    k, other, t = np.asarray(rig.left_matrix), np.asarray(rig.right_matrix), np.ravel(rig.T)
+    is_level = np.allclose(rig.R, np.eye(3), atol=1e-6) and np.allclose(t[1:], 0, atol=1e-6 * abs(t[0]))
+    if rig.given is not None or np.any(rig.left_distortion) or np.any(rig.right_distortion) or not is_level or not t[0] < 0:
+        return None
+    if not np.allclose([k[0, 0], k[1, 1], k[1, 2]], [other[0, 0], other[1, 1], other[1, 2]], rtol=1e-6):
+        return None
+    return _egosgm.Calibration(k[0, 0], k[1, 1], k[0, 2], k[1, 2], -t[0], other[0, 2] - k[0, 2])
 
 
 def _refuse(file: pathlib.Path, text: str) -> _egosgm.InvalidArgument:
@@ -79,7 +60,11 @@ def _yaml_of(text: str, file: pathlib.Path) -> Any:
 
 def _matrix(value: Any, shape: Tuple[int, ...]) -> Optional[_Matrix]:
     if isinstance(value, dict):
+        if str(value.get("dt", "d"))[-1:] not in tuple("ucwsifd"):
+            return None
         value = value.get("data")
+    if isinstance(value, str):  # in XML
+        value = value.split()
     try:
         numbers = np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -126,13 +111,13 @@ def _distortion(values: Any, model: str, file: pathlib.Path) -> Tuple[_Matrix, b
 
 
 def _pair(left: Tuple[_Matrix, _Matrix, bool], right: Tuple[_Matrix, _Matrix, bool], right_from_left: _Matrix, size: Any,
-          file: pathlib.Path) -> Rig:
+          file: pathlib.Path) -> StereoRig:
     if left[2] != right[2]:
         raise _refuse(file, "one camera is a fisheye and the other one is not: calibrate both by one model")
-    return Rig(left[0], left[1], right[0], right[1], right_from_left[:3, :3], right_from_left[:3, 3], left[2], _size_of(size))
+    return StereoRig(left[0], left[1], right[0], right[1], right_from_left[:3, :3], right_from_left[:3, 3], left[2], _size_of(size))
 
 
-def _kalibr(data: Dict[str, Any], file: pathlib.Path) -> Rig:
+def _kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
     what = "a camera chain of Kalibr"
     cameras: List[Tuple[_Matrix, _Matrix, bool]] = []
     for name in ("cam0", "cam1"):
@@ -154,7 +139,7 @@ def _kalibr(data: Dict[str, Any], file: pathlib.Path) -> Rig:
     return _pair(cameras[0], cameras[1], right_from_left, data["cam0"].get("resolution"), file)
 
 
-def _sensors(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> Rig:
+def _sensors(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> StereoRig:
     """EuRoC's and Kimera's, a file for each camera."""
     cameras, body_from = [], []
     for file, data in zip(files, contents):
@@ -238,33 +223,64 @@ _NAMES = {
     "right_matrix": r"(m|k|mtx|cam(era)?(mats?|matrix|matrices)|intrinsics?|cam)(r|right|2)|(r|right|2)(k|m|mtx|cam(era)?(mat|matrix)|intrinsics?)",
     "left_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(l|left|1)|(l|left|1)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
     "right_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(r|right|2)|(r|right|2)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
-    "R": r"r|rot|rotmat|rotation(matrix)?|rmat|rstereo|stereor", "T": r"t|trans|transvec|translation(vector)?|tvec|tstereo|stereot",
-    "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims",
+    "R": r"r|om|rot|rotmat|rotation(matrix)?|rmat|rstereo|stereor", "T": r"t|trans|transvec|translation(vector)?|tvec|tstereo|stereot",
+    "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims", "width": r"image_?width", "height": r"image_?height",
+    "R1": r"r1", "R2": r"r2", "P1": r"p1", "P2": r"p2",
 }
 
 
-def _by_names(data: Dict[str, Any], file: pathlib.Path, what: str) -> Found:
+def _named(data: Dict[str, Any]) -> Dict[str, Any]:
+    """The values of a stereo calibration by our names."""
     found: Dict[str, Any] = {}
     for key, value in data.items():
         plain = re.sub(r"[^a-z0-9]", "", str(key).lower())
         for name, pattern in _NAMES.items():
             if re.fullmatch(pattern, plain) and value is not None:
                 found.setdefault(name, value)
-    shapes: Dict[str, Tuple[int, ...]] = {"left_matrix": (3, 3), "right_matrix": (3, 3), "left_distortion": (), "right_distortion": (), "R": (3, 3),
-                                          "T": (3,)}
-    matrices = {name: _matrix(found.get(name), shape) if name in found else None for name, shape in shapes.items()}
-    for name in ("left_distortion", "right_distortion"):
-        if matrices[name] is None and name not in found:
-            matrices[name] = np.zeros(5)
+    return found
+
+
+def _coefficients(value: Any, name: str, is_fisheye: bool, file: pathlib.Path) -> _Matrix:
+    if value is None:
+        return np.zeros(4 if is_fisheye else 5)
+    numbers = _matrix(value, ())
+    if numbers is None or numbers.size not in ((4,) if is_fisheye else (4, 5, 8, 12, 14)):
+        count = 0 if numbers is None else numbers.size
+        raise _refuse(file, f"{name} has {count} numbers; OpenCV's {'fisheye model has 4' if is_fisheye else 'model has 4, 5, 8, 12 or 14'}")
+    return numbers
+
+
+def _rotation(value: Any) -> Optional[_Matrix]:
+    """Of a matrix, or of a vector along the axis whose length is the angle."""
+    vector = _matrix(value, (3,))
+    if vector is None:
+        return _matrix(value, (3, 3))
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector / (angle or 1.0)
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def _by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bool = False) -> Found:
+    found = _named(data)
+    matrices = {name: _matrix(found.get(name), (3, 3)) for name in ("left_matrix", "right_matrix")}
+    matrices["R"], matrices["T"] = _rotation(found.get("R")), _matrix(found.get("T"), (3,))
     missing = [name for name, matrix in matrices.items() if matrix is None]
     if not missing:
-        return Rig(**matrices, size=_size_of(found.get("size")))  # type: ignore[arg-type]
+        for side, name in enumerate(("left_distortion", "right_distortion"), 1):
+            matrices[name] = _coefficients(found.get(name), f"D{side}", is_fisheye, file)
+        given = tuple(_matrix(found.get(name), (3, 3) if name[0] == "R" else (3, 4)) for name in ("R1", "R2", "P1", "P2"))
+        size = _size_of(found.get("size"))
+        if size is None and "width" in found and "height" in found:
+            size = _size_of([found["width"], found["height"]])
+        return StereoRig(**matrices, is_fisheye=is_fisheye, size=size,  # type: ignore[arg-type]
+                         given=None if any(matrix is None for matrix in given) else given)  # type: ignore[arg-type]
     q = _matrix(found["Q"], (4, 4)) if "Q" in found else None
     if q is not None and len(missing) >= 2:
         return _of_q(q, file)
     there = ", ".join(str(key) for key in list(data)[:12])
     raise _refuse(file, f"is {what} ({there}) and lacks {', '.join(missing)}: a stereo calibration has the matrix and the distortion of both cameras, "
-                        "R and T")
+                        "R and T, of finite numbers (M1, D1, M2, D2, R, T)")
 
 
 def _other_side(file: pathlib.Path) -> Tuple[pathlib.Path, pathlib.Path]:
@@ -293,7 +309,40 @@ def _plain_numbers(text: str, file: pathlib.Path) -> Optional[_egosgm.Calibratio
     return _egosgm.Calibration(numbers[0], numbers[4], numbers[2], numbers[5], numbers[9])
 
 
-def _of_data(data: Any, file: pathlib.Path) -> Found:
+def _check_parts(text: str, file: pathlib.Path) -> None:
+    """Readers call themselves for what is nested, as deep as it is: what begins something is counted."""
+    begun = len(re.findall(r"[\[{<]|[:-](?=\s|$)", text))
+    if begun > _MOST_PARTS:
+        raise _refuse(file, f"has {begun} nested or named parts, the most is {_MOST_PARTS}; give a calibration alone")
+
+
+def _text_of(file: pathlib.Path) -> str:
+    if not file.exists():
+        raise _refuse(file, "no such file")
+    if file.stat().st_size > _MOST_BYTES:
+        raise _refuse(file, f"is longer than {_MOST_BYTES >> 20} MiB; give a calibration alone")
+    return file.read_bytes().decode("utf-8-sig", errors="replace")
+
+
+def _of_element(element: Any) -> Any:
+    return {part.tag: _of_element(part) for part in element} if len(element) else element.text
+
+
+def _data_of(text: str, file: pathlib.Path) -> Any:
+    """What XML, JSON or YAML holds."""
+    _check_parts(text, file)
+    start = text.lstrip()[:1]
+    try:
+        if start == "<":
+            return _of_element(ElementTree.fromstring(text))
+        return json.loads(text) if start in ("{", "[") and start else _yaml_of(text, file)
+    except (ValueError, RecursionError, ElementTree.ParseError) as error:
+        if isinstance(error, _egosgm.InvalidArgument):
+            raise
+        raise _refuse(file, f"is no {'XML' if start == '<' else 'JSON'} that can be read: {error}") from None
+
+
+def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool) -> Found:
     if not isinstance(data, dict):
         raise _refuse(file, "holds no names with values: it is no calibration that is known")
     flat = {str(key): value for key, value in data.items()}
@@ -301,7 +350,7 @@ def _of_data(data: Any, file: pathlib.Path) -> Found:
         return _kalibr(flat, file)
     if "T_BS" in flat or "projection_matrix" in flat:
         both = list(_other_side(file))
-        contents = [_yaml_of(path.read_text(errors="replace"), path) for path in both]
+        contents = [_data_of(_text_of(path), path) for path in both]
         return (_sensors if "T_BS" in flat else _ros)(both, contents)
     if isinstance(flat.get("disparity_to_depth"), dict):
         name = next((name for name in ("cams_12", "cams_03") if name in flat["disparity_to_depth"]), "cams_12")
@@ -312,15 +361,15 @@ def _of_data(data: Any, file: pathlib.Path) -> Found:
         return _cityscapes(flat, file)
     nested = {f"{outer}_{inner}": value for outer, group in flat.items() if isinstance(group, dict) and "data" not in group
               for inner, value in group.items()}
-    return _by_names({**nested, **flat}, file, "YAML or JSON")
+    return _by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye)
 
 
-def _of_folder(folder: pathlib.Path) -> Found:
+def _of_folder(folder: pathlib.Path, is_fisheye: bool) -> Found:
     for mav0 in (folder, folder / "mav0"):
         if (mav0 / "cam0/sensor.yaml").exists():
-            return _egosgm.read_euroc_rig(mav0)
+            return read_euroc_rig(mav0)
     if (folder / "intrinsics.yml").exists():
-        found = _egosgm.read_opencv_rig(folder)
+        found = read_opencv_rig(folder, 1.0, is_fisheye)
         if found is not None:
             return found
     arrays = sorted(folder.glob("*.npy"))
@@ -329,15 +378,15 @@ def _of_folder(folder: pathlib.Path) -> Found:
     candidates = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in (".yaml", ".yml", ".json", ".xml", ".txt", ".npz")]
     lefts = [file for file in candidates if re.search("left|cam0|_l[.]", file.name, re.IGNORECASE)]
     if len(lefts) == 1:
-        return _found(lefts[0])
+        return _found(lefts[0], is_fisheye)
     if len(candidates) == 1:
-        return _found(candidates[0])
+        return _found(candidates[0], is_fisheye)
     raise _refuse(folder, "is a folder without one calibration: give the file" + (", of " + ", ".join(c.name for c in candidates[:8]) if candidates else ""))
 
 
-def _found(file: pathlib.Path, unit_m: float = 1.0, is_fisheye: bool = False) -> Found:
+def _found(file: pathlib.Path, is_fisheye: bool) -> Found:
     if file.is_dir():
-        return _of_folder(file)
+        return _of_folder(file, is_fisheye)
     if not file.is_file():
         raise _refuse(file, "no such file")
     start = file.read_bytes()[:8]
@@ -352,52 +401,79 @@ def _found(file: pathlib.Path, unit_m: float = 1.0, is_fisheye: bool = False) ->
         if array.shape == (4, 4):
             return _of_q(array.astype(float), file)
         raise _refuse(file, f"is one NumPy array of the shape {array.shape}: give the folder that holds all of them, or Q")
-    errors: List[Exception] = []
-    readers: Tuple[Callable[[], Optional[Found]], ...] = (lambda: _egosgm.read_opencv_rig(file, unit_m, is_fisheye), lambda: _egosgm._read_calibration(file))
-    for reader in readers:
-        try:
-            found = reader()
-        except _egosgm.InvalidArgument as error:
-            errors.append(error)
-            continue
-        if found is not None:
-            return found
-    text = file.read_bytes().decode("utf-8-sig", errors="replace")
+    try:
+        return _egosgm._read_calibration(file)
+    except _egosgm.InvalidArgument as error:
+        own_error = error
+    text = _text_of(file)
     plain = _plain_numbers(text, file)
     if plain is not None:
         return plain
-    is_own = re.search(r"(?m)^\s*(P_rect_\d|P[0-3]\s*:|cam0\s*=|baseline_m)", text)
+    is_own = re.search(r"(?m)^\s*(P_rect_\d|P[0-3]\s*:(?!\s*!!)|cam0\s*=|baseline_m)", text) and not text.startswith("%YAML")
     if is_own or file.suffix.lower() not in (".yaml", ".yml", ".json", ".xml", ".txt", ".conf", ".cfg", ""):
-        raise errors[-1]
-    if text.lstrip().startswith("<"):
-        raise errors[0]
-    try:
-        data = json.loads(text) if text.lstrip().startswith(("{", "[")) else _yaml_of(text, file)
-    except ValueError as error:
-        raise _refuse(file, f"is no JSON that can be read: {error}") from None
+        raise own_error
+    data = _data_of(text, file)
     if not isinstance(data, dict):
-        raise errors[-1]
-    return _of_data(data, file)
+        raise own_error
+    return _of_data(data, file, is_fisheye)
+
+
+def _in_unit(rig: StereoRig, unit_m: float) -> StereoRig:
+    """The rig whose translation was in units of unit_m, in metres."""
+    given = rig.given and (*rig.given[:3], np.asarray(rig.given[3]) * [1, 1, 1, unit_m])
+    return dataclasses.replace(rig, T=np.asarray(rig.T) * unit_m, given=given)
+
+
+def read_opencv_rig(file: _Path, unit_m: float = 1.0, is_fisheye: bool = False) -> Optional[StereoRig]:
+    """Reads OpenCV's stereo calibration (M1, D1, M2, D2, R, T; YAML, XML or JSON). unit_m: metres in a unit of T. None where the file is of another
+    kind."""
+    path = pathlib.Path(file)
+    data: Any = {}
+    for part in (path / "intrinsics.yml", path / "extrinsics.yml") if path.is_dir() else (path,):
+        text = _text_of(part)
+        try:
+            contents = _data_of(text, part)
+        except _egosgm.InvalidArgument:
+            if text.startswith(("%YAML", "{", "<")):
+                raise
+            contents = None
+        if not isinstance(contents, dict):
+            return None
+        data = {**contents, **data}
+    if "left_matrix" not in _named(data):
+        return None
+    found = _by_names(data, path, "a calibration of OpenCV", is_fisheye)
+    return _in_unit(found, unit_m) if isinstance(found, StereoRig) else None
+
+
+def read_euroc_rig(mav0: _Path) -> StereoRig:
+    """Reads cam0/sensor.yaml and cam1/sensor.yaml of an EuRoC sequence."""
+    files = [pathlib.Path(mav0, camera, "sensor.yaml") for camera in ("cam0", "cam1")]
+    contents = [_data_of(_text_of(file), file) for file in files]
+    for file, data in zip(files, contents):
+        if not isinstance(data, dict):
+            raise _refuse(file, "is no sensor.yaml of EuRoC")
+    return _sensors(files, contents)
 
 
 def find(file: _Path, unit_m: Optional[float] = None, is_fisheye: bool = False) -> Found:
     """The calibration of a file or a folder, of whichever program: a Calibration of rectified images, or a rig of raw ones. unit_m: metres in a unit of
     the translation; None: 1, and a baseline that no rig has is refused. Throws InvalidArgument with what the file is, and what it lacks."""
     path = pathlib.Path(file)
-    found = _found(path, unit_m or 1.0, is_fisheye)
-    if isinstance(found, Rig):
-        found.T = found.T * (unit_m or 1.0)
-        found.is_fisheye = found.is_fisheye or is_fisheye
-    if unit_m is None and isinstance(found, Rig):
-        baseline = float(np.linalg.norm(found.T))
-        doubt = _egosgm._suspect_baseline(baseline, 0.0)
-        if doubt and baseline > 1:
-            raise _refuse(path, f"{doubt} Give unit_m (--unit): 0.01 (cm) or 0.001 (mm), or 1 (m) where it is right")
-    return found
+    found = _found(path, is_fisheye)
+    if not isinstance(found, StereoRig):
+        return found
+    found = dataclasses.replace(_in_unit(found, unit_m or 1.0), is_fisheye=found.is_fisheye or is_fisheye)
+    baseline_m = float(np.linalg.norm(found.T))
+    if unit_m is None and math.isfinite(baseline_m) and baseline_m > 1e-3:
+        doubt = _egosgm._suspect_baseline(baseline_m, 0.0)
+        if doubt:
+            raise _refuse(path, f"T gives {doubt} Give --unit cm or --unit mm (unit_m 0.01 or 0.001), whichever it is, or --unit m (unit_m 1) where it is "
+                                "right")
+    return _without_rectification(found) or found
 
 
-def read_calibration(file: _Path, unit_m: Optional[float] = None, is_fisheye: bool = False) -> "_egosgm.Calibration | _egosgm.StereoRig":
+def read_calibration(file: _Path, unit_m: Optional[float] = None, is_fisheye: bool = False) -> Found:
     """Reads a calibration, of whichever program: EgoSGM's, KITTI's, Middlebury's, Cityscapes', DSEC's, ORB-SLAM's and FoundationStereo's of rectified
     images give a Calibration; OpenCV's, ROS's, Kalibr's, EuRoC's, and NumPy's arrays, of raw ones a StereoRig."""
-    found = find(file, unit_m, is_fisheye)
-    return found.rectified() or found.stereo_rig() if isinstance(found, Rig) else found
+    return find(file, unit_m, is_fisheye)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import _egosgm
 from .calibrations import read_calibration
+from .rectification import StereoRig
 
 FRAMES_PER_LOOK = 50  # for what is nearer than the range
 
@@ -75,7 +76,7 @@ class Drive:
             calibration = self.sequence.calibration
         if isinstance(calibration, (str, os.PathLike)):
             calibration = read_calibration(calibration)
-        if isinstance(calibration, _egosgm.StereoRig):
+        if isinstance(calibration, StereoRig):
             raise _egosgm.InvalidArgument("calibration: is of raw images: rectify them first (egosgm.Rectification, egosgm rectify)")
         if calibration is not None and not isinstance(calibration, _egosgm.Calibration):
             raise _egosgm.InvalidArgument(f"calibration: is a {type(calibration).__name__}: give an egosgm.Calibration; read_calibration reads a file")

@@ -12,13 +12,11 @@ import tempfile
 import threading
 from typing import List, Optional, Sequence, Tuple
 
-_RAW = "rectify"  # the command that takes raw cameras; all others take rectified ones
 _PACKAGES = {  # what brings a module
     "cv2": "pip install opencv-python-headless, or apt install python3-opencv",
     "matplotlib": "pip install matplotlib, or apt install python3-matplotlib",
     "rosbags": 'pip install the wheel with "[bag]" (docs/robots.md)',
 }
-_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
 def _value_of(arguments: List[str], name: str) -> Tuple[int, str]:
@@ -31,50 +29,29 @@ def _value_of(arguments: List[str], name: str) -> Tuple[int, str]:
     return -1, ""
 
 
-def _reads_itself(command: str, calib: str) -> bool:
+def _reads_itself(calib: str) -> bool:
     from . import _egosgm
-    readers = [lambda: _egosgm._read_calibration(calib)]
-    if command == _RAW:
-        readers.append(lambda: _egosgm.read_opencv_rig(calib))
-    for reader in readers:
-        try:
-            if reader() is not None:
-                return True
-        except (_egosgm.InvalidArgument, _egosgm.IoError, OSError):
-            continue
-    return False
+    try:
+        _egosgm._read_calibration(calib)
+        return True
+    except (_egosgm.InvalidArgument, _egosgm.IoError, OSError):
+        return False
 
 
 def with_calibration(arguments: List[str], folder: pathlib.Path) -> List[str]:
     """The arguments with --calib in a form that the program reads, in a file of `folder`. Throws InvalidArgument."""
     from . import _egosgm, calibrations
     place, calib = _value_of(arguments, "--calib")
-    if place < 0 or not calib or _reads_itself(arguments[0], calib):
+    if place < 0 or not calib or _reads_itself(calib):
         return arguments
-    _, unit = _value_of(arguments, "--unit")
-    found = calibrations.find(calib, _UNITS.get(unit), "--fisheye" in arguments)
-    rest: List[str] = []
-    if isinstance(found, calibrations.Rig) and found.rectified() is not None:
-        found = found.rectified()
-    if isinstance(found, _egosgm.Calibration):
-        file = folder / "calib.txt"
-        _egosgm.write_calibration(file, found)
-    elif arguments[0] != _RAW:
+    found = calibrations.find(calib)
+    if not isinstance(found, _egosgm.Calibration):
         raise _egosgm.InvalidArgument(f"{calib}: is of raw images, and `egosgm {arguments[0]}` takes rectified ones: `egosgm rectify` makes them, by it")
-    elif isinstance(found, calibrations.Rig):
-        file = folder / "calib.json"
-        file.write_text(found.text())
-        rest = ["--fisheye"] if found.is_fisheye and "--fisheye" not in arguments else []
-        if unit:  # it is in metres now
-            arguments = [a for i, a in enumerate(arguments) if i not in (_value_of(arguments, "--unit")[0], _value_of(arguments, "--unit")[0] - 1)] \
-                if "--unit" in arguments else [a for a in arguments if not a.startswith("--unit=")]
-            place, _ = _value_of(arguments, "--calib")
-            rest.append("--unit=m")
-    else:
-        return arguments
+    file = folder / "calib.txt"
+    _egosgm.write_calibration(file, found)
     changed = list(arguments)
     changed[place] = f"--calib={file}" if changed[place].startswith("--calib=") else str(file)
-    return changed + rest
+    return changed
 
 
 def _module_of(arguments: Sequence[str]) -> Optional[str]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
+from .rectification import Rectification, StereoRig
 
 # Bytes between neighbouring pixels of an encoding, and where the brightness lies in them, or red, green and blue.
 _GREY8 = {"mono8": (1, 0), "8UC1": (1, 0), "yuv422": (2, 1), "uyvy": (2, 1), "yuv422_yuy2": (2, 0), "yuyv": (2, 0), "nv12": (1, 0),
@@ -173,23 +174,23 @@ class Cameras:
         if abs(left_p[0, 0] - right_p[0, 0]) > 1e-3 * left_p[0, 0] or abs(left_p[1, 2] - right_p[1, 2]) > 1e-2:
             raise _egosgm.InvalidArgument("camera info: P of both cameras have different focal lengths or rows: they are not of one rectified pair")
         self.size = _size(left)
-        self.rig: Optional[_egosgm.StereoRig] = None
-        self._rectification: Optional[_egosgm.Rectification] = None
+        self.rig: Optional[StereoRig] = None
+        self._rectification: Optional[Rectification] = None
         if rectify:
             self.rig = _rig(left, right, shift)
-            self._rectification = _egosgm.Rectification(self.rig, *self.size)
+            self._rectification = Rectification(self.rig, *self.size)
             self.calibration = self._rectification.calibration
         else:
             self.calibration = _egosgm.Calibration(left_p[0, 0], left_p[1, 1], left_p[0, 2], left_p[1, 2],
                                                    -shift, right_p[0, 2] - left_p[0, 2])
 
     @classmethod
-    def of_calibration(cls, rig_or_calibration: "_egosgm.StereoRig | _egosgm.Calibration", width: int, height: int) -> "Cameras":
+    def of_calibration(cls, rig_or_calibration: "StereoRig | _egosgm.Calibration", width: int, height: int) -> "Cameras":
         """Without infos: of raw images by a rig, of rectified ones by their calibration."""
         cameras = cls.__new__(cls)
         cameras.size, cameras.rig, cameras._rectification = (width, height), None, None
-        if isinstance(rig_or_calibration, _egosgm.StereoRig):
-            cameras._rectification = _egosgm.Rectification(rig_or_calibration, width, height)
+        if isinstance(rig_or_calibration, StereoRig):
+            cameras._rectification = Rectification(rig_or_calibration, width, height)
             cameras.calibration = cameras._rectification.calibration
         else:
             cameras.calibration = rig_or_calibration
@@ -206,7 +207,7 @@ def are_raw(info: Any, topic: str) -> bool:
     return bool(np.any(_distortion(info) != 0)) or not np.allclose(_matrix(info, "R", 3, 3), np.eye(3), atol=1e-9)
 
 
-def _rig(left: Any, right: Any, shift: float) -> _egosgm.StereoRig:
+def _rig(left: Any, right: Any, shift: float) -> StereoRig:
     """From where both cameras look after rectification: a point's x differs by `shift` there."""
     names = {"fisheye": "equidistant", "radtan": "plumb_bob"}  # of Kalibr and some drivers
     models = {names.get(info.distortion_model, info.distortion_model) for info in (left, right)}
@@ -219,7 +220,7 @@ def _rig(left: Any, right: Any, shift: float) -> _egosgm.StereoRig:
     left_r, right_r = _matrix(left, "R", 3, 3), _matrix(right, "R", 3, 3)
     if fisheye:  # some drivers fill up with zeros
         distortions = [d[:4] if not np.any(d[4:]) else d for d in distortions]
-    return _egosgm.StereoRig(_camera(left, "K", 3), distortions[0], _camera(right, "K", 3), distortions[1],
+    return StereoRig(_camera(left, "K", 3), distortions[0], _camera(right, "K", 3), distortions[1],
                              right_r.T @ left_r, right_r.T @ np.array([shift, 0, 0]), fisheye, _size(left))
 
 

@@ -169,12 +169,9 @@ def test_the_command_hands_the_program_what_it_reads(tmp_path):
     changed = program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--out", "o"], folder)
     assert changed == ["run", "--calib", str(folder / "calib.txt"), "--out", "o"]
     expect_rectified(egosgm.read_calibration(folder / "calib.txt"))
-    (tmp_path / "chain.yaml").write_text(kalibr(LENS, T_cn_cnm1=[[1, 0, 0, -300.0], *SHIFT[1:]]))
-    changed = program.with_calibration(["rectify", f"--calib={tmp_path / 'chain.yaml'}", "--unit", "mm", "--out", "o"], folder)
-    assert changed == ["rectify", f"--calib={folder / 'calib.json'}", "--out", "o", "--unit=m"]
-    expect_raw(egosgm.read_opencv_rig(folder / "calib.json"))
+    (tmp_path / "chain.yaml").write_text(kalibr(LENS))
     with pytest.raises(egosgm.InvalidArgument, match="is of raw images"):
-        program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--unit=mm"], folder)
+        program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml")], folder)
     (tmp_path / "own.txt").write_text(RECTIFIED["own.txt"])
     for arguments in (["run", "--calib", str(tmp_path / "own.txt")], ["run", "folder"], ["run", "--calib"]):
         assert program.with_calibration(arguments, folder) == arguments

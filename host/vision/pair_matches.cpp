@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "host/vision/pair_matches.h"
+
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/video/tracking.hpp>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/rectification.h"
 #include "host/vision/grey_bytes.h"
 
 namespace egosgm::vision {

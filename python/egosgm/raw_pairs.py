@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Left and right images of one moment, of files, side-by-side images, videos, lists or an EuRoC folder; colour as RGB."""
+import bisect
+import dataclasses
+import math
+import os
+import pathlib
+import re
+from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
+
+from . import _egosgm
+from .arguments import counted
+
+os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")  # what OpenCV would say of a broken file stands in our message
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+import cv2
+
+_FOREIGN = (".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")  # that only OpenCV reads
+_MOST_SKEW_NS = 2_000_000  # of cameras that are triggered together
+_MOST_LIST_BYTES = 1 << 28
+
+
+@dataclasses.dataclass
+class RawPair:
+    left: Any
+    right: Any
+    time_s: Optional[float] = None
+
+
+def _refuse(text: str) -> _egosgm.InvalidArgument:
+    return _egosgm.InvalidArgument(text)
+
+
+def _expect_file(file: str) -> None:
+    """For OpenCV, which would wait for a pipe without an end."""
+    if not os.path.exists(file):
+        raise _refuse(f"{file}: no such file")
+    if not os.path.isfile(file):
+        raise _refuse(f"{file}: is no file; give an image or a video")
+
+
+def _read_image(file: pathlib.Path) -> Any:
+    if file.suffix.lower() not in _FOREIGN:
+        return _egosgm._read_stored_image(file)
+    _expect_file(os.fspath(file))
+    image = cv2.imread(os.fspath(file), cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR)
+    if image is None or image.dtype.name not in ("uint8", "uint16"):
+        raise _refuse(f"{file}: cannot be read as an image of 8 or 16 bits")
+    return image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+
+
+def _names_files(pattern: str) -> bool:
+    """Whether it names images, by a pattern or an image's extension; else it is a video."""
+    path = pathlib.Path(pattern)
+    return any(mark in path.name for mark in "*%") or path.suffix.lower() in (".png", ".jpg", ".jpeg", *_FOREIGN)
+
+
+class _Files:
+    def __init__(self, pattern: str) -> None:
+        self._files = _egosgm._find_images(pattern)
+        self.count: Optional[int] = len(self._files)
+        if not self._files:
+            raise _refuse(f"{pattern}: no file matches")
+
+    def __iter__(self) -> Iterator[Tuple[Any, Optional[float]]]:
+        return ((_read_image(file), None) for file in self._files)
+
+
+class _Video:
+    def __init__(self, file: str) -> None:
+        _expect_file(file)
+        # By FFmpeg alone where OpenCV has it: other readers, which it would try next, print.
+        has_ffmpeg = cv2.CAP_FFMPEG in cv2.videoio_registry.getStreamBackends()
+        self._video = cv2.VideoCapture(file, cv2.CAP_FFMPEG if has_ffmpeg else cv2.CAP_ANY)
+        if not self._video.isOpened():
+            raise _refuse(f"{file}: neither an image nor a video that OpenCV can read")
+        count = int(self._video.get(cv2.CAP_PROP_FRAME_COUNT))
+        self.count = count if count >= 0 else None
+
+    def __iter__(self) -> Iterator[Tuple[Any, Optional[float]]]:
+        number = 0
+        while True:
+            rate = self._video.get(cv2.CAP_PROP_FPS)
+            is_there, image = self._video.read()
+            if not is_there:
+                return
+            yield image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB), number / rate if rate > 0 else None
+            number += 1
+
+
+def _open(pattern: str) -> Any:
+    return _Files(pattern) if _names_files(pattern) else _Video(pattern)
+
+
+def _same_size(pair: RawPair, what: str) -> RawPair:
+    left, right = pair.left, pair.right
+    if left.shape[:2] != right.shape[:2] or left.dtype != right.dtype:
+        raise _refuse(f"{what}: the left image is {left.shape[1]}x{left.shape[0]}, the right one {right.shape[1]}x{right.shape[0]}: both need one size "
+                      "and depth")
+    return pair
+
+
+class RawPairs:
+    """Iterate over it once. count: None where a video does not say. note: what was left out; known in full at the end."""
+
+    count: Optional[int] = None
+    note = ""
+
+    def __iter__(self) -> Iterator[RawPair]:
+        raise NotImplementedError
+
+
+class _TwoSources(RawPairs):
+    def __init__(self, left: str, right: str) -> None:
+        self._names = f"--left {left}", f"--right {right}"
+        self._sources = _open(left), _open(right)
+        counts = [source.count for source in self._sources]
+        if None not in counts and counts[0] != counts[1]:
+            raise _refuse(f"--left {left} has {counts[0]} images, --right {right} has {counts[1]}: give as many of both")
+        self.count = counts[0]
+
+    def __iter__(self) -> Iterator[RawPair]:
+        sources, pairs = [iter(source) for source in self._sources], 0
+        while True:
+            left, right = (next(source, None) for source in sources)
+            if left is None or right is None:
+                break
+            yield _same_size(RawPair(left[0], right[0], left[1]), self._names[0][7:])
+            pairs += 1
+        if left is not None or right is not None:
+            ended, longer = self._names if left is None else self._names[::-1]
+            self.note = f"{ended} ends after {counted(pairs, 'image')}, before {longer}: the rest of that one is left out"
+
+
+class _SideBySide(RawPairs):
+    def __init__(self, pattern: str) -> None:
+        self._name, self._images = pattern, _open(pattern)
+        self.count = self._images.count
+
+    def __iter__(self) -> Iterator[RawPair]:
+        for both, time_s in self._images:
+            width = both.shape[1]
+            if width % 2:
+                raise _refuse(f"--side-by-side {self._name}: the images are {width} px wide, which has no half")
+            yield RawPair(both[:, :width // 2], both[:, width // 2:], time_s)
+
+
+class _Listed(RawPairs):
+    def __init__(self, pairs: Sequence[Tuple[pathlib.Path, pathlib.Path, Optional[float]]], note: str = "") -> None:
+        self._pairs, self.count, self.note = pairs, len(pairs), note
+
+    def __iter__(self) -> Iterator[RawPair]:
+        return (_same_size(RawPair(_read_image(left), _read_image(right), time_s), str(right)) for left, right, time_s in self._pairs)
+
+
+def _of_patterns(left: str, right: str, by_order: bool) -> RawPairs:
+    """Files of equal names; those without a partner are left out, with a note."""
+    pairs, alone = _egosgm._find_pairs(left, right, by_order)
+    if not pairs:
+        raise _refuse(f"--left {left} --right {right}: no file matches both")
+    if len(alone) > 2 * len(pairs):
+        raise _refuse(f"--left {left} --right {right}: only {counted(len(pairs), 'pair')} of equal names, {counted(len(alone), 'image')} without, "
+                      f"{alone[0]} say: give --pair-by order where order tells, or other patterns")
+    note = f"{counted(len(alone), 'image')} without the other camera's left out, the first is {alone[0]}" if alone else ""
+    return _Listed([(*pair, None) for pair in pairs], note)
+
+
+def _rows(file: pathlib.Path) -> List[str]:
+    try:
+        with open(file, "rb") as stream:
+            content = stream.read(_MOST_LIST_BYTES + 1)
+    except OSError as error:
+        raise _refuse(f"{file}: cannot be read: {error.strerror}; give an existing, readable file") from None
+    if len(content) > _MOST_LIST_BYTES:
+        raise _refuse(f"{file}: is longer than {_MOST_LIST_BYTES >> 20} MiB: is it the right file?")
+    return content.decode("utf-8-sig", errors="surrogateescape").splitlines()
+
+
+def _of_list(file: pathlib.Path) -> RawPairs:
+    """Rows LEFT RIGHT [SECONDS]; paths from the list's folder on."""
+    pairs = []
+    for number, row in enumerate(_rows(file), 1):
+        words = row.partition("#")[0].split()
+        if not words:
+            continue
+        is_time = len(words) < 3 or bool(re.fullmatch(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", words[2]))
+        if len(words) not in (2, 3) or not is_time or (len(words) == 3 and not math.isfinite(float(words[2]))):
+            raise _refuse(f"{file}:{number}: give LEFT RIGHT or LEFT RIGHT SECONDS")
+        pairs.append((file.parent / words[0], file.parent / words[1], float(words[2]) if len(words) == 3 else None))
+    if not pairs:
+        raise _refuse(f"{file}: lists no pair")
+    return _Listed(pairs)
+
+
+def _euroc_images(camera: pathlib.Path) -> Dict[int, pathlib.Path]:
+    """Nanoseconds and files of a camera's data.csv."""
+    file, images = camera / "data.csv", {}
+    for number, row in enumerate(_rows(file), 1):
+        time, _, name = (part.strip() for part in row.partition(","))
+        is_header = not images and time and not time[0].isdigit()
+        if not row.strip() or row.startswith("#") or is_header:
+            continue
+        if not name or not re.fullmatch(r"-?[0-9]{1,19}", time):
+            raise _refuse(f'{file}:{number}: "{row}" is not TIME,FILE')
+        images[int(time)] = camera / "data" / name
+    return images
+
+
+def _of_euroc(mav0: pathlib.Path) -> RawPairs:
+    left, right = (_euroc_images(mav0 / name) for name in ("cam0", "cam1"))
+    times = sorted(left), sorted(right)
+
+    def nearest(stamps: List[int], time_ns: int) -> int:
+        at = bisect.bisect_left(stamps, time_ns)
+        return min(stamps[max(at - 1, 0):at + 1], key=lambda stamp: abs(stamp - time_ns))
+
+    pairs, largest_ns, nearest_ns = [], 0, None
+    for time_ns in times[0] if right else []:
+        other = nearest(times[1], time_ns)
+        if nearest(times[0], other) != time_ns:
+            continue
+        apart_ns = abs(other - time_ns)
+        if apart_ns > _MOST_SKEW_NS:
+            nearest_ns = min(apart_ns, nearest_ns or apart_ns)
+            continue
+        largest_ns = max(largest_ns, apart_ns)
+        pairs.append((left[time_ns], right[other], 1e-9 * (time_ns - times[0][0])))
+    if not pairs:
+        raise _refuse(f"{mav0}: cam0 and cam1 have no time stamp in common" + (
+            f"; the nearest are {1e-6 * nearest_ns:.3f} ms apart, at most {_MOST_SKEW_NS // 1_000_000} ms are paired: --left, --right and --pair-by "
+            "order pair the images as they come" if nearest_ns else ""))
+    alone = len(left) + len(right) - 2 * len(pairs)
+    notes = [f"{counted(alone, 'image')} without the other one left out"] if alone else []
+    if largest_ns:
+        notes.append(f"stamps of a pair differ by up to {1e-6 * largest_ns:.3f} ms")
+    return _Listed(pairs, "; ".join(notes))
+
+
+def open_pairs(left: Optional[str], right: Optional[str], side_by_side: Optional[str], list_: Optional[str], euroc: Optional[str],
+               by_order: bool) -> RawPairs:
+    """Throws InvalidArgument unless exactly one input was named."""
+    two = bool(left or right)
+    sources = two + bool(side_by_side) + bool(list_) + bool(euroc)
+    if sources != 1 or (two and not (left and right)):
+        what = "no input" if sources == 0 else "more than one input" if sources > 1 else "half a pair"
+        raise _refuse(f"{what}: give --left and --right, or --side-by-side, or --list, or --euroc")
+    if left and right:
+        return _of_patterns(left, right, by_order) if _names_files(left) and _names_files(right) else _TwoSources(left, right)
+    if side_by_side:
+        return _SideBySide(side_by_side)
+    return _of_list(pathlib.Path(list_)) if list_ else _of_euroc(pathlib.Path(euroc or ""))
