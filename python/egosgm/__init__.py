@@ -3,7 +3,9 @@
 
     import egosgm
     for frame in egosgm.run("street"):
-        frame.disparity  # float32, pixels, egosgm.INVALID_DISPARITY where there is none
+        frame.disparity    # float32 [px], egosgm.INVALID_DISPARITY where there is none
+        frame.depth        # float32 [m], NaN where there is none
+        frame.depth_sigma  # its standard deviation [m]
 
 The same, step by step:
 
@@ -26,13 +28,14 @@ from . import _egosgm
 from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
 from .calibrations import read_calibration
+from .depth import depth_sigma_from_disparity
 from .drive import Drive, DriveFrame, run
 from .matcher import Matcher
 from .pose_evaluation import MotionError, PoseEvaluation, SegmentError, evaluate_poses
 from .values import as_dataclass as _as_dataclass
 from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video, move_map
 
-__all__ = ["__version__", "read_calibration", "Drive", "DriveFrame", "Matcher", "run", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
+__all__ = ["__version__", "read_calibration", "depth_sigma_from_disparity", "Drive", "DriveFrame", "Matcher", "run", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 

@@ -9,6 +9,7 @@ from typing_extensions import Unpack
 
 from ._options import PipelineOptions, StereoOdometryOptions, SyntheticOptions
 from .calibrations import read_calibration as read_calibration
+from .depth import depth_sigma_from_disparity as depth_sigma_from_disparity
 from .drive import Drive as Drive
 from .drive import DriveFrame as DriveFrame
 from .drive import run as run

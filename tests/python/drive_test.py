@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import egosgm
+from egosgm import ros_images
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -240,6 +241,29 @@ def test_the_page_for_those_who_come_from_elsewhere_names_options_that_exist():
     assert all(f"`{name}`" in page or f"`{name} = " in page for name in names)
     for cost in re.findall(r"`((?:census|sad)\d+x\d+)`", page):
         egosgm.Pipeline(egosgm.Calibration(100, 100, 32, 16, 0.1), 64, 32, disparities=16, cost=cost)
+
+
+def test_depth_and_its_sigma_are_metres_or_nan():
+    camera = egosgm.Calibration(fx=100, fy=50, cx=2, cy=1, baseline_m=0.5, doffs_px=5)
+    disparity = np.array([[5, 20, egosgm.INVALID_DISPARITY], [-5, -6, np.nan]], np.float32)
+    variance = np.array([[4, 0.25, 0], [1, 1, 1]], np.float32)
+    none = [np.nan] * 3
+    depth, sigma = egosgm.depth_from_disparity(disparity, camera), egosgm.depth_sigma_from_disparity(disparity, variance, camera)
+    np.testing.assert_allclose(depth, [[5, 2, np.nan], none], rtol=1e-6)      # 50 m px over 10 and 25 px
+    np.testing.assert_allclose(sigma, [[1, 0.04, np.nan], none], rtol=1e-6)   # 5 m of 2 px in 10; 2 m of half a pixel in 25
+    assert depth.dtype == sigma.dtype == np.float32
+    np.testing.assert_allclose(ros_images.depth_maps(disparity, variance, camera), (depth, sigma**2), rtol=1e-6)
+    with pytest.raises(egosgm.InvalidArgument, match="maps of one frame"):
+        egosgm.depth_sigma_from_disparity(disparity, variance[:1], camera)
+
+
+def test_a_frames_depth_says_how_sure_it_is(street_folder):
+    frame = next(iter(egosgm.run(street_folder, **OPTIONS)))
+    np.testing.assert_array_equal(frame.depth_sigma, egosgm.depth_sigma_from_disparity(frame.disparity, frame.variance, frame.calibration))
+    assert (np.isnan(frame.depth_sigma) == ~(frame.disparity > 0)).all() and np.nanmin(frame.depth_sigma) > 0
+    for outputs, asked in (("disparity", "depth_sigma"), ("variance", "depth")):
+        with pytest.raises(egosgm.InvalidArgument, match="name it too, outputs="):
+            getattr(next(iter(egosgm.run(street_folder, **OPTIONS, outputs=outputs))), asked)
 
 
 def test_without_a_calibration_there_are_disparities_alone(street, frames):
