@@ -31,11 +31,12 @@ from .calibrations import read_calibration
 from .depth import depth_sigma_from_disparity
 from .drive import Drive, DriveFrame, run
 from .matcher import Matcher
+from .points import PointCloud, point_cloud, write_ply
 from .pose_evaluation import MotionError, PoseEvaluation, SegmentError, evaluate_poses
 from .values import as_dataclass as _as_dataclass
 from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video, move_map
 
-__all__ = ["__version__", "read_calibration", "depth_sigma_from_disparity", "Drive", "DriveFrame", "Matcher", "run", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
+__all__ = ["__version__", "read_calibration", "depth_sigma_from_disparity", "Drive", "DriveFrame", "Matcher", "run", "PointCloud", "point_cloud", "write_ply", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 
