@@ -52,6 +52,17 @@ std::string note_of(const FrameReport& report) {
                                        : fmt::format("  ({}; matched {:.2g} times)", why, report.search_fraction);
 }
 
+std::string text_of(const CloudCounts& clouds, const vision::PointCloudOptions& bounds) {
+  const vision::LeftOut& out = clouds.left_out;
+  const double all = static_cast<double>(clouds.points + out.far + out.uncertain + out.alone);
+  const auto percent = [all](std::int64_t pixels) { return 100 * static_cast<double>(pixels) / std::max(1.0, all); };
+  return fmt::format(
+      "clouds hold {:.1f} % of the pixels with a disparity; left out: {:.1f} % uncertain by more than {:g} % "
+      "(--cloud-sigma), {:.1f} % farther than {:g} m, {:.1f} % without a neighbour",
+      percent(clouds.points), percent(out.uncertain), 100 * bounds.max_relative_sigma, percent(out.far),
+      bounds.max_depth_m, percent(out.alone));
+}
+
 PixelType type_of(const vision::StereoSequence& sequence) {
   return vision::read_pixel_type(sequence.frames.front().left);
 }
@@ -65,6 +76,7 @@ struct RunArguments {
   OptionArguments method;
   std::string out, poses, device, programs, tuning, write, trace;
   StereoOdometryOptions odometry;
+  double cloud_sigma_percent = 100 * vision::PointCloudOptions().max_relative_sigma;
   bool interpolate = false, quiet = false, resume = false;
 };
 
@@ -85,6 +97,7 @@ class Run {
         folder_(job.out),
         save_config_(job.save_config),
         sequence_(job.sequence),
+        cloud_options_(job.cloud),
         input_(job.input),
         size_(vision::check_image_sizes(sequence_)),
         motions_(sequence_, job.poses_file, job.odometry),
@@ -97,7 +110,7 @@ class Run {
         doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, size_) {
     folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
-    outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration);
+    outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration, cloud_options_);
     pipeline_.prepare(type_of(sequence_), outputs_->views());
     waiting_.reset();
     if (job.trace.empty()) return;
@@ -218,11 +231,12 @@ class Run {
     under_way_.pop_front();
     const vision::StereoFrame& frame = sequence_.frames[prepared.index];
     const auto before_write = Clock::now();
-    const std::int64_t unstorable = outputs_->write(frame, prepared.images.left);
+    const WrittenFrame written = outputs_->write(frame, prepared.images.left);
+    if (written.cloud) add(*written.cloud);
     const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
-    report_.add(frame, result, prepared.motion, times, unstorable);
+    report_.add(frame, result, prepared.motion, times, written);
     if (poses_.size() % kFramesPerLook == 0) {
       const PipelineOptions& options = pipeline_.options();
       doubt_.look_beyond(prepared.images.left, prepared.images.right, options.min_disparity,
@@ -230,7 +244,15 @@ class Run {
     }
     doubt_.add(result.density, prepared.motion.motion.has_value(), vision::holds_8_bits_in_16(prepared.images.left));
     poses_.push_back(prepared.motion.first_from_camera);
-    tell(frame, result, prepared.motion, times, unstorable, progress);
+    tell(frame, result, prepared.motion, times, written.unstorable, progress);
+  }
+
+  void add(const CloudCounts& cloud) {
+    if (!clouds_) clouds_.emplace();
+    clouds_->points += cloud.points;
+    clouds_->left_out.far += cloud.left_out.far;
+    clouds_->left_out.uncertain += cloud.left_out.uncertain;
+    clouds_->left_out.alone += cloud.left_out.alone;
   }
 
   void trace(const std::string& frame, const PreparedFrame& prepared, const FrameReport& result,
@@ -274,6 +296,7 @@ class Run {
       fmt::print("{} of {} could not be read and {} left out: {}\n", left_out_,
                  counted(sequence_.frames.size(), "pair"), left_out_ == 1 ? "is" : "are", first_left_out_);
     }
+    if (clouds_) fmt::print("{}\n", text_of(*clouds_, cloud_options_));
     if (const std::string doubt = doubt_.text(); !doubt.empty()) {
       fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
     }
@@ -310,6 +333,8 @@ class Run {
   OutputFolder folder_;
   const fs::path save_config_;
   const vision::StereoSequence& sequence_;
+  const vision::PointCloudOptions cloud_options_;
+  std::optional<CloudCounts> clouds_;  // of all frames
   const std::string& input_;
   const cv::Size size_;
   MotionSource motions_;
@@ -338,6 +363,11 @@ SequenceJob job_of(const RunArguments& arguments) {
   job.odometry = arguments.odometry;
   job.kinds = parse_write_list(arguments.write);
   if (arguments.interpolate) job.kinds.insert("interpolated");
+  job.cloud.max_relative_sigma = arguments.cloud_sigma_percent / 100;
+  if (!(arguments.cloud_sigma_percent > 0)) {
+    throw InvalidArgument(
+        fmt::format("--cloud-sigma {:g}: choose a number of percent above 0", arguments.cloud_sigma_percent));
+  }
   for (const char* kind : {"cloud", "depth", "depth_m"}) {
     if (job.sequence.has_calibration || !job.kinds.contains(kind)) continue;
     throw InvalidArgument(
@@ -378,6 +408,14 @@ Command add_run(CLI::App& program) {
       ->group(group)
       ->required();
   command->add_option("--write", arguments->write, kWriteListHelp)->type_name("LIST")->group(group);
+  command
+      ->add_option(
+          "--cloud-sigma", arguments->cloud_sigma_percent,
+          fmt::format(
+              "--write cloud leaves out depths whose standard deviation is larger than this [% of the depth, {:g}]",
+              arguments->cloud_sigma_percent))
+      ->type_name("PERCENT")
+      ->group(group);
   command->add_flag("--interpolate", arguments->interpolate, "fill holes from the background, into OUT/interpolated")
       ->group(group);
   command

@@ -10,6 +10,7 @@
 #include "egosgm/odometry.h"
 #include "egosgm/options.h"
 #include "egosgm/vision/dataset.h"
+#include "egosgm/vision/point_cloud.h"
 
 namespace egosgm::app {
 
@@ -22,6 +23,7 @@ struct SequenceJob {
   StereoOdometryOptions odometry;  // with these options
   OutputFolder out;
   std::set<std::string> kinds;  // what is written beside the disparity, see parse_write_list
+  vision::PointCloudOptions cloud;
   // Files that are written as well, where they are not empty: the options in use, and a trace of all commands.
   std::filesystem::path save_config, trace;
   bool quiet = false;

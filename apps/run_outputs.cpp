@@ -63,7 +63,7 @@ const char* const kWriteListHelp =
     "  reason         why a pixel has no value, or a doubtful one: a number each, 8-bit PNG (docs/formats.md)\n"
     "  color          disparity in colours, PNG\n"
     "  overview       image, disparity, search width and error (or variance) in one PNG\n"
-    "  cloud          points with colours [m], PLY, without those whose depth is uncertain by more than 5 %\n"
+    "  cloud          points with colours [m], PLY, without those whose depth is uncertain (--cloud-sigma)\n"
     "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none; in metres, PFM";
 
 const std::vector<std::string>& write_kinds() { return kKinds; }
@@ -106,11 +106,13 @@ std::vector<std::string> output_files(const std::set<std::string>& kinds, const 
 }
 
 RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size,
-                       const PipelineOptions& options, const Calibration& calibration)
+                       const PipelineOptions& options, const Calibration& calibration,
+                       const vision::PointCloudOptions& cloud)
     : folder_(std::move(folder)),
       kinds_(std::move(kinds)),
       options_(options),
       calibration_(calibration),
+      cloud_(cloud),
       disparity_(size, CV_32FC1),
       panels_(options.disparities) {
   vision::make_folder(folder_ / "disparity");
@@ -138,8 +140,9 @@ FrameOutputs RunOutputs::views() {
   return outputs;
 }
 
-std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& left) {
+WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& left) {
   using Path = std::filesystem::path;
+  WrittenFrame written;
   const auto depth_m = [&] { return vision::depth_from_disparity(disparity_, calibration_); };
   const std::pair<const char*, std::function<void(const Path&)>> writers[] = {
       {"variance", [&](const Path& path) { vision::write_pfm(path, variance_); }},
@@ -165,7 +168,9 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
       {"cloud",
        [&](const Path& path) {
          const cv::Mat colors = vision::read_color_image(frame.left);
-         vision::write_ply(path, vision::point_cloud(disparity_, variance_, colors, calibration_));
+         const vision::PointCloud cloud = vision::point_cloud(disparity_, variance_, colors, calibration_, cloud_);
+         vision::write_ply(path, cloud);
+         written.cloud = {static_cast<std::int64_t>(cloud.points_m.size()), cloud.left_out};
        }},
       {"depth", [&](const Path& path) { vision::write_depth_png(path, depth_m()); }},
       {"depth_m", [&](const Path& path) { vision::write_pfm(path, depth_m()); }}};
@@ -173,7 +178,8 @@ std::int64_t RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
     if (wants(kind)) write(folder_ / output_file(kind, frame.name, options_));
   }
   // Last: a frame with it is complete.
-  return vision::write_disparity(folder_ / output_file("disparity", frame.name, options_), disparity_);
+  written.unstorable = vision::write_disparity(folder_ / output_file("disparity", frame.name, options_), disparity_);
+  return written;
 }
 
 }  // namespace egosgm::app

@@ -4,12 +4,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/dataset.h"
+#include "egosgm/vision/point_cloud.h"
 #include "host/vision/frame_panels.h"
 
 namespace egosgm::app {
@@ -27,19 +29,29 @@ const std::vector<std::string>& write_kinds();
 /// The same, as --help and the README describe it.
 extern const char* const kWriteListHelp;
 
+/// How many points a frame's cloud has, and what it left out.
+struct CloudCounts {
+  std::int64_t points = 0;
+  vision::LeftOut left_out;
+};
+
+struct WrittenFrame {
+  std::int64_t unstorable = 0;       // disparities that KITTI's PNG has no room for
+  std::optional<CloudCounts> cloud;  // where one was written
+};
+
 /// The maps of one frame and the files that they go to. Every file appears whole or not at all.
 class RunOutputs {
  public:
   /// Makes the folders. Throws IoError.
   RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, const PipelineOptions& options,
-             const Calibration& calibration);
+             const Calibration& calibration, const vision::PointCloudOptions& cloud);
 
   /// Where the pipeline is to write; valid as long as this object lives.
   FrameOutputs views();
 
-  /// Writes the frame that the views hold; `left` is its left image. Returns how many disparities KITTI's PNG has no
-  /// room for.
-  std::int64_t write(const vision::StereoFrame& frame, const cv::Mat& left);
+  /// Writes the frame that the views hold; `left` is its left image.
+  WrittenFrame write(const vision::StereoFrame& frame, const cv::Mat& left);
 
  private:
   bool wants(const char* kind) const { return kinds_.contains(kind); }
@@ -48,6 +60,7 @@ class RunOutputs {
   const std::set<std::string> kinds_;
   const PipelineOptions options_;
   const Calibration calibration_;
+  const vision::PointCloudOptions cloud_;
   cv::Mat disparity_, variance_, right_, predicted_, measured_, search_, dynamic_, reason_;
   vision::FramePanels panels_;
 };

@@ -110,7 +110,7 @@ Json RunReport::identity() const {
 }
 
 void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
-                    const HostTimes& times, std::int64_t unstorable) {
+                    const HostTimes& times, const WrittenFrame& written) {
   json_["frames"].push_back({{"frame", frame.number},
                              {"left", std::filesystem::absolute(frame.left).string()},
                              {"search_fraction", report.search_fraction},
@@ -122,8 +122,14 @@ void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report,
                              {"odometry", odometry_json(motion)},
                              {"launches", report.launches},
                              {"stripes", report.stripes},
-                             {"outside_png_range", unstorable},
+                             {"outside_png_range", written.unstorable},
                              {"ms", times_json(report, motion, times)}});
+  if (const auto& cloud = written.cloud) {
+    const vision::LeftOut& out = cloud->left_out;
+    json_["frames"].back()["cloud"] = {
+        {"points", cloud->points},
+        {"left_out", {{"far", out.far}, {"uncertain", out.uncertain}, {"alone", out.alone}}}};
+  }
   if (frame.name != fmt::format("{:06}", frame.number)) json_["frames"].back()["name"] = frame.name;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "apps/motion_source.h"
+#include "apps/run_outputs.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/dataset.h"
 
@@ -31,7 +32,7 @@ class RunReport {
   nlohmann::ordered_json identity() const;
 
   void add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
-           const HostTimes& times, std::int64_t unstorable);
+           const HostTimes& times, const WrittenFrame& written);
 
   /// Names the numbers of `run --write reason`.
   void add_reasons();

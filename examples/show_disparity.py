@@ -44,8 +44,8 @@ for left, right in frames:
 
 # %% NumPy from here on: depth, and how sure it is
 valid = result.disparity != egosgm.INVALID_DISPARITY
-depth_m = np.where(valid, egosgm.depth_from_disparity(result.disparity, calibration), np.nan)
-sigma_m = depth_m**2 / (calibration.fx * calibration.baseline_m) * np.sqrt(result.variance)
+depth_m = egosgm.depth_from_disparity(result.disparity, calibration)
+sigma_m = egosgm.depth_sigma_from_disparity(result.disparity, result.variance, calibration)
 print(f"median depth {np.nanmedian(depth_m):.1f} m, median standard deviation {np.nanmedian(sigma_m):.2f} m")
 
 # %% Look at it

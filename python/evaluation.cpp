@@ -5,6 +5,8 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <limits>
+
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/render.h"
 #include "host/vision/estimate_reader.h"
@@ -154,9 +156,15 @@ void bind_evaluation(py::module_& module) {
   module.def(
       "depth_from_disparity",
       [](const py::object& map, const Calibration& calibration) {
-        return of_map(map, [&](const cv::Mat& mat) { return vision::depth_from_disparity(mat, calibration); });
+        return of_map(map, [&](const cv::Mat& mat) {
+          cv::Mat depth_m = vision::depth_from_disparity(mat, calibration);
+          depth_m.setTo(std::numeric_limits<float>::quiet_NaN(), depth_m <= 0);
+          return depth_m;
+        });
       },
-      py::arg("disparity"), py::arg("calibration"), "Depth [m]; INVALID_DISPARITY where there is none.");
+      py::arg("disparity"), py::arg("calibration"),
+      "Depth [m] = fx * baseline_m / (disparity + doffs_px); NaN where there is no disparity, and where depth has no "
+      "end.");
   module.def("color_disparity", &color_disparity, py::arg("disparity"), py::arg("low") = py::none(),
              py::arg("high") = py::none(), "H x W x 3, RGB: turbo colours, near is red, black where invalid.");
   module.def(

@@ -6,6 +6,7 @@
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/point_cloud.h"
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/file_io.h"
 #include "host/vision/frame_panels.h"
@@ -149,6 +150,54 @@ void write_pfm(const path& file, const py::object& map) {
   vision::write_pfm(file, map_of(map, "map", keep));
 }
 
+/// N x 3 values, of any numbers, as vectors. Throws InvalidArgument for another shape.
+template <typename T, typename Vector>
+std::vector<Vector> vectors_of(const std::optional<py::array_t<T, py::array::c_style | py::array::forcecast>>& array,
+                               const char* name) {
+  if (!array) return {};
+  if (array->ndim() != 2 || array->shape(1) != 3) {
+    throw InvalidArgument(std::string(name) + " need a row of three numbers for each point: give an N x 3 array");
+  }
+  const auto* first = reinterpret_cast<const Vector*>(array->data());
+  return {first, first + array->shape(0)};
+}
+
+using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
+using Bytes = py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>;
+
+void write_ply(const path& file, const Floats& points, const std::optional<Bytes>& bgr,
+               const std::optional<Floats>& normals) {
+  vision::PointCloud cloud;
+  cloud.points_m = vectors_of<float, cv::Point3f>(points, "points");
+  cloud.colors = vectors_of<std::uint8_t, cv::Vec3b>(bgr, "colors");
+  cloud.normals = vectors_of<float, cv::Vec3f>(normals, "normals");
+  const OtherThreadsRun other_threads_run;
+  vision::write_ply(file, cloud);
+}
+
+/// (points, BGR, what was left out) of H x W maps and H x W x 3 colours, BGR.
+py::tuple point_cloud(const py::object& disparity, const py::object& variance, const Bytes& bgr,
+                      const Calibration& calibration, double max_relative_sigma, double max_depth_m, double max_jump_px,
+                      const std::vector<int>& kept, const std::optional<Bytes>& reasons) {
+  py::array keep_disparity, keep_variance;
+  const cv::Mat d = map_of(disparity, "disparity", keep_disparity), p = map_of(variance, "variance", keep_variance);
+  const auto mat_of = [](const Bytes& bytes, int type) {
+    return cv::Mat(static_cast<int>(bytes.shape(0)), static_cast<int>(bytes.shape(1)), type,
+                   const_cast<std::uint8_t*>(bytes.data()));
+  };
+  vision::PointCloudOptions options{max_relative_sigma, max_depth_m, max_jump_px, {}};
+  for (const int reason : kept) options.reasons.push_back(static_cast<Reason>(reason));
+  const vision::PointCloud cloud = vision::point_cloud(d, p, mat_of(bgr, CV_8UC3), calibration, options,
+                                                       reasons ? mat_of(*reasons, CV_8UC1) : cv::Mat());
+  const auto count = static_cast<py::ssize_t>(cloud.points_m.size());
+  const vision::LeftOut& out = cloud.left_out;
+  return py::make_tuple(
+      py::array_t<float>({count, py::ssize_t{3}}, reinterpret_cast<const float*>(cloud.points_m.data())),
+      py::array_t<std::uint8_t>({count, py::ssize_t{3}}, reinterpret_cast<const std::uint8_t*>(cloud.colors.data())),
+      py::dict(py::arg("far") = out.far, py::arg("uncertain") = out.uncertain, py::arg("reason") = out.reason,
+               py::arg("alone") = out.alone));
+}
+
 }  // namespace
 
 void bind_files(py::module_& module) {
@@ -173,6 +222,13 @@ void bind_files(py::module_& module) {
   module.def(
       "read_grey", [](const path& file) { return array_of(vision::read_grey_image(file)); }, py::arg("file"),
       "Reads a PNG of any colour type as grey, uint8 or uint16.");
+  module.def(
+      "read_color", [](const path& file) { return array_of(vision::read_color_image(file)); }, py::arg("file"),
+      "Reads a PNG or JPEG as RGB, H x W x 3 of uint8.");
+  module.def("_write_ply", &write_ply, py::arg("file"), py::arg("points"), py::arg("bgr"), py::arg("normals"));
+  module.def("_point_cloud", &point_cloud, py::arg("disparity"), py::arg("variance"), py::arg("bgr"),
+             py::arg("calibration"), py::arg("max_relative_sigma"), py::arg("max_depth_m"), py::arg("max_jump_px"),
+             py::arg("kept"), py::arg("reasons"));
   module.def(
       "read_disparity", [](const path& file) { return array_of(vision::read_disparity(file)); }, py::arg("file"),
       "Reads KITTI's PNG or a PFM into float32; INVALID_DISPARITY where there is none.");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "egosgm/vision/point_cloud.h"
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -46,12 +47,17 @@ void PointCloudOptions::validate() const {
 }
 
 PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const cv::Mat& colors,
-                       const Calibration& calibration, const PointCloudOptions& options) {
+                       const Calibration& calibration, const PointCloudOptions& options, const cv::Mat& reasons) {
   require(!disparity.empty() && disparity.type() == CV_32FC1 && variance.type() == CV_32FC1,
           "disparity and variance must be CV_32FC1");
   require(disparity.size() == variance.size() && disparity.size() == colors.size(),
           "disparity, variance and image must have one size");
+  const bool judges_reasons = !options.reasons.empty();
+  require(!judges_reasons || (reasons.type() == CV_8UC1 && reasons.size() == disparity.size()),
+          "a choice of reasons needs their map, CV_8UC1, of the disparity's size");
   options.validate();
+  std::array<bool, 256> stays{};
+  for (const Reason reason : options.reasons) stays[static_cast<std::uint8_t>(reason)] = true;
   const cv::Mat picture = colors.type() == CV_8UC3 ? colors : color_grey(colors);
   PointCloud cloud;
   cloud.points_m.reserve(disparity.total());
@@ -60,11 +66,19 @@ PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const 
     for (int x = 0; x < disparity.cols; ++x) {
       const float d = disparity.at<float>(y, x);
       const double shift_px = d + calibration.doffs_px;
-      if (!is_valid_disparity(d) || shift_px <= 0) continue;
-      const double depth_m = calibration.fx * calibration.baseline_m / shift_px;
+      if (!is_valid_disparity(d)) continue;
+      const double depth_m = shift_px > 0 ? calibration.fx * calibration.baseline_m / shift_px : HUGE_VAL;
       const double relative_sigma = std::sqrt(variance.at<float>(y, x)) / shift_px;
-      if (depth_m > options.max_depth_m || !(relative_sigma <= options.max_relative_sigma)) continue;
-      if (!has_neighbour_within(disparity, x, y, static_cast<float>(options.max_jump_px))) continue;
+      std::int64_t* const why = !(depth_m <= options.max_depth_m)                          ? &cloud.left_out.far
+                                : !(relative_sigma <= options.max_relative_sigma)          ? &cloud.left_out.uncertain
+                                : judges_reasons && !stays[reasons.at<std::uint8_t>(y, x)] ? &cloud.left_out.reason
+                                : !has_neighbour_within(disparity, x, y, static_cast<float>(options.max_jump_px))
+                                    ? &cloud.left_out.alone
+                                    : nullptr;
+      if (why) {
+        ++*why;
+        continue;
+      }
       cloud.points_m.emplace_back(static_cast<float>((x - calibration.cx) / calibration.fx * depth_m),
                                   static_cast<float>((y - calibration.cy) / calibration.fy * depth_m),
                                   static_cast<float>(depth_m));
@@ -75,24 +89,28 @@ PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const 
 }
 
 void write_ply(const std::filesystem::path& file, const PointCloud& cloud) {
-  require(cloud.points_m.size() == cloud.colors.size(), "as many colours as points are needed");
-  std::string bytes =
-      "ply\nformat binary_little_endian 1.0\ncomment EgoSGM: left camera's frame, x right, y down, z forward, metres\n"
-      "element vertex " +
-      std::to_string(cloud.points_m.size()) +
-      "\nproperty float x\nproperty float y\nproperty float z\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n";
-  constexpr std::size_t kPointBytes = 3 * sizeof(float) + 3;
+  const std::size_t count = cloud.points_m.size();
+  const bool has_normals = !cloud.normals.empty(), has_colors = !cloud.colors.empty();
+  require(!has_normals || cloud.normals.size() == count, "as many normals as points are needed");
+  require(!has_colors || cloud.colors.size() == count, "as many colours as points are needed");
+  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment EgoSGM: x right, y down, z forward, metres\n";
+  bytes += "element vertex " + std::to_string(count) + "\nproperty float x\nproperty float y\nproperty float z\n";
+  if (has_normals) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
+  if (has_colors) bytes += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  bytes += "end_header\n";
+  constexpr std::size_t kVectorBytes = 3 * sizeof(float);
   const std::size_t header_bytes = bytes.size();
-  bytes.resize(header_bytes + kPointBytes * cloud.points_m.size());
+  bytes.resize(header_bytes + count * (kVectorBytes + (has_normals ? kVectorBytes : 0) + (has_colors ? 3 : 0)));
   char* next = bytes.data() + header_bytes;
-  for (std::size_t i = 0; i < cloud.points_m.size(); ++i, next += kPointBytes) {
-    const cv::Point3f& point = cloud.points_m[i];
-    const float position[3] = {point.x, point.y, point.z};
-    std::memcpy(next, position, sizeof position);
-    for (int channel = 0; channel < 3; ++channel) {
-      next[sizeof position + channel] = static_cast<char>(cloud.colors[i][2 - channel]);
-    }
+  const auto put = [&next](float x, float y, float z) {
+    const float vector[3] = {x, y, z};
+    std::memcpy(next, vector, kVectorBytes);
+    next += kVectorBytes;
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    put(cloud.points_m[i].x, cloud.points_m[i].y, cloud.points_m[i].z);
+    if (has_normals) put(cloud.normals[i][0], cloud.normals[i][1], cloud.normals[i][2]);
+    for (int channel = 2; has_colors && channel >= 0; --channel) *next++ = static_cast<char>(cloud.colors[i][channel]);
   }
   write_file(file, bytes);
 }

@@ -3,7 +3,9 @@
 
     import egosgm
     for frame in egosgm.run("street"):
-        frame.disparity  # float32, pixels, egosgm.INVALID_DISPARITY where there is none
+        frame.disparity    # float32 [px], egosgm.INVALID_DISPARITY where there is none
+        frame.depth        # float32 [m], NaN where there is none
+        frame.depth_sigma  # its standard deviation [m]
 
 The same, step by step:
 
@@ -26,14 +28,16 @@ from . import _egosgm
 from ._egosgm import *  # noqa: F401,F403
 from ._egosgm import __version__
 from .calibrations import read_calibration, read_euroc_rig, read_opencv_rig
+from .depth import depth_sigma_from_disparity
 from .drive import Drive, DriveFrame, run
 from .matcher import Matcher
+from .points import PointCloud, point_cloud, write_ply
 from .pose_evaluation import MotionError, PoseEvaluation, SegmentError, evaluate_poses
 from .rectification import Rectification, StereoRig
 from .values import as_dataclass as _as_dataclass
 from .video_evaluation import DensityFigures, RegionFigures, VideoEvaluation, VideoFigures, evaluate_video, move_map
 
-__all__ = ["__version__", "read_calibration", "read_euroc_rig", "read_opencv_rig", "Rectification", "StereoRig", "Drive", "DriveFrame", "Matcher", "run", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
+__all__ = ["__version__", "read_calibration", "read_euroc_rig", "read_opencv_rig", "depth_sigma_from_disparity", "Rectification", "StereoRig", "Drive", "DriveFrame", "Matcher", "run", "PointCloud", "point_cloud", "write_ply", "MotionError", "PoseEvaluation", "SegmentError", "evaluate_poses", "DensityFigures", "RegionFigures", "VideoEvaluation", "VideoFigures", "evaluate_video", "move_map",
            *(name for name in dir(_egosgm) if not name.startswith("_"))]
 
 

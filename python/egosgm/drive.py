@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import _egosgm
 from .calibrations import read_calibration
+from .depth import depth_sigma_from_disparity
 from .rectification import StereoRig
 
 FRAMES_PER_LOOK = 50  # for what is nearer than the range
@@ -29,21 +30,32 @@ class DriveFrame:
 
     @property
     def disparity(self) -> Optional[NDArray[np.float32]]:
-        """Pixels; INVALID_DISPARITY where there is none."""
+        """x_left - x_right [px]; INVALID_DISPARITY where there is none."""
         return self.maps.disparity
 
     @property
     def variance(self) -> Optional[NDArray[np.float32]]:
-        """Of the disparity [px^2]."""
+        """Of the disparity [px^2]; 0 where there is none."""
         return self.maps.variance
+
+    def _of_depth(self, *needed: str) -> Tuple[Any, ...]:
+        """The maps that depth comes from, and the calibration."""
+        if self.calibration is None:
+            raise _egosgm.InvalidArgument("depth: a disparity is none without a calibration: give it to run()")
+        for name in needed:
+            if getattr(self.maps, name) is None:
+                raise _egosgm.InvalidArgument(f'depth: needs the {name}: name it too, outputs=("disparity", "variance")')
+        return (*(getattr(self.maps, name) for name in needed), self.calibration)
 
     @property
     def depth(self) -> NDArray[np.float32]:
-        """Metres; NaN where there is no disparity."""
-        if self.calibration is None:
-            raise _egosgm.InvalidArgument("depth: a disparity is none without a calibration: give it to run()")
-        depth = _egosgm.depth_from_disparity(self.disparity, self.calibration)
-        return np.where(depth > 0, depth, np.float32(np.nan))
+        """Along the left camera's axis [m]; NaN where there is none."""
+        return _egosgm.depth_from_disparity(*self._of_depth("disparity"))
+
+    @property
+    def depth_sigma(self) -> NDArray[np.float32]:
+        """Standard deviation of `depth` [m]; NaN where there is none."""
+        return depth_sigma_from_disparity(*self._of_depth("disparity", "variance"))
 
     @property
     def motion(self) -> Optional[_egosgm.Motion]:
@@ -202,7 +214,7 @@ def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Iterable[
     """Disparity and variance for each frame of a drive:
 
         for frame in egosgm.run("drive/"):
-            print(frame, frame.disparity, frame.depth)
+            print(frame, frame.disparity, frame.depth, frame.depth_sigma)
 
     source: a folder as open_folder takes it, a StereoSequence, or pairs of rectified images, grey or colour (RGB).
     calibration: a Calibration, or a file as read_calibration takes it; without any there are disparities, but no depth and

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
+from .depth import depth_sigma_from_disparity
 from .rectification import Rectification, StereoRig
 
 # Bytes between neighbouring pixels of an encoding, and where the brightness lies in them, or red, green and blue.
@@ -227,11 +228,8 @@ def _rig(left: Any, right: Any, shift: float) -> StereoRig:
 def depth_maps(disparity: NDArray[np.float32], variance: NDArray[np.float32],
                calibration: _egosgm.Calibration) -> Tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Depth [m] and its variance [m^2], NaN where there is none (REP 118)."""
-    depth = np.asarray(_egosgm.depth_from_disparity(disparity, calibration))
-    depth = np.where(depth > 0, depth, np.float32(np.nan))
-    with np.errstate(over="ignore"):  # infinitely uncertain, where the disparity is next to nothing
-        of_depth = (depth * depth / np.float32(calibration.fx * calibration.baseline_m)) ** 2 * variance
-    return depth, of_depth.astype(np.float32)
+    with np.errstate(over="ignore"):
+        return _egosgm.depth_from_disparity(disparity, calibration), depth_sigma_from_disparity(disparity, variance, calibration) ** 2
 
 
 def ros_range(options: Dict[str, Any], calibration: _egosgm.Calibration) -> Tuple[float, float]:

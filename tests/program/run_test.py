@@ -10,10 +10,29 @@ import shutil
 import subprocess
 import unittest
 
-from program_case import DATA, FRAMES, PROGRAM, ProgramTest, egosgm, grey_png
+from program_case import DATA, FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png
 
 
 class Run(ProgramTest):
+    def test_clouds_say_what_they_left_out(self):
+        counts = {}
+        for sigma in (None, 1, 50):
+            out = self.new_folder() / "out"
+            said = self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "cloud", "--disparities", 64, "--frames", "0:1",
+                                     *([] if sigma is None else ["--cloud-sigma", sigma]))
+            self.assertIn(f"uncertain by more than {sigma or 10} % (--cloud-sigma)", said)
+            clouds = [frame["cloud"] for frame in self.report(out)["frames"]]
+            for name, frame, cloud in zip(("000000", "000001"), self.report(out)["frames"], clouds, strict=True):
+                header = (out / f"cloud/{name}.ply").read_bytes().split(b"end_header")[0].decode()
+                self.assertIn(f"element vertex {cloud['points']}\n", header)
+                self.assertEqual(cloud["points"] + sum(cloud["left_out"].values()), round(frame["density"] * WIDTH * HEIGHT))
+            points, pixels = sum(c["points"] for c in clouds), sum(c["points"] + sum(c["left_out"].values()) for c in clouds)
+            self.assertIn(f"clouds hold {100 * points / pixels:.1f} % of the pixels with a disparity", said)
+            counts[sigma] = points
+        self.assertLess(counts[1], counts[None])
+        self.assertLess(counts[None], counts[50])
+        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder() / "out", "--cloud-sigma", 0], "--cloud-sigma 0", "above 0")
+
     def test_steps_names_by_order_and_a_folder_as_it_is(self):
         skip, other = self.new_folder(), self.new_folder()
         for i in range(FRAMES):

@@ -36,12 +36,32 @@ TEST(PointCloud, LeavesOutWhatIsUncertainFarInvalidOrAlone) {
   disparity.at<float>(0, 0) = kNo;
   disparity.at<float>(0, 2) = -5;    // d + doffs = 0
   disparity.at<float>(1, 4) = 9;     // no neighbour near
-  variance.at<float>(3, 1) = 0.26f;  // sigma 0.51 px of 10 px: just above 5 %
-  variance.at<float>(3, 3) = 0.24f;
+  variance.at<float>(3, 1) = 1.02f;  // sigma 1.01 px of 10 px: just above 10 %
+  variance.at<float>(3, 3) = 0.98f;
   variance.at<float>(3, 5) = NAN;
   EXPECT_EQ(point_cloud(disparity, variance, grey(), kCamera).points_m.size(), 24u - 5u);
+  const LeftOut left_out = point_cloud(disparity, variance, grey(), kCamera).left_out;
+  EXPECT_EQ(left_out.far, 1);        // d + doffs = 0
+  EXPECT_EQ(left_out.uncertain, 2);  // one above 10 %, one unknown
+  EXPECT_EQ(left_out.alone, 1);
+  EXPECT_EQ(left_out.reason, 0);
   EXPECT_EQ(point_cloud(disparity, variance, grey(), kCamera, {.max_depth_m = 4.9}).points_m.size(), 0u);
   EXPECT_EQ(point_cloud(disparity, variance, grey(), kCamera, {.max_jump_px = 4}).points_m.size(), 24u - 4u);
+}
+
+TEST(PointCloud, KeepsPixelsOfTheReasonsThatWereChosen) {
+  cv::Mat reasons(4, 6, CV_8UC1, cv::Scalar(static_cast<int>(Reason::kTrusted)));
+  reasons.at<std::uint8_t>(1, 2) = static_cast<std::uint8_t>(Reason::kFlat);
+  reasons.at<std::uint8_t>(3, 0) = static_cast<std::uint8_t>(Reason::kPredicted);
+  const auto cloud = [&](std::vector<Reason> kept) {
+    return point_cloud(filled(5), filled(0.01f), grey(), kCamera, {.reasons = std::move(kept)}, reasons);
+  };
+  EXPECT_EQ(cloud({}).points_m.size(), 24u);
+  EXPECT_EQ(cloud({Reason::kTrusted}).points_m.size(), 22u);
+  EXPECT_EQ(cloud({Reason::kTrusted}).left_out.reason, 2);
+  EXPECT_EQ(cloud({Reason::kTrusted, Reason::kPredicted}).points_m.size(), 23u);
+  EXPECT_EQ(cloud({Reason::kFlat}).points_m.size(), 1u);
+  EXPECT_THROW(point_cloud(filled(5), filled(1), grey(), kCamera, {.reasons = {Reason::kFlat}}), InvalidArgument);
 }
 
 TEST(PointCloud, RefusesWhatDoesNotBelongTogether) {
@@ -49,7 +69,8 @@ TEST(PointCloud, RefusesWhatDoesNotBelongTogether) {
   EXPECT_THROW(point_cloud(filled(5), filled(1), grey({6, 5}), kCamera), InvalidArgument);
   EXPECT_THROW(point_cloud(grey(), filled(1), grey(), kCamera), InvalidArgument);
   EXPECT_THROW(point_cloud(filled(5), filled(1), grey(), kCamera, {.max_relative_sigma = 0}), InvalidArgument);
-  EXPECT_THROW(write_ply("cloud.ply", {.points_m = {{1, 2, 3}}, .colors = {}}), InvalidArgument);
+  EXPECT_THROW(write_ply("cloud.ply", {.points_m = {{1, 2, 3}}, .colors = {{1, 2, 3}, {4, 5, 6}}}), InvalidArgument);
+  EXPECT_THROW(write_ply("cloud.ply", {.points_m = {{1, 2, 3}}, .normals = {{1, 2, 3}, {4, 5, 6}}}), InvalidArgument);
 }
 
 TEST(PointCloud, PlyHoldsPointsAndColoursAsItsHeaderSays) {
@@ -67,6 +88,24 @@ TEST(PointCloud, PlyHoldsPointsAndColoursAsItsHeaderSays) {
   EXPECT_EQ(xyz[2], 6.0f);
   EXPECT_EQ(static_cast<unsigned char>(bytes[begin + 12]), 30);  // red first
   EXPECT_EQ(static_cast<unsigned char>(bytes[begin + 14]), 10);
+}
+
+TEST(PointCloud, PlyHoldsNormalsWhereThereAreAny) {
+  const TemporaryFolder folder;
+  write_ply(folder / "plain.ply", {.points_m = {{1, 2, 3}}});
+  const std::string plain = read_file(folder / "plain.ply", 1 << 16);
+  EXPECT_EQ(plain.size(), plain.find("end_header\n") + 11 + 12);
+  EXPECT_EQ(plain.find("red"), std::string::npos);
+  write_ply(folder / "full.ply", {.points_m = {{1, 2, 3}}, .colors = {{10, 20, 30}}, .normals = {{0, 0.5f, -1}}});
+  const std::string full = read_file(folder / "full.ply", 1 << 16);
+  const std::size_t begin = full.find("end_header\n") + 11;
+  ASSERT_EQ(full.size(), begin + 12 + 12 + 3);
+  float normal[3];
+  std::memcpy(normal, &full[begin + 12], sizeof normal);
+  EXPECT_EQ(normal[1], 0.5f);
+  EXPECT_EQ(normal[2], -1.0f);
+  EXPECT_LT(full.find("property float nz"), full.find("property uchar red"));
+  EXPECT_EQ(static_cast<unsigned char>(full[begin + 24]), 30);
 }
 
 TEST(PointCloud, DepthIsStoredInMillimetres) {

@@ -8,34 +8,49 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
+#include "egosgm/reason.h"
 
 namespace egosgm::vision {
 
-/// Points in the left camera's frame (x right, y down, z forward), row by row, and their colours.
+/// Pixels with a disparity that became no points, by the first of the bounds that left them out.
+struct LeftOut {
+  std::int64_t far = 0;        // beyond max_depth_m
+  std::int64_t uncertain = 0;  // max_relative_sigma
+  std::int64_t reason = 0;     // one that is not among `reasons`
+  std::int64_t alone = 0;      // max_jump_px
+};
+
+/// Points, and what belongs to each of them; colours and normals may be missing.
 struct PointCloud {
   std::vector<cv::Point3f> points_m;
-  std::vector<cv::Vec3b> colors;  // BGR
+  std::vector<cv::Vec3b> colors{};  // BGR
+  std::vector<cv::Vec3f> normals{};
+  LeftOut left_out{};
 };
 
 /// Which pixels become points. The standard deviation of a depth Z is sigma_Z = Z sqrt(p) / (d + doffs), p the
 /// disparity's variance: it grows with the square of the depth, and so do the cones of noise behind every surface.
 struct EGOSGM_EXPORT PointCloudOptions {
-  double max_relative_sigma = 0.05;  // largest sigma_Z / Z
+  double max_relative_sigma = 0.1;  // largest sigma_Z / Z
   double max_depth_m = 80.0;
-  double max_jump_px = 1.0;  // a pixel whose disparity lies farther than this from all four neighbours is left out
+  double max_jump_px = 1.0;       // a pixel whose disparity lies farther than this from all four neighbours is left out
+  std::vector<Reason> reasons{};  // a pixel that has none of these is left out; empty: all may stay
 
   /// Throws InvalidArgument, naming the value, unless all are positive.
   void validate() const;
 };
 
-/// The points of a disparity map [px] with its variance [px^2], both CV_32FC1; `colors` is the left image, CV_8UC1,
-/// CV_16UC1 (stretched to its maximum) or CV_8UC3. Throws InvalidArgument for other types, for maps of different sizes,
-/// and as PointCloudOptions::validate does. Thread-safe.
+/// The points of a disparity map [px] with its variance [px^2], both CV_32FC1, in the left camera's frame (x right, y
+/// down, z forward), row by row. `colors` is the left image, CV_8UC1, CV_16UC1 (stretched to its maximum) or CV_8UC3;
+/// `reasons` are FrameOutputs::reason, CV_8UC1, which options.reasons needs. Throws InvalidArgument for other types,
+/// for maps of different sizes, and as PointCloudOptions::validate does. Thread-safe.
 EGOSGM_EXPORT PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const cv::Mat& colors,
-                                     const Calibration& calibration, const PointCloudOptions& options = {});
+                                     const Calibration& calibration, const PointCloudOptions& options = {},
+                                     const cv::Mat& reasons = {});
 
-/// Writes a binary PLY (x, y, z as float [m]; red, green, blue as uchar), whole or not at all. Throws IoError.
-/// Thread-safe for different files.
+/// Writes a binary PLY (x, y, z as float [m]; nx, ny, nz as float and red, green, blue as uchar where there are any),
+/// whole or not at all. Throws InvalidArgument unless there are as many of each as points, and IoError. Thread-safe for
+/// different files.
 EGOSGM_EXPORT void write_ply(const std::filesystem::path& file, const PointCloud& cloud);
 
 /// Writes a depth map [m], CV_32FC1, as a 16-bit PNG of millimetres, 0 where there is none, as RGB-D data sets store

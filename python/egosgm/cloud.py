@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm cloud: the points of all frames of a run, by its poses, in one cloud."""
+import pathlib
+from typing import Any, List, Sequence, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _egosgm
+from .arguments import Parser, decimal, expect_new_file, read_json
+from .points import cloud_of_maps, write_ply
+
+
+def _parser() -> Parser:
+    parser = Parser("cloud", description="Fuse the points of all frames of a run, by its poses, into one cloud with colours",
+                    epilog="The run has to have variances and poses: egosgm run DRIVE --out OUT --write variance\n"
+                    "The cloud lies in the frame of the run's first left camera: x right, y down, z forward, metres.")
+    add = parser.add_argument
+    add("run", metavar="OUT", help="the folder that `egosgm run` wrote")
+    add("--out", metavar="FILE.ply", help="the cloud: a new file; without: OUT/cloud.ply")
+    add("--voxel", metavar="M", type=decimal, default=0.05, help="points within a cube of this side become their mean [m, %(default)s]")
+    add("--cloud-sigma", metavar="PERCENT", type=decimal, default=10, help="largest standard deviation of a depth [%% of the depth, %(default)s]")
+    add("--max-depth", metavar="M", type=decimal, default=20, help="points farther from their camera are left out [m, %(default)s]")
+    add("--least-frames", metavar="N", type=int, default=1, help="cubes that fewer frames saw are left out [%(default)s]")
+    add("--normals", action="store_true", help="a normal for each point too, towards the cameras that saw it")
+    return parser
+
+
+def _map_of(folder: pathlib.Path, name: str, kind: str) -> NDArray[np.float32]:
+    for extension in (".pfm", ".png"):
+        if (folder / kind / (name + extension)).exists():
+            return _egosgm.read_disparity(folder / kind / (name + extension))
+    raise _egosgm.InvalidArgument(f"{folder / kind}: has no map of frame {name}: egosgm run --write {kind} writes it, into a new folder"
+                                  if kind != "disparity" else f"{folder / kind}: has no map of frame {name}: give the folder that `egosgm run` wrote")
+
+
+def _frames_of(folder: pathlib.Path) -> Tuple[_egosgm.Calibration, List[Tuple[str, str]], NDArray[np.float64]]:
+    """The calibration, names and left images, and the poses."""
+    file = folder / "report.json"
+    if not file.exists():
+        raise _egosgm.InvalidArgument(f"{file}: no such file: give the folder that `egosgm run --out` wrote")
+    poses = folder / "poses.txt"
+    if not poses.exists():
+        raise _egosgm.InvalidArgument(f"{poses}: no such file: a run with a calibration (--calib) writes it when it ends")
+    try:
+        report = read_json(file)
+        calibration = _egosgm.Calibration(**report["calibration"])
+        frames = [(entry.get("name") or f"{entry['frame']:06d}", entry["left"]) for entry in report["frames"]]
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise _egosgm.InvalidArgument(f"{file}: is no report of a run: {error}") from None
+    world_from_camera = _egosgm.read_poses(poses)
+    if len(world_from_camera) != len(frames) or not frames:
+        raise _egosgm.InvalidArgument(f"{poses}: has {len(world_from_camera)} poses and {file.name} {len(frames)} frames: let the run end, "
+                                      "or run it again with --resume")
+    return calibration, frames, world_from_camera
+
+
+class VoxelGrid:
+    """Means of what lies in one cube, of as many frames as there are."""
+
+    def __init__(self, side_m: float) -> None:
+        self._side_m = side_m
+        self._keys = np.empty((0, 3), np.int32)
+        self._sums = np.empty((0, 11))  # points, colours, normals, count, frames
+
+    def add(self, points: NDArray[Any], colors: NDArray[Any], normals: NDArray[Any]) -> None:
+        ones = np.ones((len(points), 1))
+        keys, sums = self._of(np.floor(points / self._side_m).astype(np.int32), np.hstack([points, colors, normals, ones, ones]))
+        sums[:, 10] = 1
+        self._keys, self._sums = self._of(np.vstack([self._keys, keys]), np.vstack([self._sums, sums]))
+
+    @staticmethod
+    def _of(keys: NDArray[np.int32], rows: NDArray[np.float64]) -> Tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Each key once, and the sum of its rows."""
+        order = np.lexsort(keys.T)
+        keys, rows = keys[order], rows[order]
+        if not len(keys):
+            return keys, rows
+        begins = np.flatnonzero(np.r_[True, (keys[1:] != keys[:-1]).any(axis=1)])
+        return keys[begins], np.add.reduceat(rows, begins)
+
+    def means(self, least_frames: int) -> Tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.float32]]:
+        """Points, colours and unit normals."""
+        sums = self._sums[self._sums[:, 10] >= least_frames]
+        count = sums[:, 9:10]
+        length = np.linalg.norm(sums[:, 6:9], axis=1, keepdims=True)
+        return ((sums[:, :3] / count).astype(np.float32), np.rint(sums[:, 3:6] / count).astype(np.uint8),
+                (sums[:, 6:9] / np.where(length > 0, length, 1)).astype(np.float32))
+
+
+def normals_of(disparity: NDArray[np.float32], calibration: _egosgm.Calibration, points: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Of the disparity's slope at each point's pixel: a plane of space is one of disparities, d = a x + b y + c. They look at the camera."""
+    c = calibration
+    x, y = (np.rint(f * points[:, i] / points[:, 2] + m).astype(int) for i, f, m in ((0, c.fx, c.cx), (1, c.fy, c.cy)))
+    d = np.where(disparity > _egosgm.INVALID_DISPARITY, disparity, np.nan) + c.doffs_px
+    down, across = np.gradient(d)
+    a, b, here = across[y, x], down[y, x], d[y, x]
+    # d = f b / Z, so that a fx X + b fy Y + (d - a (x - cx) - b (y - cy)) Z = fx baseline.
+    normal = -np.stack([a * c.fx, b * c.fy, here - a * (x - c.cx) - b * (y - c.cy)], axis=1)
+    normal[~np.isfinite(normal).all(axis=1)] = 0
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return normal / np.where(length > 0, length, 1)
+
+
+def main(arguments: Sequence[str]) -> int:
+    given = _parser().parse(arguments)
+    for name in ("voxel", "cloud_sigma", "max_depth", "least_frames"):
+        if not getattr(given, name) > 0:
+            raise _egosgm.InvalidArgument(f"--{name.replace('_', '-')} {getattr(given, name)}: choose a number above 0")
+    folder = pathlib.Path(given.run)
+    calibration, frames, poses = _frames_of(folder)
+    file = pathlib.Path(given.out) if given.out else folder / "cloud.ply"
+    expect_new_file("--out", file)
+    grid, taken, pixels = VoxelGrid(given.voxel), 0, 0
+    for (name, left), pose in zip(frames, poses):
+        disparity, variance = (_map_of(folder, name, kind) for kind in ("disparity", "variance"))
+        if not pathlib.Path(left).exists():
+            raise _egosgm.InvalidArgument(f"{left}: no such file: the colours come from the left images of the run")
+        points, colors, left_out = cloud_of_maps(disparity, variance, _egosgm.read_color(left), calibration, given.cloud_sigma / 100, None, None,
+                                                 given.max_depth, 1)
+        normals = normals_of(disparity, calibration, points) if given.normals else np.zeros_like(points)
+        grid.add(points @ pose[:3, :3].T + pose[:3, 3], colors, normals @ pose[:3, :3].T)
+        taken, pixels = taken + len(points), pixels + len(points) + sum(left_out.values())
+    points, colors, normals = grid.means(given.least_frames)
+    if not len(points):
+        raise _egosgm.InvalidArgument(f"{folder}: no point is left: raise --cloud-sigma or --max-depth, or lower --least-frames")
+    write_ply(file, points, colors, normals if given.normals else None)
+    print(f"{file}: {len(points)} points, of {100 * taken / pixels:.1f} % of the pixels with a disparity in {len(frames)} frames")
+    return 0

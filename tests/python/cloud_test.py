@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm cloud: a run's frames in one cloud, of numbers by hand."""
+import json
+
+import numpy as np
+import pytest
+
+import egosgm
+from egosgm import cloud
+
+WIDTH, HEIGHT = 6, 4
+CAMERA = dict(fx=100.0, fy=100.0, cx=2.0, cy=1.0, baseline_m=0.5, doffs_px=0.0)
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Two frames of a wall 5 m ahead; between them the camera goes 1 m to the right."""
+    folder = tmp_path / "out"
+    for kind in ("disparity", "variance"):
+        (folder / kind).mkdir(parents=True)
+    poses = np.stack([np.eye(4)] * 2)
+    poses[1, 0, 3] = 1
+    egosgm.write_poses(folder / "poses.txt", poses)
+    for number in (0, 1):
+        egosgm.write_disparity(folder / f"disparity/{number:06d}.png", np.full((HEIGHT, WIDTH), 10, np.float32))
+        egosgm.write_pfm(folder / f"variance/{number:06d}.pfm", np.full((HEIGHT, WIDTH), 0.01, np.float32))
+        image = np.full((HEIGHT, WIDTH), 51, np.float32)
+        image[0, 0] = 255  # 16 bits are stretched to their maximum
+        egosgm.write_disparity(tmp_path / f"left{number}.png", image)
+    report = {"calibration": CAMERA, "frames": [{"frame": n, "left": str(tmp_path / f"left{n}.png")} for n in (0, 1)]}
+    (folder / "report.json").write_text(json.dumps(report))
+    return folder
+
+
+def points_of(file, normals=False):
+    header, body = file.read_bytes().split(b"end_header\n", 1)
+    names = ["xyz"] + ["normal"] * normals + ["rgb"]
+    rows = np.frombuffer(body, [(name, np.uint8 if name == "rgb" else "<f4", 3) for name in names])
+    assert f"element vertex {len(rows)}\n".encode() in header
+    return rows
+
+
+def test_frames_meet_by_their_poses(run, capsys):
+    assert cloud.main([str(run), "--voxel", "0.01", "--normals"]) == 0
+    rows = points_of(run / "cloud.ply", normals=True)
+    assert "48 points, of 100.0 %" in capsys.readouterr().out and len(rows) == 48
+    np.testing.assert_allclose(rows["xyz"][:, 2], 5, rtol=1e-6)
+    # Pixels 0 to 5 are -0.1 to 0.15 m of the axis; the second camera's, a metre more.
+    np.testing.assert_allclose(np.unique(rows["xyz"][:, 0].round(4)), [*np.arange(-2, 4) * 0.05, *1 + np.arange(-2, 4) * 0.05], atol=1e-4)
+    np.testing.assert_allclose(rows["normal"], np.tile([0, 0, -1], (48, 1)), atol=1e-6)
+    corner = (np.abs(rows["xyz"] - (-0.1, -0.05, 5)).max(axis=1) < 1e-4) | (np.abs(rows["xyz"] - (0.9, -0.05, 5)).max(axis=1) < 1e-4)
+    assert corner.sum() == 2 and (rows["rgb"][corner] == 255).all() and (rows["rgb"][~corner] == 51).all()
+
+
+def test_what_lies_in_one_cube_is_its_mean():
+    grid = cloud.VoxelGrid(1)
+    for x, colour in ((0.2, 10), (0.6, 20)):
+        grid.add(np.array([[x, 0.5, 0.5], [x + 5 * x, 0.5, 0.5]]), np.full((2, 3), colour), np.array([[0, 0, -1.0], [0, 0, -1]]))
+    grid.add(np.full((2, 3), 20.5), np.zeros((2, 3)), np.zeros((2, 3)))  # one frame's
+    points, colors, normals = grid.means(2)
+    np.testing.assert_allclose(points, [[0.4, 0.5, 0.5]])
+    assert colors.tolist() == [[15, 15, 15]] and normals.tolist() == [[0, 0, -1]]
+    assert len(grid.means(1)[0]) == 4
+
+
+def test_normals_are_of_the_slope():
+    camera = egosgm.Calibration(**CAMERA)
+    y, x = np.mgrid[:20, :20]
+    # The plane X + Z = 5: with X = (x - cx) Z / fx, d = f b / Z = 50 (1 + (x - 2) / 100) / 5.
+    disparity = (10 * (1 + (x - 2) / 100)).astype(np.float32)
+    depth = 50 / disparity
+    points = np.stack([(x - 2) / 100 * depth, (y - 1) / 100 * depth, depth], axis=-1).reshape(-1, 3)
+    np.testing.assert_allclose(cloud.normals_of(disparity, camera, points), np.tile([-(0.5**0.5), 0, -(0.5**0.5)], (400, 1)), atol=1e-3)
+
+
+def test_what_is_missing_is_named(run):
+    def refused(*named):
+        with pytest.raises(egosgm.InvalidArgument) as error:
+            cloud.main([str(run), "--voxel", "0.01"])
+        assert all(text in str(error.value) for text in named), error.value
+        assert not (run / "cloud.ply").exists()
+
+    (run / "variance/000001.pfm").rename(run / "kept")
+    refused("no map of frame 000001", "--write variance")
+    (run / "kept").rename(run / "variance/000001.pfm")
+    egosgm.write_poses(run / "poses.txt", np.stack([np.eye(4)]))
+    refused("has 1 poses and report.json 2 frames", "--resume")
+    (run / "poses.txt").unlink()
+    refused("poses.txt: no such file", "--calib")
+    (run / "report.json").unlink()
+    refused("report.json: no such file")
