@@ -217,7 +217,7 @@ def test_the_stub_has_the_parameters_of_the_module():
             stubbed = [a.arg for a in function.args.args + function.args.kwonlyargs if a.arg != "self"]
             assert stubbed == parameters_of(documented), f"{owner.__name__}.{function.name}"
             compared += 1
-    assert compared > 40
+    assert compared > 35
     assert "frames" in inspect.signature(egosgm.run).parameters
 
 
