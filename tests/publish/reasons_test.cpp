@@ -8,7 +8,6 @@
 
 #include "host/match/banded_sgm.h"
 #include "host/match/census.h"
-#include "kernels/method.h"
 #include "tests/reference/publish/reasons.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
@@ -57,7 +56,7 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   doubtful.write(context, inputs.doubtful);
   FlagMap evidence(context, 2 * pixel_count(size));
   if (!inputs.evidence.empty()) evidence.write(context, inputs.evidence);
-  const int columns = (size.width + 3) / 4, stride = EGOSGM_EVIDENCE_STRIDE(size.width);
+  const int columns = (size.width + 3) / 4, stride = (size.width + 15) / 16 * 4;
   std::vector<cl_int> blocks(static_cast<std::size_t>(stride) * ((size.height + 3) / 4));
   for (std::size_t i = 0; i < inputs.block_evidence.size(); ++i) {
     blocks[i / columns * stride + i % columns] = inputs.block_evidence[i];
