@@ -32,7 +32,7 @@ OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reas
 OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False, "auto_start": True, "odom_frame": "odom",
        "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1, "compressed": False, "max_depth_sigma": 0.1, "point_reasons": ""}
 LOST_ON_THE_WAY = ("images lost on the way: the middleware's memory does not hold them: set FASTDDS_BUILTIN_TRANSPORTS=LARGE_DATA for the driver and for "
-                   "this node, or reliable:=true where the driver is reliable")
+                   "this node; where that is not enough, reliable:=true with a driver that is reliable")
 REPLACED = "pairs replaced by newer ones: more come than are matched in time"
 PAIRS_PER_LOOK = 50  # for what is nearer than the range
 QUEUE_SIZE = 5  # of the middleware, as topics of sensors have it: the node empties it at once, and keeps the newest pair
