@@ -56,7 +56,7 @@ class RerunOutput:
         if maps.reason is not None:
             self._log("camera/image/reason", rerun.SegmentationImage(maps.reason))
         self._log("figures/density", rerun.Scalars(maps.report.density))
-        self._log("figures/search_fraction", rerun.Scalars(maps.report.search_fraction))
+        self._log("figures/search_fraction", rerun.Scalars(min(1.0, maps.report.search_fraction)))
 
     def finish(self) -> None:
         self._recording.flush()
