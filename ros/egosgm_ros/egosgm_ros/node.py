@@ -348,7 +348,7 @@ class EgosgmNode(LifecycleNode):
         if gaps:
             values.update(unpaired_left=str(gaps.unpaired_left), unpaired_right=str(gaps.unpaired_right))
         if self._report:
-            values.update(density=f"{self._report.density:.4f}", search_fraction=f"{self._report.search_fraction:.4f}",
+            values.update(density=f"{self._report.density:.4f}", search_fraction=f"{min(1.0, self._report.search_fraction):.4f}",
                           vertical_offset_px=f"{self._report.vertical_offset_px:.3f}", latency_ms=f"{self._latency_ms:.1f}",
                           device=self._pipeline.device.name)
         for loss in losses:
