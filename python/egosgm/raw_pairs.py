@@ -180,7 +180,7 @@ def _of_list(file: pathlib.Path) -> RawPairs:
     """Rows LEFT RIGHT [SECONDS]; paths from the list's folder on."""
     pairs = []
     for number, row in enumerate(_rows(file), 1):
-        words = row.partition("#")[0].split()
+        words = re.split(r"(?:^|\s)#", row, maxsplit=1)[0].split()  # a comment begins after a blank
         if not words:
             continue
         is_time = len(words) < 3 or bool(re.fullmatch(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", words[2]))
