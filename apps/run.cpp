@@ -180,11 +180,8 @@ class Run {
     }
     while (!under_way_.empty()) collect(progress);
     if (!quiet_) summary_ = fmt::format("{:.1f} frames/s", progress.frames_per_second());
-    if (interrupted() && poses_.size() + left_out_ < sequence_.frames.size()) return false;
-    if (2 * left_out_ > sequence_.frames.size()) {
-      throw InvalidArgument(fmt::format("{} of {} could not be read, which is too many to go on: {}", left_out_,
-                                        counted(sequence_.frames.size(), "pair"), first_left_out_));
-    }
+    if (poses_.size() + left_out_ < sequence_.frames.size()) return false;
+    if (2 * left_out_ > sequence_.frames.size()) throw InvalidArgument(text_of_left_out());
     return true;
   }
 
@@ -195,6 +192,7 @@ class Run {
     try {
       frame.images = vision::read_images(sequence_.frames[i]);
     } catch (const Error& error) {
+      if (interrupted()) throw;  // a pipe that was waited for
       frame.unreadable = error.what();
       return frame;
     }
@@ -287,19 +285,25 @@ class Run {
     if (sequence_.has_calibration && !poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
     write_report(finished, why_not);
     if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace);
-    if (!finished || quiet_) return;
+    if (!finished) return;
+    if (quiet_) {
+      if (left_out_ > 0) say("egosgm: " + text_of_left_out());
+      return;
+    }
     fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
                pipeline_.device().info().name);
     fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
                100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.path().string());
-    if (left_out_ > 0) {
-      fmt::print("{} of {} could not be read and {} left out: {}\n", left_out_,
-                 counted(sequence_.frames.size(), "pair"), left_out_ == 1 ? "is" : "are", first_left_out_);
-    }
+    if (left_out_ > 0) fmt::print("{}\n", text_of_left_out());
     if (clouds_) fmt::print("{}\n", text_of(*clouds_, cloud_options_));
     if (const std::string doubt = doubt_.text(); !doubt.empty()) {
       fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
     }
+  }
+
+  std::string text_of_left_out() const {
+    return fmt::format("{} of {} could not be read: {}", left_out_, counted(sequence_.frames.size(), "pair"),
+                       first_left_out_);
   }
 
   std::string text_of_doubt() const {

@@ -3,7 +3,14 @@
 
 #include <pybind11/pybind11.h>
 
+#include <string>
+
+#include "egosgm/vision/dataset.h"
+
 namespace egosgm::python {
+
+/// "7:10", "7:", ":10" or "7"; empty: all.
+vision::FrameRange range_of(const std::string& frames);
 
 void bind_errors(pybind11::module_& module);
 void bind_values(pybind11::module_& module);

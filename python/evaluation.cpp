@@ -75,10 +75,6 @@ void bind_disparity(py::module_& module) {
   module.def("mean_of", &vision::mean_of, py::arg("images"), "The mean of each image's figures (KITTI 2012).");
 }
 
-vision::FrameRange range_of(const std::string& frames) {
-  return frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(frames);
-}
-
 /// What the commands eval-video and eval-poses share with eval: which files belong together, and what they hold.
 void bind_estimates(py::module_& module) {
   using std::filesystem::path;

@@ -22,10 +22,6 @@ using std::filesystem::path;
 using vision::StereoFrame;
 using vision::StereoSequence;
 
-vision::FrameRange range_of(const std::string& frames) {
-  return frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(frames);
-}
-
 py::tuple read_images(const StereoFrame& frame) {
   vision::StereoImages images;
   {
@@ -87,14 +83,6 @@ void bind_sequences(py::module_& module) {
       "PNG or JPEG files or patterns such as 'left/%06d.png' or 'left/*.jpg'. by_order: the first left image belongs "
       "to\n"
       "the first right one, and so on; else those of equal names belong together.");
-}
-
-/// Of each of a run's `frames`, which are some of `numbers`.
-py::array poses_of_frames(const std::vector<int>& frames, const std::vector<int>& numbers, const path& poses) {
-  StereoSequence sequence;
-  sequence.numbers = numbers;
-  for (const int number : frames) sequence.frames.emplace_back().number = number;
-  return array_of(vision::poses_of_frames(sequence, poses));
 }
 
 cv::Mat read_if_there(const path& file, cv::Mat (*read)(const path&)) {
@@ -200,12 +188,15 @@ py::tuple point_cloud(const py::object& disparity, const py::object& variance, c
 
 }  // namespace
 
+vision::FrameRange range_of(const std::string& frames) {
+  return frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(frames);
+}
+
 void bind_files(py::module_& module) {
   bind_sequences(module);
   py::class_<vision::FramePanels>(module, "_FramePanels")
       .def(py::init<int>(), py::arg("disparities"))
       .def("layers", &layers_of_run, py::arg("folder"), py::arg("name"), py::arg("left"), py::arg("truth"));
-  module.def("_poses_of_frames", &poses_of_frames, py::arg("frames"), py::arg("numbers"), py::arg("poses"));
   module.def("_write_new_file", &write_new_file, py::arg("file"), py::arg("bytes"));
   module.def("_write_new_calibration", &write_new_calibration, py::arg("file"), py::arg("calibration"));
   module.def("_find_pairs", &find_pairs, py::arg("left"), py::arg("right"), py::arg("by_order"));

@@ -193,7 +193,8 @@ class _Page:
             poses = _egosgm.read_poses(file)
             estimated = [poses[frame.place] for frame in self._frames if frame.place < len(poses)]
         if self._given.poses:
-            true = _egosgm._poses_of_frames([frame.number for frame in self._frames], self._numbers(), self._given.poses)
+            poses, numbers = _egosgm.read_poses(self._given.poses), [frame.number for frame in self._frames]
+            true = poses[_egosgm._rows_of_frames(numbers, self._numbers(), len(poses), self._given.poses, "poses")]
         return {"path": from_above(estimated), "true_path": from_above(true)}
 
     def _numbers(self) -> Sequence[int]:

@@ -63,7 +63,10 @@ class Run(ProgramTest):
             os.truncate(file, left)
             text = self.assert_works("run", street, "--out", out, *poses)
             self.assertIn(f"frame 00000{broken}: left out: {file}", text)
-            self.assertIn(f"1 of {FRAMES} pairs could not be read and is left out: {file}", text)
+            self.assertIn(f"1 of {FRAMES} pairs could not be read: {file}", text)
+            quiet = egosgm("run", street, "--out", out.parent / "quiet", "--quiet", *poses)
+            self.assertEqual((quiet.returncode, quiet.stdout, quiet.stderr.count("\n")), (0, "", 1))
+            self.assertIn(f"1 of {FRAMES} pairs could not be read: {file}", quiet.stderr)
             report, others = self.report(out), [i for i in range(FRAMES) if i != broken]
             self.assertTrue(report["finished"])
             self.assertEqual([(one["frame"], one["name"]) for one in report["left_out"]], [(broken, f"00000{broken}")])
