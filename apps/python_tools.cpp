@@ -60,8 +60,11 @@ std::map<std::string, std::string> python_tools() {
 bool is_for_python(int argc, const char* const* argv) {
   if (argc < 2) return false;
   if (python_tools().contains(argv[1])) return true;
-  const auto reads_bag = [](std::string_view word) { return word.substr(0, word.find('=')) == "--bag"; };
-  return std::string_view(argv[1]) == "run" && std::any_of(argv + 2, argv + argc, reads_bag);
+  const auto is_of_package = [](std::string_view word) {
+    return word == "--rerun" || word.substr(0, word.find('=')) == "--bag" || word.ends_with(".mcap") ||
+           word.ends_with(".rrd");
+  };
+  return std::string_view(argv[1]) == "run" && std::any_of(argv + 2, argv + argc, is_of_package);
 }
 
 void become_python(int argc, const char* const* argv) {

@@ -3,8 +3,6 @@
 
 #include <pybind11/stl.h>
 
-#include <cstring>
-
 #include "host/vision/doubt.h"
 #include "host/vision/pair_matches.h"
 #include "host/vision/pose_doubt.h"
@@ -14,18 +12,6 @@
 
 namespace egosgm::python {
 namespace {
-
-/// A copy, as rows may lie at any stride.
-cv::Mat mat_of(const py::object& image, const char* name) {
-  const ImageArray owner = image_of(image, name);
-  const ImageView& view = owner.view;
-  cv::Mat mat(view.height, view.width, view.type == PixelType::kU8 ? CV_8UC1 : CV_16UC1);
-  for (int y = 0; y < view.height; ++y) {
-    std::memcpy(mat.ptr(y), static_cast<const char*>(view.data) + y * view.stride_bytes,
-                static_cast<std::size_t>(view.width) * mat.elemSize());
-  }
-  return mat;
-}
 
 py::array_t<float> matches_of(const py::object& left, const py::object& right) {
   const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
@@ -73,19 +59,21 @@ std::string motions_doubt(const std::vector<py::object>& given, const std::vecto
 /// Names with a line before them: the package's own.
 void bind_doubts(py::module_& module) {
   py::class_<Doubt>(module, "_Doubt")
-      .def(py::init([](const std::optional<Calibration>& calibration, int width, int height) {
-             return Doubt(calibration, {width, height});
+      .def(py::init([](const std::optional<Calibration>& calibration, int min_disparity, int disparities) {
+             PipelineOptions options;
+             options.min_disparity = min_disparity;
+             options.disparities = disparities;
+             return Doubt(calibration, options);
            }),
-           py::arg("calibration"), py::arg("width"), py::arg("height"))
-      .def("add", &Doubt::add, py::arg("density"), py::arg("has_motion"), py::arg("holds_8_bits_in_16"))
+           py::arg("calibration"), py::arg("min_disparity"), py::arg("disparities"))
       .def(
-          "look_beyond",
-          [](Doubt& self, const py::object& left, const py::object& right, int least, int end) {
+          "add",
+          [](Doubt& self, const py::object& left, const py::object& right, const FrameReport& report, bool has_motion) {
             const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
             const OtherThreadsRun other_threads_run;
-            self.look_beyond(left_image, right_image, least, end);
+            self.add(left_image, right_image, report, has_motion);
           },
-          py::arg("left"), py::arg("right"), py::arg("least"), py::arg("end"))
+          py::arg("left"), py::arg("right"), py::arg("report"), py::arg("has_motion"))
       .def("text", &Doubt::text);
   module.def(
       "_clipped_by_range",
