@@ -8,7 +8,7 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
-#include "host/vision/examination.h"
+#include "host/vision/coarse_map.h"
 
 namespace egosgm::vision {
 

@@ -449,11 +449,15 @@ _LOOKED_AT = 8  # motions that are given, beside those of the odometry
 
 def _problems(calibration: _egosgm.Calibration, samples: Sequence[Tuple[NDArray[Any], NDArray[Any]]], options: Dict[str, Any]) -> List[str]:
     """What `egosgm doctor` says of such pairs."""
+    try:
+        from .examination import Examination
+    except ModuleNotFoundError:  # without OpenCV
+        return []
     least = int(options["min_disparity"])
-    examination = _egosgm._Examination(calibration, least, least + int(options["disparities"]))
+    examination = Examination(calibration, least, least + int(options["disparities"]))
     for left, right in samples:
         examination.add(left, right)
-    return [f"{check}: {text}: {remedy}" for verdict, check, text, remedy in examination.findings(len(samples)) if verdict == "problem"]
+    return [f"{found.check}: {found.text}: {found.remedy}" for found in examination.findings(len(samples)) if found.verdict == "problem"]
 
 
 def run(bag: Bag, outputs: Sequence[Any] = (), progress: Optional[bool] = None,
