@@ -37,6 +37,5 @@ Command add_compile(CLI::App& program);
 Command add_synth(CLI::App& program);
 Command add_odometry(CLI::App& program);
 Command add_tune(CLI::App& program);
-Command add_doctor(CLI::App& program);
 
 }  // namespace egosgm::app

@@ -10,7 +10,7 @@
 #include "egosgm/export.h"
 #include "egosgm/frame.h"
 #include "egosgm/options.h"
-#include "host/vision/examination.h"
+#include "host/vision/coarse_map.h"
 
 namespace egosgm::vision {
 

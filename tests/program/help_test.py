@@ -11,7 +11,7 @@ import unittest
 
 from program_case import PROGRAM, SOURCE, ProgramTest, egosgm
 
-COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-poses", "tune", "report", "doctor", "rectify")
+COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-poses", "tune", "report", "doctor", "rectify", "calibrate")
 
 
 class Help(ProgramTest):

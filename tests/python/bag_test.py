@@ -1037,3 +1037,29 @@ def test_poses_of_another_unit_are_told(tmp_path, street, frames, capfd):
             position=types["geometry_msgs/msg/Point"](x=at[0], y=at[1], z=at[2]), orientation=types["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w)))
     said = told_of(capfd, recording.write(tmp_path / "drive"), "--pose-topic", "/odom", "--pose-axes", "optical")
     assert "the given poses contradict the images" in said and "millimetres" in said
+
+
+def examined(capfd, path, *arguments):
+    """Verdicts of `egosgm doctor` by check."""
+    from egosgm import doctor
+    code = doctor.main(["--bag", str(path), *map(str, arguments), "--json"])
+    findings = {found["check"]: found for found in json.loads(capfd.readouterr().out)}
+    assert code == (2 if any(found["verdict"] == "problem" for found in findings.values()) else 0)
+    return findings
+
+
+def test_doctor_looks_at_bags(tmp_path, street, frames, capfd):
+    pytest.importorskip("cv2")
+    findings = examined(capfd, record("mcap", tmp_path / "good", street, frames))
+    assert [found["verdict"] for found in findings.values() if found["check"] != "range"] == ["ok"] * 5
+    assert "0.1 s between two frames" in findings["times"]["text"]
+    findings = examined(capfd, drive_of(street, frames, rescaled(100)).write(tmp_path / "cm"))
+    assert "centimetres" in findings["calibration"]["remedy"]
+
+    class Swapped:
+        def __init__(self, frame):
+            self.left, self.right = frame.right, frame.left
+    assert "swapped" in examined(capfd, drive_of(street, [Swapped(frame) for frame in frames]).write(tmp_path / "swapped"))["sides"]["remedy"]
+    between = drive_of(street, frames, of_right=lambda i, time: time + RATE_NS // 2).write(tmp_path / "between")
+    findings = examined(capfd, between, "--max-skew-ms", 50)
+    assert findings["times"]["verdict"] == "problem" and "other moments" in findings["times"]["text"]
