@@ -35,17 +35,15 @@ struct Package {
 };
 
 Package package_beside_program() {
+#ifdef EGOSGM_PACKAGE_PYTHON
   std::error_code none;
   const fs::path program = fs::read_symlink("/proc/self/exe", none).parent_path();
-  const auto is_in = [&](const fs::path& folder) { return fs::exists(folder / "egosgm/program.py", none); };
-#ifdef EGOSGM_PACKAGE_PYTHON
   for (const char* from_program : {EGOSGM_PACKAGE_BUILT, EGOSGM_PACKAGE_INSTALLED}) {
     const fs::path folder = (program / from_program).lexically_normal();
-    if (is_in(folder)) return {EGOSGM_PACKAGE_PYTHON, folder.string()};
+    if (fs::exists(folder / "egosgm/program.py", none)) return {EGOSGM_PACKAGE_PYTHON, folder.string()};
   }
 #endif
-  const fs::path of_wheel = program.parent_path().parent_path();  // the program is egosgm/bin/egosgm there
-  return {"python3", is_in(of_wheel) ? of_wheel.string() : ""};
+  return {"python3", ""};
 }
 
 }  // namespace

@@ -14,11 +14,11 @@
 namespace egosgm::vision {
 namespace {
 
-constexpr int kCodeRadius = 2;                      // of the census: 24 neighbours
+constexpr int kCodeRadius = 2;                         // of the census: 24 neighbours
 constexpr int kLargest = 24, kSmall = 3, kLarge = 12;  // costs: of a pixel, of a step by 1, of a larger one
-constexpr double kUnique = 1.12;                    // the second best cost by the best one's
-constexpr int kMostDifference = 1;                  // between the views [px]
-constexpr std::size_t kLeastPatch = 40;             // pixels; less is a speckle
+constexpr double kUnique = 1.12;                       // the second best cost by the best one's
+constexpr int kMostDifference = 1;                     // between the views [px]
+constexpr std::size_t kLeastPatch = 40;                // pixels; less is a speckle
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
 using Codes = std::vector<std::uint32_t>;
@@ -54,9 +54,9 @@ class Matching {
         for (int i = 0; i < 2 * half; ++i) {
           const int other = x - (i - half);
           if (other < 0 || other >= width_) continue;
-          costs_[at(x, y) + static_cast<std::size_t>(i)] = static_cast<std::uint16_t>(
-              std::popcount(left_codes[static_cast<std::size_t>(y * width_ + x)] ^
-                            right_codes[static_cast<std::size_t>(y * width_ + other)]));
+          costs_[at(x, y) + static_cast<std::size_t>(i)] =
+              static_cast<std::uint16_t>(std::popcount(left_codes[static_cast<std::size_t>(y * width_ + x)] ^
+                                                       right_codes[static_cast<std::size_t>(y * width_ + other)]));
         }
       }
     }

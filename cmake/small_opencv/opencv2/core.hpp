@@ -87,7 +87,7 @@ struct float16_t {
 
   operator float() const {  // NOLINT: as OpenCV's
     const int exponent = (bits >> 10) & 31, fraction = bits & 1023;
-    const float size = exponent == 31 ? (fraction ? NAN : INFINITY)
+    const float size = exponent == 31  ? (fraction ? NAN : INFINITY)
                        : exponent == 0 ? std::ldexp(static_cast<float>(fraction), -24)
                                        : std::ldexp(static_cast<float>(1024 + fraction), exponent - 25);
     return bits >> 15 ? -size : size;
@@ -134,7 +134,7 @@ class Mat {
     const std::size_t bytes = std::max<std::size_t>(1, step.bytes * static_cast<std::size_t>(rows));
     constexpr std::align_val_t kAlignment{64};
     u = {static_cast<std::uint8_t*>(::operator new(bytes, kAlignment)),
-         [](std::uint8_t* memory) { ::operator delete(memory, std::align_val_t{64}); }};
+         [](std::uint8_t* memory) { ::operator delete (memory, std::align_val_t{64}); }};
     data = u.get();
   }
   void create(int height, int width, int type) { create({width, height}, type); }
