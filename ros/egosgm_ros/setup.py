@@ -5,6 +5,7 @@ setup(
     name="egosgm_ros",
     version="0.1.0",
     packages=["egosgm_ros"],
+    package_data={"egosgm_ros": ["fastdds.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/egosgm_ros"]),
         ("share/egosgm_ros", ["package.xml"]),
