@@ -1,8 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Moving pictures of two runs: draw_side_by_side.py SEQUENCE LEFT_RUN RIGHT_RUN OUT.webp. The left image above, both runs' colours below."""
+"""Moving pictures of two runs. The left image above, both runs' colours below."""
 import pathlib
 import sys
 
+from usage import Parser
+
+parser = Parser(__doc__)
+for name in ("SEQUENCE", "LEFT_RUN", "RIGHT_RUN", "OUT.webp"):
+    parser.add_argument(name, type=pathlib.Path)
+chosen = parser.parse_args()
 try:
     from PIL import Image, ImageDraw, ImageOps
 except ImportError:
@@ -39,6 +45,4 @@ def main(sequence, left, right, out):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 5:
-        sys.exit(__doc__)
-    main(*map(pathlib.Path, sys.argv[1:]))
+    main(*vars(chosen).values())
