@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Moving pictures of two runs: draw_side_by_side.py SEQUENCE LEFT_RUN RIGHT_RUN OUT.webp. The left image and both runs' colours, beside each
-other, or above where they are wide."""
+"""Moving pictures of two runs. The left image and both runs' colours, beside each other, or above where they are wide."""
 import pathlib
 import sys
 
+from usage import Parser
+
+parser = Parser(__doc__)
+for name in ("SEQUENCE", "LEFT_RUN", "RIGHT_RUN", "OUT.webp"):
+    parser.add_argument(name, type=pathlib.Path)
+chosen = parser.parse_args()
 try:
     from PIL import Image, ImageDraw, ImageFont
 except ImportError:
@@ -45,6 +50,4 @@ def main(sequence, left, right, out):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 5:
-        sys.exit(__doc__)
-    main(*map(pathlib.Path, sys.argv[1:]))
+    main(*vars(chosen).values())
