@@ -12,7 +12,7 @@ setup(
         ("share/egosgm_ros/launch", ["launch/egosgm.launch.py"]),
         ("share/egosgm_ros/rviz", ["rviz/egosgm.rviz"]),
     ],
-    install_requires=["setuptools", "egosgm"],
+    install_requires=["setuptools"],  # egosgm's wheel is on no index: whose a package of that name would be, nobody knows
     license="Apache-2.0",
     entry_points={"console_scripts": ["egosgm_node = egosgm_ros.node:main"]},
 )
