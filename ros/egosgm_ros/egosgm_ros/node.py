@@ -36,8 +36,9 @@ OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reas
 OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False, "auto_start": True, "odom_frame": "odom",
        "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1, "compressed": False, "max_depth_sigma": 0.1, "point_reasons": ""}
 PROFILES = pathlib.Path(__file__).with_name("fastdds.xml")
-PROFILES_NAMES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")  # the second one before Fast DDS 3
-LOST_ON_THE_WAY = (f"images lost on the way: the driver's shared memory does not hold them: start the driver with {PROFILES_NAMES[0]}={PROFILES}; "
+PROFILES_NAMES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # before Fast DDS 3, and since then
+PROFILES_NAME = PROFILES_NAMES[os.environ.get("ROS_DISTRO") not in ("humble", "iron", "jazzy")]
+LOST_ON_THE_WAY = (f"images lost on the way: the driver's shared memory does not hold them: start the driver with {PROFILES_NAME}={PROFILES}; "
                    "where that is not enough, reliable:=true with a driver that is reliable")
 REPLACED = "pairs replaced by newer ones: more come than are matched in time"
 PAIRS_PER_LOOK = 50  # for what is nearer than the range
@@ -375,7 +376,7 @@ def _prepare_process() -> None:
     """Fast DDS gets shared memory for maps, unless somebody chose what it has. glibc keeps the memory of maps, which come and go with each pair;
     else the kernel clears it anew each time."""
     if not any(name in os.environ for name in (*PROFILES_NAMES, "FASTDDS_BUILTIN_TRANSPORTS")):
-        os.environ.update(dict.fromkeys(PROFILES_NAMES, str(PROFILES)))
+        os.environ[PROFILES_NAME] = str(PROFILES)
     with contextlib.suppress(AttributeError, OSError, TypeError):  # another C library
         mallopt = ctypes.CDLL(None).mallopt
         mallopt(-3, 32 << 20)  # M_MMAP_THRESHOLD
