@@ -2,12 +2,12 @@
 #include "egosgm/vision/matcher.h"
 
 #include <limits>
-#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/opencv.h"
+#include "host/vision/grey_bytes.h"
 
 namespace egosgm::vision {
 namespace {
@@ -20,9 +20,7 @@ cv::Mat grey_of(const cv::Mat& image, const char* name) {
                           ": give grey or BGR of 8 or 16 bits");
   }
   if (image.channels() == 1) return image;
-  cv::Mat grey;
-  cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  return grey;
+  return grey_of_colors(image, ColorOrder::kBgr);
 }
 
 /// That the options are valid, and their disparities fit.

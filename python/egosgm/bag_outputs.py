@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is made of a bag: a ROS 2 MCAP file, or a folder of maps. egosgm.viewer has a third one."""
+"""What is made of a bag: a ROS 2 MCAP file. egosgm.viewer has another one."""
 import contextlib
 import os
 import pathlib
@@ -151,33 +151,3 @@ class McapOutput:
         self._part.unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # of a full disk
             self._stream.close()
-
-
-class FolderOutput:
-    """disparity/NUMBER.png as the program writes them, or .pfm where KITTI's PNG has no room for the range; and the calibration of the
-    rectified images."""
-
-    def __init__(self, folder: pathlib.Path, options: Dict[str, Any]) -> None:
-        """options: those of the pipeline, by name."""
-        self._folder = folder
-        fits_png = options["min_disparity"] >= 0 and options["min_disparity"] + options["disparities"] <= 256
-        self._extension = "png" if fits_png else "pfm"
-        if os.path.lexists(folder) and not folder.is_dir():
-            raise _egosgm.InvalidArgument(f"{folder}: is no folder: give a new one, or a name that ends in .mcap")
-        if folder.exists() and any(folder.iterdir()):
-            raise _egosgm.InvalidArgument(f"{folder}: holds files already: give a new folder")
-        (folder / "disparity").mkdir(parents=True, exist_ok=True)
-
-    def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
-        if frame.number == 0:
-            _egosgm.write_calibration(self._folder / "calibration.txt", calibration)
-        _egosgm.write_disparity(self._folder / "disparity" / f"{frame.number:06d}.{self._extension}", maps.disparity)
-
-    def finish(self) -> None:
-        pass
-
-    def give_up(self) -> None:
-        """What was written is whole, and stays."""
-        for folder in (self._folder / "disparity", self._folder):
-            with contextlib.suppress(OSError):  # it is not empty
-                folder.rmdir()

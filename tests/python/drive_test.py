@@ -335,7 +335,7 @@ CAMERA = egosgm.Calibration(fx=100, fy=50, cx=2, cy=1, baseline_m=0.5, doffs_px=
 def frame_of(disparity, variance, reason=None, left=None):
     """As run() gives it, of maps by hand."""
     maps = types.SimpleNamespace(disparity=np.float32(disparity), variance=np.float32(variance), reason=reason)
-    return egosgm.DriveFrame(0, "000000", np.full(np.shape(disparity), 90, np.uint8) if left is None else left, None, maps, None, CAMERA)
+    return egosgm.DriveFrame(0, "000000", np.full(np.shape(disparity), 90, np.uint8) if left is None else left, None, maps, None, None, CAMERA)
 
 
 def test_a_cloud_has_the_points_that_are_sure(tmp_path):
