@@ -94,9 +94,9 @@ def _figures(counts: Any) -> Dict[str, Any]:
 
 
 def _doubts(text: str) -> List[Dict[str, str]]:
-    """What a run doubts, one by one: "what (remedy), what" as `egosgm run` says it."""
+    """What a run doubts, one by one: "what (remedy), what; what" as `egosgm run` says it."""
     doubts = []
-    for part in re.split(r", (?![^(]*\))", text) if text else []:
+    for part in re.split(r"[,;] (?![^(]*\))", text) if text else []:
         what, _, remedy = part.removesuffix(")").rpartition(" (") if part.endswith(")") else (part, "", "")
         doubts.append({"what": what, "remedy": f"run it with {remedy}" if remedy.startswith("--") else remedy or "`egosgm doctor` tells why"})
     return doubts
@@ -160,7 +160,7 @@ class _Page:
         self._run = _read_run(self._folder)
         self._of_run = [_Frame(place, entry) for place, entry in enumerate(self._run["frames"])]
         self._panels = _egosgm._FramePanels(int(self._run["options"].get("disparities", 128)))
-        self._notes: List[str] = []
+        self._notes = [str(note) for note in self._run.get("notes", [])]
         first, last = _egosgm._parse_frame_range(given.frames or "")
         self._frames = [f for f in self._of_run if (first is None or f.number >= first) and (last is None or f.number <= last)]
         if not self._frames:
