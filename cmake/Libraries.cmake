@@ -17,7 +17,7 @@ function(egosgm_libraries name component exported)
       VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
     target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-    target_compile_features(${target} PUBLIC cxx_std_20)
+    target_compile_features(${target} PUBLIC cxx_std_17)  # of the headers
     list(TRANSFORM library_PUBLIC REPLACE LINKAGE ${linkage} OUTPUT_VARIABLE public)
     target_link_libraries(${target} PUBLIC ${public} PRIVATE ${library_PRIVATE})
     if(linkage STREQUAL shared AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")

@@ -34,6 +34,8 @@ TOPICS = ["--left-topic", "/left/image_rect", "--right-topic", "/right/image_rec
 class Recording:
     """Messages of one bag, whatever its format."""
 
+    frame_id = "left_optical"
+
     def __init__(self, kind):
         self.kind = kind
         self.store = get_typestore(Stores.ROS1_NOETIC if kind == "ros1" else Stores.ROS2_HUMBLE)
@@ -43,7 +45,7 @@ class Recording:
     def header(self, time):
         stamp = self.types["builtin_interfaces/msg/Time"](sec=time // 10**9, nanosec=time % 10**9)
         seq = {"seq": 0} if self.kind == "ros1" else {}
-        return self.types["std_msgs/msg/Header"](**seq, stamp=stamp, frame_id="left_optical")
+        return self.types["std_msgs/msg/Header"](**seq, stamp=stamp, frame_id=self.frame_id)
 
     def add(self, topic, kind, time, received=None, **fields):
         message = self.types[kind](header=self.header(time), **fields)
@@ -130,10 +132,10 @@ def test_the_written_bag_says_where_things_are(tmp_path, street, frames, shared_
     with AnyReader([out]) as reader:
         for connection, time, raw in reader.messages():
             message = reader.deserialize(raw, connection.msgtype)
-            assert time == ros_images.stamp_ns(message)
+            assert time == ros_images.stamp_ns(message.transforms[0] if connection.topic == "/tf" else message)
             found.setdefault(connection.topic, []).append(message)
     assert {topic: len(messages) for topic, messages in found.items()} == dict.fromkeys(
-        [f"/egosgm/{name}" for name in ("depth", "variance", "disparity", "reason", "odom", "left/camera_info", "right/camera_info")], FRAMES)
+        [f"/egosgm/{name}" for name in ("depth", "variance", "disparity", "reason", "odom", "points", "left/camera_info", "right/camera_info")] + ["/tf"], FRAMES)
     c = street.calibration
     for i, result in enumerate(expected):
         message = found["/egosgm/disparity"][i]
@@ -163,6 +165,57 @@ def test_the_written_bag_says_where_things_are(tmp_path, street, frames, shared_
     assert refused.returncode == 2 and "is there already" in refused.stderr
     again = bags.Bag(out, "/egosgm/depth", "/egosgm/variance", ["/egosgm/left/camera_info", "/egosgm/right/camera_info"])
     assert again.count == FRAMES  # a bag as any other
+
+
+def matrix_of(transform):
+    matrix, q, t = np.eye(4), transform.rotation, transform.translation
+    matrix[:3, :3] = ros_images.rotation_of(q.x, q.y, q.z, q.w)
+    matrix[:3, 3] = t.x, t.y, t.z
+    return matrix
+
+
+def test_a_3d_panel_can_place_the_points(tmp_path, street, frames, monkeypatch):
+    """As Foxglove asks for it: an ROS 2 schema with all that it is made of, points in a frame that tf leads to from odom at their time, rgb in a float."""
+    from mcap.reader import make_reader
+    out = tmp_path / "result.mcap"
+    monkeypatch.setattr(Recording, "frame_id", "")  # a camera that names none
+    told = program("--bag", record("mcap", tmp_path / "drive", street, frames), *TOPICS, "--out", out, *SET)
+    assert told.returncode == 0, told.stderr
+    with open(out, "rb") as file:
+        summary = make_reader(file).get_summary()
+    for channel in summary.channels.values():
+        schema = summary.schemas[channel.schema_id]
+        assert (channel.message_encoding, schema.encoding) == ("cdr", "ros2msg")
+        own = {name.rsplit("/", 1)[-1] for name in re.findall(r"^MSG: (\S+)", schema.data.decode(), re.MULTILINE)}
+        for kind in re.findall(r"^(?:\w+/)?([A-Z]\w+)(?:\[.*\])? \w+$", schema.data.decode(), re.MULTILINE):
+            assert kind in own, (schema.name, kind)
+    clouds, trees, poses = {}, {}, {}
+    with AnyReader([out]) as reader:
+        for connection, time, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            kept = {"/egosgm/points": clouds, "/tf": trees, "/egosgm/odom": poses}.get(connection.topic)
+            if kept is not None:
+                kept[time] = message
+    assert len(clouds) == FRAMES and set(clouds) == set(trees) == set(poses)
+    in_odom = []
+    for time, cloud in clouds.items():
+        tree = {transform.child_frame_id: transform for transform in trees[time].transforms}
+        assert [field.name for field in cloud.fields] == ["x", "y", "z", "rgb"] and [field.offset for field in cloud.fields] == [0, 4, 8, 12]
+        assert (cloud.height, cloud.point_step, cloud.row_step) == (1, 16, 16 * cloud.width) and len(cloud.data) == 16 * cloud.width > 16 * 1000
+        points = cloud.data.view(np.float32).reshape(-1, 4)
+        grey = points[:, 3].copy().view(np.uint32)
+        np.testing.assert_array_equal(grey, (grey & 255) * 0x010101)
+        assert len(np.unique(grey)) > 20
+        pose, frame = np.eye(4), cloud.header.frame_id
+        while frame != "odom":
+            assert frame
+            pose, frame = matrix_of(tree[frame].transform) @ pose, tree[frame].header.frame_id
+        body, expected = matrix_of(tree["egosgm_camera"].transform), poses[time].pose.pose.position
+        np.testing.assert_allclose(body[:3, 3], [expected.x, expected.y, expected.z])
+        in_odom.append(points[:, :3] @ pose[:3, :3].T + pose[:3, 3])
+    ahead, _, up = np.median(in_odom[-1], axis=0)
+    assert ahead > 5 and up < ahead / 4  # x is forward, z up
+    assert len({tuple(matrix_of(tree.transforms[0].transform)[:3, 3]) for tree in trees.values()}) == FRAMES  # it drives
 
 
 def test_a_range_beyond_the_usual_is_said_and_nothing_of_it_is_lost(tmp_path, street, frames):

@@ -237,8 +237,14 @@ def test_the_matcher_has_opencvs_values(street, frames):
     assert valid.any() and not valid.all()
     np.testing.assert_array_equal(found[valid], np.rint(16 * single[valid]))
     assert (found[~valid] == -16).all()
+    np.testing.assert_array_equal(found, matcher.compute(*(np.dstack([image] * 3) for image in (frames[0].left, frames[0].right))))
+    blue = np.dstack([frames[0].left, np.zeros((HEIGHT, WIDTH, 2), np.uint8)])  # as OpenCV has it; the least of a grey value
+    np.testing.assert_array_equal(matcher.compute(blue, blue), matcher.compute(*[((3735 * blue[..., 0].astype(np.uint32) + (1 << 14)) >> 15).astype(np.uint8)] * 2))
     assert matcher.compute(frames[0].left[:48], frames[0].right[:48]).shape == (48, WIDTH)
-    for call, named in ((lambda: egosgm.Matcher(2000, 128), "do not fit"), (lambda: matcher.compute(np.zeros((4, 4, 3), np.uint8), None), "H x W"),
+    eight, default = (egosgm.Matcher(disparities=48, **given).compute(frames[0].left, frames[0].right) for given in ({"paths": 8}, {}))
+    np.testing.assert_array_equal(default, eight)
+    assert (eight != found).any()
+    for call, named in ((lambda: egosgm.Matcher(2000, 128), "do not fit"), (lambda: matcher.compute(np.zeros(4, np.uint8), None), "H x W"),
                         (lambda: egosgm.Matcher(p22=1).compute(frames[0].left, frames[0].right), "did you mean p2")):
         with pytest.raises(egosgm.InvalidArgument, match=named):
             call()
