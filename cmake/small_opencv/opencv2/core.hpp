@@ -18,6 +18,13 @@
 
 enum { CV_8U = 0, CV_16U = 2, CV_16S = 3, CV_32F = 5 };
 constexpr int CV_MAKETYPE(int depth, int channels) { return depth + 8 * (channels - 1); }
+constexpr int CV_MAT_DEPTH(int type) { return type % 8; }
+constexpr std::size_t CV_ELEM_SIZE(int type) {
+  return (CV_MAT_DEPTH(type) == CV_8U    ? 1u
+          : CV_MAT_DEPTH(type) == CV_32F ? 4u
+                                         : 2u) *
+         static_cast<std::size_t>(type / 8 + 1);
+}
 constexpr int CV_8UC1 = CV_8U, CV_16UC1 = CV_16U, CV_16SC1 = CV_16S, CV_32FC1 = CV_32F;
 constexpr int CV_8UC3 = CV_MAKETYPE(CV_8U, 3), CV_16UC3 = CV_MAKETYPE(CV_16U, 3);
 
@@ -142,8 +149,8 @@ class Mat {
   int type() const { return type_; }
   int depth() const { return type_ % 8; }
   int channels() const { return type_ / 8 + 1; }
-  std::size_t elemSize1() const { return depth() == CV_8U ? 1 : depth() == CV_32F ? 4 : 2; }
-  std::size_t elemSize() const { return elemSize1() * static_cast<std::size_t>(channels()); }
+  std::size_t elemSize1() const { return CV_ELEM_SIZE(depth()); }
+  std::size_t elemSize() const { return CV_ELEM_SIZE(type_); }
   Size size() const { return {cols, rows}; }
   bool empty() const { return rows == 0 || cols == 0; }
   std::size_t total() const { return static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols); }
@@ -174,6 +181,26 @@ class Mat {
     return ptr<T>(p.y)[p.x];
   }
 
+  /// REQUIRES: isContinuous().
+  template <typename T>
+  const T* begin() const {
+    return ptr<T>();
+  }
+  template <typename T>
+  const T* end() const {
+    return ptr<T>() + total();
+  }
+  /// `act` gets a value and its row and column.
+  template <typename T, typename Act>
+  void forEach(const Act& act) {
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < cols; ++x) {
+        const int at_yx[] = {y, x};
+        act(at<T>(y, x), at_yx);
+      }
+    }
+  }
+
   Mat operator()(const Rect& part) const {
     Mat mat = *this;
     mat.data += static_cast<std::size_t>(part.y) * step + static_cast<std::size_t>(part.x) * elemSize();
@@ -190,6 +217,14 @@ class Mat {
     for (int y = 0; y < rows; ++y) std::memcpy(to.ptr(y), ptr(y), static_cast<std::size_t>(cols) * elemSize());
   }
   void copyTo(Mat&& part) const { copyTo(part); }
+  /// Where the mask, CV_8UC1, is not 0. REQUIRES: `to` has the same size and type.
+  void copyTo(Mat& to, const Mat& mask) const {
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < cols; ++x) {
+        if (mask.at<std::uint8_t>(y, x)) std::memcpy(to.ptr(y) + x * elemSize(), ptr(y) + x * elemSize(), elemSize());
+      }
+    }
+  }
   void push_back(const Mat& below) {
     Mat mat(rows + below.rows, cols, type_);
     copyTo(mat(Rect(0, 0, cols, rows)));
@@ -197,7 +232,8 @@ class Mat {
     *this = mat;
   }
 
-  Mat& setTo(const Scalar& value, const Mat& mask = {}) {
+  Mat& setTo(const Scalar& value) { return setTo(value, Mat()); }
+  Mat& setTo(const Scalar& value, const Mat& mask) {
     visit([&]<typename T>(T) {
       for (int y = 0; y < rows; ++y) {
         for (int x = 0; x < cols; ++x) {
