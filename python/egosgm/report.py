@@ -2,14 +2,15 @@
 """egosgm report: one HTML page of a run, with everything that it shows in it."""
 import argparse
 import base64
+import io
 import json
 import pathlib
 import re
 import zlib
 from typing import Any, Dict, List, Optional, Sequence
 
-import cv2
 import numpy
+import PIL.Image
 
 from . import _egosgm
 from .arguments import Parser, counted, expect_new_file, read_json, whole_number
@@ -79,13 +80,16 @@ def _with_short_paths(part: Any) -> Any:
 
 
 def _data_uri(picture: numpy.ndarray, kind: str) -> str:
-    encoded = cv2.imencode("." + kind, cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 92] if kind == "jpeg" else [])[1]
-    return f"data:image/{kind};base64,{base64.b64encode(encoded.tobytes()).decode()}"
+    encoded = io.BytesIO()
+    PIL.Image.fromarray(numpy.ascontiguousarray(picture)).save(encoded, kind, **({"quality": 92} if kind == "jpeg" else {}))
+    return f"data:image/{kind};base64,{base64.b64encode(encoded.getvalue()).decode()}"
 
 
 def _narrowed(picture: numpy.ndarray, width: int) -> numpy.ndarray:
     height, own = picture.shape[:2]
-    return picture if own <= width else cv2.resize(picture, (width, max(1, height * width // own)), interpolation=cv2.INTER_AREA)
+    if own <= width:
+        return picture
+    return numpy.asarray(PIL.Image.fromarray(numpy.ascontiguousarray(picture)).resize((width, max(1, height * width // own)), PIL.Image.BOX))
 
 
 def _figures(counts: Any) -> Dict[str, Any]:
