@@ -51,6 +51,8 @@ class Outputs:
         self._file, self._viewer, self._outputs = pathlib.Path(file) if file else None, viewer, []
         if file and os.path.lexists(file):
             raise _egosgm.InvalidArgument(f"--out {file}: is there already, and stays: give another name, or remove it first")
+        if self._file and not self._file.parent.is_dir():
+            raise _egosgm.InvalidArgument(f"--out {file}: {self._file.parent}: no such folder")
 
     def begin(self, options: Dict[str, Any], calibration: _egosgm.Calibration) -> None:
         self._calibration = calibration

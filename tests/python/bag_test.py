@@ -19,7 +19,8 @@ from rosbags.typesys import Stores, get_typestore
 import egosgm
 
 from egosgm import bag as bags
-from egosgm import bag_outputs, bag_program, cloud
+from egosgm import bag_outputs, bag_program
+from egosgm import cloud as cloud_program
 from egosgm import ros_images
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
@@ -332,7 +333,7 @@ def test_a_folder_is_that_of_any_run(tmp_path, street, frames, street_folder, ca
     report = json.loads((out / "report.json").read_text())
     assert report["finished"] and report["input"] == "bag drive" and "doubt" not in report
     assert [frame["stamp_ns"] for frame in report["frames"]] == [START + i * RATE_NS for i in range(FRAMES)]
-    assert cloud.main([str(out)]) == 0
+    assert cloud_program.main([str(out)]) == 0
     refused(capfd, given, "is not empty")
     (out / "disparity/000002.png").unlink()
     assert program(*given, "--resume").returncode == 0
