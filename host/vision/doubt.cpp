@@ -15,7 +15,7 @@ constexpr double kMinBaseline_m = 0.004, kMaxBaseline_m = 3.0;
 constexpr double kUsualBaseline_m[] = {0.02, 1.5};
 constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
 constexpr double kMinDensity = 0.5;
-constexpr double kFarRows_px = 0.95 * EGOSGM_MAX_OFFSET_PX;
+constexpr double kFarRows_px = 0.9 * EGOSGM_MAX_OFFSET_PX;
 constexpr std::size_t kFramesPerLook = 50;  // for what is nearer than the range
 
 template <typename... Values>

@@ -14,14 +14,15 @@
 namespace egosgm::vision {
 namespace {
 
-constexpr int kCodeRadius = 2;                         // of the census: 24 neighbours
-constexpr int kLargest = 24, kSmall = 3, kLarge = 12;  // costs: of a pixel, of a step by 1, of a larger one
-constexpr double kUnique = 1.12;                       // the second best cost by the best one's
+constexpr int kCodeRadius = 2;                         // of the census: 24 neighbours, each darker, brighter or alike
+constexpr int kNoise = 3;                              // grey levels; what differs by less is alike
+constexpr int kSmall = 6, kLarge = 24, kLargest = 48;  // costs: of a step by 1, of a larger one, of a pixel
+constexpr double kUnique = 1.05;                       // the second best cost by the best one's
 constexpr int kMostDifference = 1;                     // between the views [px]
 constexpr std::size_t kLeastPatch = 40;                // pixels; less is a speckle
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
-using Codes = std::vector<std::uint32_t>;
+using Codes = std::vector<std::uint64_t>;
 using Costs = std::vector<std::uint16_t>;  // of each pixel, the disparities side by side
 
 Codes census_of(const cv::Mat& image) {
@@ -29,11 +30,12 @@ Codes census_of(const cv::Mat& image) {
   const auto row_at = [&](int y) { return image.ptr(std::clamp(y, 0, image.rows - 1)); };
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
-      std::uint32_t code = 0;
+      std::uint64_t code = 0;
       for (int v = -kCodeRadius; v <= kCodeRadius; ++v) {
         for (int u = -kCodeRadius; u <= kCodeRadius; ++u) {
           if (u == 0 && v == 0) continue;
-          code = 2 * code + (row_at(y + v)[std::clamp(x + u, 0, image.cols - 1)] < row_at(y)[x]);
+          const int other = row_at(y + v)[std::clamp(x + u, 0, image.cols - 1)], difference = other - row_at(y)[x];
+          code = 4 * code + (difference < -kNoise ? 1 : difference > kNoise ? 2 : 0);
         }
       }
       codes[static_cast<std::size_t>(y * image.cols + x)] = code;

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import ros_images
+from egosgm import cpu_driver, ros_images
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -327,6 +327,31 @@ def test_a_doubtful_drive_is_told(street, frames):
     far = egosgm.Calibration(street.calibration.fx, street.calibration.fy, 5, street.calibration.cy, 54)
     with pytest.warns(UserWarning, match="a baseline of 54 m"):
         list(egosgm.run([(frames[0].left, frames[0].right)], far, **OPTIONS))
+
+
+def test_rows_that_no_alignment_mends_are_told(street, frames):
+    apart = [(frame.left, np.roll(frame.right, 3, axis=0)) for frame in frames]
+    with pytest.warns(UserWarning, match="rows of the two views lie 2 px apart, the most that is mended"):
+        list(egosgm.run(apart, street.calibration, **OPTIONS))
+
+
+def test_the_packaged_cpu_driver_is_beside_what_is_registered(tmp_path, monkeypatch):
+    registered, cache = tmp_path / "vendors", tmp_path / "cache/egosgm/vendors"
+    registered.mkdir()
+    (registered / "gpu.icd").write_text("libgpu.so\n")
+    cache.mkdir(parents=True)
+    (cache / "gone.icd").write_text("libgone.so\n")
+    for name in ("OCL_ICD_FILENAMES", "OCL_ICD_VENDORS"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(cpu_driver, "_REGISTERED", registered)
+    monkeypatch.setattr(cpu_driver, "packaged_library", lambda: "/pip/libcpu.so")
+    cpu_driver.show()
+    assert os.environ["OCL_ICD_VENDORS"] == str(cache)
+    assert {file.name: file.read_text() for file in cache.iterdir()} == {"gpu.icd": "libgpu.so\n", "egosgm_cpu.icd": "/pip/libcpu.so\n"}
+    monkeypatch.setenv("OCL_ICD_VENDORS", "/mine")
+    cpu_driver.show()
+    assert os.environ["OCL_ICD_VENDORS"] == "/mine"
 
 
 CAMERA = egosgm.Calibration(fx=100, fy=50, cx=2, cy=1, baseline_m=0.5, doffs_px=5)
