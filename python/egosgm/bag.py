@@ -8,7 +8,7 @@ import itertools
 import math
 import os
 import pathlib
-from typing import Any, Callable, Collection, Deque, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Collection, Deque, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
