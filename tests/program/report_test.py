@@ -323,7 +323,10 @@ class ReportInBrowser(ReportTest):
         self.assert_no_errors()
 
     def test_the_mouse_tells_what_the_maps_say(self):
-        import cv2  # which the tool needs, too
+        try:
+            import cv2
+        except ImportError:
+            self.skipTest("no OpenCV for Python, which reads the maps here")
         self.browser.open(self.page)
         name, run = f"{FRAMES - 1:06d}", self.report(self.out)
         maps = {kind: cv2.imread(str(next((self.out / kind).glob(name + ".*"))), cv2.IMREAD_UNCHANGED) for kind in ("disparity", "variance", "reason")}

@@ -199,15 +199,15 @@ def test_a_3d_panel_can_place_the_points(tmp_path, street, frames, monkeypatch):
                 kept[time] = message
     assert len(clouds) == FRAMES and set(clouds) == set(trees) == set(poses)
     in_odom = []
-    for time, cloud in clouds.items():
+    for time, message in clouds.items():
         tree = {transform.child_frame_id: transform for transform in trees[time].transforms}
-        assert [field.name for field in cloud.fields] == ["x", "y", "z", "rgb"] and [field.offset for field in cloud.fields] == [0, 4, 8, 12]
-        assert (cloud.height, cloud.point_step, cloud.row_step) == (1, 16, 16 * cloud.width) and len(cloud.data) == 16 * cloud.width > 16 * 1000
-        points = cloud.data.view(np.float32).reshape(-1, 4)
+        assert [field.name for field in message.fields] == ["x", "y", "z", "rgb"] and [field.offset for field in message.fields] == [0, 4, 8, 12]
+        assert (message.height, message.point_step, message.row_step) == (1, 16, 16 * message.width) and len(message.data) == 16 * message.width > 16 * 1000
+        points = message.data.view(np.float32).reshape(-1, 4)
         grey = points[:, 3].copy().view(np.uint32)
         np.testing.assert_array_equal(grey, (grey & 255) * 0x010101)
         assert len(np.unique(grey)) > 20
-        pose, frame = np.eye(4), cloud.header.frame_id
+        pose, frame = np.eye(4), message.header.frame_id
         while frame != "odom":
             assert frame
             pose, frame = matrix_of(tree[frame].transform) @ pose, tree[frame].header.frame_id

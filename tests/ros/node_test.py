@@ -338,16 +338,18 @@ class Parameters(unittest.TestCase):
         import egosgm
         street = egosgm.SyntheticSequence(**STREET)
         frame, told = street.render(0), []
+        report = egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, temporal=False).process(frame.left, frame.right).report
         for disparities in (16, 128):
             node = self.node(disparities=disparities)
             node._pipeline = type("Pipeline", (), dict(options=dict(min_disparity=0, disparities=disparities)))
+            node._cameras = type("Cameras", (), dict(calibration=street.calibration))
             warned = []
             node.get_logger().warning = warned.append
             for _ in range(2):
-                node._look_beyond(frame.left, frame.right)
-            told.append((node._nearer, len(warned)))
+                node._look_at_input((frame.left, frame.right), report)
+            told.append((node._suspicion, len(warned)))
             node.destroy_node()
-        self.assertRegex(told[0][0], r"^\d+ % of the image is nearer than the range: disparities \d+$")
+        self.assertRegex(told[0][0], r"^\d+ % of the image is nearer than the range \(disparities:=\d+\)$")
         self.assertEqual([told[0][1], *told[1]], [1, "", 0])
 
     def test_the_newest_pair_comes_next(self):

@@ -41,7 +41,7 @@ PROFILES_NAME = PROFILES_NAMES[os.environ.get("ROS_DISTRO") not in ("humble", "i
 LOST_ON_THE_WAY = (f"images lost on the way: the driver's shared memory does not hold them: start the driver with {PROFILES_NAME}={PROFILES}; "
                    "where that is not enough, reliable:=true with a driver that is reliable")
 REPLACED = "pairs replaced by newer ones: more come than are matched in time"
-PAIRS_PER_LOOK = 50  # for what is nearer than the range
+PAIRS_PER_LOOK = 50  # at what speaks against the input
 QUEUE_SIZE = 5  # of the middleware, as topics of sensors have it: the node empties it at once, and keeps the newest pair
 
 
@@ -92,7 +92,7 @@ class EgosgmNode(LifecycleNode):
         self._last_stamp: Optional[int] = None
         self._report: Optional[egosgm.FrameReport] = None
         self._latency_ms = 0.0
-        self._nearer, self._nearer_told = "", False
+        self._suspicion, self._suspicion_told = "", False
         self._told_at = time.monotonic()
         self._warned_at: Dict[str, float] = {}
         self._waits_since = self._told_at  # for a pair
@@ -257,7 +257,7 @@ class EgosgmNode(LifecycleNode):
         self._report, self._count = maps.report, self._count + 1
         self._latency_ms = self.get_clock().now().nanoseconds / 1e6 - stamp / 1e6
         if self._count % PAIRS_PER_LOOK == 1:
-            self._look_beyond(*images)
+            self._look_at_input(images, maps.report)
         if self._count == 1:
             width, height = self._cameras.size
             self.get_logger().info(f"first pair: {width}x{height} px, matched by {self._pipeline.device.name}")
@@ -266,15 +266,15 @@ class EgosgmNode(LifecycleNode):
         needed = {"variance": {"variance", "points2"}, "reason": {"reason"} | ({"points2"} if self._point_reasons else set())}
         return ("disparity", *(name for name, topics in needed.items() if wanted & topics))
 
-    def _look_beyond(self, left: Any, right: Any) -> None:
+    def _look_at_input(self, images: Any, report: egosgm.FrameReport) -> None:
+        """What is nearer than the range, and what else speaks against the images or their calibration."""
         options = self._pipeline.options
-        clipped = egosgm._egosgm._clipped_by_range(left, right, options["min_disparity"], options["min_disparity"] + options["disparities"])
-        self._nearer = ""
-        if clipped:
-            self._nearer = f"{clipped[0]:.0%} of the image is nearer than the range: disparities {clipped[1]}".replace("%", " %")
-            if not self._nearer_told:
-                self.get_logger().warning(self._nearer)
-            self._nearer_told = True
+        doubt = egosgm._egosgm._Doubt(self._cameras.calibration, options["min_disparity"], options["disparities"])
+        doubt.add(*images, report, True)
+        self._suspicion = doubt.text().replace("--disparities ", "disparities:=")
+        if self._suspicion and not self._suspicion_told:
+            self.get_logger().warning(self._suspicion)
+            self._suspicion_told = True
 
     def _motion(self, frame_id: str, images: Any, previous: Optional[int], stamp: int) -> Optional[egosgm.Motion]:
         if self._tf is None:
@@ -353,8 +353,8 @@ class EgosgmNode(LifecycleNode):
             status.level, status.message = DiagnosticStatus.WARN, "; ".join(losses)
         elif self._doubt:
             status.level, status.message = DiagnosticStatus.WARN, self._doubt
-        elif self._nearer:
-            status.level, status.message = DiagnosticStatus.WARN, self._nearer
+        elif self._suspicion:
+            status.level, status.message = DiagnosticStatus.WARN, self._suspicion
         values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "replaced": str(self._replaced), "lost_on_the_way": str(self._lost_on_the_way)}
         if self._is_active:
             values["listened_to"] = " ".join(sorted(self._listened_to()))
