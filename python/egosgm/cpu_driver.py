@@ -36,6 +36,7 @@ def vendors_with(library: str) -> pathlib.Path:
 
 def show() -> None:
     """Beside what is registered in the system. What the user set is left as it is."""
+    os.environ.setdefault("PYOPENCL_HOME", os.path.dirname(os.path.abspath(__file__)))  # the wheel's loader, which is pyopencl's, ends the process without it
     if "OCL_ICD_FILENAMES" in os.environ or "OCL_ICD_VENDORS" in os.environ:
         return
     library = packaged_library()
