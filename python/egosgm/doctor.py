@@ -83,7 +83,7 @@ class _OfBag(_Source):
     def __init__(self, given: argparse.Namespace) -> None:
         from .bag import Bag
         self._bag = Bag(given.bag, given.left_topic or "", given.right_topic or "", given.info_topics or (), max_skew_ms=given.max_skew_ms,
-                        calib=given.calib or "")
+                        calib=given.calib[0] if given.calib else "")
         self._stamps: List[int] = []
         self._frames = itertools.islice(self._bag.frames(), _MOST_OF_BAG)
         self._next: Any = next(self._frames, None)  # then its cameras are known
@@ -185,7 +185,7 @@ def _findings(given: argparse.Namespace) -> List[Finding]:
         return _examine(_OfBag(given), given.samples, given.min_disparity, end)
     try:
         sequence, calibration = open_input(given)
-        source = _OfSequence(sequence, calibration, given.calib)
+        source = _OfSequence(sequence, calibration, " ".join(given.calib or ()))
     except _egosgm._NegativeBaseline as error:
         wrong = Finding("problem", "calibration", str(error), _EXCHANGE)
         if not given.calib:
