@@ -176,7 +176,7 @@ class Examination:
     def _of_calibration(self) -> Finding:
         c = self._calibration
         if c is None:
-            return Finding("note", "calibration", "none was given: there is no depth and no odometry", "give --calib FILE")
+            return Finding("note", "calibration", "none was given: there is no depth and no odometry", "give --calib FILE; `egosgm calibrate` finds one by pictures of a board")
         text = f"fx {c.fx:.1f}, fy {c.fy:.1f}, cx {c.cx:.1f}, cy {c.cy:.1f} px, baseline {c.baseline_m:.4g} m"
         suspicion = _egosgm._suspect_calibration(c, self._width, self._height)
         return Finding("problem", "calibration", f"{text}: {suspicion.what}", suspicion.remedy) if suspicion else Finding("ok", "calibration", text)

@@ -65,7 +65,8 @@ class _Rectifier:
             self.rig = read_euroc_rig(given.euroc)
             return
         if not given.calib:
-            raise _egosgm.InvalidArgument("no calibration: give --calib FILE")
+            raise _egosgm.InvalidArgument("no calibration: give --calib FILE; `egosgm calibrate` finds one by pictures of a board, and rectified pictures need "
+                                          "none: `egosgm run LEFT RIGHT`")
         found = find(given.calib, given.unit, given.fisheye, size)
         if isinstance(found, StereoRig):
             self.rig = found
