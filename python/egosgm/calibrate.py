@@ -154,8 +154,8 @@ def _calibrate(board: Board, views: Sequence[_View], size: Tuple[int, int]) -> _
         lefts.append(left)
         rights.append(_points(board, numbers, view.corners[1])[1])
     given = [part for camera in cameras for part in (camera.matrix, camera.distortion)]
-    error, _, _, _, _, rotation, translation, _, _, errors = cv2.stereoCalibrateExtended(objects, lefts, rights, *given, size, np.eye(3), np.zeros((3, 1)),
-                                                                                       flags=cv2.CALIB_FIX_INTRINSIC)[:10]
+    found = cv2.stereoCalibrateExtended(objects, lefts, rights, *given, size, np.eye(3), np.zeros((3, 1)), flags=cv2.CALIB_FIX_INTRINSIC)
+    error, rotation, translation, errors = found[0], found[5], found[6], found[-1]  # between them lies what depends on OpenCV's version
     return _Stereo((cameras[0], cameras[1]), rotation, translation.ravel(), float(error), np.asarray(errors))
 
 
