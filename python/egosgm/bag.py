@@ -403,7 +403,7 @@ def _in_order(messages: Iterator[Tuple[int, int, Any]]) -> Iterator[Tuple[int, i
 def _remedy(path: pathlib.Path) -> str:
     if path.is_file() and (path.parent / "metadata.yaml").exists():
         return f"; it is a part of the bag {path.parent}: give that folder"
-    tool = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "ros2 bag reindex"}.get(path.suffix)
+    tool = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "sqlite3 FILE .recover"}.get(path.suffix)
     return f"; if its recording was cut short, `{tool}` mends it" if tool else ""
 
 
@@ -501,6 +501,7 @@ def run(bag: Bag, outputs: Sequence[Any] = (), progress: Optional[bool] = None,
             samples.append((frame.left, frame.right))
         frames, moved, density = frames + 1, moved + (motion is not None), density + maps.report.density
     said = [text for text in (doubt.text(), _egosgm._suspect_motions(given, found)) if text]
-    problems = _problems(bag.cameras.calibration, samples, pipeline.options) if doubt.text() else []
+    are_apart = bag.gaps.are_other_moments(bag.gaps.largest_skew_ms)  # which explains rows and ranges, and is told
+    problems = _problems(bag.cameras.calibration, samples, pipeline.options) if doubt.text() and not are_apart else []
     return {"doubt": "; ".join(said), "problems": problems, "frames": frames, "density": density / max(1, frames), "motions": moved, "calibration": bag.cameras.calibration,
             "rectified": bag.is_rectified_here, "device": pipeline.device.name, "gaps": bag.gaps}

@@ -44,6 +44,10 @@ class _Source:
     def times(self) -> Finding:
         raise NotImplementedError
 
+    def is_of_other_moments(self) -> bool:
+        """Whether left and right were taken too far apart, by their stamps. Known once all was read."""
+        return False
+
 
 class _OfSequence(_Source):
     def __init__(self, sequence: _egosgm.StereoSequence, calibration: "_egosgm.Calibration | StereoRig | None", calib: str) -> None:
@@ -99,6 +103,9 @@ class _OfBag(_Source):
             self._stamps.append(frame.stamp_ns)
             if frame.number in wanted:
                 yield _Pair(frame.number, f"{frame.number:06d}", frame.left, frame.right)
+
+    def is_of_other_moments(self) -> bool:
+        return self._bag.gaps.are_other_moments(self._bag.gaps.largest_skew_ms)
 
     def times(self) -> Finding:
         gaps, text = self._bag.gaps, self._bag.gaps.text()
@@ -171,6 +178,8 @@ def _examine(source: _Source, samples: int, least: int, end: int) -> List[Findin
     of_pairs = examination.findings(count)
     if source.rectified:
         of_pairs[0] = of_pairs[0]._replace(text=f"{of_pairs[0].text}, rectified here by {source.rectified}")
+    if source.is_of_other_moments():  # which explains what rows, sides and range would say
+        of_pairs = [finding for finding in of_pairs if finding.check in ("images", "calibration")]
     findings += of_pairs
     is_sound = all(finding.verdict != "problem" for finding in findings)
     findings.append(source.times())

@@ -1018,3 +1018,4 @@ def test_doctor_looks_at_bags(tmp_path, street, frames, capsys):
     between = drive_of(street, frames, of_right=lambda i, time: time + RATE_NS // 2).write(tmp_path / "between")
     findings = examined(capsys, between, "--max-skew-ms", 50)
     assert findings["times"]["verdict"] == "problem" and "other moments" in findings["times"]["text"]
+    assert list(findings) == ["images", "calibration", "times"]
