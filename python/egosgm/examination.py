@@ -196,8 +196,9 @@ class Examination:
         text = f"vertical misalignment {offset:.2f} px in the median, 90 % within {spread:.2f} px of it ({of}){_slopes(places, errors)}"
         if abs(offset) <= _MOST_OFFSET_PX and spread <= _MOST_SPREAD_PX:
             return Finding("ok", "rows", text)
-        return Finding("problem", "rows", text,
-                       f"{max(abs(offset), spread):.1f} px: rectify again (egosgm rectify, from the raw images and a new calibration)")
+        remedy = "rectify again (egosgm rectify, from the raw images and a new calibration)" if self._calibration else \
+            "these images are not rectified: `egosgm calibrate` finds the cameras, and `egosgm rectify` makes images of equal rows"
+        return Finding("problem", "rows", text, f"{max(abs(offset), spread):.1f} px: {remedy}")
 
     def _without_texture(self, points: Optional[NDArray[np.float32]]) -> List[Finding]:
         found = []

@@ -49,6 +49,9 @@ class Doctor(InputTest):
             finding = self.assert_only_problem("rows", self.shifted(shift))
             self.assertAlmostEqual(float(finding["text"].split()[2]), shift, delta=0.07)
             self.assertIn(f"{abs(shift):.1f} px: rectify again", finding["remedy"])
+        street = self.shifted(-3)
+        alone = self.assert_only_problem("rows", "--left", street / "image_0/%06d.png", "--right", street / "image_1/%06d.png")
+        self.assertIn("3.0 px: these images are not rectified: `egosgm calibrate`", alone["remedy"])
 
     def test_a_turned_camera_is_measured(self):
         street = self.broken_street()
