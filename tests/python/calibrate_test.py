@@ -85,6 +85,7 @@ def expect_the_cameras(file, within_px=4):
     for matrix, (expected, _) in ((rig.left_matrix, LEFT), (rig.right_matrix, RIGHT)):
         np.testing.assert_allclose(matrix, expected, atol=within_px)
     assert np.linalg.norm(rig.T) == pytest.approx(BASELINE, rel=0.02)
+    np.testing.assert_allclose(rig.T, T, atol=0.003)
     np.testing.assert_allclose(rig.R, R, atol=0.006)
     assert rig.size == (WIDTH, HEIGHT)
     return rig
