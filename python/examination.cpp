@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <pybind11/stl.h>
 
-#include <cstring>
-
 #include "egosgm/options.h"
 #include "host/vision/coarse_map.h"
 #include "host/vision/doubt.h"
 #include "host/vision/grey_bytes.h"
-#include "host/vision/pose_doubt.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
@@ -15,46 +12,10 @@
 namespace egosgm::python {
 namespace {
 
-/// A copy, as rows may lie at any stride.
-cv::Mat mat_of(const py::object& image, const char* name) {
-  const ImageArray owner = image_of(image, name);
-  const ImageView& view = owner.view;
-  cv::Mat mat(view.height, view.width, view.type == PixelType::kU8 ? CV_8UC1 : CV_16UC1);
-  for (int y = 0; y < view.height; ++y) {
-    std::memcpy(mat.ptr(y), static_cast<const char*>(view.data) + y * view.stride_bytes,
-                static_cast<std::size_t>(view.width) * mat.elemSize());
-  }
-  return mat;
-}
-
 using vision::Doubt;
-
-std::string motions_doubt(const std::vector<py::object>& given, const std::vector<py::object>& found) {
-  std::vector<Eigen::Isometry3d> motions;
-  std::vector<std::optional<Eigen::Isometry3d>> others;
-  for (const py::object& motion : given) motions.push_back(transform_of(motion, "given"));
-  for (const py::object& motion : found) {
-    others.push_back(motion.is_none() ? std::nullopt : std::optional(transform_of(motion, "found")));
-  }
-  return vision::suspect_motions(motions, others);
-}
 
 /// Names with a line before them: the package's own.
 void bind_images(py::module_& module) {
-  module.def(
-      "_clipped_by_range",
-      [](const py::object& left, const py::object& right, int least, int end) {
-        const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
-        std::optional<vision::Clipped> clipped;
-        {
-          const OtherThreadsRun other_threads_run;
-          clipped = vision::clipped_by_range(left_image, right_image, least, end);
-        }
-        return clipped ? py::object(py::make_tuple(clipped->share, clipped->disparities)) : py::none();
-      },
-      py::arg("left"), py::arg("right"), py::arg("least"), py::arg("end"),
-      "The share of the image that is nearer than [least, end), and the number of disparities that would do; None "
-      "where hardly anything is.");
   module.def(
       "_coarse_map",
       [](const py::object& left, const py::object& right, double row_offset_px, int least, int end) {
@@ -87,19 +48,21 @@ void bind_images(py::module_& module) {
 
 void bind_doubts(py::module_& module) {
   py::class_<Doubt>(module, "_Doubt")
-      .def(py::init([](const std::optional<Calibration>& calibration, int width, int height) {
-             return Doubt(calibration, {width, height});
+      .def(py::init([](const std::optional<Calibration>& calibration, int min_disparity, int disparities) {
+             PipelineOptions options;
+             options.min_disparity = min_disparity;
+             options.disparities = disparities;
+             return Doubt(calibration, options);
            }),
-           py::arg("calibration"), py::arg("width"), py::arg("height"))
-      .def("add", &Doubt::add, py::arg("density"), py::arg("has_motion"), py::arg("holds_8_bits_in_16"))
+           py::arg("calibration"), py::arg("min_disparity"), py::arg("disparities"))
       .def(
-          "look_beyond",
-          [](Doubt& self, const py::object& left, const py::object& right, int least, int end) {
+          "add",
+          [](Doubt& self, const py::object& left, const py::object& right, const FrameReport& report, bool has_motion) {
             const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
             const OtherThreadsRun other_threads_run;
-            self.look_beyond(left_image, right_image, least, end);
+            self.add(left_image, right_image, report, has_motion);
           },
-          py::arg("left"), py::arg("right"), py::arg("least"), py::arg("end"))
+          py::arg("left"), py::arg("right"), py::arg("report"), py::arg("has_motion"))
       .def("text", &Doubt::text);
   py::class_<vision::Suspicion>(module, "_Suspicion")
       .def_readonly("what", &vision::Suspicion::what)
@@ -108,7 +71,6 @@ void bind_doubts(py::module_& module) {
     return vision::suspect_calibration(calibration, {width, height});
   });
   module.def("_suspect_baseline", &vision::suspect_baseline, py::arg("baseline_m"), py::arg("fx"));
-  module.def("_suspect_motions", &motions_doubt, py::arg("given"), py::arg("found"));
 }
 
 }  // namespace

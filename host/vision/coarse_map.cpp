@@ -5,16 +5,17 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/imgproc.hpp>
+#include <utility>
 #include <vector>
 
 #include "host/vision/grey_bytes.h"
+#include "host/vision/wide_matching.h"
 
 namespace egosgm::vision {
 namespace {
 
 constexpr double kClippedShare = 0.01;  // of the points
+constexpr int kLeastSlope = 24;         // of grey levels; where rows are smoother, nothing is sure
 constexpr int kCoarseWidth = 256;       // images are made smaller, down to this
 constexpr double kFewest = 0.03;        // of the pixels; below, the map says nothing
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
@@ -47,6 +48,16 @@ bool is_ambiguous(const cv::Mat& left, const cv::Mat& right, int x, int y, int d
   return false;
 }
 
+/// Across a column, as Sobel has it.
+int slope_at(const cv::Mat& image, int x, int y) {
+  int slope = 0;
+  for (const auto& [v, weight] : {std::pair{-1, 1}, {0, 2}, {1, 1}}) {
+    const std::uint8_t* row = image.ptr(std::clamp(y + v, 0, image.rows - 1));
+    slope += weight * (row[std::min(x + 1, image.cols - 1)] - row[std::max(x - 1, 0)]);
+  }
+  return slope;
+}
+
 /// As coarse_map, of bytes.
 cv::Mat coarse_map_of(const cv::Mat& left, const cv::Mat& right, double row_offset_px, int least, int end) {
   const int factor = std::max(1, (left.cols + kCoarseWidth - 1) / kCoarseWidth);
@@ -54,25 +65,12 @@ cv::Mat coarse_map_of(const cv::Mat& left, const cv::Mat& right, double row_offs
   cv::Mat map(std::max(size.height, 0), std::max(size.width, 0), CV_32FC1, cv::Scalar(kNothing));
   if (size.width < 32 || size.height < 16) return map;
   const int half = (size.width / 2 + 15) / 16 * 16;
-  cv::Mat small[2], wide[2], found;
-  const cv::Mat back = (cv::Mat_<double>(2, 3) << 1, 0, 0, 0, 1, -row_offset_px);
-  cv::Mat aligned;
-  cv::warpAffine(right, aligned, back, right.size(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  for (int i = 0; i < 2; ++i) {
-    cv::resize(i == 0 ? left : aligned, small[i], size, 0, 0, cv::INTER_AREA);
-    cv::copyMakeBorder(small[i], wide[i], 0, 0, half, half, cv::BORDER_CONSTANT, cv::Scalar(0));
-  }
-  constexpr int kBlock = 5;
-  const auto matcher = cv::StereoSGBM::create(-half, 2 * half, kBlock, 8 * kBlock * kBlock, 32 * kBlock * kBlock,
-                                              /*disp12MaxDiff=*/1, /*preFilterCap=*/31, /*uniquenessRatio=*/15,
-                                              /*speckleWindowSize=*/40, /*speckleRange=*/1);
-  matcher->compute(wide[0], wide[1], found);
-  cv::Mat edges;
-  cv::Sobel(small[0], edges, CV_16S, 1, 0);
+  const cv::Mat small[2] = {shrunk_grey(left, factor, 0), shrunk_grey(right, factor, row_offset_px)};
+  const cv::Mat found = match_widely(small[0], small[1], half);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
-      const float d = static_cast<float>(found.at<std::int16_t>(y, x + half)) / 16;
-      const bool is_sure = d > static_cast<float>(-half) - 0.5f && std::abs(edges.at<std::int16_t>(y, x)) >= 24;
+      const float d = found.at<float>(y, x);
+      const bool is_sure = !std::isnan(d) && std::abs(slope_at(small[0], x, y)) >= kLeastSlope;
       if (!is_sure || x - d < 0 || x - d >= static_cast<float>(size.width)) continue;
       const float full = d * static_cast<float>(factor);
       const bool is_outside = full < static_cast<float>(least) - 1 || full > static_cast<float>(end);
