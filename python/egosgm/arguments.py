@@ -32,7 +32,7 @@ class Parser(argparse.ArgumentParser):
                 self.error(f'{kind} "{name}", a file: did the shell expand a pattern? quote it: \'*.png\'')
             self.error(f'{kind} "{name}"' + (f": did you mean {near[0]}?" if near else ""))
         for name, value in vars(given).items():
-            if value == "":
+            if value == "" or (isinstance(value, list) and "" in value and f"--{name}" in self._option_string_actions):
                 shown = name.replace("_", "-")
                 shown = f"--{shown}" if f"--{shown}" in self._option_string_actions else shown
                 raise _egosgm.InvalidArgument(f'{shown} "": is empty: give a value, or leave it out')

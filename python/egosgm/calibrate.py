@@ -135,17 +135,20 @@ def _points(board: Board, numbers: Sequence[int], corners: Corners) -> Tuple[NDA
     return board.points_m[list(numbers)].reshape(-1, 1, 3), np.array([corners[number] for number in numbers], np.float32).reshape(-1, 1, 2)
 
 
-def _calibrate_camera(board: Board, views: Sequence[_View], side: int, size: Tuple[int, int]) -> Tuple[_Camera, NDArray[np.float64]]:
-    """The camera, and the error of each view [px]."""
+def _flags(views: int) -> int:
+    """Few views say nothing of the third radial coefficient."""
+    return cv2.CALIB_FIX_K3 if views < _MANY_VIEWS else 0
+
+
+def _calibrate_camera(board: Board, views: Sequence[_View], side: int, size: Tuple[int, int]) -> Tuple[NDArray[np.float64], NDArray[np.float64], List[float]]:
+    """Matrix, distortion, and the board's tilts [degrees], by one camera alone."""
     objects, images = zip(*(_points(board, sorted(view.corners[side]), view.corners[side]) for view in views))
-    flags = cv2.CALIB_FIX_K3 if len(views) < _MANY_VIEWS else 0
-    error, matrix, distortion, turns, _, _, _, errors = cv2.calibrateCameraExtended(objects, images, size, None, None, flags=flags)
-    tilts = [float(np.degrees(np.arccos(min(1.0, abs(cv2.Rodrigues(turn)[0][2, 2]))))) for turn in turns]
-    return _Camera(matrix, distortion.ravel()[:5], float(error), tilts), errors.ravel()
+    _, matrix, distortion, turns, _ = cv2.calibrateCamera(objects, images, size, None, None, flags=_flags(len(views)))
+    return matrix, distortion.ravel()[:5], [float(np.degrees(np.arccos(min(1.0, abs(cv2.Rodrigues(turn)[0][2, 2]))))) for turn in turns]
 
 
 def _calibrate(board: Board, views: Sequence[_View], size: Tuple[int, int]) -> _Stereo:
-    cameras = tuple(_calibrate_camera(board, views, side, size)[0] for side in (0, 1))
+    alone = [_calibrate_camera(board, views, side, size) for side in (0, 1)]
     objects, lefts, rights = [], [], []
     for view in views:
         numbers = view.common()
@@ -153,10 +156,14 @@ def _calibrate(board: Board, views: Sequence[_View], size: Tuple[int, int]) -> _
         objects.append(points)
         lefts.append(left)
         rights.append(_points(board, numbers, view.corners[1])[1])
-    given = [part for camera in cameras for part in (camera.matrix, camera.distortion)]
-    error, _, _, _, _, rotation, translation, _, _, errors = cv2.stereoCalibrateExtended(objects, lefts, rights, *given, size, np.eye(3), np.zeros((3, 1)),
-                                                                                       flags=cv2.CALIB_FIX_INTRINSIC)[:10]
-    return _Stereo((cameras[0], cameras[1]), rotation, translation.ravel(), float(error), np.asarray(errors))
+    # One camera alone may take a lens for a distance, which both together do not.
+    given = [part for matrix, distortion, _ in alone for part in (matrix, distortion)]
+    found = cv2.stereoCalibrateExtended(objects, lefts, rights, *given, size, np.eye(3), np.zeros((3, 1)),
+                                        flags=cv2.CALIB_USE_INTRINSIC_GUESS | _flags(len(views)))
+    errors = np.asarray(found[-1])  # what lies before it depends on OpenCV's version
+    of_cameras = np.sqrt((errors ** 2).mean(axis=0))
+    cameras = [_Camera(found[1 + 2 * side], found[2 + 2 * side].ravel()[:5], float(of_cameras[side]), alone[side][2]) for side in (0, 1)]
+    return _Stereo((cameras[0], cameras[1]), found[5], found[6].ravel(), float(found[0]), errors)
 
 
 def _without_bad(board: Board, views: List[_View], size: Tuple[int, int]) -> Tuple[_Stereo, List[_View], List[Tuple[_View, float]]]:

@@ -32,7 +32,8 @@ def add_input(parser: argparse.ArgumentParser) -> None:
     add("--scene", metavar="NUMBER", help="scene of --kitti, for example 000151")
     add("--left", metavar="PATTERN", help="left images: one PNG or JPEG, or a pattern (in quotes) such as 'left/%%06d.png' or 'left/*.jpg'")
     add("--right", metavar="PATTERN", help="right images, likewise; rectified, or raw where --calib is of raw images")
-    add("--calib", metavar="FILE", help="calibration of --left and --right, of whichever program, as egosgm.read_calibration reads it")
+    add("--calib", metavar="FILE", nargs="+", help="calibration of --left and --right, of whichever program, as egosgm.read_calibration reads it; the left and the "
+        "right camera's file, where each has one")
     add("--pair-by", metavar="name|order", help="what tells which --left and --right images belong together: equal texts in their names (what * or %%d "
         "stands for), or their order")
     add("--frames", metavar="FIRST:LAST", help="frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all")
@@ -104,13 +105,15 @@ def _of_patterns(given: argparse.Namespace) -> Opened:
     if not given.calib:
         return Opened(open_without_calibration(given), None)
     try:
-        sequence = _egosgm.open_patterns(given.left, given.right, given.calib, given.frames or "", given.pair_by == "order")
-        return Opened(sequence, sequence.calibration)
+        if len(given.calib) == 1:
+            sequence = _egosgm.open_patterns(given.left, given.right, given.calib[0], given.frames or "", given.pair_by == "order")
+            return Opened(sequence, sequence.calibration)
     except _egosgm._NegativeBaseline:
         raise
     except _egosgm.InvalidArgument:
-        found = calibrations.find(given.calib)  # of another program, or the error that is to be told
-    return Opened(open_without_calibration(given), found)
+        pass  # of another program, or the error is told below
+    sequence = open_without_calibration(given)
+    return Opened(sequence, calibrations.find(given.calib, size=sequence.size))
 
 
 def _seconds(row: str) -> Optional[float]:
