@@ -74,7 +74,7 @@ double ms_since(Clock::time_point start) {
 struct RunArguments {
   SequenceArguments input;
   OptionArguments method;
-  std::string out, poses, device, programs, tuning, write, trace;
+  std::string out, poses, device, fallback, programs, cache, tuning, write, trace;
   StereoOdometryOptions odometry;
   double cloud_sigma_percent = 100 * vision::PointCloudOptions().max_relative_sigma;
   bool interpolate = false, quiet = false, resume = false;
@@ -108,11 +108,10 @@ class Run {
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, type_of(sequence_)),
         report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height),
         doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, size_) {
+    if (job.lost) report_.take_over(*job.lost);
     folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration, cloud_options_);
-    pipeline_.prepare(type_of(sequence_), outputs_->views());
-    waiting_.reset();
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
     pipeline_.record_commands(true);
@@ -124,6 +123,8 @@ class Run {
     write_report(false, kKilled);
     try {
       save_config();
+      pipeline_.prepare(type_of(sequence_), outputs_->views());
+      waiting_.reset();
       const bool finished = process_all();
       finish(finished, finished ? "" : kInterrupt);
       if (!finished) {
@@ -384,13 +385,37 @@ SequenceJob job_of(const RunArguments& arguments) {
   return job;
 }
 
+std::optional<Device> fallback_of(const RunArguments& arguments) {
+  if (arguments.fallback.empty()) return std::nullopt;
+  return tuned_by_argument(Device::select(arguments.fallback).with_cache(arguments.cache), arguments.tuning);
+}
+
+/// What is left of a job whose device failed.
+SequenceJob rest_of(SequenceJob job, const RunArguments& arguments, const LostDevice& lost) {
+  job.out = OutputFolder(arguments.out, /*resume=*/true, output_files(job.kinds, job.sequence, job.options));
+  for (fs::path* file : {&job.trace, &job.save_config}) {
+    if (fs::exists(*file)) file->clear();
+  }
+  job.lost = lost;
+  return job;
+}
+
 int run(const RunArguments& arguments) {
   const SequenceJob job = job_of(arguments);
-  Device device = Device::select(arguments.device);
+  Device device = Device::select(arguments.device).with_cache(arguments.cache);
   if (arguments.programs.empty() || !arguments.tuning.empty()) device = tuned_by_argument(device, arguments.tuning);
   if (!arguments.programs.empty()) device = device.with_programs(arguments.programs);
+  const std::optional<Device> fallback = fallback_of(arguments);
   catch_interrupts();
-  return run_sequence(job, device) ? kOk : kInterrupted;
+  std::optional<LostDevice> lost;
+  try {
+    return run_sequence(job, device) ? kOk : kInterrupted;
+  } catch (const DeviceError& error) {
+    if (!fallback || interrupted()) throw;
+    lost = {device.info(), error.what()};
+  }
+  say(fmt::format("egosgm: {} failed ({}): {} goes on", lost->device.name, lost->why, fallback->info().name));
+  return run_sequence(rest_of(job, arguments, *lost), *fallback) ? kOk : kInterrupted;
 }
 
 }  // namespace
@@ -437,7 +462,9 @@ Command add_run(CLI::App& program) {
   arguments->method.add_to(*command);
   add_motion(*command, arguments->poses, arguments->odometry);
   add_device(*command, arguments->device);
+  add_fallback(*command, arguments->fallback);
   add_programs(*command, arguments->programs);
+  add_cache(*command, arguments->cache);
   add_tuning(*command, arguments->tuning);
   return {command, [arguments] { return run(*arguments); }};
 }

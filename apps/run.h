@@ -2,10 +2,12 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <string>
 
 #include "apps/output_folder.h"
+#include "apps/run_report.h"
 #include "egosgm/device.h"
 #include "egosgm/odometry.h"
 #include "egosgm/options.h"
@@ -27,6 +29,7 @@ struct SequenceJob {
   // Files that are written as well, where they are not empty: the options in use, and a trace of all commands.
   std::filesystem::path save_config, trace;
   bool quiet = false;
+  std::optional<LostDevice> lost;  // which this one takes over from
 };
 
 /// What `egosgm run` does once its arguments are read: every frame of the sequence into `job.out`, then poses.txt and
