@@ -172,10 +172,10 @@ cl_int CL_API_CALL launch(cl_command_queue queue, cl_kernel kernel, cl_uint dime
 
 }  // namespace
 
-/// From now on the first launch of each kernel is written to FOLDER/PREFIXKERNEL. A null folder: none is.
-extern "C" void egosgm_cases_into(const char* folder, const char* names_begin_with) {
-  into = folder ? folder : "";
-  prefix = names_begin_with;
+/// From now on the first launch of each kernel is written to FOLDER/FRAME.KERNEL.
+extern "C" void egosgm_cases_into(const char* folder, const char* frame) {
+  into = folder;
+  prefix = std::string(frame) + '.';
 }
 
 extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target, cl_uint* count,

@@ -90,16 +90,13 @@ double build_s(const Device& device, const Street& street, int disparities) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// The layer that the loader has loaded where OPENCL_LAYERS names it.
-void write_cases(StreetFrame& frame, const std::string& folder) {
+/// The first frame of each kind, by the layer that the loader has loaded where OPENCL_LAYERS names it.
+void write_cases(ocl::Context& context, const Street& street, int disparities, const std::string& folder) {
   void* const layer = dlopen(CASE_LAYER, RTLD_NOW | RTLD_NOLOAD);
   if (!layer) throw DeviceError(0, "--export: this OpenCL loader has no layers: take that of ocl-icd 2.3 or Khronos");
   const auto into = reinterpret_cast<void (*)(const char*, const char*)>(dlsym(layer, "egosgm_cases_into"));
-  into(folder.c_str(), "full.");
-  frame.full_range();
-  into(folder.c_str(), "steady.");
-  frame.steady();
-  into(nullptr, "");
+  const StreetFrame frame(context, street, disparities, Scheduling::kAutomatic,
+                          [&](const char* kind) { into(folder.c_str(), kind); });
 }
 
 /// For tools that count what kernels do: one frame of each kind, and no other launch between the lines.
@@ -132,9 +129,9 @@ int run(int argc, char** argv) {
     machine.more.emplace_back("build_s", build_s(device, street, disparities));
   ocl::Context context(device.handle().device);
   ocl::translated(context, [&] {
+    if (!arguments.cases.empty()) return write_cases(context, street, disparities, arguments.cases);
     // A tool that counts is no GPU, whatever it calls itself.
     StreetFrame frame(context, street, disparities, arguments.counts ? Scheduling::kWavefront : Scheduling::kAutomatic);
-    if (!arguments.cases.empty()) return write_cases(frame, arguments.cases);
     if (arguments.counts) return run_once(frame);
     const Roofs roofs = roofs_of(context);
     machine.copy_gb_s = roofs.copy_gb_s;

@@ -32,7 +32,8 @@ double FrameTimes::device_ms() const {
                          [](double total, const auto& stage) { return total + stage.second; });
 }
 
-StreetFrame::StreetFrame(ocl::Context& context, const Street& street, int disparities, Scheduling scheduling)
+StreetFrame::StreetFrame(ocl::Context& context, const Street& street, int disparities, Scheduling scheduling,
+                         const std::function<void(const char*)>& begins)
     : context_(context),
       size_(street.size),
       motion_(street.motion),
@@ -46,11 +47,13 @@ StreetFrame::StreetFrame(ocl::Context& context, const Street& street, int dispar
   images_.pixels.write(context, street.images);
   method_.prepare(images_.type);
   method_.observer = [this](Room room) { look(room); };
+  if (begins) begins("full");
   full_range();
   belief_ = std::exchange(after_, belief_);
   belief_.maps.disparity.write(context, street.disparity);
   belief_.maps.variance.write(context, street.variance);
   belief_.evidence.fill(context, EGOSGM_EVIDENCE_MOST);
+  if (begins) begins("steady");
   steady();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -30,8 +31,9 @@ struct FrameTimes {
 /// A frame of the street, as a pipeline with default options runs it, that can be run again and again.
 class StreetFrame {
  public:
+  /// Runs one of each kind. `begins`: called before each with "full" or "steady", while memory holds nothing of it yet.
   StreetFrame(ocl::Context& context, const Street& street, int disparities,
-              Scheduling scheduling = Scheduling::kAutomatic);
+              Scheduling scheduling = Scheduling::kAutomatic, const std::function<void(const char*)>& begins = {});
 
   const FrameTimes& steady() { return run(after_, belief_); }
   const FrameTimes& full_range();

@@ -101,7 +101,7 @@ class Ruler(unittest.TestCase):
             self.assertTrue(results, file)
             if all(hashlib.sha256((file.parent / buffer["file"]).read_bytes()).hexdigest() == buffer["sha256"] for buffer in results):
                 unchanged.append(file.parent.name)
-        self.assertLess(len(unchanged), 6, f"kernels that change nothing: {unchanged}")
+        self.assertLess(len(unchanged), 3, f"kernels that change nothing: {unchanged}")
         self.assertNotEqual(ruler(*SIZE, "--export", folder).returncode, 0, "written over a folder that is there")
         if subprocess.run([sys.executable, "-c", "import pyopencl"], capture_output=True).returncode != 0:
             self.skipTest("no pyopencl, which runs them")
