@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "egosgm/odometry.h"
 #include "egosgm/vision/dataset.h"
 
 namespace egosgm::python {
@@ -12,11 +13,15 @@ namespace egosgm::python {
 /// "7:10", "7:", ":10" or "7"; empty: all.
 vision::FrameRange range_of(const std::string& frames);
 
+/// Throws InvalidArgument.
+StereoOdometryOptions odometry_options_of(const pybind11::kwargs& values);
+
 void bind_errors(pybind11::module_& module);
 void bind_values(pybind11::module_& module);
 void bind_pipeline(pybind11::module_& module);
 void bind_odometry(pybind11::module_& module);
 void bind_examination(pybind11::module_& module);
+void bind_program(pybind11::module_& module);
 void bind_files(pybind11::module_& module);
 void bind_evaluation(pybind11::module_& module);
 

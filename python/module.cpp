@@ -3,6 +3,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/image.h"
+#include "egosgm/vision/calibration_io.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
 
@@ -21,6 +22,7 @@ void bind_errors(py::module_& module) {
       "The file system refused to take a result. What stood under the file's name before stands there still.";
   auto device_error = py::register_exception<DeviceError>(module, "DeviceError", also(PyExc_RuntimeError));
   device_error.doc() = "The device or its driver refused. The text names the stage and the OpenCL status.";
+  py::register_exception<vision::NegativeBaseline>(module, "_NegativeBaseline", module.attr("InvalidArgument"));
   // Asked before the others, as the last to be registered.
   py::register_exception<BuildError>(module, "BuildError", device_error).doc() =
       "A kernel did not compile. The text ends with the compiler's log.";
@@ -41,6 +43,7 @@ PYBIND11_MODULE(_egosgm, module) {
   bind_pipeline(module);
   bind_odometry(module);
   bind_examination(module);
+  bind_program(module);
   bind_files(module);
   bind_evaluation(module);
 }

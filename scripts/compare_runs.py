@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prints the figures of several outputs of `egosgm run` side by side: compare_runs.py FOLDER..."""
+"""Prints the figures of several outputs of `egosgm run` side by side"""
 import json
 import pathlib
 import statistics
-import sys
+
+from usage import Parser
 
 STEADY_FROM = 3  # frames; the first ones search everything and warm the device up
 HOST = ("total", "wall", "odometry", "read", "write")  # in "ms"; all else there ran on the device
@@ -47,6 +48,6 @@ def main(folders):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2:
-        sys.exit("usage: compare_runs.py FOLDER...")
-    main([pathlib.Path(argument) for argument in sys.argv[1:]])
+    parser = Parser(__doc__)
+    parser.add_argument("folders", metavar="FOLDER", nargs="+", type=pathlib.Path)
+    main(parser.parse_args().folders)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Prints which tests of ctest's JUnit file were skipped, and why: scripts/list_skipped.py FILE"""
+"""Prints which tests of ctest's JUnit file were skipped, and why"""
 import re
-import sys
 import xml.etree.ElementTree
+
+from usage import Parser
 
 # As cmake/SkippedTest.cmake, unittest and GoogleTest say it.
 REASONS = re.compile(r"^skipped: (.+)$|\.\.\. skipped ['\"](.+)['\"]$|: Skipped\n(.+)$", re.MULTILINE)
@@ -18,4 +19,6 @@ def main(file):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    parser = Parser(__doc__)
+    parser.add_argument("file", metavar="FILE")
+    main(parser.parse_args().file)

@@ -8,10 +8,11 @@ could change.
 scripts/measure runs the benches. All of one page must come from one commit without changes, or it is refused. The table of scripts/drivers
 (build/lanes/drivers.json, to be put beside the others) names its own, row by row.
 """
-import argparse
 import json
 import pathlib
 import sys
+
+from usage import Parser
 
 DOCS = pathlib.Path(__file__).resolve().parents[1] / "docs"
 FILES = ("accuracy", "video", "compare", "stages")
@@ -215,7 +216,7 @@ def with_results(readme, text):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing")
     parser.add_argument("--docs", metavar="DIR", type=pathlib.Path, default=DOCS, help="where measured/ and measured.md are, beside README.md (docs)")
     arguments = parser.parse_args()

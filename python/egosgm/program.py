@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `egosgm`: tools in Python (tools.json lists them), and the program in C++ for all others."""
+"""The command `egosgm`: tools in Python (tools.json lists them), and those in C++ by the module."""
 import contextlib
 import importlib
 import json
 import os
 import pathlib
 import signal
-import subprocess
 import sys
 import tempfile
 import threading
@@ -55,9 +54,7 @@ def with_calibration(arguments: List[str], folder: pathlib.Path) -> List[str]:
 
 
 def _module_of(arguments: Sequence[str]) -> Optional[str]:
-    """The package's module whose main(arguments) does what is asked for; None where the C++ program does it."""
-    if arguments[:1] == ["run"] and any(a.split("=")[0] == "--bag" for a in arguments):
-        return "bag_program"
+    """The package's module whose main(arguments) does what is asked for; None where C++ does it."""
     tools = json.loads(pathlib.Path(__file__).with_name("tools.json").read_text())
     return tools[arguments[0]]["module"] if arguments and arguments[0] in tools else None
 
@@ -81,16 +78,28 @@ def _flushed(code: int) -> int:
     return code
 
 
+def _run_program(arguments: List[str]) -> int:
+    """A command in C++, in this process."""
+    from . import _egosgm, bag_program
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)  # Python's handlers would wait for C++ to come back
+    given = {argument.split("=")[0] for argument in arguments}
+    if "--calib" not in given or "--bag" in given:
+        return _egosgm._main(arguments, bag_program)
+    with tempfile.TemporaryDirectory(prefix="egosgm_") as folder:
+        return _egosgm._main(with_calibration(arguments, pathlib.Path(folder)), bag_program)
+
+
 def run_tool(arguments: Sequence[str]) -> int:
-    """Runs a tool that is written in Python, and returns its exit code. Never calls the C++ program."""
+    """Runs a command, and returns its exit code. Never calls the C++ program."""
     from . import _egosgm
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
     module = _module_of(arguments)
-    if module is None:
-        _say(f"error: {' '.join(arguments[:1])}: this version of the Python package has no such tool: install the program's own version")
-        return 1
     try:
+        if module is None:
+            return _run_program(list(arguments))
         return _flushed(importlib.import_module("." + module, __package__).main(list(arguments[1:])))
     except SystemExit as end:  # of --help
         return _flushed(int(end.code or 0))
@@ -111,39 +120,8 @@ def run_tool(arguments: Sequence[str]) -> int:
         return 130
 
 
-def _program() -> Optional[pathlib.Path]:
-    """The C++ program that came with the package, or that was built or installed beside it."""
-    package = pathlib.Path(__file__).resolve().parent
-    places = [package / "bin/egosgm", package.parents[1] / "apps/egosgm"]
-    if package.parent.name == "dist-packages":
-        places.append(package.parents[3] / "bin/egosgm")
-    for place in places:
-        with contextlib.suppress(OSError):
-            with place.open("rb") as file:
-                if file.read(4) == b"\x7fELF":  # no script, which could be this one
-                    return place
-    return None
-
-
 def main() -> None:
-    arguments = sys.argv[1:]
-    if _module_of(arguments):
-        sys.exit(run_tool(arguments))
-    program = _program()
-    if program is None:
-        sys.exit("egosgm: error: the program is neither in this package nor beside it: pip install the wheel, which has it (docs/python.md)")
-    if not any(a.split("=")[0] == "--calib" for a in arguments):
-        os.execv(program, ["egosgm", *arguments])
-    from . import _egosgm
-    with tempfile.TemporaryDirectory(prefix="egosgm_") as folder:
-        try:
-            changed = with_calibration(arguments, pathlib.Path(folder))
-        except (_egosgm.InvalidArgument, _egosgm.IoError, OSError) as error:
-            print(f"egosgm: error: {error}", file=sys.stderr)
-            sys.exit(2)
-        if changed != arguments:
-            sys.exit(subprocess.call([program, *changed]))
-    os.execv(program, ["egosgm", *arguments])
+    sys.exit(run_tool(sys.argv[1:]))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every script explains itself by --help, and refuses what it does not know with one line, before it does anything."""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SCRIPTS = pathlib.Path(__file__).resolve().parents[1] / "scripts"
+SHARED = ("usage.sh", "usage.py")
+
+
+def explanation(script):
+    """The first words of the comment, or of the text, at its head."""
+    lines = [line for line in script.read_text().splitlines() if not line.startswith(("#!", "# SPDX-"))]
+    return " ".join(re.findall(r"[\w-]+", lines[0])[:5])
+
+
+class Scripts(unittest.TestCase):
+    def setUp(self):
+        # Should a script begin with its work, it finds no tool for it.
+        self.folder = tempfile.TemporaryDirectory(prefix="egosgm_scripts_")
+        self.addCleanup(self.folder.cleanup)
+        for tool in ("apt-get", "sudo", "dpkg-query", "cmake", "debootstrap", "pip", "git"):
+            stub = pathlib.Path(self.folder.name, tool)
+            stub.write_text(f"#!/bin/sh\necho 'the script began to work: {tool}' >&2\nexit 99\n")
+            stub.chmod(0o755)
+        self.scripts = sorted(script for script in SCRIPTS.iterdir() if script.is_file() and script.name not in SHARED)
+        self.assertGreater(len(self.scripts), 20)
+
+    def called(self, script, *arguments):
+        words = [script] if os.access(script, os.X_OK) else [sys.executable, script]
+        environment = dict(os.environ, PATH=f"{self.folder.name}:{os.environ['PATH']}", PYTHONDONTWRITEBYTECODE="1", COLUMNS="200")
+        return subprocess.run([*words, *arguments], env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
+
+    def test_help_is_the_comment_at_the_head(self):
+        for script in self.scripts:
+            for option in ("--help", "-h"):
+                with self.subTest(script=script.name, option=option):
+                    done = self.called(script, option)
+                    self.assertEqual((done.returncode, done.stderr), (0, ""))
+                    self.assertIn(explanation(script), " ".join(re.findall(r"[\w-]+", done.stdout)))
+
+    def test_unknown_arguments_are_one_line_of_error(self):
+        for script in self.scripts:
+            for arguments in (["--progam"], ["--progam=1"], ["-q"] if script.name != "test" else ["--progam", "-R", "x"]):
+                with self.subTest(script=script.name, arguments=arguments):
+                    done = self.called(script, *arguments)
+                    self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
+                    self.assertRegex(done.stderr, r"\A[^\n]+\n\Z")
+                    self.assertIn(arguments[0], done.stderr)
+
+    def test_a_word_too_many_is_refused(self):
+        for name, arguments in {"install-dependencies": ["--program", "again"], "format": ["--check", "all"], "measure": ["--build", "b", "c"],
+                                "build-site": ["now"], "try-arm": ["now"], "lanes": ["asan", "usan"]}.items():
+            with self.subTest(script=name):
+                done = self.called(SCRIPTS / name, *arguments)
+                self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
+                self.assertIn(f"{arguments[-1]}", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
