@@ -92,8 +92,8 @@ std::optional<Motion> motion_of(const py::object& motion) {
 class LockedPipeline {
  public:
   LockedPipeline(const Calibration& calibration, int width, int height, const PipelineOptions& options,
-                 const std::string& device)
-      : width_(width), height_(height), pipeline_(calibration, width, height, options, Device::select(device)) {}
+                 const Device& device)
+      : width_(width), height_(height), pipeline_(calibration, width, height, options, device) {}
 
   Frame process(const py::object& left, const py::object& right, const py::object& motion, const py::object& wanted) {
     const ImageArray left_image = image_of(left, "left"), right_image = image_of(right, "right");
@@ -184,12 +184,13 @@ class LockedPipeline {
 
 std::unique_ptr<LockedPipeline> make_pipeline(const Calibration& calibration, int width, int height,
                                               const std::string& device, const std::string& preset,
-                                              const py::kwargs& values) {
+                                              const std::string& cache, const py::kwargs& values) {
   PipelineOptions options = options_of_preset(preset);
   set_options(options, values);
   options.validate();
   const OtherThreadsRun other_threads_run;
-  return std::make_unique<LockedPipeline>(calibration, width, height, options, device);
+  return std::make_unique<LockedPipeline>(calibration, width, height, options,
+                                          Device::select(device).with_cache(cache));
 }
 
 py::list stages_of(const FrameReport& report) {
@@ -236,7 +237,7 @@ void bind_pipeline(py::module_& module) {
   bind_frame(module);
   py::class_<LockedPipeline>(module, "Pipeline")
       .def(py::init(&make_pipeline), py::arg("calibration"), py::arg("width"), py::arg("height"), py::kw_only(),
-           py::arg("device") = "", py::arg("preset") = "default")
+           py::arg("device") = "", py::arg("preset") = "default", py::arg("cache") = "")
       .def(
           "process", &LockedPipeline::process, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
           py::arg("outputs") = py::make_tuple("disparity", "variance"),
