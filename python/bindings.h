@@ -12,6 +12,9 @@ namespace egosgm::python {
 /// "7:10", "7:", ":10" or "7"; empty: all.
 vision::FrameRange range_of(const std::string& frames);
 
+/// Of a text that may hold the name of a file: bytes that are no UTF-8 stand in it as they do in Python's paths.
+pybind11::str text_of(const std::string& text);
+
 void bind_errors(pybind11::module_& module);
 void bind_values(pybind11::module_& module);
 void bind_pipeline(pybind11::module_& module);

@@ -14,6 +14,7 @@
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
+#include "python/pickling.h"
 
 namespace egosgm::python {
 namespace {
@@ -32,19 +33,28 @@ py::tuple read_images(const StereoFrame& frame) {
 }
 
 void bind_sequences(py::module_& module) {
-  py::class_<StereoFrame>(module, "StereoFrame", "One stereo pair on disk, and its truth where there is one.")
-      .def_readonly("number", &StereoFrame::number)
+  auto frame =
+      py::class_<StereoFrame>(module, "StereoFrame", "One stereo pair on disk, and its truth where there is one.");
+  pickle_members<&StereoFrame::number, &StereoFrame::name, &StereoFrame::left, &StereoFrame::right,
+                 &StereoFrame::truth_noc, &StereoFrame::truth_occ>(frame);
+  frame.def_readonly("number", &StereoFrame::number)
       .def_readonly("name", &StereoFrame::name, "The number with six digits.")
       .def_readonly("left", &StereoFrame::left)
       .def_readonly("right", &StereoFrame::right)
       .def_readonly("truth_noc", &StereoFrame::truth_noc, "Left disparity of non-occluded pixels; empty: none.")
       .def_readonly("truth_occ", &StereoFrame::truth_occ, "Left disparity of all pixels; empty: none.")
       .def("read", &read_images, "Both images as grey: (left, right).");
-  py::class_<StereoSequence>(module, "StereoSequence", "Frames of one rectified camera pair, one after the other.")
-      .def_readonly("title", &StereoSequence::title)
+  auto sequence =
+      py::class_<StereoSequence>(module, "StereoSequence", "Frames of one rectified camera pair, one after the other.");
+  pickle_members<&StereoSequence::title, &StereoSequence::frames, &StereoSequence::numbers, &StereoSequence::note,
+                 &StereoSequence::has_calibration, &StereoSequence::calibration, &StereoSequence::calibration_file,
+                 &StereoSequence::poses_file, &StereoSequence::times_file>(sequence);
+  sequence.def_property_readonly("title", [](const StereoSequence& s) { return text_of(s.title); })
       .def_readonly("frames", &StereoSequence::frames)
       .def_readonly("numbers", &StereoSequence::numbers, "Of all frames that are there, chosen or not.")
-      .def_readonly("note", &StereoSequence::note, "What is unusual, such as gaps in the numbers; empty: nothing.")
+      .def_property_readonly(
+          "note", [](const StereoSequence& s) { return text_of(s.note); },
+          "What is unusual, such as gaps in the numbers; empty: nothing.")
       .def_property_readonly(
           "calibration",
           [](const StereoSequence& s) { return s.has_calibration ? std::optional(s.calibration) : std::nullopt; },
@@ -73,9 +83,8 @@ void bind_sequences(py::module_& module) {
       py::arg("folder"), py::arg("scene"), py::arg("frames") = "", "KITTI 2012 or 2015 multi-view.");
   module.def(
       "open_patterns",
-      [](const std::string& left, const std::string& right, const path& calibration, const std::string& frames,
-         bool by_order) {
-        return vision::open_patterns(left, right, calibration, range_of(frames),
+      [](const path& left, const path& right, const path& calibration, const std::string& frames, bool by_order) {
+        return vision::open_patterns(left.string(), right.string(), calibration, range_of(frames),
                                      by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
       },
       py::arg("left"), py::arg("right"), py::arg("calibration") = path(), py::arg("frames") = "",
@@ -110,6 +119,15 @@ py::list layers_of_run(vision::FramePanels& panels, const path& folder, const st
   return layers;
 }
 
+py::bytes read_file(const path& file, std::size_t max_bytes) {
+  std::string bytes;
+  {
+    const OtherThreadsRun other_threads_run;
+    bytes = vision::read_file(file, max_bytes);
+  }
+  return py::bytes(bytes);
+}
+
 /// Throws IoError where a file has come there meanwhile.
 void write_new_file(const path& file, const py::bytes& bytes) {
   const vision::KeepFiles others;
@@ -122,9 +140,9 @@ void write_new_calibration(const path& file, const Calibration& calibration) {
 }
 
 /// (pairs of files, files without one of the other camera).
-py::tuple find_pairs(const std::string& left, const std::string& right, bool by_order) {
+py::tuple find_pairs(const path& left, const path& right, bool by_order) {
   const vision::ImagePairs found =
-      vision::find_pairs(left, right, by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
+      vision::find_pairs(left.string(), right.string(), by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
   return py::make_tuple(py::cast(found.pairs), py::cast(found.alone));
 }
 
@@ -197,10 +215,12 @@ void bind_files(py::module_& module) {
   py::class_<vision::FramePanels>(module, "_FramePanels")
       .def(py::init<int>(), py::arg("disparities"))
       .def("layers", &layers_of_run, py::arg("folder"), py::arg("name"), py::arg("left"), py::arg("truth"));
+  module.def("_read_file", &read_file, py::arg("file"), py::arg("max_bytes"));
   module.def("_write_new_file", &write_new_file, py::arg("file"), py::arg("bytes"));
   module.def("_write_new_calibration", &write_new_calibration, py::arg("file"), py::arg("calibration"));
   module.def("_find_pairs", &find_pairs, py::arg("left"), py::arg("right"), py::arg("by_order"));
-  module.def("_find_images", &vision::find_images, py::arg("pattern"));
+  module.def(
+      "_find_images", [](const path& pattern) { return vision::find_images(pattern.string()); }, py::arg("pattern"));
   module.def(
       "_read_stored_image", [](const path& file) { return array_of(vision::read_stored_image(file)); },
       py::arg("file"));

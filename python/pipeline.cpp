@@ -14,6 +14,7 @@
 #include "python/bindings.h"
 #include "python/option_values.h"
 #include "python/other_threads.h"
+#include "python/pickling.h"
 
 namespace egosgm::python {
 namespace {
@@ -205,7 +206,11 @@ py::list stages_of(const FrameReport& report) {
 }
 
 void bind_frame(py::module_& module) {
-  py::class_<FrameReport>(module, "FrameReport", "What happened in a frame.")
+  auto report = py::class_<FrameReport>(module, "FrameReport", "What happened in a frame.");
+  pickle_members<&FrameReport::unpredicted, &FrameReport::searched_everything, &FrameReport::search_fraction,
+                 &FrameReport::predicted_fraction, &FrameReport::density, &FrameReport::vertical_offset_px,
+                 &FrameReport::launches, &FrameReport::stripes, &FrameReport::stages, &FrameReport::total_ms>(report);
+  report
       .def_property_readonly(
           "unpredicted", [](const FrameReport& report) { return to_string(report.unpredicted); },
           "Why nothing was predicted: 'first frame', 'reset', 'no motion' or 'not temporal'; '' where something was.")
@@ -230,6 +235,7 @@ void bind_frame(py::module_& module) {
     frame.def_property_readonly(name, [name](const Frame& f) { return f.map(name); });
   });
   frame.def_readonly("report", &Frame::report);
+  pickle_members<&Frame::maps, &Frame::report>(frame);
 
   py::tuple reasons(kReasonCount);
   for (int reason = 0; reason < kReasonCount; ++reason) reasons[reason] = to_string(static_cast<Reason>(reason));

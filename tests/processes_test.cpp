@@ -60,7 +60,7 @@ TEST(BeginInThreads, ListDevices) {
 TEST(BeginInThreads, MakePipelines) {
   const ShortVideo video;
   ASSERT_EQ(status_of([&] { return !video.through(Device::select()).empty(); }), 0);  // fills the driver's cache
-  for (int process = 0; process < 10; ++process) {
+  for (int process = 0; process < 50; ++process) {
     ASSERT_EQ(status_of([&] {
                 return in_threads([&] {
                   const Pipeline pipeline = video.pipeline(Device::select());

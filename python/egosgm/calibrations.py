@@ -317,11 +317,7 @@ def _check_parts(text: str, file: pathlib.Path) -> None:
 
 
 def _text_of(file: pathlib.Path) -> str:
-    if not file.exists():
-        raise _refuse(file, "no such file")
-    if file.stat().st_size > _MOST_BYTES:
-        raise _refuse(file, f"is longer than {_MOST_BYTES >> 20} MiB; give a calibration alone")
-    return file.read_bytes().decode("utf-8-sig", errors="replace")
+    return _egosgm._read_file(file, _MOST_BYTES).decode("utf-8-sig", errors="replace")
 
 
 def _of_element(element: Any) -> Any:
@@ -388,8 +384,9 @@ def _found(file: pathlib.Path, is_fisheye: bool) -> Found:
     if file.is_dir():
         return _of_folder(file, is_fisheye)
     if not file.is_file():
-        raise _refuse(file, "no such file")
-    start = file.read_bytes()[:8]
+        raise _refuse(file, "is a pipe or a device; give a file" if file.exists() else "no such file")
+    with open(file, "rb") as stream:
+        start = stream.read(8)
     if start.startswith(b"PK"):
         try:
             with np.load(file, allow_pickle=False) as archive:

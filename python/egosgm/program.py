@@ -6,11 +6,11 @@ import json
 import os
 import pathlib
 import signal
-import subprocess
 import sys
-import tempfile
 import threading
 from typing import List, Optional, Sequence, Tuple
+
+from .arguments import say
 
 _PACKAGES = {  # what brings a module
     "cv2": "pip install opencv-python-headless, or apt install python3-opencv",
@@ -38,19 +38,19 @@ def _reads_itself(calib: str) -> bool:
         return False
 
 
-def with_calibration(arguments: List[str], folder: pathlib.Path) -> List[str]:
-    """The arguments with --calib in a form that the program reads, in a file of `folder`. Throws InvalidArgument."""
+def with_calibration(arguments: List[str]) -> List[str]:
+    """The arguments with --calib in a form that the program reads, in a file of memory alone that it inherits. Throws InvalidArgument."""
     from . import _egosgm, calibrations
     place, calib = _value_of(arguments, "--calib")
-    if place < 0 or not calib or _reads_itself(calib):
+    if place < 0 or not (os.path.isfile(calib) or os.path.isdir(calib)) or _reads_itself(calib):  # a pipe can be read once
         return arguments
     found = calibrations.find(calib)
     if not isinstance(found, _egosgm.Calibration):
         raise _egosgm.InvalidArgument(f"{calib}: is of raw images, and `egosgm {arguments[0]}` takes rectified ones: `egosgm rectify` makes them, by it")
-    file = folder / "calib.txt"
+    file = f"/proc/self/fd/{os.memfd_create('calib.txt', 0)}"
     _egosgm.write_calibration(file, found)
     changed = list(arguments)
-    changed[place] = f"--calib={file}" if changed[place].startswith("--calib=") else str(file)
+    changed[place] = f"--calib={file}" if changed[place].startswith("--calib=") else file
     return changed
 
 
@@ -62,53 +62,60 @@ def _module_of(arguments: Sequence[str]) -> Optional[str]:
     return tools[arguments[0]]["module"] if arguments and arguments[0] in tools else None
 
 
-def _say(text: str) -> None:
-    """On one line, whatever a name in it holds."""
-    with contextlib.suppress(OSError, AttributeError):  # the standard error may be full or closed
-        print("egosgm: " + "".join(c if c.isprintable() else " " for c in text), file=sys.stderr, flush=True)
+def _print_any_name() -> None:
+    """Names of files need not be text."""
+    with contextlib.suppress(AttributeError):  # no standard output, or one of a test
+        sys.stdout.reconfigure(errors="surrogateescape" if sys.stdout.encoding.lower() == "utf-8" else "replace")
 
 
-def _flushed(code: int) -> int:
-    """A result that the standard output did not take is none; a reader that goes has read enough."""
+def _output_error() -> Optional[OSError]:
+    """Why the standard output does not take what was printed; None where it does."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if not isinstance(error, BrokenPipeError):
-            _say(f"error: the standard output cannot be written: {error.strerror}")
-            return 1
-    return code
+        return error
+    return None
 
 
-def run_tool(arguments: Sequence[str]) -> int:
-    """Runs a tool that is written in Python, and returns its exit code. Never calls the C++ program."""
+def _outcome(arguments: Sequence[str], module: str) -> Tuple[int, str]:
+    """A tool's exit code, and what is to be said of it."""
     from . import _egosgm
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
-    module = _module_of(arguments)
-    if module is None:
-        _say(f"error: {' '.join(arguments[:1])}: this version of the Python package has no such tool: install the program's own version")
-        return 1
     try:
-        return _flushed(importlib.import_module("." + module, __package__).main(list(arguments[1:])))
+        return importlib.import_module("." + module, __package__).main(list(arguments[1:])), ""
     except SystemExit as end:  # of --help
-        return _flushed(int(end.code or 0))
+        return int(end.code or 0), ""
     except ModuleNotFoundError as error:
         package = error.name or ""
         if package.startswith("egosgm"):
             raise
         remedy = _PACKAGES.get(package, f"pip install {package}")
-        _say(f"error: {arguments[0]}: needs the Python module {package}, which {sys.executable} does not find: {remedy}")
-        return 1
+        return 1, f"error: {arguments[0]}: needs the Python module {package}, which {sys.executable} does not find: {remedy}"
     except BrokenPipeError:
-        return _flushed(0)
+        return 0, ""
     except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError, OSError) as error:
-        _say(f"error: {error}")
-        return 2 if isinstance(error, _egosgm.InvalidArgument) else 1
+        return 2 if isinstance(error, _egosgm.InvalidArgument) else 1, f"error: {error}"
     except KeyboardInterrupt:
-        _say("interrupted")
-        return 130
+        return 130, "interrupted"
+
+
+def run_tool(arguments: Sequence[str]) -> int:
+    """Runs a tool that is written in Python, and returns its exit code. Never calls the C++ program."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
+    _print_any_name()
+    module = _module_of(arguments)
+    if module is None:
+        say(f"error: {' '.join(arguments[:1])}: this version of the Python package has no such tool: install the program's own version")
+        return 1
+    code, told = _outcome(arguments, module)
+    error = _output_error()
+    if error is not None and not isinstance(error, BrokenPipeError) and code in (0, 1):  # a reader that goes has read enough
+        code, told = 1, f"error: the standard output cannot be written: {error.strerror}"
+    if told:
+        say(told)
+    return code
 
 
 def _program() -> Optional[pathlib.Path]:
@@ -132,17 +139,12 @@ def main() -> None:
     program = _program()
     if program is None:
         sys.exit("egosgm: error: the program is neither in this package nor beside it: pip install the wheel, which has it (docs/python.md)")
-    if not any(a.split("=")[0] == "--calib" for a in arguments):
-        os.execv(program, ["egosgm", *arguments])
     from . import _egosgm
-    with tempfile.TemporaryDirectory(prefix="egosgm_") as folder:
-        try:
-            changed = with_calibration(arguments, pathlib.Path(folder))
-        except (_egosgm.InvalidArgument, _egosgm.IoError, OSError) as error:
-            print(f"egosgm: error: {error}", file=sys.stderr)
-            sys.exit(2)
-        if changed != arguments:
-            sys.exit(subprocess.call([program, *changed]))
+    try:
+        arguments = with_calibration(arguments)
+    except (_egosgm.InvalidArgument, _egosgm.IoError, OSError) as error:
+        say(f"error: {error}")
+        sys.exit(2 if isinstance(error, _egosgm.InvalidArgument) else 1)
     os.execv(program, ["egosgm", *arguments])
 
 

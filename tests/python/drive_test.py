@@ -187,6 +187,30 @@ def test_what_other_processes_need_is_pickled_and_copied(street):
         np.testing.assert_array_equal(copied[1].covariance, np.eye(6))
 
 
+def fields_of(value):
+    """What a value tells, to be compared."""
+    return {name: getattr(value, name) for name, member in vars(type(value)).items() if isinstance(member, property)}
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_results_leave_a_process(copied, street_folder):
+    sequence = egosgm.open_folder(street_folder)
+    for frame in egosgm.run(street_folder, **OPTIONS, frames="0:1", outputs=("disparity", "reason")):
+        counts = egosgm.compare_disparity(frame.disparity, frame.disparity)
+        for value in (frame.report, counts, counts.metrics, egosgm.devices()[0]):
+            assert copied(value) == value
+        for value in (frame.odometry, sequence, sequence.frames[1]):
+            now, before = fields_of(copied(value)), fields_of(value)
+            assert repr(now) == repr(before) and now.keys() == before.keys()
+        taken = copied(frame)
+        for name in ("disparity", "variance", "reason"):
+            np.testing.assert_array_equal(getattr(taken.maps, name), getattr(frame.maps, name))
+        assert taken.report == frame.report and taken.calibration == frame.calibration
+        if frame.motion:
+            np.testing.assert_array_equal(taken.motion.covariance, frame.motion.covariance)
+            np.testing.assert_array_equal(taken.motion.current_from_previous, frame.motion.current_from_previous)
+
+
 def test_repr_says_what_it_is(shared_pipeline, street, frames):
     result = shared_pipeline.process(frames[0].left, frames[0].right, outputs="disparity")
     assert repr(result) == "<Frame of disparity>"
