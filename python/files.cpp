@@ -187,6 +187,7 @@ py::tuple point_cloud(const py::object& disparity, const py::object& variance, c
                       const std::vector<int>& kept, const std::optional<Bytes>& reasons) {
   py::array keep_disparity, keep_variance;
   const cv::Mat d = map_of(disparity, "disparity", keep_disparity), p = map_of(variance, "variance", keep_variance);
+  if (reasons && reasons->ndim() != 2) throw InvalidArgument("reason: give an H x W map of uint8");
   const auto mat_of = [](const Bytes& bytes, int type) {
     return cv::Mat(static_cast<int>(bytes.shape(0)), static_cast<int>(bytes.shape(1)), type,
                    const_cast<std::uint8_t*>(bytes.data()));

@@ -94,8 +94,10 @@ def _outcome(arguments: Sequence[str], module: str) -> Tuple[int, str]:
         return 1, f"error: {arguments[0]}: needs the Python module {package}, which {sys.executable} does not find: {remedy}"
     except BrokenPipeError:
         return 0, ""
-    except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError, OSError) as error:
+    except _egosgm.Error as error:
         return 2 if isinstance(error, _egosgm.InvalidArgument) else 1, f"error: {error}"
+    except OSError as error:
+        return 1, f"error: {os.fsdecode(error.filename)}: {error.strerror}: choose another one" if error.filename else f"error: {error}"
     except KeyboardInterrupt:
         return 130, "interrupted"
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import ros_images
+from egosgm import points, ros_images
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -377,6 +377,23 @@ def test_a_cloud_has_the_points_that_are_sure(tmp_path):
     np.testing.assert_array_equal(np.frombuffer(body[-3:], np.uint8), left[3, 5])
     egosgm.write_ply(tmp_path / "plain.ply", [[1, 2, 3]], normals=[[0, 0, -1]])
     assert np.frombuffer((tmp_path / "plain.ply").read_bytes()[-24:], np.float32).tolist() == [1, 2, 3, 0, 0, -1]
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_is_no_map_makes_no_cloud_and_no_depth(tmp_path):
+    camera = egosgm.Calibration(100, 100, 1, 1, 0.5)
+    none, disparity = np.zeros((0, 0), np.float32), np.full((2, 3), 5, np.float32)
+    for maps in ((none, none, np.zeros((0, 0), np.uint8)), (disparity, disparity, np.zeros((0, 0), np.uint8))):
+        with pytest.raises(egosgm.InvalidArgument):
+            points.cloud_of_maps(*maps, camera, 0.1, None, None, 80, 1)
+    for reason in (np.zeros(6, np.uint8), np.zeros((2, 3, 3), np.uint8)):
+        with pytest.raises(egosgm.InvalidArgument, match="reason"):
+            points.cloud_of_maps(disparity, disparity, np.zeros((2, 3), np.uint8), camera, 0.1, "trusted", reason, 80, 1)
+    with pytest.raises(egosgm.InvalidArgument, match="colors are"):
+        egosgm.write_ply(tmp_path / "p.ply", np.zeros((5, 3)), np.uint8(3))
+    assert np.isnan(egosgm.depth_sigma_from_disparity(disparity, -disparity, camera)).all()
+    with pytest.raises(egosgm.InvalidArgument):
+        egosgm.Rectification(egosgm.StereoRig(np.eye(3), np.zeros(5), np.eye(3), np.zeros(5), np.diag([1e300, 1, 1]), [-0.5, 0, 0]), 64, 48)
 
 
 def test_a_cloud_keeps_the_reasons_that_were_chosen():
