@@ -172,12 +172,14 @@ using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using Bytes = py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>;
 
 void write_ply(const path& file, const Floats& points, const std::optional<Bytes>& bgr,
-               const std::optional<Floats>& normals) {
+               const std::optional<Floats>& normals, bool is_new) {
   vision::PointCloud cloud;
   cloud.points_m = vectors_of<float, cv::Point3f>(points, "points");
   cloud.colors = vectors_of<std::uint8_t, cv::Vec3b>(bgr, "colors");
   cloud.normals = vectors_of<float, cv::Vec3f>(normals, "normals");
   const OtherThreadsRun other_threads_run;
+  std::optional<vision::KeepFiles> others;
+  if (is_new) others.emplace();
   vision::write_ply(file, cloud);
 }
 
@@ -237,7 +239,8 @@ void bind_files(py::module_& module) {
   module.def(
       "read_color", [](const path& file) { return array_of(vision::read_color_image(file)); }, py::arg("file"),
       "Reads a PNG or JPEG as RGB, H x W x 3 of uint8.");
-  module.def("_write_ply", &write_ply, py::arg("file"), py::arg("points"), py::arg("bgr"), py::arg("normals"));
+  module.def("_write_ply", &write_ply, py::arg("file"), py::arg("points"), py::arg("bgr"), py::arg("normals"),
+             py::arg("is_new") = false);
   module.def("_point_cloud", &point_cloud, py::arg("disparity"), py::arg("variance"), py::arg("bgr"),
              py::arg("calibration"), py::arg("max_relative_sigma"), py::arg("max_depth_m"), py::arg("max_jump_px"),
              py::arg("kept"), py::arg("reasons"));

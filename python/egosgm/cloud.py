@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from . import _egosgm
 from .arguments import decimal, expect_new_file, Parser, read_json, tell
-from .points import cloud_of_maps, write_ply
+from .points import cloud_of_maps, write_new_ply
 
 
 def _parser() -> Parser:
@@ -127,6 +127,6 @@ def main(arguments: Sequence[str]) -> int:
     points, colors, normals = grid.means(given.least_frames)
     if not len(points):
         raise _egosgm.InvalidArgument(f"{folder}: no point is left: raise --cloud-sigma or --max-depth, or lower --least-frames")
-    write_ply(file, points, colors, normals if given.normals else None)
+    write_new_ply(file, points, colors, normals if given.normals else None)
     tell(f"{file}: {len(points)} points, of {100 * taken / pixels:.1f} % of the pixels with a disparity in {len(frames)} frames")
     return 0

@@ -107,3 +107,16 @@ def test_cubes_that_are_too_many_to_tell_apart_are_refused(run):
         with pytest.raises(egosgm.InvalidArgument, match="--voxel 1e-.*is too small for points that lie"):
             cloud.main([str(run), "--voxel", voxel])
     assert cloud.main([str(run), "--voxel", "1e300"]) == 0
+
+
+def test_a_file_that_comes_while_it_works_stays(run, monkeypatch):
+    means = cloud.VoxelGrid.means
+
+    def slow_means(grid, least_frames):
+        (run / "cloud.ply").write_text("mine")
+        return means(grid, least_frames)
+
+    monkeypatch.setattr(cloud.VoxelGrid, "means", slow_means)
+    with pytest.raises(egosgm.IoError, match="has come there meanwhile"):
+        cloud.main([str(run)])
+    assert (run / "cloud.ply").read_text() == "mine"
