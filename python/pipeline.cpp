@@ -35,7 +35,7 @@ py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
     return arrays;
   }
   for (const py::handle& item : py::isinstance<py::str>(wanted) ? py::make_tuple(wanted) : py::tuple(wanted)) {
-    const auto name = item.cast<std::string>();
+    const auto name = py::str(item).cast<std::string>();
     if (name == "search_width") {
       arrays[item] = py::array_t<std::uint16_t>({height, width});
     } else if (name == "dynamic" || name == "reason") {
