@@ -3,6 +3,11 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
+#include <string>
+
+#include "apps/feed.h"
+#include "apps/sequence_arguments.h"
 
 namespace egosgm::app {
 
@@ -15,13 +20,22 @@ struct Command {
   std::function<int()> run;
 };
 
-Command add_run(CLI::App& program);
+/// What the Python package does for a run. Without it, the program becomes the package's where that is asked for.
+struct Package {
+  /// The frames of a bag that lie in `range`, of a run that writes to `out`.
+  std::function<std::shared_ptr<Feed>(const BagArguments& bag, const std::string& calib, vision::FrameRange range,
+                                      const std::string& out)>
+      open_bag;
+  /// A recording, unless `file` is empty, and a viewer.
+  std::function<std::shared_ptr<Taker>(const std::string& file, bool viewer)> take;
+};
+
+Command add_run(CLI::App& program, const Package& package);
 Command add_eval(CLI::App& program);
 Command add_devices(CLI::App& program);
 Command add_compile(CLI::App& program);
 Command add_synth(CLI::App& program);
 Command add_odometry(CLI::App& program);
 Command add_tune(CLI::App& program);
-Command add_doctor(CLI::App& program);
 
 }  // namespace egosgm::app

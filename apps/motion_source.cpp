@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/motion_source.h"
 
-#include <algorithm>
 #include <chrono>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
-#include "host/vision/pose_doubt.h"
 
 namespace egosgm::app {
+namespace {
+
+constexpr std::size_t kLookedAt = 6;  // motions that are given, beside those of the odometry
+
+}  // namespace
 
 void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOptions& options) {
   command
@@ -35,67 +38,69 @@ void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const 
       ->capture_default_str();
 }
 
-MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
-                           const StereoOdometryOptions& options) {
+MotionSource::MotionSource(const std::optional<Calibration>& calibration, const StereoOdometryOptions& options) {
   options.validate();
+  if (calibration) odometry_.emplace(*calibration, options);
+}
+
+MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
+                           const StereoOdometryOptions& options)
+    : MotionSource(sequence.has_calibration ? std::optional(sequence.calibration) : std::nullopt, options) {
+  if (poses_file.empty()) return;
   if (!sequence.has_calibration) {
-    if (poses_file.empty()) return;
     throw InvalidArgument("--poses " + poses_file + ": a motion predicts nothing without a calibration: give --calib");
   }
-  if (poses_file.empty()) {
-    odometry_.emplace(sequence.calibration, options);
-  } else {
-    poses_ = vision::poses_of_frames(sequence, poses_file);
-  }
+  poses_ = vision::poses_of_frames(sequence, poses_file);
 }
 
-std::string MotionSource::doubt(const vision::StereoSequence& sequence, const StereoOdometryOptions& options) const {
-  constexpr std::size_t kFrames = 7;
-  if (poses_.size() < 3) return {};
-  StereoOdometry odometry(sequence.calibration, options);
-  std::vector<Eigen::Isometry3d> given;
-  std::vector<std::optional<Eigen::Isometry3d>> found;
-  for (std::size_t i = 0; i < std::min(kFrames, poses_.size()); ++i) {
-    vision::StereoImages images;
-    try {
-      images = vision::read_images(sequence.frames[i]);
-    } catch (const Error&) {
-      break;  // the run says so
-    }
-    const auto motion = odometry.process(vision::image_view(images.left), vision::image_view(images.right)).motion;
-    if (i == 0) continue;
-    given.push_back(vision::current_from_previous(poses_[i - 1], poses_[i]));
-    found.push_back(motion ? std::optional(motion->current_from_previous) : std::nullopt);
-  }
-  return vision::suspect_motions(given, found);
-}
-
-FrameMotion MotionSource::next(const vision::StereoImages& images, std::size_t frame) {
+FrameMotion MotionSource::next(const FedFrame& fed, std::size_t frame) {
   FrameMotion result;
-  if (odometry_) {
-    estimate(images, result);
-  } else if (!poses_.empty()) {
-    take_from_file(frame, result);
+  if (fed.starts_anew) {
+    if (odometry_) odometry_->reset();
+    last_pose_.reset();
+    last_motion_ = Eigen::Isometry3d::Identity();
   }
-  last_frame_ = frame;
+  const std::optional<Eigen::Isometry3d> pose = poses_.empty() ? fed.world_from_camera : std::optional(poses_[frame]);
+  // A file has poses of all frames: odometry only looks at the first ones.
+  if (odometry_ && (poses_.empty() || frames_ <= kLookedAt)) estimate(fed, result);
+  if (pose) {
+    take(*pose, result);
+  } else {
+    last_pose_.reset();
+  }
+  if (odometry_) follow(result);
+  ++frames_;
   return result;
 }
 
-void MotionSource::take_from_file(std::size_t frame, FrameMotion& result) {
-  result.from_file = true;
-  result.first_from_camera = poses_.front().inverse() * poses_[frame];
-  if (!last_frame_) return;
-  result.motion.emplace();
-  result.motion->current_from_previous = vision::current_from_previous(poses_[*last_frame_], poses_[frame]);
-}
-
-void MotionSource::estimate(const vision::StereoImages& images, FrameMotion& result) {
+void MotionSource::estimate(const FedFrame& fed, FrameMotion& result) {
   const auto start = std::chrono::steady_clock::now();
-  result.odometry = odometry_->process(vision::image_view(images.left), vision::image_view(images.right));
+  result.odometry = odometry_->process(vision::image_view(fed.images.left), vision::image_view(fed.images.right));
   result.odometry_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   result.motion = result.odometry.motion;
+}
+
+void MotionSource::take(const Eigen::Isometry3d& pose, FrameMotion& result) {
+  if (last_pose_) {
+    const Eigen::Isometry3d given = vision::current_from_previous(*last_pose_, pose);
+    if (given_.size() < kLookedAt) {
+      given_.push_back(given);
+      found_.push_back(result.motion ? std::optional(result.motion->current_from_previous) : std::nullopt);
+    }
+    result.motion = Motion{.current_from_previous = given};
+  }
+  result.is_given = last_pose_ || !poses_.empty();
+  last_pose_ = pose;
+}
+
+/// The camera's way: by the file's poses themselves, or by one motion after the other.
+void MotionSource::follow(FrameMotion& result) {
   if (result.motion) last_motion_ = result.motion->current_from_previous;
-  if (last_frame_) first_from_camera_ = first_from_camera_ * last_motion_.inverse();
+  if (!poses_.empty()) {
+    first_from_camera_ = poses_.front().inverse() * *last_pose_;
+  } else if (frames_ > 0) {
+    first_from_camera_ = first_from_camera_ * last_motion_.inverse();
+  }
   result.first_from_camera = first_from_camera_;
 }
 

@@ -6,16 +6,17 @@
 #include <string>
 #include <vector>
 
+#include "apps/feed.h"
 #include "egosgm/motion.h"
 #include "egosgm/odometry.h"
-#include "egosgm/vision/dataset.h"
+#include "host/vision/pose_doubt.h"
 
 namespace egosgm::app {
 
 /// How the camera came to a frame.
 struct FrameMotion {
   std::optional<Motion> motion;  // from the previous frame; none in the first frame
-  bool from_file = false;        // else estimated:
+  bool is_given = false;         // else estimated:
   OdometryResult odometry;
   double odometry_ms = 0;
   Eigen::Isometry3d first_from_camera = Eigen::Isometry3d::Identity();  // the pose in the first frame's system
@@ -27,29 +28,38 @@ void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOption
 /// Adds --max-translation and --max-rotation.
 void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const std::string& group);
 
-/// The motion of one frame after the other: from a file of poses, or by stereo odometry. A frame where odometry found
-/// none repeats the last motion in its pose, and only there. Not thread-safe.
+/// The motion of one frame after the other: from a file of poses, from poses that come with the frames, or by stereo
+/// odometry, also where one of two frames came without its pose. A frame where odometry found none repeats the last
+/// motion in its pose, and only there. Not thread-safe.
 class MotionSource {
  public:
-  /// Reads `poses_file`; empty: estimates. Throws InvalidArgument.
+  /// `calibration`: none where nothing can be predicted. Throws InvalidArgument.
+  MotionSource(const std::optional<Calibration>& calibration, const StereoOdometryOptions& options);
+  /// Reads `poses_file`; empty: there is none. Throws InvalidArgument.
   MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
                const StereoOdometryOptions& options);
 
-  /// What the odometry of the first frames says against poses of a file; empty where nothing, and without such.
-  std::string doubt(const vision::StereoSequence& sequence, const StereoOdometryOptions& options) const;
+  /// The motion from the frame of the last call, unless this one starts anew. REQUIRES: `frame`, a place in the
+  /// sequence, grows from call to call.
+  FrameMotion next(const FedFrame& fed, std::size_t frame);
 
-  /// The motion from the frame of the last call. REQUIRES: `frame`, a place in the sequence, grows from call to call.
-  FrameMotion next(const vision::StereoImages& images, std::size_t frame);
+  /// What the odometry of the first frames says against the given poses; empty where nothing, and without such. To be
+  /// asked from the thread of `next`.
+  std::string doubt() const { return vision::suspect_motions(given_, found_); }
 
  private:
-  void take_from_file(std::size_t frame, FrameMotion& result);
-  void estimate(const vision::StereoImages& images, FrameMotion& result);
+  void estimate(const FedFrame& fed, FrameMotion& result);
+  void take(const Eigen::Isometry3d& pose, FrameMotion& result);
+  void follow(FrameMotion& result);
 
   std::vector<Eigen::Isometry3d> poses_;
   std::optional<StereoOdometry> odometry_;
-  std::optional<std::size_t> last_frame_;
+  std::size_t frames_ = 0;
+  std::optional<Eigen::Isometry3d> last_pose_;
   Eigen::Isometry3d first_from_camera_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d last_motion_ = Eigen::Isometry3d::Identity();
+  std::vector<Eigen::Isometry3d> given_;  // of the first frames, and what odometry found
+  std::vector<std::optional<Eigen::Isometry3d>> found_;
 };
 
 }  // namespace egosgm::app

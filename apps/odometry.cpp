@@ -12,6 +12,7 @@
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
 #include "apps/standard_output.h"
+#include "egosgm/error.h"
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/file_io.h"
 
@@ -35,8 +36,8 @@ void tell(const vision::StereoFrame& frame, const FrameMotion& motion, bool firs
 }
 
 int estimate(const OdometryArguments& arguments) {
-  const vision::StereoSequence sequence = arguments.input.open();
-  vision::check_image_sizes(sequence);
+  FileFeed feed(arguments.input.open());
+  const vision::StereoSequence& sequence = feed.sequence();
   MotionSource motions(sequence, {}, arguments.options);
   if (!arguments.out.empty()) vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
   expect_new_file("--out", arguments.out);
@@ -46,10 +47,12 @@ int estimate(const OdometryArguments& arguments) {
   try {
     Progress progress(static_cast<int>(sequence.frames.size()), arguments.quiet);
     if (!sequence.note.empty()) progress.note(sequence.note);
-    for (const vision::StereoFrame& frame : sequence.frames) {
-      if (interrupted()) break;
-      const FrameMotion motion = motions.next(vision::read_images(frame), poses.size());
-      tell(frame, motion, poses.empty(), progress);
+    while (!interrupted()) {
+      const std::optional<FedFrame> fed = feed.next();
+      if (!fed) break;
+      if (!fed->unreadable.empty()) throw InvalidArgument(fed->unreadable);
+      const FrameMotion motion = motions.next(*fed, poses.size());
+      tell(fed->frame, motion, poses.empty(), progress);
       poses.push_back(motion.first_from_camera);
     }
   } catch (const std::exception&) {  // the poses before are whole

@@ -35,17 +35,15 @@ struct Package {
 };
 
 Package package_beside_program() {
+#ifdef EGOSGM_PACKAGE_PYTHON
   std::error_code none;
   const fs::path program = fs::read_symlink("/proc/self/exe", none).parent_path();
-  const auto is_in = [&](const fs::path& folder) { return fs::exists(folder / "egosgm/program.py", none); };
-#ifdef EGOSGM_PACKAGE_PYTHON
   for (const char* from_program : {EGOSGM_PACKAGE_BUILT, EGOSGM_PACKAGE_INSTALLED}) {
     const fs::path folder = (program / from_program).lexically_normal();
-    if (is_in(folder)) return {EGOSGM_PACKAGE_PYTHON, folder.string()};
+    if (fs::exists(folder / "egosgm/program.py", none)) return {EGOSGM_PACKAGE_PYTHON, folder.string()};
   }
 #endif
-  const fs::path of_wheel = program.parent_path().parent_path();  // the program is egosgm/bin/egosgm there
-  return {"python3", is_in(of_wheel) ? of_wheel.string() : ""};
+  return {"python3", ""};
 }
 
 }  // namespace
@@ -60,8 +58,11 @@ std::map<std::string, std::string> python_tools() {
 bool is_for_python(int argc, const char* const* argv) {
   if (argc < 2) return false;
   if (python_tools().contains(argv[1])) return true;
-  const auto reads_bag = [](std::string_view word) { return word.substr(0, word.find('=')) == "--bag"; };
-  return std::string_view(argv[1]) == "run" && std::any_of(argv + 2, argv + argc, reads_bag);
+  const auto is_of_package = [](std::string_view word) {
+    return word == "--rerun" || word.substr(0, word.find('=')) == "--bag" || word.ends_with(".mcap") ||
+           word.ends_with(".rrd");
+  };
+  return std::string_view(argv[1]) == "run" && std::any_of(argv + 2, argv + argc, is_of_package);
 }
 
 void become_python(int argc, const char* const* argv) {

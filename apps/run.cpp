@@ -14,6 +14,7 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/device_arguments.h"
+#include "apps/feed.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
 #include "apps/option_arguments.h"
@@ -26,7 +27,7 @@
 #include "apps/trace.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/image_io.h"
+#include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/doubt.h"
@@ -37,13 +38,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kCalibration = "calibration.txt";  // of a run whose images came from no files
 constexpr const char *kKilled = "a kill, or it is still running", *kInterrupt = "an interrupt";
 
 constexpr const char* kNoCalibration =
     "no calibration was given: disparities are there, but no depth and no odometry; --calib FILE brings both";
 
 using Clock = std::chrono::steady_clock;
-constexpr std::size_t kFramesPerLook = 50;  // for what is nearer than the range
 std::string note_of(const FrameReport& report) {
   if (!report.searched_everything && !report.unpredicted) return "";
   const std::string why =
@@ -63,31 +64,26 @@ std::string text_of(const CloudCounts& clouds, const vision::PointCloudOptions& 
       bounds.max_depth_m, percent(out.alone));
 }
 
-PixelType type_of(const vision::StereoSequence& sequence) {
-  return vision::read_pixel_type(sequence.frames.front().left);
-}
-
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
 struct RunArguments {
   SequenceArguments input;
+  BagArguments bag;
   OptionArguments method;
   std::string out, poses, device, programs, tuning, write, trace;
   StereoOdometryOptions odometry;
   double cloud_sigma_percent = 100 * vision::PointCloudOptions().max_relative_sigma;
-  bool interpolate = false, quiet = false, resume = false;
+  bool interpolate = false, quiet = false, resume = false, rerun = false;
 };
 
 /// What a frame needs before the device can start.
 struct PreparedFrame {
-  std::size_t index = 0;
-  vision::StereoImages images;
+  FedFrame fed;
   FrameMotion motion;
   Clock::time_point read_start, odometry_start;
   double read_ms = 0;
-  std::string unreadable;  // why there are no images; empty: there are
 };
 
 class Run {
@@ -96,22 +92,24 @@ class Run {
       : quiet_(job.quiet),
         folder_(job.out),
         save_config_(job.save_config),
-        sequence_(job.sequence),
+        feed_(*job.feed),
+        taker_(job.taker.get()),
+        sequence_(feed_.sequence()),
         cloud_options_(job.cloud),
         input_(job.input),
-        size_(vision::check_image_sizes(sequence_)),
+        size_(feed_.size()),
         motions_(sequence_, job.poses_file, job.odometry),
-        poses_doubt_(motions_.doubt(sequence_, job.odometry)),
         waiting_(std::in_place,
                  fmt::format("compiling the kernels for {}, which its driver keeps if it can", device.info().name),
                  quiet_),
-        pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, type_of(sequence_)),
+        pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, feed_.type()),
         report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height),
-        doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, size_) {
-    folder_.begin(report_.identity());
+        doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, job.options) {
+    if (has_folder()) folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration, cloud_options_);
-    pipeline_.prepare(type_of(sequence_), outputs_->views());
+    if (taker_) outputs_->make_shown_maps();
+    pipeline_.prepare(feed_.type(), outputs_->views());
     waiting_.reset();
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
@@ -124,11 +122,16 @@ class Run {
     write_report(false, kKilled);
     try {
       save_config();
+      if (has_folder() && feed_.has_no_files()) {
+        vision::write_calibration(folder_.path() / kCalibration, sequence_.calibration);
+      }
+      if (taker_) taker_->begin(pipeline_.options(), sequence_.calibration);
       const bool finished = process_all();
       finish(finished, finished ? "" : kInterrupt);
       if (!finished) {
-        say(fmt::format("egosgm: interrupted after {} of {} frames: what is in {} is whole", poses_.size(),
-                        sequence_.frames.size(), folder_.path().string()));
+        say(has_folder() ? fmt::format("egosgm: interrupted after {} of {} frames: what is in {} is whole",
+                                       poses_.size(), sequence_.frames.size(), folder_.path().string())
+                         : "egosgm: interrupted");
       }
       return finished;
     } catch (const std::exception& error) {
@@ -143,9 +146,12 @@ class Run {
     if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
   }
 
+  bool has_folder() const { return !folder_.path().empty(); }
+
   static std::string motion_of(const SequenceJob& job) {
-    if (!job.sequence.has_calibration) return "none: the images have no calibration";
+    if (!job.feed->sequence().has_calibration) return "none: the images have no calibration";
     if (!job.poses_file.empty()) return "poses of " + job.poses_file;
+    if (const std::string poses = job.feed->poses(); !poses.empty()) return "poses of " + poses;
     return fmt::format("stereo odometry, at most {} m and {} degrees a frame", job.odometry.max_translation_m,
                        job.odometry.max_rotation_deg);
   }
@@ -158,67 +164,70 @@ class Run {
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
     if (!sequence_.note.empty()) progress.note(sequence_.note);
     if (!sequence_.has_calibration) progress.note(kNoCalibration);
-    if (!poses_doubt_.empty()) progress.note(poses_doubt_);
-    const auto prepare_later = [&](std::size_t i) { return std::async(policy, [this, i] { return prepare(i); }); };
-    auto next = prepare_later(0);
-    for (std::size_t i = 0; i < sequence_.frames.size() && !interrupted(); ++i) {
+    const auto prepare_later = [&] { return std::async(policy, [this] { return prepare(); }); };
+    auto next = prepare_later();
+    bool is_over = false;
+    while (!interrupted()) {
       try {
-        PreparedFrame frame = next.get();
-        if (frame.unreadable.empty()) {
-          submit(std::move(frame));
+        std::optional<PreparedFrame> frame = next.get();
+        is_over = !frame;
+        if (is_over) break;
+        if (frame->fed.unreadable.empty()) {
+          submit(std::move(*frame), progress);
         } else {
-          leave_out(frame, progress);
+          leave_out(frame->fed, progress);
         }
-        if (i + 1 < sequence_.frames.size()) next = prepare_later(i + 1);
       } catch (const DeviceError&) {
         throw;
       } catch (const std::exception&) {  // what is under way does not suffer from a next frame that cannot be read
         while (!under_way_.empty()) collect(progress);
         throw;
       }
+      next = prepare_later();
       if (under_way_.size() > 1) collect(progress);
     }
     while (!under_way_.empty()) collect(progress);
     if (!quiet_) summary_ = fmt::format("{:.1f} frames/s", progress.frames_per_second());
-    if (poses_.size() + left_out_ < sequence_.frames.size()) return false;
+    if (!is_over && fed_ < sequence_.frames.size()) return false;
     if (2 * left_out_ > sequence_.frames.size()) throw InvalidArgument(text_of_left_out());
     return true;
   }
 
-  PreparedFrame prepare(std::size_t i) {
+  std::optional<PreparedFrame> prepare() {
     PreparedFrame frame;
-    frame.index = i;
     frame.read_start = Clock::now();
-    try {
-      frame.images = vision::read_images(sequence_.frames[i]);
-    } catch (const Error& error) {
-      if (interrupted()) throw;  // a pipe that was waited for
-      frame.unreadable = error.what();
-      return frame;
-    }
+    std::optional<FedFrame> fed = feed_.next();
+    if (!fed) return std::nullopt;
+    frame.fed = std::move(*fed);
     frame.read_ms = ms_since(frame.read_start);
-    if (frame.images.left.size() != size_) {
+    const std::size_t place = fed_++;
+    if (!frame.fed.unreadable.empty()) return frame;
+    const cv::Mat& left = frame.fed.images.left;
+    if (left.size() != size_) {
       throw InvalidArgument(fmt::format("{} is {}x{} and the sequence {}x{}: all frames need one size",
-                                        sequence_.frames[i].left.string(), frame.images.left.cols,
-                                        frame.images.left.rows, size_.width, size_.height));
+                                        frame.fed.frame.left.string(), left.cols, left.rows, size_.width,
+                                        size_.height));
     }
     frame.odometry_start = Clock::now();
-    frame.motion = motions_.next(frame.images, i);
+    frame.motion = motions_.next(frame.fed, place);
     return frame;
   }
 
   /// A pair that cannot be read costs itself alone: the next motion is over two intervals.
-  void leave_out(const PreparedFrame& prepared, Progress& progress) {
-    const vision::StereoFrame& frame = sequence_.frames[prepared.index];
-    if (left_out_++ == 0) first_left_out_ = prepared.unreadable;
-    report_.leave_out(frame, prepared.unreadable);
-    progress.note(fmt::format("frame {}: left out: {}", frame.name, prepared.unreadable));
-    progress.done(fmt::format("frame {}  left out", frame.name));
+  void leave_out(const FedFrame& fed, Progress& progress) {
+    if (left_out_++ == 0) first_left_out_ = fed.unreadable;
+    report_.leave_out(fed.frame, fed.unreadable);
+    progress.note(fmt::format("frame {}: left out: {}", fed.frame.name, fed.unreadable));
+    progress.done(fmt::format("frame {}  left out", fed.frame.name));
   }
 
-  void submit(PreparedFrame frame) {
-    pipeline_.submit(vision::image_view(frame.images.left), vision::image_view(frame.images.right), frame.motion.motion,
-                     outputs_->views());
+  void submit(PreparedFrame frame, Progress& progress) {
+    if (frame.fed.starts_anew && (!poses_.empty() || !under_way_.empty())) {
+      while (!under_way_.empty()) collect(progress);
+      pipeline_.reset();
+    }
+    pipeline_.submit(vision::image_view(frame.fed.images.left), vision::image_view(frame.fed.images.right),
+                     frame.motion.motion, outputs_->views());
     under_way_.push_back(std::move(frame));
   }
 
@@ -227,20 +236,20 @@ class Run {
     const FrameReport result = pipeline_.collect();
     const PreparedFrame prepared = std::move(under_way_.front());
     under_way_.pop_front();
-    const vision::StereoFrame& frame = sequence_.frames[prepared.index];
+    const vision::StereoFrame& frame = prepared.fed.frame;
+    const std::optional<Motion>& motion = prepared.motion.motion;
     const auto before_write = Clock::now();
-    const WrittenFrame written = outputs_->write(frame, prepared.images.left);
+    const WrittenFrame written = has_folder() ? outputs_->write(frame, prepared.fed.images.left) : WrittenFrame();
+    if (taker_) {
+      taker_->take(prepared.fed, outputs_->shown(), result,
+                   motion ? std::optional(motion->current_from_previous) : std::nullopt);
+    }
     if (written.cloud) add(*written.cloud);
     const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
-    report_.add(frame, result, prepared.motion, times, written);
-    if (poses_.size() % kFramesPerLook == 0) {
-      const PipelineOptions& options = pipeline_.options();
-      doubt_.look_beyond(prepared.images.left, prepared.images.right, options.min_disparity,
-                         options.min_disparity + options.disparities);
-    }
-    doubt_.add(result.density, prepared.motion.motion.has_value(), vision::holds_8_bits_in_16(prepared.images.left));
+    report_.add(prepared.fed, result, prepared.motion, times, written);
+    doubt_.add(prepared.fed.images.left, prepared.fed.images.right, result, motion.has_value());
     poses_.push_back(prepared.motion.first_from_camera);
     tell(frame, result, prepared.motion, times, written.unstorable, progress);
   }
@@ -256,7 +265,7 @@ class Run {
   void trace(const std::string& frame, const PreparedFrame& prepared, const FrameReport& result,
              Clock::time_point before_write, double write_ms) {
     trace_->add_host("read", frame, Trace::Row::kPrepare, prepared.read_start, prepared.read_ms);
-    if (!prepared.motion.from_file) {
+    if (!prepared.motion.is_given) {
       trace_->add_host("odometry", frame, Trace::Row::kPrepare, prepared.odometry_start, prepared.motion.odometry_ms);
     }
     trace_->add_device(result.commands, frame);
@@ -281,34 +290,35 @@ class Run {
   }
 
   void finish(bool finished, const std::string& why_not) {
-    report_.set_doubt(text_of_doubt());
-    if (sequence_.has_calibration && !poses_.empty()) vision::write_poses(folder_.path() / "poses.txt", poses_);
+    if (taker_) taker_->end(finished);
+    const std::string doubt = doubt_.text(), of_poses = motions_.doubt();
+    const std::vector<std::string> notes = feed_.notes();
+    report_.set_doubt(doubt.empty() || of_poses.empty() ? doubt + of_poses : doubt + "; " + of_poses, notes);
+    if (has_folder() && sequence_.has_calibration && !poses_.empty())
+      vision::write_poses(folder_.path() / "poses.txt", poses_);
     write_report(finished, why_not);
     if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace);
     if (!finished) return;
     if (quiet_) {
       if (left_out_ > 0) say("egosgm: " + text_of_left_out());
+      for (const std::string& note : notes) say("egosgm: " + note);
       return;
     }
     fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
                pipeline_.device().info().name);
-    fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean: {}\n", summary_,
-               100 * report_.mean("search_fraction"), 100 * report_.mean("density"), folder_.path().string());
+    fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean{}{}\n", summary_,
+               100 * report_.mean("search_fraction"), 100 * report_.mean("density"), has_folder() ? ": " : "",
+               folder_.path().string());
     if (left_out_ > 0) fmt::print("{}\n", text_of_left_out());
     if (clouds_) fmt::print("{}\n", text_of(*clouds_, cloud_options_));
-    if (const std::string doubt = doubt_.text(); !doubt.empty()) {
-      fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
-    }
+    for (const std::string& note : notes) fmt::print("{}\n", note);
+    if (!of_poses.empty()) fmt::print("{}\n", of_poses);
+    if (!doubt.empty()) fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
   }
 
   std::string text_of_left_out() const {
     return fmt::format("{} of {} could not be read: {}", left_out_, counted(sequence_.frames.size(), "pair"),
                        first_left_out_);
-  }
-
-  std::string text_of_doubt() const {
-    const std::string text = doubt_.text();
-    return text.empty() || poses_doubt_.empty() ? text + poses_doubt_ : text + "; " + poses_doubt_;
   }
 
   void write_trace(const Trace& trace) {
@@ -318,7 +328,7 @@ class Run {
   }
 
   void write_report(bool finished, const std::string& why_not) {
-    report_.write(folder_.path() / "report.json", finished, why_not);
+    if (has_folder()) report_.write(folder_.path() / "report.json", finished, why_not);
   }
 
   /// The first error counts; that something cannot be written either adds nothing.
@@ -336,13 +346,14 @@ class Run {
   const bool quiet_;
   OutputFolder folder_;
   const fs::path save_config_;
+  Feed& feed_;
+  Taker* const taker_;
   const vision::StereoSequence& sequence_;
   const vision::PointCloudOptions cloud_options_;
   std::optional<CloudCounts> clouds_;  // of all frames
   const std::string& input_;
   const cv::Size size_;
   MotionSource motions_;
-  const std::string poses_doubt_;
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
   std::optional<Waiting> waiting_;     // until all is built
   Pipeline pipeline_;
@@ -353,18 +364,64 @@ class Run {
   Clock::time_point last_written_ = Clock::now();
   std::vector<Eigen::Isometry3d> poses_;
   std::string summary_;
-  std::size_t left_out_ = 0;
+  std::size_t fed_ = 0, left_out_ = 0;
   std::string first_left_out_;  // why
   bool warned_of_range_ = false;
 };
 
-SequenceJob job_of(const RunArguments& arguments) {
+/// Whether --out is one file for all frames, which the package writes.
+bool has_recording(const RunArguments& arguments) {
+  return arguments.out.ends_with(".mcap") || arguments.out.ends_with(".rrd");
+}
+
+bool has_folder(const RunArguments& arguments) { return !arguments.out.empty() && !has_recording(arguments); }
+
+std::shared_ptr<Feed> feed_of(const RunArguments& arguments, const Package& package) {
+  const std::string input = arguments.input.text();
+  if (arguments.bag.bag.empty()) {
+    if (!arguments.bag.text().empty()) throw InvalidArgument(arguments.bag.text() + ": give --bag BAG with it");
+    return std::make_shared<FileFeed>(arguments.input.open(/*needs_calibration=*/false));
+  }
+  SequenceArguments others = arguments.input;
+  others.calib = others.frames = "";
+  if (!others.text().empty()) {
+    throw InvalidArgument("more than one input: --bag " + arguments.bag.bag + " and " + others.text() +
+                          ": give one of them");
+  }
+  const vision::FrameRange range =
+      arguments.input.frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(arguments.input.frames);
+  return package.open_bag(arguments.bag, arguments.input.calib, range, arguments.out);
+}
+
+/// Throws InvalidArgument for what only a folder takes, or for what the frames have not.
+void expect_takeable(const RunArguments& arguments, const SequenceJob& job) {
+  const vision::StereoSequence& sequence = job.feed->sequence();
+  for (const char* kind : {"cloud", "depth", "depth_m"}) {
+    if (sequence.has_calibration || !job.kinds.contains(kind)) continue;
+    throw InvalidArgument(
+        fmt::format("--write {}: a disparity is no depth without a calibration: give --calib FILE", kind));
+  }
+  if (!has_recording(arguments) && !arguments.rerun) return;
+  const std::string what = has_recording(arguments) ? "--out " + arguments.out : "--rerun";
+  if (!sequence.has_calibration) throw InvalidArgument(what + ": shows depth, which needs a calibration: give --calib");
+  if (has_recording(arguments) && !arguments.out.ends_with(".rrd") && arguments.bag.bag.empty()) {
+    throw InvalidArgument(what + ": its messages have the stamps of a bag: give a folder, or FILE.rrd");
+  }
+  if (!has_folder(arguments) && (!job.kinds.empty() || arguments.resume)) {
+    throw InvalidArgument(what + ": --write, --interpolate and --resume are for a folder: give one as --out");
+  }
+}
+
+OutputFolder folder_of(const RunArguments& arguments, const SequenceJob& job) {
+  std::vector<std::string> files = output_files(job.kinds, job.feed->sequence(), job.options);
+  if (job.feed->has_no_files()) files.emplace_back(kCalibration);
+  return {arguments.out, arguments.resume, files};
+}
+
+SequenceJob job_of(const RunArguments& arguments, const Package& package) {
   SequenceJob job;
-  job.sequence = arguments.input.open(/*needs_calibration=*/false);
-  job.input = arguments.input.text();
+  if (arguments.out.empty() && !arguments.rerun) throw InvalidArgument("--out is required: see `egosgm run --help`");
   job.options = arguments.method.options();
-  job.poses_file = arguments.poses;
-  job.odometry = arguments.odometry;
   job.kinds = parse_write_list(arguments.write);
   if (arguments.interpolate) job.kinds.insert("interpolated");
   job.cloud.max_relative_sigma = arguments.cloud_sigma_percent / 100;
@@ -372,20 +429,25 @@ SequenceJob job_of(const RunArguments& arguments) {
     throw InvalidArgument(
         fmt::format("--cloud-sigma {:g}: choose a number of percent above 0", arguments.cloud_sigma_percent));
   }
-  for (const char* kind : {"cloud", "depth", "depth_m"}) {
-    if (job.sequence.has_calibration || !job.kinds.contains(kind)) continue;
-    throw InvalidArgument(
-        fmt::format("--write {}: a disparity is no depth without a calibration: give --calib FILE", kind));
+  job.feed = feed_of(arguments, package);
+  job.input = arguments.bag.bag.empty() ? arguments.input.text() : arguments.bag.text();
+  job.poses_file = arguments.poses;
+  job.odometry = arguments.odometry;
+  expect_takeable(arguments, job);
+  if (job.feed->has_no_files() && has_folder(arguments)) job.kinds.insert("left");
+  if (has_folder(arguments)) job.out = folder_of(arguments, job);
+  if (has_recording(arguments) || arguments.rerun) {
+    job.taker = package.take(has_recording(arguments) ? arguments.out : "", arguments.rerun);
   }
-  job.out = OutputFolder(arguments.out, arguments.resume, output_files(job.kinds, job.sequence, job.options));
   job.trace = job.out.named_file("--trace", arguments.trace);
   job.save_config = job.out.named_file("--save-config", arguments.method.save_config);
   job.quiet = arguments.quiet;
   return job;
 }
 
-int run(const RunArguments& arguments) {
-  const SequenceJob job = job_of(arguments);
+int run(const RunArguments& arguments, const Package& package) {
+  if (!arguments.bag.bag.empty()) catch_interrupts();  // parts of it may be unpacked meanwhile
+  const SequenceJob job = job_of(arguments, package);
   Device device = Device::select(arguments.device);
   if (arguments.programs.empty() || !arguments.tuning.empty()) device = tuned_by_argument(device, arguments.tuning);
   if (!arguments.programs.empty()) device = device.with_programs(arguments.programs);
@@ -397,7 +459,7 @@ int run(const RunArguments& arguments) {
 
 bool run_sequence(const SequenceJob& job, const Device& device) { return Run(job, device)(); }
 
-Command add_run(CLI::App& program) {
+Command add_run(CLI::App& program, const Package& package) {
   CLI::App* command = program.add_subcommand("run", "Disparity and variance for every frame of a stereo sequence");
   auto arguments = std::make_shared<RunArguments>();
   arguments->input.add_to(*command);
@@ -407,10 +469,10 @@ Command add_run(CLI::App& program) {
                    "new or empty folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room "
                    "for the range), "
                    "poses.txt, "
-                   "report.json")
-      ->type_name("DIR")
-      ->group(group)
-      ->required();
+                   "report.json. With the Python package also FILE.rrd, for the viewer Rerun, and of a bag FILE.mcap, "
+                   "for ROS 2")
+      ->type_name("DIR|FILE")
+      ->group(group);
   command->add_option("--write", arguments->write, kWriteListHelp)->type_name("LIST")->group(group);
   command
       ->add_option(
@@ -433,13 +495,16 @@ Command add_run(CLI::App& program) {
                  "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
                  "before are computed again, for the filter's state")
       ->group(group);
+  command->add_flag("--rerun", arguments->rerun, "show each frame in the viewer Rerun, by the Python package")
+      ->group(group);
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors")->group(group);
+  arguments->bag.add_to(*command);
   arguments->method.add_to(*command);
   add_motion(*command, arguments->poses, arguments->odometry);
   add_device(*command, arguments->device);
   add_programs(*command, arguments->programs);
   add_tuning(*command, arguments->tuning);
-  return {command, [arguments] { return run(*arguments); }};
+  return {command, [arguments, package] { return run(*arguments, package); }};
 }
 
 }  // namespace egosgm::app

@@ -2,36 +2,39 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <set>
 #include <string>
 
+#include "apps/feed.h"
 #include "apps/output_folder.h"
 #include "egosgm/device.h"
 #include "egosgm/odometry.h"
 #include "egosgm/options.h"
-#include "egosgm/vision/dataset.h"
 #include "egosgm/vision/point_cloud.h"
 
 namespace egosgm::app {
 
 /// A sequence, how to match it, and where its results go.
 struct SequenceJob {
-  vision::StereoSequence sequence;
-  std::string input;  // the arguments that named it, for messages
+  std::shared_ptr<Feed> feed;
+  std::shared_ptr<Taker> taker;  // null: the folder alone takes what the run makes
+  std::string input;             // the arguments that named the sequence, for messages
   PipelineOptions options;
   std::string poses_file;          // empty: stereo odometry,
   StereoOdometryOptions odometry;  // with these options
-  OutputFolder out;
-  std::set<std::string> kinds;  // what is written beside the disparity, see parse_write_list
+  OutputFolder out;                // of no name: there is none
+  std::set<std::string> kinds;     // what is written beside the disparity, see parse_write_list
   vision::PointCloudOptions cloud;
   // Files that are written as well, where they are not empty: the options in use, and a trace of all commands.
   std::filesystem::path save_config, trace;
   bool quiet = false;
 };
 
-/// What `egosgm run` does once its arguments are read: every frame of the sequence into `job.out`, then poses.txt and
-/// report.json. Returns false where an interrupt ended it early. Throws InvalidArgument (input), IoError, DeviceError;
-/// report.json then says why it stopped, where it could be written. Thread-safe for different folders.
+/// What `egosgm run` does once its arguments are read: every frame that is fed into `job.out`, then poses.txt and
+/// report.json, and to the taker. Returns false where an interrupt ended it early. Throws InvalidArgument (input),
+/// IoError, DeviceError; report.json then says why it stopped, where it could be written. Thread-safe for different
+/// folders.
 bool run_sequence(const SequenceJob& job, const Device& device);
 
 }  // namespace egosgm::app

@@ -24,8 +24,9 @@ namespace egosgm::app {
 namespace {
 
 const std::vector<std::string> kKinds{
-    "variance", "color", "predicted", "measured", "right", "interpolated", "interpolated_certain", "search", "dynamic",
-    "reason",   "pfm",   "overview",  "cloud",    "depth", "depth_m"};
+    "variance", "color",   "predicted", "measured", "right",    "interpolated", "interpolated_certain",
+    "search",   "dynamic", "reason",    "pfm",      "overview", "cloud",        "depth",
+    "depth_m",  "left"};
 
 const std::set<std::string> kDisparities{"disparity", "predicted",    "measured",
                                          "right",     "interpolated", "interpolated_certain"};
@@ -64,7 +65,8 @@ const char* const kWriteListHelp =
     "  color          disparity in colours, PNG\n"
     "  overview       image, disparity, search width and error (or variance) in one PNG\n"
     "  cloud          points with colours [m], PLY, without those whose depth is uncertain (--cloud-sigma)\n"
-    "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none; in metres, PFM";
+    "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none; in metres, PFM\n"
+    "  left           the left images as they are matched, grey PNG; always of a bag";
 
 const std::vector<std::string>& write_kinds() { return kKinds; }
 
@@ -109,14 +111,17 @@ RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds
                        const PipelineOptions& options, const Calibration& calibration,
                        const vision::PointCloudOptions& cloud)
     : folder_(std::move(folder)),
+      size_(size),
       kinds_(std::move(kinds)),
       options_(options),
       calibration_(calibration),
       cloud_(cloud),
       disparity_(size, CV_32FC1),
       panels_(options.disparities) {
-  vision::make_folder(folder_ / "disparity");
-  for (const std::string& kind : kinds_) vision::make_folder(folder_ / kind);
+  if (!folder_.empty()) {
+    vision::make_folder(folder_ / "disparity");
+    for (const std::string& kind : kinds_) vision::make_folder(folder_ / kind);
+  }
   if (wants("variance") || wants("overview") || wants("cloud") || wants("interpolated_certain"))
     variance_.create(size, CV_32FC1);
   if (wants("right")) right_.create(size, CV_32FC1);
@@ -125,6 +130,11 @@ RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds
   if (wants("search") || wants("overview")) search_.create(size, CV_16UC1);
   if (wants("dynamic")) dynamic_.create(size, CV_8UC1);
   if (wants("reason")) reason_.create(size, CV_8UC1);
+}
+
+void RunOutputs::make_shown_maps() {
+  variance_.create(size_, CV_32FC1);
+  reason_.create(size_, CV_8UC1);
 }
 
 FrameOutputs RunOutputs::views() {
@@ -145,6 +155,8 @@ WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
   WrittenFrame written;
   const auto depth_m = [&] { return vision::depth_from_disparity(disparity_, calibration_); };
   const std::pair<const char*, std::function<void(const Path&)>> writers[] = {
+      {"left",
+       [&](const Path& path) { vision::write_png(path, left); }},  // first: a cloud takes its colours from there
       {"variance", [&](const Path& path) { vision::write_pfm(path, variance_); }},
       {"pfm", [&](const Path& path) { vision::write_pfm(path, disparity_); }},
       {"predicted", [&](const Path& path) { vision::write_disparity(path, predicted_); }},

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "apps/feed.h"
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/dataset.h"
 #include "egosgm/vision/point_cloud.h"
 #include "host/vision/frame_panels.h"
 
@@ -43,12 +43,16 @@ struct WrittenFrame {
 /// The maps of one frame and the files that they go to. Every file appears whole or not at all.
 class RunOutputs {
  public:
-  /// Makes the folders. Throws IoError.
+  /// Makes the folders, unless `folder` has no name. Throws IoError.
   RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, const PipelineOptions& options,
              const Calibration& calibration, const vision::PointCloudOptions& cloud);
 
   /// Where the pipeline is to write; valid as long as this object lives.
   FrameOutputs views();
+
+  /// Those of a Taker, whatever is written.
+  void make_shown_maps();
+  ShownMaps shown() const { return {disparity_, variance_, reason_}; }
 
   /// Writes the frame that the views hold; `left` is its left image.
   WrittenFrame write(const vision::StereoFrame& frame, const cv::Mat& left);
@@ -57,6 +61,7 @@ class RunOutputs {
   bool wants(const char* kind) const { return kinds_.contains(kind); }
 
   const std::filesystem::path folder_;
+  const cv::Size size_;
   const std::set<std::string> kinds_;
   const PipelineOptions options_;
   const Calibration calibration_;

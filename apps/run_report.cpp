@@ -29,8 +29,8 @@ Json json_of(const Calibration& c) {
 }
 
 Json odometry_json(const FrameMotion& motion) {
-  Json json{{"source", motion.from_file ? "poses file" : "estimated"}};
-  if (!motion.from_file) {
+  Json json{{"source", motion.is_given ? "poses file" : "estimated"}};
+  if (!motion.is_given) {
     json["features"] = motion.odometry.features;
     json["matches"] = motion.odometry.matches;
     json["inliers"] = motion.odometry.inliers;
@@ -84,10 +84,7 @@ RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pip
            {"version", EGOSGM_VERSION},
            {"input", sequence.title},
            {"first_frame", sequence.frames.front().number},
-           {"sequence",
-            {{"first_frame", sequence.numbers.front()},
-             {"last_frame", sequence.numbers.back()},
-             {"frames", sequence.numbers.size()}}},
+           {"sequence", Json()},
            {"motion", motion},
            {"width", width},
            {"height", height},
@@ -98,6 +95,10 @@ RunReport::RunReport(const vision::StereoSequence& sequence, const Pipeline& pip
            {"options", json_of(pipeline.options())},
            {"finished", false},
            {"frames", Json::array()}};
+  if (sequence.numbers.empty()) return;
+  json_["sequence"] = {{"first_frame", sequence.numbers.front()},
+                       {"last_frame", sequence.numbers.back()},
+                       {"frames", sequence.numbers.size()}};
 }
 
 Json RunReport::identity() const {
@@ -109,8 +110,9 @@ Json RunReport::identity() const {
   return identity;
 }
 
-void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
-                    const HostTimes& times, const WrittenFrame& written) {
+void RunReport::add(const FedFrame& fed, const FrameReport& report, const FrameMotion& motion, const HostTimes& times,
+                    const WrittenFrame& written) {
+  const vision::StereoFrame& frame = fed.frame;
   json_["frames"].push_back({{"frame", frame.number},
                              {"left", std::filesystem::absolute(frame.left).string()},
                              {"search_fraction", report.search_fraction},
@@ -130,6 +132,7 @@ void RunReport::add(const vision::StereoFrame& frame, const FrameReport& report,
         {"points", cloud->points},
         {"left_out", {{"far", out.far}, {"uncertain", out.uncertain}, {"alone", out.alone}}}};
   }
+  if (fed.stamp_ns) json_["frames"].back()["stamp_ns"] = *fed.stamp_ns;
   if (frame.name != fmt::format("{:06}", frame.number)) json_["frames"].back()["name"] = frame.name;
 }
 
@@ -143,8 +146,9 @@ void RunReport::leave_out(const vision::StereoFrame& frame, const std::string& w
   json_["left_out"].push_back({{"frame", frame.number}, {"name", frame.name}, {"why", why}});
 }
 
-void RunReport::set_doubt(const std::string& doubt) {
+void RunReport::set_doubt(const std::string& doubt, const std::vector<std::string>& notes) {
   if (!doubt.empty()) json_["doubt"] = doubt;
+  if (!notes.empty()) json_["notes"] = notes;
 }
 
 void RunReport::write(const std::filesystem::path& file, bool finished, const std::string& why_not) {

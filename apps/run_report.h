@@ -31,16 +31,16 @@ class RunReport {
   /// All that the maps depend on. Two runs with equal identities give the same maps.
   nlohmann::ordered_json identity() const;
 
-  void add(const vision::StereoFrame& frame, const FrameReport& report, const FrameMotion& motion,
-           const HostTimes& times, const WrittenFrame& written);
+  void add(const FedFrame& fed, const FrameReport& report, const FrameMotion& motion, const HostTimes& times,
+           const WrittenFrame& written);
 
   /// Names the numbers of `run --write reason`.
   void add_reasons();
 
-  /// What speaks against the input, see Doubt; empty: nothing.
   /// A pair that could not be read.
   void leave_out(const vision::StereoFrame& frame, const std::string& why);
-  void set_doubt(const std::string& doubt);
+  /// What speaks against the input, see Doubt, and what was unusual about its frames.
+  void set_doubt(const std::string& doubt, const std::vector<std::string>& notes);
 
   /// `finished`: whether all frames ran; else `why_not` says what stopped them. Throws IoError.
   void write(const std::filesystem::path& file, bool finished, const std::string& why_not = {});

@@ -18,6 +18,15 @@ bool is_image(const std::filesystem::path& file) {
   return !file.extension().empty() && std::filesystem::is_regular_file(file, error);
 }
 
+/// `options` that are given, as a shell takes them.
+std::string words_of(const std::vector<std::pair<const char*, std::string>>& options) {
+  std::string text;
+  for (const auto& [name, value] : options) {
+    if (!value.empty()) text += (text.empty() ? "" : " ") + std::string(name) + shell_word(value);
+  }
+  return text;
+}
+
 }  // namespace
 
 void add_pair_by(CLI::App& command, std::string& pair_by, const std::string& group) {
@@ -126,22 +135,43 @@ std::string shell_word(const std::string& text) {
 }
 
 std::string SequenceArguments::text() const {
-  std::string text;
-  const auto append = [&](const char* name, const std::string& value) {
-    if (value.empty()) return;
-    text += (text.empty() ? "" : " ") + std::string(name) + shell_word(value);
+  return words_of({{"", folder},
+                   {"", other_picture},
+                   {"--kitti ", kitti},
+                   {"--scene ", scene},
+                   {"--odometry ", odometry},
+                   {"--left ", left},
+                   {"--right ", right},
+                   {"--calib ", calib},
+                   {"--pair-by ", pair_by},
+                   {"--frames ", frames}});
+}
+
+void BagArguments::add_to(CLI::App& command) {
+  const char* group = "Bags, by the Python package with its extra \"bag\"";
+  const auto add = [&](const char* name, auto& value, const char* text, const char* type) {
+    return command.add_option(name, value, text)->type_name(type)->group(group);
   };
-  append("", folder);
-  append("", other_picture);
-  append("--kitti ", kitti);
-  append("--scene ", scene);
-  append("--odometry ", odometry);
-  append("--left ", left);
-  append("--right ", right);
-  append("--calib ", calib);
-  append("--pair-by ", pair_by);
-  append("--frames ", frames);
-  return text;
+  add("--bag", bag, "ROS 2 (MCAP, SQLite) or ROS 1: a .mcap, a .bag, or a bag's folder", "BAG");
+  add("--left-topic", left_topic, "raw or compressed images [where names tell, and there is one choice, that one]",
+      "TOPIC");
+  add("--right-topic", right_topic, "", "TOPIC");
+  add("--info-topics", info_topics, "camera infos, left and right [camera_info beside the images]", "TOPIC TOPIC")
+      ->expected(2);
+  add("--pose-topic", pose_topic, "motion from there (Odometry, PoseStamped) in place of stereo odometry", "TOPIC");
+  add("--pose-axes", pose_axes, "of the poses: x forward, z up, or z forward, y down [body]", "body|optical");
+  add("--max-skew-ms", max_skew_ms, "how far the stamps of a pair may differ [0]", "MS");
+  add("--rectify", rectify,
+      "images by their infos [auto: where the infos have a distortion and the topic is not named rect]", "auto|on|off");
+}
+
+std::string BagArguments::text() const {
+  const bool has_infos = !info_topics.empty();
+  return words_of({{"--bag ", bag},
+                   {"--left-topic ", left_topic},
+                   {"--right-topic ", right_topic},
+                   {"--info-topics ", has_infos ? info_topics[0] : ""},
+                   {"", has_infos ? info_topics[1] : ""}});
 }
 
 }  // namespace egosgm::app

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
+#include <vector>
 
 #include "egosgm/vision/dataset.h"
 
@@ -17,6 +18,16 @@ struct SequenceArguments {
   /// calibration and `needs_calibration`.
   vision::StereoSequence open(bool needs_calibration = true) const;
   /// What was given, as a shell takes it for any command that reads a sequence.
+  std::string text() const;
+};
+
+/// The arguments of a drive that ROS recorded, which the Python package reads.
+struct BagArguments {
+  std::string bag, left_topic, right_topic, pose_topic, pose_axes = "body", max_skew_ms = "0", rectify = "auto";
+  std::vector<std::string> info_topics;
+
+  void add_to(CLI::App& command);
+  /// As SequenceArguments::text.
   std::string text() const;
 };
 

@@ -17,14 +17,17 @@ function(egosgm_libraries name component exported)
       VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
     target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include>
                                                 $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-    target_compile_features(${target} PUBLIC cxx_std_20)
+    target_compile_features(${target} PUBLIC cxx_std_17)  # of the headers
     list(TRANSFORM library_PUBLIC REPLACE LINKAGE ${linkage} OUTPUT_VARIABLE public)
     target_link_libraries(${target} PUBLIC ${public} PRIVATE ${library_PRIVATE})
     if(linkage STREQUAL shared AND NOT CMAKE_CXX_FLAGS MATCHES "-fsanitize")
       target_link_options(${target} PRIVATE LINKER:--no-undefined)
     endif()
-    if(PROJECT_IS_TOP_LEVEL)
-      set_target_properties(${target} PROPERTIES INSTALL_RPATH $ORIGIN)
+    set_target_properties(${target} PROPERTIES INSTALL_RPATH $ORIGIN)
+    if(PROJECT_IS_TOP_LEVEL AND component STREQUAL vision AND NOT EGOSGM_OPENCV)  # its interface is of cmake/small_opencv's types
+      install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libegosgm NAMELINK_SKIP
+              ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libegosgm-dev EXCLUDE_FROM_ALL)
+    elseif(PROJECT_IS_TOP_LEVEL)
       install(TARGETS ${target} EXPORT egosgm-${component}-${linkage}
               LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libegosgm NAMELINK_COMPONENT libegosgm-dev
               ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libegosgm-dev)

@@ -8,12 +8,11 @@
 #include <egosgm/vision/opencv.h>
 
 #include <cstdio>
-#include <stdexcept>
 
 using namespace egosgm;
 
-void run(const char* folder) {
-  const vision::StereoSequence sequence = vision::open_folder(folder);
+int main(int argc, char** argv) try {
+  const vision::StereoSequence sequence = vision::open_folder(argc > 1 ? argv[1] : ".");
   const cv::Size size = vision::check_image_sizes(sequence);
   Pipeline pipeline(sequence.calibration, size.width, size.height);
   StereoOdometry odometry(sequence.calibration);
@@ -23,11 +22,6 @@ void run(const char* folder) {
     const vision::FrameMaps maps = vision::process(pipeline, left, right, motion);
     vision::write_disparity(frame.name + ".png", maps.disparity);
   }
-}
-
-int main(int argc, char** argv) try {
-  if (argc != 2) throw std::runtime_error("usage: minimal SEQUENCE");
-  run(argv[1]);
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());
   return 1;

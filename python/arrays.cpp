@@ -2,9 +2,11 @@
 #include "python/arrays.h"
 
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "egosgm/error.h"
+#include "host/vision/grey_bytes.h"
 
 namespace egosgm::python {
 namespace {
@@ -76,29 +78,16 @@ void store(const Eigen::Isometry3d& transform, double* to) {
   Eigen::Map<Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(to, 4, 4) = transform.matrix();
 }
 
-template <typename T>
-void weigh(const py::array& colour, cv::Mat& grey) {
-  const auto channels = colour.shape(2);
-  const auto* pixel = static_cast<const T*>(colour.data());
-  for (int y = 0; y < grey.rows; ++y) {
-    for (int x = 0; x < grey.cols; ++x, pixel += channels) {
-      const std::uint64_t sum = channels == 1 ? std::uint64_t{pixel[0]} << 15
-                                              : std::uint64_t{9798} * pixel[0] + std::uint64_t{19235} * pixel[1] +
-                                                    std::uint64_t{3735} * pixel[2] + (1 << 14);
-      grey.at<T>(y, x) = static_cast<T>(sum >> 15);
-    }
-  }
-}
-
 /// RGB as OpenCV weighs it; what is no image of whole numbers stays as it is.
 py::array grey_of(const py::array& colour) {
   const bool bytes = colour.dtype().equal(py::dtype::of<std::uint8_t>());
   if ((!bytes && !colour.dtype().equal(py::dtype::of<std::uint16_t>())) || colour.size() == 0) return colour;
   const py::array packed = contiguous(colour);
   expect_indexable(packed, "image");
-  cv::Mat grey(static_cast<int>(packed.shape(0)), static_cast<int>(packed.shape(1)), bytes ? CV_8UC1 : CV_16UC1);
-  bytes ? weigh<std::uint8_t>(packed, grey) : weigh<std::uint16_t>(packed, grey);
-  return array_of(grey);
+  const int height = static_cast<int>(packed.shape(0)), width = static_cast<int>(packed.shape(1)),
+            channels = static_cast<int>(packed.shape(2));
+  const cv::Mat colors(height, width, CV_MAKETYPE(bytes ? CV_8U : CV_16U, channels), const_cast<void*>(packed.data()));
+  return array_of(channels == 1 ? colors : vision::grey_of_colors(colors, vision::ColorOrder::kRgb));
 }
 
 }  // namespace
@@ -119,6 +108,17 @@ ImageArray image_of(const py::object& image, const char* name) {
                        .stride_bytes = array.strides(0),
                        .type = bytes ? PixelType::kU8 : PixelType::kU16};
   return {array, view};
+}
+
+cv::Mat mat_of(const py::object& image, const char* name) {
+  const ImageArray owner = image_of(image, name);
+  const ImageView& view = owner.view;
+  cv::Mat mat(view.height, view.width, view.type == PixelType::kU8 ? CV_8UC1 : CV_16UC1);
+  for (int y = 0; y < view.height; ++y) {
+    std::memcpy(mat.ptr(y), static_cast<const char*>(view.data) + y * view.stride_bytes,
+                static_cast<std::size_t>(view.width) * mat.elemSize());
+  }
+  return mat;
 }
 
 cv::Mat map_of(const py::object& map, const char* name, py::array& keep) {

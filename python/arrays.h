@@ -25,6 +25,9 @@ struct ImageArray {
 /// side, rows overlap (broadcast ones) or pixels are not aligned. Throws InvalidArgument, naming the image.
 ImageArray image_of(const py::object& image, const char* name);
 
+/// A copy of such an image. Throws InvalidArgument.
+cv::Mat mat_of(const py::object& image, const char* name);
+
 /// An H x W map of float32; other numbers, and rows that are not contiguous, are converted into a copy, which `keep`
 /// holds. Throws InvalidArgument.
 cv::Mat map_of(const py::object& map, const char* name, py::array& keep);

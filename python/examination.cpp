@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/vision/examination.h"
-
 #include <pybind11/stl.h>
 
-#include <cstring>
-
+#include "egosgm/options.h"
+#include "host/vision/coarse_map.h"
 #include "host/vision/doubt.h"
-#include "host/vision/pair_matches.h"
-#include "host/vision/pose_doubt.h"
+#include "host/vision/grey_bytes.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
@@ -15,117 +12,72 @@
 namespace egosgm::python {
 namespace {
 
-/// A copy, as rows may lie at any stride.
-cv::Mat mat_of(const py::object& image, const char* name) {
-  const ImageArray owner = image_of(image, name);
-  const ImageView& view = owner.view;
-  cv::Mat mat(view.height, view.width, view.type == PixelType::kU8 ? CV_8UC1 : CV_16UC1);
-  for (int y = 0; y < view.height; ++y) {
-    std::memcpy(mat.ptr(y), static_cast<const char*>(view.data) + y * view.stride_bytes,
-                static_cast<std::size_t>(view.width) * mat.elemSize());
-  }
-  return mat;
-}
-
-py::array_t<float> matches_of(const py::object& left, const py::object& right) {
-  const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
-  std::vector<vision::PairMatch> matches;
-  {
-    const OtherThreadsRun other_threads_run;
-    matches = vision::match_pair(left_image, right_image);
-  }
-  py::array_t<float> rows({static_cast<py::ssize_t>(matches.size()), py::ssize_t{4}});
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    float* row = rows.mutable_data(static_cast<py::ssize_t>(i), 0);
-    row[0] = matches[i].left.x, row[1] = matches[i].left.y, row[2] = matches[i].right.x, row[3] = matches[i].right.y;
-  }
-  return rows;
-}
-
 using vision::Doubt;
-using vision::Examination;
-
-py::object text_of(const std::optional<vision::Suspicion>& suspicion) {
-  return suspicion ? py::object(py::str(suspicion->what + ": " + suspicion->remedy)) : py::none();
-}
-
-py::list findings_of(const Examination& examination, std::size_t pairs) {
-  py::list list;
-  for (const vision::Finding& finding : examination.findings(pairs)) {
-    const char* verdict = finding.verdict == vision::Verdict::kFine   ? "ok"
-                          : finding.verdict == vision::Verdict::kNote ? "note"
-                                                                      : "problem";
-    list.append(py::make_tuple(verdict, finding.check, finding.text, finding.remedy));
-  }
-  return list;
-}
-
-std::string motions_doubt(const std::vector<py::object>& given, const std::vector<py::object>& found) {
-  std::vector<Eigen::Isometry3d> motions;
-  std::vector<std::optional<Eigen::Isometry3d>> others;
-  for (const py::object& motion : given) motions.push_back(transform_of(motion, "given"));
-  for (const py::object& motion : found) {
-    others.push_back(motion.is_none() ? std::nullopt : std::optional(transform_of(motion, "found")));
-  }
-  return vision::suspect_motions(motions, others);
-}
 
 /// Names with a line before them: the package's own.
-void bind_doubts(py::module_& module) {
-  py::class_<Doubt>(module, "_Doubt")
-      .def(py::init([](const std::optional<Calibration>& calibration, int width, int height) {
-             return Doubt(calibration, {width, height});
-           }),
-           py::arg("calibration"), py::arg("width"), py::arg("height"))
-      .def("add", &Doubt::add, py::arg("density"), py::arg("has_motion"), py::arg("holds_8_bits_in_16"))
-      .def(
-          "look_beyond",
-          [](Doubt& self, const py::object& left, const py::object& right, int least, int end) {
-            const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
-            const OtherThreadsRun other_threads_run;
-            self.look_beyond(left_image, right_image, least, end);
-          },
-          py::arg("left"), py::arg("right"), py::arg("least"), py::arg("end"))
-      .def("text", &Doubt::text);
+void bind_images(py::module_& module) {
   module.def(
-      "_clipped_by_range",
-      [](const py::object& left, const py::object& right, int least, int end) {
+      "_coarse_map",
+      [](const py::object& left, const py::object& right, double row_offset_px, int least, int end) {
         const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
-        std::optional<vision::Clipped> clipped;
+        cv::Mat map;
         {
           const OtherThreadsRun other_threads_run;
-          clipped = vision::clipped_by_range(left_image, right_image, least, end);
+          map = vision::coarse_map(left_image, right_image, row_offset_px, least, end);
         }
-        return clipped ? py::object(py::make_tuple(clipped->share, clipped->disparities)) : py::none();
+        return array_of(map);
       },
-      py::arg("left"), py::arg("right"), py::arg("least"), py::arg("end"),
-      "The share of the image that is nearer than [least, end), and the number of disparities that would do; None "
-      "where hardly anything is.");
-  py::class_<Examination>(module, "_Examination")
-      .def(py::init<const std::optional<Calibration>&, int, int>(), py::arg("calibration"), py::arg("least"),
-           py::arg("end"))
-      .def("add",
-           [](Examination& self, const py::object& left, const py::object& right) {
-             const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
-             const OtherThreadsRun other_threads_run;
-             self.add(left_image, right_image);
-           })
-      .def("findings", &findings_of, py::arg("pairs"));
+      py::arg("left"), py::arg("right"), py::arg("row_offset_px"), py::arg("least"), py::arg("end"),
+      "Disparities [px] of images made smaller, over the full range; NaN where nothing is sure.");
+  module.def(
+      "_grey_bytes",
+      [](const py::object& left, const py::object& right) {
+        const auto [left_bytes, right_bytes] = vision::bytes_of(mat_of(left, "left"), mat_of(right, "right"));
+        return py::make_tuple(array_of(left_bytes), array_of(right_bytes));
+      },
+      py::arg("left"), py::arg("right"), "A pair as uint8, as the odometry sees it.");
+  module.def(
+      "_check_range",
+      [](int disparities, int min_disparity) {
+        PipelineOptions options;
+        options.disparities = disparities, options.min_disparity = min_disparity;
+        options.validate();
+      },
+      py::arg("disparities"), py::arg("min_disparity"));
+}
+
+void bind_doubts(py::module_& module) {
+  py::class_<Doubt>(module, "_Doubt")
+      .def(py::init([](const std::optional<Calibration>& calibration, int min_disparity, int disparities) {
+             PipelineOptions options;
+             options.min_disparity = min_disparity;
+             options.disparities = disparities;
+             return Doubt(calibration, options);
+           }),
+           py::arg("calibration"), py::arg("min_disparity"), py::arg("disparities"))
+      .def(
+          "add",
+          [](Doubt& self, const py::object& left, const py::object& right, const FrameReport& report, bool has_motion) {
+            const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
+            const OtherThreadsRun other_threads_run;
+            self.add(left_image, right_image, report, has_motion);
+          },
+          py::arg("left"), py::arg("right"), py::arg("report"), py::arg("has_motion"))
+      .def("text", &Doubt::text);
+  py::class_<vision::Suspicion>(module, "_Suspicion")
+      .def_readonly("what", &vision::Suspicion::what)
+      .def_readonly("remedy", &vision::Suspicion::remedy);
   module.def("_suspect_calibration", [](const Calibration& calibration, int width, int height) {
-    return text_of(vision::suspect_calibration(calibration, {width, height}));
+    return vision::suspect_calibration(calibration, {width, height});
   });
-  module.def("_suspect_baseline",
-             [](double baseline_m, double fx) { return text_of(vision::suspect_baseline(baseline_m, fx)); });
-  module.def("_suspect_motions", &motions_doubt, py::arg("given"), py::arg("found"));
+  module.def("_suspect_baseline", &vision::suspect_baseline, py::arg("baseline_m"), py::arg("fx"));
 }
 
 }  // namespace
 
 void bind_examination(py::module_& module) {
+  bind_images(module);
   bind_doubts(module);
-  module.def("match_pair", &matches_of, py::arg("left"), py::arg("right"),
-             "Points found in both images, in any rows: (N, 4) of x_left, y_left, x_right, y_right [px]. Rectified "
-             "images have them in\nequal rows.");
 }
 
 }  // namespace egosgm::python

@@ -59,6 +59,8 @@ void bind_sequences(py::module_& module) {
           "calibration",
           [](const StereoSequence& s) { return s.has_calibration ? std::optional(s.calibration) : std::nullopt; },
           "None where the images came without one.")
+      .def_readonly("times_file", &StereoSequence::times_file,
+                    "When the frames were taken; empty where no file says so.")
       .def_readonly("poses_file", &StereoSequence::poses_file, "The true poses; empty where there are none.")
       .def_property_readonly(
           "size",
@@ -75,6 +77,12 @@ void bind_sequences(py::module_& module) {
       py::arg("folder"), py::arg("frames") = "",
       "Opens a folder in the layout of KITTI odometry, KITTI raw or Middlebury, or with left, right and calib.txt. "
       "frames: \"7:10\", \"7:\", \":10\".");
+  module.def(
+      "_open_kitti_odometry",
+      [](const path& folder, const std::string& frames) {
+        return vision::open_kitti_odometry(folder, range_of(frames));
+      },
+      py::arg("folder"), py::arg("frames") = "");
   module.def(
       "open_kitti_multiview",
       [](const path& folder, const std::string& scene, const std::string& frames) {

@@ -3,6 +3,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/image.h"
+#include "egosgm/vision/calibration_io.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
 
@@ -36,6 +37,10 @@ py::str text_of(const std::string& text) {
       PyUnicode_DecodeFSDefaultAndSize(text.data(), static_cast<py::ssize_t>(text.size())));
 }
 
+std::string text_from(const py::handle& text) {
+  return py::reinterpret_steal<py::bytes>(PyUnicode_EncodeFSDefault(py::str(text).ptr()));
+}
+
 void bind_errors(py::module_& module) {
   const py::exception<Error> error(module, "Error");
   error.doc() = "What all errors of this library have in common.";
@@ -50,6 +55,7 @@ void bind_errors(py::module_& module) {
   const py::object device_error =
       bind_error<DeviceError>(module, "DeviceError", also(PyExc_RuntimeError),
                               "The device or its driver refused. The text names the stage and the OpenCL status.");
+  bind_error<vision::NegativeBaseline>(module, "_NegativeBaseline", module.attr("InvalidArgument"), "");
   // Asked before the others, as the last to be registered.
   bind_error<BuildError>(module, "BuildError", device_error,
                          "A kernel did not compile. The text ends with the compiler's log.");
@@ -70,6 +76,7 @@ PYBIND11_MODULE(_egosgm, module) {
   bind_pipeline(module);
   bind_odometry(module);
   bind_examination(module);
+  bind_program(module);
   bind_files(module);
   bind_evaluation(module);
 }

@@ -55,17 +55,17 @@ void for_each_field(SyntheticOptions& o, Visit&& visit) {
 }  // namespace egosgm
 
 namespace egosgm::python {
+
+StereoOdometryOptions odometry_options_of(const py::kwargs& values) {
+  StereoOdometryOptions options;
+  set_fields(options, values);
+  return options;
+}
+
 namespace {
 
 using vision::SyntheticFrame;
 using vision::SyntheticSequence;
-
-template <typename Options>
-Options options_of(const py::kwargs& values) {
-  Options options;
-  set_fields(options, values);
-  return options;
-}
 
 /// One frame after the other, also where several Python threads call.
 class LockedOdometry {
@@ -114,7 +114,9 @@ void bind_synthetic(py::module_& module) {
                                 "A drive through a synthetic street with exact truth; frames are rendered on demand. "
                                 "Options as keyword arguments: see synthetic_options().")
       .def(py::init([](const py::kwargs& values) {
-        return std::make_unique<SyntheticSequence>(options_of<vision::SyntheticOptions>(values));
+        vision::SyntheticOptions options;
+        set_fields(options, values);
+        return std::make_unique<SyntheticSequence>(options);
       }))
       .def("__len__", &SyntheticSequence::frames)
       .def_property_readonly("options", [](const SyntheticSequence& s) { return dict_of_fields(s.options()); })
@@ -144,7 +146,7 @@ void bind_odometry(py::module_& module) {
                              "Ego-motion from rectified stereo video. Options as keyword arguments: see "
                              "odometry_options(). Threads that share one take turns.")
       .def(py::init([](const Calibration& calibration, const py::kwargs& values) {
-             return std::make_unique<LockedOdometry>(calibration, options_of<StereoOdometryOptions>(values));
+             return std::make_unique<LockedOdometry>(calibration, odometry_options_of(values));
            }),
            py::arg("calibration"))
       .def("process", &LockedOdometry::process, py::arg("left"), py::arg("right"), py::arg("prior") = py::none(),

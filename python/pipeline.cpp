@@ -12,19 +12,13 @@
 #include "host/frame/frame_outputs.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "python/frame.h"
 #include "python/option_values.h"
 #include "python/other_threads.h"
 #include "python/pickling.h"
 
 namespace egosgm::python {
 namespace {
-
-struct Frame {
-  py::dict maps;
-  FrameReport report;
-
-  py::object map(const char* name) const { return maps.contains(name) ? py::object(maps[name]) : py::none(); }
-};
 
 /// A dict of arrays to fill, or names of arrays to make.
 py::dict arrays_to_fill(const py::object& wanted, int width, int height) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Moving pictures of two runs. The left image above, both runs' colours below."""
+"""Moving pictures of two runs. The left image and both runs' colours, beside each other, or above where they are wide."""
 import pathlib
 import sys
 
@@ -10,37 +10,42 @@ for name in ("SEQUENCE", "LEFT_RUN", "RIGHT_RUN", "OUT.webp"):
     parser.add_argument(name, type=pathlib.Path)
 chosen = parser.parse_args()
 try:
-    from PIL import Image, ImageDraw, ImageOps
+    from PIL import Image, ImageDraw, ImageFont
 except ImportError:
     sys.exit("no moving pictures without Pillow: apt install python3-pil")
 
 FRAME_MS = 200
-LABEL_PART = 8  # of a picture's height
+MOST_SIDE = 1280  # of a moving picture [px]
 
 
-def label(text, height):
-    """White on black, of that height whatever font there is."""
-    drawn = Image.new("L", (8 * len(text) + 8, 14))
-    ImageDraw.Draw(drawn).text((4, 1), text, fill=255)
-    drawn = ImageOps.expand(drawn.crop(drawn.getbbox()), 3)
-    return drawn.resize((drawn.width * height // drawn.height, height), Image.LANCZOS)
+def labelled(picture, text, size):
+    try:
+        font = ImageFont.truetype("DejaVuSans.ttf", size)
+    except OSError:
+        font = ImageFont.load_default()
+    draw = ImageDraw.Draw(picture)
+    draw.rectangle(draw.textbbox((6, 4), text, font=font), fill="black", outline="black", width=3)
+    draw.text((6, 4), text, font=font, fill="white")
+    return picture
 
 
 def main(sequence, left, right, out):
     frames = []
     for file in sorted((left / "color").glob("*.png")):
-        pictures = [Image.open(run / "color" / file.name).convert("RGB") for run in (left, right)]
+        image = next(sequence / folder / file.name for folder in ("image_0", "image_2", "left") if (sequence / folder / file.name).exists())
+        pictures = [Image.open(shown).convert("RGB") for shown in (image, *(run / "color" / file.name for run in (left, right)))]
         width, height = pictures[0].size
-        shown = Image.new("RGB", (2 * width, 2 * height))
-        shown.paste(Image.open(next((sequence / folder / file.name for folder in ("image_0", "image_2", "left") if (sequence / folder / file.name).exists()))).convert("RGB"),
-                    (width // 2, 0))
-        for i, (run, picture) in enumerate(zip((left, right), pictures)):
-            shown.paste(picture, (i * width, height))
-            shown.paste(label(run.name.replace("_", " "), height // LABEL_PART), (i * width, height))
-        frames.append(shown.resize((shown.width // 2, shown.height // 2)) if shown.width > 1280 else shown)
+        columns, rows = (1, 3) if width >= 2 * height else (3, 1)
+        scale = min(1, MOST_SIDE / (columns * width))
+        width, height = int(scale * width), int(scale * height)
+        shown = Image.new("RGB", (columns * width, rows * height))
+        for i, (picture, name) in enumerate(zip(pictures, ("left image", left.name, right.name))):
+            picture = labelled(picture.resize((width, height), Image.LANCZOS), name.replace("_", " "), max(12, height // 16))
+            shown.paste(picture, (i % columns * width, i // columns * height))
+        frames.append(shown)
     if not frames:
         sys.exit(f"{left / 'color'}: no pictures: run with --write color")
-    frames[0].save(out, save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0, quality=80)
+    frames[0].save(out, save_all=True, append_images=frames[1:], duration=FRAME_MS, loop=0, quality=50, method=6)
     print(f"Moving pictures: {out}")
 
 

@@ -62,6 +62,7 @@ class Pages(ProgramTest):
         for page, (package, extra) in of_pages(r'pip install "([\w./*-]+)\[(\w+)\]'):
             self.assertIn(extra, there, page)
             self.assertTrue(package.endswith(".whl"), f"{page}: {package} is on no index")
+        self.assertEqual(list(of_pages(r'pip install (?:-\S+ )*("?egosgm)(?![\w/-])')), [])  # whose it would be, nobody knows
 
     def test_files_exist(self):
         for page, name in of_pages(rf"`((?:{FOLDERS})/[\w./-]+)`"):

@@ -2,7 +2,11 @@
 #include "host/vision/doubt.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+
+#include "egosgm/vision/image_io.h"
+#include "kernels/method.h"
 
 namespace egosgm::vision {
 namespace {
@@ -11,6 +15,8 @@ constexpr double kMinBaseline_m = 0.004, kMaxBaseline_m = 3.0;
 constexpr double kUsualBaseline_m[] = {0.02, 1.5};
 constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
 constexpr double kMinDensity = 0.5;
+constexpr double kFarRows_px = 0.9 * EGOSGM_MAX_OFFSET_PX;
+constexpr std::size_t kFramesPerLook = 50;  // for what is nearer than the range
 
 template <typename... Values>
 std::string formatted(const char* format, Values... values) {
@@ -69,15 +75,16 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, cv::Size size
   return std::nullopt;
 }
 
-void Doubt::add(double density, bool has_motion, bool holds_8_bits_in_16) {
-  density_ += density;
-  if (holds_8_bits_in_16) ++narrow_;
+void Doubt::add(const cv::Mat& left, const cv::Mat& right, const FrameReport& report, bool has_motion) {
+  if (frames_ % kFramesPerLook == 0) {
+    const std::optional<Clipped> clipped = clipped_by_range(left, right, least_, end_);
+    if (clipped && (!clipped_ || clipped->share > clipped_->share)) clipped_ = clipped;
+  }
+  size_ = left.size();
+  density_ += report.density;
+  if (holds_8_bits_in_16(left)) ++narrow_;
+  if (std::abs(report.vertical_offset_px) >= kFarRows_px) ++far_rows_;
   if (frames_++ > 0 && calibration_ && !has_motion) ++without_motion_;
-}
-
-void Doubt::look_beyond(const cv::Mat& left, const cv::Mat& right, int least, int end) {
-  const std::optional<Clipped> clipped = clipped_by_range(left, right, least, end);
-  if (clipped && (!clipped_ || clipped->share > clipped_->share)) clipped_ = clipped;
 }
 
 std::string Doubt::text() const {
@@ -88,6 +95,10 @@ std::string Doubt::text() const {
   if (2 * without_motion_ > frames_ - 1)
     append(text, formatted("no motion in %zu of %zu frames", without_motion_, frames_ - 1));
   if (narrow_ == frames_) append(text, "values of 8 bits in images of 16");
+  if (2 * far_rows_ > frames_) {
+    append(text, formatted("rows of the two views lie %g px apart, the most that is mended, or farther",
+                           static_cast<double>(EGOSGM_MAX_OFFSET_PX)));
+  }
   if (clipped_) {
     append(text, formatted("%.0f %% of the image is nearer than the range (--disparities %d)", 100 * clipped_->share,
                            clipped_->disparities));

@@ -8,7 +8,9 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
-#include "host/vision/examination.h"
+#include "egosgm/frame.h"
+#include "egosgm/options.h"
+#include "host/vision/coarse_map.h"
 
 namespace egosgm::vision {
 
@@ -26,26 +28,26 @@ EGOSGM_EXPORT std::optional<Suspicion> suspect_baseline(double baseline_m, doubl
 EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& calibration, cv::Size size);
 
 /// What speaks against a run's input once it is matched: a mean density below a half (maps of good input keep four
-/// fifths and more), no motion in most frames that have one before them, images of 16 bits that hold 8, what is
-/// nearer than the range, a suspected calibration.
+/// fifths and more), no motion in most frames that have one before them, images of 16 bits that hold 8, rows that are
+/// farther apart than the vertical alignment mends, what is nearer than the range, a suspected calibration.
 class EGOSGM_EXPORT Doubt {
  public:
   /// `calibration`: none where the images came without one, so that there is no motion either.
-  explicit Doubt(const std::optional<Calibration>& calibration, cv::Size size = {})
-      : calibration_(calibration), size_(size) {}
+  Doubt(const std::optional<Calibration>& calibration, const PipelineOptions& options)
+      : calibration_(calibration), least_(options.min_disparity), end_(least_ + options.disparities) {}
 
-  void add(double density, bool has_motion, bool holds_8_bits_in_16);
-  /// Looks whether something is nearer than the range, as clipped_by_range does.
-  void look_beyond(const cv::Mat& left, const cv::Mat& right, int least, int end);
+  /// The next frame's images, both CV_8UC1 or both CV_16UC1, what the pipeline said of it, and whether it had a motion.
+  void add(const cv::Mat& left, const cv::Mat& right, const FrameReport& report, bool has_motion);
 
   /// "density 24 % in the mean, no motion in 10 of 11 frames"; empty where nothing does.
   std::string text() const;
 
  private:
   const std::optional<Calibration> calibration_;
-  const cv::Size size_;
+  const int least_, end_;
+  cv::Size size_;
   double density_ = 0;  // of all frames, added up
-  std::size_t frames_ = 0, without_motion_ = 0, narrow_ = 0;
+  std::size_t frames_ = 0, without_motion_ = 0, narrow_ = 0, far_rows_ = 0;
   std::optional<Clipped> clipped_;  // of the pair of which the range clips most
 };
 

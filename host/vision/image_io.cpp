@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "egosgm/vision/image_io.h"
 
-#include <opencv2/imgproc.hpp>
+#include <algorithm>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "egosgm/error.h"
 #include "egosgm/vision/render.h"
 #include "host/vision/file_io.h"
+#include "host/vision/grey_bytes.h"
 #include "host/vision/image_bounds.h"
 #include "host/vision/jpeg.h"
 #include "host/vision/plain_png.h"
@@ -23,31 +25,63 @@ cv::Mat decode_image(const std::filesystem::path& file) {
   return starts_like_jpeg(bytes) ? decode_jpeg(bytes, file) : decode_png(bytes, file);
 }
 
+/// RGB becomes BGR, or the other way round.
+void reverse_colors(cv::Mat& pixels) {
+  const auto reverse = [&]<typename T>(T) {
+    for (int y = 0; y < pixels.rows; ++y) {
+      auto* row = pixels.ptr<T>(y);
+      for (int x = 0; x < pixels.cols; ++x) std::swap(row[3 * x], row[3 * x + 2]);
+    }
+  };
+  pixels.depth() == CV_8U ? reverse(std::uint8_t{}) : reverse(std::uint16_t{});
+}
+
 }  // namespace
+
+cv::Mat grey_of_colors(const cv::Mat& colors, ColorOrder order) {
+  cv::Mat grey(colors.size(), colors.depth());
+  const int channels = colors.channels(), red = order == ColorOrder::kRgb ? 0 : 2;
+  const auto weigh = [&]<typename T>(T) {
+    for (int y = 0; y < colors.rows; ++y) {
+      const T* pixel = colors.ptr<T>(y);
+      for (int x = 0; x < colors.cols; ++x, pixel += channels) {
+        const std::uint64_t sum = std::uint64_t{9798} * pixel[red] + std::uint64_t{19235} * pixel[1] +
+                                  std::uint64_t{3735} * pixel[2 - red] + (1 << 14);
+        grey.at<T>(y, x) = static_cast<T>(sum >> 15);
+      }
+    }
+  };
+  colors.depth() == CV_8U ? weigh(std::uint8_t{}) : weigh(std::uint16_t{});
+  return grey;
+}
 
 cv::Mat read_grey_image(const std::filesystem::path& file) {
   const cv::Mat pixels = decode_image(file);
-  if (pixels.channels() == 1) return pixels;
-  cv::Mat grey;
-  cv::cvtColor(pixels, grey, cv::COLOR_RGB2GRAY);
-  return grey;
+  return pixels.channels() == 1 ? pixels : grey_of_colors(pixels, ColorOrder::kRgb);
 }
 
 cv::Mat read_stored_image(const std::filesystem::path& file) {
   cv::Mat pixels = decode_image(file);
-  if (pixels.channels() == 3) cv::cvtColor(pixels, pixels, cv::COLOR_RGB2BGR);
+  if (pixels.channels() == 3) reverse_colors(pixels);
   return pixels;
 }
 
 cv::Mat read_color_image(const std::filesystem::path& file) {
-  cv::Mat pixels = decode_image(file), picture;
+  cv::Mat pixels = decode_image(file);
   if (pixels.channels() == 1) return color_grey(pixels);
   if (pixels.depth() == CV_16U) pixels.convertTo(pixels, CV_8U, 1.0 / 256.0, -0.5);  // rounds, so half a step down
-  cv::cvtColor(pixels, picture, cv::COLOR_RGB2BGR);
-  return picture;
+  reverse_colors(pixels);
+  return pixels;
 }
 
-bool holds_8_bits_in_16(const cv::Mat& grey) { return grey.type() == CV_16UC1 && cv::norm(grey, cv::NORM_INF) < 256; }
+bool holds_8_bits_in_16(const cv::Mat& grey) {
+  if (grey.type() != CV_16UC1) return false;
+  for (int y = 0; y < grey.rows; ++y) {
+    const auto* row = grey.ptr<std::uint16_t>(y);
+    if (std::any_of(row, row + grey.cols, [](std::uint16_t value) { return value > 255; })) return false;
+  }
+  return true;
+}
 
 cv::Size read_image_size(const std::filesystem::path& file) {
   const std::string start = read_file_start(file, kPngHeaderBytes);

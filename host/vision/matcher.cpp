@@ -2,12 +2,12 @@
 #include "egosgm/vision/matcher.h"
 
 #include <limits>
-#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/opencv.h"
+#include "host/vision/grey_bytes.h"
 
 namespace egosgm::vision {
 namespace {
@@ -20,9 +20,19 @@ cv::Mat grey_of(const cv::Mat& image, const char* name) {
                           ": give grey or BGR of 8 or 16 bits");
   }
   if (image.channels() == 1) return image;
-  cv::Mat grey;
-  cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  return grey;
+  return grey_of_colors(image, ColorOrder::kBgr);
+}
+
+/// That the options are valid, and their disparities fit.
+void expect_sixteenths(const PipelineOptions& options) {
+  options.validate();
+  const int end = options.min_disparity + options.disparities;
+  constexpr int kLargest = std::numeric_limits<std::int16_t>::max() / cv::StereoMatcher::DISP_SCALE;
+  if (end > kLargest || options.min_disparity - 1 < -kLargest) {
+    throw InvalidArgument("Matcher: disparities " + std::to_string(options.min_disparity) + " to " +
+                          std::to_string(end - 1) + " do not fit into 16 bits with 16 steps a pixel: up to " +
+                          std::to_string(kLargest - 1) + " do; Pipeline gives float");
+  }
 }
 
 }  // namespace
@@ -48,25 +58,33 @@ struct Matcher::State {
     size = wanted;
     type = wanted_type;
   }
+
+  template <typename Value>
+  void change(Value PipelineOptions::*option, Value value) {
+    PipelineOptions changed = options;
+    changed.*option = value;
+    expect_sixteenths(changed);
+    options = changed;
+    pipeline.reset();
+  }
 };
 
 Matcher::Matcher(const Calibration& calibration, const PipelineOptions& options, const Device& device)
     : state_(std::make_unique<State>(calibration, options, device)) {
   calibration.validate();
-  options.validate();
-  const int end = options.min_disparity + options.disparities;
-  constexpr int kLargest = std::numeric_limits<std::int16_t>::max() / kDispScale;
-  if (end > kLargest || options.min_disparity - 1 < -kLargest) {
-    throw InvalidArgument("Matcher: disparities " + std::to_string(options.min_disparity) + " to " +
-                          std::to_string(end - 1) + " do not fit into 16 bits with 16 steps a pixel: up to " +
-                          std::to_string(kLargest - 1) + " do; Pipeline gives float");
-  }
+  expect_sixteenths(options);
 }
 
 Matcher::Matcher(const PipelineOptions& options, const Device& device)
     : Matcher(Calibration{.fx = 1000, .fy = 1000, .cx = 0, .cy = 0, .baseline_m = 1}, options, device) {
   state_->calibration.reset();
   state_->options.temporal = false;
+}
+
+PipelineOptions Matcher::single_pair() {
+  PipelineOptions options;
+  options.paths = 8;
+  return options;
 }
 
 Matcher::~Matcher() = default;
@@ -91,12 +109,50 @@ void Matcher::compute(cv::InputArray left, cv::InputArray right, cv::OutputArray
   outputs.disparity = map_view(map);
   state_->pipeline->process(image_view(left_grey), image_view(right_grey), motion, outputs);
   cv::Mat steps;
-  map.convertTo(steps, CV_16SC1, kDispScale);
-  steps.setTo((min_disparity() - 1) * kDispScale, map == kInvalidDisparity);
+  map.convertTo(steps, CV_16SC1, DISP_SCALE);
+  steps.setTo((getMinDisparity() - 1) * DISP_SCALE, map == kInvalidDisparity);
   steps.copyTo(disparity);
 }
 
-int Matcher::min_disparity() const { return state_->options.min_disparity; }
-int Matcher::num_disparities() const { return state_->options.disparities; }
+const PipelineOptions& Matcher::options() const { return state_->options; }
+
+int Matcher::getMinDisparity() const { return options().min_disparity; }
+void Matcher::setMinDisparity(int least) { state_->change(&PipelineOptions::min_disparity, least); }
+int Matcher::getNumDisparities() const { return options().disparities; }
+void Matcher::setNumDisparities(int count) { state_->change(&PipelineOptions::disparities, count); }
+int Matcher::getSpeckleWindowSize() const { return options().max_speckle_px; }
+void Matcher::setSpeckleWindowSize(int most_px) { state_->change(&PipelineOptions::max_speckle_px, most_px); }
+int Matcher::getDisp12MaxDiff() const { return cvRound(options().left_right_px); }
+void Matcher::setDisp12MaxDiff(int most_px) {
+  state_->change(&PipelineOptions::left_right_px, static_cast<float>(most_px > 0 ? most_px : options().disparities));
+}
+
+int Matcher::getBlockSize() const {
+  switch (options().cost) {
+    case MatchingCost::kCensus9x7:
+      return 9;
+    case MatchingCost::kLearned7x7:
+      return 7;
+    case MatchingCost::kCensus5x5:
+      return 5;
+    case MatchingCost::kSad3x3:
+      return 3;
+  }
+  return 0;
+}
+
+void Matcher::setBlockSize(int side_px) {
+  if (side_px == getBlockSize()) return;
+  throw InvalidArgument("Matcher: blockSize " + std::to_string(side_px) +
+                        ": the window belongs to the cost: choose PipelineOptions::cost");
+}
+
+int Matcher::getSpeckleRange() const { return 0; }
+
+void Matcher::setSpeckleRange(int range) {
+  if (range == getSpeckleRange()) return;
+  throw InvalidArgument("Matcher: speckleRange " + std::to_string(range) +
+                        ": the method has its own: leave it out, and set speckleWindowSize");
+}
 
 }  // namespace egosgm::vision

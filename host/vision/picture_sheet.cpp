@@ -3,9 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 #include "egosgm/error.h"
+#include "host/vision/drawing.h"
 
 namespace egosgm::vision {
 namespace {
@@ -19,10 +19,8 @@ void require_width(int width) {
 
 cv::Mat scaled_to(const cv::Mat& picture, int cell_width) {
   if (picture.cols <= cell_width) return picture;
-  cv::Mat scaled;
   const int height = std::max(1, static_cast<int>(std::lround(1.0 * picture.rows * cell_width / picture.cols)));
-  cv::resize(picture, scaled, cv::Size(cell_width, height), 0, 0, cv::INTER_AREA);
-  return scaled;
+  return shrunk(picture, {cell_width, height});
 }
 
 cv::Mat with_caption(const CaptionedPicture& item, int cell_width) {
@@ -30,10 +28,7 @@ cv::Mat with_caption(const CaptionedPicture& item, int cell_width) {
   const int top = item.caption.empty() ? 0 : kCaptionHeight;
   cv::Mat cell(picture.rows + top, picture.cols, CV_8UC3, cv::Scalar::all(0));
   picture.copyTo(cell(cv::Rect(0, top, picture.cols, picture.rows)));
-  if (top > 0) {
-    cv::putText(cell, item.caption, {4, kCaptionHeight - 7}, cv::FONT_HERSHEY_SIMPLEX, 0.5, {255, 255, 255}, 1,
-                cv::LINE_AA);
-  }
+  if (top > 0) draw_text(cell, item.caption, 4, kCaptionHeight - 5, 2);
   return cell;
 }
 

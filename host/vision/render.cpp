@@ -5,18 +5,20 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "egosgm/error.h"
 #include "egosgm/reason.h"
 #include "egosgm/vision/disparity_io.h"
+#include "host/vision/drawing.h"
 
 namespace egosgm::vision {
 namespace {
 
 constexpr int kBarHeight = 40, kBarColors = 22;  // [px]; below the colours stands the text
 constexpr int kMaxPictureSide = 32768;
-const cv::Scalar kBlack(0, 0, 0), kWhite(255, 255, 255);
+constexpr int kSmallWidth = 640;  // of a bar; below, its letters are small [px]
+const cv::Scalar kBlack(0, 0, 0);
 const cv::Vec3b kMissing(128, 128, 128);
 
 /// |error| below limit_px has this colour: ColorBrewer's RdYlBu in ten classes, BGR.
@@ -91,17 +93,6 @@ double value_at(const ColorRange& range, double position) {
                            : range.low + position * (range.high - range.low);
 }
 
-cv::Mat turbo_colors() {
-  cv::Mat steps(1, 256, CV_8UC1), colors;
-  for (int i = 0; i < 256; ++i) steps.at<std::uint8_t>(i) = static_cast<std::uint8_t>(i);
-  cv::applyColorMap(steps, colors, cv::COLORMAP_TURBO);
-  return colors;
-}
-
-cv::Vec3b color_at(const cv::Mat& colors, double position) {
-  return colors.ptr<cv::Vec3b>()[static_cast<int>(255.0 * position + 0.5)];
-}
-
 cv::Vec3b error_color(float error_px) {
   for (const ErrorStep& step : kErrorSteps) {
     if (error_px < step.limit_px) return step.color;
@@ -111,11 +102,9 @@ cv::Vec3b error_color(float error_px) {
 
 /// Text centred at x, moved so far that it stays in the picture.
 void put_label(cv::Mat& picture, const std::string& text, double center_x) {
-  constexpr double kScale = 0.4;
-  int baseline = 0;
-  const int width = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, kScale, 1, &baseline).width;
+  const int scale = picture.cols < kSmallWidth ? 1 : 2, width = text_width(text, scale);
   const int left = std::clamp(static_cast<int>(center_x) - width / 2, 1, std::max(1, picture.cols - width - 1));
-  cv::putText(picture, text, {left, kBarHeight - 6}, cv::FONT_HERSHEY_SIMPLEX, kScale, kWhite, 1, cv::LINE_AA);
+  draw_text(picture, text, left, kBarHeight - 2, scale);
 }
 
 std::string format_value(double value) {
@@ -145,7 +134,6 @@ ColorRange disparity_range(const cv::Mat& disparity) {
 cv::Mat color_map(const cv::Mat& map, ColorRange range) {
   require_map(map, "color_map");
   require_range(range);
-  const cv::Mat colors = turbo_colors();
   const Scale scale(range);
   cv::Mat picture(map.size(), CV_8UC3, kBlack);
   float last = kInvalidDisparity;  // widths of the search are often those of the pixel before
@@ -155,7 +143,7 @@ cv::Mat color_map(const cv::Mat& map, ColorRange range) {
     auto* colored = picture.ptr<cv::Vec3b>(y);
     for (int x = 0; x < map.cols; ++x) {
       if (!is_valid_disparity(row[x])) continue;
-      if (row[x] != last) color = color_at(colors, scale.position_of(row[x]));
+      if (row[x] != last) color = turbo(scale.position_of(row[x]));
       last = row[x];
       colored[x] = color;
     }
@@ -208,10 +196,9 @@ cv::Mat color_bar(int width, ColorRange range, const std::string& unit) {
   require_width(width);
   require_range(range);
   constexpr int kIntervals = 4;
-  const cv::Mat colors = turbo_colors();
   cv::Mat bar(kBarHeight, width, CV_8UC3, kBlack);
   for (int x = 0; x < width; ++x) {
-    const cv::Vec3b color = color_at(colors, static_cast<double>(x) / std::max(1, width - 1));
+    const cv::Vec3b color = turbo(static_cast<double>(x) / std::max(1, width - 1));
     bar(cv::Rect(x, 0, 1, kBarColors)).setTo(cv::Scalar(color));
   }
   for (int i = 0; i <= kIntervals; ++i) {
@@ -276,13 +263,19 @@ cv::Mat color_grey(const cv::Mat& grey) {
   if (grey.empty() || (grey.type() != CV_8UC1 && grey.type() != CV_16UC1)) {
     throw InvalidArgument("color_grey: the image must be CV_8UC1 or CV_16UC1 and not empty");
   }
-  cv::Mat bytes = grey, picture;
+  cv::Mat bytes = grey, picture(grey.size(), CV_8UC3);
   if (grey.depth() == CV_16U) {
-    double highest = 0;
-    cv::minMaxLoc(grey, nullptr, &highest);
+    int highest = 0;
+    for (int y = 0; y < grey.rows; ++y) {
+      const auto* row = grey.ptr<std::uint16_t>(y);
+      highest = std::max<int>(highest, *std::max_element(row, row + grey.cols));
+    }
     grey.convertTo(bytes, CV_8U, highest > 0 ? 255.0 / highest : 1.0);
   }
-  cv::cvtColor(bytes, picture, cv::COLOR_GRAY2BGR);
+  for (int y = 0; y < bytes.rows; ++y) {
+    const std::uint8_t* row = bytes.ptr(y);
+    std::transform(row, row + bytes.cols, picture.ptr<cv::Vec3b>(y), [](auto v) { return cv::Vec3b(v, v, v); });
+  }
   return picture;
 }
 

@@ -26,8 +26,6 @@ struct EGOSGM_EXPORT Tuning {
 
   /// Throws InvalidArgument, naming the size, its value and what is allowed.
   void validate() const;
-
-  bool operator==(const Tuning&) const = default;
 };
 
 /// All of them by name, in the order above.

@@ -205,15 +205,15 @@ inline uint16 joined_bytes(const uchar16 b0, const uchar16 b1, const uchar16 b2,
 
 #if PIXEL_BYTES == 1
 typedef short Sum;
-typedef short16 Sums;
+typedef short16 SumVector;
 #define convert_sums convert_short16
 #else
 typedef int Sum;
-typedef int16 Sums;
+typedef int16 SumVector;
 #define convert_sums convert_int16
 #endif
 typedef struct __attribute__((packed)) {
-  Sums sums;
+  SumVector sums;
 } PackedSums;
 #define SUMS_WIDTH (AT_ONCE + SUMS - 1)
 #define SUMS_VECTORS ((SUMS_WIDTH + 15) / 16)  // the last one overlaps the one before it
@@ -223,7 +223,7 @@ inline void sum_around(const Rows* rows, const int x, Sum* sums) {
 #pragma unroll
   for (int vector = 0; vector < SUMS_VECTORS; ++vector) {
     const int at = min(vector * 16, SUMS_WIDTH - 16);
-    Sums across[SUMS + 2];
+    SumVector across[SUMS + 2];
 #pragma unroll
     for (int row = 0; row < SUMS + 2; ++row) {
       global const Pixel* from = rows->at[row] + x - RADIUS_X + at;
@@ -239,13 +239,13 @@ inline void sum_around(const Rows* rows, const int x, Sum* sums) {
 
 // Eight learned bits of 16 pixels, from the lowest but 8 `byte` on.
 inline uchar16 learned_byte(const Sum* sums, const int byte) {
-  Sums bits = 0;
+  SumVector bits = 0;
 #pragma unroll
   for (int bit = 0; bit < 8; ++bit) {
     const int i = LEARNED - 1 - 8 * byte - bit;
-    const Sums first = ((const PackedSums*)(sums + FIRST_PLACE(i, SUMS_WIDTH)))->sums;
-    const Sums second = ((const PackedSums*)(sums + SECOND_PLACE(i, SUMS_WIDTH)))->sums;
-    bits |= (first < second + (Sums)((Sum)THRESHOLD(i))) & (Sums)((Sum)(1 << bit));
+    const SumVector first = ((const PackedSums*)(sums + FIRST_PLACE(i, SUMS_WIDTH)))->sums;
+    const SumVector second = ((const PackedSums*)(sums + SECOND_PLACE(i, SUMS_WIDTH)))->sums;
+    bits |= (first < second + (SumVector)((Sum)THRESHOLD(i))) & (SumVector)((Sum)(1 << bit));
   }
   return convert_uchar16(bits);
 }

@@ -112,9 +112,11 @@ typedef struct {
   float from, to;
 } Span;
 
-// What the predictions in the 3x3 blocks around it and the coarse match span. `found`: what the predictions in the
-// block and in those above and below it, and the coarse match span. Thin things stand upright: where a frame lost a
-// part of one, the parts above and below it say where to search.
+// What the predictions in the 3x3 blocks around it and the coarse match span, and the whole range where few are
+// predicted: a few beside each other may be wrong together, and what searches near them alone would confirm them, as
+// where texture repeats. `found`: what the predictions in the block and in those above and below it, and the coarse
+// match span. Thin things stand upright: where a frame lost a part of one, the parts above and below it say where to
+// search.
 static inline Span span_around(const ImageSize blocks, const int view, const int x, const int y,
                                const int from_neighbours, const float margin, const int min_count,
                                const float coarse_margin, global const BlockRange* ranges,
@@ -140,13 +142,9 @@ static inline Span span_around(const ImageSize blocks, const int view, const int
   if (has_coarse) both = coarse;
   found[here] = joined(both, upright);
 
-  const bool has_any = from_neighbours && (has_around || has_coarse);
-  Span span = {has_any ? INFINITY : -INFINITY, has_any ? -INFINITY : INFINITY};
-  if (has_any && has_around) {
-    span.from = least - margin;
-    span.to = most + margin;
-  }
-  if (has_any && has_coarse) {
+  const bool is_narrow = from_neighbours && has_around;
+  Span span = {is_narrow ? least - margin : -INFINITY, is_narrow ? most + margin : INFINITY};
+  if (is_narrow && has_coarse) {
     span.from = fmin(span.from, coarse.min - coarse_margin);
     span.to = fmax(span.to, coarse.max + coarse_margin);
   }

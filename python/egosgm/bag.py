@@ -8,7 +8,7 @@ import itertools
 import math
 import os
 import pathlib
-from typing import Any, Callable, Collection, Deque, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Collection, Deque, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -231,6 +231,11 @@ class Bag:
             if types[topic] not in kinds:
                 raise _egosgm.InvalidArgument(f"{self.path}: \"{topic}\" is of type {types[topic]}; its topics of {what}: {there}")
 
+    def find_cameras(self) -> Cameras:
+        with self._opened() as reader:
+            self.cameras = self._find_cameras(reader)
+        return self.cameras
+
     def _first_messages(self, reader: Any, topic: str) -> Iterator[Any]:
         connections = [c for c in reader.connections if c.topic == topic]
         return (reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(connections=connections))
@@ -442,61 +447,3 @@ def _pose_at(times: List[int], poses: List[NDArray[np.float64]], stamp: int) -> 
     result[:3, :3] = rotation_of(*((1 - part) * a + part * b))
     result[:3, 3] = (1 - part) * before[:3, 3] + part * later[:3, 3]
     return result
-
-
-_LOOKED_AT = 8  # motions that are given, beside those of the odometry
-
-
-def _problems(calibration: _egosgm.Calibration, samples: Sequence[Tuple[NDArray[Any], NDArray[Any]]], options: Dict[str, Any]) -> List[str]:
-    """What `egosgm doctor` says of such pairs."""
-    least = int(options["min_disparity"])
-    examination = _egosgm._Examination(calibration, least, least + int(options["disparities"]))
-    for left, right in samples:
-        examination.add(left, right)
-    return [f"{check}: {text}: {remedy}" for verdict, check, text, remedy in examination.findings(len(samples)) if verdict == "problem"]
-
-
-def run(bag: Bag, outputs: Sequence[Any] = (), progress: Optional[bool] = None,
-        on_frame: Optional[Callable[[BagFrame, Any], None]] = None, **options: Any) -> Dict[str, Any]:
-    """Matches all frames of a bag. outputs: of bag_outputs or of viewer. options: those of Pipeline. Returns what happened."""
-    from .drive import FRAMES_PER_LOOK, _bar
-    pipeline = odometry = previous = doubt = None
-    samples: List[Tuple[NDArray[Any], NDArray[Any]]] = []
-    given: List[NDArray[np.float64]] = []
-    found: List[Optional[NDArray[np.float64]]] = []
-    density = 0.0
-    frames = moved = 0
-    for frame in _bar(progress)(bag.frames(), len(bag)):
-        calibration = bag.cameras.calibration
-        if pipeline is None:
-            pipeline = _egosgm.Pipeline(calibration, *bag.cameras.size, **options)
-            odometry = _egosgm.StereoOdometry(calibration)
-            doubt = _egosgm._Doubt(calibration, *bag.cameras.size)
-        if frame.starts_anew:
-            pipeline.reset()
-            odometry.reset()
-            previous = None
-        motion = odometry.process(frame.left, frame.right).motion
-        if frame.world_from_camera is not None and previous is not None:
-            if len(given) < _LOOKED_AT:
-                given.append(np.linalg.inv(frame.world_from_camera) @ previous)
-                found.append(motion.current_from_previous if motion else None)
-            motion = _egosgm.Motion(np.linalg.inv(frame.world_from_camera) @ previous)
-        previous = frame.world_from_camera
-        maps = pipeline.process(frame.left, frame.right, motion, ("disparity", "variance", "reason"))
-        for output in outputs:
-            output.add(frame, maps, motion.current_from_previous if motion else None, calibration)
-        if on_frame:
-            on_frame(frame, maps)
-        if frames % FRAMES_PER_LOOK == 0:
-            least = pipeline.options["min_disparity"]
-            doubt.look_beyond(frame.left, frame.right, least, least + pipeline.options["disparities"])
-        is_narrow = frame.left.dtype == np.uint16 and int(frame.left.max()) < 256
-        doubt.add(maps.report.density, motion is not None, is_narrow)
-        if frames in (0, 3, 10, 30, 100):
-            samples.append((frame.left, frame.right))
-        frames, moved, density = frames + 1, moved + (motion is not None), density + maps.report.density
-    said = [text for text in (doubt.text(), _egosgm._suspect_motions(given, found)) if text]
-    problems = _problems(bag.cameras.calibration, samples, pipeline.options) if doubt.text() else []
-    return {"doubt": "; ".join(said), "problems": problems, "frames": frames, "density": density / max(1, frames), "motions": moved, "calibration": bag.cameras.calibration,
-            "rectified": bag.is_rectified_here, "device": pipeline.device.name, "gaps": bag.gaps}

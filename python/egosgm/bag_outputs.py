@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is made of a bag: a ROS 2 MCAP file, or a folder of maps. egosgm.viewer has a third one."""
+"""What is made of a bag: a ROS 2 MCAP file. egosgm.viewer has another one."""
 import contextlib
 import os
 import pathlib
@@ -11,11 +11,15 @@ from numpy.typing import NDArray
 
 from . import _egosgm
 from .bag import BagFrame
+from .points import cloud_of_maps
 from .ros_images import BODY_FROM_OPTICAL, depth_maps, needs, quaternion_of, ros_disparity, ros_range
 
 
+_MOST_POINTS = 100_000  # of a frame: more are slow to look at, and make large files
+
+
 class McapOutput:
-    """Depth, disparity, variance, odometry and camera infos as a ROS 2 MCAP file, which appears when all of it is there."""
+    """Depth, disparity, variance, points, odometry, tf and camera infos as a ROS 2 MCAP file, which appears when all of it is there."""
 
     def __init__(self, file: pathlib.Path, options: Dict[str, Any]) -> None:
         """options: those of the pipeline, by name."""
@@ -60,7 +64,7 @@ class McapOutput:
 
     def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
         time, types = frame.stamp_ns, self._types
-        header = self._header(time, frame.frame_id)
+        header = self._header(time, frame.frame_id or "egosgm_camera_optical")  # a frame without a name is none in tf
         depth, variance = depth_maps(maps.disparity, maps.variance, calibration)
         self._write("/egosgm/depth", "sensor_msgs/msg/Image", self._image(header, depth, "32FC1"), time)
         self._write("/egosgm/variance", "sensor_msgs/msg/Image", self._image(header, variance, "32FC1"), time)
@@ -81,6 +85,37 @@ class McapOutput:
         if self._last_motion is not None:  # where none was found, the last one is repeated
             self._world_from_camera = self._world_from_camera @ np.linalg.inv(self._last_motion)
         self._write("/egosgm/odom", "nav_msgs/msg/Odometry", self._odometry(header), time)
+        self._write("/tf", "tf2_msgs/msg/TFMessage", self._tf(header), time)
+        self._write("/egosgm/points", "sensor_msgs/msg/PointCloud2", self._points(header, frame.left, maps, calibration), time)
+
+    def _points(self, header: Any, grey: NDArray[Any], maps: Any, calibration: _egosgm.Calibration) -> Any:
+        """Those of `egosgm.point_cloud`, evenly thinned out, in the greys of the image."""
+        types = self._types
+        cloud = cloud_of_maps(maps.disparity, maps.variance, grey, calibration, 0.1, None, None, 80, 1)
+        step = slice(None, None, 1 + len(cloud.points) // _MOST_POINTS)
+        values = np.empty((len(cloud.points[step]), 4), np.float32)
+        values[:, :3] = cloud.points[step]
+        rgb = cloud.colors[step].astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+        values[:, 3] = rgb.astype(np.uint32).view(np.float32)  # as PCL packs it: three bytes of a float
+        fields = [types["sensor_msgs/msg/PointField"](name=name, offset=4 * i, datatype=7, count=1) for i, name in enumerate(("x", "y", "z", "rgb"))]
+        return types["sensor_msgs/msg/PointCloud2"](header=header, height=1, width=len(values), fields=fields, is_bigendian=False, point_step=16,
+                                                    row_step=16 * len(values), data=values.view(np.uint8).reshape(-1), is_dense=True)
+
+    def _tf(self, header: Any) -> Any:
+        """odom to the camera's body, and from there to the images' frame."""
+        types = self._types
+
+        def transform(parent: str, child: str, matrix: NDArray[np.float64]) -> Any:
+            x, y, z, w = quaternion_of(matrix[:3, :3])
+            return types["geometry_msgs/msg/TransformStamped"](
+                header=types["std_msgs/msg/Header"](stamp=header.stamp, frame_id=parent), child_frame_id=child,
+                transform=types["geometry_msgs/msg/Transform"](
+                    translation=types["geometry_msgs/msg/Vector3"](x=matrix[0, 3], y=matrix[1, 3], z=matrix[2, 3]),
+                    rotation=types["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w)))
+
+        body = BODY_FROM_OPTICAL @ self._world_from_camera @ BODY_FROM_OPTICAL.T
+        return types["tf2_msgs/msg/TFMessage"](transforms=[transform("odom", "egosgm_camera", body),
+                                                           transform("egosgm_camera", header.frame_id, BODY_FROM_OPTICAL)])
 
     def _info(self, header: Any, c: _egosgm.Calibration, shift: float, width: int, height: int, region: Any) -> Any:
         cx = c.cx + (c.doffs_px if shift else 0.0)
@@ -116,33 +151,3 @@ class McapOutput:
         self._part.unlink(missing_ok=True)
         with contextlib.suppress(OSError):  # of a full disk
             self._stream.close()
-
-
-class FolderOutput:
-    """disparity/NUMBER.png as the program writes them, or .pfm where KITTI's PNG has no room for the range; and the calibration of the
-    rectified images."""
-
-    def __init__(self, folder: pathlib.Path, options: Dict[str, Any]) -> None:
-        """options: those of the pipeline, by name."""
-        self._folder = folder
-        fits_png = options["min_disparity"] >= 0 and options["min_disparity"] + options["disparities"] <= 256
-        self._extension = "png" if fits_png else "pfm"
-        if os.path.lexists(folder) and not folder.is_dir():
-            raise _egosgm.InvalidArgument(f"{folder}: is no folder: give a new one, or a name that ends in .mcap")
-        if folder.exists() and any(folder.iterdir()):
-            raise _egosgm.InvalidArgument(f"{folder}: holds files already: give a new folder")
-        (folder / "disparity").mkdir(parents=True, exist_ok=True)
-
-    def add(self, frame: BagFrame, maps: Any, motion: Optional[NDArray[np.float64]], calibration: _egosgm.Calibration) -> None:
-        if frame.number == 0:
-            _egosgm.write_calibration(self._folder / "calibration.txt", calibration)
-        _egosgm.write_disparity(self._folder / "disparity" / f"{frame.number:06d}.{self._extension}", maps.disparity)
-
-    def finish(self) -> None:
-        pass
-
-    def give_up(self) -> None:
-        """What was written is whole, and stays."""
-        for folder in (self._folder / "disparity", self._folder):
-            with contextlib.suppress(OSError):  # it is not empty
-                folder.rmdir()

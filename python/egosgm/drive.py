@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
+from .bag import Bag
 from .calibrations import read_calibration
 from .depth import depth_sigma_from_disparity
 from .rectification import StereoRig
-
-FRAMES_PER_LOOK = 50  # for what is nearer than the range
 
 
 @dataclasses.dataclass(frozen=True, repr=False, eq=False)
@@ -26,6 +25,7 @@ class DriveFrame:
     right: NDArray[Any]
     maps: _egosgm.Frame
     odometry: Optional[_egosgm.OdometryResult]
+    motion: Optional[_egosgm.Motion]  # from the frame before
     calibration: Optional[_egosgm.Calibration]
 
     @property
@@ -58,11 +58,6 @@ class DriveFrame:
         return depth_sigma_from_disparity(*self._of_depth("disparity", "variance"))
 
     @property
-    def motion(self) -> Optional[_egosgm.Motion]:
-        """From the frame before."""
-        return self.odometry.motion if self.odometry else None
-
-    @property
     def report(self) -> _egosgm.FrameReport:
         return self.maps.report
 
@@ -75,7 +70,7 @@ class DriveFrame:
 class Drive:
     """What run() gives: iterate over it, as often as you like."""
 
-    def __init__(self, source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
+    def __init__(self, source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
                  calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
                  outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None,
                  progress: Optional[bool] = None, **options: Any) -> None:
@@ -86,6 +81,10 @@ class Drive:
         self.sequence = source if isinstance(source, _egosgm.StereoSequence) else None
         if calibration is None and self.sequence is not None:
             calibration = self.sequence.calibration
+        if isinstance(source, Bag):
+            if calibration is not None:
+                raise _egosgm.InvalidArgument("calibration: a bag has its own: give it to the Bag, as calib")
+            calibration = source.find_cameras().calibration
         if isinstance(calibration, (str, os.PathLike)):
             calibration = read_calibration(calibration)
         if isinstance(calibration, StereoRig):
@@ -98,7 +97,8 @@ class Drive:
         self._odometry_options = (odometry or {}) if motion and calibration is not None else None
         self._begun = False
         # What an iteration has of its own, ready for the next one. Made now where the size is known: what is wrong is said at once.
-        self._spare = [self._tools(*(self.sequence.size if self.sequence is not None else ()))]
+        self._motions()
+        self._spare = [self._pipeline(*self.sequence.size)] if self.sequence is not None else []
 
     def __len__(self) -> int:
         return len(self._source)
@@ -114,7 +114,8 @@ class Drive:
         self._begun = True
         return iter(self._bar(self._frames(), len(self) if hasattr(self._source, "__len__") else None))
 
-    def _pairs(self) -> Iterator[Tuple[int, str, NDArray[Any], NDArray[Any]]]:
+    def _pairs(self) -> Iterator[Tuple[Any, ...]]:
+        """Number, name, images, the camera's pose where it is known, and whether what was before says nothing of this frame."""
         if self.sequence is not None:
             left_out = 0
             for frame in self.sequence.frames:
@@ -126,43 +127,46 @@ class Drive:
                         raise
                     warnings.warn(f"frame {frame.name}: left out: {error}", UserWarning, stacklevel=5)
                     continue
-                yield (frame.number, frame.name, *images)
+                yield (frame.number, frame.name, *images, None, False)
+        elif isinstance(self._source, Bag):
+            for frame in self._source.frames():
+                yield frame.number, f"{frame.number:06d}", frame.left, frame.right, frame.world_from_camera, frame.starts_anew and frame.number > 0
         else:
             for number, pair in enumerate(self._source):
                 if not isinstance(pair, (tuple, list)) or len(pair) != 2:
                     raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}: give (left, right), each an image")
                 # Copies: a camera may use its buffers again before the frame is handed out.
-                yield (number, f"{number:06d}", *(np.array(image) for image in pair))
+                yield (number, f"{number:06d}", *(np.array(image) for image in pair), None, False)
 
-    def _tools(self, width: int = 0, height: int = 0) -> Tuple[Optional[_egosgm.StereoOdometry], Optional[_egosgm.Pipeline]]:
-        odometry = None if self._odometry_options is None else _egosgm.StereoOdometry(self.calibration, **self._odometry_options)
-        return odometry, self._pipeline(width, height) if width else None
+    def _motions(self) -> _egosgm._MotionSource:
+        return _egosgm._MotionSource(None if self._odometry_options is None else self.calibration, **(self._odometry_options or {}))
 
     def _pipeline(self, width: int, height: int) -> _egosgm.Pipeline:
         """Without a calibration, nothing is predicted: any one does."""
         calibration = self.calibration or _egosgm.Calibration(width, width, width / 2, height / 2, 1)
         return _egosgm.Pipeline(calibration, width, height, **self._options)
 
-    def _tell(self, doubt: Optional[_egosgm._Doubt]) -> None:
-        text = doubt.text() if doubt else ""
+    def _tell(self, *doubts: str) -> None:
+        text = "; ".join(filter(None, doubts))
         if text:
-            warnings.warn(f"{text}: `egosgm doctor` tells why, of images in a folder", UserWarning, stacklevel=4)
+            warnings.warn(f"{text}: `egosgm doctor` tells why", UserWarning, stacklevel=4)
 
     def _frames(self) -> Iterator[DriveFrame]:
         """The device matches a frame while the next one is read and its motion is found. Iterations share nothing, so that each may end
         where it likes, and two may run at once."""
-        odometry, pipeline = self._spare.pop() if self._spare else self._tools(*(self.sequence.size if self.sequence is not None else ()))
-        pairs, under_way, failure, doubt, looked = self._pairs(), None, None, None, 0
+        motions, pipeline = self._motions(), self._spare.pop() if self._spare else None
+        pairs, under_way, failure, doubt = self._pairs(), None, None, None
         try:
             while True:
                 next_one = None
                 try:
-                    for number, name, left, right in pairs:
-                        found = odometry.process(left, right) if odometry else None
+                    for number, name, left, right, pose, starts_anew in pairs:
+                        found = motions.next(left, right, pose, starts_anew)
                         if pipeline is None:
                             pipeline = self._pipeline(*np.shape(left)[1::-1])
-                        pipeline.submit(left, right, found.motion if found else None, self._outputs)
                         next_one = number, name, left, right, found
+                        if not starts_anew:
+                            pipeline.submit(left, right, found.motion, self._outputs)
                         break
                 except Exception as error:  # what is under way does not suffer from a next frame that is none
                     failure = error
@@ -170,28 +174,27 @@ class Drive:
                     number, name, left, right, found = under_way
                     maps = pipeline.collect()
                     if doubt is None:
-                        doubt = _egosgm._Doubt(self.calibration if odometry else None, *np.shape(left)[1::-1])
-                    is_narrow = left.dtype == np.uint16 and int(left.max(initial=0)) < 256
-                    if looked % FRAMES_PER_LOOK == 0:
                         options = pipeline.options
-                        least = options["min_disparity"]
-                        doubt.look_beyond(left, right, least, least + options["disparities"])
-                    looked += 1
-                    doubt.add(maps.report.density, found is not None and found.motion is not None, is_narrow)
-                    yield DriveFrame(number, name, left, right, maps, found, self.calibration)
+                        doubt = _egosgm._Doubt(None if self._odometry_options is None else self.calibration, options["min_disparity"],
+                                               options["disparities"])
+                    doubt.add(left, right, maps.report, found.motion is not None)
+                    odometry = None if self._odometry_options is None else found.odometry
+                    yield DriveFrame(number, name, left, right, maps, odometry, found.motion, self.calibration)
                 if failure:
                     raise failure
                 under_way = next_one
                 if under_way is None:
-                    self._tell(doubt)
+                    self._tell(doubt.text() if doubt else "", motions.doubt())
                     return
+                if starts_anew:
+                    pipeline.reset()
+                    pipeline.submit(left, right, under_way[4].motion, self._outputs)
         finally:
             while pipeline and pipeline.under_way:
                 pipeline.collect()
-            for tool in (odometry, pipeline):
-                if tool:
-                    tool.reset()
-            self._spare = [(odometry, pipeline)]
+            if pipeline:
+                pipeline.reset()
+                self._spare = [pipeline]
 
 
 def _bar(progress: Optional[bool]):
@@ -207,7 +210,7 @@ def _bar(progress: Optional[bool]):
     return lambda frames, count: tqdm(frames, total=count, unit=" frames", disable=False if progress else None)
 
 
-def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
+def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Bag, Iterable[Tuple[NDArray[Any], NDArray[Any]]]],
         calibration: "_egosgm.Calibration | str | os.PathLike[str] | None" = None, *, frames: str = "", motion: bool = True,
         outputs: Union[str, Sequence[str]] = ("disparity", "variance"), odometry: Optional[Dict[str, Any]] = None,
         progress: Optional[bool] = None, **options: Any) -> Drive:
@@ -216,7 +219,7 @@ def run(source: Union[str, "os.PathLike[str]", _egosgm.StereoSequence, Iterable[
         for frame in egosgm.run("drive/"):
             print(frame, frame.disparity, frame.depth, frame.depth_sigma)
 
-    source: a folder as open_folder takes it, a StereoSequence, or pairs of rectified images, grey or colour (RGB).
+    source: a folder as open_folder takes it, a StereoSequence, an egosgm.bag.Bag, or pairs of rectified images, grey or colour (RGB).
     calibration: a Calibration, or a file as read_calibration takes it; without any there are disparities, but no depth and
     no odometry.
     frames: "7:10" of a folder. motion=False: no odometry, so nothing is predicted. outputs: names of maps, found in

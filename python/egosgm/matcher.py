@@ -9,14 +9,17 @@ from . import _egosgm
 
 
 class Matcher:
-    """In place of cv2.StereoSGBM: compute(left, right) gives int16, 16 steps a pixel, (min_disparity - 1) * 16 where there is none."""
+    """In place of cv2.StereoSGBM: compute(left, right) gives int16, 16 steps a pixel, (min_disparity - 1) * 16 where there is none.
+
+    Each pair is matched alone, with eight paths unless `paths` says otherwise. All else is for Pipeline: device, preset and its options.
+    """
 
     def __init__(self, min_disparity: int = 0, disparities: int = 128, *, device: str = "", preset: str = "default", **options: Any) -> None:
         if not (min_disparity > -2047 and min_disparity + disparities <= 2047):
             raise _egosgm.InvalidArgument(f"disparities {min_disparity} to {min_disparity + disparities - 1} do not fit into 16 bits with 16 steps "
                                           "a pixel; Pipeline gives float")
         self.min_disparity, self.disparities = min_disparity, disparities
-        self._options = {"device": device, "preset": preset, **options, "min_disparity": min_disparity, "disparities": disparities, "temporal": False}
+        self._options = {"device": device, "preset": preset, "paths": 8, **options, "min_disparity": min_disparity, "disparities": disparities, "temporal": False}
         self._pipeline: Optional[_egosgm.Pipeline] = None
         self._made_for: Tuple[Any, ...] = ()
 
@@ -24,11 +27,12 @@ class Matcher:
         return f"<Matcher of {self.disparities} disparities from {self.min_disparity}>"
 
     def compute(self, left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.int16]:
-        """A rectified pair, H x W, uint8 or uint16."""
-        made_for = np.shape(left), np.asarray(left).dtype
+        """A rectified pair of uint8 or uint16: grey, H x W, or colour as cv2.imread gives it, H x W x 3, BGR."""
+        left, right = (image[..., ::-1] if image.ndim == 3 and image.shape[2] == 3 else image for image in map(np.asarray, (left, right)))
+        made_for = left.shape[:2], left.dtype
         if self._pipeline is None or made_for != self._made_for:
             if len(made_for[0]) != 2:
-                raise _egosgm.InvalidArgument(f"left is an array of the shape {made_for[0]}: give a grey image, H x W")
+                raise _egosgm.InvalidArgument(f"left is an array of the shape {made_for[0]}: give an image, H x W or H x W x 3")
             height, width = made_for[0]
             camera = _egosgm.Calibration(1000, 1000, width / 2, height / 2, 1)  # nothing depends on it without prediction
             self._pipeline, self._made_for = _egosgm.Pipeline(camera, width, height, **self._options), made_for

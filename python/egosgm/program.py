@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `egosgm`: tools in Python (tools.json lists them), and the program in C++ for all others."""
+"""The command `egosgm`: tools in Python (tools.json lists them), and those in C++ by the module."""
 import contextlib
 import importlib
 import json
@@ -39,7 +39,7 @@ def _reads_itself(calib: str) -> bool:
 
 
 def with_calibration(arguments: List[str]) -> List[str]:
-    """The arguments with --calib in a form that the program reads, in a file of memory alone that it inherits. Throws InvalidArgument."""
+    """The arguments with --calib in a form that the program reads, in a file of memory alone. Throws InvalidArgument."""
     from . import _egosgm, calibrations
     place, calib = _value_of(arguments, "--calib")
     if place < 0 or not (os.path.isfile(calib) or os.path.isdir(calib)) or _reads_itself(calib):  # a pipe can be read once
@@ -47,7 +47,7 @@ def with_calibration(arguments: List[str]) -> List[str]:
     found = calibrations.find(calib)
     if not isinstance(found, _egosgm.Calibration):
         raise _egosgm.InvalidArgument(f"{calib}: is of raw images, and `egosgm {arguments[0]}` takes rectified ones: `egosgm rectify` makes them, by it")
-    file = f"/proc/self/fd/{os.memfd_create('calib.txt', 0)}"
+    file = f"/proc/self/fd/{os.memfd_create('calib.txt')}"
     _egosgm.write_calibration(file, found)
     changed = list(arguments)
     changed[place] = f"--calib={file}" if changed[place].startswith("--calib=") else file
@@ -55,9 +55,7 @@ def with_calibration(arguments: List[str]) -> List[str]:
 
 
 def _module_of(arguments: Sequence[str]) -> Optional[str]:
-    """The package's module whose main(arguments) does what is asked for; None where the C++ program does it."""
-    if arguments[:1] == ["run"] and any(a.split("=")[0] == "--bag" for a in arguments):
-        return "bag_program"
+    """The package's module whose main(arguments) does what is asked for; None where C++ does it."""
     tools = json.loads(pathlib.Path(__file__).with_name("tools.json").read_text())
     return tools[arguments[0]]["module"] if arguments and arguments[0] in tools else None
 
@@ -79,10 +77,23 @@ def _output_error() -> Optional[OSError]:
     return None
 
 
-def _outcome(arguments: Sequence[str], module: str) -> Tuple[int, str]:
+def _run_program(arguments: List[str]) -> int:
+    """A command in C++, in this process."""
+    from . import _egosgm, bag_program
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)  # Python's handlers would wait for C++ to come back
+    given = {argument.split("=")[0] for argument in arguments}
+    arguments = arguments if "--bag" in given else with_calibration(arguments)
+    return _egosgm._main([os.fsencode(argument) for argument in arguments], bag_program)
+
+
+def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]:
     """A tool's exit code, and what is to be said of it."""
     from . import _egosgm
     try:
+        if module is None:
+            return _run_program(list(arguments)), ""
         return importlib.import_module("." + module, __package__).main(list(arguments[1:])), ""
     except SystemExit as end:  # of --help
         return int(end.code or 0), ""
@@ -103,15 +114,11 @@ def _outcome(arguments: Sequence[str], module: str) -> Tuple[int, str]:
 
 
 def run_tool(arguments: Sequence[str]) -> int:
-    """Runs a tool that is written in Python, and returns its exit code. Never calls the C++ program."""
+    """Runs a command, and returns its exit code. Never calls the C++ program."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
     _print_any_name()
-    module = _module_of(arguments)
-    if module is None:
-        say(f"error: {' '.join(arguments[:1])}: this version of the Python package has no such tool: install the program's own version")
-        return 1
-    code, told = _outcome(arguments, module)
+    code, told = _outcome(arguments, _module_of(arguments))
     error = _output_error()
     if error is not None and not isinstance(error, BrokenPipeError) and code in (0, 1):  # a reader that goes has read enough
         code, told = 1, f"error: the standard output cannot be written: {error.strerror}"
@@ -120,34 +127,8 @@ def run_tool(arguments: Sequence[str]) -> int:
     return code
 
 
-def _program() -> Optional[pathlib.Path]:
-    """The C++ program that came with the package, or that was built or installed beside it."""
-    package = pathlib.Path(__file__).resolve().parent
-    places = [package / "bin/egosgm", package.parents[1] / "apps/egosgm"]
-    if package.parent.name == "dist-packages":
-        places.append(package.parents[3] / "bin/egosgm")
-    for place in places:
-        with contextlib.suppress(OSError):
-            with place.open("rb") as file:
-                if file.read(4) == b"\x7fELF":  # no script, which could be this one
-                    return place
-    return None
-
-
 def main() -> None:
-    arguments = sys.argv[1:]
-    if _module_of(arguments):
-        sys.exit(run_tool(arguments))
-    program = _program()
-    if program is None:
-        sys.exit("egosgm: error: the program is neither in this package nor beside it: pip install the wheel, which has it (docs/python.md)")
-    from . import _egosgm
-    try:
-        arguments = with_calibration(arguments)
-    except (_egosgm.InvalidArgument, _egosgm.IoError, OSError) as error:
-        say(f"error: {error}")
-        sys.exit(2 if isinstance(error, _egosgm.InvalidArgument) else 1)
-    os.execv(program, ["egosgm", *arguments])
+    sys.exit(run_tool(sys.argv[1:]))
 
 
 if __name__ == "__main__":

@@ -20,6 +20,18 @@ import cv2
 _UNITS = {None: None, "m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
+def _unit_m(unit: Optional[str]) -> Optional[float]:
+    if unit in _UNITS:
+        return _UNITS[unit]
+    try:
+        metres = decimal(unit or "")
+    except ValueError:
+        metres = 0.0
+    if not metres > 0:
+        raise _egosgm.InvalidArgument(f"--unit {unit}: choose m, cm or mm, or give the metres of one unit, above 0")
+    return metres
+
+
 def _parser() -> Parser:
     parser = Parser("rectify", description="Make a rectified sequence of raw pairs, side-by-side images or videos, EuRoC folders, lists")
     add = parser.add_argument_group("input (one of)").add_argument
@@ -35,7 +47,7 @@ def _parser() -> Parser:
         "XML or JSON), a folder with intrinsics.yml and extrinsics.yml, ROS's, Kalibr's; or, for images that are rectified already, what "
         "`run --calib` reads")
     add("--fisheye", action="store_true", help="OpenCV's calibration is one of cv::fisheye: D1 and D2 hold four coefficients of the angle")
-    add("--unit", metavar="m|cm|mm", help="unit of T in OpenCV's calibration; without: m")
+    add("--unit", metavar="m|cm|mm|METRES", help="unit of T in OpenCV's calibration; where it counts a board's squares, the side of a square [m]; without: m")
     add("--alpha", type=decimal, default=0.0, metavar="A", help="0: only pixels that the raw images have; 1: all of theirs, with black borders; without: 0")
     add("--out", required=True, metavar="DIR", help="new folder: image_0 and image_1 (colour: image_2, image_3), calib.txt, times.txt, valid.png")
     add("--quiet", action="store_true", help="no progress, only errors")
@@ -53,7 +65,7 @@ class _Rectifier:
             return
         if not given.calib:
             raise _egosgm.InvalidArgument("no calibration: give --calib FILE")
-        found = find(given.calib, _UNITS[given.unit], given.fisheye)
+        found = find(given.calib, given.unit, given.fisheye)
         if isinstance(found, StereoRig):
             self.rig = found
         elif given.fisheye:
@@ -140,8 +152,7 @@ def main(arguments: Sequence[str]) -> int:
         raise _egosgm.InvalidArgument(f"--alpha {given.alpha:g}: choose from 0 to 1")
     if given.pair_by not in ("name", "order"):
         raise _egosgm.InvalidArgument(f"--pair-by {given.pair_by}: choose name or order")
-    if given.unit not in _UNITS:
-        raise _egosgm.InvalidArgument(f"--unit {given.unit}: choose m, cm or mm")
+    given.unit = _unit_m(given.unit)
     if given.euroc and os.path.isdir(os.path.join(given.euroc, "mav0")):
         given.euroc = os.path.join(given.euroc, "mav0")
     pairs = open_pairs(given.left, given.right, given.side_by_side, given.list, given.euroc, given.pair_by == "order")

@@ -6,7 +6,8 @@ import json
 import operator
 import pathlib
 import re
-from typing import Any, Dict, List, Sequence
+import zlib
+from typing import Any, Dict, List, Optional, Sequence
 
 import cv2
 import numpy
@@ -93,6 +94,53 @@ def _figures(counts: Any) -> Dict[str, Any]:
     return {name.replace("mae_px", "mae"): None if value != value else value for name, value in values.items()}
 
 
+def _doubts(text: str) -> List[Dict[str, str]]:
+    """What a run doubts, one by one: "what (remedy), what; what" as `egosgm run` says it."""
+    doubts = []
+    for part in re.split(r"[,;] (?![^(]*\))", text) if text else []:
+        what, _, remedy = part.removesuffix(")").rpartition(" (") if part.endswith(")") else (part, "", "")
+        doubts.append({"what": what, "remedy": f"run it with {remedy}" if remedy.startswith("--") else remedy or "`egosgm doctor` tells why"})
+    return doubts
+
+
+_SIGMA_LEAST_PX, _SIGMA_STEP = 0.01, 1.04  # a byte's scale; 0: none
+
+
+class _Values:
+    """A frame's maps as the page reads them under the mouse: 16 bits of disparity a pixel, 8 of its sigma, 8 of its reason."""
+
+    def __init__(self, folder: pathlib.Path, name: str, most_width: int) -> None:
+        exact = folder / "disparity" / f"{name}.pfm"
+        whole = _egosgm.read_disparity(exact if exact.exists() else exact.with_suffix(".png"))
+        self._size, self._folder, self._name = whole.shape, folder, name
+        width = min(whole.shape[1], most_width)
+        height = max(1, whole.shape[0] * width // whole.shape[1])
+        self._place = numpy.ix_(*((2 * numpy.arange(shown) + 1) * own // (2 * shown) for shown, own in zip((height, width), whole.shape)))
+        disparity = whole[self._place]
+        valid = disparity != _egosgm.INVALID_DISPARITY
+        least, largest = (float(end(disparity[valid])) if valid.any() else 0.0 for end in (numpy.min, numpy.max))
+        step = max(1 / 256, (largest - least) / 65534)
+        planes = [numpy.where(valid, numpy.rint((disparity - least) / step) + 1, 0).astype("<u2")]
+        variance, reason = self._of("variance", ".pfm", _egosgm.read_disparity), self._of("reason", ".png", _egosgm.read_grey)
+        if variance is not None:
+            known = valid & (variance > 0)
+            code = numpy.log(numpy.sqrt(numpy.where(known, variance, 1)) / _SIGMA_LEAST_PX) / numpy.log(_SIGMA_STEP)
+            planes.append(numpy.where(known, numpy.clip(numpy.rint(code), 0, 254) + 1, 0).astype(numpy.uint8))
+        if reason is not None:
+            planes.append(reason.astype(numpy.uint8))
+        self.json = {"width": width, "height": height, "least": least, "step": step, "sigma": variance is not None, "reason": reason is not None,
+                     "data": base64.b64encode(zlib.compress(b"".join(plane.tobytes() for plane in planes), 9)).decode()}
+
+    def _of(self, kind: str, extension: str, read: Any) -> Optional[numpy.ndarray]:
+        file = self._folder / kind / (self._name + extension)
+        if not file.exists():
+            return None
+        found = read(file)
+        if found.shape != self._size:
+            raise _egosgm.InvalidArgument(f"{file}: is {found.shape[1]}x{found.shape[0]}, while the disparity is {self._size[1]}x{self._size[0]}")
+        return found[self._place]
+
+
 class _Frame:
     def __init__(self, place: int, entry: Dict[str, Any]) -> None:
         self.place = place  # among all of the run
@@ -113,7 +161,7 @@ class _Page:
         self._run = _read_run(self._folder)
         self._of_run = [_Frame(place, entry) for place, entry in enumerate(self._run["frames"])]
         self._panels = _egosgm._FramePanels(operator.index(self._run["options"].get("disparities", 128)))
-        self._notes: List[str] = []
+        self._notes = [str(note) for note in self._run.get("notes", [])]
         first, last = _egosgm._parse_frame_range(text_argument(given.frames or ""))
         self._frames = [f for f in self._of_run if (first is None or f.number >= first) and (last is None or f.number <= last)]
         if not self._frames:
@@ -124,6 +172,8 @@ class _Page:
         data: Dict[str, Any] = {**self._truth(), **self._pictures(), **self._paths()}
         data["changed"] = self._changed_options()
         data["notes"] = self._notes
+        data["doubts"] = _doubts(str(self._run.get("doubt", "")))
+        data["scales"] = {"sigma_least_px": _SIGMA_LEAST_PX, "sigma_step": _SIGMA_STEP, "reasons": _egosgm.REASONS}
         data["run"] = _with_short_paths({**self._run, "frames": [frame.entry for frame in self._frames]})
         text = json.dumps(data).replace("<", "\\u003c")  # nothing in a text may end the script element
         return pathlib.Path(__file__).with_name("report.html").read_text().replace("@DATA@", text, 1)
@@ -176,7 +226,8 @@ class _Page:
                 layers.append({"name": name, "picture": _data_uri(_narrowed(picture, self._given.picture_width), "png" if has_edges else "jpeg")})
                 if bar is not None:
                     bars[name] = _data_uri(bar, "png")
-            pictures.append({"frame": frame.number, "name": frame.name, "layers": layers})
+            pictures.append({"frame": frame.number, "name": frame.name, "layers": layers,
+                             "values": _Values(self._folder, frame.name, self._given.picture_width).json})
         if not self._frames[0].left:
             self._notes.append("The left images are not where the report of the run says, so they are not shown.")
         for kind in ("variance", "search"):

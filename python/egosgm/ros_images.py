@@ -228,8 +228,13 @@ def _rig(left: Any, right: Any, shift: float) -> StereoRig:
 def depth_maps(disparity: NDArray[np.float32], variance: NDArray[np.float32],
                calibration: _egosgm.Calibration) -> Tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Depth [m] and its variance [m^2], NaN where there is none (REP 118)."""
+    return _egosgm.depth_from_disparity(disparity, calibration), variance_of_depth(disparity, variance, calibration)
+
+
+def variance_of_depth(disparity: NDArray[np.float32], variance: NDArray[np.float32], calibration: _egosgm.Calibration) -> NDArray[np.float32]:
+    """[m^2], NaN where there is none."""
     with np.errstate(over="ignore"):
-        return _egosgm.depth_from_disparity(disparity, calibration), depth_sigma_from_disparity(disparity, variance, calibration) ** 2
+        return depth_sigma_from_disparity(disparity, variance, calibration) ** 2
 
 
 def ros_range(options: Dict[str, Any], calibration: _egosgm.Calibration) -> Tuple[float, float]:

@@ -69,7 +69,7 @@ class Installed(unittest.TestCase):
         for program in PROGRAMS:
             module = "egosgm" if program == "core" else "egosgm-vision"
             flags = self.assert_runs("pkg-config", "--cflags", "--libs", module, env=environment).split()
-            self.assert_runs(CXX, "-std=c++20", SOURCE / f"{program}.cpp", *flags, "-o", self.folder / program)
+            self.assert_runs(CXX, "-std=c++17", SOURCE / f"{program}.cpp", *flags, "-o", self.folder / program)
             self.assert_runs(self.folder / program, env=environment, cwd=self.folder)
 
     def test_the_shared_libraries_show_only_what_is_public_and_carry_their_version(self):
@@ -85,7 +85,7 @@ class Installed(unittest.TestCase):
         flags = self.assert_runs("pkg-config", "--cflags", "--libs", "egosgm", env=dict(
             os.environ, PKG_CONFIG_PATH=str(self.library_folder() / "pkgconfig"))).split()
         program = self.folder / "without_opencv"
-        self.assert_runs(CXX, "-std=c++20", SOURCE / "core.cpp", *flags, "-o", program)  # odometry and pipeline
+        self.assert_runs(CXX, "-std=c++17", SOURCE / "core.cpp", *flags, "-o", program)  # odometry and pipeline
         needed = self.assert_runs("ldd", program, env=dict(os.environ, LD_LIBRARY_PATH=str(self.library_folder())))
         self.assertIn("libegosgm.so", needed)
         for library in ("opencv", "libpng", "libjpeg", "libisal"):

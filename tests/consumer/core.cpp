@@ -16,7 +16,7 @@ int main() try {
   for (std::size_t i = 0; i + kShift_px < left.size(); ++i) right[i] = left[i + kShift_px];
   egosgm::PipelineOptions options;
   egosgm::set_option(options, "disparities", "16");
-  const egosgm::Calibration calibration{.fx = 300, .fy = 300, .cx = 160, .cy = 80, .baseline_m = 0.5};
+  const egosgm::Calibration calibration{300, 300, 160, 80, 0.5};
   egosgm::Pipeline pipeline(calibration, kWidth, kHeight, options);
   egosgm::StereoOdometry odometry(calibration);
   std::vector<float> disparity(left.size());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <egosgm/error.h>
 #include <egosgm/vision/disparity_io.h>
+#include <egosgm/vision/matcher.h>
 #include <egosgm/vision/odometry.h>
 #include <egosgm/vision/opencv.h>
 #include <egosgm/vision/synthetic.h>
@@ -8,12 +9,19 @@
 #include <cstdio>
 
 int main() try {
-  egosgm::vision::SyntheticSequence street({.frames = 1, .width = 64, .height = 32, .supersampling = 1});
+  egosgm::vision::SyntheticOptions options;
+  options.frames = options.supersampling = 1;
+  options.width = 64;
+  options.height = 32;
+  egosgm::vision::SyntheticSequence street(options);
   egosgm::vision::StereoOdometry odometry(street.calibration());
   const egosgm::vision::SyntheticFrame frame = street.render(0);
   egosgm::Pipeline pipeline(street.calibration(), 64, 32);
   const auto maps = egosgm::vision::process(pipeline, frame.left, frame.right, {});
   if (maps.report.density <= 0) return 1;
+  const cv::Ptr<cv::StereoMatcher> matcher = cv::makePtr<egosgm::vision::Matcher>();  // without OpenCV's calib3d
+  cv::Mat steps;
+  matcher->compute(frame.left, frame.right, steps);
   egosgm::vision::write_disparity("street.pfm", maps.disparity);
   egosgm::vision::read_disparity("no such file.png");
   return 1;

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm doctor: sequences that are broken in just one way. Environment as for program_case.py."""
+import json
 import pathlib
+import shutil
 import unittest
 
 import numpy
 
-from input_case import InputTest, read_grey, sampled, write_grey
+from input_case import InputTest, read_grey, rotation, sampled, write_grey
 from program_case import DATA, FRAMES, HEIGHT, WIDTH, png
 
 
@@ -112,10 +114,74 @@ class Doctor(InputTest):
             write_grey(file, numpy.full((HEIGHT, WIDTH), 60))
         self.assert_only_problem("matches", street)
 
+    def test_the_same_image_on_both_sides(self):
+        street = self.broken_street()
+        for file in (street / "image_0").iterdir():
+            shutil.copy(file, street / "image_1" / file.name)
+        self.assertIn("are the same", self.assert_only_problem("matches", street)["text"])
+
+    def test_a_pair_that_cannot_be_read_costs_itself_alone(self):
+        street = self.broken_street()
+        (street / "image_1/000002.png").write_bytes((street / "image_1/000002.png").read_bytes()[:500])
+        finding = self.assert_only_problem("files", street)
+        self.assertIn("frame 000002", finding["text"])
+
+    def test_names_that_are_times_are_the_times(self):
+        for step, start in ((50_000_000, 1403636579763555584), (50_000, 1403636579763555)):
+            folder = self.new_folder() / "named"
+            for side, source in (("left", "image_0"), ("right", "image_1")):
+                (folder / side).mkdir(parents=True)
+                for i in range(FRAMES):
+                    shutil.copy(self.street / source / f"{i:06d}.png", folder / side / f"{start + step * (i + 2 * (i > 1))}.png")
+            shutil.copy(self.street / "calib.txt", folder / "calib.txt")
+            finding = self.assert_only_problem("times", folder)
+            self.assertIn("0.05 s between two frames", finding["text"])
+            self.assertIn(f"0.15 s after frame {start + step}", finding["text"])
+
+    def test_what_only_few_points_say_is_no_range(self):
+        """Nearly all of the image is grey: what is left are a few points at the horizon."""
+        street = self.broken_street()
+        for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+            image = read_grey(file)
+            blank = numpy.full_like(image, 128)
+            blank[38:52, 130:190] = image[38:52, 130:190]
+            write_grey(file, blank)
+        findings = self.examine(street, "--disparities", 4)
+        self.assertEqual(findings["texture"]["verdict"], "note")
+        self.assertNotIn("range", findings)
+
+    def raw_rig(self, name, **changes):
+        """A file of another program, of cameras whose images need no rectification but for `changes`."""
+        f, cx, cy, baseline = self.calibration()
+        matrix = [[f, 0, cx], [0, f, cy], [0, 0, 1]]
+        file = self.new_folder() / name
+        file.write_text(json.dumps({"K1": matrix, "D1": [0, 0, 0, 0], "K2": matrix, "D2": [0, 0, 0, 0], "R": numpy.eye(3).tolist(), "T": [-baseline, 0, 0], **changes}))
+        return file
+
+    def test_raw_images_are_rectified_by_their_calibration(self):
+        patterns = "--left", self.street / "image_0/%06d.png", "--right", self.street / "image_1/%06d.png"
+        self.assertEqual(self.examine(*patterns, "--calib", self.raw_rig("rig.json"))["calibration"]["verdict"], "ok")
+        turned = self.raw_rig("turned.json", R=rotation((1, 0, 0), 1).tolist())  # which these cameras are not
+        finding = self.assert_only_problem("rows", *patterns, "--calib", turned)
+        self.assertGreater(abs(float(finding["text"].split()[2])), 2)
+        self.assertIn("rectified here by", self.examine(*patterns, "--calib", turned, code=2)["images"]["text"])
+
+    def test_a_wrong_sign_hides_nothing_else(self):
+        street = self.shifted(2)
+        f, cx, cy, baseline = self.calibration()
+        calib = street / "wrong.txt"
+        calib.write_text(f"fx = {f}\nfy = {f}\ncx = {cx}\ncy = {cy}\nbaseline_m = {-baseline}\n")
+        findings = self.examine("--left", street / "image_0/%06d.png", "--right", street / "image_1/%06d.png", "--calib", calib, code=2)
+        self.assertEqual([name for name, finding in findings.items() if finding["verdict"] == "problem"], ["calibration", "rows"])
+        self.assertIn("exchange", findings["calibration"]["remedy"])
+
     def test_wrong_arguments(self):
         self.assert_refused(["doctor", self.street, "--samples", 0], "--samples 0")
         self.assert_refused(["doctor", self.street, "--disparities", 0], "disparities")
         self.assert_refused(["doctor", self.folder / "nowhere"], "nowhere")
+        self.assert_refused(["doctor", "--bag", self.folder / "nowhere"], "nowhere")
+        self.assert_refused(["doctor", self.street, "--bag", self.folder], "one input")
+        self.assert_refused(["doctor", self.street, "--left-topic", "/left"], "--bag FILE")
 
 
 @unittest.skipUnless(DATA and pathlib.Path(DATA).is_dir(), "no real data")

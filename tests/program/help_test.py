@@ -11,7 +11,7 @@ import unittest
 
 from program_case import PROGRAM, SOURCE, ProgramTest, egosgm
 
-COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-poses", "tune", "report", "doctor", "rectify")
+COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-poses", "tune", "report", "doctor", "rectify", "calibrate")
 
 
 class Help(ProgramTest):
@@ -75,7 +75,7 @@ class Help(ProgramTest):
             (folder / name).write_text("raise SystemExit(77)")
         if not (pathlib.Path(PROGRAM).parents[1] / "python/egosgm/program.py").exists():
             self.skipTest("built without the Python package")
-        self.assert_refused(["run", "--bag"], "--bag", "expected one argument", cwd=folder)
+        self.assert_refused(["run", "--bag"], "--bag: 1 required BAG missing", cwd=folder)
         self.assertIn("--left-topic", self.assert_works("run", "--bag=x", "--help", cwd=folder))
         with open("/dev/full", "w") as full:
             done = subprocess.run([PROGRAM, "run", "--bag=x", "--help"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=600)

@@ -5,6 +5,7 @@ import html.parser
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import tempfile
@@ -312,13 +313,61 @@ class ReportInBrowser(ReportTest):
 
         sources = lambda: browser.evaluate("['above', 'below'].map(id => document.getElementById(id).src)")
         pictures = self.data(self.page)["pictures"]
-        self.assertEqual(sources(), [pictures[0]["layers"][i]["picture"] for i in (0, 1)])
+        self.assertEqual(sources(), [pictures[-1]["layers"][i]["picture"] for i in (0, 1)])  # opens on the last one
         for i, name in enumerate(LAYERS):
             browser.evaluate(f"{{ const s = document.getElementById('right-layer'); s.value = {json.dumps(name)}; s.dispatchEvent(new Event('change')) }}")
-            self.assertEqual(sources()[1], pictures[0]["layers"][i]["picture"])
+            self.assertEqual(sources()[1], pictures[-1]["layers"][i]["picture"])
         browser.evaluate("{ const f = document.getElementById('frame'); f.value = 2; f.dispatchEvent(new Event('input')) }")
         self.assertEqual(sources(), [pictures[2]["layers"][i]["picture"] for i in (0, len(LAYERS) - 1)])
         self.assertEqual(browser.evaluate("document.getElementById('frame-name').textContent"), "000002")
+        self.assert_no_errors()
+
+    def test_the_mouse_tells_what_the_maps_say(self):
+        import cv2  # which the tool needs, too
+        self.browser.open(self.page)
+        name, run = f"{FRAMES - 1:06d}", self.report(self.out)
+        maps = {kind: cv2.imread(str(next((self.out / kind).glob(name + ".*"))), cv2.IMREAD_UNCHANGED) for kind in ("disparity", "variance", "reason")}
+        box = self.browser.evaluate("(() => { document.getElementById('stage').scrollIntoView(); "
+                                    "const b = document.getElementById('stage').getBoundingClientRect(); return [b.x, b.y, b.width, b.height] })()")
+        places = [(10 + 30 * i, 5 + 9 * i) for i in range(10)]
+        places.append(next((x, y) for y in range(HEIGHT) for x in range(WIDTH) if not maps["disparity"][y, x]))
+        camera, reasons = run["calibration"], run["reasons"]
+        for x, y in places:
+            reading = ""
+            while not reading.startswith("x "):  # the maps are unpacked meanwhile
+                self.browser.mouse("mouseMoved", box[0] + (x + 0.5) / WIDTH * box[2], box[1] + (y + 0.5) / HEIGHT * box[3], buttons=0)
+                reading = self.browser.evaluate("document.getElementById('reading').textContent")
+            while not reading.startswith(f"x {x}, y {y};"):
+                reading = self.browser.evaluate("document.getElementById('reading').textContent")
+            self.assertTrue(reading.endswith("; reason: " + reasons[maps["reason"][y, x]]), reading)
+            disparity = maps["disparity"][y, x] / 256
+            if not disparity:
+                self.assertIn("; no disparity;", reading)
+                continue
+            found = [float(number) for number in re.findall(r"[\d.e+-]+(?= |$)", reading.split("disparity")[1])]
+            depth, sigma = camera["fx"] * camera["baseline_m"] / disparity, maps["variance"][y, x] ** 0.5
+            for value, expected, near in zip(found, (disparity, sigma, depth, depth * sigma / disparity), (0.002, 0.1, 0.002, 0.1), strict=True):
+                self.assertAlmostEqual(value / expected, 1, delta=near, msg=reading)
+        self.assert_no_errors()
+
+    def test_a_doubt_and_its_remedy_stand_apart(self):
+        out = self.new_folder() / "out"
+        shutil.copytree(self.out, out)
+        (out / "report.html").unlink()
+        report = self.report(out)
+        report["doubt"] = "density 24 % in the mean, 62 % of the image is nearer than the range (--disparities 128), the principal point is far (cx 1, cy 2) (scale fx, fy); poses in another order"
+        report["notes"] = ["1 left image has no partner"]
+        (out / "report.json").write_text(json.dumps(report))
+        self.assert_works("report", out)
+        self.assertEqual(self.data(out / "report.html")["doubts"], [
+            {"what": "density 24 % in the mean", "remedy": "`egosgm doctor` tells why"},
+            {"what": "62 % of the image is nearer than the range", "remedy": "run it with --disparities 128"},
+            {"what": "the principal point is far (cx 1, cy 2)", "remedy": "scale fx, fy"},
+            {"what": "poses in another order", "remedy": "`egosgm doctor` tells why"}])
+        self.assertEqual(self.data(out / "report.html")["notes"][0], "1 left image has no partner")
+        self.browser.open(out / "report.html")
+        self.assertEqual(self.browser.evaluate("document.querySelectorAll('#notes .note')[1].textContent"),
+                         "62 % of the image is nearer than the rangeRemedy: run it with --disparities 128")
         self.assert_no_errors()
 
     def test_a_short_run_without_truth(self):

@@ -77,7 +77,7 @@ class WrongArguments(ProgramTest):
     def test_an_option_is_no_value(self):
         out = self.new_folder()
         self.assert_refused(["run", self.street, "--out", "--quiet"], "--out: its value is missing", "--quiet is an option", cwd=out)
-        self.assert_refused(["run", self.street, "--poses", "--out", "never"], "--out is required", cwd=out)
+        self.assert_refused(["run", self.street, "--poses", "--out", "never"], "--poses: its value is missing, as --out is an option", cwd=out)
         self.assert_refused(["synth", "--out", "-h"], "--out: its value is missing", cwd=out)
         self.assertEqual(list(out.iterdir()), [])
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import points, ros_images
+from egosgm import cpu_driver, points, ros_images
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -261,8 +261,14 @@ def test_the_matcher_has_opencvs_values(street, frames):
     assert valid.any() and not valid.all()
     np.testing.assert_array_equal(found[valid], np.rint(16 * single[valid]))
     assert (found[~valid] == -16).all()
+    np.testing.assert_array_equal(found, matcher.compute(*(np.dstack([image] * 3) for image in (frames[0].left, frames[0].right))))
+    blue = np.dstack([frames[0].left, np.zeros((HEIGHT, WIDTH, 2), np.uint8)])  # as OpenCV has it; the least of a grey value
+    np.testing.assert_array_equal(matcher.compute(blue, blue), matcher.compute(*[((3735 * blue[..., 0].astype(np.uint32) + (1 << 14)) >> 15).astype(np.uint8)] * 2))
     assert matcher.compute(frames[0].left[:48], frames[0].right[:48]).shape == (48, WIDTH)
-    for call, named in ((lambda: egosgm.Matcher(2000, 128), "do not fit"), (lambda: matcher.compute(np.zeros((4, 4, 3), np.uint8), None), "H x W"),
+    eight, default = (egosgm.Matcher(disparities=48, **given).compute(frames[0].left, frames[0].right) for given in ({"paths": 8}, {}))
+    np.testing.assert_array_equal(default, eight)
+    assert (eight != found).any()
+    for call, named in ((lambda: egosgm.Matcher(2000, 128), "do not fit"), (lambda: matcher.compute(np.zeros(4, np.uint8), None), "H x W"),
                         (lambda: egosgm.Matcher(p22=1).compute(frames[0].left, frames[0].right), "did you mean p2")):
         with pytest.raises(egosgm.InvalidArgument, match=named):
             call()
@@ -347,13 +353,38 @@ def test_a_doubtful_drive_is_told(street, frames):
         list(egosgm.run([(frames[0].left, frames[0].right)], far, **OPTIONS))
 
 
+def test_rows_that_no_alignment_mends_are_told(street, frames):
+    apart = [(frame.left, np.roll(frame.right, 3, axis=0)) for frame in frames]
+    with pytest.warns(UserWarning, match="rows of the two views lie 2 px apart, the most that is mended"):
+        list(egosgm.run(apart, street.calibration, **OPTIONS))
+
+
+def test_the_packaged_cpu_driver_is_beside_what_is_registered(tmp_path, monkeypatch):
+    registered, cache = tmp_path / "vendors", tmp_path / "cache/egosgm/vendors"
+    registered.mkdir()
+    (registered / "gpu.icd").write_text("libgpu.so\n")
+    cache.mkdir(parents=True)
+    (cache / "gone.icd").write_text("libgone.so\n")
+    for name in ("OCL_ICD_FILENAMES", "OCL_ICD_VENDORS"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(cpu_driver, "_REGISTERED", registered)
+    monkeypatch.setattr(cpu_driver, "packaged_library", lambda: "/pip/libcpu.so")
+    cpu_driver.show()
+    assert os.environ["OCL_ICD_VENDORS"] == str(cache)
+    assert {file.name: file.read_text() for file in cache.iterdir()} == {"gpu.icd": "libgpu.so\n", "egosgm_cpu.icd": "/pip/libcpu.so\n"}
+    monkeypatch.setenv("OCL_ICD_VENDORS", "/mine")
+    cpu_driver.show()
+    assert os.environ["OCL_ICD_VENDORS"] == "/mine"
+
+
 CAMERA = egosgm.Calibration(fx=100, fy=50, cx=2, cy=1, baseline_m=0.5, doffs_px=5)
 
 
 def frame_of(disparity, variance, reason=None, left=None):
     """As run() gives it, of maps by hand."""
     maps = types.SimpleNamespace(disparity=np.float32(disparity), variance=np.float32(variance), reason=reason)
-    return egosgm.DriveFrame(0, "000000", np.full(np.shape(disparity), 90, np.uint8) if left is None else left, None, maps, None, CAMERA)
+    return egosgm.DriveFrame(0, "000000", np.full(np.shape(disparity), 90, np.uint8) if left is None else left, None, maps, None, None, CAMERA)
 
 
 def test_a_cloud_has_the_points_that_are_sure(tmp_path):

@@ -151,7 +151,7 @@ def subscribe(frames, seconds, reliable=True, tf=False):
 class Node(unittest.TestCase):
     def run_three(self, frames, rate, seconds=None, parameters=(), reliable=True, right_width=WIDTH, tf=False, listens_to_tf=False,
                   component=None, waits=True):
-        environment = {"FASTDDS_BUILTIN_TRANSPORTS": "LARGE_DATA", **os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        environment = {"FASTDDS_DEFAULT_PROFILES_FILE": str(PACKAGE / "egosgm_ros/fastdds.xml"), **os.environ, "ROS_DOMAIN_ID": str(os.getpid() % 100), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
                        "PYTHONPATH": f"{PACKAGE}:{os.environ.get('PYTHONPATH', '')}"}
         seconds = seconds or 60 + 2 * frames / rate
         ros = ["-p", "reliable:=true"] if reliable else []
@@ -209,7 +209,7 @@ class Node(unittest.TestCase):
         self.assertLess(int(last["frames"]), frames)
         self.assertGreaterEqual(int(last["frames"]) + lost, frames)  # nothing goes untold
         messages = " ".join(message for level, message, _ in told["diagnostics"] if level == 1)
-        self.assertEqual("LARGE_DATA" in messages, int(last["lost_on_the_way"]) > 0, told["diagnostics"])
+        self.assertEqual("FASTDDS_DEFAULT_PROFILES_FILE" in messages, int(last["lost_on_the_way"]) > 0, told["diagnostics"])
         self.assertEqual("replaced by newer" in messages, int(last["replaced"]) > 0, told["diagnostics"])
 
     def test_wrong_images_are_told_on_diagnostics(self):
@@ -384,8 +384,25 @@ class Parameters(unittest.TestCase):
         for index, (on_the_way, replaced) in enumerate((("3 images lost on the way", ""), ("", "2 pairs replaced"), ("4 images lost on the way", "1 pairs replaced"))):
             self.assertIn(on_the_way, said[index])
             self.assertIn(replaced, said[index])
-        self.assertEqual([("LARGE_DATA" in text, "replaced by newer" in text) for text in said], [(True, False), (False, True), (True, True), (False, False)])
+        self.assertEqual([("fastdds.xml" in text, "replaced by newer" in text) for text in said], [(True, False), (False, True), (True, True), (False, False)])
         self.assertEqual(len(warned), 4)
+
+    def test_maps_are_made_for_those_who_listen(self):
+        for parameters, topics, maps in (({}, {"depth", "odom"}, ("disparity",)), ({}, {"points2"}, ("disparity", "variance")), ({}, {"reason"}, ("disparity", "reason")),
+                                         ({"point_reasons": "trusted"}, {"points2"}, ("disparity", "variance", "reason")), ({"point_reasons": "trusted"}, {"depth"}, ("disparity",))):
+            node = self.node(**parameters)
+            node.trigger_configure()
+            self.assertEqual(node._maps_for(topics), maps)
+            node.destroy_node()
+
+    def test_the_middleware_has_room_for_maps_unless_somebody_chose(self):
+        from unittest import mock
+        from egosgm_ros import node
+        for chosen in ({}, {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}):
+            with mock.patch.dict(os.environ, chosen, clear=True):
+                node._prepare_process()
+                self.assertEqual(dict(os.environ), chosen or {"FASTDDS_DEFAULT_PROFILES_FILE": str(node.PROFILES)})
+        self.assertTrue(node.PROFILES.exists())
 
     def test_compressed_images_are_matched_and_the_info_goes_with_them(self):
         import cv2

@@ -217,14 +217,19 @@ TEST(SearchBand, ReachesWhatTheCoarseMatchFoundElsewhere) {
   for (int v = 3; v <= 6; ++v) {
     for (int u = 3; u <= 6; ++u) coarse[v * 16 + u] = 20;  // 80 px, around the block of (16..23, 16..23) alone
   }
-  const SearchBandOptions options{.min_half_width_px = 2, .coarse_tolerance_px = 3, .coarse_margin_px = 2};
+  const SearchBandOptions options{
+      .min_half_width_px = 2, .neighbour_min_count = 1, .coarse_tolerance_px = 3, .coarse_margin_px = 2};
   const auto bands = run(size, {0, 128}, options, maps, 0, coarse).bands;
   EXPECT_EQ(bands[20 * 64 + 20].first, 38);
   EXPECT_EQ(bands[20 * 64 + 20].last, 82);
   EXPECT_EQ(bands[20 * 64 + 60].last, 42) << "nothing was found there";
-  EXPECT_EQ(bands[20 * 64 + 21].first, 78) << "unpredicted, with one prediction around: what was found";
+  EXPECT_EQ(bands[20 * 64 + 21].first, 36) << "unpredicted: what is predicted around and what was found";
   EXPECT_EQ(bands[20 * 64 + 21].last, 82);
+  EXPECT_EQ(bands[44 * 64 + 20].last, 127) << "nothing is predicted around";
   EXPECT_EQ(bands[4096 + 20 * 64 + 20].last, 127) << "the right view";
+
+  const SearchBandOptions two{.neighbour_min_count = 2};
+  EXPECT_EQ(run(size, {0, 128}, two, maps, 0, coarse).bands[20 * 64 + 21].first, 0) << "too few are predicted around";
 
   // Two of the coarse pixels that stand out are mismatches, three are not.
   coarse[3 * 16 + 3] = 30, coarse[4 * 16 + 6] = 31;

@@ -52,6 +52,45 @@ TEST(Matcher, IsCalledAsOpenCvsAndMeansTheSame) {
   EXPECT_GT(close, both * 8 / 10);
 }
 
+TEST(Matcher, IsAStereoMatcherWhoseOptionsHaveOpenCvsNames) {
+  EXPECT_EQ(Matcher().options().paths, 8);
+  const cv::Ptr<cv::StereoMatcher> matcher = cv::makePtr<Matcher>(few());
+  const auto& options = matcher.dynamicCast<Matcher>()->options();
+  const SyntheticFrame frame = street().render(0);
+  const cv::Mat before = disparity_by(*matcher, frame.left, frame.right);
+  EXPECT_EQ(matcher->getNumDisparities(), 48);
+  matcher->setNumDisparities(matcher->getNumDisparities() - 8);
+  matcher->setMinDisparity(-3);
+  matcher->setSpeckleWindowSize(9);
+  matcher->setDisp12MaxDiff(2);
+  EXPECT_EQ(options.disparities, 40);
+  EXPECT_EQ(options.min_disparity, matcher->getMinDisparity());
+  EXPECT_EQ(options.min_disparity, -3);
+  EXPECT_EQ(options.max_speckle_px, matcher->getSpeckleWindowSize());
+  EXPECT_EQ(options.max_speckle_px, 9);
+  EXPECT_EQ(options.left_right_px, matcher->getDisp12MaxDiff());
+  EXPECT_EQ(options.left_right_px, 2);
+  Matcher made_so(options);
+  const cv::Mat after = disparity_by(*matcher, frame.left, frame.right);
+  EXPECT_EQ(cv::countNonZero(after != disparity_by(made_so, frame.left, frame.right)), 0);
+  EXPECT_NE(cv::countNonZero(after != before), 0);
+  matcher->setDisp12MaxDiff(0);
+  EXPECT_EQ(matcher->getDisp12MaxDiff(), 40);
+}
+
+TEST(Matcher, SettersThatRefuseChangeNothing) {
+  Matcher matcher(few());
+  matcher.setBlockSize(matcher.getBlockSize());
+  matcher.setSpeckleRange(matcher.getSpeckleRange());
+  EXPECT_THROW(matcher.setBlockSize(5), InvalidArgument);
+  EXPECT_THROW(matcher.setSpeckleRange(32), InvalidArgument);
+  EXPECT_THROW(matcher.setNumDisparities(0), InvalidArgument);
+  EXPECT_THROW(matcher.setMinDisparity(2000), InvalidArgument);
+  EXPECT_THROW(matcher.setSpeckleWindowSize(-1), InvalidArgument);
+  EXPECT_EQ(matcher.getNumDisparities(), 48);
+  EXPECT_EQ(matcher.getMinDisparity(), 0);
+}
+
 TEST(Matcher, GivesThePipelinesDisparitiesInSixteenths) {
   const SyntheticSequence sequence = street();
   for (const int least : {0, -3}) {
@@ -59,8 +98,6 @@ TEST(Matcher, GivesThePipelinesDisparitiesInSixteenths) {
     options.min_disparity = least;
     Matcher matcher(sequence.calibration(), options);
     Pipeline pipeline(sequence.calibration(), 160, 64, options);
-    EXPECT_EQ(matcher.min_disparity(), least);
-    EXPECT_EQ(matcher.num_disparities(), 48);
     for (int k = 0; k < 2; ++k) {
       const SyntheticFrame frame = sequence.render(k);
       const auto motion = k ? std::optional(sequence.motion(k)) : std::nullopt;

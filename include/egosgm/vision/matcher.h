@@ -2,7 +2,7 @@
 #pragma once
 
 #include <memory>
-#include <opencv2/core.hpp>
+#include <opencv2/calib3d.hpp>
 #include <optional>
 
 #include "egosgm/calibration.h"
@@ -13,32 +13,47 @@
 
 namespace egosgm::vision {
 
-/// What is called as cv::StereoMatcher is, for code that has a cv::StereoSGBM today. Sizes may change between calls;
-/// each new one builds its pipeline. A pair alone depends on no pair before: where options.vertical_alignment is true,
-/// it is matched twice, first to find the vertical offset. Not thread-safe.
-class EGOSGM_EXPORT Matcher {
+/// A cv::StereoMatcher, in the place of a cv::StereoSGBM. Sizes may change between calls; each new one builds its
+/// pipeline, and so does each setter. A pair alone depends on no pair before: where options.vertical_alignment is true,
+/// it is matched twice, first to find the vertical offset. Not thread-safe. It links opencv_core alone.
+class EGOSGM_EXPORT Matcher : public cv::StereoMatcher {
  public:
-  /// Least value of 16-bit disparities: four bits of a pixel's part.
-  static constexpr int kDispShift = 4, kDispScale = 1 << kDispShift;
+  /// What suits single pairs: the default options, with eight paths.
+  static PipelineOptions single_pair();
 
   /// For single frames: `options.temporal` is taken as false, and no calibration is needed. Throws InvalidArgument
   /// where an option is wrong, or disparities do not fit into 16 bits with 4 of a pixel's part.
-  explicit Matcher(const PipelineOptions& options = {}, const Device& device = Device::select());
+  explicit Matcher(const PipelineOptions& options = single_pair(), const Device& device = Device::select());
   /// For video, with the motion of each frame.
   Matcher(const Calibration& calibration, const PipelineOptions& options, const Device& device = Device::select());
-  ~Matcher();
+  ~Matcher() override;
   Matcher(Matcher&&) noexcept;
   Matcher& operator=(Matcher&&) noexcept;
 
   /// A rectified pair, grey or BGR, of 8 or 16 bits. `disparity` becomes CV_16SC1: 16 times the disparity, rounded;
   /// (min_disparity - 1) * 16 where there is none, as OpenCV has it. Throws InvalidArgument for other images.
-  void compute(cv::InputArray left, cv::InputArray right, cv::OutputArray disparity);
+  void compute(cv::InputArray left, cv::InputArray right, cv::OutputArray disparity) override;
   /// The same of the next frame of a video.
   void compute(cv::InputArray left, cv::InputArray right, cv::OutputArray disparity,
                const std::optional<Motion>& motion);
 
-  int min_disparity() const;
-  int num_disparities() const;
+  const PipelineOptions& options() const;
+
+  // The options by OpenCV's names. Setters throw InvalidArgument as the constructor does, and then change nothing.
+  int getMinDisparity() const override;
+  void setMinDisparity(int least) override;
+  int getNumDisparities() const override;
+  void setNumDisparities(int count) override;  ///< Any number, not only multiples of 16.
+  int getSpeckleWindowSize() const override;
+  void setSpeckleWindowSize(int most_px) override;
+  int getDisp12MaxDiff() const override;
+  void setDisp12MaxDiff(int most_px) override;  ///< 0 or less: any difference.
+  /// Of the window that belongs to options().cost. Setting another one is refused: choose the cost.
+  int getBlockSize() const override;
+  void setBlockSize(int side_px) override;
+  /// 0: the method has its own. Setting another one is refused.
+  int getSpeckleRange() const override;
+  void setSpeckleRange(int range) override;
 
  private:
   struct State;

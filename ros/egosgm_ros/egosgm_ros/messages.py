@@ -13,11 +13,18 @@ import egosgm
 from egosgm.ros_images import BODY_FROM_OPTICAL, quaternion_of, ros_disparity, ros_range
 
 
+def bytes_of(values: Any) -> array.array:
+    """Copied once."""
+    data = array.array("B")
+    data.frombytes(np.ascontiguousarray(values).reshape(-1).view(np.uint8))
+    return data
+
+
 def image_of(header: Any, values: Any) -> Image:
     """float32 as 32FC1, uint8 as mono8."""
     height, width = values.shape
     return Image(header=header, height=height, width=width, encoding="mono8" if values.dtype == np.uint8 else "32FC1", is_bigendian=0,
-                 step=values.itemsize * width, data=array.array("B", np.ascontiguousarray(values).tobytes()))
+                 step=values.itemsize * width, data=bytes_of(values))
 
 
 def disparity_of(header: Any, disparity: Any, calibration: egosgm.Calibration, options: Any) -> DisparityImage:
@@ -43,7 +50,7 @@ def points_of(header: Any, depth: Any, grey: Any, rgb: Any, calibration: egosgm.
     fields = [PointField(name=name, offset=4 * i, datatype=PointField.FLOAT32, count=1) for i, name in enumerate(names)]
     step = 4 * len(names)
     return PointCloud2(header=header, height=height, width=width, fields=fields, is_bigendian=False, point_step=step, row_step=step * width,
-                       data=array.array("B", points.tobytes()), is_dense=False)
+                       data=bytes_of(points), is_dense=False)
 
 
 class Path:

@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node egosgm: rectified pairs in, disparity, depth, its variance, points and odometry out, by stereo_image_proc's names."""
+import contextlib
 import copy
+import ctypes
 import difflib
+import os
+import pathlib
 import sys
 import threading
 import time
@@ -23,7 +27,7 @@ from stereo_msgs.msg import DisparityImage
 
 import egosgm
 from egosgm.bag import Pairing
-from egosgm.ros_images import Cameras, depth_maps, grey_of, rgb_of, stamp_ns
+from egosgm.ros_images import Cameras, grey_of, rgb_of, stamp_ns, variance_of_depth
 from egosgm_ros.messages import Path, disparity_of, image_of, odometry_of, points_of, transform_of
 from egosgm_ros.tf_motion import TfMotion, tf2_ros
 
@@ -31,8 +35,11 @@ SIDES = ("left", "right")
 OUTPUTS = {"disparity": DisparityImage, "depth": Image, "variance": Image, "reason": Image, "points2": PointCloud2, "camera_info": CameraInfo}
 OWN = {"device": "", "preset": "default", "max_skew_ms": 0.0, "reliable": False, "auto_start": True, "odom_frame": "odom",
        "publish_tf": False, "motion_frame": "", "tf_wait_s": 0.1, "compressed": False, "max_depth_sigma": 0.1, "point_reasons": ""}
-LOST_ON_THE_WAY = ("images lost on the way: the middleware's memory does not hold them: set FASTDDS_BUILTIN_TRANSPORTS=LARGE_DATA for the driver and for "
-                   "this node; where that is not enough, reliable:=true with a driver that is reliable")
+PROFILES = pathlib.Path(__file__).with_name("fastdds.xml")
+PROFILES_NAMES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")  # before Fast DDS 3, and since then
+PROFILES_NAME = PROFILES_NAMES[os.environ.get("ROS_DISTRO") not in ("humble", "iron", "jazzy")]
+LOST_ON_THE_WAY = (f"images lost on the way: the driver's shared memory does not hold them: start the driver with {PROFILES_NAME}={PROFILES}; "
+                   "where that is not enough, reliable:=true with a driver that is reliable")
 REPLACED = "pairs replaced by newer ones: more come than are matched in time"
 PAIRS_PER_LOOK = 50  # for what is nearer than the range
 QUEUE_SIZE = 5  # of the middleware, as topics of sensors have it: the node empties it at once, and keeps the newest pair
@@ -245,7 +252,7 @@ class EgosgmNode(LifecycleNode):
         if previous is not None:
             self._path.add(motion, (stamp - previous) / 1e9)
         wanted = self._listened_to()
-        maps = self._pipeline.process(*images, motion, ("disparity", "variance", "reason") if "reason" in wanted or self._point_reasons else ("disparity", "variance"))
+        maps = self._pipeline.process(*images, motion, self._maps_for(wanted))
         self._publish(wanted, left, images[0], maps)
         self._report, self._count = maps.report, self._count + 1
         self._latency_ms = self.get_clock().now().nanoseconds / 1e6 - stamp / 1e6
@@ -254,6 +261,10 @@ class EgosgmNode(LifecycleNode):
         if self._count == 1:
             width, height = self._cameras.size
             self.get_logger().info(f"first pair: {width}x{height} px, matched by {self._pipeline.device.name}")
+
+    def _maps_for(self, wanted: Set[str]) -> Tuple[str, ...]:
+        needed = {"variance": {"variance", "points2"}, "reason": {"reason"} | ({"points2"} if self._point_reasons else set())}
+        return ("disparity", *(name for name, topics in needed.items() if wanted & topics))
 
     def _look_beyond(self, left: Any, right: Any) -> None:
         options = self._pipeline.options
@@ -292,9 +303,11 @@ class EgosgmNode(LifecycleNode):
         if "reason" in wanted:
             self._outputs["reason"].publish(image_of(header, maps.reason))
         if wanted & {"depth", "variance", "points2"}:
-            depth, variance = depth_maps(maps.disparity, maps.variance, calibration)
+            depth = egosgm.depth_from_disparity(maps.disparity, calibration)
             if "depth" in wanted:
                 self._outputs["depth"].publish(image_of(header, depth))
+        if wanted & {"variance", "points2"}:
+            variance = variance_of_depth(maps.disparity, maps.variance, calibration)
             if "variance" in wanted:
                 self._outputs["variance"].publish(image_of(header, variance))
             if "points2" in wanted:
@@ -359,7 +372,19 @@ class EgosgmNode(LifecycleNode):
         self._diagnostics.publish(message)
 
 
+def _prepare_process() -> None:
+    """Fast DDS gets shared memory for maps, unless somebody chose what it has. glibc keeps the memory of maps, which come and go with each pair;
+    else the kernel clears it anew each time."""
+    if not any(name in os.environ for name in (*PROFILES_NAMES, "FASTDDS_BUILTIN_TRANSPORTS")):
+        os.environ[PROFILES_NAME] = str(PROFILES)
+    with contextlib.suppress(AttributeError, OSError, TypeError):  # another C library
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(-3, 32 << 20)  # M_MMAP_THRESHOLD
+        mallopt(-1, 128 << 20)  # M_TRIM_THRESHOLD
+
+
 def main() -> int:
+    _prepare_process()
     rclpy.init()
     try:
         node = EgosgmNode()

@@ -4,9 +4,9 @@ import os
 
 from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, SetEnvironmentVariable
+from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
-from launch.substitutions import EnvironmentVariable, LaunchConfiguration
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
@@ -29,8 +29,6 @@ def generate_launch_description():
         DeclareLaunchArgument("namespace", default_value="", description="of the camera: NAMESPACE/left/image_rect"),
         *(DeclareLaunchArgument(name, default_value=default, description=meaning) for name, _, default, meaning in PARAMETERS),
         DeclareLaunchArgument("rviz", default_value="false"),
-        # Fast DDS's shared memory does not hold two images of 640x480 by default. The camera's driver needs the same.
-        SetEnvironmentVariable("FASTDDS_BUILTIN_TRANSPORTS", EnvironmentVariable("FASTDDS_BUILTIN_TRANSPORTS", default_value="LARGE_DATA")),
         Node(package="egosgm_ros", executable="egosgm_node", name="egosgm", namespace=namespace, output="screen", parameters=[parameters]),
         Node(package="rviz2", executable="rviz2", namespace=namespace, arguments=["-d", rviz], condition=IfCondition(LaunchConfiguration("rviz"))),
     ])

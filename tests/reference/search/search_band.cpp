@@ -81,14 +81,11 @@ shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange rang
                              const std::vector<float>& predicted, std::pair<float, float> coarse, int view, int x,
                              int y) {
   const Predicted around = predicted_in(size, predicted, view, x - 1, y - 1, x + 1, y + 1);
-  const bool is_coarse = coarse.first <= coarse.second;
-  const float coarse_from = coarse.first - options.coarse_margin_px,
-              coarse_to = coarse.second + options.coarse_margin_px;
-  if (around.count == 0 || around.count < options.neighbour_min_count) {
-    return is_coarse ? band_of(range, coarse_from, coarse_to) : band_of(range, -kInfinity, kInfinity);
-  }
+  if (around.count == 0 || around.count < options.neighbour_min_count) return band_of(range, -kInfinity, kInfinity);
   const float from = around.least - options.neighbour_margin_px, to = around.most + options.neighbour_margin_px;
-  return is_coarse ? band_of(range, std::min(from, coarse_from), std::max(to, coarse_to)) : band_of(range, from, to);
+  if (coarse.first > coarse.second) return band_of(range, from, to);
+  return band_of(range, std::min(from, coarse.first - options.coarse_margin_px),
+                 std::max(to, coarse.second + options.coarse_margin_px));
 }
 
 shared::Band of_prediction(shared::DisparityRange range, const SearchBandOptions& options, float d, float p,

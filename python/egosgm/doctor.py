@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: Apache-2.0
+"""egosgm doctor: looks for what is wrong with a sequence before it is matched. Needs no device."""
+import argparse
+import itertools
+import json
+import math
+from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+
+import cv2  # noqa: F401  who lacks it is told at once
+import numpy as np
+
+from . import _egosgm
+from .arguments import counted, Parser, tell, whole_number
+from .examination import Examination, Finding
+from .rectification import Rectification, StereoRig
+from .sequences import add_input, frame_times, open_input, open_without_calibration
+
+_MOST_GAP = 1.6  # of the usual time between two frames
+_LEAST_STEP_S, _MOST_STEP_S = 1e-4, 20.0  # between two frames
+_MOST_OF_BAG = 300  # frames of a bag, which is read from its start on
+_EXCHANGE = ("the calibration's right camera stands left of its left one: exchange the two cameras' rows, and where the images are swapped, too, exchange "
+             "them as well; or its transformation is the inverse of the one that is meant")
+
+
+class _Pair(NamedTuple):
+    place: int
+    name: str
+    left: Any
+    right: Any
+
+
+class _Source:
+    """Pairs, whatever they come from. read() goes forward only."""
+
+    count = 0
+    note = ""
+    rectified = ""  # by what they were rectified here
+    calibration: Optional[_egosgm.Calibration] = None
+
+    def read(self, places: Sequence[int]) -> Iterator["_Pair | Tuple[str, Exception]"]:
+        """The pairs in these places, in order; the name of one that cannot be read, and why."""
+        raise NotImplementedError
+
+    def times(self) -> Finding:
+        raise NotImplementedError
+
+
+class _OfSequence(_Source):
+    def __init__(self, sequence: _egosgm.StereoSequence, calibration: "_egosgm.Calibration | StereoRig | None", calib: str) -> None:
+        self._sequence, self.count, self.note = sequence, len(sequence), sequence.note
+        self._rectification = None
+        size = sequence.size
+        if isinstance(calibration, StereoRig):
+            self._rectification = Rectification(calibration, *size)
+            self.calibration, self.rectified = self._rectification.calibration, calib
+        else:
+            self.calibration = calibration
+
+    def read(self, places: Sequence[int]) -> Iterator["_Pair | Tuple[str, Exception]"]:
+        for place in places:
+            frame = self._sequence.frames[place]
+            try:
+                left, right = frame.read()
+            except _egosgm.Error as error:
+                yield frame.name, error
+                continue
+            if self._rectification:
+                left, right = self._rectification.rectify(left, right)
+            yield _Pair(place, frame.name, left, right)
+
+    def times(self) -> Finding:
+        try:
+            times, file = frame_times(self._sequence)
+        except _egosgm.InvalidArgument as error:
+            return Finding("problem", "times", str(error), "give a row for each frame, or remove the file")
+        if not times:
+            return Finding("note", "times", "no time stamps (times.txt or timestamps.txt) beside the images", "without them, gaps are not seen")
+        frames = self._sequence.frames
+        return _of_times(times, file, [frame.name for frame in frames], [frame.number for frame in frames])
+
+
+class _OfBag(_Source):
+    def __init__(self, given: argparse.Namespace) -> None:
+        from .bag import Bag
+        self._bag = Bag(given.bag, given.left_topic or "", given.right_topic or "", given.info_topics or (), max_skew_ms=given.max_skew_ms,
+                        calib=given.calib or "")
+        self._stamps: List[int] = []
+        self._frames = itertools.islice(self._bag.frames(), _MOST_OF_BAG)
+        self._next: Any = next(self._frames, None)  # then its cameras are known
+        self.calibration, self.count = self._bag.cameras.calibration, min(len(self._bag), _MOST_OF_BAG)
+        self.rectified = "its camera infos" if self._bag.is_rectified_here else ""
+        if len(self._bag) > _MOST_OF_BAG:
+            self.note = f"of {len(self._bag)} pairs the first {_MOST_OF_BAG} are looked at"
+
+    def read(self, places: Sequence[int]) -> Iterator["_Pair | Tuple[str, Exception]"]:
+        wanted = set(places)
+        while self._next is not None:
+            frame, self._next = self._next, next(self._frames, None)
+            self._stamps.append(frame.stamp_ns)
+            if frame.number in wanted:
+                yield _Pair(frame.number, f"{frame.number:06d}", frame.left, frame.right)
+
+    def times(self) -> Finding:
+        gaps, text = self._bag.gaps, self._bag.gaps.text()
+        if text:
+            is_problem = bool(gaps.broken or gaps.unpaired_left or gaps.unpaired_right or gaps.are_other_moments(gaps.largest_skew_ms))
+            return Finding("problem" if is_problem else "note", "times", text, "record all topics without loss, from cameras that are triggered together")
+        places = list(range(len(self._stamps)))
+        return _of_times([1e-9 * (stamp - self._stamps[0]) for stamp in self._stamps], "stamps of the images", [f"{place:06d}" for place in places], places)
+
+
+def _of_times(times: Sequence[float], source: str, names: Sequence[str], numbers: Sequence[int]) -> Finding:
+    steps = np.diff(times)
+    if not len(steps):
+        return Finding("ok", "times", "a single frame")
+    usual = float(np.median(steps))
+    text = f"{usual:.4g} s between two frames ({source})"
+    for unit, seconds in (("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9)):
+        if usual > _MOST_STEP_S and _LEAST_STEP_S <= usual * seconds <= _MOST_STEP_S:
+            return Finding("problem", "times", text, f"a time is in seconds: are these {unit} ({usual * seconds:.4g} s)? Divide them")
+    gaps = np.flatnonzero((steps <= 0) | (steps > _MOST_GAP * usual))
+    if not len(gaps):
+        return Finding("ok", "times", text)
+    first = int(gaps[0])
+    if steps[first] <= 0:
+        return Finding("problem", "times", f"{text}, but after frame {names[first]} the time goes back by {-steps[first]:.4g} s",
+                       "sort the frames by time, and drop those that came twice")
+    return Finding("problem", "times", f"{text}, but {counted(len(gaps), 'gap')}, the first of {steps[first]:.4g} s after frame {names[first]}",
+                   f"record without dropping frames, or run the parts alone: --frames :{numbers[first]} and --frames {numbers[first + 1]}:")
+
+
+def _motion(calibration: _egosgm.Calibration, steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:
+    """A run that finds no motion sends its user here."""
+    reasons = []
+    for pairs in steps:
+        odometry = _egosgm.StereoOdometry(calibration)
+        for pair in pairs:
+            result = odometry.process(pair.left, pair.right)
+        if result.motion is None:
+            reasons.append(result.reason)
+    if 2 * len(reasons) <= len(steps):
+        return []
+    return [Finding("note", "motion", f"no motion in {len(reasons)} of {len(steps)} steps that were looked at ({reasons[-1]})",
+                    "without a motion nothing is predicted: give frames that follow each other closely, all of one drive, left and right of the same "
+                    "moments; or the poses (run --poses)")]
+
+
+def _examine(source: _Source, samples: int, least: int, end: int) -> List[Finding]:
+    findings = []
+    if source.note:
+        findings.append(Finding("note", "frames", source.note, "a longer motion is harder: give all frames where there are some"))
+    count = source.count
+    samples = min(samples, count)
+    places = sorted({0 if samples == 1 else i * (count - 1) // (samples - 1) for i in range(samples)})
+    examination, looked_at, broken = Examination(source.calibration, least, end), 0, []
+    steps, before = [], None
+    for pair in source.read(sorted({*places, *(place + 1 for place in places if place + 1 < count)})):
+        if not isinstance(pair, _Pair):
+            broken.append(pair)
+            continue
+        if pair.place in places:
+            examination.add(pair.left, pair.right)
+            looked_at += 1
+        if before is not None and before.place + 1 == pair.place and before.place in places:
+            steps.append((before, pair))
+        before = pair
+    if not looked_at:
+        raise broken[0][1] if broken else _egosgm.InvalidArgument("no pair can be looked at")
+    if broken:
+        findings.append(Finding("problem", "files", f"frame {broken[0][0]} cannot be read: {broken[0][1]}", "`run` leaves such a pair out: save it again"))
+    of_pairs = examination.findings(count)
+    if source.rectified:
+        of_pairs[0] = of_pairs[0]._replace(text=f"{of_pairs[0].text}, rectified here by {source.rectified}")
+    findings += of_pairs
+    is_sound = all(finding.verdict != "problem" for finding in findings)
+    findings.append(source.times())
+    if is_sound and source.calibration is not None:
+        findings += _motion(source.calibration, steps)
+    return findings
+
+
+def _findings(given: argparse.Namespace) -> List[Finding]:
+    end = given.min_disparity + given.disparities
+    if given.bag:
+        return _examine(_OfBag(given), given.samples, given.min_disparity, end)
+    try:
+        sequence, calibration = open_input(given)
+        source = _OfSequence(sequence, calibration, given.calib)
+    except _egosgm._NegativeBaseline as error:
+        wrong = Finding("problem", "calibration", str(error), _EXCHANGE)
+        if not given.calib:
+            return [wrong]
+        source = _OfSequence(open_without_calibration(given), None, "")
+        return [wrong if finding.check == "calibration" else finding for finding in _examine(source, given.samples, given.min_disparity, end)]
+    return _examine(source, given.samples, given.min_disparity, end)
+
+
+def _parser() -> Parser:
+    parser = Parser("doctor", usage="egosgm doctor [OPTIONS] [DATASET] [RIGHT]", description="Check a sequence: rows, swapped sides, calibration, range, time stamps",
+                    epilog="Points are matched in the whole image, without regard to rows, sides or range. Exit code 2 where a problem was\n"
+                    "found; below each stands its remedy.")
+    add_input(parser)
+    add = parser.add_argument_group("or a recording of ROS, as `egosgm run --bag` takes it").add_argument
+    add("--bag", metavar="FILE.mcap|FILE.bag|FOLDER", help="ROS 2 (MCAP, SQLite) or ROS 1; --calib takes the place of camera infos")
+    add("--left-topic", metavar="TOPIC", help="raw or compressed images; where names tell, and there is one choice, that one")
+    add("--right-topic", metavar="TOPIC", help="likewise")
+    add("--info-topics", nargs=2, metavar=("LEFT", "RIGHT"), help="camera infos; without: camera_info beside the images")
+    add("--max-skew-ms", type=float, default=0.0, metavar="MS", help="how far the stamps of a pair may differ; without: 0")
+    defaults = _egosgm.pipeline_options()
+    add = parser.add_argument
+    add("--disparities", type=whole_number, default=defaults["disparities"], metavar="D", help="size of the range that is to be searched [px, %(default)s]")
+    add("--min-disparity", type=whole_number, default=defaults["min_disparity"], metavar="N", help="where it begins [px, %(default)s], of either sign")
+    add("--samples", type=whole_number, default=5, metavar="N", help="frames to look at, spread over the sequence [%(default)s]")
+    add("--json", action="store_true", help="print JSON")
+    return parser
+
+
+def main(arguments: Sequence[str]) -> int:
+    given = _parser().parse(arguments)
+    _egosgm._check_range(given.disparities, given.min_disparity)
+    if given.samples < 1:
+        raise _egosgm.InvalidArgument(f"--samples {given.samples}: choose a number above 0")
+    if given.bag and any((given.folder, given.dataset, given.odometry, given.kitti, given.left, given.right, given.frames)):
+        raise _egosgm.InvalidArgument(f"--bag {given.bag}: is an input of its own: give one input, and no --frames")
+    if not given.bag and any((given.left_topic, given.right_topic, given.info_topics, given.max_skew_ms)):
+        raise _egosgm.InvalidArgument("topics and --max-skew-ms are of a bag: give --bag FILE with them")
+    if not math.isfinite(given.max_skew_ms):
+        raise _egosgm.InvalidArgument(f"--max-skew-ms {given.max_skew_ms}: give 0 for equal stamps, or how far they may differ")
+    findings = _findings(given)
+    problems = sum(finding.verdict == "problem" for finding in findings)
+    if given.json:
+        tell(json.dumps([finding._asdict() for finding in findings], indent=2, ensure_ascii=False))
+        return 2 if problems else 0
+    for finding in findings:
+        tell(f"{finding.verdict:<8} {finding.check:<12} {finding.text}")
+        if finding.remedy:
+            tell(f"{'->':>21} {finding.remedy}")
+    tell(f"{counted(problems, 'problem') if problems else 'No problem was'} found.")
+    return 2 if problems else 0

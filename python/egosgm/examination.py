@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is wrong with rectified pairs before they are matched: their images, calibration, rows, sides and range. Needs OpenCV (cv2)."""
+from typing import Any, List, NamedTuple, Optional
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _egosgm
+from .arguments import counted
+
+_FEATURES, _FAST_THRESHOLD = 3000, 12
+_MOST_DESCRIPTOR_DISTANCE = 50  # of 256 bits
+_FEWEST_FOR_EPIPOLAR = 16  # below this a fundamental matrix says nothing
+_EPIPOLAR_PX, _RETURN_PX = 1.5, 0.3
+
+_FEWEST_MATCHES, _FEWEST_SURE = 30, 8  # the latter beside a coarse map that is sure of much
+_MOST_OFFSET_PX = 0.6  # KITTI's own pairs reach that
+_MOST_SPREAD_PX = 1.0  # of the rest, 90 % of the matches that agree
+_AGREEMENT_PX = 1.0  # of a match with what most of them say
+_FEWEST_AGREEING = 0.4  # of the matches; below, they are mistaken for each other
+_CLIPPED_SHARE = 0.01  # of the points
+_BEHIND_SHARE, _BEHIND_PX = 0.02, 1.0  # points whose disparity none before the cameras has
+_MOST_BRIGHTNESS = 1.25  # of one image by the other's
+_MOST_SATURATED = 0.25  # of the pixels
+_FEWEST_COARSE = 0.03  # of the pixels of the coarse map; below, it says nothing
+
+
+class Finding(NamedTuple):
+    """What a check says. verdict: ok, note or problem."""
+
+    verdict: str
+    check: str
+    text: str
+    remedy: str = ""
+
+
+def match_pair(left: NDArray[Any], right: NDArray[Any]) -> NDArray[np.float32]:
+    """Points found in both images, wherever they lie: (N, 4) of x_left, y_left, x_right, y_right [px]. Rectified images have them in equal rows;
+    nothing is assumed of rows, sides or range here. Matched by ORB, outliers dropped by a fundamental matrix, refined to a part of a pixel."""
+    import cv2
+    left, right = np.asarray(left), np.asarray(right)
+    if left.ndim != 2 or left.shape != right.shape or left.dtype != right.dtype or left.dtype not in (np.uint8, np.uint16):
+        raise _egosgm.InvalidArgument("the pair: give grey images of 8 or 16 bits, both of one size and depth")
+    left, right = _egosgm._grey_bytes(left, right)
+    none = np.empty((0, 4), np.float32)
+    detector = cv2.ORB_create(_FEATURES, 1.2, 4, 31, 0, 2, cv2.ORB_HARRIS_SCORE, 31, _FAST_THRESHOLD)
+    (left_points, left_words), (right_points, right_words) = (detector.detectAndCompute(image, None) for image in (left, right))
+    if not left_points or not right_points:
+        return none
+    found = [match for match in cv2.BFMatcher(cv2.NORM_HAMMING, crossCheck=True).match(left_words, right_words)
+             if match.distance <= _MOST_DESCRIPTOR_DISTANCE]
+    points = np.array([(*left_points[match.queryIdx].pt, *right_points[match.trainIdx].pt) for match in found], np.float32).reshape(-1, 4)
+    if len(points) < _FEWEST_FOR_EPIPOLAR:
+        return none
+    cv2.setRNGSeed(0)
+    inliers = cv2.findFundamentalMat(points[:, :2], points[:, 2:], cv2.FM_RANSAC, _EPIPOLAR_PX, 0.999)[1]
+    points = points[inliers.ravel() != 0] if inliers is not None else none
+    if len(points) < _FEWEST_FOR_EPIPOLAR:
+        return none
+    how = dict(winSize=(15, 15), maxLevel=0, criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.005), flags=cv2.OPTFLOW_USE_INITIAL_FLOW)
+    start = np.ascontiguousarray(points[:, :2])
+    there, is_there, _ = cv2.calcOpticalFlowPyrLK(left, right, start, np.ascontiguousarray(points[:, 2:]), **how)
+    back, is_back, _ = cv2.calcOpticalFlowPyrLK(right, left, there, start.copy(), **how)
+    kept = (is_there.ravel() != 0) & (is_back.ravel() != 0) & (np.linalg.norm(back - start, axis=1) <= _RETURN_PX)
+    return np.hstack([start, there])[kept]
+
+
+def _row_terms(matches: NDArray[np.float32], width: int, height: int) -> NDArray[np.float64]:
+    """What rows of both images differ by is a smooth function of these, of the place and of the disparity, in a pair that is not rectified."""
+    x, y = matches[:, 0] / width - 0.5, matches[:, 1] / height - 0.5
+    return np.stack([np.ones(len(x)), x, y, x * y, x * x, y * y, (matches[:, 0] - matches[:, 2]) / width], axis=1)
+
+
+def _agreeing(matches: NDArray[np.float32], width: int, height: int) -> NDArray[np.bool_]:
+    """Which matches agree on how far rows are apart: those that the best of many functions through seven of them explains."""
+    tries, most_looked_at = 1000, 1500
+    terms, errors = _row_terms(matches, width, height), (matches[:, 3] - matches[:, 1]).astype(float)
+    chosen = np.random.default_rng(1).integers(0, len(matches), (tries, terms.shape[1]))
+    systems = terms[chosen]
+    solvable = np.abs(np.linalg.det(systems)) > 1e-14
+    if not solvable.any():
+        return np.zeros(len(matches), bool)
+    candidates = np.linalg.solve(systems[solvable], errors[chosen[solvable]][:, :, None])[:, :, 0]
+    step = 1 + len(matches) // most_looked_at
+    counts = (np.abs(candidates @ terms[::step].T - errors[::step]) <= _AGREEMENT_PX).sum(axis=1)
+    return np.abs(terms @ candidates[counts.argmax()] - errors) <= _AGREEMENT_PX
+
+
+def _slopes(places: NDArray[np.float64], errors: NDArray[np.float64]) -> str:
+    """How the misalignment changes from left to right and from top to bottom, by least squares."""
+    fit = np.linalg.lstsq(places, errors, rcond=None)[0]
+    return f", {fit[1]:+.2f} px from left to right, {fit[2]:+.2f} px from top to bottom"
+
+
+class Examination:
+    """It looks at a few pairs, however they came: add() them, then ask for findings()."""
+
+    def __init__(self, calibration: Optional[_egosgm.Calibration], least: int, end: int) -> None:
+        """calibration: None where the pairs have none. The range of disparities that is to be searched: [least, end)."""
+        self._calibration, self._least, self._end = calibration, least, end
+        self._pairs = self._narrow = self._equal = 0
+        self._width = self._height = self._bits = 0
+        self._brightness = np.zeros(2)
+        self._saturated = np.zeros(2)
+        self._matches: List[NDArray[np.float32]] = []
+        self._coarse: List[NDArray[np.float32]] = []
+        self._coarse_pixels = 0
+
+    def add(self, left: NDArray[Any], right: NDArray[Any]) -> None:
+        """Throws InvalidArgument unless both are grey, of 8 or 16 bits, and of one size and depth."""
+        matches = match_pair(left, right)
+        self._height, self._width = left.shape
+        self._bits = 8 * left.dtype.itemsize
+        self._pairs += 1
+        self._narrow += int(left.dtype == np.uint16 and max(int(left.max()), int(right.max())) < 256)
+        self._equal += int(np.array_equal(left, right))
+        for side, image in enumerate((left, right)):
+            self._brightness[side] += image.mean()
+            largest = image.max()
+            self._saturated[side] += np.mean(image == largest) if largest in (255, 1023, 4095, 16383, 65535) else 0
+        self._matches.append(matches)
+        row_offset = float(np.median(matches[:, 3] - matches[:, 1])) if len(matches) else 0.0
+        coarse = _egosgm._coarse_map(left, right, row_offset, self._least, self._end)
+        self._coarse_pixels += coarse.size
+        self._coarse.append(coarse[np.isfinite(coarse)])
+
+    def findings(self, pairs: int) -> List[Finding]:
+        """pairs: how many there are in all. REQUIRES: add() was called."""
+        found = [self._images(pairs), self._of_calibration()]
+        matches = np.concatenate(self._matches)
+        if self._equal == self._pairs:
+            return [*found, Finding("problem", "matches", "the left and the right images are the same", "give the images of both cameras")]
+        coarse = np.concatenate(self._coarse)
+        is_sure = len(coarse) >= _FEWEST_COARSE * self._coarse_pixels
+        if len(matches) < _FEWEST_MATCHES and (not is_sure or len(matches) < _FEWEST_SURE):
+            return [*found, Finding("problem", "matches", f"only {counted(len(matches), 'point')} found in both images",
+                                    "give the left and right images of the same moments, sharp, and overlapping")]
+        agreeing = matches[_agreeing(matches, self._width, self._height)] if len(matches) >= _FEWEST_MATCHES else matches[:0]
+        is_agreed = len(agreeing) >= max(_FEWEST_MATCHES, _FEWEST_AGREEING * len(matches))
+        found.append(self._rows(len(matches), agreeing))
+        points = agreeing[:, 0] - agreeing[:, 2] if is_agreed else None
+        if not is_sure:
+            return [*found, *self._without_texture(points)]
+        behind = self._share_below(coarse, points, -self._doffs() - _BEHIND_PX)
+        found.append(self._sides(behind))
+        if behind <= 0.5:
+            found.append(self._range(coarse, points))
+        return found
+
+    def _doffs(self) -> float:
+        """A point before the cameras has disparity + doffs > 0."""
+        return self._calibration.doffs_px if self._calibration else 0.0
+
+    @staticmethod
+    def _share_below(coarse: NDArray[np.float32], points: Optional[NDArray[np.float32]], bound: float) -> float:
+        """Of both sources the one that accuses less: each has its own mistakes."""
+        share = float(np.mean(coarse < bound))
+        return share if points is None else min(share, float(np.mean(points < bound)))
+
+    def _images(self, pairs: int) -> Finding:
+        text = f"{counted(pairs, 'pair')} of {self._width}x{self._height}, {self._bits} bit"
+        if self._narrow == self._pairs:
+            return Finding("problem", "images", f"{text}, but no value above 255: the upper 8 bits, which tell edges, are empty",
+                           "save them with 8 bits, or multiply the values by 257")
+        left, right = self._brightness / self._pairs
+        ratio = (left + 1) / (right + 1)
+        if max(ratio, 1 / ratio) > _MOST_BRIGHTNESS:
+            return Finding("note", "images", f"{text}; the left ones are {ratio:.2f} times as bright as the right ones",
+                           "expose both cameras alike; the census cost bears it, sad3x3 does not")
+        saturated = float((self._saturated / self._pairs).max())
+        if saturated > _MOST_SATURATED:
+            return Finding("note", "images", f"{text}; {100 * saturated:.0f} % of the pixels hold the largest value",
+                           "expose shorter: where all is white there is nothing to match")
+        return Finding("ok", "images", text)
+
+    def _of_calibration(self) -> Finding:
+        c = self._calibration
+        if c is None:
+            return Finding("note", "calibration", "none was given: there is no depth and no odometry", "give --calib FILE")
+        text = f"fx {c.fx:.1f}, fy {c.fy:.1f}, cx {c.cx:.1f}, cy {c.cy:.1f} px, baseline {c.baseline_m:.4g} m"
+        suspicion = _egosgm._suspect_calibration(c, self._width, self._height)
+        return Finding("problem", "calibration", f"{text}: {suspicion.what}", suspicion.remedy) if suspicion else Finding("ok", "calibration", text)
+
+    def _rows(self, matches: int, agreeing: NDArray[np.float32]) -> Finding:
+        """The rows of the two views: a constant offset, and what is left beside it."""
+        of = f"{counted(matches, 'point')} in {counted(self._pairs, 'frame')}"
+        if matches < _FEWEST_MATCHES:
+            return Finding("note", "rows", f"only {of}, too few to measure rows by", "look at frames of things that are not alike")
+        if len(agreeing) < _FEWEST_AGREEING * matches:
+            return Finding("note", "rows", f"only {len(agreeing)} of {of} agree on how far rows are apart",
+                           "textures that repeat are mistaken for each other: look at frames of other things")
+        errors = (agreeing[:, 3] - agreeing[:, 1]).astype(float)
+        places = np.stack([np.ones(len(agreeing)), agreeing[:, 0] / self._width, agreeing[:, 1] / self._height], axis=1)
+        offset = round(float(np.median(errors)), 2) + 0.0  # no -0.00
+        spread = float(np.quantile(np.abs(errors - offset), 0.9))
+        text = f"vertical misalignment {offset:.2f} px in the median, 90 % within {spread:.2f} px of it ({of}){_slopes(places, errors)}"
+        if abs(offset) <= _MOST_OFFSET_PX and spread <= _MOST_SPREAD_PX:
+            return Finding("ok", "rows", text)
+        return Finding("problem", "rows", text,
+                       f"{max(abs(offset), spread):.1f} px: rectify again (egosgm rectify, from the raw images and a new calibration)")
+
+    def _without_texture(self, points: Optional[NDArray[np.float32]]) -> List[Finding]:
+        found = []
+        if points is not None:
+            found.append(self._sides(float(np.mean(points < -self._doffs() - _BEHIND_PX))))
+        share = 100 * sum(map(len, self._coarse)) / max(1, self._coarse_pixels)
+        return [*found, Finding("note", "texture", f"a coarse match is sure of {share:.1f} % of the image, too little to tell a range by",
+                                "much will stay empty: give images with more light, sharper, or of what has texture")]
+
+    @staticmethod
+    def _sides(behind: float) -> Finding:
+        text = f"{100 * behind:.1f} % of the points lie behind the cameras"
+        if behind > 0.5:
+            return Finding("problem", "sides", text, "left and right are swapped: exchange the images (and their calibrations)")
+        if behind <= _BEHIND_SHARE:
+            return Finding("ok", "sides", text)
+        return Finding("problem", "sides", text, "the principal points differ by more than doffs_px says, or the cameras converge: rectify again, or give "
+                       "--min-disparity and doffs_px")
+
+    def _range(self, coarse: NDArray[np.float32], points: Optional[NDArray[np.float32]]) -> Finding:
+        low, high, farthest = (float(value) for value in np.quantile(coarse, (0.005, 0.995, 0.999)))
+        least, end = self._least, self._end
+        text = f"disparities from {low:.1f} to {high:.1f} px (99 % of the points), the range is [{least}, {end})"
+        above, below = float(np.mean(coarse > end - 1)), self._share_below(coarse, points, least - _BEHIND_PX)
+        if above > _CLIPPED_SHARE:
+            return Finding("problem", "range", f"{text}: it clips {100 * above:.1f} % of them, the near ones",
+                           f"give --disparities {_rounded_up(1.1 * high - least + 1)}")
+        if below > _CLIPPED_SHARE and high > 0:
+            return Finding("problem", "range", f"{text}: it clips {100 * below:.1f} % of them, the far ones", f"give --min-disparity {int(np.floor(low)) - 2}")
+        if 2 * (farthest - least + 1) < end - least:
+            return Finding("note", "range", f"{text}: half of it is never needed",
+                           f"--disparities {max(16, _rounded_up(1.25 * farthest - least + 1))} is faster")
+        return Finding("ok", "range", text)
+
+
+def _rounded_up(value: float) -> int:
+    return 16 * int(np.ceil(value / 16))

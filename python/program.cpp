@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program in this process, which the package feeds with bags, and whose maps it shows.
+#include "apps/program.h"
+
+#include <fmt/core.h>
+#include <pybind11/stl.h>
+
+#include <deque>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "apps/motion_source.h"
+#include "egosgm/error.h"
+#include "python/arrays.h"
+#include "python/bindings.h"
+#include "python/frame.h"
+#include "python/option_values.h"
+#include "python/other_threads.h"
+
+namespace egosgm::python {
+namespace {
+
+/// Does what needs the interpreter, in any thread. Python's errors become those of the library.
+template <typename Do>
+auto in_python(Do&& act) {
+  const py::gil_scoped_acquire python;
+  try {
+    return act();
+  } catch (const py::error_already_set& error) {
+    const py::module_ module = py::module_::import("egosgm._egosgm");
+    const std::string text = text_from(error.value());
+    if (error.matches(module.attr("InvalidArgument"))) throw InvalidArgument(text);
+    if (error.matches(PyExc_OSError)) throw IoError(text);
+    throw std::runtime_error(error.what());
+  }
+}
+
+/// A Python object of which no thread has to hold the interpreter's lock when it goes.
+class Held {
+ public:
+  explicit Held(py::object object) : object_(std::move(object)) {}
+  ~Held() {
+    const py::gil_scoped_acquire python;
+    object_.release().dec_ref();
+  }
+  Held(const Held&) = delete;
+  Held& operator=(const Held&) = delete;
+  py::object call(const char* method, const auto&... arguments) const { return object_.attr(method)(arguments...); }
+  py::object operator[](const char* name) const { return object_.attr(name); }
+
+ private:
+  py::object object_;
+};
+
+/// egosgm.bag_program.BagFeed.
+class BagFeed : public app::Feed {
+ public:
+  BagFeed(py::object bag, vision::FrameRange range, const std::string& out) : bag_(std::move(bag)), range_(range) {
+    sequence_.title = text_from(bag_["title"]);
+    sequence_.note = text_from(bag_["note"]);
+    sequence_.calibration = bag_["calibration"].cast<Calibration>();
+    size_ = {bag_["width"].cast<int>(), bag_["height"].cast<int>()};
+    type_ = bag_["bits"].cast<int>() == 8 ? PixelType::kU8 : PixelType::kU16;
+    poses_ = text_from(bag_["poses"]);
+    out_ = out;
+    const int count = bag_["count"].cast<int>(), first = range.first.value_or(0);
+    if (first >= count) {
+      throw InvalidArgument(
+          fmt::format("--frames: {} has at most {} frames, which begin with 0", sequence_.title, count));
+    }
+    for (int number = first; number <= std::min(range.last.value_or(count - 1), count - 1); ++number) {
+      sequence_.frames.push_back(frame_of(number));
+    }
+  }
+
+  bool has_no_files() const override { return true; }
+  std::string poses() const override { return poses_; }
+
+  std::optional<app::FedFrame> next() override {
+    return in_python([&]() -> std::optional<app::FedFrame> {
+      for (;;) {
+        const py::object found = bag_.call("next");
+        if (found.is_none()) return std::nullopt;
+        const int number = found.attr("number").cast<int>();
+        if (number < range_.first.value_or(0)) continue;
+        if (number > range_.last.value_or(number)) return std::nullopt;
+        app::FedFrame fed;
+        fed.frame = frame_of(number);
+        fed.images = {mat_of(found.attr("left"), "left"), mat_of(found.attr("right"), "right")};
+        fed.starts_anew = found.attr("starts_anew").cast<bool>();
+        fed.stamp_ns = found.attr("stamp_ns").cast<std::int64_t>();
+        fed.camera = found.attr("frame_id").cast<std::string>();
+        const py::object pose = found.attr("world_from_camera");
+        if (!pose.is_none()) fed.world_from_camera = transform_of(pose, "pose");
+        return fed;
+      }
+    });
+  }
+
+  std::vector<std::string> notes() const override {
+    return in_python([&] { return bag_.call("notes").cast<std::vector<std::string>>(); });
+  }
+
+ private:
+  vision::StereoFrame frame_of(int number) const {
+    vision::StereoFrame frame;
+    frame.number = number;
+    frame.name = fmt::format("{:06}", number);
+    frame.left = out_ / "left" / (frame.name + ".png");
+    return frame;
+  }
+
+  const Held bag_;
+  const vision::FrameRange range_;
+  std::filesystem::path out_;
+  std::string poses_;
+};
+
+/// egosgm.bag_program.Outputs.
+class Outputs : public app::Taker {
+ public:
+  explicit Outputs(py::object outputs) : outputs_(std::move(outputs)) {}
+
+  void begin(const PipelineOptions& options, const Calibration& calibration) override {
+    in_python([&] { outputs_.call("begin", dict_of(options), calibration); });
+  }
+
+  void take(const app::FedFrame& fed, const app::ShownMaps& maps, const FrameReport& report,
+            const std::optional<Eigen::Isometry3d>& current_from_previous) override {
+    in_python([&] {
+      py::dict frame;
+      frame["number"] = fed.frame.number;
+      frame["name"] = fed.frame.name;
+      frame["left"] = array_of(fed.images.left);
+      frame["right"] = array_of(fed.images.right);
+      frame["starts_anew"] = fed.starts_anew;
+      frame["frame_id"] = fed.camera;
+      if (fed.stamp_ns) frame["stamp_ns"] = *fed.stamp_ns;
+      Frame made{.maps = {}, .report = report};
+      made.maps["disparity"] = array_of(maps.disparity.clone());
+      made.maps["variance"] = array_of(maps.variance.clone());
+      made.maps["reason"] = array_of(maps.reason.clone());
+      const py::object motion = current_from_previous ? py::object(array_of(*current_from_previous)) : py::none();
+      outputs_.call("take", frame, made, motion);
+    });
+  }
+
+  void end(bool finished) override {
+    in_python([&] { outputs_.call("end", finished); });
+  }
+
+ private:
+  const Held outputs_;
+};
+
+/// The program's exit code. `package`: what opens bags and outputs, see egosgm.bag_program.
+int main_of(const std::vector<std::string>& arguments, const py::object& package) {
+  app::Package hooks;
+  hooks.open_bag = [&](const app::BagArguments& given, const std::string& calib, vision::FrameRange range,
+                       const std::string& out) {
+    return in_python([&]() -> std::shared_ptr<app::Feed> {
+      py::dict values;
+      values["bag"] = given.bag;
+      values["left_topic"] = given.left_topic;
+      values["right_topic"] = given.right_topic;
+      values["info_topics"] = given.info_topics;
+      values["pose_topic"] = given.pose_topic;
+      values["pose_axes"] = given.pose_axes;
+      values["max_skew_ms"] = given.max_skew_ms;
+      values["rectify"] = given.rectify;
+      values["calib"] = calib;
+      values["out"] = out;
+      return std::make_shared<BagFeed>(package.attr("BagFeed")(**values), range, out);
+    });
+  };
+  hooks.take = [&](const std::string& file, bool viewer) {
+    return in_python([&]() -> std::shared_ptr<app::Taker> {
+      return std::make_shared<Outputs>(package.attr("Outputs")(file, viewer));
+    });
+  };
+  std::vector<const char*> words{"egosgm"};
+  for (const std::string& argument : arguments) words.push_back(argument.c_str());
+  words.push_back(nullptr);
+  const OtherThreadsRun other_threads_run;
+  return app::run_program(static_cast<int>(words.size()) - 1, words.data(), &hooks);
+}
+
+void bind_motions(py::module_& module) {
+  using app::FrameMotion;
+  using app::MotionSource;
+  py::class_<FrameMotion>(module, "_FrameMotion")
+      .def_readonly("motion", &FrameMotion::motion)
+      .def_readonly("odometry", &FrameMotion::odometry);
+  py::class_<MotionSource>(module, "_MotionSource")
+      .def(py::init([](const std::optional<Calibration>& calibration, const py::kwargs& values) {
+             return MotionSource(calibration, odometry_options_of(values));
+           }),
+           py::arg("calibration"))
+      .def(
+          "next",
+          [](MotionSource& self, const py::object& left, const py::object& right, const py::object& pose,
+             bool starts_anew) {
+            app::FedFrame fed;
+            fed.images = {mat_of(left, "left"), mat_of(right, "right")};
+            if (!pose.is_none()) fed.world_from_camera = transform_of(pose, "pose");
+            fed.starts_anew = starts_anew;
+            const OtherThreadsRun other_threads_run;
+            return self.next(fed, 0);
+          },
+          py::arg("left"), py::arg("right"), py::arg("pose") = py::none(), py::arg("starts_anew") = false)
+      .def("doubt", &MotionSource::doubt);
+}
+
+}  // namespace
+
+void bind_program(py::module_& module) {
+  bind_motions(module);
+  module.def("_main", &main_of, py::arg("arguments"), py::arg("package"));
+}
+
+}  // namespace egosgm::python
