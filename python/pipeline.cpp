@@ -15,6 +15,7 @@
 #include "python/frame.h"
 #include "python/option_values.h"
 #include "python/other_threads.h"
+#include "python/pickling.h"
 
 namespace egosgm::python {
 namespace {
@@ -28,7 +29,7 @@ py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
     return arrays;
   }
   for (const py::handle& item : py::isinstance<py::str>(wanted) ? py::make_tuple(wanted) : py::tuple(wanted)) {
-    const auto name = item.cast<std::string>();
+    const auto name = py::str(item).cast<std::string>();
     if (name == "search_width") {
       arrays[item] = py::array_t<std::uint16_t>({height, width});
     } else if (name == "dynamic" || name == "reason") {
@@ -200,7 +201,11 @@ py::list stages_of(const FrameReport& report) {
 }
 
 void bind_frame(py::module_& module) {
-  py::class_<FrameReport>(module, "FrameReport", "What happened in a frame.")
+  auto report = py::class_<FrameReport>(module, "FrameReport", "What happened in a frame.");
+  pickle_members<&FrameReport::unpredicted, &FrameReport::searched_everything, &FrameReport::search_fraction,
+                 &FrameReport::predicted_fraction, &FrameReport::density, &FrameReport::vertical_offset_px,
+                 &FrameReport::launches, &FrameReport::stripes, &FrameReport::stages, &FrameReport::total_ms>(report);
+  report
       .def_property_readonly(
           "unpredicted", [](const FrameReport& report) { return to_string(report.unpredicted); },
           "Why nothing was predicted: 'first frame', 'reset', 'no motion' or 'not temporal'; '' where something was.")
@@ -225,6 +230,7 @@ void bind_frame(py::module_& module) {
     frame.def_property_readonly(name, [name](const Frame& f) { return f.map(name); });
   });
   frame.def_readonly("report", &Frame::report);
+  pickle_members<&Frame::maps, &Frame::report>(frame);
 
   py::tuple reasons(kReasonCount);
   for (int reason = 0; reason < kReasonCount; ++reason) reasons[reason] = to_string(static_cast<Reason>(reason));

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
-from .arguments import Parser, counted, decimal, expect_new_file, expect_new_folder
+from .arguments import counted, decimal, expect_new_file, expect_new_folder, Parser, tell
 from .boards import Board, Corners, charuco, chessboard, drawn, other_size
 from .raw_pairs import RawPair, open_pairs
 
@@ -238,20 +238,20 @@ def _text(stereo: _Stereo, size: Tuple[int, int]) -> str:
 
 def _tell(found: _Views, stereo: _Stereo, views: Sequence[_View], out: Sequence[Tuple[_View, float]], coverage: Sequence[float],
           rows: NDArray[np.float64]) -> None:
-    print(f"the board is in both images of {len(found.views)} of {counted(found.pairs, 'pair')} ({found.found[0]} left, {found.found[1]} right)")
+    tell(f"the board is in both images of {len(found.views)} of {counted(found.pairs, 'pair')} ({found.found[0]} left, {found.found[1]} right)")
     for view, errors in zip(views, stereo.errors_px):
-        print(f"  pair {view.number:3}: error {errors[0]:.3f} px left, {errors[1]:.3f} px right")
+        tell(f"  pair {view.number:3}: error {errors[0]:.3f} px left, {errors[1]:.3f} px right")
     for view, error in out:
-        print(f"  pair {view.number:3}: left out, {error:.3f} px")
+        tell(f"  pair {view.number:3}: left out, {error:.3f} px")
     for name, camera, share in zip(("left", "right"), stereo.cameras, coverage):
         m = camera.matrix
-        print(f"{name + ':':<7}fx {m[0, 0]:.2f}, fy {m[1, 1]:.2f}, cx {m[0, 2]:.2f}, cy {m[1, 2]:.2f} px; error {camera.error_px:.3f} px; corners cover {100 * share:.0f} % "
+        tell(f"{name + ':':<7}fx {m[0, 0]:.2f}, fy {m[1, 1]:.2f}, cx {m[0, 2]:.2f}, cy {m[1, 2]:.2f} px; error {camera.error_px:.3f} px; corners cover {100 * share:.0f} % "
               "of the image")
     turn = float(np.degrees(np.linalg.norm(cv2.Rodrigues(stereo.rotation)[0])))
-    print(f"pair:  baseline {np.linalg.norm(stereo.translation_m):.4f} m, turned by {turn:.2f} degrees; error {stereo.error_px:.3f} px; rows agree within "
+    tell(f"pair:  baseline {np.linalg.norm(stereo.translation_m):.4f} m, turned by {turn:.2f} degrees; error {stereo.error_px:.3f} px; rows agree within "
           f"{np.quantile(rows, 0.9):.2f} px after rectification (90 % of the corners)")
     for text in _advice(stereo, coverage, len(views)):
-        print(f"note:  {text}")
+        tell(f"note:  {text}")
 
 
 def _next_step(given: argparse.Namespace) -> str:
@@ -280,5 +280,5 @@ def main(arguments: Sequence[str]) -> int:
     coverage = [_coverage(views, side, found.size) for side in (0, 1)]
     _tell(found, stereo, views, left_out, coverage, _rows_px(board, views, stereo, found.size))
     _egosgm._write_new_file(out, _text(stereo, found.size).encode())
-    print(f"{given.out}: {_next_step(given)}")
+    tell(f"{given.out}: {_next_step(given)}")
     return 0

@@ -453,9 +453,7 @@ def _check_parts(text: str, file: pathlib.Path) -> None:
 def _text_of(file: pathlib.Path) -> str:
     if not file.exists():
         raise _refuse(file, "no such file")
-    if file.stat().st_size > _MOST_BYTES:
-        raise _refuse(file, f"is longer than {_MOST_BYTES >> 20} MiB; give a calibration alone")
-    content = file.read_bytes()
+    content = _egosgm._read_file(file, _MOST_BYTES)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise _refuse(file, "is UTF-16, as some editors write: save it as UTF-8")
     return content.decode("utf-8-sig", errors="replace")
@@ -541,8 +539,9 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
     if file.is_dir():
         return _of_folder(file, is_fisheye)
     if not file.is_file():
-        raise _refuse(file, "no such file")
-    start = file.read_bytes()[:8]
+        raise _refuse(file, "is a pipe or a device; give a file" if file.exists() else "no such file")
+    with open(file, "rb") as stream:
+        start = stream.read(8)
     if start.startswith((b"\x80", b"MATLAB")):
         kind, remedy = ("a file of MATLAB", "write its matrices as JSON, by jsonencode, or of OpenCV's names") if start.startswith(b"M") else \
             ("a pickle of Python, which may run programs", "save its matrices by numpy.savez, or as JSON")

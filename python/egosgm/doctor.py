@@ -10,7 +10,7 @@ import cv2  # noqa: F401  who lacks it is told at once
 import numpy as np
 
 from . import _egosgm
-from .arguments import Parser, counted, whole_number
+from .arguments import counted, Parser, tell, whole_number
 from .examination import Examination, Finding
 from .rectification import Rectification, StereoRig
 from .sequences import add_input, frame_times, open_input, open_without_calibration
@@ -238,11 +238,11 @@ def main(arguments: Sequence[str]) -> int:
     findings = _findings(given)
     problems = sum(finding.verdict == "problem" for finding in findings)
     if given.json:
-        print(json.dumps([finding._asdict() for finding in findings], indent=2, ensure_ascii=False))
+        tell(json.dumps([finding._asdict() for finding in findings], indent=2, ensure_ascii=False))
         return 2 if problems else 0
     for finding in findings:
-        print(f"{finding.verdict:<8} {finding.check:<12} {finding.text}")
+        tell(f"{finding.verdict:<8} {finding.check:<12} {finding.text}")
         if finding.remedy:
-            print(f"{'->':>21} {finding.remedy}")
-    print(f"{counted(problems, 'problem') if problems else 'No problem was'} found.")
+            tell(f"{'->':>21} {finding.remedy}")
+    tell(f"{counted(problems, 'problem') if problems else 'No problem was'} found.")
     return 2 if problems else 0

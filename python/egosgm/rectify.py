@@ -11,7 +11,7 @@ import threading
 from typing import Any, List, Optional, Sequence, Tuple
 
 from . import _egosgm
-from .arguments import Parser, counted, decimal, expect_new_folder
+from .arguments import Parser, counted, decimal, expect_new_folder, say
 from .calibrations import find, read_euroc_rig
 from .raw_pairs import RawPair, open_pairs
 from .rectification import Rectification, StereoRig
@@ -144,13 +144,6 @@ class _Lines:
                 self.error = error
 
 
-def _say(text: str) -> None:
-    try:
-        print(f"egosgm: {text}", file=sys.stderr, flush=True)
-    except (OSError, AttributeError):  # the standard error may be full or closed
-        pass
-
-
 def _rectangle_text(rectangle: Sequence[int]) -> str:
     return "{2}x{3} from ({0}, {1})".format(*rectangle)
 
@@ -191,7 +184,7 @@ def main(arguments: Sequence[str]) -> int:
     if pairs.note != note:
         say_line(pairs.note)
     if stops and folder.frames == 0:
-        _say("interrupted before the first pair")
+        say("interrupted before the first pair")
         return 130
     folder.finish(rectifier)
     calibration = rectifier.calibration
@@ -202,9 +195,9 @@ def main(arguments: Sequence[str]) -> int:
                  "(valid.png has the left one's pixels)")
     say_line(f"egosgm doctor {shlex.quote(given.out)}; egosgm run --odometry {shlex.quote(given.out)} --out OUT")
     if stops:
-        _say(f"interrupted after {counted(folder.frames, 'pair')}: what is in {given.out} is whole")
+        say(f"interrupted after {counted(folder.frames, 'pair')}: what is in {given.out} is whole")
         return 130
     if say_line.error is not None:
-        _say(f"error: the standard output cannot be written: {say_line.error.strerror}")
+        say(f"error: the standard output cannot be written: {say_line.error.strerror}")
         return 1
     return 0

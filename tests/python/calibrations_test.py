@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations of other programs: one rig, written as each of them does."""
 import json
+import os
 
 import numpy as np
 import pytest
@@ -232,16 +233,17 @@ def test_units_are_never_guessed(tmp_path):
 
 
 def test_the_command_hands_the_program_what_it_reads(tmp_path):
-    folder = tmp_path / "given"
-    folder.mkdir()
     (tmp_path / "chain.yaml").write_text(kalibr())
-    changed = program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--out", "o"], folder)
-    assert changed == ["run", "--calib", str(folder / "calib.txt"), "--out", "o"]
-    expect_rectified(egosgm.read_calibration(folder / "calib.txt"))
+    changed = program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--out", "o"])
+    given = changed[2]
+    assert changed == ["run", "--calib", given, "--out", "o"]
+    expect_rectified(egosgm.read_calibration(given))
+    os.close(int(given.rpartition("/")[2]))
     (tmp_path / "chain.yaml").write_text(kalibr(LENS))
     with pytest.raises(egosgm.InvalidArgument, match="is of raw images"):
-        program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml")], folder)
+        program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml")])
     (tmp_path / "own.txt").write_text(RECTIFIED["own.txt"])
-    for arguments in (["run", "--calib", str(tmp_path / "own.txt")], ["run", "folder"], ["run", "--calib"]):
-        assert program.with_calibration(arguments, folder) == arguments
+    os.mkfifo(tmp_path / "pipe")  # which would be read here, and no more there
+    for arguments in (["run", "--calib", str(tmp_path / "own.txt")], ["run", "folder"], ["run", "--calib"], ["run", "--calib", str(tmp_path / "pipe")]):
+        assert program.with_calibration(arguments) == arguments
     assert calibrations.find(tmp_path / "own.txt").fx == F
