@@ -137,7 +137,8 @@ class Examination:
             return [*found, Finding("problem", "matches", "the left and the right images are the same", "give the images of both cameras")]
         coarse = np.concatenate(self._coarse)
         is_sure = len(coarse) >= _FEWEST_COARSE * self._coarse_pixels
-        if len(matches) < _FEWEST_MATCHES and (not is_sure or len(matches) < _FEWEST_SURE):
+        are_related = len(matches) >= _FEWEST_SURE and len(coarse) >= _FEWEST_COARSE / 2 * self._coarse_pixels
+        if len(matches) < _FEWEST_MATCHES and not are_related:
             remedy = "give them sharper, brighter or with less noise: coarsely, left and right agree" if is_sure else \
                 "give the left and right images of the same moments, sharp, and overlapping"
             return [*found, Finding("problem", "matches", f"only {counted(len(matches), 'point')} found in both images", remedy)]
