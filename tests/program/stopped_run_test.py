@@ -234,7 +234,7 @@ class Fallback(LongRuns):
         expected = self.new_folder()
         self.assert_works(*run, expected)
         maps = {file.relative_to(expected): file.read_bytes() for file in expected.rglob("0*.*")}
-        last, written = self.commands_of_a_run(run), set()
+        last = self.commands_of_a_run(run)
         for command in (0, last // 2, last * 3 // 4, last):
             out, trace = self.new_folder(), self.new_folder() / "trace.json"
             failed = egosgm(*run, self.new_folder(), env=self.lost_at(command))
