@@ -276,6 +276,9 @@ class Mat {
   friend Mat operator==(const Mat& mat, double value) {
     return mat.where([&](auto other) { return static_cast<double>(other) == value; });
   }
+  friend Mat operator<=(const Mat& mat, double value) {
+    return mat.where([&](auto other) { return static_cast<double>(other) <= value; });
+  }
   friend Mat operator>(const Mat& mat, double value) {
     return mat.where([&](auto other) { return static_cast<double>(other) > value; });
   }
