@@ -17,6 +17,16 @@ void add_device(CLI::App& command, std::string& device) {
       ->group(kGroup);
 }
 
+void add_fallback(CLI::App& command, std::string& device) {
+  command
+      .add_option(
+          "--fallback", device,
+          "where the device fails, go on with this one: what is written stays, frames before are computed again "
+          "for the filter's state, and the bits are the same")
+      ->type_name("NAME")
+      ->group(kGroup);
+}
+
 void add_tuning(CLI::App& command, std::string& tuning) {
   command
       .add_option("--tuning", tuning,
@@ -33,6 +43,15 @@ void add_programs(CLI::App& command, std::string& folder) {
           "take the kernels from a folder of egosgm compile, and compile nothing; refused where device, driver, "
           "options or version differ")
       ->type_name("DIR")
+      ->group(kGroup);
+}
+
+void add_cache(CLI::App& command, std::string& cache) {
+  command
+      .add_option("--cache", cache,
+                  "keep what the compiler makes in this folder, whatever the driver keeps, or nowhere [EGOSGM_CACHE; "
+                  "else ~/.cache/egosgm for drivers that keep nothing]")
+      ->type_name("DIR|off")
       ->group(kGroup);
 }
 

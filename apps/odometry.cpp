@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/core.h>
 
+#include <exception>
 #include <filesystem>
 #include <memory>
 
@@ -41,8 +42,9 @@ int estimate(const OdometryArguments& arguments) {
   if (!arguments.out.empty()) vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
   expect_new_file("--out", arguments.out);
   std::vector<Eigen::Isometry3d> poses;
+  std::exception_ptr failure;
   catch_interrupts();
-  {
+  try {
     Progress progress(static_cast<int>(sequence.frames.size()), arguments.quiet);
     if (!sequence.note.empty()) progress.note(sequence.note);
     while (!interrupted()) {
@@ -53,9 +55,12 @@ int estimate(const OdometryArguments& arguments) {
       tell(fed->frame, motion, poses.empty(), progress);
       poses.push_back(motion.first_from_camera);
     }
+  } catch (const std::exception&) {  // the poses before are whole
+    failure = std::current_exception();
   }
   const vision::KeepFiles others;
   if (!poses.empty()) vision::write_poses(arguments.out, poses);
+  if (failure) std::rethrow_exception(failure);
   if (poses.size() == sequence.frames.size()) return kOk;
   say(fmt::format("egosgm: interrupted after {} of {} frames", poses.size(), sequence.frames.size()));
   return kInterrupted;

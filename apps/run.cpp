@@ -72,7 +72,7 @@ struct RunArguments {
   SequenceArguments input;
   BagArguments bag;
   OptionArguments method;
-  std::string out, poses, device, programs, tuning, write, trace;
+  std::string out, poses, device, fallback, programs, cache, tuning, write, trace;
   StereoOdometryOptions odometry;
   double cloud_sigma_percent = 100 * vision::PointCloudOptions().max_relative_sigma;
   bool interpolate = false, quiet = false, resume = false, rerun = false;
@@ -105,12 +105,11 @@ class Run {
         pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, feed_.type()),
         report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height),
         doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, job.options) {
+    if (job.lost) report_.take_over(*job.lost);
     if (has_folder()) folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration, cloud_options_);
     if (taker_) outputs_->make_shown_maps();
-    pipeline_.prepare(feed_.type(), outputs_->views());
-    waiting_.reset();
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
     pipeline_.record_commands(true);
@@ -122,6 +121,8 @@ class Run {
     write_report(false, kKilled);
     try {
       save_config();
+      pipeline_.prepare(feed_.type(), outputs_->views());
+      waiting_.reset();
       if (has_folder() && feed_.has_no_files()) {
         vision::write_calibration(folder_.path() / kCalibration, sequence_.calibration);
       }
@@ -445,14 +446,44 @@ SequenceJob job_of(const RunArguments& arguments, const Package& package) {
   return job;
 }
 
+/// The device of --fallback. Throws InvalidArgument where what the run makes cannot be made twice.
+std::optional<Device> fallback_of(const RunArguments& arguments) {
+  if (arguments.fallback.empty()) return std::nullopt;
+  if (!has_folder(arguments) || arguments.rerun) {
+    throw InvalidArgument(
+        "--fallback: frames are matched again, which a viewer or a recording would show twice: give a folder as --out");
+  }
+  return tuned_by_argument(Device::select(arguments.fallback).with_cache(arguments.cache), arguments.tuning);
+}
+
+/// What is left of a job whose device failed: what was written stays.
+SequenceJob rest_of(RunArguments arguments, const Package& package, const LostDevice& lost) {
+  arguments.resume = true;
+  for (std::string* file : {&arguments.trace, &arguments.method.save_config}) {
+    if (fs::exists(*file)) file->clear();
+  }
+  SequenceJob job = job_of(arguments, package);
+  job.lost = lost;
+  return job;
+}
+
 int run(const RunArguments& arguments, const Package& package) {
   if (!arguments.bag.bag.empty()) catch_interrupts();  // parts of it may be unpacked meanwhile
   const SequenceJob job = job_of(arguments, package);
-  Device device = Device::select(arguments.device);
+  Device device = Device::select(arguments.device).with_cache(arguments.cache);
   if (arguments.programs.empty() || !arguments.tuning.empty()) device = tuned_by_argument(device, arguments.tuning);
   if (!arguments.programs.empty()) device = device.with_programs(arguments.programs);
+  const std::optional<Device> fallback = fallback_of(arguments);
   catch_interrupts();
-  return run_sequence(job, device) ? kOk : kInterrupted;
+  std::optional<LostDevice> lost;
+  try {
+    return run_sequence(job, device) ? kOk : kInterrupted;
+  } catch (const DeviceError& error) {
+    if (!fallback || interrupted()) throw;
+    lost = {device.info(), error.what()};
+  }
+  say(fmt::format("egosgm: {} failed ({}): {} goes on", lost->device.name, lost->why, fallback->info().name));
+  return run_sequence(rest_of(arguments, package, *lost), *fallback) ? kOk : kInterrupted;
 }
 
 }  // namespace
@@ -502,7 +533,9 @@ Command add_run(CLI::App& program, const Package& package) {
   arguments->method.add_to(*command);
   add_motion(*command, arguments->poses, arguments->odometry);
   add_device(*command, arguments->device);
+  add_fallback(*command, arguments->fallback);
   add_programs(*command, arguments->programs);
+  add_cache(*command, arguments->cache);
   add_tuning(*command, arguments->tuning);
   return {command, [arguments, package] { return run(*arguments, package); }};
 }

@@ -3,11 +3,13 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 
 #include "apps/feed.h"
 #include "apps/output_folder.h"
+#include "apps/run_report.h"
 #include "egosgm/device.h"
 #include "egosgm/odometry.h"
 #include "egosgm/options.h"
@@ -29,6 +31,7 @@ struct SequenceJob {
   // Files that are written as well, where they are not empty: the options in use, and a trace of all commands.
   std::filesystem::path save_config, trace;
   bool quiet = false;
+  std::optional<LostDevice> lost;  // which this one takes over from
 };
 
 /// What `egosgm run` does once its arguments are read: every frame that is fed into `job.out`, then poses.txt and

@@ -107,7 +107,12 @@ Json RunReport::identity() const {
        {"version", "input", "first_frame", "motion", "width", "height", "calibration", "device", "options"}) {
     identity[key] = json_.at(key);
   }
+  if (json_.contains("fallback")) identity.erase("device");
   return identity;
+}
+
+void RunReport::take_over(const LostDevice& from) {
+  json_["fallback"] = {{"from", json_of(from.device)}, {"why", from.why}};
 }
 
 void RunReport::add(const FedFrame& fed, const FrameReport& report, const FrameMotion& motion, const HostTimes& times,

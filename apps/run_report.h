@@ -18,6 +18,12 @@ struct HostTimes {
   double wall_ms = 0;  // from frame to frame
 };
 
+/// A device that failed in a run, and how.
+struct LostDevice {
+  DeviceInfo device;
+  std::string why;
+};
+
 /// The device as reports name it.
 nlohmann::ordered_json json_of(const DeviceInfo& info);
 
@@ -36,6 +42,9 @@ class RunReport {
 
   /// Names the numbers of `run --write reason`.
   void add_reasons();
+
+  /// The device goes on with what another one began: the identity is without it.
+  void take_over(const LostDevice& from);
 
   /// A pair that could not be read.
   void leave_out(const vision::StereoFrame& frame, const std::string& why);

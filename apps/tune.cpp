@@ -21,7 +21,7 @@ namespace egosgm::app {
 namespace {
 
 struct TuneArguments {
-  std::string device, file, stage;
+  std::string device, file, stage, cache;
   int width = 1242, height = 375, disparities = 128, rounds = 9;
 };
 
@@ -133,7 +133,7 @@ std::string text_of(const std::vector<NamedOption>& sizes) {
 }
 
 int tune(const TuneArguments& arguments) {
-  const Device device = Device::select(arguments.device);
+  const Device device = Device::select(arguments.device).with_cache(arguments.cache);
   const std::filesystem::path file =
       arguments.file.empty() ? user_tuning_file() : std::filesystem::path(arguments.file);
   if (file.empty()) throw InvalidArgument("tune: neither XDG_CONFIG_HOME nor HOME is set: give --file FILE");
@@ -202,6 +202,7 @@ Command add_tune(CLI::App& program) {
       ->group(group)
       ->check(CLI::IsMember({"BandedSgm", "ForwardWarp", "SpeckleRemoval", "SearchBand"}));
   add_device(*command, arguments->device);
+  add_cache(*command, arguments->cache);
   return {command, [arguments] { return tune(*arguments); }};
 }
 

@@ -8,6 +8,7 @@
 
 #include "egosgm/error.h"
 #include "host/json_text.h"
+#include "host/tuning_defaults.h"
 #include "host/vision/file_io.h"
 
 namespace egosgm::app {
@@ -16,8 +17,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxBytes = 1 << 20;
-
-std::string key_of(const DeviceInfo& device) { return device.name + ", driver " + device.driver; }
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& what) {
   throw InvalidArgument(
@@ -56,7 +55,7 @@ std::filesystem::path user_tuning_file() {
 
 Device tuned(const Device& device, const std::filesystem::path& file) {
   const Json json = read(file);
-  const auto sizes = json.find(key_of(device.info()));
+  const auto sizes = json.find(tuning_key(device.info()));
   return sizes == json.end() ? device : device.with_tuning(tuning_of(*sizes, file));
 }
 
@@ -83,7 +82,7 @@ void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, c
     const Json number = Json::parse(value, nullptr, /*allow_exceptions=*/false);
     sizes[name] = number.is_discarded() ? Json(value) : number;
   }
-  json[key_of(device)] = sizes;
+  json[tuning_key(device)] = sizes;
   vision::write_file(file, dumped(json, 2) + "\n");
 }
 

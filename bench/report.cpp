@@ -128,7 +128,9 @@ Arguments parse_arguments(int argc, char** argv, const char* help, int default_r
       std::fputs(help, stdout);
       std::exit(0);
     }
-    if (const auto text = value_of("--size", argc, argv, i)) {
+    if (std::strcmp(argv[i], "--count") == 0) {
+      arguments.counts = true;
+    } else if (const auto text = value_of("--size", argc, argv, i)) {
       arguments.size = parse_size(*text);
     } else if (const auto count = value_of("--disparities", argc, argv, i)) {
       arguments.disparities = positive("--disparities", *count);
@@ -140,6 +142,8 @@ Arguments parse_arguments(int argc, char** argv, const char* help, int default_r
       arguments.json = *json;
     } else if (const auto bits = value_of("--bits", argc, argv, i)) {
       arguments.bits = *bits;
+    } else if (const auto cases = value_of("--export", argc, argv, i)) {
+      arguments.cases = *cases;
     } else if (const auto sweep = value_of("--sweep", argc, argv, i)) {
       arguments.sweep = *sweep;
     } else if (const auto setting = value_of("--set", argc, argv, i)) {
@@ -198,8 +202,9 @@ void write_json(const std::string& file, const Machine& machine, const std::vect
       << ",\n \"version\": " << quoted(machine.device.version)
       << ",\n \"compute_units\": " << machine.device.compute_units << ",\n \"threads\": " << machine.threads
       << ",\n \"commit\": " << quoted(EGOSGM_COMMIT) << ",\n \"date\": " << quoted(now())
-      << ",\n \"input\": " << quoted(machine.input) << ",\n \"copy_gb_s\": " << number(machine.copy_gb_s)
-      << ",\n \"rows\": [";
+      << ",\n \"input\": " << quoted(machine.input) << ",\n \"copy_gb_s\": " << number(machine.copy_gb_s);
+  for (const auto& [name, value] : machine.more) out << ",\n " << quoted(name) << ": " << number(value);
+  out << ",\n \"rows\": [";
   for (std::size_t i = 0; i < rows.size(); ++i) out << (i ? ",\n  " : "\n  ") << json_of(rows[i]);
   out << "]}\n";
   vision::write_file(file, out.str());

@@ -22,6 +22,8 @@ struct Arguments {
   std::string json;                       // --json FILE
   std::string bits;                       // --bits FILE (egosgm_stages)
   std::string sweep;                      // --sweep NAME (egosgm_scaling)
+  std::string cases;                      // --export DIR (egosgm_kernels)
+  bool counts = false;                    // --count (egosgm_kernels)
   std::vector<std::string> settings;      // --set NAME=VALUE, repeated (egosgm_compare)
 };
 
@@ -61,13 +63,14 @@ struct Machine {
   double copy_gb_s = 0;  // bytes read and written by a copy on the device, a second; 0: not measured
   std::string input;
   int threads = 0;
+  std::vector<std::pair<std::string, double>> more = {};  // figures of the device, by name
 };
 
 void print_machine(const Machine& machine);
 
-/// {"device": ..., "driver": ..., "commit": ..., "date": ..., "rows": [{"name": ..., "width": ..., "height": ...,
-/// "disparities": ..., "median_ms": ..., counters}]}. Written under another name first, then renamed. Throws
-/// std::runtime_error naming the file.
+/// {"device": ..., "driver": ..., "commit": ..., "date": ..., figures of the device, "rows": [{"name": ..., "width":
+/// ..., "height": ..., "disparities": ..., "median_ms": ..., counters}]}. Written under another name first, then
+/// renamed. Throws std::runtime_error naming the file.
 void write_json(const std::string& file, const Machine& machine, const std::vector<Row>& rows);
 
 /// Runs `main_body`; an exception becomes one line on stderr and exit code 1.

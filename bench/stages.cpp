@@ -1,26 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // The stages of a steady frame as it runs: device time, bytes moved, and their share of what a copy reaches.
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <chrono>
-#include <cstdint>
 #include <cstdio>
 #include <fstream>
-#include <functional>
 #include <map>
-#include <numeric>
 #include <utility>
 
-#include "bench/device_copy.h"
 #include "bench/report.h"
-#include "bench/street.h"
+#include "bench/roofs.h"
+#include "bench/street_frame.h"
 #include "egosgm/error.h"
-#include "host/method.h"
 #include "host/ocl/device_handle.h"
 #include "host/ocl/errors.h"
-#include "host/tuning_defaults.h"
-#include "kernels/method.h"
 
 namespace egosgm::bench {
 namespace {
@@ -45,140 +35,31 @@ constexpr const char* kHelp =
     "are matched.\n";
 
 constexpr int kFramesARound = 5;
-constexpr const char* kRooms[] = {"predict", "align", "search", "match", "refine_alignment", "fuse", "publish"};
+/// Bytes that each stage must move in a steady frame that matches so many cells.
+std::map<std::string, double> bytes_of(shared::ImageSize size, double cells) {
+  const double pixels = static_cast<double>(pixel_count(size));  // of a view; a map of both has two times as many
+  const double map = 4 * pixels, maps = 2 * map, band = 12 * pixels, codes = 8 * pixels, grey = 2 * pixels;
+  return {{"ForwardWarp", 4 * maps},
+          {"HoleFill", 8 * maps},
+          {"ConsistencyCheck", 3 * 2 * maps},
+          {"CoarseMatch", grey},
+          {"SearchBand", 2 * (maps + band)},
+          // Resampling both images, and the estimate on every fourth row of the left view.
+          {"VerticalAlignment", 2 * grey + (grey + map) / 4},
+          {"Census", grey + codes},
+          {"StepPenalties", grey + 8 * pixels},
+          {"BandedSgm", 2 * (2 * (codes + band) + maps + cells)},
+          {"MedianFilter", 4 * maps},
+          {"SpeckleRemoval", 2 * map},
+          // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.
+          {"Evidence", codes * 17 / 16 + 2 * maps + 2 * map},
+          {"KalmanUpdate", 6 * maps},
+          {"OutputVariance", 12 * map}};
+}
 
-using Clock = std::chrono::steady_clock;
-
-/// What a frame took, by stage and by room [ms].
-struct Times {
-  std::map<std::string, double> device, wall;
-};
-
-/// A frame of the method that can be run again and again.
-class Frame {
- public:
-  Frame(ocl::Context& context, const Street& street, int disparities)
-      : context_(context),
-        size_(street.size),
-        motion_(street.motion),
-        options_(options(disparities)),
-        method_(context, size_, street.calibration, options_, with_defaults({}, Device::select().info())),
-        images_{ocl::Buffer<cl_uchar>(context, street.images.size()), PixelType::kU8},
-        disparity_(context, 2 * pixel_count(size_)),
-        variance_(context, 2 * pixel_count(size_)),
-        belief_(context, size_),
-        after_(context, size_) {
-    images_.pixels.write(context, street.images);
-    method_.prepare(images_.type);
-    method_.observer = [this](Room room) { look(room); };
-    for (int frame = 0; frame < 2; ++frame) run(belief_, belief_of_nothing());  // the second pays no first launches
-    full_range_ = times_;
-    full_range_cells_ = cells(Views::kBoth);
-    belief_.maps.disparity.write(context, street.disparity);
-    belief_.maps.variance.write(context, street.variance);
-    belief_.evidence.fill(context, EGOSGM_EVIDENCE_MOST);
-    steady();
-  }
-
-  const Times& steady() {
-    run(after_, belief_);
-    return times_;
-  }
-  const Times& full_range() const { return full_range_; }
-
-  /// Bytes that each stage must move in a steady frame.
-  std::map<std::string, double> bytes() const {
-    const double pixels = static_cast<double>(pixel_count(size_));  // of a view; a map of both has two times as many
-    const double map = 4 * pixels, maps = 2 * map, band = 12 * pixels, codes = 8 * pixels, grey = 2 * pixels;
-    return {
-        {"ForwardWarp", 4 * maps},
-        {"HoleFill", 8 * maps},
-        {"ConsistencyCheck", 3 * 2 * maps},
-        {"CoarseMatch", grey},
-        {"SearchBand", 2 * (maps + band)},
-        // Resampling both images, and the estimate on every fourth row of the left view.
-        {"VerticalAlignment", 2 * grey + (grey + map) / 4},
-        {"Census", grey + codes},
-        {"StepPenalties", grey + 8 * pixels},
-        {"BandedSgm", 2 * (2 * (codes + band) + maps + cells(Views::kBoth))},
-        {"MedianFilter", 4 * maps},
-        {"SpeckleRemoval", 2 * map},
-        // Both views' codes, prediction and measurement, those of a quarter, and what is given out of the left view.
-        {"Evidence", codes * 17 / 16 + 2 * maps + 2 * map},
-        {"KalmanUpdate", 6 * maps},
-        {"OutputVariance", 12 * map}};
-  }
-  /// A checksum (FNV-1a) of what the last steady frame found in the left view.
-  std::string bits() const {
-    const auto pixels = static_cast<std::ptrdiff_t>(pixel_count(size_));
-    std::uint64_t hash = 14695981039346656037u;
-    const std::vector<float> belief = after_.maps.disparity.read(context_);
-    std::vector<float> filters = after_.maps.variance.read(context_);
-    for (std::size_t i = 0; i < belief.size(); ++i) {
-      if (!(belief[i] > EGOSGM_INVALID_DISPARITY)) filters[i] = 0;  // there it means nothing
-    }
-    for (const std::vector<float>& values : {disparity_.read(context_), filters, variance_.read(context_)}) {
-      std::for_each(values.begin(), values.begin() + pixels, [&](float value) {
-        for (const auto byte : std::bit_cast<std::array<unsigned char, sizeof value>>(value))
-          hash = (hash ^ byte) * 1099511628211u;
-      });
-    }
-    char text[17];
-    std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
-    return text;
-  }
-
-  double steady_cells() const { return cells(Views::kBoth); }
-  double full_range_cells() const { return full_range_cells_; }
-  double full_range_bytes() const {
-    return (2 * (8 + 2 * 12) + 16) * static_cast<double>(pixel_count(size_)) + 2 * full_range_cells_;
-  }
-
- private:
-  static MethodOptions options(int disparities) {
-    MethodOptions options;
-    options.disparities = disparities;
-    return options;
-  }
-
-  Belief belief_of_nothing() {
-    Belief nothing = after_;
-    nothing.forget(Unpredicted::kFirstFrame);
-    return nothing;
-  }
-
-  void run(Belief& after, const Belief& before) {
-    times_ = {};
-    const Plan plan = plan_of(options_, before.why_not, before.offset.is_known, motion_, {Views::kLeft, false, false});
-    last_ = Clock::now();
-    method_.frame(plan, images_, before, after, {disparity_, variance_});
-  }
-
-  void look(Room room) {
-    for (const auto& command : context_.wait()) times_.device[command.stage] += command.ms;
-    const Clock::time_point now = Clock::now();
-    times_.wall[kRooms[static_cast<int>(room)]] += std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-  }
-
-  double cells(Views views) const {
-    const std::vector<shared::RowSum> rows = method_.workspace().bands.row_sums.read(context_);
-    return std::accumulate(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(count(views)) * size_.height, 0.0,
-                           [](double sum, const shared::RowSum& row) { return sum + row.cells; });
-  }
-
-  ocl::Context& context_;
-  const shared::ImageSize size_;
-  const Motion motion_;
-  const MethodOptions options_;
-  Method method_;
-  FrameImages images_;
-  Map disparity_, variance_;
-  Belief belief_, after_;
-  Times times_, full_range_;
-  double full_range_cells_ = 0;
-  Clock::time_point last_;
-};
+double full_range_bytes_of(shared::ImageSize size, double cells) {
+  return (2 * (8 + 2 * 12) + 16) * static_cast<double>(pixel_count(size)) + 2 * cells;
+}
 
 Row row_of(const std::string& name, shared::ImageSize size, int disparities, double ms) {
   Row row;
@@ -187,11 +68,6 @@ Row row_of(const std::string& name, shared::ImageSize size, int disparities, dou
   row.disparities = disparities;
   row.median_ms = ms;
   return row;
-}
-
-double sum(const std::map<std::string, double>& ms) {
-  return std::accumulate(ms.begin(), ms.end(), 0.0,
-                         [](double total, const auto& stage) { return total + stage.second; });
 }
 
 /// Checksums by what they are of: "WIDTHxHEIGHT D".
@@ -220,16 +96,17 @@ bool run_frames(const Device& device, shared::ImageSize size, int disparities, c
                 double copy_gb_s, const std::map<std::string, std::string>& recorded, std::vector<Row>& rows) {
   ocl::Context context(device.handle().device);
   return ocl::translated(context, [&] {
-    Frame frame(context, make_street(size, disparities), disparities);
+    StreetFrame frame(context, make_street(size, disparities), disparities);
+    const FrameTimes full_range = frame.full_range();
     std::map<std::string, std::vector<double>> device_ms, wall_ms;
     std::vector<double> frame_ms;
     for (int i = 0; i < arguments.rounds * kFramesARound; ++i) {
-      const Times& times = frame.steady();
+      const FrameTimes& times = frame.steady();
       for (const auto& [stage, ms] : times.device) device_ms[stage].push_back(ms);
       for (const auto& [room, ms] : times.wall) wall_ms[room].push_back(ms);
-      frame_ms.push_back(sum(times.device));
+      frame_ms.push_back(times.device_ms());
     }
-    const std::map<std::string, double> bytes = frame.bytes();
+    const std::map<std::string, double> bytes = bytes_of(size, frame.steady_cells());
     for (const auto& [stage, all] : device_ms) {
       const double ms = median(all);
       Row row = row_of(stage, size, disparities, ms);
@@ -238,16 +115,16 @@ bool run_frames(const Device& device, shared::ImageSize size, int disparities, c
       if (stage == "BandedSgm") row.more.emplace_back("Gcells_s", 1e-6 * frame.steady_cells() / ms);
       add_row(std::move(row), rows);
     }
-    const double full_ms = frame.full_range().device.at("BandedSgm");
+    const double full_ms = full_range.device.at("BandedSgm");
     Row full = row_of("BandedSgm_full", size, disparities, full_ms);
-    const double full_gb_s = 1e-6 * frame.full_range_bytes() / full_ms;
+    const double full_gb_s = 1e-6 * full_range_bytes_of(size, frame.full_range_cells()) / full_ms;
     full.more = {{"device_ms", full_ms},
                  {"GB_s", full_gb_s},
                  {"of_copy", full_gb_s / copy_gb_s},
                  {"Gcells_s", 1e-6 * frame.full_range_cells() / full_ms}};
     add_row(std::move(full), rows);
     for (const auto& [room, all] : wall_ms) add_row(row_of("room_" + room, size, disparities, median(all)), rows);
-    add_row(row_of("full_frame", size, disparities, sum(frame.full_range().device)), rows);
+    add_row(row_of("full_frame", size, disparities, full_range.device_ms()), rows);
     add_row(row_of("steady_frame", size, disparities, median(frame_ms)), rows);
     return check_bits(
         std::to_string(size.width) + "x" + std::to_string(size.height) + " " + std::to_string(disparities),

@@ -39,7 +39,8 @@ struct SearchBandOptions {
   float sigmas = 2.0f;             // half-width of a predicted pixel's band, in standard deviations
   float min_half_width_px = 2.5f;  // and at least this
   bool from_neighbours = true;     // unpredicted pixels search the range of the predictions around them
-  int neighbour_min_count = 72;    // with fewer predictions than this in the 3x3 blocks around, an eighth, the whole range
+  int neighbour_min_count =
+      72;  // with fewer predictions than this in the 3x3 blocks around, an eighth, the whole range
   float neighbour_margin_px = 4.0f;
   // A band is widened to what CoarseMatch found, and a margin, where that lies beyond it by more than the tolerance.
   float coarse_tolerance_px = 2.0f, coarse_margin_px = 2.0f;

@@ -3,8 +3,10 @@
 
 #include <bit>
 #include <charconv>
+#include <nlohmann/json.hpp>
 
 #include "egosgm/error.h"
+#include "host/embedded_files.h"
 #include "host/option_text.h"
 #include "host/tuning_defaults.h"
 
@@ -70,11 +72,32 @@ void set_tuning(Tuning& tuning, std::string_view name, std::string_view value) {
   throw InvalidArgument("no tuning named \"" + std::string(name) + "\": choose from " + all);
 }
 
-Tuning with_defaults(Tuning tuning, const DeviceInfo& device) {
-  const bool is_small = device.compute_units <= kFewComputeUnits;
-  const Tuning& defaults = device.type == DeviceType::kGpu ? kGpuTuning : is_small ? kSmallCpuTuning : kCpuTuning;
-  for (const Size& size : kSizes) {
-    if (tuning.*size.value == 0) tuning.*size.value = defaults.*size.value;
+const TuningDefaults& tuning_defaults() {
+  static const TuningDefaults table = [] {
+    const auto json = nlohmann::json::parse(embedded_files().at("tuning_defaults.json"));
+    TuningDefaults read;
+    for (const auto& [key, sizes] : json.items()) {
+      for (const auto& [name, value] : sizes.items()) {
+        set_tuning(read[key], name, value.is_string() ? value.get<std::string>() : value.dump());
+      }
+    }
+    return read;
+  }();
+  return table;
+}
+
+Tuning with_defaults(Tuning tuning, const DeviceInfo& device, const TuningDefaults& defaults) {
+  const char* const of_class = device.type == DeviceType::kGpu            ? "GPU"
+                               : device.compute_units <= kFewComputeUnits ? "CPU of few units"
+                                                                          : "CPU";
+  for (const std::string& key : {tuning_key(device), device.name, std::string(of_class)}) {
+    const auto found = defaults.find(key);
+    if (found == defaults.end()) continue;
+    const Tuning& given = found->second;
+    if (tuning.scheduling == Scheduling::kAutomatic) tuning.scheduling = given.scheduling;
+    for (const Size& size : kSizes) {
+      if (tuning.*size.value == 0) tuning.*size.value = given.*size.value;
+    }
   }
   return tuning;
 }

@@ -14,6 +14,7 @@
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
+#include "python/pickling.h"
 
 namespace egosgm::python {
 namespace {
@@ -45,9 +46,14 @@ py::array color_disparity(const py::object& disparity, std::optional<double> low
 }
 
 void bind_disparity(py::module_& module) {
-  py::class_<DisparityCounts>(module, "DisparityCounts",
-                              "What comparing a disparity map with its truth counted; those of several images add up.")
-      .def(py::init<>())
+  auto counts =
+      py::class_<DisparityCounts>(module, "DisparityCounts",
+                                  "What comparing a disparity map with its truth counted; those of several images add "
+                                  "up.");
+  pickle_members<&DisparityCounts::truth, &DisparityCounts::valid, &DisparityCounts::bad, &DisparityCounts::d1,
+                 &DisparityCounts::bad_interpolated, &DisparityCounts::d1_interpolated,
+                 &DisparityCounts::absolute_error_px, &DisparityCounts::sky, &DisparityCounts::sky_valid>(counts);
+  counts.def(py::init<>())
       .def_readonly("truth", &DisparityCounts::truth)
       .def_readonly("valid", &DisparityCounts::valid)
       .def_readonly("bad", &DisparityCounts::bad)
@@ -59,9 +65,12 @@ void bind_disparity(py::module_& module) {
       .def_readonly("sky_valid", &DisparityCounts::sky_valid)
       .def("__add__", [](DisparityCounts a, const DisparityCounts& b) { return a += b; })
       .def_property_readonly("metrics", &vision::metrics_of, "The figures in percent.");
-  py::class_<DisparityMetrics>(module, "DisparityMetrics",
-                               "Percent of the pixels with truth; bad: off by more than 3 px (KITTI).")
-      .def_readonly("bad_or_missing", &DisparityMetrics::bad_or_missing)
+  auto metrics = py::class_<DisparityMetrics>(module, "DisparityMetrics",
+                                              "Percent of the pixels with truth; bad: off by more than 3 px (KITTI).");
+  pickle_members<&DisparityMetrics::bad_or_missing, &DisparityMetrics::bad_of_valid, &DisparityMetrics::density,
+                 &DisparityMetrics::interpolated, &DisparityMetrics::d1, &DisparityMetrics::d1_interpolated,
+                 &DisparityMetrics::mae_px, &DisparityMetrics::filled, &DisparityMetrics::wrong_of_all>(metrics);
+  metrics.def_readonly("bad_or_missing", &DisparityMetrics::bad_or_missing)
       .def_readonly("bad_of_valid", &DisparityMetrics::bad_of_valid, "Percent of the pixels with an estimate.")
       .def_readonly("density", &DisparityMetrics::density, "Percent of the pixels with a surface.")
       .def_readonly("interpolated", &DisparityMetrics::interpolated, "After background interpolation (KITTI 2012).")
@@ -82,7 +91,7 @@ void bind_estimates(py::module_& module) {
   py::class_<vision::EvaluationPair>(module, "_EvaluationPair")
       .def_readonly("estimate", &vision::EvaluationPair::estimate)
       .def_readonly("truth", &vision::EvaluationPair::truth)
-      .def_readonly("name", &vision::EvaluationPair::name)
+      .def_property_readonly("name", [](const vision::EvaluationPair& pair) { return text_of(pair.name); })
       .def_readonly("same_name", &vision::EvaluationPair::same_name);
   module.def(
       "_pair_with_truth",
@@ -109,7 +118,14 @@ void bind_estimates(py::module_& module) {
             reader.compare(map_of(estimate, "estimate", keep_estimate), map_of(truth, "truth", keep_truth));
           },
           py::arg("estimate"), py::arg("truth"))
-      .def("doubts", &EstimateReader::doubts, py::arg("scale"));
+      .def(
+          "doubts",
+          [](const EstimateReader& reader, double scale) {
+            py::list doubts;
+            for (const std::string& doubt : reader.doubts(scale)) doubts.append(text_of(doubt));
+            return doubts;
+          },
+          py::arg("scale"));
   module.def(
       "_parse_frame_range",
       [](const std::string& frames) {

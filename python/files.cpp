@@ -14,6 +14,7 @@
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/other_threads.h"
+#include "python/pickling.h"
 
 namespace egosgm::python {
 namespace {
@@ -32,19 +33,28 @@ py::tuple read_images(const StereoFrame& frame) {
 }
 
 void bind_sequences(py::module_& module) {
-  py::class_<StereoFrame>(module, "StereoFrame", "One stereo pair on disk, and its truth where there is one.")
-      .def_readonly("number", &StereoFrame::number)
+  auto frame =
+      py::class_<StereoFrame>(module, "StereoFrame", "One stereo pair on disk, and its truth where there is one.");
+  pickle_members<&StereoFrame::number, &StereoFrame::name, &StereoFrame::left, &StereoFrame::right,
+                 &StereoFrame::truth_noc, &StereoFrame::truth_occ>(frame);
+  frame.def_readonly("number", &StereoFrame::number)
       .def_readonly("name", &StereoFrame::name, "The number with six digits.")
       .def_readonly("left", &StereoFrame::left)
       .def_readonly("right", &StereoFrame::right)
       .def_readonly("truth_noc", &StereoFrame::truth_noc, "Left disparity of non-occluded pixels; empty: none.")
       .def_readonly("truth_occ", &StereoFrame::truth_occ, "Left disparity of all pixels; empty: none.")
       .def("read", &read_images, "Both images as grey: (left, right).");
-  py::class_<StereoSequence>(module, "StereoSequence", "Frames of one rectified camera pair, one after the other.")
-      .def_readonly("title", &StereoSequence::title)
+  auto sequence =
+      py::class_<StereoSequence>(module, "StereoSequence", "Frames of one rectified camera pair, one after the other.");
+  pickle_members<&StereoSequence::title, &StereoSequence::frames, &StereoSequence::numbers, &StereoSequence::note,
+                 &StereoSequence::has_calibration, &StereoSequence::calibration, &StereoSequence::calibration_file,
+                 &StereoSequence::poses_file, &StereoSequence::times_file>(sequence);
+  sequence.def_property_readonly("title", [](const StereoSequence& s) { return text_of(s.title); })
       .def_readonly("frames", &StereoSequence::frames)
       .def_readonly("numbers", &StereoSequence::numbers, "Of all frames that are there, chosen or not.")
-      .def_readonly("note", &StereoSequence::note, "What is unusual, such as gaps in the numbers; empty: nothing.")
+      .def_property_readonly(
+          "note", [](const StereoSequence& s) { return text_of(s.note); },
+          "What is unusual, such as gaps in the numbers; empty: nothing.")
       .def_property_readonly(
           "calibration",
           [](const StereoSequence& s) { return s.has_calibration ? std::optional(s.calibration) : std::nullopt; },
@@ -81,9 +91,8 @@ void bind_sequences(py::module_& module) {
       py::arg("folder"), py::arg("scene"), py::arg("frames") = "", "KITTI 2012 or 2015 multi-view.");
   module.def(
       "open_patterns",
-      [](const std::string& left, const std::string& right, const path& calibration, const std::string& frames,
-         bool by_order) {
-        return vision::open_patterns(left, right, calibration, range_of(frames),
+      [](const path& left, const path& right, const path& calibration, const std::string& frames, bool by_order) {
+        return vision::open_patterns(left.string(), right.string(), calibration, range_of(frames),
                                      by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
       },
       py::arg("left"), py::arg("right"), py::arg("calibration") = path(), py::arg("frames") = "",
@@ -118,6 +127,15 @@ py::list layers_of_run(vision::FramePanels& panels, const path& folder, const st
   return layers;
 }
 
+py::bytes read_file(const path& file, std::size_t max_bytes) {
+  std::string bytes;
+  {
+    const OtherThreadsRun other_threads_run;
+    bytes = vision::read_file(file, max_bytes);
+  }
+  return py::bytes(bytes);
+}
+
 /// Throws IoError where a file has come there meanwhile.
 void write_new_file(const path& file, const py::bytes& bytes) {
   const vision::KeepFiles others;
@@ -130,9 +148,9 @@ void write_new_calibration(const path& file, const Calibration& calibration) {
 }
 
 /// (pairs of files, files without one of the other camera).
-py::tuple find_pairs(const std::string& left, const std::string& right, bool by_order) {
+py::tuple find_pairs(const path& left, const path& right, bool by_order) {
   const vision::ImagePairs found =
-      vision::find_pairs(left, right, by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
+      vision::find_pairs(left.string(), right.string(), by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
   return py::make_tuple(py::cast(found.pairs), py::cast(found.alone));
 }
 
@@ -162,12 +180,14 @@ using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using Bytes = py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>;
 
 void write_ply(const path& file, const Floats& points, const std::optional<Bytes>& bgr,
-               const std::optional<Floats>& normals) {
+               const std::optional<Floats>& normals, bool is_new) {
   vision::PointCloud cloud;
   cloud.points_m = vectors_of<float, cv::Point3f>(points, "points");
   cloud.colors = vectors_of<std::uint8_t, cv::Vec3b>(bgr, "colors");
   cloud.normals = vectors_of<float, cv::Vec3f>(normals, "normals");
   const OtherThreadsRun other_threads_run;
+  std::optional<vision::KeepFiles> others;
+  if (is_new) others.emplace();
   vision::write_ply(file, cloud);
 }
 
@@ -177,6 +197,7 @@ py::tuple point_cloud(const py::object& disparity, const py::object& variance, c
                       const std::vector<int>& kept, const std::optional<Bytes>& reasons) {
   py::array keep_disparity, keep_variance;
   const cv::Mat d = map_of(disparity, "disparity", keep_disparity), p = map_of(variance, "variance", keep_variance);
+  if (reasons && reasons->ndim() != 2) throw InvalidArgument("reason: give an H x W map of uint8");
   const auto mat_of = [](const Bytes& bytes, int type) {
     return cv::Mat(static_cast<int>(bytes.shape(0)), static_cast<int>(bytes.shape(1)), type,
                    const_cast<std::uint8_t*>(bytes.data()));
@@ -205,10 +226,12 @@ void bind_files(py::module_& module) {
   py::class_<vision::FramePanels>(module, "_FramePanels")
       .def(py::init<int>(), py::arg("disparities"))
       .def("layers", &layers_of_run, py::arg("folder"), py::arg("name"), py::arg("left"), py::arg("truth"));
+  module.def("_read_file", &read_file, py::arg("file"), py::arg("max_bytes"));
   module.def("_write_new_file", &write_new_file, py::arg("file"), py::arg("bytes"));
   module.def("_write_new_calibration", &write_new_calibration, py::arg("file"), py::arg("calibration"));
   module.def("_find_pairs", &find_pairs, py::arg("left"), py::arg("right"), py::arg("by_order"));
-  module.def("_find_images", &vision::find_images, py::arg("pattern"));
+  module.def(
+      "_find_images", [](const path& pattern) { return vision::find_images(pattern.string()); }, py::arg("pattern"));
   module.def(
       "_read_stored_image", [](const path& file) { return array_of(vision::read_stored_image(file)); },
       py::arg("file"));
@@ -224,7 +247,8 @@ void bind_files(py::module_& module) {
   module.def(
       "read_color", [](const path& file) { return array_of(vision::read_color_image(file)); }, py::arg("file"),
       "Reads a PNG or JPEG as RGB, H x W x 3 of uint8.");
-  module.def("_write_ply", &write_ply, py::arg("file"), py::arg("points"), py::arg("bgr"), py::arg("normals"));
+  module.def("_write_ply", &write_ply, py::arg("file"), py::arg("points"), py::arg("bgr"), py::arg("normals"),
+             py::arg("is_new") = false);
   module.def("_point_cloud", &point_cloud, py::arg("disparity"), py::arg("variance"), py::arg("bgr"),
              py::arg("calibration"), py::arg("max_relative_sigma"), py::arg("max_depth_m"), py::arg("max_jump_px"),
              py::arg("kept"), py::arg("reasons"));

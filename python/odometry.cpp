@@ -10,6 +10,7 @@
 #include "python/bindings.h"
 #include "python/option_values.h"
 #include "python/other_threads.h"
+#include "python/pickling.h"
 
 namespace egosgm {
 
@@ -130,8 +131,10 @@ void bind_synthetic(py::module_& module) {
 }  // namespace
 
 void bind_odometry(py::module_& module) {
-  py::class_<OdometryResult>(module, "OdometryResult")
-      .def_readonly("motion", &OdometryResult::motion, "From the previous frame to this one, or None.")
+  auto result = py::class_<OdometryResult>(module, "OdometryResult");
+  pickle_members<&OdometryResult::motion, &OdometryResult::features, &OdometryResult::matches, &OdometryResult::inliers,
+                 &OdometryResult::reprojection_rms_px, &OdometryResult::standstill, &OdometryResult::reason>(result);
+  result.def_readonly("motion", &OdometryResult::motion, "From the previous frame to this one, or None.")
       .def_readonly("features", &OdometryResult::features)
       .def_readonly("matches", &OdometryResult::matches)
       .def_readonly("inliers", &OdometryResult::inliers)

@@ -15,6 +15,7 @@
 #include "python/frame.h"
 #include "python/option_values.h"
 #include "python/other_threads.h"
+#include "python/pickling.h"
 
 namespace egosgm::python {
 namespace {
@@ -28,7 +29,7 @@ py::dict arrays_to_fill(const py::object& wanted, int width, int height) {
     return arrays;
   }
   for (const py::handle& item : py::isinstance<py::str>(wanted) ? py::make_tuple(wanted) : py::tuple(wanted)) {
-    const auto name = item.cast<std::string>();
+    const auto name = py::str(item).cast<std::string>();
     if (name == "search_width") {
       arrays[item] = py::array_t<std::uint16_t>({height, width});
     } else if (name == "dynamic" || name == "reason") {
@@ -92,8 +93,8 @@ std::optional<Motion> motion_of(const py::object& motion) {
 class LockedPipeline {
  public:
   LockedPipeline(const Calibration& calibration, int width, int height, const PipelineOptions& options,
-                 const std::string& device)
-      : width_(width), height_(height), pipeline_(calibration, width, height, options, Device::select(device)) {}
+                 const Device& device)
+      : width_(width), height_(height), pipeline_(calibration, width, height, options, device) {}
 
   Frame process(const py::object& left, const py::object& right, const py::object& motion, const py::object& wanted) {
     const ImageArray left_image = image_of(left, "left"), right_image = image_of(right, "right");
@@ -184,12 +185,13 @@ class LockedPipeline {
 
 std::unique_ptr<LockedPipeline> make_pipeline(const Calibration& calibration, int width, int height,
                                               const std::string& device, const std::string& preset,
-                                              const py::kwargs& values) {
+                                              const std::string& cache, const py::kwargs& values) {
   PipelineOptions options = options_of_preset(preset);
   set_options(options, values);
   options.validate();
   const OtherThreadsRun other_threads_run;
-  return std::make_unique<LockedPipeline>(calibration, width, height, options, device);
+  return std::make_unique<LockedPipeline>(calibration, width, height, options,
+                                          Device::select(device).with_cache(cache));
 }
 
 py::list stages_of(const FrameReport& report) {
@@ -199,7 +201,11 @@ py::list stages_of(const FrameReport& report) {
 }
 
 void bind_frame(py::module_& module) {
-  py::class_<FrameReport>(module, "FrameReport", "What happened in a frame.")
+  auto report = py::class_<FrameReport>(module, "FrameReport", "What happened in a frame.");
+  pickle_members<&FrameReport::unpredicted, &FrameReport::searched_everything, &FrameReport::search_fraction,
+                 &FrameReport::predicted_fraction, &FrameReport::density, &FrameReport::vertical_offset_px,
+                 &FrameReport::launches, &FrameReport::stripes, &FrameReport::stages, &FrameReport::total_ms>(report);
+  report
       .def_property_readonly(
           "unpredicted", [](const FrameReport& report) { return to_string(report.unpredicted); },
           "Why nothing was predicted: 'first frame', 'reset', 'no motion' or 'not temporal'; '' where something was.")
@@ -224,6 +230,7 @@ void bind_frame(py::module_& module) {
     frame.def_property_readonly(name, [name](const Frame& f) { return f.map(name); });
   });
   frame.def_readonly("report", &Frame::report);
+  pickle_members<&Frame::maps, &Frame::report>(frame);
 
   py::tuple reasons(kReasonCount);
   for (int reason = 0; reason < kReasonCount; ++reason) reasons[reason] = to_string(static_cast<Reason>(reason));
@@ -236,7 +243,7 @@ void bind_pipeline(py::module_& module) {
   bind_frame(module);
   py::class_<LockedPipeline>(module, "Pipeline")
       .def(py::init(&make_pipeline), py::arg("calibration"), py::arg("width"), py::arg("height"), py::kw_only(),
-           py::arg("device") = "", py::arg("preset") = "default")
+           py::arg("device") = "", py::arg("preset") = "default", py::arg("cache") = "")
       .def(
           "process", &LockedPipeline::process, py::arg("left"), py::arg("right"), py::arg("motion") = py::none(),
           py::arg("outputs") = py::make_tuple("disparity", "variance"),

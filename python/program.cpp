@@ -29,7 +29,7 @@ auto in_python(Do&& act) {
     return act();
   } catch (const py::error_already_set& error) {
     const py::module_ module = py::module_::import("egosgm._egosgm");
-    const auto text = py::str(error.value()).cast<std::string>();
+    const std::string text = text_from(error.value());
     if (error.matches(module.attr("InvalidArgument"))) throw InvalidArgument(text);
     if (error.matches(PyExc_OSError)) throw IoError(text);
     throw std::runtime_error(error.what());
@@ -57,12 +57,12 @@ class Held {
 class BagFeed : public app::Feed {
  public:
   BagFeed(py::object bag, vision::FrameRange range, const std::string& out) : bag_(std::move(bag)), range_(range) {
-    sequence_.title = bag_["title"].cast<std::string>();
-    sequence_.note = bag_["note"].cast<std::string>();
+    sequence_.title = text_from(bag_["title"]);
+    sequence_.note = text_from(bag_["note"]);
     sequence_.calibration = bag_["calibration"].cast<Calibration>();
     size_ = {bag_["width"].cast<int>(), bag_["height"].cast<int>()};
     type_ = bag_["bits"].cast<int>() == 8 ? PixelType::kU8 : PixelType::kU16;
-    poses_ = bag_["poses"].cast<std::string>();
+    poses_ = text_from(bag_["poses"]);
     out_ = out;
     const int count = bag_["count"].cast<int>(), first = range.first.value_or(0);
     if (first >= count) {

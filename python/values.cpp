@@ -10,6 +10,7 @@
 #include "python/bindings.h"
 #include "python/option_values.h"
 #include "python/other_threads.h"
+#include "python/pickling.h"
 
 namespace egosgm::python {
 namespace {
@@ -76,8 +77,11 @@ void bind_values(py::module_& module) {
       .def_property_readonly("covariance", &array_of_covariance,
                              "6x6, of (translation [m], rotation [rad]); zero where it is not known.");
 
-  py::class_<DeviceInfo>(module, "DeviceInfo", "What an OpenCL device says of itself.")
-      .def_readonly("name", &DeviceInfo::name)
+  auto info = py::class_<DeviceInfo>(module, "DeviceInfo", "What an OpenCL device says of itself.");
+  pickle_members<&DeviceInfo::name, &DeviceInfo::type, &DeviceInfo::vendor, &DeviceInfo::platform, &DeviceInfo::version,
+                 &DeviceInfo::driver, &DeviceInfo::compute_units, &DeviceInfo::memory_bytes,
+                 &DeviceInfo::max_allocation_bytes, &DeviceInfo::lacks>(info);
+  info.def_readonly("name", &DeviceInfo::name)
       .def_property_readonly("type", [](const DeviceInfo& info) { return to_string(info.type); })
       .def_readonly("vendor", &DeviceInfo::vendor)
       .def_readonly("platform", &DeviceInfo::platform)

@@ -32,6 +32,31 @@ class Pages(ProgramTest):
             self.assert_refused(["run", self.street, "--device", "no such device", "--set", f"{name}={value}", "--out", self.new_folder() / "out"],
                                 "no OpenCL device fits")
 
+    def test_options_of_commands_are_theirs(self):
+        """Of each `egosgm COMMAND ... --option` in a page, also over several lines."""
+        known, found = {}, 0
+        for page, text in PAGES.items():
+            lines = "\n".join(re.findall(r"^```(?:sh|console|bash)\n(.*?)^```", text, re.MULTILINE | re.DOTALL)).replace("\\\n", " ").splitlines()
+            for line in [*lines, *re.findall(r"`([^`\n]+)`", text)]:
+                for command, rest in re.findall(r"(?:^|[\s/;(])egosgm ([a-z][a-z-]*)((?:\s[^#;|&]*)?)", line):
+                    options = set(re.findall(r"(?<=\s)--[a-z][a-z-]*", rest))
+                    words = (command, "--bag", "b.mcap") if "--bag" in options else (command,)
+                    if words not in known:
+                        known[words] = set(re.findall(r"--[a-z][a-z-]*", self.assert_works(*words, "--help")))
+                    found += len(options)
+                    self.assertLessEqual(options, known[words] | {"--help"}, f"{page.name}: {line}")
+        self.assertGreater(found, 60)
+
+    def test_options_alone_are_of_some_command(self):
+        """`--option` in a sentence: of a command, of a script or of a bench."""
+        texts = [file.read_text() for folder in ("scripts", "bench") for file in (SOURCE / folder).iterdir() if file.is_file()]
+        commands = re.findall(r"^  ([a-z][a-z-]+) ", self.assert_works("--help"), re.MULTILINE)
+        self.assertGreater(len(commands), 10)
+        texts += [self.assert_works(*words, "--help") for words in [*([command] for command in commands), ["run", "--bag", "b.mcap"]]]
+        known = {option for text in texts for option in re.findall(r"--[a-z][a-z-]*", text)}
+        for page, option in of_pages(r"`(--[a-z][a-z-]*)"):
+            self.assertIn(option, known, page)
+
     def test_extras_exist_and_are_not_asked_of_the_index(self):
         there = set(re.findall(r"^(\w+) = \[", (SOURCE / "pyproject.toml").read_text().split("[project.optional-dependencies]")[1], re.MULTILINE))
         for page, (package, extra) in of_pages(r'pip install "([\w./*-]+)\[(\w+)\]'):

@@ -6,6 +6,7 @@
 
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
+#include "host/tuning_defaults.h"
 #include "tests/support/expect_refused.h"
 #include "tests/support/pipeline_video.h"
 
@@ -56,6 +57,40 @@ TEST(Tuning, NamesEverySizeAndRefusesWhatCannotBe) {
                                                   {{.path_lanes = 64, .path_lines = 8}, "path_lines is 8"},
                                                   {{.row_group = 257}, "row_group is 257"}};
   for (const auto& [sizes, what] : wrong) expect_refused([&] { device.with_tuning(sizes); }, {what});
+}
+
+std::vector<std::string> sizes_of(const Tuning& tuning) {
+  std::vector<std::string> sizes;
+  for (const NamedOption& size : list_tuning(tuning)) sizes.push_back(size.name + " " + size.value);
+  return sizes;
+}
+
+TEST(Tuning, TakesADevicesOwnSizesBeforeThoseOfItsClass) {
+  DeviceInfo device;
+  device.name = "Board";
+  device.driver = "7";
+  device.compute_units = kFewComputeUnits + 1;
+  DeviceInfo small = device, gpu = device;
+  small.compute_units = kFewComputeUnits;
+  gpu.type = DeviceType::kGpu;
+  EXPECT_EQ(sizes_of(with_defaults({}, device)), sizes_of(tuning_defaults().at("CPU")));
+  EXPECT_EQ(sizes_of(with_defaults({}, small)), sizes_of(tuning_defaults().at("CPU of few units")));
+  EXPECT_EQ(sizes_of(with_defaults({}, gpu)), sizes_of(tuning_defaults().at("GPU")));
+  TuningDefaults defaults = tuning_defaults();
+  defaults[tuning_key(device)] = {.tile_width = 96, .tile_height = 16};
+  defaults["Board"] = {.scheduling = Scheduling::kPaths, .tile_width = 64, .tile_height = 8, .warp_band_rows = 5};
+  const Tuning own = with_defaults({.row_group = 3}, device, defaults);
+  EXPECT_EQ(sizes_of(own), sizes_of({.scheduling = Scheduling::kPaths,
+                                     .tile_width = 96,
+                                     .tile_height = 16,
+                                     .warp_band_rows = 5,
+                                     .speckle_strip_rows = tuning_defaults().at("CPU").speckle_strip_rows,
+                                     .row_group = 3}));
+  EXPECT_EQ(with_defaults({.scheduling = Scheduling::kWavefront}, device, defaults).scheduling, Scheduling::kWavefront);
+}
+
+TEST(Tuning, DefaultsAreSizesThatADeviceTakes) {
+  for (const auto& [key, tuning] : tuning_defaults()) EXPECT_NO_THROW(tuning.validate()) << key;
 }
 
 struct Frame {

@@ -19,6 +19,11 @@ namespace egosgm::testing {
 namespace {
 
 constexpr int kThreads = 3;
+#ifdef __SANITIZE_THREAD__
+constexpr int kProcesses = 5;  // each takes seconds
+#else
+constexpr int kProcesses = 50;
+#endif
 
 /// What waitpid says of a process that does `work`: 0 where that returned true.
 int status_of(const std::function<bool()>& work) {
@@ -60,7 +65,7 @@ TEST(BeginInThreads, ListDevices) {
 TEST(BeginInThreads, MakePipelines) {
   const ShortVideo video;
   ASSERT_EQ(status_of([&] { return !video.through(Device::select()).empty(); }), 0);  // fills the driver's cache
-  for (int process = 0; process < 10; ++process) {
+  for (int process = 0; process < kProcesses; ++process) {
     ASSERT_EQ(status_of([&] {
                 return in_threads([&] {
                   const Pipeline pipeline = video.pipeline(Device::select());

@@ -129,6 +129,16 @@ TEST_F(KeptTest, NothingWhereItIsOff) {
   EXPECT_FALSE(fs::exists("off"));
 }
 
+TEST_F(KeptTest, WhatADeviceSaysGoesBeforeTheVariable) {
+  video_.pipeline(Device::select().with_cache("off"));
+  EXPECT_TRUE(files().empty());
+  EXPECT_FALSE(fs::exists("off"));
+  const fs::path other = folder_.parent_path() / "other";
+  video_.pipeline(Device::select().with_cache(other.string()));
+  EXPECT_TRUE(files().empty());
+  EXPECT_FALSE(fs::is_empty(other));
+}
+
 TEST_F(KeptTest, WhereNothingIsSaidOnlyForDriversThatKeepNone) {
   const cl::Device device = testing::any_device();
   ::unsetenv("EGOSGM_CACHE");

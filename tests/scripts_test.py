@@ -61,5 +61,15 @@ class Scripts(unittest.TestCase):
                 self.assertIn(f"{arguments[-1]}", done.stderr)
 
 
+    def test_the_lane_of_threads_names_tests_that_there_are(self):
+        names = re.search(r"^threaded='\^\((.*)\)'$", (SCRIPTS / "lanes").read_text(), re.MULTILINE)[1]
+        outer, programs = re.fullmatch(r"(.*)\|program\\\.\((.*)\)\$", names).groups()
+        tests = "\n".join(file.read_text() for file in SCRIPTS.parent.glob("tests/**/*") if file.suffix in (".cpp", ".py"))
+        for name in outer.split("|"):
+            self.assertRegex(tests, rf"(TEST|TEST_[FP]|INSTANTIATE_TEST_SUITE_P)\({name.rstrip('/')}")
+        for name in programs.split("|"):
+            self.assertRegex(tests, rf"class {name}\(")
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -27,7 +27,8 @@ void pack(const ImageView& left, const ImageView& right, std::vector<cl_uchar>& 
 }  // namespace
 
 ocl::Context context_on(const Device::Handle& device) {
-  return device.queue() ? ocl::Context(device.queue, device.programs) : ocl::Context(device.device, device.programs);
+  return device.queue() ? ocl::Context(device.queue, device.programs, device.cache)
+                        : ocl::Context(device.device, device.programs, device.cache);
 }
 
 MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning) {

@@ -58,7 +58,9 @@ std::vector<ProgramText> list_programs(const Device& device, const PipelineOptio
     // With the sizes of devices with fewer and with more compute units, too.
     std::vector<Device> devices{device};
     if (device.info().type != DeviceType::kGpu) {
-      for (const Tuning& tuning : {kCpuTuning, kSmallCpuTuning}) devices.push_back(device.with_tuning(tuning));
+      for (const char* key : {"CPU", "CPU of few units"}) {
+        devices.push_back(device.with_tuning(tuning_defaults().at(key)));
+      }
     }
     std::map<std::pair<std::string, std::string>, std::string> texts;
     for (const Device& each : devices) {

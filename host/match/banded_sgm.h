@@ -26,7 +26,7 @@ class BandedSgm {
   /// Of a wavefront; at most as high as wide. `block_lanes`: disparities that are matched at once, 16 or 32 (see
   /// kernels/match/block.h); 0: what suits the compiler.
   struct Tile {
-    int width = kCpuTuning.tile_width, height = kCpuTuning.tile_height;
+    int width = cpu_tuning().tile_width, height = cpu_tuning().tile_height;
     int block_lanes = 0;
     /// Where another match has the same program: what that one needs, so that it need not be built twice. A code of one
     /// word stands twice in two.

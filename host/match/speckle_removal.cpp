@@ -10,7 +10,7 @@ SpeckleRemoval::SpeckleRemoval(ocl::Context& context, shared::ImageSize size, co
       max_size_(static_cast<cl_uint>(std::max(options.max_size_px, 0))),
       strip_rows_(strip_rows > 0           ? strip_rows
                   : stage_.row_group() > 1 ? 1
-                                           : kCpuTuning.speckle_strip_rows),
+                                           : cpu_tuning().speckle_strip_rows),
       runs_(context, 2 * pixel_count(size)),
       parents_(context, ocl::Scratch::kOfStage0, 2 * pixel_count(size)),
       roots_(context, ocl::Scratch::kOfStage1, 2 * pixel_count(size)),

@@ -104,14 +104,16 @@ double duration_ms(const cl::Event& event) {
 
 }  // namespace
 
-Context::Context(const cl::Device& device, std::shared_ptr<const ProgramFolder> programs)
-    : Context(device, cl::Context(device), {}, std::move(programs)) {}
+Context::Context(const cl::Device& device, std::shared_ptr<const ProgramFolder> programs, const std::string& cache)
+    : Context(device, cl::Context(device), {}, std::move(programs), cache) {}
 
-Context::Context(const cl::CommandQueue& kernels, std::shared_ptr<const ProgramFolder> programs)
-    : Context(kernels.getInfo<CL_QUEUE_DEVICE>(), kernels.getInfo<CL_QUEUE_CONTEXT>(), kernels, std::move(programs)) {}
+Context::Context(const cl::CommandQueue& kernels, std::shared_ptr<const ProgramFolder> programs,
+                 const std::string& cache)
+    : Context(kernels.getInfo<CL_QUEUE_DEVICE>(), kernels.getInfo<CL_QUEUE_CONTEXT>(), kernels, std::move(programs),
+              cache) {}
 
 Context::Context(const cl::Device& device, const cl::Context& context, const cl::CommandQueue& kernels,
-                 std::shared_ptr<const ProgramFolder> programs)
+                 std::shared_ptr<const ProgramFolder> programs, const std::string& cache)
     : device_(device),
       context_(context),
       queues_{make_queue(context_, device), kernels() ? kernels : make_queue(context_, device),
@@ -122,7 +124,7 @@ Context::Context(const cl::Device& device, const cl::Context& context, const cl:
       shares_host_memory_(device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>()),
       profiles_kernels_(queue().getInfo<CL_QUEUE_PROPERTIES>() & CL_QUEUE_PROFILING_ENABLE),
       folder_(std::move(programs)),
-      cache_(folder_ ? std::nullopt : ProgramCache::of(device)) {}
+      cache_(folder_ ? std::nullopt : ProgramCache::of(device, cache)) {}
 
 Context::Apart::Apart(Context& context)
     : context_(context), kernels_(context.queue()), allocated_bytes_(context.allocated_bytes_), stage_(context.stage_) {

@@ -39,10 +39,12 @@ struct Command {
 /// One device with its queues, the programs built for it, and the commands under way. Not thread-safe.
 class Context {
  public:
-  /// `programs`: where programs come from; null: from the embedded kernels, compiled.
-  explicit Context(const cl::Device& device, std::shared_ptr<const ProgramFolder> programs = nullptr);
+  /// `programs`: where programs come from; null: from the embedded kernels, compiled and kept as ProgramCache::of says.
+  explicit Context(const cl::Device& device, std::shared_ptr<const ProgramFolder> programs = nullptr,
+                   const std::string& cache = {});
   /// On a queue of the caller's, in its context; kernels run there.
-  explicit Context(const cl::CommandQueue& kernels, std::shared_ptr<const ProgramFolder> programs = nullptr);
+  explicit Context(const cl::CommandQueue& kernels, std::shared_ptr<const ProgramFolder> programs = nullptr,
+                   const std::string& cache = {});
 
   /// The program of `file`, which `build` builds.
   Program& program(const std::string& file, const Defines& defines, Joins joins = Joins::kYes);
@@ -154,7 +156,7 @@ class Context {
 
  private:
   Context(const cl::Device& device, const cl::Context& context, const cl::CommandQueue& kernels,
-          std::shared_ptr<const ProgramFolder> programs);
+          std::shared_ptr<const ProgramFolder> programs, const std::string& cache);
   static std::int64_t steady_ns() {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::steady_clock::now().time_since_epoch())
         .count();

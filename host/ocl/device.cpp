@@ -289,6 +289,12 @@ Device Device::with_tuning(const Tuning& tuning) const {
   return Device(std::make_shared<const Handle>(std::move(with)));
 }
 
+Device Device::with_cache(const std::string& folder) const {
+  Handle with = *handle_;
+  with.cache = folder;
+  return Device(std::make_shared<const Handle>(std::move(with)));
+}
+
 const DeviceInfo& Device::info() const { return handle_->info; }
 
 }  // namespace egosgm

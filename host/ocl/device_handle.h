@@ -14,6 +14,7 @@ struct Device::Handle {
   std::shared_ptr<const ocl::ProgramFolder> programs = nullptr;  // null: compiles
   cl::CommandQueue queue = {};                                   // for kernels; empty: of the pipeline's own
   Tuning tuning = {};
+  std::string cache = {};  // of programs, as ProgramCache::of takes it
 
   static Handle of(const cl::Device& device);
 };

@@ -124,14 +124,15 @@ std::string binary_of(const cl::Program& program) {
 
 }  // namespace
 
-std::optional<ProgramCache> ProgramCache::of(const cl::Device& device) {
+std::optional<ProgramCache> ProgramCache::of(const cl::Device& device, const std::string& wanted) {
   const auto variable = [](const char* name) {
     const char* value = std::getenv(name);
     return fs::path(value ? value : "");
   };
-  const fs::path wanted = variable("EGOSGM_CACHE"), xdg = variable("XDG_CACHE_HOME"), home = variable("HOME");
-  if (wanted == "off") return std::nullopt;
-  if (!wanted.empty()) return ProgramCache(wanted, device);
+  const fs::path given = wanted.empty() ? variable("EGOSGM_CACHE") : fs::path(wanted);
+  const fs::path xdg = variable("XDG_CACHE_HOME"), home = variable("HOME");
+  if (given == "off") return std::nullopt;
+  if (!given.empty()) return ProgramCache(given, device);
   const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
   if (keeps_programs(trimmed(platform.getInfo<CL_PLATFORM_NAME>()))) return std::nullopt;
   if (xdg.is_absolute()) return ProgramCache(xdg / "egosgm", device);

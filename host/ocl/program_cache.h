@@ -17,9 +17,9 @@ class ProgramCache {
  public:
   static constexpr std::uintmax_t kMaxBytes = std::uintmax_t{256} << 20;
 
-  /// As the environment says. EGOSGM_CACHE: a folder, for every driver; "off": none. Without it, a driver that keeps no
-  /// programs itself gets $XDG_CACHE_HOME/egosgm or ~/.cache/egosgm.
-  static std::optional<ProgramCache> of(const cl::Device& device);
+  /// `wanted`: a folder, for every driver; "off": none; empty: as the environment variable EGOSGM_CACHE says. Without
+  /// either, a driver that keeps no programs itself gets $XDG_CACHE_HOME/egosgm or ~/.cache/egosgm.
+  static std::optional<ProgramCache> of(const cl::Device& device, const std::string& wanted = {});
 
   /// Of its files, those that were used least lately go where all have more than `max_bytes`.
   ProgramCache(std::filesystem::path folder, const cl::Device& device, std::uintmax_t max_bytes = kMaxBytes);

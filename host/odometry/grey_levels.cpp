@@ -6,8 +6,10 @@
 namespace egosgm::odometry {
 namespace {
 
-constexpr std::int64_t kOutliers = 2000;  // one in so many pixels may lie below, and one above
-constexpr int kFewLevels = 64;            // a range that fills no more of the 255 is stretched
+constexpr std::int64_t kOutliers = 2000;   // one in so many pixels may lie below, and one above
+constexpr std::int64_t kHighlights = 100;  // or one in so many above, where all else is kFarAbove times darker
+constexpr int kFarAbove = 4;
+constexpr int kFewLevels = 64;  // a range that fills no more of the 255 is stretched
 
 }  // namespace
 
@@ -25,8 +27,14 @@ GreyLevels levels_of(const ImageView& left, const ImageView& right) {
   int low = 0, high = 65535;
   for (std::int64_t below = counts[0]; below <= pixels / kOutliers && low < high; below += counts[++low]) {
   }
-  for (std::int64_t above = counts[65535]; above <= pixels / kOutliers && high > low; above += counts[--high]) {
+  std::int64_t above = counts[65535];
+  for (; above <= pixels / kOutliers && high > low; above += counts[--high]) {
   }
+  int most = high;
+  // Lamps and the sun: they would leave a few levels to all else.
+  for (; above <= pixels / kHighlights && most > low; above += counts[--most]) {
+  }
+  if (high / kFarAbove > most) high = most;
   const auto shift_of = [](int largest) {
     int shift = 0;
     while ((largest >> shift) > 255) ++shift;

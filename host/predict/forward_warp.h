@@ -26,7 +26,7 @@ class ForwardWarp {
   /// `pixels` of a work-item: 1 (and atomics) or 16 (and bands of `band_rows` rows); 0: by the device. Same bits.
   ForwardWarp(ocl::Context& context, shared::ImageSize size, const Calibration& calibration,
               const ForwardWarpOptions& options, shared::DisparityRange range, int pixels = 0,
-              int band_rows = kCpuTuning.warp_band_rows);
+              int band_rows = cpu_tuning().warp_band_rows);
 
   /// `evidence` moves with the belief; it is 0 where nothing lands. REQUIRES: `motion` is valid; `predicted` is not
   /// `belief`.

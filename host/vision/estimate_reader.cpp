@@ -14,6 +14,7 @@
 namespace egosgm::vision {
 namespace {
 
+constexpr double kFarOff = 2.5;  // of a median ratio to the truth: no method errs so far
 constexpr double kKittiScale = 256;
 constexpr double kLeastSigned = 65520;  // -16 in 16 bits
 
@@ -87,10 +88,9 @@ void EstimateReader::compare(const cv::Mat& estimate, const cv::Mat& truth) {
       if (is_valid_disparity(e) && e > 0 && is_valid_disparity(t) && t > 1) ratios.push_back(e / t);
     }
   }
-  if (ratios.empty()) return;
-  const double ratio = median(std::move(ratios));
   const std::scoped_lock lock(mutex_);
-  ratios_.push_back(ratio);
+  is_compared_ = true;
+  if (!ratios.empty()) ratios_.push_back(median(std::move(ratios)));
 }
 
 std::vector<std::string> EstimateReader::doubts(double scale) const {
@@ -108,6 +108,9 @@ std::vector<std::string> EstimateReader::doubts(double scale) const {
         first_impossible_);
   }
   if (markers_ > 0) add(markers_, " values of estimates are ", marker_, ", below 0: they count as missing");
+  if (is_compared_ && ratios_.empty()) {
+    add("no estimate has a value above 0 where its truth has one: are they of the other sign, or of other frames?");
+  }
   const double ratio = ratios_.empty() ? 1 : median(ratios_);
   for (const double factor :
        {2.0, 4.0, 8.0, 16.0, 64.0, 256.0, 1.0 / 2, 1.0 / 4, 1.0 / 8, 1.0 / 16, 1.0 / 64, 1.0 / 256}) {
@@ -116,7 +119,12 @@ std::vector<std::string> EstimateReader::doubts(double scale) const {
         " times their truth in the median: is it another scale? A PNG of ", scale * factor,
         " steps a pixel needs --scale ", scale * factor,
         "; maps of images of another width, and other formats, need their values changed");
-    break;
+    return doubts;
+  }
+  if (ratio > kFarOff || ratio < 1 / kFarOff) {
+    add(std::setprecision(4), "estimates are ", ratio,
+        " times their truth in the median: are they disparities in pixels? Depths, inverse depths and shares of the "
+        "width are none");
   }
   return doubts;
 }

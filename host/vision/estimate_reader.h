@@ -36,6 +36,7 @@ class EGOSGM_EXPORT EstimateReader {
   std::int64_t impossible_ = 0, values_ = 0, markers_ = 0;
   float marker_ = 0;
   std::string first_impossible_;
+  bool is_compared_ = false;
   std::vector<double> ratios_;  // of an estimate to its truth, in the median of each map
 };
 

@@ -16,11 +16,30 @@ namespace {
 constexpr std::size_t kMaxPosesBytes = std::size_t{1} << 28;
 constexpr double kMaxRotationError = 1e-4;
 
+/// What rows of other lengths are.
+std::string other_poses(const std::vector<std::string_view>& tokens) {
+  if (!tokens.empty() && tokens[0].starts_with('#')) return ": it is a comment, as in TUM's files";
+  switch (tokens.size()) {
+    case 4:
+      return ", as of 4x4 matrices: write the first three rows of each in one";
+    case 7:
+      return ", as TartanAir's (x y z and a quaternion, in NED's axes): turn its axes, and write matrices";
+    case 8:
+      return ", as TUM's (a time, x y z, a quaternion): `evo_traj tum FILE --save_as_kitti` converts it";
+    case 16:
+      return ", as of whole 4x4 matrices: leave out each one's last four";
+    case 17:
+      return ", as of a time or a number before a 4x4 matrix: leave it and the last four out";
+    default:
+      return "";
+  }
+}
+
 Eigen::Matrix<double, 3, 4> parse_row(const std::filesystem::path& file, const TextRow& row) {
   const std::vector<std::string_view> tokens = split_tokens(row.text);
   if (tokens.size() != 12) {
     refuse_row(file, row.number,
-               "a pose is a row of 12 numbers, this one has " + std::to_string(tokens.size()) +
+               "a pose is a row of 12 numbers, this one has " + std::to_string(tokens.size()) + other_poses(tokens) +
                    "; give KITTI poses without blank rows");
   }
   Eigen::Matrix<double, 3, 4> pose;

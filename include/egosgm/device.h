@@ -65,6 +65,11 @@ class EGOSGM_EXPORT Device {
   /// The same device, on which pipelines use these sizes. Throws InvalidArgument as Tuning::validate.
   Device with_tuning(const Tuning& tuning) const;
 
+  /// The same device, on which pipelines keep what the compiler makes in `folder`, and take it from there; "off":
+  /// nowhere. It goes before the environment variable EGOSGM_CACHE; without both, drivers that keep no programs
+  /// themselves get $XDG_CACHE_HOME/egosgm or ~/.cache/egosgm. A folder that cannot be used is no error.
+  Device with_cache(const std::string& folder) const;
+
   const DeviceInfo& info() const;
 
   struct Handle;  // the OpenCL side, host/ocl/device_handle.h

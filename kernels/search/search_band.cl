@@ -114,8 +114,9 @@ typedef struct {
 
 // What the predictions in the 3x3 blocks around it and the coarse match span, and the whole range where few are
 // predicted: a few beside each other may be wrong together, and what searches near them alone would confirm them, as
-// where texture repeats. `found`: what the predictions in the block and in those above and below it, and the coarse match span. Thin things stand upright: where a frame lost a
-// part of one, the parts above and below it say where to search.
+// where texture repeats. `found`: what the predictions in the block and in those above and below it, and the coarse
+// match span. Thin things stand upright: where a frame lost a part of one, the parts above and below it say where to
+// search.
 static inline Span span_around(const ImageSize blocks, const int view, const int x, const int y,
                                const int from_neighbours, const float margin, const int min_count,
                                const float coarse_margin, global const BlockRange* ranges,

@@ -52,9 +52,11 @@ def _signature(leading, options):
 
 _egosgm.Pipeline.__doc__ = """Disparity and its variance for every frame of rectified stereo video.
 
-Pipeline(calibration, width, height, *, device="", preset="default", **options)
+Pipeline(calibration, width, height, *, device="", preset="default", cache="", **options)
 
 device: a number, a type or a part of a name, see devices(); "" is the environment variable EGOSGM_DEVICE, else the first one.
+cache: a folder that keeps what the device's compiler makes, or "off"; "" is the environment variable EGOSGM_CACHE, else ~/.cache/egosgm for
+drivers that keep nothing themselves.
 Options, with their defaults:
 """ + "".join(f"    {_name}={_egosgm.pipeline_options()[_name]!r}\n        {_meaning} {_range}{' ' + _unit if _unit else ''}. {_when}\n"
               for _name, _meaning, _unit, _range, _when in _egosgm._option_texts())

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tools in Python share: arguments, JSON, new files, numbers in words. Errors are InvalidArgument and IoError."""
 import argparse
+import contextlib
 import difflib
 import json
 import math
 import os
 import pathlib
 import re
+import sys
 from typing import Any, NoReturn
 
 from . import _egosgm
@@ -21,9 +23,16 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         raise _egosgm.InvalidArgument(f"{message}: see `{self.prog} --help`")
 
+    def print_help(self, file: Any = None) -> None:
+        tell(self.format_help().rstrip())
+
     def parse(self, arguments: Any) -> argparse.Namespace:
         """The values. An empty one is refused, as it is a variable of the shell that was not set."""
-        given, unknown = self.parse_known_args(arguments)
+        for before, word in zip(["", *arguments], arguments):
+            name = word[:-1] if word[:-1] in self._option_string_actions else before if before in self._option_string_actions else "an argument"
+            if word == "" or word == name + "=":
+                raise _egosgm.InvalidArgument(f'{name} "": is empty: give a value, or leave it out')
+        given, unknown = self.parse_known_intermixed_args(arguments)
         if unknown:
             name = unknown[0].split("=")[0]
             near = difflib.get_close_matches(name, self._option_string_actions, 1)
@@ -31,12 +40,28 @@ class Parser(argparse.ArgumentParser):
             if pathlib.Path(name).suffix and pathlib.Path(name).is_file():
                 self.error(f'{kind} "{name}", a file: did the shell expand a pattern? quote it: \'*.png\'')
             self.error(f'{kind} "{name}"' + (f": did you mean {near[0]}?" if near else ""))
-        for name, value in vars(given).items():
-            if value == "":
-                shown = name.replace("_", "-")
-                shown = f"--{shown}" if f"--{shown}" in self._option_string_actions else shown
-                raise _egosgm.InvalidArgument(f'{shown} "": is empty: give a value, or leave it out')
         return given
+
+
+def text_argument(text: str) -> bytes:
+    """For the library, which says what is wrong of a text that is no UTF-8."""
+    return os.fsencode(text)
+
+
+def say(text: str) -> None:
+    """On the standard error, which may be full or closed; on one line, whatever a name in it holds."""
+    with contextlib.suppress(OSError, AttributeError):
+        print("egosgm: " + "".join(c if c.isprintable() else " " for c in text), file=sys.stderr, flush=True)
+
+
+def tell(text: str) -> None:
+    """On the standard output. A reader that goes has read enough."""
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        pass
+    except OSError as error:
+        raise _egosgm.IoError(f"the standard output cannot be written: {error.strerror}") from None
 
 
 def whole_number(text: str) -> int:
@@ -68,10 +93,9 @@ def read_json(file: pathlib.Path) -> Any:
             for inner in part.values() if isinstance(part, dict) else part:
                 check_levels(inner, levels + 1)
 
-    if file.stat().st_size > _MOST_BYTES:
-        refuse("is longer than 256 MiB")
+    content = _egosgm._read_file(file, _MOST_BYTES)
     try:
-        found = json.loads(file.read_bytes(), object_pairs_hook=few_keys, parse_float=finite, parse_constant=finite)
+        found = json.loads(content, object_pairs_hook=few_keys, parse_float=finite, parse_constant=finite)
         check_levels(found, 0)
         return found
     except RecursionError:
@@ -142,4 +166,4 @@ def json_text(value: Any) -> str:
         if isinstance(value, (list, tuple)):
             return [plain(part) for part in value]
         return None if isinstance(value, float) and not math.isfinite(value) else value
-    return json.dumps(plain(value), indent=2, ensure_ascii=False)
+    return json.dumps(plain(value), indent=2, ensure_ascii=False).encode(errors="replace").decode()

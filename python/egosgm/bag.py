@@ -408,7 +408,7 @@ def _in_order(messages: Iterator[Tuple[int, int, Any]]) -> Iterator[Tuple[int, i
 def _remedy(path: pathlib.Path) -> str:
     if path.is_file() and (path.parent / "metadata.yaml").exists():
         return f"; it is a part of the bag {path.parent}: give that folder"
-    tool = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "ros2 bag reindex"}.get(path.suffix)
+    tool = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "sqlite3 FILE .recover"}.get(path.suffix)
     return f"; if its recording was cut short, `{tool}` mends it" if tool else ""
 
 

@@ -61,7 +61,7 @@ class Parts:
             except Exception as failure:  # of this part alone
                 broken.append(f"{file.name} ({_first_line(failure)})")
         if not whole:
-            raise error or _egosgm.InvalidArgument(f"{self._path}: none of its parts can be read: {', '.join(broken)}{_remedy_of(files[0])}")
+            raise _egosgm.InvalidArgument(f"{self._path}: cannot be read as a bag: none of its parts can be read: {', '.join(broken)}{_remedy_of(files[0])}")
         if is_described:
             self.notes.append(f"metadata.yaml does not describe the bag ({_first_line(error)}): its parts are read as they are")
         if broken:
@@ -125,5 +125,5 @@ def _first_line(error: Optional[Exception]) -> str:
 
 
 def _remedy_of(file: pathlib.Path) -> str:
-    tool = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "ros2 bag reindex"}.get(file.suffix)
+    tool = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "sqlite3 FILE .recover"}.get(file.suffix)
     return f"; if its recording was cut short, `{tool}` mends it" if tool else ""

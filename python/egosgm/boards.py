@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from . import _egosgm
 
 Corners = Dict[int, NDArray[np.float32]]  # (x, y) [px] by the corner's number on the board
-_WINDOW = (4, 4)  # half of what a corner is refined in [px]
 _STOP = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 0.001)
 _TRIED = 3  # images in which boards of other sizes are looked for
 
@@ -32,6 +31,14 @@ def chessboard(columns: int, rows: int, square_m: float) -> Board:
         return dict(enumerate(corners.reshape(-1, 2))) if is_there else {}
 
     return Board(f"a chessboard of {columns}x{rows} inner corners", points, find, columns * rows, False)
+
+
+def _half_window(points: NDArray[np.float64], corners: NDArray[np.float32], gap_m: float) -> int:
+    """Half of the window [px] that holds a corner and nothing of the markers, which begin gap_m beside it."""
+    if len(points) < 3:
+        return 2
+    fit = np.linalg.lstsq(np.column_stack([points[:, :2], np.ones(len(points))]), corners, rcond=None)[0]
+    return int(np.clip(0.8 * gap_m * np.linalg.svd(fit[:2], compute_uv=False)[-1], 2, 8))
 
 
 def charuco(columns: int, rows: int, square_m: float, marker_m: float, dictionary: str) -> Board:
@@ -60,7 +67,8 @@ def charuco(columns: int, rows: int, square_m: float, marker_m: float, dictionar
         corners, numbers = detect(grey)
         if numbers is None:
             return {}
-        corners = cv2.cornerSubPix(grey, np.ascontiguousarray(corners, np.float32), _WINDOW, (-1, -1), _STOP)
+        half = _half_window(np.array(points)[numbers.ravel()], corners.reshape(-1, 2), (square_m - marker_m) / 2)
+        corners = cv2.cornerSubPix(grey, np.ascontiguousarray(corners, np.float32), (half, half), (-1, -1), _STOP)
         return dict(zip(numbers.ravel().tolist(), corners.reshape(-1, 2)))
 
     return Board(f"a ChArUco board of {columns}x{rows} squares, {dictionary}", np.array(points, np.float32), find, 8, True)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
-from .arguments import Parser, counted, decimal, expect_new_file, expect_new_folder
+from .arguments import counted, decimal, expect_new_file, expect_new_folder, Parser, tell
 from .boards import Board, Corners, charuco, chessboard, drawn, other_size
 from .raw_pairs import RawPair, open_pairs
 
@@ -135,17 +135,20 @@ def _points(board: Board, numbers: Sequence[int], corners: Corners) -> Tuple[NDA
     return board.points_m[list(numbers)].reshape(-1, 1, 3), np.array([corners[number] for number in numbers], np.float32).reshape(-1, 1, 2)
 
 
-def _calibrate_camera(board: Board, views: Sequence[_View], side: int, size: Tuple[int, int]) -> Tuple[_Camera, NDArray[np.float64]]:
-    """The camera, and the error of each view [px]."""
+def _flags(views: int) -> int:
+    """Few views say nothing of the third radial coefficient."""
+    return cv2.CALIB_FIX_K3 if views < _MANY_VIEWS else 0
+
+
+def _calibrate_camera(board: Board, views: Sequence[_View], side: int, size: Tuple[int, int]) -> Tuple[NDArray[np.float64], NDArray[np.float64], List[float]]:
+    """Matrix, distortion, and the board's tilts [degrees], by one camera alone."""
     objects, images = zip(*(_points(board, sorted(view.corners[side]), view.corners[side]) for view in views))
-    flags = cv2.CALIB_FIX_K3 if len(views) < _MANY_VIEWS else 0
-    error, matrix, distortion, turns, _, _, _, errors = cv2.calibrateCameraExtended(objects, images, size, None, None, flags=flags)
-    tilts = [float(np.degrees(np.arccos(min(1.0, abs(cv2.Rodrigues(turn)[0][2, 2]))))) for turn in turns]
-    return _Camera(matrix, distortion.ravel()[:5], float(error), tilts), errors.ravel()
+    _, matrix, distortion, turns, _ = cv2.calibrateCamera(objects, images, size, None, None, flags=_flags(len(views)))
+    return matrix, distortion.ravel()[:5], [float(np.degrees(np.arccos(min(1.0, abs(cv2.Rodrigues(turn)[0][2, 2]))))) for turn in turns]
 
 
 def _calibrate(board: Board, views: Sequence[_View], size: Tuple[int, int]) -> _Stereo:
-    cameras = tuple(_calibrate_camera(board, views, side, size)[0] for side in (0, 1))
+    alone = [_calibrate_camera(board, views, side, size) for side in (0, 1)]
     objects, lefts, rights = [], [], []
     for view in views:
         numbers = view.common()
@@ -153,10 +156,14 @@ def _calibrate(board: Board, views: Sequence[_View], size: Tuple[int, int]) -> _
         objects.append(points)
         lefts.append(left)
         rights.append(_points(board, numbers, view.corners[1])[1])
-    given = [part for camera in cameras for part in (camera.matrix, camera.distortion)]
-    error, _, _, _, _, rotation, translation, _, _, errors = cv2.stereoCalibrateExtended(objects, lefts, rights, *given, size, np.eye(3), np.zeros((3, 1)),
-                                                                                       flags=cv2.CALIB_FIX_INTRINSIC)[:10]
-    return _Stereo((cameras[0], cameras[1]), rotation, translation.ravel(), float(error), np.asarray(errors))
+    # One camera alone may take a lens for a distance, which both together do not.
+    given = [part for matrix, distortion, _ in alone for part in (matrix, distortion)]
+    found = cv2.stereoCalibrateExtended(objects, lefts, rights, *given, size, np.eye(3), np.zeros((3, 1)),
+                                        flags=cv2.CALIB_USE_INTRINSIC_GUESS | _flags(len(views)))
+    errors = np.asarray(found[-1])  # what lies before it depends on OpenCV's version
+    of_cameras = np.sqrt((errors ** 2).mean(axis=0))
+    cameras = [_Camera(found[1 + 2 * side], found[2 + 2 * side].ravel()[:5], float(of_cameras[side]), alone[side][2]) for side in (0, 1)]
+    return _Stereo((cameras[0], cameras[1]), found[5], found[6].ravel(), float(found[0]), errors)
 
 
 def _without_bad(board: Board, views: List[_View], size: Tuple[int, int]) -> Tuple[_Stereo, List[_View], List[Tuple[_View, float]]]:
@@ -231,20 +238,20 @@ def _text(stereo: _Stereo, size: Tuple[int, int]) -> str:
 
 def _tell(found: _Views, stereo: _Stereo, views: Sequence[_View], out: Sequence[Tuple[_View, float]], coverage: Sequence[float],
           rows: NDArray[np.float64]) -> None:
-    print(f"the board is in both images of {len(found.views)} of {counted(found.pairs, 'pair')} ({found.found[0]} left, {found.found[1]} right)")
+    tell(f"the board is in both images of {len(found.views)} of {counted(found.pairs, 'pair')} ({found.found[0]} left, {found.found[1]} right)")
     for view, errors in zip(views, stereo.errors_px):
-        print(f"  pair {view.number:3}: error {errors[0]:.3f} px left, {errors[1]:.3f} px right")
+        tell(f"  pair {view.number:3}: error {errors[0]:.3f} px left, {errors[1]:.3f} px right")
     for view, error in out:
-        print(f"  pair {view.number:3}: left out, {error:.3f} px")
+        tell(f"  pair {view.number:3}: left out, {error:.3f} px")
     for name, camera, share in zip(("left", "right"), stereo.cameras, coverage):
         m = camera.matrix
-        print(f"{name + ':':<7}fx {m[0, 0]:.2f}, fy {m[1, 1]:.2f}, cx {m[0, 2]:.2f}, cy {m[1, 2]:.2f} px; error {camera.error_px:.3f} px; corners cover {100 * share:.0f} % "
+        tell(f"{name + ':':<7}fx {m[0, 0]:.2f}, fy {m[1, 1]:.2f}, cx {m[0, 2]:.2f}, cy {m[1, 2]:.2f} px; error {camera.error_px:.3f} px; corners cover {100 * share:.0f} % "
               "of the image")
     turn = float(np.degrees(np.linalg.norm(cv2.Rodrigues(stereo.rotation)[0])))
-    print(f"pair:  baseline {np.linalg.norm(stereo.translation_m):.4f} m, turned by {turn:.2f} degrees; error {stereo.error_px:.3f} px; rows agree within "
+    tell(f"pair:  baseline {np.linalg.norm(stereo.translation_m):.4f} m, turned by {turn:.2f} degrees; error {stereo.error_px:.3f} px; rows agree within "
           f"{np.quantile(rows, 0.9):.2f} px after rectification (90 % of the corners)")
     for text in _advice(stereo, coverage, len(views)):
-        print(f"note:  {text}")
+        tell(f"note:  {text}")
 
 
 def _next_step(given: argparse.Namespace) -> str:
@@ -273,5 +280,5 @@ def main(arguments: Sequence[str]) -> int:
     coverage = [_coverage(views, side, found.size) for side in (0, 1)]
     _tell(found, stereo, views, left_out, coverage, _rows_px(board, views, stereo, found.size))
     _egosgm._write_new_file(out, _text(stereo, found.size).encode())
-    print(f"{given.out}: {_next_step(given)}")
+    tell(f"{given.out}: {_next_step(given)}")
     return 0

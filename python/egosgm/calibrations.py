@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations as other programs write them, told apart by what they hold: the one place that reads them."""
+import configparser
 import dataclasses
 import json
 import math
 import os
 import pathlib
 import re
+import types
 import xml.etree.ElementTree as ElementTree
-from typing import Any, Dict, List, Optional, Tuple, Union
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,7 @@ _Matrix = NDArray[np.float64]
 
 _MOST_BYTES, _MOST_PARTS = 1 << 22, 2000
 Found = Union[StereoRig, _egosgm.Calibration]
+_Camera = Tuple[_Matrix, _Matrix, bool]  # matrix, distortion, whether that is a fisheye's
 
 
 def _without_rectification(rig: StereoRig) -> Optional[_egosgm.Calibration]:
@@ -53,7 +56,8 @@ def _yaml_of(text: str, file: pathlib.Path) -> Any:
     body = re.sub(r"^%YAML[^\n]*\n", "", text.lstrip("\ufeff"))
     body = re.sub(r"(?m)^(\s*[\w.]+):(?=[^\s:])", r"\1: ", body)
     try:
-        return yaml.load(body, Loader)
+        documents = [document for document in yaml.load_all(body, Loader) if document is not None]  # a topic's, one message each
+        return documents[0] if documents else None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise _refuse(file, "is no YAML that can be read: " + str(error).replace("\n", " ")) from None
 
@@ -75,10 +79,14 @@ def _matrix(value: Any, shape: Tuple[int, ...]) -> Optional[_Matrix]:
 
 
 def _needed(data: Dict[str, Any], names: Tuple[str, ...], shape: Tuple[int, ...], file: pathlib.Path, what: str) -> _Matrix:
-    for name in names:
-        if name in data and (found := _matrix(data[name], shape)) is not None:
-            return found
+    found = _first(data, names, shape)
+    if found is not None:
+        return found
     raise _refuse(file, f"is {what} and lacks {' or '.join(names)}, {int(np.prod(shape)) if shape else 'some'} finite numbers")
+
+
+def _first(data: Dict[str, Any], names: Tuple[str, ...], shape: Tuple[int, ...]) -> Optional[_Matrix]:
+    return next((found for name in names if name in data and (found := _matrix(data[name], shape)) is not None), None)
 
 
 def _number(data: Dict[str, Any], name: str, file: pathlib.Path, what: str) -> float:
@@ -110,7 +118,7 @@ def _distortion(values: Any, model: str, file: pathlib.Path) -> Tuple[_Matrix, b
     raise _refuse(file, f"its distortion is of the model \"{model}\": radtan and equidistant are read")
 
 
-def _pair(left: Tuple[_Matrix, _Matrix, bool], right: Tuple[_Matrix, _Matrix, bool], right_from_left: _Matrix, size: Any,
+def _pair(left: _Camera, right: _Camera, right_from_left: _Matrix, size: Any,
           file: pathlib.Path) -> StereoRig:
     if left[2] != right[2]:
         raise _refuse(file, "one camera is a fisheye and the other one is not: calibrate both by one model")
@@ -119,7 +127,7 @@ def _pair(left: Tuple[_Matrix, _Matrix, bool], right: Tuple[_Matrix, _Matrix, bo
 
 def _kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
     what = "a camera chain of Kalibr"
-    cameras: List[Tuple[_Matrix, _Matrix, bool]] = []
+    cameras: List[_Camera] = []
     for name in ("cam0", "cam1"):
         camera = data.get(name)
         if not isinstance(camera, dict):
@@ -155,17 +163,23 @@ class _Info:
     """A camera of ROS's calibrator, as a camera info has it."""
 
     def __init__(self, data: Dict[str, Any], file: pathlib.Path) -> None:
+        """data: of the calibrator's file, or of a message as `ros2 topic echo` and `rostopic echo` print it."""
         what = "a camera of ROS's calibrator"
-        self.k = _needed(data, ("camera_matrix",), (9,), file, what)
-        self.p = _needed(data, ("projection_matrix",), (12,), file, what)
-        rotation = _matrix(data.get("rectification_matrix"), (9,))
+        self.k = _needed(data, ("camera_matrix", "k", "K"), (9,), file, what)
+        self.p = _needed(data, ("projection_matrix", "p", "P"), (12,), file, what)
+        rotation, distortion = _first(data, ("rectification_matrix", "r", "R"), (9,)), _first(data, ("distortion_coefficients", "d", "D"), ())
         self.r = np.eye(3).reshape(-1) if rotation is None else rotation
-        distortion = _matrix(data.get("distortion_coefficients"), ())
         self.d = np.zeros(0) if distortion is None else distortion
-        self.width, self.height = int(data.get("image_width", 0)), int(data.get("image_height", 0))
+        self.width, self.height = (int(data.get(f"image_{side}", data.get(side, 0))) for side in ("width", "height"))
         self.distortion_model = str(data.get("distortion_model", ""))
-        self.binning_x = self.binning_y = 0
-        self.roi = None
+        self.binning_x, self.binning_y = int(data.get("binning_x", 0)), int(data.get("binning_y", 0))
+        region = data.get("roi")
+        self.roi = types.SimpleNamespace(**{name: int(region.get(name, 0)) for name in ("x_offset", "y_offset", "width", "height")}) \
+            if isinstance(region, dict) else None
+
+
+def _is_info(data: Dict[str, Any]) -> bool:
+    return "projection_matrix" in data or any(_matrix(data.get(p), (12,)) is not None and k in data for p, k in (("p", "k"), ("P", "K")))
 
 
 def _ros(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> Found:
@@ -203,6 +217,126 @@ def _orb_slam(data: Dict[str, Any], file: pathlib.Path) -> Found:
         if name in data:
             return _egosgm.Calibration(*four, _number(data, name, file, what) / of_focal)
     raise _refuse(file, f"is {what} of one camera: it lacks Stereo.b or Camera.bf, the baseline")
+
+
+def _transform(rotation: _Matrix, translation: Sequence[float]) -> _Matrix:
+    transform = np.eye(4)
+    transform[:3, :3], transform[:3, 3] = rotation, translation
+    return transform
+
+
+def _vins(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
+    """VINS-Fusion's, with a file for each camera beside it."""
+    what = "a configuration of VINS"
+    if int(data.get("num_of_cam", 2)) < 2 or "cam1_calib" not in data:
+        raise _refuse(file, f"is {what} of one camera: cam1_calib is missing")
+    cameras = [_camodocal(file.parent / str(data[f"cam{i}_calib"])) for i in (0, 1)]
+    body_from = [_needed(data, (f"body_T_cam{i}",), (4, 4), file, what) for i in (0, 1)]
+    return _pair(cameras[0], cameras[1], np.linalg.inv(body_from[1]) @ body_from[0], [data.get("image_width"), data.get("image_height")], file)
+
+
+def _camodocal(file: pathlib.Path) -> _Camera:
+    what, data = "a camera of VINS", _data_of(_text_of(file), file)
+    kind = str(data.get("model_type", "")).upper() if isinstance(data, dict) else ""
+    if kind == "KANNALA_BRANDT":
+        numbers = [_number(data["projection_parameters"], name, file, what) for name in ("mu", "mv", "u0", "v0", "k2", "k3", "k4", "k5")]
+        return _of_four(np.array(numbers[:4])), np.array(numbers[4:]), True
+    if kind != "PINHOLE":
+        raise _refuse(file, f"is {what} of the model \"{kind}\": PINHOLE and KANNALA_BRANDT are read")
+    four = [_number(data["projection_parameters"], name, file, what) for name in ("fx", "fy", "cx", "cy")]
+    return _of_four(np.array(four)), np.array([_number(data["distortion_parameters"], name, file, what) for name in ("k1", "k2", "p1", "p2")]), False
+
+
+def _basalt(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
+    from .ros_images import rotation_of
+    what = "a calibration of Basalt"
+    cameras, body_from = [], []
+    for camera, pose in zip(data.get("intrinsics", [])[:2], data.get("T_imu_cam", [])[:2]):
+        kind, numbers = camera.get("camera_type"), camera.get("intrinsics", {})
+        if kind not in ("pinhole", "kb4", "pinhole-radtan8"):
+            raise _refuse(file, f"is {what} of the model \"{kind}\": pinhole, pinhole-radtan8 and kb4 are read")
+        order = {"pinhole": (), "kb4": ("k1", "k2", "k3", "k4"), "pinhole-radtan8": ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")}[kind]
+        lens = [_number(numbers, name, file, what) for name in order]
+        cameras.append((_of_four(np.array([_number(numbers, name, file, what) for name in ("fx", "fy", "cx", "cy")])), np.array(lens or [0.0] * 4), kind == "kb4"))
+        p = [_number(pose, name, file, what) for name in ("px", "py", "pz", "qx", "qy", "qz", "qw")]
+        body_from.append(_transform(rotation_of(*p[3:]), p[:3]))
+    if len(cameras) < 2:
+        raise _refuse(file, f"is {what} of one camera")
+    return _pair(cameras[0], cameras[1], np.linalg.inv(body_from[1]) @ body_from[0], (data.get("resolution") or [None])[0], file)
+
+
+def _depthai(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
+    """Of the left and the right camera of an OAK, sockets 1 and 2; where one stands is told from the other, or both from a third one [cm]."""
+    what = "the calibration of an OAK camera"
+    sockets = {int(socket): camera for socket, camera in data["cameraData"]}
+    if not {1, 2} <= set(sockets):
+        raise _refuse(file, f"is {what} without a left and a right camera (sockets 1 and 2)")
+
+    def to_root(socket: int) -> Tuple[int, _Matrix]:
+        transform = np.eye(4)
+        for _ in range(len(sockets)):
+            extrinsics = sockets[socket].get("extrinsics", {})
+            rotation, t = _matrix(extrinsics.get("rotationMatrix"), (3, 3)), extrinsics.get("translation", {})
+            if rotation is None or int(extrinsics.get("toCameraSocket", -1)) not in sockets:
+                break
+            transform = _transform(rotation, [0.01 * float(t[axis]) for axis in "xyz"]) @ transform
+            socket = int(extrinsics["toCameraSocket"])
+        return socket, transform
+
+    cameras = [(_needed(sockets[i], ("intrinsicMatrix",), (3, 3), file, what), _needed(sockets[i], ("distortionCoeff",), (14,), file, what), False) for i in (1, 2)]
+    (root, left), (other_root, right) = to_root(1), to_root(2)
+    if root != other_root:
+        raise _refuse(file, f"is {what}, which does not say how the cameras of sockets 1 and 2 stand")
+    return _pair(cameras[0], cameras[1], np.linalg.inv(right) @ left, [sockets[1].get("width"), sockets[1].get("height")], file)
+
+
+_ZED_SIZES = {"2K": (2208, 1242), "FHD": (1920, 1080), "HD": (1280, 720), "VGA": (672, 376), "FHD1200": (1920, 1200), "SVGA": (960, 600)}
+
+
+def _zed(text: str, file: pathlib.Path, size: Optional[Tuple[int, int]]) -> StereoRig:
+    """The factory calibration of a ZED camera, of several sizes of images; its lengths are millimetres."""
+    what, parser = "the factory calibration of a ZED camera", configparser.ConfigParser(strict=False)
+    try:
+        parser.read_string(text)
+    except configparser.Error as error:
+        raise _refuse(file, f"is {what} that cannot be read: {str(error).splitlines()[0]}") from None
+    there = [name for name in _ZED_SIZES if parser.has_section(f"LEFT_CAM_{name}") and parser.has_section(f"RIGHT_CAM_{name}")]
+    chosen = [name for name in there if _ZED_SIZES[name] == size] if size else there
+    if len(chosen) != 1:
+        sizes = ", ".join("{}x{}".format(*_ZED_SIZES[name]) for name in there) or "none"
+        raise _refuse(file, f"is {what} for images of {sizes}, " + (f"not of {size[0]}x{size[1]}" if size else "and here nothing tells which: `egosgm rectify` "
+                      "goes by the images' size; in Python give read_calibration the size"))
+    name = chosen[0]
+    cameras = []
+    for side in ("LEFT", "RIGHT"):
+        values = dict(parser[f"{side}_CAM_{name}"])
+        four = np.array([_number(values, key, file, what) for key in ("fx", "fy", "cx", "cy")])
+        cameras.append((_of_four(four), np.array([float(values.get(key, 0)) for key in ("k1", "k2", "p1", "p2", "k3")]), False))
+    stereo = dict(parser["STEREO"]) if parser.has_section("STEREO") else {}
+    sized = [float(stereo.get(f"{key}_{name}".lower(), stereo.get(key, 0))) for key in ("ty", "tz", "rx", "cv", "rz")]
+    rotation = _rotation(sized[2:])
+    assert rotation is not None
+    return _pair(cameras[0], cameras[1], _transform(rotation, 0.001 * np.array([-_number(stereo, "baseline", file, what), *sized[:2]])), _ZED_SIZES[name], file)
+
+
+def _vkitti(file: pathlib.Path) -> _egosgm.Calibration:
+    """Virtual KITTI 2's intrinsic.txt and extrinsic.txt, of its first frame."""
+    def rows(name: str, count: int) -> Dict[int, _Matrix]:
+        path = file.with_name(name)
+        found: Dict[int, _Matrix] = {}
+        for row in _text_of(path).splitlines()[1:]:
+            numbers = _matrix(row.split(), (count + 2,))
+            if numbers is None:
+                raise _refuse(path, f"is of Virtual KITTI 2, and a row has not {count + 2} numbers")
+            found.setdefault(int(numbers[1]), numbers[2:])
+        if not {0, 1} <= set(found):
+            raise _refuse(path, "is of Virtual KITTI 2 without cameras 0 and 1")
+        return found
+
+    fx, fy, cx, cy = rows("intrinsic.txt", 4)[0]
+    poses = rows("extrinsic.txt", 16)
+    right_from_left = poses[1].reshape(4, 4) @ np.linalg.inv(poses[0].reshape(4, 4))
+    return _egosgm.Calibration(fx, fy, cx, cy, -right_from_left[0, 3])
 
 
 def _of_q(q: _Matrix, file: pathlib.Path) -> _egosgm.Calibration:
@@ -319,9 +453,10 @@ def _check_parts(text: str, file: pathlib.Path) -> None:
 def _text_of(file: pathlib.Path) -> str:
     if not file.exists():
         raise _refuse(file, "no such file")
-    if file.stat().st_size > _MOST_BYTES:
-        raise _refuse(file, f"is longer than {_MOST_BYTES >> 20} MiB; give a calibration alone")
-    return file.read_bytes().decode("utf-8-sig", errors="replace")
+    content = _egosgm._read_file(file, _MOST_BYTES)
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise _refuse(file, "is UTF-16, as some editors write: save it as UTF-8")
+    return content.decode("utf-8-sig", errors="replace")
 
 
 def _of_element(element: Any) -> Any:
@@ -348,10 +483,16 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool) -> Found:
     flat = {str(key): value for key, value in data.items()}
     if isinstance(flat.get("cam0"), dict):
         return _kalibr(flat, file)
-    if "T_BS" in flat or "projection_matrix" in flat:
-        both = list(_other_side(file))
-        contents = [_data_of(_text_of(path), path) for path in both]
-        return (_sensors if "T_BS" in flat else _ros)(both, contents)
+    if "T_BS" in flat or _is_info(flat):
+        return _of_two_files(list(_other_side(file)))
+    if "projection_parameters" in flat:
+        raise _refuse(file, "is one camera of VINS: give the configuration that names both, with cam0_calib and cam1_calib")
+    if "cam0_calib" in flat:
+        return _vins(flat, file)
+    if isinstance(flat.get("value0"), dict) and "T_imu_cam" in flat["value0"]:
+        return _basalt(flat["value0"], file)
+    if isinstance(flat.get("cameraData"), list):
+        return _depthai(flat, file)
     if isinstance(flat.get("disparity_to_depth"), dict):
         name = next((name for name in ("cams_12", "cams_03") if name in flat["disparity_to_depth"]), "cams_12")
         return _of_q(_needed(flat["disparity_to_depth"], (name,), (4, 4), file, "DSEC's cam_to_cam.yaml"), file)
@@ -362,6 +503,16 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool) -> Found:
     nested = {f"{outer}_{inner}": value for outer, group in flat.items() if isinstance(group, dict) and "data" not in group
               for inner, value in group.items()}
     return _by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye)
+
+
+def _of_two_files(files: List[pathlib.Path]) -> Found:
+    contents = [_data_of(_text_of(path), path) for path in files]
+    for file, data in zip(files, contents):
+        if not isinstance(data, dict) or not ("T_BS" in data or _is_info(data)):
+            raise _refuse(file, "is not the calibration of one camera, as of ROS (camera_matrix, projection_matrix) or EuRoC (T_BS, intrinsics)")
+    if ("T_BS" in contents[0]) != ("T_BS" in contents[1]):
+        raise _refuse(files[1], f"is of another kind than {files[0]}: give both cameras' files of one program")
+    return (_sensors if "T_BS" in contents[0] else _ros)(files, contents)
 
 
 def _of_folder(folder: pathlib.Path, is_fisheye: bool) -> Found:
@@ -384,12 +535,17 @@ def _of_folder(folder: pathlib.Path, is_fisheye: bool) -> Found:
     raise _refuse(folder, "is a folder without one calibration: give the file" + (", of " + ", ".join(c.name for c in candidates[:8]) if candidates else ""))
 
 
-def _found(file: pathlib.Path, is_fisheye: bool) -> Found:
+def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]] = None) -> Found:
     if file.is_dir():
         return _of_folder(file, is_fisheye)
     if not file.is_file():
-        raise _refuse(file, "no such file")
-    start = file.read_bytes()[:8]
+        raise _refuse(file, "is a pipe or a device; give a file" if file.exists() else "no such file")
+    with open(file, "rb") as stream:
+        start = stream.read(8)
+    if start.startswith((b"\x80", b"MATLAB")):
+        kind, remedy = ("a file of MATLAB", "write its matrices as JSON, by jsonencode, or of OpenCV's names") if start.startswith(b"M") else \
+            ("a pickle of Python, which may run programs", "save its matrices by numpy.savez, or as JSON")
+        raise _refuse(file, f"is {kind}: it is not read; {remedy}")
     if start.startswith(b"PK"):
         try:
             with np.load(file, allow_pickle=False) as archive:
@@ -406,6 +562,10 @@ def _found(file: pathlib.Path, is_fisheye: bool) -> Found:
     except _egosgm.InvalidArgument as error:
         own_error = error
     text = _text_of(file)
+    if re.search(r"(?m)^\[(LEFT|RIGHT)_CAM_\w+\]", text):
+        return _zed(text, file, size)
+    if text.startswith("frame cameraID "):
+        return _vkitti(file)
     plain = _plain_numbers(text, file)
     if plain is not None:
         return plain
@@ -456,11 +616,15 @@ def read_euroc_rig(mav0: _Path) -> StereoRig:
     return _sensors(files, contents)
 
 
-def find(file: _Path, unit_m: Optional[float] = None, is_fisheye: bool = False) -> Found:
-    """The calibration of a file or a folder, of whichever program: a Calibration of rectified images, or a rig of raw ones. unit_m: metres in a unit of
-    the translation; None: 1, and a baseline that no rig has is refused. Throws InvalidArgument with what the file is, and what it lacks."""
-    path = pathlib.Path(file)
-    found = _found(path, is_fisheye)
+def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fisheye: bool = False, size: Optional[Tuple[int, int]] = None) -> Found:
+    """The calibration of a file or a folder, of whichever program, or of a file for each camera: a Calibration of rectified images, or a rig of raw ones.
+    unit_m: metres in a unit of the translation; None: 1, and a baseline that no rig has is refused. size: (width, height) of the images, for files that
+    are of several. Throws InvalidArgument with what the file is, and what it lacks."""
+    files = [pathlib.Path(part) for part in ([file] if isinstance(file, (str, os.PathLike)) else file)]
+    if not 1 <= len(files) <= 2:
+        raise _egosgm.InvalidArgument(f"a calibration is one file, or one for each camera, left and right, not {len(files)}")
+    path = files[0]
+    found = _found(path, is_fisheye, size) if len(files) == 1 else _of_two_files(files)
     if not isinstance(found, StereoRig):
         return found
     found = dataclasses.replace(_in_unit(found, unit_m or 1.0), is_fisheye=found.is_fisheye or is_fisheye)
@@ -473,7 +637,9 @@ def find(file: _Path, unit_m: Optional[float] = None, is_fisheye: bool = False) 
     return _without_rectification(found) or found
 
 
-def read_calibration(file: _Path, unit_m: Optional[float] = None, is_fisheye: bool = False) -> Found:
-    """Reads a calibration, of whichever program: EgoSGM's, KITTI's, Middlebury's, Cityscapes', DSEC's, ORB-SLAM's and FoundationStereo's of rectified
-    images give a Calibration; OpenCV's, ROS's, Kalibr's, EuRoC's, and NumPy's arrays, of raw ones a StereoRig."""
-    return find(file, unit_m, is_fisheye)
+def read_calibration(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fisheye: bool = False,
+                     size: Optional[Tuple[int, int]] = None) -> Found:
+    """Reads a calibration, of whichever program: EgoSGM's, KITTI's, Middlebury's, Cityscapes', DSEC's, ORB-SLAM's, FoundationStereo's and Virtual KITTI's of
+    rectified images give a Calibration; OpenCV's, ROS's, Kalibr's, EuRoC's, VINS', Basalt's, an OAK's, a ZED's, and NumPy's arrays, of raw ones a
+    StereoRig. file: one, or (left, right). size: (width, height) of the images, for a ZED's file."""
+    return find(file, unit_m, is_fisheye, size)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm cloud: the points of all frames of a run, by its poses, in one cloud."""
+import os
 import pathlib
 from typing import Any, List, Sequence, Tuple
 
@@ -7,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
-from .arguments import Parser, decimal, expect_new_file, read_json
-from .points import cloud_of_maps, write_ply
+from .arguments import decimal, expect_new_file, Parser, read_json, tell
+from .points import cloud_of_maps, write_new_ply
 
 
 def _parser() -> Parser:
@@ -45,7 +46,7 @@ def _frames_of(folder: pathlib.Path) -> Tuple[_egosgm.Calibration, List[Tuple[st
     try:
         report = read_json(file)
         calibration = _egosgm.Calibration(**report["calibration"])
-        frames = [(entry.get("name") or f"{entry['frame']:06d}", entry["left"]) for entry in report["frames"]]
+        frames = [(str(entry.get("name") or f"{entry['frame']:06d}"), os.fsdecode(entry["left"])) for entry in report["frames"]]
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise _egosgm.InvalidArgument(f"{file}: is no report of a run: {error}") from None
     world_from_camera = _egosgm.read_poses(poses)
@@ -64,8 +65,10 @@ class VoxelGrid:
         self._sums = np.empty((0, 11))  # points, colours, normals, count, frames
 
     def add(self, points: NDArray[Any], colors: NDArray[Any], normals: NDArray[Any]) -> None:
-        ones = np.ones((len(points), 1))
-        keys, sums = self._of(np.floor(points / self._side_m).astype(np.int32), np.hstack([points, colors, normals, ones, ones]))
+        ones, cubes = np.ones((len(points), 1)), np.floor(points / self._side_m)
+        if not (np.abs(cubes) < 2**31).all():
+            raise _egosgm.InvalidArgument(f"--voxel {self._side_m:g}: is too small for points that lie {np.abs(points).max():.4g} m away: choose larger cubes")
+        keys, sums = self._of(cubes.astype(np.int32), np.hstack([points, colors, normals, ones, ones]))
         sums[:, 10] = 1
         self._keys, self._sums = self._of(np.vstack([self._keys, keys]), np.vstack([self._sums, sums]))
 
@@ -124,6 +127,6 @@ def main(arguments: Sequence[str]) -> int:
     points, colors, normals = grid.means(given.least_frames)
     if not len(points):
         raise _egosgm.InvalidArgument(f"{folder}: no point is left: raise --cloud-sigma or --max-depth, or lower --least-frames")
-    write_ply(file, points, colors, normals if given.normals else None)
-    print(f"{file}: {len(points)} points, of {100 * taken / pixels:.1f} % of the pixels with a disparity in {len(frames)} frames")
+    write_new_ply(file, points, colors, normals if given.normals else None)
+    tell(f"{file}: {len(points)} points, of {100 * taken / pixels:.1f} % of the pixels with a disparity in {len(frames)} frames")
     return 0

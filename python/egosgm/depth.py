@@ -15,5 +15,5 @@ def depth_sigma_from_disparity(disparity: ArrayLike, variance: ArrayLike, calibr
     p = np.asarray(variance, np.float32)
     if p.shape != depth.shape:
         raise _egosgm.InvalidArgument(f"variance is {p.shape} and disparity {depth.shape}: give maps of one frame")
-    with np.errstate(over="ignore"):  # infinitely uncertain, where the disparity is next to nothing
+    with np.errstate(over="ignore", invalid="ignore"):  # infinitely uncertain, where the disparity is next to nothing; NaN where p is no variance
         return depth * (depth / np.float32(calibration.fx * calibration.baseline_m)) * np.sqrt(p)

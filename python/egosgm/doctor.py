@@ -10,7 +10,7 @@ import cv2  # noqa: F401  who lacks it is told at once
 import numpy as np
 
 from . import _egosgm
-from .arguments import Parser, counted, whole_number
+from .arguments import counted, Parser, tell, whole_number
 from .examination import Examination, Finding
 from .rectification import Rectification, StereoRig
 from .sequences import add_input, frame_times, open_input, open_without_calibration
@@ -43,6 +43,10 @@ class _Source:
 
     def times(self) -> Finding:
         raise NotImplementedError
+
+    def is_of_other_moments(self) -> bool:
+        """Whether left and right were taken too far apart, by their stamps. Known once all was read."""
+        return False
 
 
 class _OfSequence(_Source):
@@ -83,7 +87,7 @@ class _OfBag(_Source):
     def __init__(self, given: argparse.Namespace) -> None:
         from .bag import Bag
         self._bag = Bag(given.bag, given.left_topic or "", given.right_topic or "", given.info_topics or (), max_skew_ms=given.max_skew_ms,
-                        calib=given.calib or "")
+                        calib=given.calib[0] if given.calib else "")
         self._stamps: List[int] = []
         self._frames = itertools.islice(self._bag.frames(), _MOST_OF_BAG)
         self._next: Any = next(self._frames, None)  # then its cameras are known
@@ -99,6 +103,9 @@ class _OfBag(_Source):
             self._stamps.append(frame.stamp_ns)
             if frame.number in wanted:
                 yield _Pair(frame.number, f"{frame.number:06d}", frame.left, frame.right)
+
+    def is_of_other_moments(self) -> bool:
+        return self._bag.gaps.are_other_moments(self._bag.gaps.largest_skew_ms)
 
     def times(self) -> Finding:
         gaps, text = self._bag.gaps, self._bag.gaps.text()
@@ -171,6 +178,8 @@ def _examine(source: _Source, samples: int, least: int, end: int) -> List[Findin
     of_pairs = examination.findings(count)
     if source.rectified:
         of_pairs[0] = of_pairs[0]._replace(text=f"{of_pairs[0].text}, rectified here by {source.rectified}")
+    if source.is_of_other_moments():  # which explains what rows, sides and range would say
+        of_pairs = [finding for finding in of_pairs if finding.check in ("images", "calibration")]
     findings += of_pairs
     is_sound = all(finding.verdict != "problem" for finding in findings)
     findings.append(source.times())
@@ -185,7 +194,7 @@ def _findings(given: argparse.Namespace) -> List[Finding]:
         return _examine(_OfBag(given), given.samples, given.min_disparity, end)
     try:
         sequence, calibration = open_input(given)
-        source = _OfSequence(sequence, calibration, given.calib)
+        source = _OfSequence(sequence, calibration, " ".join(given.calib or ()))
     except _egosgm._NegativeBaseline as error:
         wrong = Finding("problem", "calibration", str(error), _EXCHANGE)
         if not given.calib:
@@ -229,11 +238,11 @@ def main(arguments: Sequence[str]) -> int:
     findings = _findings(given)
     problems = sum(finding.verdict == "problem" for finding in findings)
     if given.json:
-        print(json.dumps([finding._asdict() for finding in findings], indent=2, ensure_ascii=False))
+        tell(json.dumps([finding._asdict() for finding in findings], indent=2, ensure_ascii=False))
         return 2 if problems else 0
     for finding in findings:
-        print(f"{finding.verdict:<8} {finding.check:<12} {finding.text}")
+        tell(f"{finding.verdict:<8} {finding.check:<12} {finding.text}")
         if finding.remedy:
-            print(f"{'->':>21} {finding.remedy}")
-    print(f"{counted(problems, 'problem') if problems else 'No problem was'} found.")
+            tell(f"{'->':>21} {finding.remedy}")
+    tell(f"{counted(problems, 'problem') if problems else 'No problem was'} found.")
     return 2 if problems else 0

@@ -21,6 +21,7 @@ _FEWEST_AGREEING = 0.4  # of the matches; below, they are mistaken for each othe
 _CLIPPED_SHARE = 0.01  # of the points
 _BEHIND_SHARE, _BEHIND_PX = 0.02, 1.0  # points whose disparity none before the cameras has
 _MOST_BRIGHTNESS = 1.25  # of one image by the other's
+_LEAST_CONTRAST = 16  # grey levels of 256 between which nearly all pixels lie
 _MOST_SATURATED = 0.25  # of the pixels
 _FEWEST_COARSE = 0.03  # of the pixels of the coarse map; below, it says nothing
 
@@ -101,6 +102,7 @@ class Examination:
         self._pairs = self._narrow = self._equal = 0
         self._width = self._height = self._bits = 0
         self._brightness = np.zeros(2)
+        self._contrasts: List[float] = []
         self._saturated = np.zeros(2)
         self._matches: List[NDArray[np.float32]] = []
         self._coarse: List[NDArray[np.float32]] = []
@@ -114,6 +116,7 @@ class Examination:
         self._pairs += 1
         self._narrow += int(left.dtype == np.uint16 and max(int(left.max()), int(right.max())) < 256)
         self._equal += int(np.array_equal(left, right))
+        self._contrasts.append(min(float(np.ptp(np.quantile(image, (0.01, 0.99)))) for image in _egosgm._grey_bytes(left, right)))
         for side, image in enumerate((left, right)):
             self._brightness[side] += image.mean()
             largest = image.max()
@@ -128,13 +131,17 @@ class Examination:
         """pairs: how many there are in all. REQUIRES: add() was called."""
         found = [self._images(pairs), self._of_calibration()]
         matches = np.concatenate(self._matches)
+        if not self._has_contrast():  # nothing else can be told
+            return found
         if self._equal == self._pairs:
             return [*found, Finding("problem", "matches", "the left and the right images are the same", "give the images of both cameras")]
         coarse = np.concatenate(self._coarse)
         is_sure = len(coarse) >= _FEWEST_COARSE * self._coarse_pixels
-        if len(matches) < _FEWEST_MATCHES and (not is_sure or len(matches) < _FEWEST_SURE):
-            return [*found, Finding("problem", "matches", f"only {counted(len(matches), 'point')} found in both images",
-                                    "give the left and right images of the same moments, sharp, and overlapping")]
+        are_related = len(matches) >= _FEWEST_SURE and len(coarse) >= _FEWEST_COARSE / 2 * self._coarse_pixels
+        if len(matches) < _FEWEST_MATCHES and not are_related:
+            remedy = "give them sharper, brighter or with less noise: coarsely, left and right agree" if is_sure else \
+                "give the left and right images of the same moments, sharp, and overlapping"
+            return [*found, Finding("problem", "matches", f"only {counted(len(matches), 'point')} found in both images", remedy)]
         agreeing = matches[_agreeing(matches, self._width, self._height)] if len(matches) >= _FEWEST_MATCHES else matches[:0]
         is_agreed = len(agreeing) >= max(_FEWEST_MATCHES, _FEWEST_AGREEING * len(matches))
         found.append(self._rows(len(matches), agreeing))
@@ -146,6 +153,9 @@ class Examination:
         if behind <= 0.5:
             found.append(self._range(coarse, points))
         return found
+
+    def _has_contrast(self) -> bool:
+        return float(np.median(self._contrasts)) >= _LEAST_CONTRAST
 
     def _doffs(self) -> float:
         """A point before the cameras has disparity + doffs > 0."""
@@ -162,6 +172,9 @@ class Examination:
         if self._narrow == self._pairs:
             return Finding("problem", "images", f"{text}, but no value above 255: the upper 8 bits, which tell edges, are empty",
                            "save them with 8 bits, or multiply the values by 257")
+        if not self._has_contrast():
+            return Finding("problem", "images", f"{text}, of nearly one tone: they hold {np.median(self._contrasts):.0f} of 256 grey levels",
+                           "expose longer, or give more light: noise has as many")
         left, right = self._brightness / self._pairs
         ratio = (left + 1) / (right + 1)
         if max(ratio, 1 / ratio) > _MOST_BRIGHTNESS:
@@ -176,7 +189,7 @@ class Examination:
     def _of_calibration(self) -> Finding:
         c = self._calibration
         if c is None:
-            return Finding("note", "calibration", "none was given: there is no depth and no odometry", "give --calib FILE")
+            return Finding("note", "calibration", "none was given: there is no depth and no odometry", "give --calib FILE; `egosgm calibrate` finds one by pictures of a board")
         text = f"fx {c.fx:.1f}, fy {c.fy:.1f}, cx {c.cx:.1f}, cy {c.cy:.1f} px, baseline {c.baseline_m:.4g} m"
         suspicion = _egosgm._suspect_calibration(c, self._width, self._height)
         return Finding("problem", "calibration", f"{text}: {suspicion.what}", suspicion.remedy) if suspicion else Finding("ok", "calibration", text)
@@ -196,8 +209,9 @@ class Examination:
         text = f"vertical misalignment {offset:.2f} px in the median, 90 % within {spread:.2f} px of it ({of}){_slopes(places, errors)}"
         if abs(offset) <= _MOST_OFFSET_PX and spread <= _MOST_SPREAD_PX:
             return Finding("ok", "rows", text)
-        return Finding("problem", "rows", text,
-                       f"{max(abs(offset), spread):.1f} px: rectify again (egosgm rectify, from the raw images and a new calibration)")
+        remedy = "rectify again (egosgm rectify, from the raw images and a new calibration)" if self._calibration else \
+            "these images are not rectified: `egosgm calibrate` finds the cameras, and `egosgm rectify` makes images of equal rows"
+        return Finding("problem", "rows", text, f"{max(abs(offset), spread):.1f} px: {remedy}")
 
     def _without_texture(self, points: Optional[NDArray[np.float32]]) -> List[Finding]:
         found = []

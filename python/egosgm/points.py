@@ -24,7 +24,7 @@ def _rgb(image: ArrayLike) -> NDArray[np.uint8]:
         raise _egosgm.InvalidArgument(f"colors is {image.shape} of {image.dtype}: give H x W or H x W x 3 (RGB) of uint8 or uint16")
     if image.dtype == np.uint16:  # as wide as the values are
         image = (image * (255 / max(1, image.max(initial=0)))).astype(np.uint8)
-    image = image.reshape(*image.shape[:2], -1)
+    image = image[:, :, None] if image.ndim == 2 else image
     return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[:, :, :3]
 
 
@@ -69,10 +69,19 @@ def point_cloud(frame: Any, max_sigma: float = 0.1, reasons: Union[str, Sequence
 def write_ply(file: Union[str, "os.PathLike[str]"], points: ArrayLike, colors: Optional[ArrayLike] = None,
               normals: Optional[ArrayLike] = None) -> None:
     """Writes a binary PLY. points: N x 3 [m]. colors: N x 3 of uint8, RGB. normals: N x 3. A file that is there is replaced."""
+    _write(file, points, colors, normals, False)
+
+
+def write_new_ply(file: Union[str, "os.PathLike[str]"], points: ArrayLike, colors: ArrayLike, normals: Optional[ArrayLike]) -> None:
+    """The same. Throws IoError where a file has come there meanwhile."""
+    _write(file, points, colors, normals, True)
+
+
+def _write(file: Union[str, "os.PathLike[str]"], points: ArrayLike, colors: Optional[ArrayLike], normals: Optional[ArrayLike], is_new: bool) -> None:
     bgr = None
     if colors is not None:
         bgr = np.asarray(colors)
-        if bgr.dtype != np.uint8:
-            raise _egosgm.InvalidArgument(f"colors are of {bgr.dtype}: give N x 3 of uint8, from 0 to 255")
+        if bgr.dtype != np.uint8 or bgr.ndim != 2:
+            raise _egosgm.InvalidArgument(f"colors are {bgr.shape} of {bgr.dtype}: give N x 3 of uint8, from 0 to 255")
         bgr = bgr[..., ::-1]
-    _egosgm._write_ply(os.fspath(file), points, bgr, normals)
+    _egosgm._write_ply(os.fspath(file), points, bgr, normals, is_new)

@@ -53,7 +53,10 @@ class PoseEvaluation:
 
 def poses_of(matrices: ArrayLike, name: str) -> np.ndarray:
     """An (N, 4, 4) array. Throws InvalidArgument, naming it."""
-    poses = np.asarray(matrices, float)
+    try:
+        poses = np.asarray(matrices, float)
+    except (TypeError, ValueError):
+        raise _egosgm.InvalidArgument(f"{name}: is no array of numbers: give poses as an (N, 4, 4) array") from None
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
         raise _egosgm.InvalidArgument(f"{name}: an array of shape {poses.shape}: give poses as an (N, 4, 4) array")
     if not np.isfinite(poses).all():

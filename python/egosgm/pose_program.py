@@ -7,7 +7,7 @@ from typing import Any, List, Sequence, Tuple
 import numpy as np
 
 from . import _egosgm, plots
-from .arguments import comparison_parser, counted, json_text, resolve_comparison
+from .arguments import comparison_parser, counted, json_text, resolve_comparison, tell, text_argument
 from .pose_evaluation import PoseEvaluation, evaluate_poses
 from .run_folder import frames_of_run
 
@@ -30,7 +30,7 @@ def read_pairs(estimate_name: str, truth_name: str, frames: str) -> Tuple[np.nda
     estimate_file, _ = _poses_file_of(estimate_name)
     truth_file, whole = _poses_file_of(truth_name)
     estimate, truth = _egosgm.read_poses(estimate_file), _egosgm.read_poses(truth_file)
-    first, last = _egosgm._parse_frame_range(frames) if frames else (None, None)
+    first, last = _egosgm._parse_frame_range(text_argument(frames)) if frames else (None, None)
     is_chosen = lambda number: (first is None or number >= first) and (last is None or number <= last)
     # Which frames the estimate's rows are of: the run tells, or --frames where they are as many, or they are all.
     run = frames_of_run(estimate_file)
@@ -47,7 +47,7 @@ def read_pairs(estimate_name: str, truth_name: str, frames: str) -> Tuple[np.nda
             raise _egosgm.InvalidArgument(f"{estimate_file} holds {counted(len(estimate), 'pose')}, {truth_file} {len(truth)}: give --frames FIRST:LAST, "
                                           "the numbers of the estimate's frames")
     rows = _egosgm._rows_of_frames(numbers, whole or sequence, len(truth), truth_file,
-                                   f"poses (the estimate {estimate_file} holds {len(estimate)})")
+                                   text_argument(f"poses (the estimate {estimate_file} holds {len(estimate)})"))
     kept = [i for i, number in enumerate(numbers) if is_chosen(number)]
     if len(kept) < 2:
         raise _egosgm.InvalidArgument(f"{estimate_file} and {truth_file}: {counted(len(kept), 'pose')} of the same frames"
@@ -84,7 +84,7 @@ def _work(arguments: Sequence[str]) -> str:
     parser.add_argument("--plot", action="append", default=[], metavar="FILE", help="draw both paths from above, in metres: a new .png or .svg file; "
                         "may be repeated")
     parser.add_argument("--json", action="store_true", help="print JSON")
-    given = parser.parse_intermixed_args(arguments)
+    given = parser.parse(arguments)
     resolve_comparison(given)
     for file in given.plot:
         plots.expect_plot("--plot", file)
@@ -96,5 +96,5 @@ def _work(arguments: Sequence[str]) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    print(_work(arguments))
+    tell(_work(arguments))
     return 0

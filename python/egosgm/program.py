@@ -7,9 +7,10 @@ import os
 import pathlib
 import signal
 import sys
-import tempfile
 import threading
 from typing import List, Optional, Sequence, Tuple
+
+from .arguments import say
 
 _PACKAGES = {  # what brings a module
     "cv2": "pip install opencv-python-headless, or apt install python3-opencv",
@@ -38,19 +39,19 @@ def _reads_itself(calib: str) -> bool:
         return False
 
 
-def with_calibration(arguments: List[str], folder: pathlib.Path) -> List[str]:
-    """The arguments with --calib in a form that the program reads, in a file of `folder`. Throws InvalidArgument."""
+def with_calibration(arguments: List[str]) -> List[str]:
+    """The arguments with --calib in a form that the program reads, in a file of memory alone. Throws InvalidArgument."""
     from . import _egosgm, calibrations
     place, calib = _value_of(arguments, "--calib")
-    if place < 0 or not calib or _reads_itself(calib):
+    if place < 0 or not (os.path.isfile(calib) or os.path.isdir(calib)) or _reads_itself(calib):  # a pipe can be read once
         return arguments
     found = calibrations.find(calib)
     if not isinstance(found, _egosgm.Calibration):
         raise _egosgm.InvalidArgument(f"{calib}: is of raw images, and `egosgm {arguments[0]}` takes rectified ones: `egosgm rectify` makes them, by it")
-    file = folder / "calib.txt"
+    file = f"/proc/self/fd/{os.memfd_create('calib.txt')}"
     _egosgm.write_calibration(file, found)
     changed = list(arguments)
-    changed[place] = f"--calib={file}" if changed[place].startswith("--calib=") else str(file)
+    changed[place] = f"--calib={file}" if changed[place].startswith("--calib=") else file
     return changed
 
 
@@ -60,23 +61,21 @@ def _module_of(arguments: Sequence[str]) -> Optional[str]:
     return tools[arguments[0]]["module"] if arguments and arguments[0] in tools else None
 
 
-def _say(text: str) -> None:
-    """On one line, whatever a name in it holds."""
-    with contextlib.suppress(OSError, AttributeError):  # the standard error may be full or closed
-        print("egosgm: " + "".join(c if c.isprintable() else " " for c in text), file=sys.stderr, flush=True)
+def _print_any_name() -> None:
+    """Names of files need not be text."""
+    with contextlib.suppress(AttributeError):  # no standard output, or one of a test
+        sys.stdout.reconfigure(errors="surrogateescape" if sys.stdout.encoding.lower() == "utf-8" else "replace")
 
 
-def _flushed(code: int) -> int:
-    """A result that the standard output did not take is none; a reader that goes has read enough."""
+def _output_error() -> Optional[OSError]:
+    """Why the standard output does not take what was printed; None where it does."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if not isinstance(error, BrokenPipeError):
-            _say(f"error: the standard output cannot be written: {error.strerror}")
-            return 1
-    return code
+        return error
+    return None
 
 
 def _run_program(arguments: List[str]) -> int:
@@ -86,39 +85,47 @@ def _run_program(arguments: List[str]) -> int:
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)  # Python's handlers would wait for C++ to come back
     given = {argument.split("=")[0] for argument in arguments}
-    if "--calib" not in given or "--bag" in given:
-        return _egosgm._main(arguments, bag_program)
-    with tempfile.TemporaryDirectory(prefix="egosgm_") as folder:
-        return _egosgm._main(with_calibration(arguments, pathlib.Path(folder)), bag_program)
+    arguments = arguments if "--bag" in given else with_calibration(arguments)
+    return _egosgm._main([os.fsencode(argument) for argument in arguments], bag_program)
 
 
-def run_tool(arguments: Sequence[str]) -> int:
-    """Runs a command, and returns its exit code. Never calls the C++ program."""
+def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]:
+    """A tool's exit code, and what is to be said of it."""
     from . import _egosgm
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
-    module = _module_of(arguments)
     try:
         if module is None:
-            return _run_program(list(arguments))
-        return _flushed(importlib.import_module("." + module, __package__).main(list(arguments[1:])))
+            return _run_program(list(arguments)), ""
+        return importlib.import_module("." + module, __package__).main(list(arguments[1:])), ""
     except SystemExit as end:  # of --help
-        return _flushed(int(end.code or 0))
+        return int(end.code or 0), ""
     except ModuleNotFoundError as error:
         package = error.name or ""
         if package.startswith("egosgm"):
             raise
         remedy = _PACKAGES.get(package, f"pip install {package}")
-        _say(f"error: {arguments[0]}: needs the Python module {package}, which {sys.executable} does not find: {remedy}")
-        return 1
+        return 1, f"error: {arguments[0]}: needs the Python module {package}, which {sys.executable} does not find: {remedy}"
     except BrokenPipeError:
-        return _flushed(0)
-    except (_egosgm.InvalidArgument, _egosgm.IoError, _egosgm.DeviceError, OSError) as error:
-        _say(f"error: {error}")
-        return 2 if isinstance(error, _egosgm.InvalidArgument) else 1
+        return 0, ""
+    except _egosgm.Error as error:
+        return 2 if isinstance(error, _egosgm.InvalidArgument) else 1, f"error: {error}"
+    except OSError as error:
+        return 1, f"error: {os.fsdecode(error.filename)}: {error.strerror}: choose another one" if error.filename else f"error: {error}"
     except KeyboardInterrupt:
-        _say("interrupted")
-        return 130
+        return 130, "interrupted"
+
+
+def run_tool(arguments: Sequence[str]) -> int:
+    """Runs a command, and returns its exit code. Never calls the C++ program."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
+    _print_any_name()
+    code, told = _outcome(arguments, _module_of(arguments))
+    error = _output_error()
+    if error is not None and not isinstance(error, BrokenPipeError) and code in (0, 1):  # a reader that goes has read enough
+        code, told = 1, f"error: the standard output cannot be written: {error.strerror}"
+    if told:
+        say(told)
+    return code
 
 
 def main() -> None:

@@ -166,14 +166,7 @@ def _of_patterns(left: str, right: str, by_order: bool) -> RawPairs:
 
 
 def _rows(file: pathlib.Path) -> List[str]:
-    try:
-        with open(file, "rb") as stream:
-            content = stream.read(_MOST_LIST_BYTES + 1)
-    except OSError as error:
-        raise _refuse(f"{file}: cannot be read: {error.strerror}; give an existing, readable file") from None
-    if len(content) > _MOST_LIST_BYTES:
-        raise _refuse(f"{file}: is longer than {_MOST_LIST_BYTES >> 20} MiB: is it the right file?")
-    return content.decode("utf-8-sig", errors="surrogateescape").splitlines()
+    return _egosgm._read_file(file, _MOST_LIST_BYTES).decode("utf-8-sig", errors="surrogateescape").splitlines()
 
 
 def _of_list(file: pathlib.Path) -> RawPairs:

@@ -142,6 +142,7 @@ class Rectification:
     """How raw images of a rig, width x height, become rectified ones of the same size. alpha 0: only pixels that the raw images have, to 1: all
     that they have. Threads may share one."""
 
+    @np.errstate(all="ignore")  # what is no number is refused by its name
     def __init__(self, rig: StereoRig, width: int, height: int, alpha: float = 0.0) -> None:
         import cv2
         if not (1 <= width <= _MOST_SIDE and 1 <= height <= _MOST_SIDE):

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm rectify: raw pairs in, a rectified sequence out, in the layout that all other commands read."""
 import argparse
+import itertools
 import os
 import pathlib
 import shlex
 import signal
 import sys
 import threading
-from typing import Any, List, Optional, Sequence
+from typing import Any, List, Optional, Sequence, Tuple
 
 from . import _egosgm
-from .arguments import Parser, counted, decimal, expect_new_folder
+from .arguments import Parser, counted, decimal, expect_new_folder, say
 from .calibrations import find, read_euroc_rig
 from .raw_pairs import RawPair, open_pairs
 from .rectification import Rectification, StereoRig
@@ -43,9 +44,9 @@ def _parser() -> Parser:
     add("--list", metavar="FILE", help="a text file with rows LEFT RIGHT or LEFT RIGHT SECONDS")
     add("--euroc", metavar="DIR", help="an EuRoC sequence (mav0 or its parent), with its own calibration")
     add = parser.add_argument
-    add("--calib", metavar="FILE", help="the calibration of the raw cameras, as egosgm.read_calibration reads it: OpenCV's (M1, D1, M2, D2, R, T; YAML, "
-        "XML or JSON), a folder with intrinsics.yml and extrinsics.yml, ROS's, Kalibr's; or, for images that are rectified already, what "
-        "`run --calib` reads")
+    add("--calib", metavar="FILE", nargs="+", help="the calibration of the raw cameras, as egosgm.read_calibration reads it: OpenCV's (M1, D1, M2, D2, R, T; "
+        "YAML, XML or JSON), a folder with intrinsics.yml and extrinsics.yml, ROS's, Kalibr's; the left and the right camera's file, where each has one; or, for "
+        "images that are rectified already, what `run --calib` reads")
     add("--fisheye", action="store_true", help="OpenCV's calibration is one of cv::fisheye: D1 and D2 hold four coefficients of the angle")
     add("--unit", metavar="m|cm|mm|METRES", help="unit of T in OpenCV's calibration; where it counts a board's squares, the side of a square [m]; without: m")
     add("--alpha", type=decimal, default=0.0, metavar="A", help="0: only pixels that the raw images have; 1: all of theirs, with black borders; without: 0")
@@ -57,19 +58,20 @@ def _parser() -> Parser:
 class _Rectifier:
     """What a pair goes through: rectification, or nothing where the images are rectified already."""
 
-    def __init__(self, given: argparse.Namespace) -> None:
+    def __init__(self, given: argparse.Namespace, size: Optional[Tuple[int, int]]) -> None:
         self._alpha, self.rectification = given.alpha, None
         self.rig: Optional[StereoRig] = None
         if given.euroc:
             self.rig = read_euroc_rig(given.euroc)
             return
         if not given.calib:
-            raise _egosgm.InvalidArgument("no calibration: give --calib FILE")
-        found = find(given.calib, given.unit, given.fisheye)
+            raise _egosgm.InvalidArgument("no calibration: give --calib FILE; `egosgm calibrate` finds one by pictures of a board, and rectified pictures need "
+                                          "none: `egosgm run LEFT RIGHT`")
+        found = find(given.calib, given.unit, given.fisheye, size)
         if isinstance(found, StereoRig):
             self.rig = found
         elif given.fisheye:
-            raise _egosgm.InvalidArgument(f"--fisheye: {given.calib} is no calibration of OpenCV's (K1, D1, K2, D2, R, T)")
+            raise _egosgm.InvalidArgument(f"--fisheye: {' '.join(given.calib)} is no calibration of OpenCV's (K1, D1, K2, D2, R, T)")
         else:
             self.calibration = found
 
@@ -142,13 +144,6 @@ class _Lines:
                 self.error = error
 
 
-def _say(text: str) -> None:
-    try:
-        print(f"egosgm: {text}", file=sys.stderr, flush=True)
-    except (OSError, AttributeError):  # the standard error may be full or closed
-        pass
-
-
 def _rectangle_text(rectangle: Sequence[int]) -> str:
     return "{2}x{3} from ({0}, {1})".format(*rectangle)
 
@@ -163,7 +158,9 @@ def main(arguments: Sequence[str]) -> int:
     if given.euroc and os.path.isdir(os.path.join(given.euroc, "mav0")):
         given.euroc = os.path.join(given.euroc, "mav0")
     pairs = open_pairs(given.left, given.right, given.side_by_side, given.list, given.euroc, given.pair_by == "order")
-    rectifier = _Rectifier(given)
+    stream = iter(pairs)
+    first = next(stream, None)
+    rectifier = _Rectifier(given, first.left.shape[1::-1] if first else None)
     expect_new_folder("--out", pathlib.Path(given.out))
     folder = _SequenceFolder(pathlib.Path(given.out))
     stops: List[int] = []
@@ -174,7 +171,7 @@ def main(arguments: Sequence[str]) -> int:
     if note:
         say_line(note)
     try:
-        for pair in pairs:
+        for pair in itertools.chain([first] if first else [], stream):
             if stops:
                 break
             rectifier(pair)
@@ -187,7 +184,7 @@ def main(arguments: Sequence[str]) -> int:
     if pairs.note != note:
         say_line(pairs.note)
     if stops and folder.frames == 0:
-        _say("interrupted before the first pair")
+        say("interrupted before the first pair")
         return 130
     folder.finish(rectifier)
     calibration = rectifier.calibration
@@ -198,9 +195,9 @@ def main(arguments: Sequence[str]) -> int:
                  "(valid.png has the left one's pixels)")
     say_line(f"egosgm doctor {shlex.quote(given.out)}; egosgm run --odometry {shlex.quote(given.out)} --out OUT")
     if stops:
-        _say(f"interrupted after {counted(folder.frames, 'pair')}: what is in {given.out} is whole")
+        say(f"interrupted after {counted(folder.frames, 'pair')}: what is in {given.out} is whole")
         return 130
     if say_line.error is not None:
-        _say(f"error: the standard output cannot be written: {say_line.error.strerror}")
+        say(f"error: the standard output cannot be written: {say_line.error.strerror}")
         return 1
     return 0

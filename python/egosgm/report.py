@@ -4,6 +4,7 @@ import argparse
 import base64
 import io
 import json
+import operator
 import pathlib
 import re
 import zlib
@@ -13,7 +14,7 @@ import numpy
 import PIL.Image
 
 from . import _egosgm
-from .arguments import Parser, counted, expect_new_file, read_json, whole_number
+from .arguments import counted, expect_new_file, Parser, read_json, tell, text_argument, whole_number
 
 _PICTURES = 6
 _MOST_FRAMES = 2_000_000  # as many rows as a text of poses may have
@@ -163,9 +164,9 @@ class _Page:
         self._folder = pathlib.Path(given.run)
         self._run = _read_run(self._folder)
         self._of_run = [_Frame(place, entry) for place, entry in enumerate(self._run["frames"])]
-        self._panels = _egosgm._FramePanels(int(self._run["options"].get("disparities", 128)))
+        self._panels = _egosgm._FramePanels(operator.index(self._run["options"].get("disparities", 128)))
         self._notes = [str(note) for note in self._run.get("notes", [])]
-        first, last = _egosgm._parse_frame_range(given.frames or "")
+        first, last = _egosgm._parse_frame_range(text_argument(given.frames or ""))
         self._frames = [f for f in self._of_run if (first is None or f.number >= first) and (last is None or f.number <= last)]
         if not self._frames:
             raise _egosgm.InvalidArgument(f"--frames {given.frames}: the run has none of them: choose from {self._of_run[0].number} to "
@@ -186,7 +187,7 @@ class _Page:
             self._notes.append("Without truth there are no errors: egosgm report OUT TRUTH compares.")
             return {"metrics": {}}
         images = {frame.name: frame.image for frame in self._of_run if frame.image}
-        pairs, _, alone = _egosgm._pair_with_truth(self._given.run, self._given.truth, self._given.frames or "", images)
+        pairs, _, alone = _egosgm._pair_with_truth(self._given.run, self._given.truth, text_argument(self._given.frames or ""), images)
         truths = [pair.truth for pair in pairs]
         note = f"Compared with {(truths[0] if len(truths) == 1 else truths[0].parent).name}."
         for pair in pairs:
@@ -279,5 +280,5 @@ def main(arguments: Sequence[str]) -> int:
     except (AttributeError, KeyError, TypeError) as error:
         raise _egosgm.InvalidArgument(f"{given.run}/report.json: not the report of a run: {re.sub(r'_egosgm[.]', '', str(error))}") from error
     _egosgm._write_new_file(file, text)
-    print(f"{file}: {len(text) / 1e6:.1f} MB, opens in any browser")
+    tell(f"{file}: {len(text) / 1e6:.1f} MB, opens in any browser")
     return 0

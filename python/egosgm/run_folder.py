@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a folder tells that `egosgm run` wrote."""
 import dataclasses
-import json
 import pathlib
 from typing import Any, Dict, List, Optional
 
-from . import _egosgm
+from .arguments import read_json
 
 _LARGEST_NUMBER = 2**31 - 1
 _MOST_FRAMES = 2_000_000
@@ -38,10 +37,7 @@ def frames_of_run(path: pathlib.Path) -> Optional[RunFrames]:
     file = report_of(path)
     if file is None:
         return None
-    try:
-        report = json.loads(file.read_text(errors="replace"))
-    except (ValueError, RecursionError):
-        raise _egosgm.InvalidArgument(f"{file}: is no JSON: is it the right file?") from None
+    report = read_json(file)
     frames = report.get("frames") if isinstance(report, dict) else None
     if not isinstance(frames, list) or not frames or any(_integer(frame, "frame") < 0 for frame in frames):
         return None

@@ -9,6 +9,7 @@ import re
 from typing import Any, List, NamedTuple, Optional, Tuple
 
 from . import _egosgm, calibrations
+from .arguments import text_argument
 from .rectification import StereoRig
 
 _MOST_TIMES_BYTES = 1 << 28
@@ -32,7 +33,8 @@ def add_input(parser: argparse.ArgumentParser) -> None:
     add("--scene", metavar="NUMBER", help="scene of --kitti, for example 000151")
     add("--left", metavar="PATTERN", help="left images: one PNG or JPEG, or a pattern (in quotes) such as 'left/%%06d.png' or 'left/*.jpg'")
     add("--right", metavar="PATTERN", help="right images, likewise; rectified, or raw where --calib is of raw images")
-    add("--calib", metavar="FILE", help="calibration of --left and --right, of whichever program, as egosgm.read_calibration reads it")
+    add("--calib", metavar="FILE", nargs="+", help="calibration of --left and --right, of whichever program, as egosgm.read_calibration reads it; the left and the "
+        "right camera's file, where each has one")
     add("--pair-by", metavar="name|order", help="what tells which --left and --right images belong together: equal texts in their names (what * or %%d "
         "stands for), or their order")
     add("--frames", metavar="FIRST:LAST", help="frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all")
@@ -84,9 +86,9 @@ def open_input(given: argparse.Namespace) -> Opened:
     """What the arguments of add_input name. Throws InvalidArgument, and _NegativeBaseline where that is what is wrong with the calibration."""
     _take_two_pictures(given)
     _check(given)
-    frames = given.frames or ""
+    frames = text_argument(given.frames or "")
     if given.kitti:
-        sequence = _egosgm.open_kitti_multiview(given.kitti, given.scene, frames)
+        sequence = _egosgm.open_kitti_multiview(given.kitti, text_argument(given.scene or ""), frames)
     elif given.odometry:
         sequence = _egosgm._open_kitti_odometry(given.odometry, frames)
     elif given.folder:
@@ -97,20 +99,23 @@ def open_input(given: argparse.Namespace) -> Opened:
 
 
 def open_without_calibration(given: argparse.Namespace) -> _egosgm.StereoSequence:
-    return _egosgm.open_patterns(given.left, given.right, "", given.frames or "", given.pair_by == "order")
+    return _egosgm.open_patterns(given.left, given.right, "", text_argument(given.frames or ""), given.pair_by == "order")
 
 
 def _of_patterns(given: argparse.Namespace) -> Opened:
     if not given.calib:
         return Opened(open_without_calibration(given), None)
     try:
-        sequence = _egosgm.open_patterns(given.left, given.right, given.calib, given.frames or "", given.pair_by == "order")
-        return Opened(sequence, sequence.calibration)
+        if len(given.calib) == 1:
+            frames = text_argument(given.frames or "")
+            sequence = _egosgm.open_patterns(given.left, given.right, given.calib[0], frames, given.pair_by == "order")
+            return Opened(sequence, sequence.calibration)
     except _egosgm._NegativeBaseline:
         raise
     except _egosgm.InvalidArgument:
-        found = calibrations.find(given.calib)  # of another program, or the error that is to be told
-    return Opened(open_without_calibration(given), found)
+        pass  # of another program, or the error is told below
+    sequence = open_without_calibration(given)
+    return Opened(sequence, calibrations.find(given.calib, size=sequence.size))
 
 
 def _seconds(row: str) -> Optional[float]:
@@ -143,10 +148,8 @@ def frame_times(sequence: _egosgm.StereoSequence) -> Tuple[List[float], str]:
     if file in ("", "."):
         times = _times_of_names(sequence)
         return times, "names of the files" if times else ""
-    if os.path.getsize(file) > _MOST_TIMES_BYTES:
-        raise _refuse(f"{file}: is longer than {_MOST_TIMES_BYTES >> 20} MiB: is it the right file?")
     rows = []
-    for number, line in enumerate(pathlib.Path(file).read_bytes().decode("utf-8-sig", errors="replace").splitlines(), 1):
+    for number, line in enumerate(_egosgm._read_file(file, _MOST_TIMES_BYTES).decode("utf-8-sig", errors="replace").splitlines(), 1):
         row = line.strip()
         if not row or row.startswith("#"):
             continue

@@ -11,12 +11,13 @@ from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple
 import numpy as np
 
 from . import _egosgm, plots
-from .arguments import comparison_parser, counted, decimal, json_text, Parser, resolve_comparison
+from .arguments import comparison_parser, counted, decimal, json_text, Parser, resolve_comparison, tell, text_argument
 from .pose_evaluation import inverse
 from .run_folder import frames_of_run
 from .video_evaluation import Frame, VideoCounts, VideoFigures, count_frames, density_of, figures_of, regions_of
 
 _Path = pathlib.Path
+_MOST_FLOW_BYTES = 1 << 31
 _PLOTTED = {"flicker": "flicker_px", "TEPE same pixel": "tepe_dynamicstereo_px", "TEPE along motion": "tepe_codd_px"}
 
 
@@ -57,10 +58,7 @@ def find_successors(names: Sequence[str]) -> List[bool]:
 
 def read_flow(file: _Path) -> np.ndarray:
     """KITTI's PNG or .flo: H x W x 2 [px], NaN where there is none. Throws InvalidArgument."""
-    try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise _egosgm.InvalidArgument(f"{file}: cannot be read: {error.strerror}; give an existing, readable file") from None
+    content = _egosgm._read_file(file, _MOST_FLOW_BYTES)
     if content[:4] == b"PIEH":
         width, height = struct.unpack("<ii", content[4:12].ljust(8, b"\0"))
         if width < 1 or height < 1 or len(content) - 12 != 8 * width * height:
@@ -70,18 +68,12 @@ def read_flow(file: _Path) -> np.ndarray:
             return np.where((np.abs(flow) < 1e9).all(axis=2, keepdims=True), flow, np.nan).astype(np.float32)
     if content[:4] != b"\x89PNG":
         raise _egosgm.InvalidArgument(f"{file}: not readable optical flow (truncated?): neither KITTI's PNG nor .flo")
-    try:
-        import cv2
-    except ImportError:
-        raise _egosgm.InvalidArgument(f"{file}: flow in PNG needs OpenCV: pip install opencv-python-headless, or apt install python3-opencv") from None
-    stored = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
-    if stored is None:
-        raise _egosgm.InvalidArgument(f"{file}: not readable optical flow (truncated?)")
+    stored = _egosgm._read_stored_image(file)
     if stored.ndim != 3 or stored.shape[2] != 3 or stored.dtype != np.uint16:
         raise _egosgm.InvalidArgument(f"{file}: not optical flow: KITTI's is 16-bit RGB PNG, this one has {1 if stored.ndim == 2 else stored.shape[2]} channel(s) "
                                       f"of {8 * stored.itemsize} bit")
-    flow = (stored[..., [2, 1]].astype(np.float32) - 32768) / 64  # OpenCV has blue first
-    return np.where(stored[..., :1] == 0, np.float32(np.nan), flow)
+    flow = (stored[..., :2].astype(np.float32) - 32768) / 64
+    return np.where(stored[..., 2:] == 0, np.float32(np.nan), flow)
 
 
 class Odometry:
@@ -139,18 +131,18 @@ class VideoInput:
 
     def _pairs_with(self, estimate: _Path, truth: _Path) -> Tuple[List[Any], List[_Path], List[_Path]]:
         run = frames_of_run(estimate)
-        return _egosgm._pair_with_truth(estimate, truth, self.given.frames, run.images if run else {})
+        return _egosgm._pair_with_truth(estimate, truth, text_argument(self.given.frames), run.images if run else {})
 
     def _list_frames(self) -> None:
         """Every estimate, with its truth where it has one."""
         given, pairs, self.notes = self.given, [], []
         if not given.truth:
-            alone = _egosgm._list_maps(given.estimate, given.frames)
+            alone = _egosgm._list_maps(given.estimate, text_argument(given.frames))
         else:
             pairs, without_estimate, alone = self._pairs_with(_Path(given.estimate), _Path(given.truth))
             if given.sequence and not _Path(given.truth).is_dir():
                 # One truth file: the frames around it are measured over time all the same.
-                alone = [file for file in _egosgm._list_maps(given.estimate, given.frames) if file != pairs[0].estimate]
+                alone = [file for file in _egosgm._list_maps(given.estimate, text_argument(given.frames)) if file != pairs[0].estimate]
             self.notes += [f"{pair.estimate.name} is compared with {pair.truth}: only the number is the same" for pair in pairs if not pair.same_name]
             if without_estimate:
                 self.notes.append(f"{counted(len(without_estimate), 'truth file')} without an estimate, the first is {without_estimate[0]}")
@@ -173,7 +165,7 @@ class VideoInput:
 
     def _open_sequence(self) -> None:
         given = self.given
-        self.sequence = _egosgm.open_kitti_multiview(given.sequence, given.scene) if given.scene else _egosgm.open_folder(given.sequence)
+        self.sequence = _egosgm.open_kitti_multiview(given.sequence, text_argument(given.scene)) if given.scene else _egosgm.open_folder(given.sequence)
         place = {frame.number: i for i, frame in enumerate(self.sequence.frames)}
         for frame in self.frames:
             numbers = re.findall("[0-9]+", frame.name)
@@ -304,7 +296,7 @@ def _text_of(found: VideoInput, total: VideoCounts) -> str:
 
 
 def _work(arguments: Sequence[str]) -> str:
-    given = _parser().parse_intermixed_args(arguments)
+    given = _parser().parse(arguments)
     for option, file in (("--plot-frames", given.plot_frames), ("--plot-density", given.plot_density)):
         if file:
             plots.expect_plot(option, file)
@@ -327,5 +319,5 @@ def _work(arguments: Sequence[str]) -> str:
 
 
 def main(arguments: Sequence[str]) -> int:
-    print(_work(arguments))
+    tell(_work(arguments))
     return 0

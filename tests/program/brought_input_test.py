@@ -287,6 +287,12 @@ class Maps(Brought):
         self.assertIn("needs --scale 16;", self.figures("map.png")[2])
         self.assertEqual(self.figures("map.png", "--scale", 16)[2], "")
 
+    def test_what_is_no_disparity_in_pixels_is_told(self):
+        for name, values, named in (("width", self.truth / WIDTH, "are they disparities in pixels?"), ("depth", 20 / self.truth, "are they disparities in pixels?"),
+                                    ("sign", -self.truth, "of the other sign"), ("none", numpy.full_like(self.truth, numpy.nan), "no estimate has a value")):
+            self.npy(self.maps / f"{name}.npy", values.astype(numpy.float32))
+            self.assertIn(named, self.figures(f"{name}.npy")[2], name)
+
     def test_a_scale_that_does_not_apply_is_refused(self):
         self.npy(self.maps / "map.npy", self.truth)
         self.pfm(self.maps / "map.pfm", self.truth)

@@ -36,6 +36,16 @@ class ProgramCaches(ProgramTest):
         for name in names:
             self.assertRegex(name, "^[0-9a-f]{64}$")  # nothing that is half written stays
 
+    def test_an_option_goes_before_the_variable(self):
+        expected = self.without_cache()
+        named, option, out = self.new_folder(), self.new_folder(), self.new_folder()
+        environment = dict(os.environ, EGOSGM_CACHE=str(named))
+        self.assert_works(*self.run_command(out), "--cache", option, env=environment)
+        self.assertEqual(self.maps_of(out), expected)
+        self.assertTrue(list(option.iterdir()))
+        self.assert_works(*self.run_command(self.new_folder()), "--cache", "off", env=environment)
+        self.assertEqual(list(named.iterdir()), [])
+
     @unittest.skipUnless(os.geteuid() == 0, "rights are taken from another user: needs root")
     def test_a_folder_that_may_not_be_written(self):
         expected = self.without_cache()

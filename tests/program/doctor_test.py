@@ -49,6 +49,9 @@ class Doctor(InputTest):
             finding = self.assert_only_problem("rows", self.shifted(shift))
             self.assertAlmostEqual(float(finding["text"].split()[2]), shift, delta=0.07)
             self.assertIn(f"{abs(shift):.1f} px: rectify again", finding["remedy"])
+        street = self.shifted(-3)
+        alone = self.assert_only_problem("rows", "--left", street / "image_0/%06d.png", "--right", street / "image_1/%06d.png")
+        self.assertIn("3.0 px: these images are not rectified: `egosgm calibrate`", alone["remedy"])
 
     def test_a_turned_camera_is_measured(self):
         street = self.broken_street()
@@ -112,13 +115,32 @@ class Doctor(InputTest):
         self.assert_only_problem("matches", street)
         for file in (street / "image_1").iterdir():
             write_grey(file, numpy.full((HEIGHT, WIDTH), 60))
-        self.assert_only_problem("matches", street)
+        self.assert_only_problem("images", street)
 
     def test_the_same_image_on_both_sides(self):
         street = self.broken_street()
         for file in (street / "image_0").iterdir():
             shutil.copy(file, street / "image_1" / file.name)
         self.assertIn("are the same", self.assert_only_problem("matches", street)["text"])
+
+    def blurred(self, change):
+        street = self.broken_street()
+        for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+            write_grey(file, change(read_grey(file).astype(float)))
+        return street
+
+    def test_images_of_nearly_one_tone(self):
+        for change in (lambda image: image / 32, lambda image: 0 * image):
+            self.assertIn("of nearly one tone", self.assert_only_problem("images", self.blurred(change))["text"])
+
+    def test_what_is_blurred_is_not_said_to_be_of_other_moments(self):
+        def smooth(image):
+            for axis in (0, 1):
+                for _ in range(3):
+                    image = sum(numpy.roll(image, shift, axis) for shift in range(-3, 4)) / 7
+            return image
+        finding = self.assert_only_problem("matches", self.blurred(smooth))
+        self.assertIn("coarsely, left and right agree", finding["remedy"])
 
     def test_a_pair_that_cannot_be_read_costs_itself_alone(self):
         street = self.broken_street()

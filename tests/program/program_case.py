@@ -90,11 +90,11 @@ class ProgramTest(unittest.TestCase):
         shutil.copytree(self.street, copy)
         return copy
 
-    def started(self, *words, lines=1, stderr=subprocess.PIPE):
+    def started(self, *words, lines=1, stderr=subprocess.PIPE, command=(PROGRAM,), **options):
         """A command that has printed so many lines and waits to be read before it goes on, however busy the machine is."""
         reading, writing = os.pipe2(os.O_CLOEXEC | os.O_DIRECT)
         fcntl.fcntl(writing, F_SETPIPE_SZ, 4096)  # room for one line: with O_DIRECT, each takes a page
-        process = Started([PROGRAM, *map(str, words)], stdout=writing, stderr=stderr, text=True)
+        process = Started([*command, *map(str, words)], stdout=writing, stderr=stderr, text=True, **options)
         os.close(writing)
         process.stdout = os.fdopen(reading)
         for _ in range(lines):

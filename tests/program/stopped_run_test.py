@@ -214,6 +214,50 @@ class Killed(LongRuns):
         self.assert_refused([*run, "--resume"], "report.json", "another --out")
 
 
+class Fallback(LongRuns):
+    """A device that is lost while a run is under way, by the fault layer: the run's first context, from some command on."""
+
+    def lost_at(self, command):
+        return dict(os.environ, OPENCL_LAYERS=os.environ["EGOSGM_FAULT_LAYER"], EGOSGM_FAILING_CONTEXT=f"0/{command}")
+
+    def commands_of_a_run(self, run):
+        """The first command whose loss no run of this kind sees, to within a frame."""
+        least, most = 0, 4096
+        while most - least > 32:
+            middle = (least + most) // 2
+            worked = egosgm(*run, self.new_folder(), env=self.lost_at(middle)).returncode == 0
+            least, most = (least, middle) if worked else (middle, most)
+        return least
+
+    def test_another_device_goes_on_with_the_same_bits(self):
+        run = ["run", "--odometry", self.street, "--disparities", 32, "--write", "variance", "--quiet", "--out"]
+        expected = self.new_folder()
+        self.assert_works(*run, expected)
+        maps = {file.relative_to(expected): file.read_bytes() for file in expected.rglob("0*.*")}
+        last = self.commands_of_a_run(run)
+        for command in (0, last // 2, last * 3 // 4, last):
+            out, trace = self.new_folder(), self.new_folder() / "trace.json"
+            failed = egosgm(*run, self.new_folder(), env=self.lost_at(command))
+            self.assertEqual(failed.returncode, 1)
+            self.assertIn("CL_DEVICE_NOT_AVAILABLE", failed.stderr)
+            done = egosgm(*run, out, "--fallback", "cpu", "--trace", trace, env=self.lost_at(command))
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertRegex(done.stderr, r"^egosgm: .* failed \(.*CL_DEVICE_NOT_AVAILABLE.*\): .* goes on\n$")
+            self.assertEqual({file.relative_to(out): file.read_bytes() for file in out.rglob("0*.*")}, maps)
+            self.assertEqual((out / "poses.txt").read_bytes(), (expected / "poses.txt").read_bytes())
+            report = self.report(out)
+            self.assertTrue(report["finished"])
+            self.assertEqual(report["fallback"]["from"], report["device"])
+            self.assertIn("CL_DEVICE_NOT_AVAILABLE", report["fallback"]["why"])
+            self.assertEqual([frame["frame"] for frame in report["frames"]], list(range(FRAMES)))
+        self.assertNotIn("fallback", self.report(expected))
+
+    def test_a_device_that_is_not_there_is_refused_before_the_first_frame(self):
+        out = self.new_folder() / "out"
+        self.assert_refused(["run", self.street, "--out", out, "--fallback", "no such device"], "no such device")
+        self.assertFalse(out.exists())
+
+
 class Resume(LongRuns):
     """An earlier run in OUT: in the way, replaced, or gone on with."""
     FRAMES = 12

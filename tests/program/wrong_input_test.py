@@ -250,6 +250,9 @@ class BrokenInput(ProgramTest):
         file = street / "image_1/000002.png"
         file.write_bytes(file.read_bytes()[:-1500])
         self.assert_left_out(street, file)
+        poses = self.new_folder() / "poses.txt"
+        self.assert_refused(["odometry", street, "--out", poses, "--quiet"], file)
+        self.assertEqual(len(poses.read_text().splitlines()), 2)  # of the pairs before
 
     def test_image_that_is_none(self):
         street = self.broken_street()

@@ -1016,6 +1016,18 @@ def test_sixteen_bits_with_a_pedestal_and_a_hot_pixel(image, tmp_path, street, f
     assert "no motion" not in said and "doctor" not in said
 
 
+@pytest.mark.parametrize("per_mille", [0, 1, 4, 8])
+def test_highlights_of_sixteen_bits_cost_no_motion(per_mille, street, frames):
+    """A lamp, many times as bright as the rest."""
+    odometry = egosgm.StereoOdometry(street.calibration)
+    side = int((WIDTH * HEIGHT * per_mille / 1000) ** 0.5)
+    for i, frame in enumerate(frames):
+        images = [image.astype(np.uint16) * 16 for image in (frame.left, frame.right)]
+        for image in images:
+            image[5:5 + side, 150:150 + side] = 65535
+        assert (odometry.process(*images).motion is not None) == (i > 0)
+
+
 def parts_of(street, frames, tmp_path):
     """A described bag of two MCAP files."""
     folder = tmp_path / "parts"
@@ -1117,3 +1129,4 @@ def test_doctor_looks_at_bags(tmp_path, street, frames, capfd):
     between = drive_of(street, frames, of_right=lambda i, time: time + RATE_NS // 2).write(tmp_path / "between")
     findings = examined(capfd, between, "--max-skew-ms", 50)
     assert findings["times"]["verdict"] == "problem" and "other moments" in findings["times"]["text"]
+    assert list(findings) == ["images", "calibration", "times"]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations of other programs: one rig, written as each of them does."""
 import json
+import os
 
 import numpy as np
 import pytest
@@ -57,6 +58,8 @@ RECTIFIED = {
     "orb_slam2.yaml": f"%YAML:1.0\nCamera.fx: {F}\nCamera.fy: {F}\nCamera.cx: {CX}\nCamera.cy: {CY}\nCamera.bf: {F * B}\n",
     "orb_slam3.yaml": f'%YAML:1.0\nFile.version: "1.0"\nCamera.type: "Rectified"\nCamera1.fx: {F}\nCamera1.fy: {F}\nCamera1.cx: {CX}\nCamera1.cy: {CY}\nStereo.b: {B}\n',
     "kalibr.yaml": kalibr(),
+    "basalt.json": json.dumps(dict(value0=dict(T_imu_cam=[dict(px=x, py=0, pz=0, qx=0, qy=0, qz=0, qw=1) for x in (1.0, 1.0 + B)], resolution=[[WIDTH, HEIGHT]] * 2,
+                                               intrinsics=[dict(camera_type="pinhole", intrinsics=dict(fx=F, fy=F, cx=CX, cy=CY))] * 2))),
     "kalibr_imu.yaml": kalibr(T_cam_imu=SHIFT).replace("cam1:", "cam1:", 1).replace("cam0:\n", f"cam0:\n  T_cam_imu: {np.eye(4).tolist()}\n"),
     "kalibr_none.yaml": kalibr(model="none", lens=()),
 }
@@ -69,6 +72,10 @@ RAW = {
     "in_groups.json": json.dumps(dict(left=dict(camera_matrix=K, dist_coeffs=LENS), right=dict(camera_matrix=K, dist_coeffs=LENS),
                                       stereo=dict(R=EYE, T=[-B, 0, 0]))),
     "kalibr_lens.yaml": kalibr(LENS),
+    "oak.json": json.dumps(dict(boardName="OAK-D", cameraData=[
+        [socket, dict(distortionCoeff=[*LENS, *[0] * 10], intrinsicMatrix=K, width=WIDTH, height=HEIGHT, extrinsics=dict(
+            rotationMatrix=EYE, toCameraSocket=0, translation=dict(x=x, y=0, z=0)))] for socket, x in ((1, -5.0), (2, 100 * B - 5.0))]
+        + [[0, dict(distortionCoeff=[0] * 14, intrinsicMatrix=K, extrinsics=dict(rotationMatrix=[], toCameraSocket=-1))]])),
     "orb_slam3_raw.yaml": "%YAML:1.0\nCamera.type: \"PinHole\"\n" + "".join(
         f"{camera}.{name}: {value}\n" for camera in ("Camera1", "Camera2")
         for name, value in dict(fx=F, fy=F, cx=CX, cy=CY, k1=LENS[0], k2=LENS[1], p1=LENS[2], p2=LENS[3]).items()) + opencv_yaml(
@@ -121,6 +128,69 @@ def test_two_files_of_ros_and_of_kimera(tmp_path):
     expect_raw(egosgm.read_calibration(folder / "LeftCameraParams.yaml"))
 
 
+def echoed(p, lens):
+    """A camera info as `ros2 topic echo` prints it."""
+    return "---\n".join(["", yaml.safe_dump(dict(header=dict(frame_id="camera"), height=HEIGHT, width=WIDTH, distortion_model="plumb_bob", d=lens, k=flat(K),
+                                                 r=flat(EYE), p=flat(p), binning_x=0, binning_y=0, roi=dict(x_offset=0, y_offset=0, height=0, width=0)))] * 2)
+
+
+def test_a_file_for_each_camera_of_any_name(tmp_path):
+    for lens, expect in (([0.0] * 5, expect_rectified), ([*LENS, 0], expect_raw)):
+        for name, text in (("a.yaml", echoed(P, lens)), ("b.yaml", echoed(RIGHT_P, lens))):
+            (tmp_path / name).write_text(text)
+        expect(egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "b.yaml")))
+    with pytest.raises(egosgm.InvalidArgument, match="one file, or one for each camera"):
+        egosgm.read_calibration([tmp_path / "a.yaml"] * 3)
+    (tmp_path / "c.yaml").write_text("a: 1\n")
+    with pytest.raises(egosgm.InvalidArgument, match="c.yaml: is not the calibration of one camera"):
+        egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "c.yaml"))
+
+
+def test_vins_and_its_cameras(tmp_path):
+    for i in (0, 1):
+        (tmp_path / f"cam{i}.yaml").write_text("%YAML:1.0\n---\n" + yaml.safe_dump(dict(
+            model_type="PINHOLE", image_width=WIDTH, image_height=HEIGHT, projection_parameters=dict(fx=F, fy=F, cx=CX, cy=CY),
+            distortion_parameters=dict(zip(("k1", "k2", "p1", "p2"), LENS)))))
+    (tmp_path / "config.yaml").write_text(opencv_yaml(body_T_cam0=np.eye(4), body_T_cam1=BACK)
+                                          + f"num_of_cam: 2\ncam0_calib: cam0.yaml\ncam1_calib: cam1.yaml\nimage_width: {WIDTH}\nimage_height: {HEIGHT}\n")
+    expect_raw(egosgm.read_calibration(tmp_path / "config.yaml"))
+    with pytest.raises(egosgm.InvalidArgument, match="is one camera of VINS"):
+        egosgm.read_calibration(tmp_path / "cam0.yaml")
+
+
+def test_a_zed_is_read_for_the_size_of_the_images(tmp_path):
+    file = tmp_path / "SN1.conf"
+    camera = "".join(f"{name}={value}\n" for name, value in dict(fx=F, fy=F, cx=CX, cy=CY, k1=LENS[0], k2=LENS[1], p1=LENS[2], p2=LENS[3]).items())
+    file.write_text("".join(f"[{side}_CAM_{size}]\n{camera if size == 'VGA' else camera.replace(str(F), '1')}" for side in ("LEFT", "RIGHT") for size in ("HD", "VGA"))
+                    + f"[STEREO]\nBaseline={1000 * B}\nTY=0\nTZ=0\nRX_VGA=0.01\nCV_VGA=0.02\nRZ_VGA=-0.03\n")
+    rig = egosgm.read_calibration(file, size=(672, 376))
+    assert rig.size == (672, 376) and rig.T.tolist() == pytest.approx([-B, 0, 0])
+    np.testing.assert_allclose(rig.left_matrix, K)
+    np.testing.assert_allclose(rig.left_distortion[:4], LENS)
+    np.testing.assert_allclose([rig.R[2, 1], rig.R[0, 2], rig.R[1, 0]], [0.01, 0.02, -0.03], atol=5e-4)
+    for size, named in ((None, "nothing tells which"), ((640, 480), "images of 1280x720, 672x376, not of 640x480")):
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            egosgm.read_calibration(file, size=size)
+
+
+def test_virtual_kitti(tmp_path):
+    (tmp_path / "intrinsic.txt").write_text("frame cameraID K[0,0] K[1,1] K[0,2] K[1,2]\n" + "".join(f"{i} {c} {F} {F} {CX} {CY}\n" for i in (0, 1) for c in (0, 1)))
+    moved = np.array([[0, 0, 1, 5], [0, 1, 0, 2], [-1, 0, 0, 1], [0, 0, 0, 1.0]])
+    rows = [f"{i} {c} {' '.join(map(str, flat((np.array(SHIFT) if c else np.eye(4)) @ moved)))}\n" for i in (0, 1) for c in (0, 1)]
+    (tmp_path / "extrinsic.txt").write_text("frame cameraID r1,1 and so on\n" + "".join(rows))
+    for name in ("intrinsic.txt", "extrinsic.txt"):
+        expect_rectified(egosgm.read_calibration(tmp_path / name))
+
+
+@pytest.mark.parametrize("content, named", [
+    (b"\x80\x04\x95", "a pickle of Python"), (b"MATLAB 5.0 MAT-file", "a file of MATLAB"), ("fx = 460\n".encode("utf-16"), "is UTF-16"),
+])
+def test_files_that_are_no_text(content, named, tmp_path):
+    (tmp_path / "calib").write_bytes(content)
+    with pytest.raises(egosgm.InvalidArgument, match=named):
+        egosgm.read_calibration(tmp_path / "calib")
+
+
 def test_arrays_of_numpy(tmp_path):
     arrays = dict(cam_mats_left=np.array(K), cam_mats_right=np.array(K), dist_coefs_left=np.array([LENS]), dist_coefs_right=np.array([LENS]),
                   rot_mat=np.eye(3), trans_vec=np.array([[-B], [0], [0]]))
@@ -163,16 +233,17 @@ def test_units_are_never_guessed(tmp_path):
 
 
 def test_the_command_hands_the_program_what_it_reads(tmp_path):
-    folder = tmp_path / "given"
-    folder.mkdir()
     (tmp_path / "chain.yaml").write_text(kalibr())
-    changed = program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--out", "o"], folder)
-    assert changed == ["run", "--calib", str(folder / "calib.txt"), "--out", "o"]
-    expect_rectified(egosgm.read_calibration(folder / "calib.txt"))
+    changed = program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--out", "o"])
+    given = changed[2]
+    assert changed == ["run", "--calib", given, "--out", "o"]
+    expect_rectified(egosgm.read_calibration(given))
+    os.close(int(given.rpartition("/")[2]))
     (tmp_path / "chain.yaml").write_text(kalibr(LENS))
     with pytest.raises(egosgm.InvalidArgument, match="is of raw images"):
-        program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml")], folder)
+        program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml")])
     (tmp_path / "own.txt").write_text(RECTIFIED["own.txt"])
-    for arguments in (["run", "--calib", str(tmp_path / "own.txt")], ["run", "folder"], ["run", "--calib"]):
-        assert program.with_calibration(arguments, folder) == arguments
+    os.mkfifo(tmp_path / "pipe")  # which would be read here, and no more there
+    for arguments in (["run", "--calib", str(tmp_path / "own.txt")], ["run", "folder"], ["run", "--calib"], ["run", "--calib", str(tmp_path / "pipe")]):
+        assert program.with_calibration(arguments) == arguments
     assert calibrations.find(tmp_path / "own.txt").fx == F

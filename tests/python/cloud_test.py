@@ -89,3 +89,34 @@ def test_what_is_missing_is_named(run):
     refused("poses.txt: no such file", "--calib")
     (run / "report.json").unlink()
     refused("report.json: no such file")
+
+
+@pytest.mark.parametrize("entry", [{"frame": 0, "left": None}, {"frame": 0, "left": 5}, {"frame": 0, "name": [1], "left": "left0.png"}, {"frame": "a", "left": "b"}, 3])
+def test_an_edited_report_is_refused(run, entry):
+    report = json.loads((run / "report.json").read_text())
+    report["frames"][0] = entry
+    (run / "report.json").write_text(json.dumps(report))
+    with pytest.raises(egosgm.InvalidArgument):
+        cloud.main([str(run)])
+    assert not (run / "cloud.ply").exists()
+
+
+@pytest.mark.filterwarnings("error")
+def test_cubes_that_are_too_many_to_tell_apart_are_refused(run):
+    for voxel in ("1e-12", "1e-300"):
+        with pytest.raises(egosgm.InvalidArgument, match="--voxel 1e-.*is too small for points that lie"):
+            cloud.main([str(run), "--voxel", voxel])
+    assert cloud.main([str(run), "--voxel", "1e300"]) == 0
+
+
+def test_a_file_that_comes_while_it_works_stays(run, monkeypatch):
+    means = cloud.VoxelGrid.means
+
+    def slow_means(grid, least_frames):
+        (run / "cloud.ply").write_text("mine")
+        return means(grid, least_frames)
+
+    monkeypatch.setattr(cloud.VoxelGrid, "means", slow_means)
+    with pytest.raises(egosgm.IoError, match="has come there meanwhile"):
+        cloud.main([str(run)])
+    assert (run / "cloud.ply").read_text() == "mine"

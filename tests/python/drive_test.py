@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import cpu_driver, ros_images
+from egosgm import cpu_driver, points, ros_images
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -185,6 +185,30 @@ def test_what_other_processes_need_is_pickled_and_copied(street):
         assert copied[0] == street.calibration
         np.testing.assert_array_equal(copied[1].current_from_previous, motion.current_from_previous)
         np.testing.assert_array_equal(copied[1].covariance, np.eye(6))
+
+
+def fields_of(value):
+    """What a value tells, to be compared."""
+    return {name: getattr(value, name) for name, member in vars(type(value)).items() if isinstance(member, property)}
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_results_leave_a_process(copied, street_folder):
+    sequence = egosgm.open_folder(street_folder)
+    for frame in egosgm.run(street_folder, **OPTIONS, frames="0:1", outputs=("disparity", "reason")):
+        counts = egosgm.compare_disparity(frame.disparity, frame.disparity)
+        for value in (frame.report, counts, counts.metrics, egosgm.devices()[0]):
+            assert copied(value) == value
+        for value in (frame.odometry, sequence, sequence.frames[1]):
+            now, before = fields_of(copied(value)), fields_of(value)
+            assert repr(now) == repr(before) and now.keys() == before.keys()
+        taken = copied(frame)
+        for name in ("disparity", "variance", "reason"):
+            np.testing.assert_array_equal(getattr(taken.maps, name), getattr(frame.maps, name))
+        assert taken.report == frame.report and taken.calibration == frame.calibration
+        if frame.motion:
+            np.testing.assert_array_equal(taken.motion.covariance, frame.motion.covariance)
+            np.testing.assert_array_equal(taken.motion.current_from_previous, frame.motion.current_from_previous)
 
 
 def test_repr_says_what_it_is(shared_pipeline, street, frames):
@@ -384,6 +408,23 @@ def test_a_cloud_has_the_points_that_are_sure(tmp_path):
     np.testing.assert_array_equal(np.frombuffer(body[-3:], np.uint8), left[3, 5])
     egosgm.write_ply(tmp_path / "plain.ply", [[1, 2, 3]], normals=[[0, 0, -1]])
     assert np.frombuffer((tmp_path / "plain.ply").read_bytes()[-24:], np.float32).tolist() == [1, 2, 3, 0, 0, -1]
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_is_no_map_makes_no_cloud_and_no_depth(tmp_path):
+    camera = egosgm.Calibration(100, 100, 1, 1, 0.5)
+    none, disparity = np.zeros((0, 0), np.float32), np.full((2, 3), 5, np.float32)
+    for maps in ((none, none, np.zeros((0, 0), np.uint8)), (disparity, disparity, np.zeros((0, 0), np.uint8))):
+        with pytest.raises(egosgm.InvalidArgument):
+            points.cloud_of_maps(*maps, camera, 0.1, None, None, 80, 1)
+    for reason in (np.zeros(6, np.uint8), np.zeros((2, 3, 3), np.uint8)):
+        with pytest.raises(egosgm.InvalidArgument, match="reason"):
+            points.cloud_of_maps(disparity, disparity, np.zeros((2, 3), np.uint8), camera, 0.1, "trusted", reason, 80, 1)
+    with pytest.raises(egosgm.InvalidArgument, match="colors are"):
+        egosgm.write_ply(tmp_path / "p.ply", np.zeros((5, 3)), np.uint8(3))
+    assert np.isnan(egosgm.depth_sigma_from_disparity(disparity, -disparity, camera)).all()
+    with pytest.raises(egosgm.InvalidArgument):
+        egosgm.Rectification(egosgm.StereoRig(np.eye(3), np.zeros(5), np.eye(3), np.zeros(5), np.diag([1e300, 1, 1]), [-0.5, 0, 0]), 64, 48)
 
 
 def test_a_cloud_keeps_the_reasons_that_were_chosen():

@@ -125,6 +125,14 @@ def test_wrong_options_are_refused_by_name(street, options, named):
     assert isinstance(refused.value, ValueError)
 
 
+def test_programs_are_kept_where_the_pipeline_says(street, tmp_path, monkeypatch):
+    monkeypatch.setenv("EGOSGM_CACHE", str(tmp_path / "variable"))
+    for cache in (str(tmp_path / "kept"), "off"):
+        egosgm.Pipeline(street.calibration, WIDTH, HEIGHT, cache=cache, **OPTIONS)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["kept"]
+    assert any((tmp_path / "kept").iterdir())
+
+
 @pytest.mark.parametrize("image, named", [
     (np.zeros((HEIGHT, WIDTH, 2), np.uint8), "left is"), (np.zeros((HEIGHT, WIDTH), np.float32), "uint8 or uint16"),
     (np.zeros((HEIGHT, WIDTH + 1), np.uint8), str(WIDTH + 1)), (np.zeros((HEIGHT, WIDTH), np.uint16), "type"), (None, "no array"),
@@ -142,7 +150,7 @@ def test_wrong_outputs_and_motions_are_refused(pipeline, frames):
     left, right = frames[0].left, frames[0].right
     read_only = np.zeros((HEIGHT, WIDTH), np.float32)
     read_only.flags.writeable = False
-    for outputs, named in (("disparities", "choose from disparity"), ({"disparity": read_only}, "read-only"),
+    for outputs, named in (("disparities", "choose from disparity"), ((5,), "choose from disparity"), ({"disparity": read_only}, "read-only"),
                            ({"disparity": np.zeros((HEIGHT, WIDTH))}, "float32"), ({"variance": np.zeros((3, 4), np.float32)}, ""),
                            ({"disparity": [[1.0]]}, "no NumPy array"),
                            ({"disparity": np.zeros((HEIGHT, 2 * WIDTH), np.float32)[:, ::2]}, "contiguous")):

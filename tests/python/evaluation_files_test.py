@@ -38,7 +38,7 @@ def test_flow_is_read(tmp_path):
 
 
 @pytest.mark.parametrize("content, named", [(b"", "neither KITTI's PNG nor .flo"), (b"PIEH", "truncated"), (flo(2, 2, [0] * 6), "2x2 pixels do not fit"),
-                                            (flo(-1, -1, [0, 0]), "truncated"), (b"\x89PNG\r\n\x1a\n", "truncated|OpenCV")])
+                                            (flo(-1, -1, [0, 0]), "truncated"), (b"\x89PNG\r\n\x1a\n", "truncated")])
 def test_what_is_no_flow_is_refused(tmp_path, content, named):
     (tmp_path / "flow").write_bytes(content)
     with pytest.raises(egosgm.InvalidArgument, match=named):

@@ -369,6 +369,23 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
   expect_refused([&] { open_folder(root_ / "e"); }, {"e/calib.txt"});
 }
 
+TEST_F(DatasetTest, ImagesInColourAreOfKittisColourCameras) {
+  for (const char* side : {"left", "right"}) {
+    add_image(std::string("grey/") + side + "/1.png"),
+        add_image(std::string("colour/") + side + "/1.png", 8, 4, CV_8UC3);
+  }
+  add_text("both.txt", kProjections), add_text("grey.txt", kProjections.substr(0, kProjections.find("P2")));
+  add_text("own.txt", kOwnCalibration);
+  const auto baseline_m = [&](const std::string& folder, const char* calibration) {
+    return open_patterns(path(folder + "/left/*"), path(folder + "/right/*"), root_ / calibration)
+        .calibration.baseline_m;
+  };
+  EXPECT_DOUBLE_EQ(baseline_m("colour", "both.txt"), 0.4);
+  EXPECT_DOUBLE_EQ(baseline_m("grey", "both.txt"), 0.5);
+  EXPECT_DOUBLE_EQ(baseline_m("colour", "grey.txt"), 0.5);
+  EXPECT_DOUBLE_EQ(baseline_m("colour", "own.txt"), 0.5);
+}
+
 TEST_F(DatasetTest, TimesAreThoseOfTheSequencesFolder) {
   add_odometry(0, 1), add_text("c.toml", kOwnCalibration);
   const auto times = [&](const std::string& folder) {

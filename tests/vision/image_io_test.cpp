@@ -239,6 +239,23 @@ TEST(ImageIo, NonImagesAreRefused) {
   expect_refused([&] { write_png(file, cv::Mat(1, 1, CV_32FC1)); }, {file.string()});
 }
 
+TEST(ImageIo, WhatIsGivenInPlaceOfAnImageIsNamed) {
+  const TemporaryFolder folder;
+  const std::filesystem::path file = folder / "0.png";
+  const std::pair<std::string, std::string> kinds[] = {
+      {"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "git lfs pull"},
+      {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video, which `egosgm rectify` reads"},
+      {"RIFF0000AVI LIST", "is a video"},
+      {std::string("II*\0", 4) + "12345678", "is a TIFF"},
+      {"P5\n2 2\n255\n1234", "is a PGM"},
+      {"<!DOCTYPE html>", "is a web page"}};
+  for (const auto& [content, named] : kinds) {
+    write_file(file, content);
+    expect_refused([&] { read_grey_image(file); }, {file.string(), named});
+    expect_refused([&] { read_image_size(file); }, {file.string(), named});
+  }
+}
+
 TEST(ImageIo, StoredImagesKeepTheirDepthAndChannels) {
   const TemporaryFolder folder;
   const cv::Mat grey = (cv::Mat_<std::uint16_t>(1, 2) << 7, 255), color(1, 2, CV_8UC3, cv::Scalar(1, 2, 3));

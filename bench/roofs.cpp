@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bench/roofs.h"
+
+#include <algorithm>
+#include <chrono>
+
+#include "host/ocl/buffer.h"
+
+namespace egosgm::bench {
+namespace {
+
+// Eight vectors to a work-item, which do not wait for one another; each has a name, as some compilers keep arrays in
+// memory.
+constexpr const char* kKernels = R"(
+#define EACH(DO) DO(0) DO(1) DO(2) DO(3) DO(4) DO(5) DO(6) DO(7)
+#define ADD_TO_SUM(k) sum ^= v##k;
+kernel void copy(global const uint4* from, global uint4* to) { to[get_global_id(0)] = from[get_global_id(0)]; }
+kernel void min_add(const int turns, global ushort16* out) {
+#define SHORTS(k) ushort16 v##k = (ushort16)((ushort)(get_global_id(0) + k));
+#define MIN_ADD(k) v##k = min(v##k + step, most);
+  EACH(SHORTS)
+  const ushort16 step = out[get_global_id(0)], most = out[0];
+  for (int i = 0; i < turns; ++i) { EACH(MIN_ADD) }
+  ushort16 sum = 0;
+  EACH(ADD_TO_SUM)
+  out[get_global_id(0)] = sum;
+}
+kernel void count_bits(const int turns, global uint16* out) {
+#define WORDS(k) uint16 v##k = (uint16)((uint)(get_global_id(0) + k));
+#define COUNT_BITS(k) v##k = popcount(v##k);
+  EACH(WORDS)
+  for (int i = 0; i < turns; ++i) { EACH(COUNT_BITS) }
+  uint16 sum = 0;
+  EACH(ADD_TO_SUM)
+  out[get_global_id(0)] = sum;
+}
+kernel void nothing(global uint* out) {}
+kernel void rotate_local(const int turns, global uint* out, local uint* memory) {
+  const int lane = get_local_id(0), lanes = get_local_size(0);
+  memory[lane] = lane;
+  for (int i = 0; i < turns; ++i) {
+    barrier(CLK_LOCAL_MEM_FENCE);
+    const uint next = memory[(lane + 1) % lanes];
+    barrier(CLK_LOCAL_MEM_FENCE);
+    memory[lane] = next + i;
+  }
+  out[get_global_id(0)] = memory[lane];
+}
+kernel void wait_for_all(const int turns, global uint* out) {
+  for (int i = 0; i < turns; ++i) barrier(CLK_LOCAL_MEM_FENCE);
+  out[get_global_id(0)] = turns;
+}
+)";
+constexpr std::size_t kElements = std::size_t{16} << 20;  // of 16 bytes
+constexpr int kRounds = 10, kTurns = 500, kLaunches = 100;
+constexpr std::size_t kItems = 4096, kGroup = 64;
+constexpr double kValues = 8 * 16.0 * kItems * kTurns;
+
+/// The least seconds of `f`, but for the first call, which pays what only comes once.
+template <typename F>
+double least_s(F&& f) {
+  double least = 1e9;
+  for (int round = 0; round < kRounds; ++round) {
+    const auto start = std::chrono::steady_clock::now();
+    f();
+    const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (round > 0) least = std::min(least, s);
+  }
+  return least;
+}
+
+class Kernels {
+ public:
+  explicit Kernels(ocl::Context& context)
+      : context_(context), program_(context.get(), kKernels, /*build=*/true), values_(context, 16 * kItems) {
+    context.enter("roofs");
+    values_.fill(context, 3);
+    context.wait();
+  }
+
+  double copy_gb_s() {
+    const ocl::Buffer<cl_uint4> from(context_, kElements), to(context_, kElements);
+    cl::Kernel copy(program_, "copy");
+    copy.setArg(0, from.get());
+    copy.setArg(1, to.get());
+    return 2.0 * sizeof(cl_uint4) * kElements * 1e-9 / least_s([&] { run(copy, kElements, kGroup); });
+  }
+  double values_g_s(const char* name, double each) { return each * kValues * 1e-9 / turns_s(name, 1); }
+  double turns_s(const char* name, std::size_t group, std::size_t local_bytes = 0) {
+    cl::Kernel kernel(program_, name);
+    kernel.setArg(0, cl_int{kTurns});
+    kernel.setArg(1, values_.get());
+    if (local_bytes > 0) kernel.setArg(2, local_bytes, nullptr);
+    return least_s([&] { run(kernel, kItems, group); });
+  }
+  double launch_us() {
+    cl::Kernel nothing(program_, "nothing");
+    nothing.setArg(0, values_.get());
+    return 1e6 / kLaunches * least_s([&] { run(nothing, kGroup, kGroup, kLaunches); });
+  }
+
+ private:
+  void run(const cl::Kernel& kernel, std::size_t items, std::size_t group, int launches = 1) {
+    for (int i = 0; i < launches; ++i) {
+      cl::Event done;
+      context_.queue().enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(items), cl::NDRange(group), nullptr,
+                                            &done);
+      context_.record(done, "roof");
+    }
+    context_.wait();
+  }
+
+  ocl::Context& context_;
+  cl::Program program_;
+  ocl::Buffer<cl_uint> values_;
+};
+
+}  // namespace
+
+double copy_gb_s(ocl::Context& context) { return Kernels(context).copy_gb_s(); }
+
+Roofs roofs_of(ocl::Context& context) {
+  Kernels kernels(context);
+  Roofs roofs{.copy_gb_s = kernels.copy_gb_s(),
+              .min_add_g_s = kernels.values_g_s("min_add", 2),
+              .popcount_g_s = kernels.values_g_s("count_bits", 1),
+              .launch_us = kernels.launch_us()};
+  if (context.device().getInfo<CL_DEVICE_TYPE>() != CL_DEVICE_TYPE_GPU) return roofs;
+  const double turns = kTurns * static_cast<double>(kItems);
+  const std::size_t groups = kItems / kGroup, units = context.device().getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>();
+  roofs.local_gb_s =
+      2 * sizeof(cl_uint) * turns * 1e-9 / kernels.turns_s("rotate_local", kGroup, kGroup * sizeof(cl_uint));
+  // Groups of one unit may wait side by side: the time is that of one after another.
+  roofs.barrier_ns =
+      1e9 * kernels.turns_s("wait_for_all", kGroup) / kTurns / static_cast<double>((groups + units - 1) / units);
+  return roofs;
+}
+
+}  // namespace egosgm::bench
