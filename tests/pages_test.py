@@ -49,7 +49,8 @@ class Pages(ProgramTest):
 
     def test_options_alone_are_of_some_command(self):
         """`--option` in a sentence: of a command, of a script or of a bench."""
-        texts = [file.read_text() for folder in ("scripts", "bench") for file in (SOURCE / folder).iterdir() if file.is_file()]
+        texts = [file.read_text() for folder in ("scripts", "bench") for file in (SOURCE / folder).rglob("*")
+                 if file.is_file() and file.parent.name != "__pycache__"]
         commands = re.findall(r"^  ([a-z][a-z-]+) ", self.assert_works("--help"), re.MULTILINE)
         self.assertGreater(len(commands), 10)
         texts += [self.assert_works(*words, "--help") for words in [*([command] for command in commands), ["run", "--bag", "b.mcap"]]]
