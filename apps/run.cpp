@@ -468,13 +468,12 @@ SequenceJob rest_of(RunArguments arguments, const Package& package, const LostDe
 }
 
 int run(const RunArguments& arguments, const Package& package) {
-  if (!arguments.bag.bag.empty()) catch_interrupts();  // parts of it may be unpacked meanwhile
+  catch_interrupts();  // from here on: the input may be waited for, and parts of a bag be unpacked meanwhile
   const SequenceJob job = job_of(arguments, package);
   Device device = Device::select(arguments.device).with_cache(arguments.cache);
   if (arguments.programs.empty() || !arguments.tuning.empty()) device = tuned_by_argument(device, arguments.tuning);
   if (!arguments.programs.empty()) device = device.with_programs(arguments.programs);
   const std::optional<Device> fallback = fallback_of(arguments);
-  catch_interrupts();
   std::optional<LostDevice> lost;
   try {
     return run_sequence(job, device) ? kOk : kInterrupted;

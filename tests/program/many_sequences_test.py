@@ -196,6 +196,7 @@ class ManySequences(ProgramTest):
             writing = os.open(pipe, os.O_WRONLY)  # once it looks at the images' sizes
             process.send_signal(signal.SIGTERM)
             while "ShdPnd:\t0000000000000000" not in pathlib.Path(f"/proc/{process.pid}/status").read_text():
+                self.assertIsNone(process.poll(), "the signal ended it")
                 time.sleep(0.01)  # until a thread takes the signal
             os.write(writing, image)
             os.close(writing)
