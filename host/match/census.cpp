@@ -24,10 +24,9 @@ Comparisons comparisons(MatchingCost cost) {
   return {};
 }
 
-ocl::Defines defines(PixelType type, MatchingCost cost, int words) {
-  const Comparisons chosen = comparisons(cost);
+ocl::Defines defines(PixelType type, const Comparisons& chosen, int words) {
   return pixel_define(type)
-      .set("CODE_BYTES", 4 * std::max(words, Census::words(cost)))
+      .set("CODE_BYTES", 4 * words)
       .set("COMPARISONS", chosen.kind)
       .set("RADIUS_X", chosen.radius_x)
       .set("RADIUS_Y", chosen.radius_y);
@@ -37,9 +36,14 @@ ocl::Defines defines(PixelType type, MatchingCost cost, int words) {
 
 Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding,
                int pixels, int words)
-    : stage_(context, "Census", "census.cl", size, pixels, defines(type, cost, words)),
-      padding_(padding),
-      census_(stage_, "census") {}
+    : Census(context, size, padding, pixels, defines(type, comparisons(cost), std::max(words, Census::words(cost)))) {}
+
+Census::Census(ocl::Context& context, shared::ImageSize size, int padding, int pixels, const ocl::Defines& defines)
+    : stage_(context, "Census", "census.cl", size, pixels, defines), padding_(padding), census_(stage_, "census") {}
+
+Census Census::of_alike(ocl::Context& context, shared::ImageSize size, int pixels) {
+  return {context, size, 0, pixels, defines(PixelType::kU16, {3, 4, 3}, 2)};
+}
 
 void Census::encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
   const shared::ImageSize size = stage_.size();

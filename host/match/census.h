@@ -19,6 +19,9 @@ class Census {
   Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding, int pixels = 0,
          int words = 0);
 
+  /// A code of 9x7 pixels says which are alike (COMPARISONS 3), of images of 16 bits; no padding.
+  static Census of_alike(ocl::Context& context, shared::ImageSize size, int pixels = 0);
+
   /// `images`: both views' pixels, the left view first, without gaps.
   void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes);
 
@@ -34,6 +37,8 @@ class Census {
   using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>>;
 
  private:
+  Census(ocl::Context& context, shared::ImageSize size, int padding, int pixels, const ocl::Defines& defines);
+
   ocl::Stage stage_;
   const cl_int padding_;
   Kernel census_;

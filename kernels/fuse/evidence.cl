@@ -2,7 +2,9 @@
 // Evidence: how much better a match is than chance, from the images alone, whatever the band was. A pixel's code is
 // compared with that of its match, and with those of control pixels of the same row that lie well away from the match.
 // Codes of nothing but noise are as far from the one as from the others, so that the mean difference is 0. It is taken
-// over a window, at full resolution and at a quarter of it, where noise is weaker and broad texture is not.
+// over a window, at full resolution and at a quarter of it, where noise is weaker and broad texture is not. Blocks that
+// are much brighter or darker do not count, neither in the window nor in the codes at a quarter: they tell of another
+// surface, and its outline is seen from afar.
 //
 // What is asked is the prediction, at its own place, before anything was chosen there: a chosen match would be better
 // than chance in noise, too. Where there is none, or the measurement lies beyond the gate, it is the measurement.
@@ -68,9 +70,9 @@ static inline int beyond_four(const Code own, volatile global const Code* match)
          bits_apart(own, match[EGOSGM_NEAR_CONTROL]) + bits_apart(own, match[EGOSGM_FAR_CONTROL]) -
          4 * bits_apart(own, match[0]);
 }
-static inline int beyond_eight(const Code own, global const Code* match) {
-  int beyond = -8 * bits_apart(own, match[0]);
-  for (int i = 0; i < 8; ++i) beyond += bits_apart(own, match[kCoarseControls[i]]);
+static inline int beyond_eight(const Code own, global const Code* match, const Code alike) {
+  int beyond = -8 * (int)popcount((own ^ match[0]) & alike);
+  for (int i = 0; i < 8; ++i) beyond += (int)popcount((own ^ match[kCoarseControls[i]]) & alike);
   return beyond;
 }
 
@@ -103,22 +105,23 @@ static inline Ints compared(const CodeRows* rows, const int x, const Floats aske
 }
 
 // Half of the weight of a full pixel, of each of `count` in a block: what the image at a quarter of the resolution says
-// of the disparity in the middle of the block.
-static inline int of_coarse(const CodeRows* coarse, const int block, const float disparity, const int count) {
+// of the disparity in the middle of the block, by those pixels of the code's window that are alike.
+static inline int of_coarse(const CodeRows* coarse, const CodeRows* alike, const int block, const float disparity,
+                            const int count) {
   if (!(disparity > EGOSGM_INVALID_DISPARITY)) return 0;
   const float shift = 12582912.0f;  // 1.5 * 2^23: rounds
   const int match = place_of_match(coarse, block, (int)((disparity / EGOSGM_COARSE + shift) - shift));
   if (match < 0 || match >= coarse->width) return 0;
-  return count * beyond_eight(coarse->own[own_place(coarse, block)], coarse->other + match) *
-         (EGOSGM_EVIDENCE_UNITS / 16);
+  const int own = own_place(coarse, block);
+  return count * beyond_eight(coarse->own[own], coarse->other + match, alike->own[own]) * (EGOSGM_EVIDENCE_UNITS / 16);
 }
 
 // Sums of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels: the evidence of those that are asked and whose match lies in
-// the other image, and how many these are. `coarse_codes` are those of the image at a quarter of the resolution. A
-// work-item a block, or a row of them.
+// the other image, and how many these are. `coarse_codes` and `alike` are those of the image at a quarter of the
+// resolution. A work-item a block, or a row of them.
 COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const float gate, const int padding,
                                global const uint* codes, const int has_coarse, const int coarse_padding,
-                               global const uint* coarse_codes, global const float* predicted,
+                               global const uint* coarse_codes, global const uint* alike, global const float* predicted,
                                global const float* measured, global EvidenceSum* sums) {
   const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
                             (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
@@ -126,6 +129,7 @@ COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const fl
   const int y = at.y * EGOSGM_COARSE, end = min(y + EGOSGM_COARSE, size.height);
   const size_t first = (size_t)view * size.height;
   const CodeRows coarse = code_rows(coarse_codes, blocks, coarse_padding, view, at.y);
+  const CodeRows alike_row = code_rows(alike, blocks, 0, view, at.y);
   const int middle = y + EGOSGM_COARSE / 2 < size.height ? y + EGOSGM_COARSE / 2 : y;
   global EvidenceSum* row = sums + ((size_t)view * blocks.height + at.y) * blocks.width;
 #if PIXELS == 1
@@ -144,7 +148,7 @@ COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const fl
       if (v == middle && x == min(start + EGOSGM_COARSE / 2, width - 1)) of_middle = asked;
     }
   }
-  if (has_coarse) sum.sum += of_coarse(&coarse, at.x, of_middle, sum.count);
+  if (has_coarse) sum.sum += of_coarse(&coarse, &alike_row, at.x, of_middle, sum.count);
   row[at.x] = sum;
 #else
   FOR_PIXELS(x, width) {
@@ -164,7 +168,7 @@ COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const fl
     for (int i = 0; i < PIXELS / EGOSGM_COARSE && x / EGOSGM_COARSE + i < blocks.width; ++i) {
       const int block = x / EGOSGM_COARSE + i, lane = min(EGOSGM_COARSE * i + EGOSGM_COARSE / 2, width - 1 - x);
       EvidenceSum sum = {EGOSGM_EVIDENCE_UNITS / 4 * LANE(int, evidence4, i), LANE(int, counted4, i)};
-      if (has_coarse) sum.sum += of_coarse(&coarse, block, LANE(float, of_middle, lane), sum.count);
+      if (has_coarse) sum.sum += of_coarse(&coarse, &alike_row, block, LANE(float, of_middle, lane), sum.count);
       row[block] = sum;
     }
   }
@@ -173,9 +177,10 @@ COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const fl
 
 KERNEL void compare(const ImageSize size, const float gate, const int padding, global const uint* codes,
                     const int has_coarse, const int coarse_padding, global const uint* coarse_codes,
-                    global const float* predicted, global const float* measured, global EvidenceSum* sums) {
-  compare_row(THIS_WORK_ITEM, size, gate, padding, codes, has_coarse, coarse_padding, coarse_codes, predicted, measured,
-              sums);
+                    global const uint* alike, global const float* predicted, global const float* measured,
+                    global EvidenceSum* sums) {
+  compare_row(THIS_WORK_ITEM, size, gate, padding, codes, has_coarse, coarse_padding, coarse_codes, alike, predicted,
+              measured, sums);
 }
 
 static inline int mean_evidence(const int2 sums) { return sums.x / sums.y; }
@@ -183,27 +188,39 @@ static inline int least_evidence(const int evidence, const int2 part) {
   return part.y > EGOSGM_EVIDENCE_LEAST_COUNT ? min(evidence, mean_evidence(part)) : evidence;
 }
 
-// The evidence of each block: the least of the means over a window of blocks and over its four halves, so that a plain
-// place beside a textured one has none. `found`: the disparity that the coarse match found there [px]; rows of both
-// have EGOSGM_EVIDENCE_STRIDE places.
+// Whether the block dx and dy beside one is alike, by its code (census.cl).
+static inline int is_alike(const Code code, const int dx, const int dy) {
+  const int place = (dy + 3) * 9 + dx + 4;
+  return place == 31 ? 1 : (int)(code >> (place < 31 ? 61 - place : 62 - place)) & 1;
+}
+
+// The evidence of each block: the least of the means over a window of blocks that are alike and over its four halves,
+// so that a plain place beside a textured one has none. `found`: the disparity that the coarse match found there [px];
+// rows of both have EGOSGM_EVIDENCE_STRIDE places.
 COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int has_coarse, global const float* coarse,
-                              global const EvidenceSum* sums, global int* evidence, global float* found) {
+                              global const uint* alike, global const EvidenceSum* sums, global int* evidence,
+                              global float* found) {
   const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
                             (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
   const int radius = EGOSGM_EVIDENCE_RADIUS;
   const size_t row = (size_t)at.view * blocks.height + at.y;
   const int stride = EGOSGM_EVIDENCE_STRIDE(size.width);
+  const CodeRows alike_row = code_rows(alike, blocks, 0, at.view, at.y);
   for (int x = at.x; x < blocks.width; x += at.items) {
+    const Code code = has_coarse ? alike_row.own[own_place(&alike_row, x)] : ~(Code)0;
     int2 left = 0, middle = 0, right = 0, above = 0, below = 0, here = 0;
     for (int v = max(at.y - radius, 0); v <= min(at.y + radius, blocks.height - 1); ++v) {
       global const int2* of_row = (global const int2*)sums + ((size_t)at.view * blocks.height + v) * blocks.width;
       int2 of_left = 0, of_right = 0;
-      for (int u = max(x - radius, 0); u < x; ++u) of_left += of_row[u];
-      for (int u = x + 1; u <= min(x + radius, blocks.width - 1); ++u) of_right += of_row[u];
+      for (int u = max(x - radius, 0); u < x; ++u) of_left += of_row[u] * is_alike(code, u - x, v - at.y);
+      for (int u = x + 1; u <= min(x + radius, blocks.width - 1); ++u) {
+        of_right += of_row[u] * is_alike(code, u - x, v - at.y);
+      }
+      const int2 of_column = of_row[x] * is_alike(code, 0, v - at.y);
       left += of_left;
-      middle += of_row[x];
+      middle += of_column;
       right += of_right;
-      const int2 all = of_left + of_row[x] + of_right;
+      const int2 all = of_left + of_column + of_right;
       if (v < at.y) above += all;
       if (v == at.y) here = all;
       if (v > at.y) below += all;
@@ -221,8 +238,9 @@ COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int
 }
 
 KERNEL void gather_evidence(const ImageSize size, const int has_coarse, global const float* coarse,
-                            global const EvidenceSum* sums, global int* evidence, global float* found) {
-  gather_row(THIS_WORK_ITEM, size, has_coarse, coarse, sums, evidence, found);
+                            global const uint* alike, global const EvidenceSum* sums, global int* evidence,
+                            global float* found) {
+  gather_row(THIS_WORK_ITEM, size, has_coarse, coarse, alike, sums, evidence, found);
 }
 
 // What is given out of a belief: what has much evidence, and what has little where confirmed pixels around lie on the

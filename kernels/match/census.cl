@@ -3,6 +3,7 @@
 // - Census transform (Zabih and Woodfill 1994): every pixel of the window, row by row, against the centre.
 // - Learned: a census of 5x5, and sums of 3x3 grey values at two places of a 7x7 window against each other, with a
 //   threshold (EGOSGM_LEARNED7X7).
+// - Alike: which pixels of a census window are about as bright as its centre, so that they may lie on its surface.
 // - The grey value itself (8 bits), for sums of absolute differences.
 // Pixels outside the image are those of its border.
 //
@@ -17,6 +18,8 @@
 // lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
 // lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=4 PIXELS=16
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=3 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=3 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
@@ -29,7 +32,7 @@
 #error "PIXELS: of a work-item, 1 or 16"
 #endif
 #ifndef COMPARISONS
-#error "COMPARISONS: 0 for the grey value, 1 for a census window, 2 for the learned ones"
+#error "COMPARISONS: 0 for the grey value, 1 for a census window, 2 for the learned ones, 3 for those alike"
 #endif
 #ifndef RADIUS_X
 #error "RADIUS_X: half the window's width"
@@ -107,10 +110,41 @@ inline Code learned_code_at(const int width, const Rows* rows, const int x) {
 }
 #endif
 
+#if COMPARISONS == 3
+#if PIXEL_BYTES != 2
+#error "COMPARISONS: 3 compares grey values of 16 bits"
+#endif
+// Pixels side by side on a surface differ by its texture and by noise, and most of the eight around a pixel lie on its
+// surface. So its tolerance follows from the fourth least difference to these. `least`: the four least, in order.
+#define ADD_DIFFERENCE(Greys, least, difference)        \
+  {                                                     \
+    Greys other = difference;                           \
+    for (int place = 0; place < 4; ++place) {           \
+      const Greys greater = max(other, (least)[place]); \
+      (least)[place] = min(other, (least)[place]);      \
+      other = greater;                                  \
+    }                                                   \
+  }
+#define TOLERANCE(Greys, least)                                                                      \
+  add_sat((Greys)(min((least)[3], (Greys)(65535 / EGOSGM_ALIKE_TIMES)) * (Greys)EGOSGM_ALIKE_TIMES), \
+          (Greys)EGOSGM_ALIKE_LEAST)
+#endif
+
 inline Code code_at(const int width, const Rows* rows, const int x) {
 #define AT(dx, dy) rows->at[RADIUS_Y + (dy)][clamp(x + (dx), 0, width - 1)]
 #if COMPARISONS == 0
   return to_8_bit(AT(0, 0));
+#elif COMPARISONS == 3
+  Pixel least[4] = {65535, 65535, 65535, 65535};
+#pragma unroll
+  for (int i = 0; i < 9; ++i) {
+    if (i != 4) ADD_DIFFERENCE(Pixel, least, abs_diff(AT(i % 3 - 1, i / 3 - 1), AT(0, 0)));
+  }
+  const Pixel tolerance = TOLERANCE(Pixel, least);
+  Code code = 0;
+#pragma unroll
+  for (int i = 0; i < COUNT; ++i) code = code << 1 | (abs_diff(AT(DX(i), DY(i)), AT(0, 0)) <= tolerance ? 1 : 0);
+  return code;
 #else
   Code code = 0;
 #pragma unroll
@@ -259,13 +293,28 @@ inline void write_codes_at(const Rows* rows, const int x, const int width, const
   sum_around(rows, x, sums);
 #endif
   const Greys centre = load_greys(rows->at[RADIUS_Y] + x);
+#define BESIDE(dx, dy) load_greys(rows->at[RADIUS_Y + (dy)] + x + (dx))
   Bytes bytes[CODE_BYTES];
 #pragma unroll
   for (int byte = 0; byte < CODE_BYTES; ++byte) bytes[byte] = 0;
+#if COMPARISONS == 3
+  const Greys most = (Greys)((ushort)65535);
+  Greys least[4] = {most, most, most, most};
+#pragma unroll
+  for (int i = 0; i < 9; ++i) {
+    if (i != 4) ADD_DIFFERENCE(Greys, least, abs_diff(BESIDE(i % 3 - 1, i / 3 - 1), centre));
+  }
+  const Greys tolerance = TOLERANCE(Greys, least);
+#endif
 #pragma unroll
   for (int i = 0; i < COUNT; ++i) {
     const int place = COUNT + LEARNED - 1 - i;
-    bytes[place / 8] |= bit_where_less(load_greys(rows->at[RADIUS_Y + DY(i)] + x + DX(i)), centre, 1 << place % 8);
+    const Greys beside = BESIDE(DX(i), DY(i));
+#if COMPARISONS == 3
+    bytes[place / 8] |= (uchar16)((uchar)(1 << place % 8)) & ~bit_where_less(tolerance, abs_diff(beside, centre), 255);
+#else
+    bytes[place / 8] |= bit_where_less(beside, centre, 1 << place % 8);
+#endif
   }
 #if COMPARISONS == 2
 #pragma unroll

@@ -48,6 +48,10 @@ struct Images {
             {reference::codes(coarse_size(), coarse[0], 16, MatchingCost::kCensus9x7),
              reference::codes(coarse_size(), coarse[1], 16, MatchingCost::kCensus9x7)}};
   }
+  reference::ViewCodes coarse_alike() const {
+    return {coarse_size(),
+            {reference::alike_codes(coarse_size(), coarse[0]), reference::alike_codes(coarse_size(), coarse[1])}};
+  }
 };
 
 Images noise(shared::ImageSize size, unsigned seed) {
@@ -139,7 +143,7 @@ TEST_P(EvidenceTest, EqualsReference) {
   std::vector<float> found = testing::random_maps(images.coarse_size(), 0, 5, 0.3, 6).disparity;
   for (const bool has_coarse : {true, false}) {
     std::optional<reference::CoarseView> coarse;
-    if (has_coarse) coarse = reference::CoarseView{images.coarse_codes(), found};
+    if (has_coarse) coarse = reference::CoarseView{images.coarse_codes(), images.coarse_alike(), found};
     const reference::BlockEvidence expected = reference::block_evidence(3, images.codes(), coarse, predicted, measured);
     for (const int pixels : {1, 16}) {
       const reference::BlockEvidence actual = evidence_of(images, has_coarse, found, predicted, measured, pixels);
@@ -205,6 +209,27 @@ TEST(Evidence, DoesNotReachOverAnEdge) {
   EXPECT_GT(row(16), 16 * 15) << "well within the texture";
   EXPECT_LT(row(11), 16 * 5) << "the last plain row but its census window";
   EXPECT_LT(row(9), 24);
+}
+
+// A plain place beside a bright thing, whose outline the codes at a quarter of the resolution show from afar.
+TEST(Evidence, DoesNotSeeAnOutlineFromAfar) {
+  Images images = noise(kSize, 1);
+  const int columns = images.coarse_size().width, rows = images.coarse_size().height, edge = columns / 2;
+  for (int view = 0; view < 2; ++view) {
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < columns; ++x) {
+        std::uint16_t& grey = images.coarse[view][y * columns + x];
+        grey = static_cast<std::uint16_t>(grey % 512 + (x + 2 * view < edge ? 20000 : 60000));
+      }
+    }
+  }
+  const testing::HostMaps predicted = everywhere(kSize, 8);
+  const auto blocks = evidence_of(images, true, nothing_found(images), predicted, predicted, 0);
+  std::vector<int> beside;
+  for (int y = 4; y + 4 < rows; ++y) {
+    for (int x = edge - 4; x < edge; ++x) beside.push_back(blocks.evidence[y * columns + x]);
+  }
+  EXPECT_LT(mean(beside), 0) << "the noise of the plain place is all that is asked";
 }
 
 TEST(Evidence, AsksThePredictionUnlessTheMeasurementContradictsIt) {

@@ -97,6 +97,45 @@ TEST(Census, LearnedSeesThroughAnOffsetAndMostOfAGain) {
   EXPECT_LT(bits, 64 * codes.size() / 2 / 20);
 }
 
+using AlikeCase = std::tuple<shared::ImageSize, int>;
+
+std::string alike_name(const ::testing::TestParamInfo<AlikeCase>& info) {
+  const auto [size, pixels] = info.param;
+  return std::to_string(size.width) + "x" + std::to_string(size.height) + "_by_" + std::to_string(pixels);
+}
+
+class AlikeTest : public ::testing::TestWithParam<AlikeCase> {};
+
+TEST_P(AlikeTest, EqualsReference) {
+  const auto [size, pixels] = GetParam();
+  std::mt19937 random(3);
+  std::vector<std::uint16_t> views[2];
+  std::vector<cl_uchar> raw;
+  for (auto& view : views) {
+    for (std::size_t i = 0; i < pixel_count(size); ++i) {  // a wall, noise, and all that 16 bits can be
+      const unsigned x = i % size.width, kind = x * 3 / size.width;
+      view.push_back(static_cast<std::uint16_t>(kind == 0   ? 30000 + random() % 300
+                                                : kind == 1 ? random() % 2 * 65535
+                                                            : random() % 65536));
+      raw.insert(raw.end(), {static_cast<cl_uchar>(view.back()), static_cast<cl_uchar>(view.back() >> 8)});
+    }
+  }
+  ocl::Context context(testing::any_device());
+  Census census = Census::of_alike(context, size, pixels);
+  ocl::Buffer<cl_uchar> images(context, raw.size());
+  ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kCensus9x7, size, 0));
+  images.write(context, raw);
+  census.encode(images, codes);
+  const auto expected = reference::padded_codes(size, reference::alike_codes(size, views[0]),
+                                                reference::alike_codes(size, views[1]), 0, MatchingCost::kCensus9x7);
+  const auto actual = codes.read(context);
+  EXPECT_TRUE(testing::same_bits(std::vector<std::uint32_t>(actual.begin(), actual.end()), expected,
+                                 {2 * size.width, size.height}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, AlikeTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::kSizes), ::testing::Values(1, 16)),
+                         alike_name);
 INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
                          ::testing::Combine(::testing::ValuesIn(testing::kSizes),
                                             ::testing::Values(PixelType::kU8, PixelType::kU16),

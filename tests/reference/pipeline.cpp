@@ -2,6 +2,8 @@
 #include "tests/reference/pipeline.h"
 
 #include <algorithm>
+#include <tuple>
+#include <utility>
 
 #include "host/method_options.h"
 #include "tests/reference/fuse/evidence.h"
@@ -113,13 +115,15 @@ void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
 
 namespace {
 
-ViewCodes coarse_codes(shared::ImageSize size, const std::vector<int>& images, int bits) {
+/// Codes at a quarter of the resolution, and those of what is alike.
+std::pair<ViewCodes, ViewCodes> coarse_codes(shared::ImageSize size, const std::vector<int>& images, int bits) {
   const shared::ImageSize coarse{(size.width + 3) / 4, (size.height + 3) / 4};
   const std::vector<std::uint16_t> shrunken = shrink(size, images, bits);
   const auto middle = shrunken.begin() + static_cast<std::ptrdiff_t>(shrunken.size() / 2);
-  return {coarse,
-          {codes(coarse, {shrunken.begin(), middle}, 16, MatchingCost::kCensus9x7),
-           codes(coarse, {middle, shrunken.end()}, 16, MatchingCost::kCensus9x7)}};
+  const std::vector<std::uint16_t> left(shrunken.begin(), middle), right(middle, shrunken.end());
+  const MatchingCost census = MatchingCost::kCensus9x7;
+  return {{coarse, {codes(coarse, left, 16, census), codes(coarse, right, 16, census)}},
+          {coarse, {alike_codes(coarse, left), alike_codes(coarse, right)}}};
 }
 
 }  // namespace
@@ -132,7 +136,7 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
   pass.images = resample(size_, known, images.greys);
   if (!everything && options_.coarse_match.enabled) {
     pass.coarse = coarse_match(size_, options_, pass.images, images.bits);
-    pass.coarse_codes = coarse_codes(size_, pass.images, images.bits);
+    std::tie(pass.coarse_codes, pass.coarse_alike) = coarse_codes(size_, pass.images, images.bits);
   }
   pass.band = everything ? full_range(size_, range_, frame.predicted.disparity)
                          : search_band(size_, range_, options_.search_band, frame.predicted, pass.coarse);
@@ -173,7 +177,7 @@ void Pipeline::update(const Images& images, Frame& frame) const {
   std::optional<FrameEvidence> evidence;
   if (has_evidence()) {
     std::optional<CoarseView> coarse;
-    if (!pass.coarse.empty()) coarse = CoarseView{pass.coarse_codes, pass.coarse};
+    if (!pass.coarse.empty()) coarse = CoarseView{pass.coarse_codes, pass.coarse_alike, pass.coarse};
     evidence = FrameEvidence{
         frame.warped.evidence,
         block_evidence(options_.kalman_update.gate_px, pass.view_codes, coarse, frame.predicted, pass.measured),

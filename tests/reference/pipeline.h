@@ -30,7 +30,7 @@ struct ViewMotions {
 struct Pass {
   std::vector<int> images;
   std::vector<float> coarse;  // disparities of both views at a quarter of the resolution
-  ViewCodes view_codes, coarse_codes;
+  ViewCodes view_codes, coarse_codes, coarse_alike;
   SearchBands band;
   std::vector<std::uint32_t> codes;     // as kernels/match/census.cl lays them out
   std::vector<std::uint8_t> penalties;  // as kernels/match/step_penalties.cl does

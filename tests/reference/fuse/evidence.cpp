@@ -29,14 +29,16 @@ int seen_by_other(int view, int x, float disparity) {
 }
 
 /// The mean distance to codes `controls` columns from the match, less that of the match, in bits times their number.
+/// Those of `bits` count.
 template <std::size_t N>
-std::optional<int> beyond(const ViewCodes& codes, const int (&controls)[N], int view, int x, int y, float disparity) {
+std::optional<int> beyond(const ViewCodes& codes, const int (&controls)[N], int view, int x, int y, float disparity,
+                          std::uint64_t bits = ~0ULL) {
   const int width = codes.size.width, match = seen_by_other(view, x, disparity);
   if (match < 0 || match >= width) return {};
   const std::size_t row = static_cast<std::size_t>(y) * width;
   const std::uint64_t own = codes.of_view[view][row + x];
   const auto distance = [&](int column) {
-    return std::popcount(own ^ codes.of_view[1 - view][row + std::clamp(column, 0, width - 1)]);
+    return std::popcount(bits & (own ^ codes.of_view[1 - view][row + std::clamp(column, 0, width - 1)]));
   };
   int sum = 0;
   for (const int control : controls) sum += distance(match + control) - distance(match);
@@ -46,6 +48,13 @@ std::optional<int> beyond(const ViewCodes& codes, const int (&controls)[N], int 
 struct Sum {
   int evidence = 0, count = 0;
 };
+
+/// By a block's code of what is alike: 9x7 bits without the one in the middle, the first one the highest.
+bool is_alike(std::uint64_t code, int dx, int dy) {
+  if (dx == 0 && dy == 0) return true;
+  const int place = 9 * (dy + 3) + dx + 4;
+  return code >> (61 - (place > 31 ? place - 1 : place)) & 1;
+}
 
 }  // namespace
 
@@ -76,7 +85,8 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
       const int middle = kSide * y + kSide / 2 < height ? kSide * y + kSide / 2 : kSide * y;
       const float d = asked_at(std::min(kSide * x + kSide / 2, width - 1), middle);
       if (!is_valid(d)) continue;
-      const std::optional<int> eight = beyond(coarse->codes, kCoarseControls, view, x, y, d / kSide);
+      const std::optional<int> eight =
+          beyond(coarse->codes, kCoarseControls, view, x, y, d / kSide, coarse->alike.of_view[view][i]);
       if (eight) sums[i].evidence += sums[i].count * *eight;  // 16 / 8, halved
     }
     for (int i = 0; i < rows * columns; ++i) {
@@ -85,6 +95,7 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
         Sum sum;
         for (int v = std::max(0, y - up); v <= std::min(rows - 1, y + down); ++v) {
           for (int u = std::max(0, x - left); u <= std::min(columns - 1, x + right); ++u) {
+            if (coarse && !is_alike(coarse->alike.of_view[view][i], u - x, v - y)) continue;
             sum.evidence += sums[v * columns + u].evidence, sum.count += sums[v * columns + u].count;
           }
         }

@@ -23,9 +23,9 @@ struct BlockEvidence {
   std::vector<float> found;
 };
 
-/// `coarse` codes and disparities [coarse px]: of the images at a quarter of the resolution.
+/// Codes, those of what is alike, and disparities [coarse px]: of the images at a quarter of the resolution.
 struct CoarseView {
-  ViewCodes codes;
+  ViewCodes codes, alike;
   std::vector<float> disparity;
 };
 BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::optional<CoarseView>& coarse,

@@ -2,6 +2,7 @@
 #include "tests/reference/match/census.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "tests/reference/method.h"
 
@@ -52,6 +53,29 @@ std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::
           code = 2 * code + (sum_around(x + dx1, y + dy1) - sum_around(x + dx2, y + dy2) < steps_per_grey * threshold);
         }
       }
+      codes.push_back(code);
+    }
+  }
+  return codes;
+}
+
+std::vector<std::uint64_t> alike_codes(shared::ImageSize size, const std::vector<std::uint16_t>& image) {
+  std::vector<std::uint64_t> codes;
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const auto difference = [&](const Offset& offset) {
+        const auto at = [&](int u, int v) {
+          return int{image[static_cast<std::size_t>(std::clamp(v, 0, size.height - 1)) * size.width +
+                           std::clamp(u, 0, size.width - 1)]};
+        };
+        return std::abs(at(x + offset.dx, y + offset.dy) - at(x, y));
+      };
+      std::vector<int> around;
+      for (const Offset& offset : window(1, 1)) around.push_back(difference(offset));
+      std::nth_element(around.begin(), around.begin() + 3, around.end());
+      const int tolerance = std::min(4 * std::min(around[3], 65535 / 4) + 128, 65535);
+      std::uint64_t code = 0;
+      for (const Offset& offset : window(4, 3)) code = 2 * code + (difference(offset) <= tolerance);
       codes.push_back(code);
     }
   }
