@@ -2,6 +2,7 @@
 """egosgm calibrate: pictures of a board, rendered for known cameras."""
 import contextlib
 import io
+import shutil
 
 import numpy as np
 import pytest
@@ -136,7 +137,11 @@ def test_a_charuco_board(tmp_path, capsys):
 
 @pytest.mark.parametrize("board, named", [("8x6", "one of 7x5 is there"), ("7", "--board 7:"), ("2x9", "--board 2x9")])
 def test_a_wrong_size_of_the_board_is_named(board, named, pictures, tmp_path, capsys):
-    code, said = calibrate(pictures, tmp_path / "calib.yml", capsys, board=board)
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        for i in range(3):
+            shutil.copy(pictures / side / f"{i}.png", tmp_path / side)
+    code, said = calibrate(tmp_path, tmp_path / "calib.yml", capsys, board=board)
     assert code == 2 and named in said, said
     assert not (tmp_path / "calib.yml").exists()
 
