@@ -35,9 +35,11 @@
 // Rows of what is known of blocks begin at multiples of what a work-item reads of them.
 #define EGOSGM_EVIDENCE_STRIDE(width) (((width) + 15) / 16 * (16 / EGOSGM_COARSE))
 // What lies on the surface of a block: blocks whose grey values at a quarter of the resolution differ from its own by
-// no more than so many times the fourth least difference to those around it, and half a grey level of 8 bits.
-#define EGOSGM_ALIKE_TIMES 4
+// no more than so many times the fourth least difference to those around it, and half a grey level of 8 bits. A code
+// counts by those of its 62 bits that are of such blocks, where at least so many are.
+#define EGOSGM_ALIKE_TIMES 16
 #define EGOSGM_ALIKE_LEAST 128
+#define EGOSGM_ALIKE_LEAST_BITS 12
 // A pixel's evidence is a sum over frames, at most MOST: of what it was, so many 64ths are kept, and a frame adds what
 // its images say, less what noise must not reach. What was chosen in this frame alone, and not by the coarse match too,
 // has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is confirmed from

@@ -105,15 +105,16 @@ static inline Ints compared(const CodeRows* rows, const int x, const Floats aske
 }
 
 // Half of the weight of a full pixel, of each of `count` in a block: what the image at a quarter of the resolution says
-// of the disparity in the middle of the block, by those pixels of the code's window that are alike.
+// of the disparity in the middle of the block, by those pixels of the code's window that are alike, if a few are.
 static inline int of_coarse(const CodeRows* coarse, const CodeRows* alike, const int block, const float disparity,
                             const int count) {
   if (!(disparity > EGOSGM_INVALID_DISPARITY)) return 0;
   const float shift = 12582912.0f;  // 1.5 * 2^23: rounds
   const int match = place_of_match(coarse, block, (int)((disparity / EGOSGM_COARSE + shift) - shift));
-  if (match < 0 || match >= coarse->width) return 0;
-  const int own = own_place(coarse, block);
-  return count * beyond_eight(coarse->own[own], coarse->other + match, alike->own[own]) * (EGOSGM_EVIDENCE_UNITS / 16);
+  const int own = own_place(coarse, block), bits = (int)popcount(alike->own[own]);
+  if (match < 0 || match >= coarse->width || bits < EGOSGM_ALIKE_LEAST_BITS) return 0;
+  return count * beyond_eight(coarse->own[own], coarse->other + match, alike->own[own]) * (EGOSGM_EVIDENCE_UNITS / 16) *
+         62 / bits;
 }
 
 // Sums of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels: the evidence of those that are asked and whose match lies in

@@ -87,7 +87,8 @@ BlockEvidence block_evidence(float gate_px, const ViewCodes& codes, const std::o
       if (!is_valid(d)) continue;
       const std::optional<int> eight =
           beyond(coarse->codes, kCoarseControls, view, x, y, d / kSide, coarse->alike.of_view[view][i]);
-      if (eight) sums[i].evidence += sums[i].count * *eight;  // 16 / 8, halved
+      const int bits = std::popcount(coarse->alike.of_view[view][i]);
+      if (eight && bits >= 12) sums[i].evidence += sums[i].count * *eight * 62 / bits;  // 16 / 8, halved
     }
     for (int i = 0; i < rows * columns; ++i) {
       const int x = i % columns, y = i / columns;

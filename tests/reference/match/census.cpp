@@ -73,7 +73,7 @@ std::vector<std::uint64_t> alike_codes(shared::ImageSize size, const std::vector
       std::vector<int> around;
       for (const Offset& offset : window(1, 1)) around.push_back(difference(offset));
       std::nth_element(around.begin(), around.begin() + 3, around.end());
-      const int tolerance = std::min(4 * std::min(around[3], 65535 / 4) + 128, 65535);
+      const int tolerance = std::min(16 * around[3] + 128, 65535);
       std::uint64_t code = 0;
       for (const Offset& offset : window(4, 3)) code = 2 * code + (difference(offset) <= tolerance);
       codes.push_back(code);

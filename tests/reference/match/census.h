@@ -13,7 +13,7 @@ namespace egosgm::reference {
 std::vector<std::uint64_t> codes(shared::ImageSize size, const std::vector<std::uint16_t>& image, int bits,
                                  MatchingCost cost);
 
-/// Which pixels of the windows of 9x7 pixels of one view are about as bright as their centres: within four times the
+/// Which pixels of the windows of 9x7 pixels of one view are about as bright as their centres: within 16 times the
 /// fourth least difference to the eight pixels around it, and half a grey level of 8 bits. `image`: of 16 bits.
 std::vector<std::uint64_t> alike_codes(shared::ImageSize size, const std::vector<std::uint16_t>& image);
 
