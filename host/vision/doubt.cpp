@@ -12,7 +12,7 @@ namespace egosgm::vision {
 namespace {
 
 constexpr double kMinBaseline_m = 0.004, kMaxBaseline_m = 3.0;
-constexpr double kUsualBaseline_m[] = {0.02, 1.5};
+constexpr double kUsualBaseline_m[] = {0.02, 1.0};
 constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
 constexpr double kMinDensity = 0.5;
 constexpr double kFarRows_px = 0.9 * EGOSGM_MAX_OFFSET_PX;
@@ -29,18 +29,28 @@ void append(std::string& text, const std::string& part) { text += (text.empty() 
 
 bool is_usual(double baseline_m) { return baseline_m >= kUsualBaseline_m[0] && baseline_m <= kUsualBaseline_m[1]; }
 
+/// Units in which a baseline that is too long for metres would be a usual one.
+std::string units_of(double baseline) {
+  std::string units;
+  for (const auto& [unit, unit_m] :
+       {std::pair{"centimetres", 0.01}, {"millimetres", 0.001}, {"decimetres", 0.1}, {"inches", 0.0254}}) {
+    if (!is_usual(baseline * unit_m)) continue;
+    units += formatted("%s%s (%.4g m)", units.empty() ? "" : " or ", unit, baseline * unit_m);
+  }
+  return units.empty() ? "a chessboard's squares or other units" : units;
+}
+
 }  // namespace
 
 std::optional<Suspicion> suspect_baseline(double baseline_m, double fx) {
   const std::string what = formatted("a baseline of %.4g m", baseline_m);
-  if (baseline_m > kMaxBaseline_m) {
-    std::string units;
-    for (const auto& [unit, unit_m] : {std::pair{"centimetres", 0.01}, {"millimetres", 0.001}}) {
-      if (!is_usual(baseline_m * unit_m)) continue;
-      units += formatted("%s%s (%.4g m)", units.empty() ? "" : " or ", unit, baseline_m * unit_m);
-    }
-    return Suspicion{what, "a baseline is in metres: is this one in " +
-                               (units.empty() ? std::string("a chessboard's squares or other units") : units) + "?"};
+  if (baseline_m > kUsualBaseline_m[1]) {
+    const bool is_certain = baseline_m > kMaxBaseline_m;
+    return Suspicion{what,
+                     (is_certain ? "a baseline is in metres: is this one in "
+                                 : "few rigs are wider than a metre, and depths grow with the baseline: is it in ") +
+                         units_of(baseline_m) + "?",
+                     is_certain};
   }
   if (baseline_m < kMinBaseline_m) {
     const std::string missing = is_usual(baseline_m * fx)

@@ -17,10 +17,11 @@ namespace egosgm::vision {
 /// What speaks against a value, and what to do about it.
 struct Suspicion {
   std::string what, remedy;
+  bool is_certain = true;  // else it may be right, but seldom is
 };
 
-/// A baseline of no rig that carries two cameras: the unit was mistaken, or a factor is missing. `fx`: 0 where it is
-/// not known. Thread-safe.
+/// A baseline of no rig that carries two cameras, or of few: the unit was mistaken, or a factor is missing. `fx`: 0
+/// where it is not known. Thread-safe.
 EGOSGM_EXPORT std::optional<Suspicion> suspect_baseline(double baseline_m, double fx = 0);
 
 /// The same, and a focal length or a principal point that does not fit images of `size`, where that is known.

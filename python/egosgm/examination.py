@@ -192,7 +192,9 @@ class Examination:
             return Finding("note", "calibration", "none was given: there is no depth and no odometry", "give --calib FILE; `egosgm calibrate` finds one by pictures of a board")
         text = f"fx {c.fx:.1f}, fy {c.fy:.1f}, cx {c.cx:.1f}, cy {c.cy:.1f} px, baseline {c.baseline_m:.4g} m"
         suspicion = _egosgm._suspect_calibration(c, self._width, self._height)
-        return Finding("problem", "calibration", f"{text}: {suspicion.what}", suspicion.remedy) if suspicion else Finding("ok", "calibration", text)
+        if not suspicion:
+            return Finding("ok", "calibration", text)
+        return Finding("problem" if suspicion.is_certain else "note", "calibration", f"{text}: {suspicion.what}", suspicion.remedy)
 
     def _rows(self, matches: int, agreeing: NDArray[np.float32]) -> Finding:
         """The rows of the two views: a constant offset, and what is left beside it."""

@@ -351,6 +351,9 @@ def test_a_doubtful_drive_is_told(street, frames):
     far = egosgm.Calibration(street.calibration.fx, street.calibration.fy, 5, street.calibration.cy, 54)
     with pytest.warns(UserWarning, match="a baseline of 54 m"):
         list(egosgm.run([(frames[0].left, frames[0].right)], far, **OPTIONS))
+    wide = egosgm.Calibration(street.calibration.fx, street.calibration.fy, street.calibration.cx, street.calibration.cy, 3)
+    with pytest.warns(UserWarning, match="few rigs .* decimetres .0.3 m."):
+        list(egosgm.run([(frames[0].left, frames[0].right)], wide, motion=False, **OPTIONS))
 
 
 def test_rows_that_no_alignment_mends_are_told(street, frames):
