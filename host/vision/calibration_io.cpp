@@ -263,7 +263,7 @@ std::string_view foreign_format(std::string_view text) {
 
 Calibration read_calibration(const std::filesystem::path& file, KittiCameras cameras) {
   const std::string text = read_file(file, kMaxCalibrationBytes);
-  const bool is_own = has_all(text, {"baseline_m"});
+  const bool is_own = has_all(text, {"baseline_m"}) && text.find('{') == std::string::npos;
   if (const std::string_view format = is_own ? "" : foreign_format(text); !format.empty()) refuse_foreign(file, format);
   const Entries entries(file, text);
   if (entries.has_prefix("P_rect_")) return from_kitti(entries, cameras, "P_rect_0");
