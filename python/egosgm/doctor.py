@@ -13,7 +13,7 @@ from . import _egosgm
 from .arguments import counted, Parser, tell, whole_number
 from .examination import Examination, Finding
 from .rectification import Rectification, StereoRig
-from .sequences import add_input, frame_times, open_input, open_without_calibration
+from .sequences import add_input, frame_times, open_input, open_without_calibration, words_of_input
 
 _MOST_GAP = 1.6  # of the usual time between two frames
 _LEAST_STEP_S, _MOST_STEP_S = 1e-4, 20.0  # between two frames
@@ -205,7 +205,7 @@ def _findings(given: argparse.Namespace) -> List[Finding]:
 
 
 def _parser() -> Parser:
-    parser = Parser("doctor", usage="egosgm doctor [OPTIONS] [DATASET] [RIGHT]", description="Check a sequence: rows, swapped sides, calibration, range, time stamps",
+    parser = Parser("doctor", usage="egosgm doctor [OPTIONS] [DATASET] [RIGHT]", description="Check a sequence: rows, swapped sides, calibration, range, time stamps. Raw images are rectified, where --calib is of raw images",
                     epilog="Points are matched in the whole image, without regard to rows, sides or range. Exit code 2 where a problem was\n"
                     "found; below each stands its remedy.")
     add_input(parser)
@@ -229,7 +229,7 @@ def main(arguments: Sequence[str]) -> int:
     _egosgm._check_range(given.disparities, given.min_disparity)
     if given.samples < 1:
         raise _egosgm.InvalidArgument(f"--samples {given.samples}: choose a number above 0")
-    if given.bag and any((given.folder, given.dataset, given.odometry, given.kitti, given.left, given.right, given.frames)):
+    if given.bag and any(not word.startswith("--calib=") for word in words_of_input(given)):
         raise _egosgm.InvalidArgument(f"--bag {given.bag}: is an input of its own: give one input, and no --frames")
     if not given.bag and any((given.left_topic, given.right_topic, given.info_topics, given.max_skew_ms)):
         raise _egosgm.InvalidArgument("topics and --max-skew-ms are of a bag: give --bag FILE with them")

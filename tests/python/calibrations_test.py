@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations of other programs: one rig, written as each of them does."""
 import json
-import os
 
 import numpy as np
 import pytest
 
 import egosgm
-from egosgm import calibrations, program
 
 yaml = pytest.importorskip("yaml")
 
@@ -233,20 +231,3 @@ def test_units_are_never_guessed(tmp_path):
     with pytest.raises(egosgm.InvalidArgument, match="centimetres .0.3 m. or millimetres .0.03 m."):
         egosgm.read_calibration(tmp_path / "chain.yaml")
     expect_raw(egosgm.read_calibration(tmp_path / "chain.yaml", unit_m=0.01))
-
-
-def test_the_command_hands_the_program_what_it_reads(tmp_path):
-    (tmp_path / "chain.yaml").write_text(kalibr())
-    changed = program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--out", "o"])
-    given = changed[2]
-    assert changed == ["run", "--calib", given, "--out", "o"]
-    expect_rectified(egosgm.read_calibration(given))
-    os.close(int(given.rpartition("/")[2]))
-    (tmp_path / "chain.yaml").write_text(kalibr(LENS))
-    with pytest.raises(egosgm.InvalidArgument, match="is of raw images"):
-        program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml")])
-    (tmp_path / "own.txt").write_text(RECTIFIED["own.txt"])
-    os.mkfifo(tmp_path / "pipe")  # which would be read here, and no more there
-    for arguments in (["run", "--calib", str(tmp_path / "own.txt")], ["run", "folder"], ["run", "--calib"], ["run", "--calib", str(tmp_path / "pipe")]):
-        assert program.with_calibration(arguments) == arguments
-    assert calibrations.find(tmp_path / "own.txt").fx == F
