@@ -233,6 +233,8 @@ std::string_view foreign_format(std::string_view text) {
       {{"Camera list with one line of data"}, "COLMAP's cameras.txt, which does not say how two cameras stand"},
       {{"Q:"}, "a matrix Q of OpenCV's stereoRectify"},
   }};
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) return "UTF-16, which is to be saved as UTF-8";
+  if (text.starts_with("\x1f\x8b")) return "packed by gzip";
   if (is_zip(text)) return "an archive of NumPy arrays (.npz)";
   if (text.starts_with("\x93NUMPY")) return "one NumPy array";
   for (const Format& format : kFormats) {

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations as other programs write them, told apart by what they hold: the one place that reads them."""
 import configparser
+import contextlib
 import dataclasses
+import gzip
+import io
 import json
 import math
 import os
@@ -9,6 +12,7 @@ import pathlib
 import re
 import types
 import xml.etree.ElementTree as ElementTree
+import zlib
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -458,6 +462,9 @@ def _text_of(file: pathlib.Path) -> str:
     if not file.exists():
         raise _refuse(file, "no such file")
     content = _egosgm._read_file(file, _MOST_BYTES)
+    if content[:2] == b"\x1f\x8b":
+        with contextlib.suppress(EOFError, OSError, zlib.error):
+            content = gzip.GzipFile(fileobj=io.BytesIO(content)).read(_MOST_BYTES)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise _refuse(file, "is UTF-16, as some editors write: save it as UTF-8")
     return content.decode("utf-8-sig", errors="replace")
@@ -572,7 +579,7 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
     if plain is not None:
         return plain
     is_own = re.search(r"(?m)^\s*(P_rect_\d|P[0-3]\s*:(?!\s*!!)|cam0\s*=|baseline_m\b)", text) and not text.startswith("%YAML")
-    if is_own or file.suffix.lower() not in (".yaml", ".yml", ".json", ".xml", ".txt", ".conf", ".cfg", ""):
+    if is_own or file.suffix.lower() not in (".yaml", ".yml", ".json", ".xml", ".txt", ".conf", ".cfg", ".gz", ""):
         raise own_error
     data = _data_of(text, file)
     if not isinstance(data, dict):

@@ -76,9 +76,9 @@ def _seconds(row: str) -> Optional[float]:
 
 
 def _times_of_names(sequence: _egosgm.StereoSequence) -> List[float]:
-    """Names that are times: nanoseconds (EuRoC) or microseconds since 1970, or seconds with decimals (TUM)."""
+    """Names that are times: nanoseconds (EuRoC), microseconds or milliseconds since 1970, or seconds with decimals (TUM)."""
     names = [frame.name for frame in sequence.frames]
-    for pattern, second in ((r"1\d{18}", 1e9), (r"1\d{15}", 1e6), (r"1\d{9}\.\d+", 1.0)):
+    for pattern, second in ((r"1\d{18}", 1e9), (r"1\d{15}", 1e6), (r"1\d{12}", 1e3), (r"1\d{9}\.\d+", 1.0)):
         if all(re.fullmatch(pattern, name) for name in names):
             first = names[0]
             return [(int(name) - int(first)) / second if second > 1 else float(name) - float(first) for name in names]

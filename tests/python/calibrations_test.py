@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations of other programs: one rig, written as each of them does."""
+import gzip
 import json
 
 import numpy as np
@@ -204,6 +205,11 @@ def test_arrays_of_numpy(tmp_path):
     expect_raw(egosgm.read_calibration(folder))
     np.save(tmp_path / "Q.npy", np.array(Q))
     expect_rectified(egosgm.read_calibration(tmp_path / "Q.npy"))
+
+
+def test_what_is_packed(tmp_path):
+    (tmp_path / "rig.yml.gz").write_bytes(gzip.compress(RAW["opencv.yml"].encode()))
+    expect_raw(egosgm.read_calibration(tmp_path / "rig.yml.gz"))
 
 
 def test_a_fisheye(tmp_path):
