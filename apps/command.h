@@ -26,6 +26,7 @@ struct Package {
   std::function<std::shared_ptr<Feed>(const BagArguments& bag, const std::string& calib, vision::FrameRange range,
                                       const std::string& out)>
       open_bag;
+  CalibrationReader read_calibration;
   /// A recording, unless `file` is empty, and a viewer.
   std::function<std::shared_ptr<Taker>(const std::string& file, bool viewer)> take;
 };
@@ -35,7 +36,7 @@ Command add_eval(CLI::App& program);
 Command add_devices(CLI::App& program);
 Command add_compile(CLI::App& program);
 Command add_synth(CLI::App& program);
-Command add_odometry(CLI::App& program);
+Command add_odometry(CLI::App& program, const Package& package);
 Command add_tune(CLI::App& program);
 
 }  // namespace egosgm::app

@@ -35,8 +35,8 @@ void tell(const vision::StereoFrame& frame, const FrameMotion& motion, bool firs
                             motion.odometry_ms));
 }
 
-int estimate(const OdometryArguments& arguments) {
-  FileFeed feed(arguments.input.open());
+int estimate(const OdometryArguments& arguments, const CalibrationReader& read) {
+  FileFeed feed(arguments.input.open(/*needs_calibration=*/true, read));
   const vision::StereoSequence& sequence = feed.sequence();
   MotionSource motions(sequence, {}, arguments.options);
   if (!arguments.out.empty()) vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
@@ -68,7 +68,7 @@ int estimate(const OdometryArguments& arguments) {
 
 }  // namespace
 
-Command add_odometry(CLI::App& program) {
+Command add_odometry(CLI::App& program, const Package& package) {
   CLI::App* command = program.add_subcommand("odometry", "Estimate the camera's poses alone, without matching");
   auto arguments = std::make_shared<OdometryArguments>();
   arguments->input.add_to(*command);
@@ -77,7 +77,7 @@ Command add_odometry(CLI::App& program) {
       ->required();
   add_motion_bounds(*command, arguments->options, "Options");
   command->add_flag("--quiet", arguments->quiet, "no progress, only errors");
-  return {command, [arguments] { return estimate(*arguments); }};
+  return {command, [arguments, read = package.read_calibration] { return estimate(*arguments, read); }};
 }
 
 }  // namespace egosgm::app

@@ -134,13 +134,10 @@ int parse_and_run(int argc, const char* const* argv, const Package* package) {
       "  egosgm eval --estimate result --truth street/truth/left_disp_noc\n"
       "Exit codes: 0 done, 1 the device, the disk or the program failed, 2 wrong arguments or input, 130 interrupted.\n"
       "Who stops reading the output (`| head`) ends the printing, not the work.");
-  const Command commands[] = {add_run(program, package ? *package : Package()),
-                              add_eval(program),
-                              add_devices(program),
-                              add_synth(program),
-                              add_odometry(program),
-                              add_compile(program),
-                              add_tune(program)};
+  const Package hooks = package ? *package : Package();
+  const Command commands[] = {
+      add_run(program, hooks),      add_eval(program),    add_devices(program), add_synth(program),
+      add_odometry(program, hooks), add_compile(program), add_tune(program)};
   for (const auto& [name, help] : python_tools()) program.add_subcommand(name, help);
   try {
     program.parse(argc, argv);

@@ -381,7 +381,7 @@ std::shared_ptr<Feed> feed_of(const RunArguments& arguments, const Package& pack
   const std::string input = arguments.input.text();
   if (arguments.bag.bag.empty()) {
     if (!arguments.bag.text().empty()) throw InvalidArgument(arguments.bag.text() + ": give --bag BAG with it");
-    return std::make_shared<FileFeed>(arguments.input.open(/*needs_calibration=*/false));
+    return std::make_shared<FileFeed>(arguments.input.open(/*needs_calibration=*/false, package.read_calibration));
   }
   SequenceArguments others = arguments.input;
   others.calib = others.frames = "";

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "egosgm/error.h"
+#include "egosgm/vision/calibration_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -73,7 +74,8 @@ void SequenceArguments::add_to(CLI::App& command) {
   command.add_option("--right", right, "right images, likewise; rectified")->type_name("PATTERN")->group(kGroup);
   command
       .add_option("--calib", calib,
-                  "calibration of --left and --right: KITTI's, Middlebury's, or fx, fy, cx, cy, baseline_m")
+                  "calibration of --left and --right: KITTI's, Middlebury's, or fx, fy, cx, cy, baseline_m; with the "
+                  "Python package, of whichever program")
       ->type_name("FILE")
       ->group(kGroup);
   add_pair_by(command, pair_by, kGroup);
@@ -82,7 +84,7 @@ void SequenceArguments::add_to(CLI::App& command) {
       ->group(kGroup);
 }
 
-vision::StereoSequence SequenceArguments::open(bool needs_calibration) const {
+vision::StereoSequence SequenceArguments::open(bool needs_calibration, const CalibrationReader& read) const {
   if (!other_picture.empty()) {
     if (!is_image(folder) || !left.empty() || !right.empty()) {
       throw InvalidArgument("more than one input: " + folder + " and " + other_picture +
@@ -91,14 +93,14 @@ vision::StereoSequence SequenceArguments::open(bool needs_calibration) const {
     SequenceArguments pair = *this;
     pair.left = std::exchange(pair.folder, "");
     pair.right = std::exchange(pair.other_picture, "");
-    return pair.open(needs_calibration);
+    return pair.open(needs_calibration, read);
   }
   const bool patterns = !left.empty() || !right.empty() || !calib.empty();
   std::vector<std::string> sources;
   if (!kitti.empty()) sources.push_back("--kitti " + kitti);
   if (!odometry.empty()) sources.push_back("--odometry " + odometry);
   if (!folder.empty()) sources.push_back(folder);
-  if (patterns) sources.push_back("--left " + left + " --right " + right);
+  if (patterns) sources.push_back(words_of({{"--left ", left}, {"--right ", right}, {"--calib ", calib}}));
   if (sources.empty()) {
     throw InvalidArgument(
         "no input: give one of --odometry DIR, --kitti DIR --scene NUMBER, --left PATTERN --right PATTERN --calib "
@@ -113,7 +115,7 @@ vision::StereoSequence SequenceArguments::open(bool needs_calibration) const {
   if (patterns && (left.empty() || right.empty() || (needs_calibration && calib.empty()))) {
     throw InvalidArgument("--left, --right and --calib belong together: give all three");
   }
-  const vision::PairBy pairing = parse_pair_by(pair_by);
+  parse_pair_by(pair_by);
   if (!pair_by.empty() && !patterns) {
     throw InvalidArgument("--pair-by " + pair_by + ": is for --left and --right; in a folder names tell");
   }
@@ -121,7 +123,26 @@ vision::StereoSequence SequenceArguments::open(bool needs_calibration) const {
   if (!kitti.empty()) return vision::open_kitti_multiview(kitti, scene, range);
   if (!odometry.empty()) return vision::open_kitti_odometry(odometry, range);
   if (!folder.empty()) return vision::open_folder(folder, range);
-  return vision::open_patterns(left, right, calib, range, pairing);
+  return open_pictures(range, read);
+}
+
+vision::StereoSequence SequenceArguments::open_pictures(const vision::FrameRange& range,
+                                                        const CalibrationReader& read) const {
+  const vision::PairBy pairing = parse_pair_by(pair_by);
+  try {
+    return vision::open_patterns(left, right, calib, range, pairing);
+  } catch (const vision::NegativeBaseline&) {
+    throw;
+  } catch (const InvalidArgument&) {
+    std::error_code error;
+    const bool is_stream = std::filesystem::is_fifo(calib, error) || std::filesystem::is_character_file(calib, error);
+    if (calib.empty() || !read || is_stream) throw;  // a pipe can be read once
+  }
+  vision::StereoSequence sequence = vision::open_patterns(left, right, "", range, pairing);
+  const std::optional<Calibration> found = read(calib, vision::check_image_sizes(sequence));
+  sequence.has_calibration = found.has_value();
+  if (found) sequence.calibration = *found;
+  return sequence;
 }
 
 std::string shell_word(const std::string& text) {

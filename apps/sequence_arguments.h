@@ -2,6 +2,8 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,16 +11,23 @@
 
 namespace egosgm::app {
 
+/// Reads the calibration of a file that this library does not, for images of `size`; none where it is of raw images,
+/// which the caller rectifies. Throws InvalidArgument.
+using CalibrationReader = std::function<std::optional<Calibration>(const std::string& file, cv::Size size)>;
+
 /// The arguments that say which stereo sequence to read.
 struct SequenceArguments {
   std::string kitti, scene, odometry, folder, other_picture, left, right, calib, pair_by, frames;
 
   void add_to(CLI::App& command);
   /// Throws InvalidArgument unless exactly one sequence was named, and as the openers do, and where the sequence has no
-  /// calibration and `needs_calibration`.
-  vision::StereoSequence open(bool needs_calibration = true) const;
+  /// calibration and `needs_calibration`. `read`: for calibrations of other programs, where somebody reads them.
+  vision::StereoSequence open(bool needs_calibration = true, const CalibrationReader& read = {}) const;
   /// What was given, as a shell takes it for any command that reads a sequence.
   std::string text() const;
+
+ private:
+  vision::StereoSequence open_pictures(const vision::FrameRange& range, const CalibrationReader& read) const;
 };
 
 /// The arguments of a drive that ROS recorded, which the Python package reads.

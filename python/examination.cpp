@@ -66,7 +66,8 @@ void bind_doubts(py::module_& module) {
       .def("text", &Doubt::text);
   py::class_<vision::Suspicion>(module, "_Suspicion")
       .def_readonly("what", &vision::Suspicion::what)
-      .def_readonly("remedy", &vision::Suspicion::remedy);
+      .def_readonly("remedy", &vision::Suspicion::remedy)
+      .def_readonly("is_certain", &vision::Suspicion::is_certain);
   module.def("_suspect_calibration", [](const Calibration& calibration, int width, int height) {
     return vision::suspect_calibration(calibration, {width, height});
   });

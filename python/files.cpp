@@ -78,12 +78,6 @@ void bind_sequences(py::module_& module) {
       "Opens a folder in the layout of KITTI odometry, KITTI raw or Middlebury, or with left, right and calib.txt. "
       "frames: \"7:10\", \"7:\", \":10\".");
   module.def(
-      "_open_kitti_odometry",
-      [](const path& folder, const std::string& frames) {
-        return vision::open_kitti_odometry(folder, range_of(frames));
-      },
-      py::arg("folder"), py::arg("frames") = "");
-  module.def(
       "open_kitti_multiview",
       [](const path& folder, const std::string& scene, const std::string& frames) {
         return vision::open_kitti_multiview(folder, scene, range_of(frames));

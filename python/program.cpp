@@ -4,9 +4,13 @@
 
 #include <fmt/core.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
+#include <CLI/CLI.hpp>
+#include <algorithm>
 #include <deque>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -154,6 +158,43 @@ class Outputs : public app::Taker {
   const Held outputs_;
 };
 
+app::CalibrationReader reader_of(const py::object& read) {
+  return [read](const std::string& file, cv::Size size) {
+    return in_python([&] {
+      const py::object found = read(std::filesystem::path(file), py::make_tuple(size.width, size.height));
+      return found.cast<std::optional<Calibration>>();
+    });
+  };
+}
+
+/// The options of app::SequenceArguments for argparse: names, what the value is called, help.
+std::vector<std::tuple<std::vector<std::string>, std::string, std::string>> input_options() {
+  CLI::App command;
+  app::SequenceArguments().add_to(command);
+  std::vector<std::tuple<std::vector<std::string>, std::string, std::string>> options;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option == command.get_help_ptr()) continue;
+    const std::string name = option->get_name(/*positional=*/true, /*all_options=*/true);
+    options.emplace_back(CLI::detail::split(name, ','), option->get_type_name(), option->get_description());
+  }
+  return options;
+}
+
+/// The sequence that a command's words name. `read`: as for app::SequenceArguments::open.
+vision::StereoSequence open_input(std::vector<std::string> words, const py::object& read) {
+  CLI::App command;
+  app::SequenceArguments arguments;
+  arguments.add_to(command);
+  try {
+    std::reverse(words.begin(), words.end());  // as CLI11 takes them
+    command.parse(words);
+  } catch (const CLI::ParseError& error) {
+    throw InvalidArgument(std::string(error.what()) + ": give one input");
+  }
+  const OtherThreadsRun other_threads_run;
+  return arguments.open(/*needs_calibration=*/false, reader_of(read));
+}
+
 /// The program's exit code. `package`: what opens bags and outputs, see egosgm.bag_program.
 int main_of(const std::vector<std::string>& arguments, const py::object& package) {
   app::Package hooks;
@@ -179,6 +220,7 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
       return std::make_shared<Outputs>(package.attr("Outputs")(file, viewer));
     });
   };
+  hooks.read_calibration = reader_of(package.attr("read_calibration"));
   std::vector<const char*> words{"egosgm"};
   for (const std::string& argument : arguments) words.push_back(argument.c_str());
   words.push_back(nullptr);
@@ -217,6 +259,8 @@ void bind_motions(py::module_& module) {
 void bind_program(py::module_& module) {
   bind_motions(module);
   module.def("_main", &main_of, py::arg("arguments"), py::arg("package"));
+  module.def("_input_options", &input_options);
+  module.def("_open_input", &open_input, py::arg("words"), py::arg("read"));
 }
 
 }  // namespace egosgm::python

@@ -233,6 +233,8 @@ std::string_view foreign_format(std::string_view text) {
       {{"Camera list with one line of data"}, "COLMAP's cameras.txt, which does not say how two cameras stand"},
       {{"Q:"}, "a matrix Q of OpenCV's stereoRectify"},
   }};
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) return "UTF-16, which is to be saved as UTF-8";
+  if (text.starts_with("\x1f\x8b")) return "packed by gzip";
   if (is_zip(text)) return "an archive of NumPy arrays (.npz)";
   if (text.starts_with("\x93NUMPY")) return "one NumPy array";
   for (const Format& format : kFormats) {
@@ -263,7 +265,7 @@ std::string_view foreign_format(std::string_view text) {
 
 Calibration read_calibration(const std::filesystem::path& file, KittiCameras cameras) {
   const std::string text = read_file(file, kMaxCalibrationBytes);
-  const bool is_own = has_all(text, {"baseline_m"});
+  const bool is_own = has_all(text, {"baseline_m"}) && text.find('{') == std::string::npos;
   if (const std::string_view format = is_own ? "" : foreign_format(text); !format.empty()) refuse_foreign(file, format);
   const Entries entries(file, text);
   if (entries.has_prefix("P_rect_")) return from_kitti(entries, cameras, "P_rect_0");

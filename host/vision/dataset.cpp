@@ -72,7 +72,7 @@ void add_frames(const fs::path& folder, const CameraFolders& cameras, const std:
     throw InvalidArgument(folder.string() + ": holds no images; " +
                           found_instead(folder).value_or("give the folder or pattern of a stereo sequence"));
   }
-  select_frames(pairs, left, right, range, folder.string(), sequence);
+  select_frames(pairs, left, range, folder.string(), sequence);
 }
 
 std::string nearest_scenes(const std::set<std::string>& scenes, const std::string& wanted) {
@@ -279,7 +279,7 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   }
   StereoSequence sequence;
   sequence.title = left + " and " + right;
-  select_frames(pairs, left_pattern, right_pattern, range, left, sequence);
+  select_frames(pairs, left_pattern, range, left, sequence);
   if (pair_by == PairBy::kOrder) {
     const std::string note = order_note(pairs);
     sequence.note += (sequence.note.empty() || note.empty() ? "" : "; ") + note;

@@ -4,6 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
+#include <iterator>
+#include <string_view>
+#include <utility>
 
 #include "egosgm/vision/image_io.h"
 #include "kernels/method.h"
@@ -12,7 +16,7 @@ namespace egosgm::vision {
 namespace {
 
 constexpr double kMinBaseline_m = 0.004, kMaxBaseline_m = 3.0;
-constexpr double kUsualBaseline_m[] = {0.02, 1.5};
+constexpr double kUsualBaseline_m[] = {0.02, 1.0};
 constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
 constexpr double kMinDensity = 0.5;
 constexpr double kFarRows_px = 0.9 * EGOSGM_MAX_OFFSET_PX;
@@ -27,20 +31,40 @@ std::string formatted(const char* format, Values... values) {
 
 void append(std::string& text, const std::string& part) { text += (text.empty() ? "" : ", ") + part; }
 
+/// Of all bytes; images that differ have different ones, as good as surely.
+std::uint64_t digest_of(const cv::Mat& image) {
+  std::uint64_t digest = 0;
+  for (int y = 0; y < image.rows; ++y) {
+    const std::string_view row(image.ptr<char>(y), image.cols * image.elemSize());
+    digest = 31 * digest + std::hash<std::string_view>()(row);
+  }
+  return digest;
+}
+
 bool is_usual(double baseline_m) { return baseline_m >= kUsualBaseline_m[0] && baseline_m <= kUsualBaseline_m[1]; }
+
+/// Units in which a baseline that is too long for metres would be a usual one.
+std::string units_of(double baseline) {
+  std::string units;
+  for (const auto& [unit, unit_m] :
+       {std::pair{"centimetres", 0.01}, {"millimetres", 0.001}, {"decimetres", 0.1}, {"inches", 0.0254}}) {
+    if (!is_usual(baseline * unit_m)) continue;
+    units += formatted("%s%s (%.4g m)", units.empty() ? "" : " or ", unit, baseline * unit_m);
+  }
+  return units.empty() ? "a chessboard's squares or other units" : units;
+}
 
 }  // namespace
 
 std::optional<Suspicion> suspect_baseline(double baseline_m, double fx) {
   const std::string what = formatted("a baseline of %.4g m", baseline_m);
-  if (baseline_m > kMaxBaseline_m) {
-    std::string units;
-    for (const auto& [unit, unit_m] : {std::pair{"centimetres", 0.01}, {"millimetres", 0.001}}) {
-      if (!is_usual(baseline_m * unit_m)) continue;
-      units += formatted("%s%s (%.4g m)", units.empty() ? "" : " or ", unit, baseline_m * unit_m);
-    }
-    return Suspicion{what, "a baseline is in metres: is this one in " +
-                               (units.empty() ? std::string("a chessboard's squares or other units") : units) + "?"};
+  if (baseline_m > kUsualBaseline_m[1]) {
+    const bool is_certain = baseline_m > kMaxBaseline_m;
+    return Suspicion{what,
+                     (is_certain ? "a baseline is in metres: is this one in "
+                                 : "few rigs are wider than a metre, and depths grow with the baseline: is it in ") +
+                         units_of(baseline_m) + "?",
+                     is_certain};
   }
   if (baseline_m < kMinBaseline_m) {
     const std::string missing = is_usual(baseline_m * fx)
@@ -80,6 +104,12 @@ void Doubt::add(const cv::Mat& left, const cv::Mat& right, const FrameReport& re
     const std::optional<Clipped> clipped = clipped_by_range(left, right, least_, end_);
     if (clipped && (!clipped_ || clipped->share > clipped_->share)) clipped_ = clipped;
   }
+  const std::uint64_t digests[2] = {digest_of(left), digest_of(right)};
+  for (const int side : {0, 1}) {
+    const bool stands_still = digests[side] == seen_[side] && digests[1 - side] != seen_[1 - side];
+    if (frames_ > 0 && stands_still) ++frozen_[side];
+  }
+  std::copy(std::begin(digests), std::end(digests), seen_);
   size_ = left.size();
   density_ += report.density;
   if (holds_8_bits_in_16(left)) ++narrow_;
@@ -98,6 +128,13 @@ std::string Doubt::text() const {
   if (2 * far_rows_ > frames_) {
     append(text, formatted("rows of the two views lie %g px apart, the most that is mended, or farther",
                            static_cast<double>(EGOSGM_MAX_OFFSET_PX)));
+  }
+  for (const auto& [side, name] : {std::pair{0, "left"}, {1, "right"}}) {
+    if (frozen_[side] == 0) continue;
+    append(text,
+           formatted("the %s image is that of the frame before in %zu frames, and the other one is not (these are "
+                     "of other moments: leave them out)",
+                     name, frozen_[side]));
   }
   if (clipped_) {
     append(text, formatted("%.0f %% of the image is nearer than the range (--disparities %d)", 100 * clipped_->share,

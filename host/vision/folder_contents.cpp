@@ -2,7 +2,9 @@
 #include "host/vision/folder_contents.h"
 
 #include <algorithm>
+#include <cstring>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "egosgm/error.h"
@@ -35,8 +37,13 @@ std::vector<fs::path> folders_in(const fs::path& folder) {
   return folders;
 }
 
-bool holds_both(const fs::path& folder, const char* left, const char* right) {
+bool holds_both(const fs::path& folder, const std::string& left, const std::string& right) {
   return is_folder(folder / left) && is_folder(folder / right);
+}
+
+bool holds_images(const fs::path& folder) {
+  const std::vector<std::string> names = names_in(folder);
+  return std::any_of(names.begin(), names.end(), [](const std::string& name) { return is_image_name(name); });
 }
 
 std::set<std::string> scenes_in(const fs::path& folder) {
@@ -112,9 +119,7 @@ Contents one_camera(const fs::path& folder) {
   for (const fs::path& above : {absolute.parent_path(), absolute.parent_path().parent_path()}) {
     if (!error && is_sequence(above)) return "it belongs to the sequence " + above.string() + ": give that one";
   }
-  const std::vector<std::string> names = names_in(folder);
-  if (std::none_of(names.begin(), names.end(), [](const std::string& name) { return is_image_name(name); }))
-    return std::nullopt;
+  if (!holds_images(folder)) return std::nullopt;
   return "it holds images of its own: give --left '" + (folder / "LEFT_*").string() + "' --right '" +
          (folder / "RIGHT_*").string() + "' --calib FILE, with the names that they have";
 }
@@ -122,8 +127,14 @@ Contents one_camera(const fs::path& folder) {
 Contents two_cameras(const fs::path& folder) {
   const std::optional<TwoCameras> cameras = find_two_cameras(folder);
   if (!cameras) return std::nullopt;
+  std::vector<std::string> files;
+  for (const std::string& name : names_in(folder)) {
+    const std::string type = fs::path(name).extension().string();
+    if (type == ".json" || type == ".yaml" || type == ".yml" || type == ".xml" || type == ".npz") files.push_back(name);
+  }
+  const std::string calibration = files.size() == 1 ? "'" + (folder / files.front()).string() + "'" : "FILE";
   return "it holds two cameras and no calib.txt: put their calibration there, or give --left '" + cameras->left +
-         "' --right '" + cameras->right + "' --calib FILE";
+         "' --right '" + cameras->right + "' --calib " + calibration;
 }
 
 Contents euroc(const fs::path& folder) {
@@ -144,6 +155,23 @@ Contents videos(const fs::path& folder) {
   return std::nullopt;
 }
 
+/// What the folders of both cameras may be called: the usual names, then any with left or right in it that holds
+/// images.
+std::vector<std::pair<std::string, std::string>> names_of_cameras(const fs::path& folder) {
+  std::vector<std::pair<std::string, std::string>> names{
+      {"left", "right"}, {"cam0", "cam1"}, {"image_left", "image_right"}, {"L", "R"}, {"l", "r"}};
+  for (const fs::path& child : folders_in(folder)) {
+    const std::string name = child.filename().string();
+    for (const auto& [left, right] : {std::pair{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}}) {
+      const std::size_t at = name.find(left);
+      if (at == std::string::npos) continue;
+      const std::string partner = std::string(name).replace(at, std::strlen(left), right);
+      if (is_folder(folder / partner) && holds_images(child)) names.emplace_back(name, partner);
+    }
+  }
+  return names;
+}
+
 Contents result_of_a_run(const fs::path& folder) {
   if (!is_file(folder / "report.json")) return std::nullopt;
   return "it is what `egosgm run` wrote: give the run's input";
@@ -159,7 +187,7 @@ Contents found_instead(const fs::path& folder) {
 }
 
 std::optional<TwoCameras> find_two_cameras(const fs::path& folder) {
-  for (const auto& [left, right] : {std::pair{"left", "right"}, {"cam0", "cam1"}, {"image_left", "image_right"}}) {
+  for (const auto& [left, right] : names_of_cameras(folder)) {
     if (!holds_both(folder, left, right)) continue;
     TwoCameras cameras{pattern_in(folder / left, "left"), pattern_in(folder / right, "right"), {}};
     for (const char* name : {"calib.txt", "calibration.txt"}) {

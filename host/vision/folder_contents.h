@@ -18,7 +18,8 @@ struct TwoCameras {
   std::filesystem::path calibration;  // empty where there is none
 };
 
-/// left and right, cam0 and cam1, or image_left and image_right in `folder`; nothing where they are not both there.
+/// left and right, cam0 and cam1, L and R, or others with left and right in their names in `folder`; nothing where they
+/// are not both there.
 /// Files that say so in their names too (left_1.png, 1_left.png) are paired by the rest of them. Thread-safe.
 std::optional<TwoCameras> find_two_cameras(const std::filesystem::path& folder);
 

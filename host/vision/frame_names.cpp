@@ -222,7 +222,8 @@ std::vector<std::string> list_folder(const fs::path& folder) {
   std::vector<std::string> names;
   fs::directory_iterator entry(folder, error);
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    names.push_back(entry->path().filename().string());
+    std::string name = entry->path().filename().string();
+    if (!name.starts_with('.')) names.push_back(std::move(name));
   }
   if (error)
     throw InvalidArgument(folder.string() + ": cannot be listed: " + error.message() + "; give a readable folder");
@@ -313,8 +314,8 @@ std::vector<fs::path> files_in_order(const NamePattern& pattern) {
   return sorted;
 }
 
-void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left, const NamePattern& right,
-                   FrameRange range, const std::string& what, StereoSequence& sequence) {
+void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left, FrameRange range,
+                   const std::string& what, StereoSequence& sequence) {
   for (const NamedPair& pair : pairs) sequence.numbers.push_back(pair.number);
   const int lowest = pairs.front().number, highest = pairs.back().number;
   const int first = range.first.value_or(lowest), last = range.last.value_or(highest);
@@ -328,17 +329,14 @@ void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left,
     throw InvalidArgument(left.file_of(std::to_string(number)).string() + ": frame " + std::to_string(number) +
                           " is missing" + remedy);
   };
+  std::vector<std::string> alone;
   if (first < lowest) refuse_missing(first);
   if (last > highest) refuse_missing(last);
   for (const NamedPair& pair : pairs) {
     if (pair.number < first || pair.number > last) continue;
-    if (pair.left.empty()) {
-      throw InvalidArgument(left.file_of(pair.text).string() + ": left image of " + pair.right.string() +
-                            " is missing" + remedy + ", or remove the right one: numbers may have gaps");
-    }
-    if (pair.right.empty()) {
-      throw InvalidArgument(right.file_of(pair.text).string() + ": right image of " + pair.left.string() +
-                            " is missing" + remedy + ", or remove the left one: numbers may have gaps");
+    if (pair.left.empty() || pair.right.empty()) {
+      alone.push_back(pair.left.empty() ? pair.right.string() : pair.left.string());
+      continue;
     }
     StereoFrame frame;
     frame.number = pair.number;
@@ -348,8 +346,16 @@ void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left,
     frame.right = pair.right;
     sequence.frames.push_back(std::move(frame));
   }
+  if (alone.size() > sequence.frames.size()) {
+    throw InvalidArgument(alone.front() + ": has no partner" + (sequence.frames.empty() ? "" : ", as most have none") +
+                          remedy + ", or other patterns");
+  }
   if (sequence.frames.empty()) refuse_missing(first);
   sequence.note = gap_note(sequence.frames);
+  if (alone.empty()) return;
+  sequence.note += (sequence.note.empty() ? "" : "; ") + std::to_string(alone.size()) +
+                   (alone.size() == 1 ? " image" : " images") + " without the other camera's left out, the first is " +
+                   alone.front();
 }
 
 }  // namespace egosgm::vision

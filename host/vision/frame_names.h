@@ -45,13 +45,14 @@ std::string order_note(const std::vector<NamedPair>& pairs);
 /// The files that match, in order. Throws as pair_files.
 std::vector<std::filesystem::path> files_in_order(const NamePattern& pattern);
 
-/// The frames in `range`, or an error that names the first file that is missing; fills `frames`, `numbers`, `note`.
-void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left, const NamePattern& right,
-                   FrameRange range, const std::string& what, StereoSequence& sequence);
+/// The frames in `range`; fills `frames`, `numbers`, `note`. What only one camera saw is left out, with a note. Throws
+/// InvalidArgument where frames of the range are missing, or most have no partner.
+void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left, FrameRange range,
+                   const std::string& what, StereoSequence& sequence);
 
 bool is_image_name(const std::filesystem::path& name);  // .png, .jpg, .jpeg, in any case
 
-/// Names in a folder, sorted. Throws InvalidArgument where it cannot be listed.
+/// Names in a folder, sorted, but for hidden ones. Throws InvalidArgument where it cannot be listed.
 std::vector<std::string> list_folder(const std::filesystem::path& folder);
 
 /// The order of names, numbers inside by their value: img_9 before img_10. Thread-safe.

@@ -20,6 +20,8 @@ std::string range(int first, int last) {
   return first == last ? std::to_string(first) : std::to_string(first) + ".." + std::to_string(last);
 }
 
+std::string describe(cv::Size size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
+
 }  // namespace
 
 StereoImages read_images(const StereoFrame& frame) {
@@ -39,6 +41,7 @@ cv::Size check_image_sizes(const StereoSequence& sequence) {
   std::optional<cv::Size> expected;
   std::exception_ptr unreadable;
   for (const StereoFrame& frame : sequence.frames) {
+    cv::Size of_left;
     for (const fs::path& file : {frame.left, frame.right}) {
       cv::Size size;
       try {
@@ -48,10 +51,15 @@ cv::Size check_image_sizes(const StereoSequence& sequence) {
         continue;
       }
       if (!expected) expected = size;
+      if (file == frame.left) of_left = size;
       if (size == *expected) continue;
-      throw InvalidArgument(file.string() + ": " + std::to_string(size.width) + "x" + std::to_string(size.height) +
-                            ", but the sequence began with " + std::to_string(expected->width) + "x" +
-                            std::to_string(expected->height) + "; select frames of one size with --frames");
+      const bool is_pair_broken = file != frame.left && !of_left.empty() && of_left != size;
+      throw InvalidArgument(file.string() + ": " + describe(size) +
+                            (is_pair_broken ? ", but its left image has " + describe(of_left) +
+                                                  "; give both of one size, as they were calibrated"
+                                            : ", but the sequence began with " + describe(*expected) +
+                                                  "; select frames of one size with --frames, or give a pattern that "
+                                                  "no other images fit"));
     }
   }
   if (!expected && unreadable) std::rethrow_exception(unreadable);

@@ -1,16 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `egosgm run` takes of the package: frames of bags in, recordings and a viewer out. The run itself is C++'s."""
+"""What `egosgm run` takes of the package: frames of bags and calibrations in, recordings and a viewer out. The run itself is C++'s."""
 import os
 import pathlib
 import sys
 import types
-from typing import Any, Dict, List, Optional, Sequence
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
-from . import _egosgm
+from . import _egosgm, calibrations
 from .arguments import decimal
 from .bag import Bag, BagFrame
 from .bag_outputs import McapOutput
 from .viewer import RerunOutput
+
+
+def read_calibration(file: pathlib.Path, size: Tuple[int, int]) -> _egosgm.Calibration:
+    found = calibrations.find(file, size=size)
+    if isinstance(found, _egosgm.Calibration):
+        return found
+    raise _egosgm.InvalidArgument(f"{file}: is of raw images, and rectified ones are matched: `egosgm rectify` makes them, by it")
 
 
 class BagFeed:

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations as other programs write them, told apart by what they hold: the one place that reads them."""
 import configparser
+import contextlib
 import dataclasses
+import gzip
+import io
 import json
 import math
 import os
@@ -9,6 +12,7 @@ import pathlib
 import re
 import types
 import xml.etree.ElementTree as ElementTree
+import zlib
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -345,13 +349,8 @@ def _of_q(q: _Matrix, file: pathlib.Path) -> _egosgm.Calibration:
     return _egosgm.Calibration(q[2, 3], q[2, 3], -q[0, 3], -q[1, 3], abs(1 / q[3, 2]), q[3, 3] / q[3, 2])
 
 
-def _cityscapes(data: Dict[str, Any], file: pathlib.Path) -> _egosgm.Calibration:
-    what = "Cityscapes' camera.json"
-    four = [_number(data["intrinsic"], name, file, what) for name in ("fx", "fy", "u0", "v0")]
-    return _egosgm.Calibration(*four, _number(data["extrinsic"], "baseline", file, what))
-
-
-# How NumPy's users and others call the matrices of stereoCalibrate, in small letters without marks.
+# How NumPy's users and others call the matrices of stereoCalibrate, and the numbers of a rectified pair (Cityscapes' in two groups), in small letters
+# without marks.
 _NAMES = {
     "left_matrix": r"(m|k|mtx|cam(era)?(mats?|matrix|matrices)|intrinsics?|cam)(l|left|1)|(l|left|1)(k|m|mtx|cam(era)?(mat|matrix)|intrinsics?)",
     "right_matrix": r"(m|k|mtx|cam(era)?(mats?|matrix|matrices)|intrinsics?|cam)(r|right|2)|(r|right|2)(k|m|mtx|cam(era)?(mat|matrix)|intrinsics?)",
@@ -360,6 +359,8 @@ _NAMES = {
     "R": r"r|om|rot|rotmat|rotation(matrix)?|rmat|rstereo|stereor", "T": r"t|trans|transvec|translation(vector)?|tvec|tstereo|stereot",
     "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims", "width": r"image_?width", "height": r"image_?height",
     "R1": r"r1", "R2": r"r2", "P1": r"p1", "P2": r"p2",
+    "fx": r"(intrinsics?)?(f|fx|focal(length)?(px)?)", "fy": r"(intrinsics?)?fy", "cx": r"(intrinsics?)?(cx[0l]?|u0|ppx)", "cy": r"(intrinsics?)?(cy[0l]?|v0|ppy)",
+    "right_cx": r"cx[1r]", "baseline": r"(extrinsics?)?baseline(m|met(er|re)s?)?", "baseline_mm": r"baseline(mm|millimet(er|re)s?)",
 }
 
 
@@ -412,6 +413,13 @@ def _by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: b
     q = _matrix(found["Q"], (4, 4)) if "Q" in found else None
     if q is not None and len(missing) >= 2:
         return _of_q(q, file)
+    numbers = {name: float(value[0]) for name in ("fx", "fy", "cx", "cy", "right_cx", "baseline", "baseline_mm")
+               if (value := _matrix(found.get(name), (1,))) is not None}
+    if {"fx", "cx", "cy"} <= set(numbers):
+        fx, cx, baseline_m = numbers["fx"], numbers["cx"], numbers.get("baseline", 0.001 * numbers.get("baseline_mm", 0))
+        if not baseline_m:
+            raise _refuse(file, f"is {what} of fx, cx and cy, and lacks the baseline: give the distance of the two cameras in metres")
+        return _egosgm.Calibration(fx, numbers.get("fy", fx), cx, numbers["cy"], baseline_m, numbers.get("right_cx", cx) - cx)
     there = ", ".join(str(key) for key in list(data)[:12])
     raise _refuse(file, f"is {what} ({there}) and lacks {', '.join(missing)}: a stereo calibration has the matrix and the distortion of both cameras, "
                         "R and T, of finite numbers (M1, D1, M2, D2, R, T)")
@@ -454,6 +462,9 @@ def _text_of(file: pathlib.Path) -> str:
     if not file.exists():
         raise _refuse(file, "no such file")
     content = _egosgm._read_file(file, _MOST_BYTES)
+    if content[:2] == b"\x1f\x8b":
+        with contextlib.suppress(EOFError, OSError, zlib.error):
+            content = gzip.GzipFile(fileobj=io.BytesIO(content)).read(_MOST_BYTES)
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise _refuse(file, "is UTF-16, as some editors write: save it as UTF-8")
     return content.decode("utf-8-sig", errors="replace")
@@ -498,8 +509,6 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool) -> Found:
         return _of_q(_needed(flat["disparity_to_depth"], (name,), (4, 4), file, "DSEC's cam_to_cam.yaml"), file)
     if "Camera.fx" in flat or "Camera1.fx" in flat:
         return _orb_slam(flat, file)
-    if isinstance(flat.get("intrinsic"), dict) and isinstance(flat.get("extrinsic"), dict):
-        return _cityscapes(flat, file)
     nested = {f"{outer}_{inner}": value for outer, group in flat.items() if isinstance(group, dict) and "data" not in group
               for inner, value in group.items()}
     return _by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye)
@@ -569,8 +578,8 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
     plain = _plain_numbers(text, file)
     if plain is not None:
         return plain
-    is_own = re.search(r"(?m)^\s*(P_rect_\d|P[0-3]\s*:(?!\s*!!)|cam0\s*=|baseline_m)", text) and not text.startswith("%YAML")
-    if is_own or file.suffix.lower() not in (".yaml", ".yml", ".json", ".xml", ".txt", ".conf", ".cfg", ""):
+    is_own = re.search(r"(?m)^\s*(P_rect_\d|P[0-3]\s*:(?!\s*!!)|cam0\s*=|baseline_m\b)", text) and not text.startswith("%YAML")
+    if is_own or file.suffix.lower() not in (".yaml", ".yml", ".json", ".xml", ".txt", ".conf", ".cfg", ".gz", ""):
         raise own_error
     data = _data_of(text, file)
     if not isinstance(data, dict):
@@ -631,7 +640,7 @@ def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fis
     baseline_m = float(np.linalg.norm(found.T))
     if unit_m is None and math.isfinite(baseline_m) and baseline_m > 1e-3:
         doubt = _egosgm._suspect_baseline(baseline_m, 0.0)
-        if doubt:
+        if doubt and doubt.is_certain:
             raise _refuse(path, f"T gives {doubt.what}: {doubt.remedy} Give --unit cm or --unit mm (unit_m 0.01 or 0.001), whichever it is; the side of a square in metres where T "
                                 "counts a board's squares (--unit 0.025, unit_m 0.025); or --unit m (unit_m 1) where it is right")
     return _without_rectification(found) or found

@@ -11,12 +11,13 @@ import numpy as np
 
 from . import _egosgm
 from .arguments import counted, Parser, tell, whole_number
-from .examination import Examination, Finding
+from .examination import FEWEST_MATCHES, Examination, Finding, match_pair
 from .rectification import Rectification, StereoRig
-from .sequences import add_input, frame_times, open_input, open_without_calibration
+from .sequences import add_input, frame_times, open_input, open_without_calibration, words_of_input
 
 _MOST_GAP = 1.6  # of the usual time between two frames
 _LEAST_STEP_S, _MOST_STEP_S = 1e-4, 20.0  # between two frames
+_LEAST_LATE_PX = 0.4  # rows of another moment are farther apart
 _MOST_OF_BAG = 300  # frames of a bag, which is read from its start on
 _EXCHANGE = ("the calibration's right camera stands left of its left one: exchange the two cameras' rows, and where the images are swapped, too, exchange "
              "them as well; or its transformation is the inverse of the one that is meant")
@@ -136,6 +137,30 @@ def _of_times(times: Sequence[float], source: str, names: Sequence[str], numbers
                    f"record without dropping frames, or run the parts alone: --frames :{numbers[first]} and --frames {numbers[first + 1]}:")
 
 
+def _spread_px(left: Any, right: Any) -> float:
+    """Rows of 90 % of the matches are no farther apart, beside a constant; infinite where there are few."""
+    matches = match_pair(left, right)
+    errors = matches[:, 3] - matches[:, 1]
+    return float(np.quantile(np.abs(errors - np.median(errors)), 0.9)) if len(errors) >= FEWEST_MATCHES else math.inf
+
+
+def _moments(steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:
+    """A camera that stands still, or is a frame late."""
+    for this, other in (("left", "right"), ("right", "left")):
+        frozen = sum(np.array_equal(getattr(a, this), getattr(b, this)) and not np.array_equal(getattr(a, other), getattr(b, other)) for a, b in steps)
+        if frozen:
+            return [Finding("problem", "moments", f"the {this} image is that of the frame before in {frozen} of {len(steps)} steps that were looked at, and the {other} "
+                            "one is not", "leave such pairs out: they are of other moments")]
+    own = float(np.median([_spread_px(b.left, b.right) for _, b in steps])) if steps else 0.0
+    if own > _LEAST_LATE_PX:
+        late = zip(*((_spread_px(a.left, b.right), _spread_px(b.left, a.right)) for a, b in steps))
+        for name, spread in zip(("right", "left"), (float(np.median(spreads)) for spreads in late)):
+            if spread < 0.5 * own:
+                return [Finding("problem", "moments", f"the {name} images are a frame late: so paired, rows agree within {spread:.2f} px, as they are within {own:.2f} px",
+                                "leave out the first image of that camera, and the last one of the other")]
+    return []
+
+
 def _motion(calibration: _egosgm.Calibration, steps: Sequence[Tuple[_Pair, _Pair]]) -> List[Finding]:
     """A run that finds no motion sends its user here."""
     reasons = []
@@ -178,9 +203,10 @@ def _examine(source: _Source, samples: int, least: int, end: int) -> List[Findin
     of_pairs = examination.findings(count)
     if source.rectified:
         of_pairs[0] = of_pairs[0]._replace(text=f"{of_pairs[0].text}, rectified here by {source.rectified}")
-    if source.is_of_other_moments():  # which explains what rows, sides and range would say
+    moments = _moments(steps) if of_pairs[0].verdict != "problem" else []
+    if moments or source.is_of_other_moments():  # which explains what rows, sides and range would say
         of_pairs = [finding for finding in of_pairs if finding.check in ("images", "calibration")]
-    findings += of_pairs
+    findings += of_pairs + moments
     is_sound = all(finding.verdict != "problem" for finding in findings)
     findings.append(source.times())
     if is_sound and source.calibration is not None:
@@ -205,7 +231,7 @@ def _findings(given: argparse.Namespace) -> List[Finding]:
 
 
 def _parser() -> Parser:
-    parser = Parser("doctor", usage="egosgm doctor [OPTIONS] [DATASET] [RIGHT]", description="Check a sequence: rows, swapped sides, calibration, range, time stamps",
+    parser = Parser("doctor", usage="egosgm doctor [OPTIONS] [DATASET] [RIGHT]", description="Check a sequence: rows, swapped sides, calibration, range, time stamps. Raw images are rectified, where --calib is of raw images",
                     epilog="Points are matched in the whole image, without regard to rows, sides or range. Exit code 2 where a problem was\n"
                     "found; below each stands its remedy.")
     add_input(parser)
@@ -229,7 +255,7 @@ def main(arguments: Sequence[str]) -> int:
     _egosgm._check_range(given.disparities, given.min_disparity)
     if given.samples < 1:
         raise _egosgm.InvalidArgument(f"--samples {given.samples}: choose a number above 0")
-    if given.bag and any((given.folder, given.dataset, given.odometry, given.kitti, given.left, given.right, given.frames)):
+    if given.bag and any(not word.startswith("--calib=") for word in words_of_input(given)):
         raise _egosgm.InvalidArgument(f"--bag {given.bag}: is an input of its own: give one input, and no --frames")
     if not given.bag and any((given.left_topic, given.right_topic, given.info_topics, given.max_skew_ms)):
         raise _egosgm.InvalidArgument("topics and --max-skew-ms are of a bag: give --bag FILE with them")

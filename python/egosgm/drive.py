@@ -175,9 +175,8 @@ class Drive:
                     maps = pipeline.collect()
                     if doubt is None:
                         options = pipeline.options
-                        doubt = _egosgm._Doubt(None if self._odometry_options is None else self.calibration, options["min_disparity"],
-                                               options["disparities"])
-                    doubt.add(left, right, maps.report, found.motion is not None)
+                        doubt = _egosgm._Doubt(self.calibration, options["min_disparity"], options["disparities"])
+                    doubt.add(left, right, maps.report, found.motion is not None or self._odometry_options is None)
                     odometry = None if self._odometry_options is None else found.odometry
                     yield DriveFrame(number, name, left, right, maps, odometry, found.motion, self.calibration)
                 if failure:

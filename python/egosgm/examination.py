@@ -13,7 +13,7 @@ _MOST_DESCRIPTOR_DISTANCE = 50  # of 256 bits
 _FEWEST_FOR_EPIPOLAR = 16  # below this a fundamental matrix says nothing
 _EPIPOLAR_PX, _RETURN_PX = 1.5, 0.3
 
-_FEWEST_MATCHES, _FEWEST_SURE = 30, 8  # the latter beside a coarse map that is sure of much
+FEWEST_MATCHES, _FEWEST_SURE = 30, 8  # the latter beside a coarse map that is sure of much
 _MOST_OFFSET_PX = 0.6  # KITTI's own pairs reach that
 _MOST_SPREAD_PX = 1.0  # of the rest, 90 % of the matches that agree
 _AGREEMENT_PX = 1.0  # of a match with what most of them say
@@ -23,6 +23,7 @@ _BEHIND_SHARE, _BEHIND_PX = 0.02, 1.0  # points whose disparity none before the 
 _MOST_BRIGHTNESS = 1.25  # of one image by the other's
 _LEAST_CONTRAST = 16  # grey levels of 256 between which nearly all pixels lie
 _MOST_SATURATED = 0.25  # of the pixels
+_LEAST_COMB = 1.5  # how much more neighbouring rows differ than those two apart
 _FEWEST_COARSE = 0.03  # of the pixels of the coarse map; below, it says nothing
 
 
@@ -103,7 +104,7 @@ class Examination:
         self._width = self._height = self._bits = 0
         self._brightness = np.zeros(2)
         self._contrasts: List[float] = []
-        self._saturated = np.zeros(2)
+        self._saturated, self._interlaced = np.zeros(2), 0
         self._matches: List[NDArray[np.float32]] = []
         self._coarse: List[NDArray[np.float32]] = []
         self._coarse_pixels = 0
@@ -121,6 +122,8 @@ class Examination:
             self._brightness[side] += image.mean()
             largest = image.max()
             self._saturated[side] += np.mean(image == largest) if largest in (255, 1023, 4095, 16383, 65535) else 0
+        near, far = (np.abs(np.diff(rows, axis=0)).mean() for rows in (left.astype(np.float32), left[::2].astype(np.float32)))
+        self._interlaced += int(near > _LEAST_COMB * far)
         self._matches.append(matches)
         row_offset = float(np.median(matches[:, 3] - matches[:, 1])) if len(matches) else 0.0
         coarse = _egosgm._coarse_map(left, right, row_offset, self._least, self._end)
@@ -138,12 +141,12 @@ class Examination:
         coarse = np.concatenate(self._coarse)
         is_sure = len(coarse) >= _FEWEST_COARSE * self._coarse_pixels
         are_related = len(matches) >= _FEWEST_SURE and len(coarse) >= _FEWEST_COARSE / 2 * self._coarse_pixels
-        if len(matches) < _FEWEST_MATCHES and not are_related:
+        if len(matches) < FEWEST_MATCHES and not are_related:
             remedy = "give them sharper, brighter or with less noise: coarsely, left and right agree" if is_sure else \
                 "give the left and right images of the same moments, sharp, and overlapping"
             return [*found, Finding("problem", "matches", f"only {counted(len(matches), 'point')} found in both images", remedy)]
-        agreeing = matches[_agreeing(matches, self._width, self._height)] if len(matches) >= _FEWEST_MATCHES else matches[:0]
-        is_agreed = len(agreeing) >= max(_FEWEST_MATCHES, _FEWEST_AGREEING * len(matches))
+        agreeing = matches[_agreeing(matches, self._width, self._height)] if len(matches) >= FEWEST_MATCHES else matches[:0]
+        is_agreed = len(agreeing) >= max(FEWEST_MATCHES, _FEWEST_AGREEING * len(matches))
         found.append(self._rows(len(matches), agreeing))
         points = agreeing[:, 0] - agreeing[:, 2] if is_agreed else None
         if not is_sure:
@@ -175,6 +178,8 @@ class Examination:
         if not self._has_contrast():
             return Finding("problem", "images", f"{text}, of nearly one tone: they hold {np.median(self._contrasts):.0f} of 256 grey levels",
                            "expose longer, or give more light: noise has as many")
+        if 2 * self._interlaced > self._pairs:
+            return Finding("problem", "images", f"{text}, interlaced: every other row is of another moment", "take every other row of both images, or deinterlace the videos")
         left, right = self._brightness / self._pairs
         ratio = (left + 1) / (right + 1)
         if max(ratio, 1 / ratio) > _MOST_BRIGHTNESS:
@@ -192,12 +197,14 @@ class Examination:
             return Finding("note", "calibration", "none was given: there is no depth and no odometry", "give --calib FILE; `egosgm calibrate` finds one by pictures of a board")
         text = f"fx {c.fx:.1f}, fy {c.fy:.1f}, cx {c.cx:.1f}, cy {c.cy:.1f} px, baseline {c.baseline_m:.4g} m"
         suspicion = _egosgm._suspect_calibration(c, self._width, self._height)
-        return Finding("problem", "calibration", f"{text}: {suspicion.what}", suspicion.remedy) if suspicion else Finding("ok", "calibration", text)
+        if not suspicion:
+            return Finding("ok", "calibration", text)
+        return Finding("problem" if suspicion.is_certain else "note", "calibration", f"{text}: {suspicion.what}", suspicion.remedy)
 
     def _rows(self, matches: int, agreeing: NDArray[np.float32]) -> Finding:
         """The rows of the two views: a constant offset, and what is left beside it."""
         of = f"{counted(matches, 'point')} in {counted(self._pairs, 'frame')}"
-        if matches < _FEWEST_MATCHES:
+        if matches < FEWEST_MATCHES:
             return Finding("note", "rows", f"only {of}, too few to measure rows by", "look at frames of things that are not alike")
         if len(agreeing) < _FEWEST_AGREEING * matches:
             return Finding("note", "rows", f"only {len(agreeing)} of {of} agree on how far rows are apart",

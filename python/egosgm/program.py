@@ -8,7 +8,7 @@ import pathlib
 import signal
 import sys
 import threading
-from typing import List, Optional, Sequence, Tuple
+from typing import Optional, Sequence, Tuple
 
 from .arguments import say
 
@@ -18,41 +18,6 @@ _PACKAGES = {  # what brings a module
     "matplotlib": "pip install matplotlib, or apt install python3-matplotlib",
     "rosbags": 'pip install the wheel with "[bag]" (docs/robots.md)',
 }
-
-
-def _value_of(arguments: List[str], name: str) -> Tuple[int, str]:
-    """Where the value of an option stands, and the value; -1 where it is not given."""
-    for i, argument in enumerate(arguments):
-        if argument == name and i + 1 < len(arguments):
-            return i + 1, arguments[i + 1]
-        if argument.startswith(name + "="):
-            return i, argument[len(name) + 1:]
-    return -1, ""
-
-
-def _reads_itself(calib: str) -> bool:
-    from . import _egosgm
-    try:
-        _egosgm._read_calibration(calib)
-        return True
-    except (_egosgm.InvalidArgument, _egosgm.IoError, OSError):
-        return False
-
-
-def with_calibration(arguments: List[str]) -> List[str]:
-    """The arguments with --calib in a form that the program reads, in a file of memory alone. Throws InvalidArgument."""
-    from . import _egosgm, calibrations
-    place, calib = _value_of(arguments, "--calib")
-    if place < 0 or not (os.path.isfile(calib) or os.path.isdir(calib)) or _reads_itself(calib):  # a pipe can be read once
-        return arguments
-    found = calibrations.find(calib)
-    if not isinstance(found, _egosgm.Calibration):
-        raise _egosgm.InvalidArgument(f"{calib}: is of raw images, and `egosgm {arguments[0]}` takes rectified ones: `egosgm rectify` makes them, by it")
-    file = f"/proc/self/fd/{os.memfd_create('calib.txt')}"
-    _egosgm.write_calibration(file, found)
-    changed = list(arguments)
-    changed[place] = f"--calib={file}" if changed[place].startswith("--calib=") else file
-    return changed
 
 
 def _module_of(arguments: Sequence[str]) -> Optional[str]:
@@ -78,14 +43,12 @@ def _output_error() -> Optional[OSError]:
     return None
 
 
-def _run_program(arguments: List[str]) -> int:
+def _run_program(arguments: Sequence[str]) -> int:
     """A command in C++, in this process."""
     from . import _egosgm, bag_program
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)  # Python's handlers would wait for C++ to come back
-    given = {argument.split("=")[0] for argument in arguments}
-    arguments = arguments if "--bag" in given else with_calibration(arguments)
     return _egosgm._main([os.fsencode(argument) for argument in arguments], bag_program)
 
 
@@ -94,7 +57,7 @@ def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]
     from . import _egosgm
     try:
         if module is None:
-            return _run_program(list(arguments)), ""
+            return _run_program(arguments), ""
         return importlib.import_module("." + module, __package__).main(list(arguments[1:])), ""
     except SystemExit as end:  # of --help
         return int(end.code or 0), ""

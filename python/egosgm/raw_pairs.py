@@ -156,6 +156,9 @@ class _Listed(RawPairs):
 def _of_patterns(left: str, right: str, by_order: bool) -> RawPairs:
     """Files of equal names; those without a partner are left out, with a note."""
     pairs, alone = _egosgm._find_pairs(left, right, by_order)
+    for suffix in _FOREIGN if "." not in left.rpartition("/")[2] + right.rpartition("/")[2] else ():
+        if not pairs:
+            pairs, alone = _egosgm._find_pairs(left + suffix, right + suffix, by_order)
     if not pairs:
         raise _refuse(f"--left {left} --right {right}: no file matches both")
     if len(alone) > 2 * len(pairs):

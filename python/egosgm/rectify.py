@@ -94,10 +94,10 @@ class _SequenceFolder:
 
     def add(self, pair: RawPair) -> None:
         size = pair.left.shape[1::-1]
-        if self.frames > 0 and size != self._size:
-            raise _egosgm.InvalidArgument("pair {} is {}x{}, the pairs before {}x{}: all need one size".format(self.frames + 1, *size, *self._size))
+        if self.frames > 0 and size != self.size:
+            raise _egosgm.InvalidArgument("pair {} is {}x{}, the pairs before {}x{}: all need one size".format(self.frames + 1, *size, *self.size))
         if self.frames == 0:
-            self._size, self._is_colour = size, pair.left.ndim == 3
+            self.size, self._is_colour = size, pair.left.ndim == 3
             self._sides = ("image_2", "image_3") if self._is_colour else ("image_0", "image_1")
             for side in self._sides:
                 (self._folder / side).mkdir(parents=True, exist_ok=True)
@@ -190,6 +190,9 @@ def main(arguments: Sequence[str]) -> int:
     calibration = rectifier.calibration
     say_line(f"{counted(folder.frames, 'pair')} in {given.out}: fx {calibration.fx:.2f} px, baseline {calibration.baseline_m:.4f} m"
              + ("; they were rectified already" if rectifier.rig is None else ""))
+    suspicion = _egosgm._suspect_calibration(calibration, *folder.size)
+    if suspicion:
+        say_line(f"doubtful: {suspicion.what}: {suspicion.remedy}")
     if rectifier.rectification is not None:
         say_line(f"valid: left {_rectangle_text(rectifier.rectification.valid_left)}, right {_rectangle_text(rectifier.rectification.valid_right)} "
                  "(valid.png has the left one's pixels)")

@@ -100,10 +100,10 @@ def _figures(counts: Any) -> Dict[str, Any]:
 
 def _doubts(text: str) -> List[Dict[str, str]]:
     """What a run doubts, one by one: "what (remedy), what; what" as `egosgm run` says it."""
-    doubts = []
-    for part in re.split(r"[,;] (?![^(]*\))", text) if text else []:
-        what, _, remedy = part.removesuffix(")").rpartition(" (") if part.endswith(")") else (part, "", "")
-        doubts.append({"what": what, "remedy": f"run it with {remedy}" if remedy.startswith("--") else remedy or "`egosgm doctor` tells why"})
+    inner, doubts = r"\((?:[^()]|\([^()]*\))*\)", []
+    for part in re.findall(rf"(?:[^,;(]|{inner}|[,;](?! ))+", text):
+        what, remedy = re.fullmatch(rf"(.*?)(?: ({inner}))?", part.strip(), re.DOTALL).groups("")  # type: ignore[union-attr]
+        doubts.append({"what": what, "remedy": f"run it with {remedy[1:-1]}" if remedy.startswith("(--") else remedy[1:-1] or "`egosgm doctor` tells why"})
     return doubts
 
 

@@ -73,6 +73,14 @@ class Doubts(Brought):
             finding = self.assert_only_problem("calibration", *arguments)
             self.assertIn(named, finding["remedy"])
 
+    def test_a_baseline_of_metres_is_told_and_may_be_right(self):
+        arguments = self.with_calibration(self.calibrated(baseline_m=3))
+        self.assertIn("decimetres (0.3 m)", self.assert_works("run", *arguments, "--out", self.new_folder() / "out"))
+        finding = self.examine(*arguments)["calibration"]
+        self.assertEqual(finding["verdict"], "note")
+        self.assertIn("decimetres (0.3 m)", finding["remedy"])
+        self.assertIn("doubtful: a baseline of 3 m", self.assert_works("rectify", *arguments, "--out", self.new_folder() / "out"))
+
     def test_what_is_nearer_than_the_range_is_said_with_a_range_that_holds_it(self):
         said = self.assert_works("run", self.street, "--disparities", 16, "--out", self.new_folder() / "out")
         share, enough = re.search(r"(\d+) % of the image is nearer than the range \(--disparities (\d+)\)", said).groups()

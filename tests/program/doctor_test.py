@@ -111,11 +111,35 @@ class Doctor(InputTest):
     def test_images_of_other_moments_or_of_nothing(self):
         street = self.broken_street()
         for file in (street / "image_1").iterdir():
-            write_grey(file, numpy.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH)))
+            write_grey(file, numpy.random.default_rng(int(file.stem)).integers(0, 255, (HEIGHT, WIDTH)))
         self.assert_only_problem("matches", street)
         for file in (street / "image_1").iterdir():
             write_grey(file, numpy.full((HEIGHT, WIDTH), 60))
         self.assert_only_problem("images", street)
+
+    def test_a_camera_that_stands_still_or_is_a_frame_late(self):
+        frozen = self.broken_street()
+        shutil.copy(frozen / "image_0/000001.png", frozen / "image_0/000002.png")
+        self.assertIn("left image is that of the frame before in 1 of 3 steps", self.assert_only_problem("moments", frozen)["text"])
+        said = self.assert_works("run", frozen, "--out", self.new_folder() / "out")
+        self.assertIn("the left image is that of the frame before in 1 frame", said)
+        for late, side in (("right", 0), ("left", 1)):
+            street = self.broken_street()
+            for i in range(FRAMES - 1):
+                shutil.copy(self.street / f"image_{side}/{i + 1:06d}.png", street / f"image_{side}/{i:06d}.png")
+            for image in ("image_0", "image_1"):
+                (street / image / f"{FRAMES - 1:06d}.png").unlink()
+            (street / "times.txt").unlink()
+            self.assertIn(f"the {late} images are a frame late", self.assert_only_problem("moments", street)["text"])
+
+    def test_rows_of_two_moments(self):
+        street = self.broken_street()
+        for side in (0, 1):
+            for i in range(FRAMES - 1):
+                image = read_grey(self.street / f"image_{side}/{i:06d}.png").copy()
+                image[1::2] = read_grey(self.street / f"image_{side}/{i + 1:06d}.png")[1::2]
+                write_grey(street / f"image_{side}/{i:06d}.png", image)
+        self.assertIn("interlaced", self.assert_only_problem("images", street)["text"])
 
     def test_the_same_image_on_both_sides(self):
         street = self.broken_street()

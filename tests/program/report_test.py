@@ -358,7 +358,7 @@ class ReportInBrowser(ReportTest):
         shutil.copytree(self.out, out)
         (out / "report.html").unlink()
         report = self.report(out)
-        report["doubt"] = "density 24 % in the mean, 62 % of the image is nearer than the range (--disparities 128), the principal point is far (cx 1, cy 2) (scale fx, fy); poses in another order"
+        report["doubt"] = "density 24 % in the mean, 62 % of the image is nearer than the range (--disparities 128), the principal point is far (cx 1, cy 2) (scale fx, fy), a baseline of 3 m (few are wider, and is it in decimetres (0.3 m)?); poses in another order"
         report["notes"] = ["1 left image has no partner"]
         (out / "report.json").write_text(json.dumps(report))
         self.assert_works("report", out)
@@ -366,6 +366,7 @@ class ReportInBrowser(ReportTest):
             {"what": "density 24 % in the mean", "remedy": "`egosgm doctor` tells why"},
             {"what": "62 % of the image is nearer than the range", "remedy": "run it with --disparities 128"},
             {"what": "the principal point is far (cx 1, cy 2)", "remedy": "scale fx, fy"},
+            {"what": "a baseline of 3 m", "remedy": "few are wider, and is it in decimetres (0.3 m)?"},
             {"what": "poses in another order", "remedy": "`egosgm doctor` tells why"}])
         self.assertEqual(self.data(out / "report.html")["notes"][0], "1 left image has no partner")
         self.browser.open(out / "report.html")

@@ -241,9 +241,11 @@ class BrokenInput(ProgramTest):
         self.assert_sequence_refused(street, "calib.txt: is no file")
 
     def test_missing_right_image(self):
-        street = self.broken_street()
+        street, out = self.broken_street(), self.new_folder() / "out"
         (street / "image_1/000002.png").unlink()
-        self.assert_sequence_refused(street, "000002.png")
+        self.assertIn("1 image without the other camera's left out", self.assert_works("run", street, "--out", out))
+        self.assertEqual([frame["frame"] for frame in self.report(out)["frames"]], [0, 1, 3])
+        self.assert_sequence_refused(street, "000002.png", "no partner", options=["--frames", "2"])
 
     def test_truncated_image(self):
         street = self.broken_street()

@@ -889,6 +889,8 @@ def test_doubts_of_a_baseline(tmp_path, street, frames, capfd):
     for name, factor, named in cases:
         said = told_of(capfd, drive_of(street, frames, rescaled(factor)).write(tmp_path / name))
         assert f"`egosgm doctor --bag {tmp_path}" in said and named in said
+    path = drive_of(street, frames, rescaled(3)).write(tmp_path / "wide")
+    assert "few rigs are wider than a metre" in told_of(capfd, path) and examined(capfd, path)["calibration"]["verdict"] == "note"
 
 
 def test_binned_and_cropped_cameras_are_what_ros_says(tmp_path, street, frames, capfd):

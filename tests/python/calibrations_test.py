@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations of other programs: one rig, written as each of them does."""
+import gzip
 import json
-import os
 
 import numpy as np
 import pytest
 
 import egosgm
-from egosgm import calibrations, program
 
 yaml = pytest.importorskip("yaml")
 
@@ -51,6 +50,9 @@ RECTIFIED = {
     "own.txt": f"fx = {F}\nfy = {F}\ncx = {CX}\ncy = {CY}\nbaseline_m = {B}\n",
     "kitti.txt": f"P0: {' '.join(map(str, flat(P)))}\nP1: {' '.join(map(str, flat(RIGHT_P)))}\n",
     "camera.json": json.dumps(dict(extrinsic=dict(baseline=B, pitch=0.03), intrinsic=dict(fx=F, fy=F, u0=CX, v0=CY))),
+    "flat.json": json.dumps(dict(width=WIDTH, height=HEIGHT, fx=F, fy=F, cx0=CX, cx1=CX, cy=CY, baseline_meters=B, depth_range=[1, 5])),
+    "flat.yaml": yaml.safe_dump(dict(focal_length=F, ppx=CX, ppy=CY, baseline_mm=1000 * B)),
+    "own.json": json.dumps(dict(fx=F, fy=F, cx=CX, cy=CY, baseline_m=B)),
     "cam_to_cam.yaml": yaml.safe_dump(dict(intrinsics=dict(cam0=dict(camera_matrix=[1, 2, 3, 4])), disparity_to_depth=dict(cams_12=Q))),
     "K.txt": " ".join(map(str, flat(K))) + f"\n{B}\n",
     "q.yml": opencv_yaml(Q=Q),
@@ -205,6 +207,11 @@ def test_arrays_of_numpy(tmp_path):
     expect_rectified(egosgm.read_calibration(tmp_path / "Q.npy"))
 
 
+def test_what_is_packed(tmp_path):
+    (tmp_path / "rig.yml.gz").write_bytes(gzip.compress(RAW["opencv.yml"].encode()))
+    expect_raw(egosgm.read_calibration(tmp_path / "rig.yml.gz"))
+
+
 def test_a_fisheye(tmp_path):
     (tmp_path / "chain.yaml").write_text(kalibr([0.01, 0, 0, 0], "equidistant"))
     assert egosgm.read_calibration(tmp_path / "chain.yaml").is_fisheye
@@ -230,20 +237,3 @@ def test_units_are_never_guessed(tmp_path):
     with pytest.raises(egosgm.InvalidArgument, match="centimetres .0.3 m. or millimetres .0.03 m."):
         egosgm.read_calibration(tmp_path / "chain.yaml")
     expect_raw(egosgm.read_calibration(tmp_path / "chain.yaml", unit_m=0.01))
-
-
-def test_the_command_hands_the_program_what_it_reads(tmp_path):
-    (tmp_path / "chain.yaml").write_text(kalibr())
-    changed = program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml"), "--out", "o"])
-    given = changed[2]
-    assert changed == ["run", "--calib", given, "--out", "o"]
-    expect_rectified(egosgm.read_calibration(given))
-    os.close(int(given.rpartition("/")[2]))
-    (tmp_path / "chain.yaml").write_text(kalibr(LENS))
-    with pytest.raises(egosgm.InvalidArgument, match="is of raw images"):
-        program.with_calibration(["run", "--calib", str(tmp_path / "chain.yaml")])
-    (tmp_path / "own.txt").write_text(RECTIFIED["own.txt"])
-    os.mkfifo(tmp_path / "pipe")  # which would be read here, and no more there
-    for arguments in (["run", "--calib", str(tmp_path / "own.txt")], ["run", "folder"], ["run", "--calib"], ["run", "--calib", str(tmp_path / "pipe")]):
-        assert program.with_calibration(arguments) == arguments
-    assert calibrations.find(tmp_path / "own.txt").fx == F

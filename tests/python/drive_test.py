@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import cpu_driver, points, ros_images
+from egosgm import bag_program, cpu_driver, points, ros_images
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -351,6 +351,22 @@ def test_a_doubtful_drive_is_told(street, frames):
     far = egosgm.Calibration(street.calibration.fx, street.calibration.fy, 5, street.calibration.cy, 54)
     with pytest.warns(UserWarning, match="a baseline of 54 m"):
         list(egosgm.run([(frames[0].left, frames[0].right)], far, **OPTIONS))
+    wide = egosgm.Calibration(street.calibration.fx, street.calibration.fy, street.calibration.cx, street.calibration.cy, 3)
+    with pytest.warns(UserWarning, match="few rigs .* decimetres .0.3 m."):
+        list(egosgm.run([(frames[0].left, frames[0].right)], wide, motion=False, **OPTIONS))
+
+
+def test_the_program_takes_calibrations_that_the_package_reads(street, street_folder, tmp_path, capfd):
+    c, file = street.calibration, tmp_path / "rig.json"
+    given = ["--left", str(street_folder / "image_0/*.png"), "--right", str(street_folder / "image_1/*.png"), "--calib", str(file), "--frames", "0"]
+    k = [[c.fx, 0, c.cx], [0, c.fy, c.cy], [0, 0, 1]]
+    file.write_text(json.dumps(dict(fx=c.fx, fy=c.fy, cx=c.cx, cy=c.cy, baseline=3)))
+    assert bag_program.main([*given, "--out", str(tmp_path / "run")]) == 0
+    assert f"--calib {file} --frames 0` tells why" in capfd.readouterr().out
+    assert json.loads((tmp_path / "run/report.json").read_text())["calibration"]["baseline_m"] == 3
+    file.write_text(json.dumps(dict(K1=k, K2=k, D1=[0.1, 0, 0, 0], D2=[0, 0, 0, 0], R=np.eye(3).tolist(), T=[-c.baseline_m, 0, 0])))
+    assert bag_program.main([*given, "--out", str(tmp_path / "raw")]) == 2
+    assert "is of raw images" in capfd.readouterr().err and not (tmp_path / "raw").exists()
 
 
 def test_rows_that_no_alignment_mends_are_told(street, frames):
