@@ -81,10 +81,15 @@ class BagFeed : public app::Feed {
     return in_python([&]() -> std::optional<app::FedFrame> {
       for (;;) {
         const py::object found = bag_.call("next");
-        if (found.is_none()) return std::nullopt;
-        const int number = found.attr("number").cast<int>();
+        if (found.is_none()) {
+          if (has_given_) return std::nullopt;
+          throw InvalidArgument(
+              fmt::format("--frames: {} has {} frames, which begin with 0", sequence_.title, last_ + 1));
+        }
+        const int number = last_ = found.attr("number").cast<int>();
         if (number < range_.first.value_or(0)) continue;
         if (number > range_.last.value_or(number)) return std::nullopt;
+        has_given_ = true;
         app::FedFrame fed;
         fed.frame = frame_of(number);
         fed.images = {mat_of(found.attr("left"), "left"), mat_of(found.attr("right"), "right")};
@@ -115,6 +120,8 @@ class BagFeed : public app::Feed {
   const vision::FrameRange range_;
   std::filesystem::path out_;
   std::string poses_;
+  int last_ = -1;  // frame that the bag gave
+  bool has_given_ = false;
 };
 
 /// egosgm.bag_program.Outputs.
