@@ -103,6 +103,15 @@ class Tools(ProgramTest):
                 self.assertEqual((done.returncode, done.stderr.count("\n")), (code, code), f"{arguments}: {done.stderr}")
                 self.assertIn(named, done.stderr)
 
+    def test_a_standard_output_that_is_closed_becomes_no_file(self):
+        out, folder = self.odd(self.out, "run"), self.new_folder()
+        calib = ["--calib", self.street / "calib.txt"]
+        rectify = ["rectify", "--left", self.street / "image_0/*.png", "--right", self.street / "image_1/*.png", *calib, "--out", folder / "new", "--quiet"]
+        for arguments, code in ((["eval-poses", out, self.street], 1), (["cloud", out], 1), (["report", "--help"], 1), (rectify, 0)):
+            done = subprocess.run(["sh", "-c", 'exec "$@" >&- <&-', "sh", PROGRAM, *map(str, arguments)], stderr=subprocess.PIPE, text=True, timeout=600)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (code, code), f"{arguments}: {done.stderr}")
+            self.assertIn("the standard output cannot be written: Bad file descriptor" if code else "", done.stderr)
+
 
 @unittest.skipUnless(HAS_PACKAGE, "built without the Python package")
 class ReadCalibration(ProgramTest):
