@@ -104,7 +104,11 @@ class BagFeed : public app::Feed {
   }
 
   std::vector<std::string> notes() const override {
-    return in_python([&] { return bag_.call("notes").cast<std::vector<std::string>>(); });
+    return in_python([&] {
+      std::vector<std::string> notes;
+      for (const py::handle& note : bag_.call("notes")) notes.push_back(text_from(note));
+      return notes;
+    });
   }
 
  private:
@@ -168,22 +172,26 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
                        const std::string& out) {
     return in_python([&]() -> std::shared_ptr<app::Feed> {
       py::dict values;
-      values["bag"] = given.bag;
-      values["left_topic"] = given.left_topic;
-      values["right_topic"] = given.right_topic;
-      values["info_topics"] = given.info_topics;
-      values["pose_topic"] = given.pose_topic;
-      values["pose_axes"] = given.pose_axes;
-      values["max_skew_ms"] = given.max_skew_ms;
-      values["rectify"] = given.rectify;
-      values["calib"] = calib;
-      values["out"] = out;
+      for (const auto& [name, value] : {std::pair{"bag", given.bag},
+                                        {"left_topic", given.left_topic},
+                                        {"right_topic", given.right_topic},
+                                        {"pose_topic", given.pose_topic},
+                                        {"pose_axes", given.pose_axes},
+                                        {"max_skew_ms", given.max_skew_ms},
+                                        {"rectify", given.rectify},
+                                        {"calib", calib},
+                                        {"out", out}}) {
+        values[name] = text_of(value);
+      }
+      py::list info_topics;
+      for (const std::string& topic : given.info_topics) info_topics.append(text_of(topic));
+      values["info_topics"] = info_topics;
       return std::make_shared<BagFeed>(package.attr("BagFeed")(**values), range, out);
     });
   };
   hooks.take = [&](const std::string& file, bool viewer) {
     return in_python([&]() -> std::shared_ptr<app::Taker> {
-      return std::make_shared<Outputs>(package.attr("Outputs")(file, viewer));
+      return std::make_shared<Outputs>(package.attr("Outputs")(text_of(file), viewer));
     });
   };
   std::vector<const char*> words{"egosgm"};
