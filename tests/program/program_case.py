@@ -16,6 +16,7 @@ import unittest
 import zlib
 
 PROGRAM = os.environ["EGOSGM_PROGRAM"]
+HAS_PACKAGE = (pathlib.Path(PROGRAM).parents[1] / "python/egosgm/program.py").exists()  # not in builds with a sanitizer
 EXAMPLES = pathlib.Path(os.environ.get("EGOSGM_EXAMPLES", ""))
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = os.environ.get("EGOSGM_DATA", "")
@@ -33,7 +34,7 @@ def egosgm(*arguments, cwd=None, **options):
     done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=600, cwd=cwd, **options)
     if isinstance(done.stderr, str):
         done.stderr = without_waiting(done.stderr)
-        if "needs the Python package egosgm, which" in done.stderr and not (pathlib.Path(PROGRAM).parents[1] / "python/egosgm/program.py").exists():
+        if "needs the Python package egosgm, which" in done.stderr and not HAS_PACKAGE:
             raise unittest.SkipTest("built without the Python package, which has this tool")
     return done
 
@@ -48,7 +49,7 @@ class Started(subprocess.Popen):
 
 def needs_package(test, arguments):
     """Skips a test of a command that the Python package has, where the build is without it."""
-    if arguments and arguments[0] in ("eval-video", "eval-poses") and not (pathlib.Path(PROGRAM).parents[1] / "python/egosgm/__main__.py").exists():
+    if arguments and arguments[0] in ("eval-video", "eval-poses") and not HAS_PACKAGE:
         test.skipTest(f"no Python package beside the program, which has {arguments[0]}")
 
 

@@ -9,7 +9,7 @@ import subprocess
 import time
 import unittest
 
-from program_case import FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png, without_waiting
+from program_case import FRAMES, HAS_PACKAGE, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png, without_waiting
 
 
 class LongRuns(ProgramTest):
@@ -152,10 +152,11 @@ class Disk(LongRuns):
         self.assertEqual(len((folder / "poses.txt").read_text().splitlines()), FRAMES)
         self.assertEqual(self.cut_short("synth", "--out", folder / "synth", "--frames", 3, "--width", 64, "--height", 48), (0, ""))
         self.assertTrue((folder / "synth/poses.txt").exists())
-        self.assertEqual(self.cut_short("rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib",
-                                        street / "calib.txt", "--out", folder / "rectified"), (0, ""))
-        self.assertEqual(len(list((folder / "rectified/image_0").iterdir())), FRAMES)
-        self.assertTrue((folder / "rectified/calib.txt").exists())
+        if HAS_PACKAGE:
+            self.assertEqual(self.cut_short("rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib",
+                                            street / "calib.txt", "--out", folder / "rectified"), (0, ""))
+            self.assertEqual(len(list((folder / "rectified/image_0").iterdir())), FRAMES)
+            self.assertTrue((folder / "rectified/calib.txt").exists())
         for command in (["eval", "--estimate", out, "--truth", self.street / "truth/left_disp_noc"], ["run", "--help"], ["devices"]):
             self.assertEqual(self.cut_short(*command, lines=0), (0, ""))
 

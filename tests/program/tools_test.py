@@ -10,9 +10,8 @@ import subprocess
 import sys
 import unittest
 
-from program_case import FRAMES, PROGRAM, ProgramTest, egosgm
+from program_case import FRAMES, HAS_PACKAGE, PROGRAM, ProgramTest, egosgm
 
-HAS_PACKAGE = (pathlib.Path(PROGRAM).parents[1] / "python/egosgm/program.py").exists()
 ODD = "b\udcff\n"  # a name of Latin-1, and of two lines
 
 
