@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdlib>
 #include <functional>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "egosgm/error.h"
@@ -19,11 +21,11 @@ namespace egosgm::testing {
 namespace {
 
 constexpr int kThreads = 3;
-#ifdef __SANITIZE_THREAD__
-constexpr int kProcesses = 5;  // each takes seconds
-#else
-constexpr int kProcesses = 50;
-#endif
+/// That make pipelines, one after the other: 50 in the lane `load`.
+int processes() {
+  const char* const text = std::getenv("EGOSGM_PROCESSES");
+  return text ? std::stoi(text) : 5;
+}
 
 /// What waitpid says of a process that does `work`: 0 where that returned true.
 int status_of(const std::function<bool()>& work) {
@@ -65,7 +67,7 @@ TEST(BeginInThreads, ListDevices) {
 TEST(BeginInThreads, MakePipelines) {
   const ShortVideo video;
   ASSERT_EQ(status_of([&] { return !video.through(Device::select()).empty(); }), 0);  // fills the driver's cache
-  for (int process = 0; process < kProcesses; ++process) {
+  for (int process = 0; process < processes(); ++process) {
     ASSERT_EQ(status_of([&] {
                 return in_threads([&] {
                   const Pipeline pipeline = video.pipeline(Device::select());

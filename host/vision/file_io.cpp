@@ -10,7 +10,6 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
-#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -159,7 +158,6 @@ int give_name(const fs::path& from, const fs::path& to) {
   const int error = errno;
   struct stat status {};
   if (::lstat(to.c_str(), &status) == 0) fail_keeping(to);
-  if (error == EXDEV) return error;
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;  // a file system without links
 }
 
@@ -325,20 +323,6 @@ void expect_writable(const std::filesystem::path& file) {
   } else if (target.descriptor < 0 && ::access(file.c_str(), W_OK) != 0) {
     fail_writing(file, errno);
   }
-}
-
-void move_file(const std::filesystem::path& from, const std::filesystem::path& to) {
-  const Target target = target_of(to);
-  if (const Descriptor descriptor(::open(from.c_str(), O_WRONLY | O_CLOEXEC)); descriptor.is_open()) {
-    Unfinished::take_mode(target, descriptor.get());
-  }
-  if (!target.is_stream()) {
-    const int error = give_name(from, target.file);
-    if (error == 0) return;
-    if (error != EXDEV) fail_writing(to, error);
-  }
-  write_file(to, read_file(from, std::numeric_limits<std::size_t>::max() - 1));  // a pipe, or another file system
-  ::unlink(from.c_str());
 }
 
 void make_folder(const std::filesystem::path& folder) {

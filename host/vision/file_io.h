@@ -42,7 +42,7 @@ class EGOSGM_EXPORT BeforeWrite {
   friend EGOSGM_EXPORT void write_file(const std::filesystem::path& file, std::string_view bytes);
 };
 
-/// While it lives, write_file and move_file of its thread replace no file, and throw IoError where one has come: for
+/// While it lives, write_file of its thread replaces no file, and throws IoError where one has come: for
 /// what takes a while after its name was found free. What is no regular file is written through as ever.
 class EGOSGM_EXPORT KeepFiles {
  public:
@@ -60,9 +60,6 @@ EGOSGM_EXPORT bool is_stream(const std::filesystem::path& file);
 
 /// Throws IoError where write_file could not write; changes nothing. Thread-safe.
 EGOSGM_EXPORT void expect_writable(const std::filesystem::path& file);
-
-/// Gives a finished file another name, as write_file does. Throws IoError. Thread-safe for different files.
-EGOSGM_EXPORT void move_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// Makes a folder with its parents. Throws IoError.
 EGOSGM_EXPORT void make_folder(const std::filesystem::path& folder);

@@ -74,11 +74,4 @@ std::vector<Layer> FramePanels::layers(const ShownFrame& shown) {
   return layers;
 }
 
-cv::Mat FramePanels::all(const ShownFrame& shown, int cell_width) {
-  std::vector<CaptionedPicture> pictures;
-  for (const Layer& layer : layers(shown)) pictures.push_back(panel(layer));
-  pictures.front().caption += ", frame " + shown.frame.name;
-  return compose(pictures, 2, cell_width);
-}
-
 }  // namespace egosgm::vision

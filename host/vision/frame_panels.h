@@ -41,8 +41,6 @@ class EGOSGM_EXPORT FramePanels {
   /// Left image in its colours, disparity, variance, search width, reasons, and the error: those for which there is a
   /// file or a map (an empty one is none).
   std::vector<Layer> layers(const ShownFrame& shown);
-  /// All of them, two a row, each at most `cell_width` px wide.
-  cv::Mat all(const ShownFrame& shown, int cell_width);
 
  private:
   Layer disparity_layer(const ShownFrame& shown);

@@ -31,14 +31,6 @@ inline std::string_view trim(std::string_view text) {
   return text.substr(0, text.find_last_not_of(kBlanks) + 1);
 }
 
-/// The row without its comment: a '#' that begins it or follows a blank, as names may hold one.
-inline std::string_view without_comment(std::string_view text) {
-  for (std::size_t at = 0; (at = text.find('#', at)) != std::string_view::npos; ++at) {
-    if (at == 0 || kBlanks.find(text[at - 1]) != std::string_view::npos) return text.substr(0, at);
-  }
-  return text;
-}
-
 /// For an error's line: shortened, unprintable characters replaced, in quotes.
 inline std::string quoted(std::string_view text) {
   constexpr std::size_t kMaxCharacters = 40;

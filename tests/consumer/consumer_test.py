@@ -62,7 +62,7 @@ class Installed(unittest.TestCase):
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("choose from core, vision", " ".join(done.stdout.split()))
 
-    def test_pkg_config(self):
+    def test_pkg_config_and_a_core_without_opencv(self):
         environment = dict(os.environ, PKG_CONFIG_PATH=str(self.library_folder() / "pkgconfig"),
                            LD_LIBRARY_PATH=str(self.library_folder()))
         self.assertEqual(self.assert_runs("pkg-config", "--modversion", "egosgm", env=environment).strip(), VERSION)
@@ -71,6 +71,10 @@ class Installed(unittest.TestCase):
             flags = self.assert_runs("pkg-config", "--cflags", "--libs", module, env=environment).split()
             self.assert_runs(CXX, "-std=c++17", SOURCE / f"{program}.cpp", *flags, "-o", self.folder / program)
             self.assert_runs(self.folder / program, env=environment, cwd=self.folder)
+        needed = self.assert_runs("ldd", self.folder / "core", env=environment)  # odometry and pipeline
+        self.assertIn("libegosgm.so", needed)
+        for library in ("opencv", "libpng", "libjpeg", "libisal"):
+            self.assertNotIn(library, needed)
 
     def test_the_shared_libraries_show_only_what_is_public_and_carry_their_version(self):
         library = self.library_folder() / f"libegosgm.so.{VERSION}"
@@ -80,16 +84,6 @@ class Installed(unittest.TestCase):
         self.assertIn(" T egosgm::Pipeline::process", shown)
         self.assertNotIn("egosgm::ForwardWarp::", shown)
         self.assertNotIn("egosgm::ocl::", shown)
-
-    def test_the_core_needs_no_opencv(self):
-        flags = self.assert_runs("pkg-config", "--cflags", "--libs", "egosgm", env=dict(
-            os.environ, PKG_CONFIG_PATH=str(self.library_folder() / "pkgconfig"))).split()
-        program = self.folder / "without_opencv"
-        self.assert_runs(CXX, "-std=c++17", SOURCE / "core.cpp", *flags, "-o", program)  # odometry and pipeline
-        needed = self.assert_runs("ldd", program, env=dict(os.environ, LD_LIBRARY_PATH=str(self.library_folder())))
-        self.assertIn("libegosgm.so", needed)
-        for library in ("opencv", "libpng", "libjpeg", "libisal"):
-            self.assertNotIn(library, needed)
 
     @unittest.skipUnless(VISION, "no program without vision")
     def test_the_program_finds_its_libraries(self):

@@ -6,12 +6,12 @@ import signal
 import subprocess
 import unittest
 
-from program_case import PROGRAM, ProgramTest, egosgm
+from program_case import FEW_KERNELS, PROGRAM, ProgramTest, egosgm
 
 
 class ProgramCaches(ProgramTest):
     def run_command(self, out):
-        return ["run", "--quiet", "--tuning", "none", "--odometry", self.street, "--frames", "0:2", "--disparities", "32", "--out", out]
+        return ["run", "--quiet", "--tuning", "none", "--odometry", self.street, "--frames", "0:2", "--disparities", "32", *FEW_KERNELS, "--out", out]
 
     def maps_of(self, out):
         return {file.name: file.read_bytes() for file in sorted((out / "disparity").iterdir())}

@@ -11,7 +11,7 @@ import unittest
 
 from program_case import egosgm, grey_png
 
-COMMANDS = int(os.environ.get("EGOSGM_FILES_COMMANDS", 1050))  # of each of the two tests; more in the lane `files`
+COMMANDS = int(os.environ.get("EGOSGM_FILES_COMMANDS", 600))  # of each of the two tests; more in the lane `files`
 RUNS = 24  # that may reach the device
 POSES = "1 0 0 0 0 1 0 0 0 0 1 0\n"
 

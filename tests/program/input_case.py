@@ -1,49 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of sequences and raw images share. Environment as for program_case.py."""
 import json
-import pathlib
-import struct
-import zlib
 
 import numpy
+import PIL.Image
 
-from program_case import ProgramTest, egosgm, png
+from program_case import ProgramTest, egosgm
 
 
 def read_grey(file):
     """An 8-bit grey PNG as an array."""
-    content, at, body = pathlib.Path(file).read_bytes(), 8, b""
-    while at < len(content):
-        length, kind = struct.unpack(">I4s", content[at:at + 8])
-        if kind == b"IHDR":
-            width, height, depth, colour = struct.unpack(">IIBB", content[at + 8:at + 18])
-            assert (depth, colour) == (8, 0), file
-        if kind == b"IDAT":
-            body += content[at + 8:at + 8 + length]
-        at += 12 + length
-    rows = zlib.decompress(body)
-    image = numpy.zeros((height + 1, width + 1), numpy.int32)  # a row above and a column to the left
-    for y in range(height):
-        start = y * (width + 1)
-        method, row = rows[start], numpy.frombuffer(rows, numpy.uint8, width, start + 1).astype(numpy.int32)
-        if method in (0, 2):
-            image[y + 1, 1:] = row + (image[y, 1:] if method == 2 else 0) & 255
-            continue
-        for x in range(width):
-            left, up, corner = image[y + 1, x], image[y, x + 1], image[y, x]
-            if method == 1:
-                guess = left
-            elif method == 3:
-                guess = (left + up) // 2
-            else:
-                guess = min((left, up, corner), key=lambda v: abs(left + up - corner - v))
-            image[y + 1, x + 1] = (row[x] + guess) & 255
-    return image[1:, 1:].astype(numpy.uint8)
+    image = PIL.Image.open(file)
+    assert image.mode == "L", file
+    return numpy.array(image)
 
 
 def write_grey(file, image):
-    rows = numpy.ascontiguousarray(image, numpy.uint8)
-    pathlib.Path(file).write_bytes(png(image.shape[1], image.shape[0], 8, (row.tobytes() for row in rows)))
+    PIL.Image.fromarray(numpy.ascontiguousarray(image, numpy.uint8)).save(file)
 
 
 def sampled(image, x, y):

@@ -4,23 +4,27 @@
 EGOSGM_PROGRAM names the program, EGOSGM_EXAMPLES the folder of the examples; EGOSGM_DATA the folder of real data (tests that need it are skipped
 without).
 """
+import contextlib
 import fcntl
+import io
 import json
 import os
 import pathlib
 import shutil
 import struct
 import subprocess
+import sys
 import tempfile
+import threading
 import unittest
 import zlib
 
 PROGRAM = os.environ["EGOSGM_PROGRAM"]
-HAS_PACKAGE = (pathlib.Path(PROGRAM).parents[1] / "python/egosgm/program.py").exists()  # not in builds with a sanitizer
 EXAMPLES = pathlib.Path(os.environ.get("EGOSGM_EXAMPLES", ""))
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 DATA = os.environ.get("EGOSGM_DATA", "")
 WIDTH, HEIGHT, FRAMES = 320, 96, 4
+FEW_KERNELS = ("--temporal", "off", "--set", "coarse_match=false", "--paths", 4)  # soon compiled where the driver's cache is empty
 F_SETPIPE_SZ = 1031  # fcntl has it since Python 3.10
 
 
@@ -29,12 +33,40 @@ def without_waiting(errors):
     return "".join(line for line in errors.splitlines(True) if not line.startswith("egosgm: compiling the kernels for "))
 
 
+PACKAGE = pathlib.Path(PROGRAM).parents[1] / "python"  # beside the program, where it was built with it
+TOOLS = json.loads((SOURCE / "python/egosgm/tools.json").read_text()) if (PACKAGE / "egosgm/program.py").exists() else {}
+HAS_PACKAGE = bool(TOOLS)  # not in builds with a sanitizer
+
+
+def in_this_process(arguments, cwd):
+    """A tool of the package without a process of its own, whose start takes longer than most of what tools are asked for. None: this Python does
+    not load the package."""
+    if str(PACKAGE) not in sys.path:
+        sys.path.insert(0, str(PACKAGE))
+    try:
+        from egosgm.program import run_tool
+    except ImportError:
+        return None
+    before, out, errors = os.getcwd(), io.StringIO(), io.StringIO()
+    os.chdir(cwd or before)
+    try:
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
+            code = run_tool(arguments)
+    finally:
+        os.chdir(before)
+    return subprocess.CompletedProcess(arguments, code, out.getvalue(), errors.getvalue())
+
+
 def egosgm(*arguments, cwd=None, **options):
     """Runs the program. Its errors are without_waiting."""
-    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=600, cwd=cwd, **options)
+    arguments = [*map(str, arguments)]
+    if arguments and arguments[0] in TOOLS and not options and threading.current_thread() is threading.main_thread():
+        if done := in_this_process(arguments, cwd):
+            return done
+    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600, cwd=cwd, **options)
     if isinstance(done.stderr, str):
         done.stderr = without_waiting(done.stderr)
-        if "needs the Python package egosgm, which" in done.stderr and not HAS_PACKAGE:
+        if "needs the Python package egosgm, which" in done.stderr and not TOOLS:
             raise unittest.SkipTest("built without the Python package, which has this tool")
     return done
 
@@ -49,7 +81,7 @@ class Started(subprocess.Popen):
 
 def needs_package(test, arguments):
     """Skips a test of a command that the Python package has, where the build is without it."""
-    if arguments and arguments[0] in ("eval-video", "eval-poses") and not HAS_PACKAGE:
+    if arguments and arguments[0] in ("eval-video", "eval-poses") and not TOOLS:
         test.skipTest(f"no Python package beside the program, which has {arguments[0]}")
 
 

@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import unittest
 
-from program_case import DATA, FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png
+from program_case import DATA, FEW_KERNELS, FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png
 
 
 class Run(ProgramTest):
@@ -243,7 +243,7 @@ class Run(ProgramTest):
 
     def test_what_is_compiled_is_waited_for_in_words(self):
         """Where nothing is cached. PoCL; other drivers may be quicker than what is worth a line."""
-        run = [PROGRAM, "run", "--odometry", self.street, "--frames", "0:0"]
+        run = [PROGRAM, "run", "--odometry", self.street, "--frames", "0:0", *map(str, FEW_KERNELS)]
         for quiet in ([], ["--quiet"]):
             environment = dict(os.environ, POCL_CACHE_DIR=str(self.new_folder()))
             os.makedirs(environment["POCL_CACHE_DIR"], exist_ok=True)

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import unittest
 
-from program_case import HAS_PACKAGE, PROGRAM, ProgramTest
+from program_case import FEW_KERNELS, HAS_PACKAGE, PROGRAM, ProgramTest
 
 
 @contextlib.contextmanager
@@ -18,7 +18,7 @@ def ended_pipe():
 
 
 class StandardError(ProgramTest):
-    """Each in a shell's words, and with a cache of the driver's that is empty: it is said there that the kernels are compiled."""
+    """Each in a shell's words. A pair that cannot be read is told there, and that kernels are compiled where the driver's cache is empty."""
 
     def code_of(self, arguments, redirection, **options):
         """Of the program, whose standard error is led by the shell's `redirection`."""
@@ -29,13 +29,16 @@ class StandardError(ProgramTest):
     REDIRECTIONS = "2>&ENDED", "2>/dev/full", "2>&-", "2>&- <&-"
 
     def test_a_first_run_is_like_any_other(self):
-        expected = self.new_folder()
-        run = ["run", "--odometry", self.street, "--frames", "0:1", "--disparities", 16, "--out"]
-        self.assert_works(*run, expected)
-        for redirection in self.REDIRECTIONS:
-            out, cache = self.new_folder(), self.new_folder()
+        street, expected = self.broken_street(), self.new_folder()
+        os.truncate(street / "image_1/000002.png", 60)
+        run = ["run", "--odometry", street, "--frames", "0:2", "--disparities", 16, *FEW_KERNELS, "--quiet", "--out"]
+        self.assertEqual(self.code_of([*run, expected], f"2>{expected.parent}/told"), 0)
+        self.assertIn("1 of 3 pairs could not be read", (expected.parent / "told").read_text())
+        cold = dict(os.environ, POCL_CACHE_DIR=str(self.new_folder()))
+        for redirection, environment in ((self.REDIRECTIONS[0], cold), *((redirection, None) for redirection in self.REDIRECTIONS)):
+            out, words = self.new_folder(), [word for word in run if environment is None or word != "--quiet"]
             with self.subTest(redirection):
-                self.assertEqual(self.code_of([*run, out], redirection, env=dict(os.environ, POCL_CACHE_DIR=str(cache))), 0)
+                self.assertEqual(self.code_of([*words, out], redirection, env=environment), 0)
                 self.assertTrue(self.report(out)["finished"])
                 for name in ("disparity/000000.png", "disparity/000001.png", "poses.txt"):
                     self.assertEqual((out / name).read_bytes(), (expected / name).read_bytes())

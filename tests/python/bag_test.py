@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags of robots in and out: what is read equals the images that were recorded, and what is written says where things are."""
+import io
 import json
 import os
 import re
@@ -10,6 +11,7 @@ import tempfile
 import time
 
 import numpy as np
+import PIL.Image
 import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag1 import Writer as Writer1
@@ -425,17 +427,12 @@ def test_both_cameras_seen_from_a_third_one(tmp_path, street, frames):
     """As KITTI's colour cameras, whose P both have a Tx."""
     c = street.calibration
 
-    def infos(left_tx):
-        recording = Recording("mcap")
-        for side, name in enumerate(("left", "right")):
-            recording.info(f"/{name}/camera_info", c, side)
-            recording.messages[-1][3].p[3] += left_tx
-            recording.image(f"/{name}/image_rect", START, (frames[0].left, frames[0].right)[side])
-        return recording.write(tmp_path / f"drive{left_tx:.0f}")
-
-    for rectify in (False, True):
-        for left_tx in (0.1 * c.fx, -0.3 * c.fx):
-            bag = bags.Bag(infos(left_tx) if not rectify else tmp_path / f"drive{left_tx:.0f}", "/left/image_rect", "/right/image_rect", rectify=rectify)
+    for left_tx in (0.1 * c.fx, -0.3 * c.fx):
+        def shifted(info):
+            info.p[3] += left_tx
+        path = drive_of(street, frames[:1], shifted).write(tmp_path / f"drive{left_tx:.0f}")
+        for rectify in (False, True):
+            bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", rectify=rectify)
             next(bag.frames())
             assert bag.cameras.calibration.baseline_m == pytest.approx(c.baseline_m)
 
@@ -443,14 +440,10 @@ def test_both_cameras_seen_from_a_third_one(tmp_path, street, frames):
 @pytest.mark.parametrize("rectify", (False, True))
 def test_binned_images_have_the_calibration_of_their_pixels(rectify, tmp_path, street, frames):
     """The info is then of the sensor's pixels: here two columns and three rows make one."""
-    recording = Recording("mcap")
-    for side, name in enumerate(("left", "right")):
-        recording.info(f"/{name}/camera_info", street.calibration, side)
-        info = recording.messages[-1][3]
+    def binned(info):
         info.width, info.height, info.binning_x, info.binning_y = 2 * WIDTH, 3 * HEIGHT, 2, 3
         info.k, info.p = (np.diag([2.0, 3, 1]) @ info.k.reshape(3, 3)).reshape(-1), (np.diag([2.0, 3, 1]) @ info.p.reshape(3, 4)).reshape(-1)
-        recording.image(f"/{name}/image_rect", START, (frames[0].left, frames[0].right)[side])
-    bag = bags.Bag(recording.write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect", rectify=rectify)
+    bag = bags.Bag(drive_of(street, frames[:1], binned).write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect", rectify=rectify)
     frame, = bag.frames()
     for name in ("fx", "fy", "cx", "cy", "baseline_m"):
         assert getattr(bag.cameras.calibration, name) == pytest.approx(getattr(street.calibration, name), abs=1e-4)
@@ -470,12 +463,7 @@ def test_messages_that_are_not_of_ros(tmp_path, capfd):
 
 
 def test_stamps_that_cameras_set_a_little_apart_are_told_with_the_bound_that_allows_them(tmp_path, street, frames):
-    recording = Recording("mcap")
-    for side, name in enumerate(("left", "right")):
-        recording.info(f"/{name}/camera_info", street.calibration, side)
-        for i in range(FRAMES):
-            recording.image(f"/{name}/image_rect", START + i * RATE_NS + (side and i and 30_400), (frames[i].left, frames[i].right)[side])
-    path = recording.write(tmp_path / "drive")
+    path = drive_of(street, frames, of_right=lambda i, time: time + (30_400 if i else 0)).write(tmp_path / "drive")
     bag = bags.Bag(path, "left/image_rect", "right/image_rect")  # a leading slash is not missed
     assert len(list(bag.frames())) == 1
     assert "2 left and 2 right images have no partner: the nearest of them differ by 0.031 ms, which --max-skew-ms can allow" in bag.gaps.text()
@@ -696,13 +684,8 @@ def test_next_to_no_disparity_is_infinitely_uncertain(street):
 
 
 def test_poses_of_the_bag_are_the_motion(tmp_path, street, frames):
-    recording = Recording("mcap")
-    for side, name in enumerate(("left", "right")):
-        recording.info(f"/{name}/camera_info", street.calibration, side)
+    recording = drive_of(street, frames)
     types = recording.types
-    for i, frame in enumerate(frames):
-        recording.image("/left/image_rect", START + i * RATE_NS, frame.left)
-        recording.image("/right/image_rect", START + i * RATE_NS, frame.right)
     for i in (-1, 0, 1, 2, 3):  # between the frames, of a constant speed of 8 m/s, forward
         recording.add("/odom", "geometry_msgs/msg/PoseStamped", START + i * RATE_NS + RATE_NS // 2, pose=types["geometry_msgs/msg/Pose"](
             position=types["geometry_msgs/msg/Point"](x=0.8 * i, y=0.0, z=0.0),
@@ -765,11 +748,8 @@ def of_pose(**fields):
     ("/left/camera_info", changed(width=0, height=0), "is of 0x0"), ("/left/camera_info", changed(d=np.full(5, np.nan)), "D of the camera info holds a value that is not finite"),
     ("/odom", of_pose(x=0.0, y=0.0, z=0.0, w=0.0), "no rotation"), ("/odom", of_pose(at_x=np.nan), "pose 0 is not finite"), ("/odom", of_pose(w=np.inf), "pose 0 is not finite")])
 def test_a_message_that_is_wrong_is_one_line(topic, change, named, tmp_path, street, frames, capfd):
-    recording = Recording("mcap")
+    recording = drive_of(street, frames[:1])
     types = recording.types
-    for side, name in enumerate(("left", "right")):
-        recording.info(f"/{name}/camera_info", street.calibration, side)
-        recording.image(f"/{name}/image_rect", START, (frames[0].left, frames[0].right)[side])
     recording.add("/odom", "geometry_msgs/msg/PoseStamped", START, pose=types["geometry_msgs/msg/Pose"](
         position=types["geometry_msgs/msg/Point"](x=0.0, y=0.0, z=0.0), orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)))
     message, = (item[3] for item in recording.messages if item[1] == topic)
@@ -998,13 +978,10 @@ def test_a_broken_message_costs_its_pair(tmp_path, street, frames, capfd):
     assert "3 frames" in said and "1 broken message, whose pairs are left out: /right/image_rect at 1700000000.200000000 s: an image of 1x1 px" in said
 
 
-def test_a_mosaic_that_was_compressed(tmp_path, street, frames):
-    mosaic = egosgm.ros_images if hasattr(egosgm, "ros_images") else ros_images
+def test_a_mosaic_that_was_compressed():
     pixels = np.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH)).astype(np.uint8)
-    expected = mosaic._of_bayer(pixels)
-    file = tmp_path / "image.png"
-    file.write_bytes(png_of(pixels))
-    message = type("CompressedImage", (), dict(format="bayer_rggb8; png compressed ", data=file.read_bytes()))()
+    expected = ros_images._of_bayer(pixels)
+    message = type("CompressedImage", (), dict(format="bayer_rggb8; png compressed ", data=png_of(pixels)))()
     np.testing.assert_array_equal(ros_images.grey_of(message), expected)
     for plain in ("bayer_rggb8; png compressed bgr8", "mono8; png compressed ", "png"):
         message.format = plain
@@ -1012,14 +989,9 @@ def test_a_mosaic_that_was_compressed(tmp_path, street, frames):
 
 
 def png_of(pixels):
-    import struct
-    import zlib
-
-    def chunk(kind, body):
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-    height, width = pixels.shape
-    rows = b"".join(b"\0" + row.tobytes() for row in pixels)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    file = io.BytesIO()
+    PIL.Image.fromarray(pixels).save(file, "png")
+    return file.getvalue()
 
 
 @pytest.mark.parametrize("image", [lambda v: (7000 + 3 * v.astype(np.uint16)).astype(np.uint16), lambda v: (51241 + 4 * v.astype(np.uint16)).astype(np.uint16)])

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm calibrate: pictures of a board, rendered for known cameras."""
+import contextlib
+import io
+import shutil
+
 import numpy as np
 import pytest
 
@@ -73,11 +77,24 @@ def pictures(tmp_path_factory):
     return write_pictures(tmp_path_factory.mktemp("board") / "views", chessboard(7, 5), 7, 5, spoilt=(4,))
 
 
+def command(folder, out, board="7x5"):
+    return ["calibrate", "--left", str(folder / "left/*.png"), "--right", str(folder / "right/*.png"), "--board", board, "--square", str(SQUARE), "--out", str(out)]
+
+
 def calibrate(folder, out, capsys, *more, board="7x5"):
-    code = program.run_tool(["calibrate", "--left", str(folder / "left/*.png"), "--right", str(folder / "right/*.png"), "--board", board, "--square", str(SQUARE),
-                             "--out", str(out), *more])
+    code = program.run_tool([*command(folder, out, board), *more])
     said = capsys.readouterr()
     return code, said.out + said.err
+
+
+@pytest.fixture(scope="module")
+def calibrated(pictures, tmp_path_factory):
+    """The folder with calib.yml and the drawn corners, and what was said."""
+    folder, said = tmp_path_factory.mktemp("calibrated"), io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        code = program.run_tool([*command(pictures, folder / "calib.yml"), "--pictures", str(folder / "corners")])
+    assert code == 0, said.getvalue()
+    return folder, said.getvalue()
 
 
 def expect_the_cameras(file, within_px=4):
@@ -91,20 +108,18 @@ def expect_the_cameras(file, within_px=4):
     return rig
 
 
-def test_a_chessboard_gives_the_cameras_and_a_view_of_another_moment_is_left_out(pictures, tmp_path, capsys):
-    code, said = calibrate(pictures, tmp_path / "calib.yml", capsys, "--pictures", str(tmp_path / "corners"))
-    assert code == 0, said
-    expect_the_cameras(tmp_path / "calib.yml")
+def test_a_chessboard_gives_the_cameras_and_a_view_of_another_moment_is_left_out(calibrated):
+    folder, said = calibrated
+    expect_the_cameras(folder / "calib.yml")
     assert "pairs (11 left, 12 right)" in said and said.count("left out") == 1 and "pair   4: left out" in said
     rows = float(said.split("rows agree within ")[1].split()[0])
     assert rows < 0.3
-    assert len(list((tmp_path / "corners").iterdir())) == 12
-    assert cv2.imread(str(tmp_path / "corners/000000.png")).shape == (HEIGHT, 2 * WIDTH, 3)
+    assert len(list((folder / "corners").iterdir())) == 12
+    assert cv2.imread(str(folder / "corners/000000.png")).shape == (HEIGHT, 2 * WIDTH, 3)
 
 
-def test_what_it_writes_rectifies(pictures, tmp_path, capsys):
-    assert calibrate(pictures, tmp_path / "calib.yml", capsys)[0] == 0
-    code = program.run_tool(["rectify", "--left", str(pictures / "left/*.png"), "--right", str(pictures / "right/*.png"), "--calib", str(tmp_path / "calib.yml"),
+def test_what_it_writes_rectifies(pictures, calibrated, tmp_path):
+    code = program.run_tool(["rectify", "--left", str(pictures / "left/*.png"), "--right", str(pictures / "right/*.png"), "--calib", str(calibrated[0] / "calib.yml"),
                              "--out", str(tmp_path / "sequence")])
     assert code == 0
     left, right = (cv2.imread(str(tmp_path / f"sequence/image_{side}/000002.png"), cv2.IMREAD_GRAYSCALE) for side in (0, 1))
@@ -122,7 +137,11 @@ def test_a_charuco_board(tmp_path, capsys):
 
 @pytest.mark.parametrize("board, named", [("8x6", "one of 7x5 is there"), ("7", "--board 7:"), ("2x9", "--board 2x9")])
 def test_a_wrong_size_of_the_board_is_named(board, named, pictures, tmp_path, capsys):
-    code, said = calibrate(pictures, tmp_path / "calib.yml", capsys, board=board)
+    for side in ("left", "right"):
+        (tmp_path / side).mkdir()
+        for i in range(3):
+            shutil.copy(pictures / side / f"{i}.png", tmp_path / side)
+    code, said = calibrate(tmp_path, tmp_path / "calib.yml", capsys, board=board)
     assert code == 2 and named in said, said
     assert not (tmp_path / "calib.yml").exists()
 
