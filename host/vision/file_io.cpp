@@ -155,7 +155,6 @@ thread_local bool keeps_files = false;
 int give_name(const fs::path& from, const fs::path& to) {
   if (!keeps_files) return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;
   if (::link(from.c_str(), to.c_str()) == 0) return ::unlink(from.c_str()) == 0 ? 0 : errno;
-  const int error = errno;
   struct stat status {};
   if (::lstat(to.c_str(), &status) == 0) fail_keeping(to);
   return ::rename(from.c_str(), to.c_str()) == 0 ? 0 : errno;  // a file system without links
