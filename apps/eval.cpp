@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/command.h"
 #include "apps/counted.h"
@@ -26,6 +27,7 @@ using vision::DisparityMetrics;
 using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxReportBytes = std::size_t{1} << 30;
+constexpr double kMostPixels = 1e12;     // of a pair of a report, and their errors
 constexpr std::size_t kLongFolder = 20;  // frames; a progress bar from here on
 
 struct EvalArguments {
@@ -172,21 +174,45 @@ void print_pairing(const vision::EvaluationPairs& found) {
   }
 }
 
+/// Whether it is a number of pixels, or a sum of their errors.
+template <typename Count>
+bool read_count(const Json& json, Count& count) {
+  const auto value = json.get<double>();
+  if (!json.is_number() || !(value >= 0 && value <= kMostPixels)) return false;
+  count = static_cast<Count>(value);
+  return value == static_cast<double>(count);
+}
+
+/// The counts of each pair of a report. Throws InvalidArgument and IoError.
+std::vector<DisparityCounts> counts_of(const std::string& file) {
+  const Json report = parse_json(vision::read_file(file, kMaxReportBytes), file);
+  std::vector<DisparityCounts> all;
+  bool is_sound = true;
+  try {
+    for (const Json& pair : report.at("pairs")) {
+      for_each_count(all.emplace_back(), [&](const char* name, auto& count) {
+        is_sound = read_count(pair.at("counts").at(name), count) && is_sound;
+      });
+    }
+  } catch (const Json::exception&) {
+    is_sound = false;
+  }
+  if (is_sound && !all.empty()) return all;
+  throw InvalidArgument(file + ": is no report of `egosgm eval --json`: give --merge such reports");
+}
+
 /// The figures of all pairs of the reports, over all their pixels. Throws InvalidArgument and IoError.
 int merge(const EvalArguments& arguments) {
   Result result;
   DisparityCounts pooled;
+  std::set<std::filesystem::path> read;
   for (const std::string& file : arguments.reports) {
-    const Json report = parse_json(vision::read_file(file, kMaxReportBytes), file);
-    try {
-      for (const Json& pair : report.at("pairs")) {
-        DisparityCounts counts;
-        for_each_count(counts, [&](const char* name, auto& count) { pair.at("counts").at(name).get_to(count); });
-        result.each.push_back(vision::metrics_of(counts));
-        pooled += counts;
-      }
-    } catch (const Json::exception&) {
-      throw InvalidArgument(file + ": is no report of `egosgm eval --json`: give --merge such reports");
+    if (!read.insert(std::filesystem::weakly_canonical(file)).second) {
+      throw InvalidArgument("--merge " + file + ": is given twice, so that its pixels would count twice");
+    }
+    for (const DisparityCounts& counts : counts_of(file)) {
+      result.each.push_back(vision::metrics_of(counts));
+      pooled += counts;
     }
   }
   result.pooled = vision::metrics_of(pooled);
@@ -244,7 +270,7 @@ Command add_eval(CLI::App& program) {
       ->add_option("--merge", arguments->reports,
                    "pool what `egosgm eval --json` printed for several sequences, over all their pixels")
       ->type_name("REPORT...")
-      ->excludes("--estimate", "--truth", "ESTIMATE");
+      ->excludes("--estimate", "--truth", "ESTIMATE", "--frames", "--mask", "--scale", "--truth-scale");
   command->add_flag("--json", arguments->json, "print JSON");
   command->footer(
       "In percent of the pixels with truth (bad_of_valid: of those with an estimate too); bad: off by more than 3 px.\n"

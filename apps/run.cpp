@@ -189,7 +189,8 @@ class Run {
     }
     while (!under_way_.empty()) collect(progress);
     if (!quiet_) summary_ = fmt::format("{:.1f} frames/s", progress.frames_per_second());
-    if (!is_over && fed_ < sequence_.frames.size()) return false;
+    if (!is_over && poses_.size() + left_out_ < sequence_.frames.size())
+      return false;  // what was only read is not done
     if (2 * left_out_ > sequence_.frames.size()) throw InvalidArgument(text_of_left_out());
     return true;
   }

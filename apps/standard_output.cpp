@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <string_view>
 
 namespace egosgm::app {
 namespace {
@@ -15,10 +16,13 @@ constexpr std::size_t kBufferBytes = 1 << 20;
 
 int first_error = 0;
 
-void flush() {
-  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return;
-  if (first_error == 0) first_error = errno;
+void drop_what_follows(int error) {
+  if (first_error == 0) first_error = error;
   if (!std::freopen("/dev/null", "w", stdout)) std::clearerr(stdout);
+}
+
+void flush() {
+  if (std::fflush(stdout) != 0 || std::ferror(stdout)) drop_what_follows(errno);
 }
 
 }  // namespace
@@ -35,8 +39,15 @@ void open_standard_streams() {
 }
 
 void print_now(const std::string& text) {
-  std::fwrite(text.data(), 1, text.size(), stdout);
   flush();
+  for (std::string_view left = text; !left.empty();) {
+    const ssize_t written = ::write(STDOUT_FILENO, left.data(), left.size());
+    if (written >= 0) {
+      left.remove_prefix(static_cast<std::size_t>(written));
+    } else if (errno != EINTR) {  // PoCL's compiler takes signals in a way that breaks writes off
+      return drop_what_follows(errno);
+    }
+  }
 }
 
 void say(const std::string& line) { std::fputs((line + '\n').c_str(), stderr); }

@@ -85,10 +85,15 @@ class BagFeed : public app::Feed {
     return in_python([&]() -> std::optional<app::FedFrame> {
       for (;;) {
         const py::object found = bag_.call("next");
-        if (found.is_none()) return std::nullopt;
-        const int number = found.attr("number").cast<int>();
+        if (found.is_none()) {
+          if (has_given_) return std::nullopt;
+          throw InvalidArgument(
+              fmt::format("--frames: {} has {} frames, which begin with 0", sequence_.title, last_ + 1));
+        }
+        const int number = last_ = found.attr("number").cast<int>();
         if (number < range_.first.value_or(0)) continue;
         if (number > range_.last.value_or(number)) return std::nullopt;
+        has_given_ = true;
         app::FedFrame fed;
         fed.frame = frame_of(number);
         fed.images = {mat_of(found.attr("left"), "left"), mat_of(found.attr("right"), "right")};
@@ -103,7 +108,11 @@ class BagFeed : public app::Feed {
   }
 
   std::vector<std::string> notes() const override {
-    return in_python([&] { return bag_.call("notes").cast<std::vector<std::string>>(); });
+    return in_python([&] {
+      std::vector<std::string> notes;
+      for (const py::handle& note : bag_.call("notes")) notes.push_back(text_from(note));
+      return notes;
+    });
   }
 
  private:
@@ -119,6 +128,8 @@ class BagFeed : public app::Feed {
   const vision::FrameRange range_;
   std::filesystem::path out_;
   std::string poses_;
+  int last_ = -1;  // frame that the bag gave
+  bool has_given_ = false;
 };
 
 /// egosgm.bag_program.Outputs.
@@ -202,22 +213,26 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
                        const std::string& out) {
     return in_python([&]() -> std::shared_ptr<app::Feed> {
       py::dict values;
-      values["bag"] = given.bag;
-      values["left_topic"] = given.left_topic;
-      values["right_topic"] = given.right_topic;
-      values["info_topics"] = given.info_topics;
-      values["pose_topic"] = given.pose_topic;
-      values["pose_axes"] = given.pose_axes;
-      values["max_skew_ms"] = given.max_skew_ms;
-      values["rectify"] = given.rectify;
-      values["calib"] = calib;
-      values["out"] = out;
+      for (const auto& [name, value] : {std::pair{"bag", given.bag},
+                                        {"left_topic", given.left_topic},
+                                        {"right_topic", given.right_topic},
+                                        {"pose_topic", given.pose_topic},
+                                        {"pose_axes", given.pose_axes},
+                                        {"max_skew_ms", given.max_skew_ms},
+                                        {"rectify", given.rectify},
+                                        {"calib", calib},
+                                        {"out", out}}) {
+        values[name] = text_of(value);
+      }
+      py::list info_topics;
+      for (const std::string& topic : given.info_topics) info_topics.append(text_of(topic));
+      values["info_topics"] = info_topics;
       return std::make_shared<BagFeed>(package.attr("BagFeed")(**values), range, out);
     });
   };
   hooks.take = [&](const std::string& file, bool viewer) {
     return in_python([&]() -> std::shared_ptr<app::Taker> {
-      return std::make_shared<Outputs>(package.attr("Outputs")(file, viewer));
+      return std::make_shared<Outputs>(package.attr("Outputs")(text_of(file), viewer));
     });
   };
   hooks.read_calibration = reader_of(package.attr("read_calibration"));

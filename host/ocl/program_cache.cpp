@@ -22,7 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view kMagic = "EgoSGM program 1";
-constexpr std::size_t kDigits = 64;  // of a file's name
+constexpr std::size_t kDigits = 64;  // of a file's name, before its end, which no file of others has
+constexpr std::string_view kEnd = ".egosgm";
 
 /// Platforms whose drivers keep what they compiled on the disk: a second copy would bring nothing.
 bool keeps_programs(const std::string& platform) {
@@ -108,8 +109,8 @@ void write(const fs::path& path, std::string_view bytes) {
 }
 
 bool is_ours(const std::string& name) {
-  return name.size() >= kDigits && name.find_first_not_of("0123456789abcdef") >= kDigits &&
-         (name.size() == kDigits || name[kDigits] == '.');
+  return name.find_first_not_of("0123456789abcdef") == kDigits &&
+         std::string_view(name).substr(kDigits).starts_with(kEnd);
 }
 
 /// What stands before a binary: who it is and how to tell that it is whole.
@@ -144,7 +145,7 @@ ProgramCache::ProgramCache(fs::path folder, const cl::Device& device, std::uintm
     : folder_(std::move(folder)), identity_(identity_of(device)), max_bytes_(max_bytes) {}
 
 fs::path ProgramCache::file_of(const ProgramSource& source) const {
-  return folder_ / hex(sha256(identity_ + part(source.options) + part(source.text)));
+  return folder_ / hex(sha256(identity_ + part(source.options) + part(source.text))).append(kEnd);
 }
 
 cl::Program ProgramCache::built(const cl::Context& context, const cl::Device& device,
@@ -152,7 +153,7 @@ cl::Program ProgramCache::built(const cl::Context& context, const cl::Device& de
   const fs::path path = file_of(source);
   const std::string bytes = read(path, max_bytes_);
   const std::string_view binary = std::string_view(bytes).substr(std::min(bytes.size(), kMagic.size() + 2 * kDigits));
-  if (binary.empty() || !bytes.starts_with(header(path.filename().string(), binary))) return {};
+  if (binary.empty() || !bytes.starts_with(header(path.stem().string(), binary))) return {};
   try {
     const cl::Program program(context, {device}, {std::vector<unsigned char>(binary.begin(), binary.end())});
     const cl_int status = ::clBuildProgram(program(), 1, &device(), source.options.c_str(), nullptr, nullptr);
@@ -173,7 +174,7 @@ void ProgramCache::keep(const ProgramSource& source, const cl::Program& program)
   std::error_code none;
   if (folder_.has_parent_path()) fs::create_directories(folder_.parent_path(), none);
   ::mkdir(folder_.c_str(), 0700);
-  write(path, header(path.filename().string(), binary) + binary);
+  write(path, header(path.stem().string(), binary) + binary);
   make_room();
 }
 

@@ -87,7 +87,8 @@ class Outputs:
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """`egosgm run`. What the program prints and returns."""
-    return _egosgm._main(["run", *(sys.argv[1:] if arguments is None else arguments)], sys.modules[__name__])
+    words = ["run", *(sys.argv[1:] if arguments is None else arguments)]
+    return _egosgm._main([os.fsencode(word) for word in words], sys.modules[__name__])
 
 
 if __name__ == "__main__":

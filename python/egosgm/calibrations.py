@@ -3,8 +3,12 @@
 import configparser
 import contextlib
 import dataclasses
+<<<<<<< HEAD
 import gzip
 import io
+=======
+import functools
+>>>>>>> lanes
 import json
 import math
 import os
@@ -12,8 +16,12 @@ import pathlib
 import re
 import types
 import xml.etree.ElementTree as ElementTree
+<<<<<<< HEAD
 import zlib
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
+=======
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, TypeVar, Union
+>>>>>>> lanes
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +36,22 @@ _Matrix = NDArray[np.float64]
 _MOST_BYTES, _MOST_PARTS = 1 << 22, 2000
 Found = Union[StereoRig, _egosgm.Calibration]
 _Camera = Tuple[_Matrix, _Matrix, bool]  # matrix, distortion, whether that is a fisheye's
+_Reader = TypeVar("_Reader", bound=Callable[..., Any])
+
+
+def _with_words(reader: _Reader) -> _Reader:
+    """The reader, for which whatever a part of another kind than it should be raises is an InvalidArgument."""
+    @functools.wraps(reader)
+    def read(file: Any, *arguments: Any, **options: Any) -> Any:
+        try:
+            with np.errstate(all="ignore"):  # what comes of it is refused
+                return reader(file, *arguments, **options)
+        except (_egosgm.Error, OSError, ImportError):
+            raise
+        except Exception as error:
+            reason = str(error).partition("\n")[0] or type(error).__name__
+            raise _egosgm.InvalidArgument(f"{file}: is a calibration with a part that cannot be read ({reason}): was it edited or cut?") from error
+    return read  # type: ignore[return-value]
 
 
 def _without_rectification(rig: StereoRig) -> Optional[_egosgm.Calibration]:
@@ -558,6 +582,8 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
     if start.startswith(b"PK"):
         try:
             with np.load(file, allow_pickle=False) as archive:
+                if sum(part.file_size for part in archive.zip.infolist()) > _MOST_BYTES:
+                    raise _refuse(file, f"holds more than {_MOST_BYTES >> 20} MiB of arrays: give a calibration alone")
                 return _by_names({name: archive[name] for name in archive.files}, file, "an archive of NumPy arrays")
         except (ValueError, OSError) as error:
             raise _refuse(file, f"is no archive of NumPy arrays: {error}") from None
@@ -593,6 +619,7 @@ def _in_unit(rig: StereoRig, unit_m: float) -> StereoRig:
     return dataclasses.replace(rig, T=np.asarray(rig.T) * unit_m, given=given)
 
 
+@_with_words
 def read_opencv_rig(file: _Path, unit_m: float = 1.0, is_fisheye: bool = False) -> Optional[StereoRig]:
     """Reads OpenCV's stereo calibration (M1, D1, M2, D2, R, T; YAML, XML or JSON). unit_m: metres in a unit of T. None where the file is of another
     kind."""
@@ -615,6 +642,7 @@ def read_opencv_rig(file: _Path, unit_m: float = 1.0, is_fisheye: bool = False) 
     return _in_unit(found, unit_m) if isinstance(found, StereoRig) else None
 
 
+@_with_words
 def read_euroc_rig(mav0: _Path) -> StereoRig:
     """Reads cam0/sensor.yaml and cam1/sensor.yaml of an EuRoC sequence."""
     files = [pathlib.Path(mav0, camera, "sensor.yaml") for camera in ("cam0", "cam1")]
@@ -625,6 +653,7 @@ def read_euroc_rig(mav0: _Path) -> StereoRig:
     return _sensors(files, contents)
 
 
+@_with_words
 def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fisheye: bool = False, size: Optional[Tuple[int, int]] = None) -> Found:
     """The calibration of a file or a folder, of whichever program, or of a file for each camera: a Calibration of rectified images, or a rig of raw ones.
     unit_m: metres in a unit of the translation; None: 1, and a baseline that no rig has is refused. size: (width, height) of the images, for files that

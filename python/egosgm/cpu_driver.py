@@ -22,14 +22,14 @@ def vendors_with(library: str) -> pathlib.Path:
     """A folder of the user with what is registered in the system, and the library. Throws OSError."""
     folder = pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "egosgm/vendors"
     folder.mkdir(parents=True, exist_ok=True)
-    texts = {file.name: file.read_text() for file in _REGISTERED.glob("*.icd")}
+    texts = {file.name: os.fsdecode(file.read_bytes()) for file in _REGISTERED.glob("*.icd")}
     texts["egosgm_cpu.icd"] = library + "\n"
     for stale in folder.glob("*.icd"):
         if stale.name not in texts:
             stale.unlink(missing_ok=True)
     for name, text in texts.items():  # each appears whole, as other processes may read it
         part = folder / f"{name}.{os.getpid()}"
-        part.write_text(text)
+        part.write_bytes(os.fsencode(text))
         os.replace(part, folder / name)
     return folder
 

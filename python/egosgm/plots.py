@@ -2,14 +2,13 @@
 """Figures over frames, against density, and paths, drawn by matplotlib into .png and .svg files."""
 import io
 import math
-import os
 import pathlib
-import stat
 from typing import Any, List, Sequence, Tuple
 
 import numpy as np
 
 from . import _egosgm
+from .arguments import expect_new_file
 from .pose_evaluation import evaluate_poses, inverse
 from .video_evaluation import DensityFigures
 
@@ -21,12 +20,7 @@ def expect_plot(option: str, name: str) -> None:
     file = pathlib.Path(name)
     if file.suffix not in (".png", ".svg"):
         raise _egosgm.InvalidArgument(f"{option} {name}: the name must end in .png or .svg")
-    if file.is_dir():
-        raise _egosgm.InvalidArgument(f"{option} {name}: is a folder: give the name of a file")
-    if file.is_file():
-        raise _egosgm.InvalidArgument(f"{option} {name}: is there already: give another name, or remove it first")
-    if not os.access(file.parent, os.W_OK | os.X_OK):
-        raise _egosgm.IoError(f"{option} {name}: cannot be written: give a name in a folder that is there and can be written")
+    expect_new_file(option, file)
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError:
@@ -39,20 +33,7 @@ def write_plot(name: str, figure: Any) -> None:
     drawn = io.BytesIO()
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "egosgm"}):
         figure.savefig(drawn, format=pathlib.Path(name).suffix[1:], dpi=100, metadata={"Date": None} if name.endswith(".svg") else None)
-    is_stream = os.path.exists(name) and not stat.S_ISREG(os.stat(name).st_mode)
-    try:
-        with open(name, "wb" if is_stream else "xb") as file:
-            try:
-                file.write(drawn.getvalue())
-                file.flush()
-            except OSError:
-                if not is_stream:
-                    os.unlink(name)
-                raise
-    except FileExistsError:
-        raise _egosgm.IoError(f"{name}: has come there meanwhile, and stays") from None
-    except OSError as error:
-        raise _egosgm.IoError(f"{name}: cannot be written: {error.strerror}") from None
+    _egosgm._write_new_file(name, drawn.getvalue())
 
 
 def _chart(x_name: str, y_name: str, curves: Sequence[Tuple[str, Sequence[float], Sequence[float]]]) -> Any:

@@ -8,7 +8,12 @@ import pathlib
 import signal
 import sys
 import threading
+<<<<<<< HEAD
 from typing import Optional, Sequence, Tuple
+=======
+import traceback
+from typing import List, Optional, Sequence, Tuple
+>>>>>>> lanes
 
 from .arguments import say
 
@@ -24,6 +29,17 @@ def _module_of(arguments: Sequence[str]) -> Optional[str]:
     """The package's module whose main(arguments) does what is asked for; None where C++ does it."""
     tools = json.loads(pathlib.Path(__file__).with_name("tools.json").read_text())
     return tools[arguments[0]]["module"] if arguments and arguments[0] in tools else None
+
+
+def _open_standard_streams() -> None:
+    """A descriptor that is closed must not become a file's, which messages would go into: using it stays an error, as in the program in C++."""
+    for stream in (0, 1, 2):
+        try:
+            os.fstat(stream)
+        except OSError:
+            os.open(os.devnull, os.O_WRONLY if stream == 0 else os.O_RDONLY)  # takes the lowest that is free
+    if sys.stdout is None:
+        sys.stdout = os.fdopen(1, "w", closefd=False)
 
 
 def _print_any_name() -> None:
@@ -75,12 +91,19 @@ def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]
         return 1, f"error: {os.fsdecode(error.filename)}: {error.strerror}: choose another one" if error.filename else f"error: {error}"
     except KeyboardInterrupt:
         return 130, "interrupted"
+    except MemoryError:
+        return 1, "error: out of memory: choose smaller images or fewer of them"
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        return 1, (f"error: {type(error).__name__}: {error} ({pathlib.Path(place.filename).name}:{place.lineno}; this is a defect of the program: "
+                   "please report it)")
 
 
 def run_tool(arguments: Sequence[str]) -> int:
     """Runs a command, and returns its exit code. Never calls the C++ program."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
+    _open_standard_streams()
     _print_any_name()
     code, told = _outcome(arguments, _module_of(arguments))
     error = _output_error()

@@ -31,6 +31,7 @@ class RerunOutput:
         else:
             self._recording.save(file)
         self._world_from_camera = np.eye(4)
+        self._last_motion: Optional[np.ndarray] = None
         self._log("camera", rerun.ViewCoordinates.RDF, static=True)
         self._log("camera/image/reason", rerun.AnnotationContext([(i, name) for i, name in enumerate(_egosgm.REASONS)]), static=True)
 
@@ -43,8 +44,10 @@ class RerunOutput:
         self._recording.set_time("frame", sequence=frame.number)
         if hasattr(frame, "stamp_ns"):
             self._recording.set_time("time", timestamp=np.datetime64(frame.stamp_ns, "ns"))
-        if motion is not None:
-            self._world_from_camera = self._world_from_camera @ np.linalg.inv(getattr(motion, "current_from_previous", motion))
+        if motion is not None or getattr(frame, "starts_anew", False):
+            self._last_motion = getattr(motion, "current_from_previous", motion)
+        if self._last_motion is not None:  # where none was found, the last one is repeated
+            self._world_from_camera = self._world_from_camera @ np.linalg.inv(self._last_motion)
         height, width = frame.left.shape
         depth, variance = depth_maps(maps.disparity, maps.variance, calibration)
         self._log("camera", rerun.Transform3D(translation=self._world_from_camera[:3, 3], mat3x3=self._world_from_camera[:3, :3]))

@@ -7,9 +7,10 @@ import sys
 import unittest
 
 import numpy as np
-from program_case import FRAMES, HEIGHT, PROGRAM, SOURCE, WIDTH, ProgramTest
+from program_case import FRAMES, HAS_PACKAGE, HEIGHT, PROGRAM, SOURCE, WIDTH, ProgramTest
 
 
+@unittest.skipUnless(HAS_PACKAGE, "built without the Python package")
 class Evidence(ProgramTest):
     @classmethod
     def setUpClass(cls):

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import unittest
 
-from program_case import PROGRAM, SOURCE, ProgramTest, egosgm
+from program_case import HAS_PACKAGE, PROGRAM, SOURCE, ProgramTest, egosgm
 
 COMMANDS = ("run", "eval", "devices", "compile", "synth", "odometry", "eval-video", "eval-poses", "tune", "report", "doctor", "rectify", "calibrate")
 
@@ -73,7 +73,7 @@ class Help(ProgramTest):
         folder = self.new_folder()
         for name in ("egosgm.py", "numpy.py", "json.py"):
             (folder / name).write_text("raise SystemExit(77)")
-        if not (pathlib.Path(PROGRAM).parents[1] / "python/egosgm/program.py").exists():
+        if not HAS_PACKAGE:
             self.skipTest("built without the Python package")
         self.assert_refused(["run", "--bag"], "--bag: 1 required BAG missing", cwd=folder)
         self.assertIn("--left-topic", self.assert_works("run", "--bag=x", "--help", cwd=folder))

@@ -164,8 +164,12 @@ class ManySequences(ProgramTest):
         self.assertAlmostEqual(merged["pooled"]["bad_or_missing"], bad / pixels, places=9)
         self.assertEqual(json.loads(self.assert_works("eval", "--merge", reports[0], "--json"))["pooled"], json.loads(reports[0].read_text())["pooled"])
         self.assertIn("pooled", self.assert_works("eval", "--merge", *reports))
-        (out / "no.json").write_text('{"pairs": [{}]}')
-        self.assert_refused(["eval", "--merge", out / "no.json"], "no.json", "egosgm eval --json")
+        text = reports[0].read_text()
+        for broken in ('{"pairs": [{}]}', '{"pairs": []}', *(re.sub(r'"truth": \d+', f'"truth": {count}', text) for count in ("-5", "1.5", "1e300", "true"))):
+            (out / "no.json").write_text(broken)
+            self.assert_refused(["eval", "--merge", reports[1], out / "no.json"], "no.json", "egosgm eval --json")
+        self.assert_refused(["eval", "--merge", reports[0], out / f"../{out.name}/0.json"], "0.json", "is given twice")
+        self.assert_refused(["eval", "--merge", reports[0], "--mask", reports[1]], "--merge")
         self.assert_refused(["eval", out / "street-0", "--merge", reports[0]], "--merge")
 
     def test_a_range_beyond_kittis_png_loses_nothing(self):

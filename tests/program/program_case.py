@@ -35,6 +35,7 @@ def without_waiting(errors):
 
 PACKAGE = pathlib.Path(PROGRAM).parents[1] / "python"  # beside the program, where it was built with it
 TOOLS = json.loads((SOURCE / "python/egosgm/tools.json").read_text()) if (PACKAGE / "egosgm/program.py").exists() else {}
+HAS_PACKAGE = bool(TOOLS)  # not in builds with a sanitizer
 
 
 def in_this_process(arguments, cwd):

@@ -6,9 +6,10 @@ import resource
 import shutil
 import signal
 import subprocess
+import time
 import unittest
 
-from program_case import FRAMES, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png, without_waiting
+from program_case import FRAMES, HAS_PACKAGE, HEIGHT, PROGRAM, WIDTH, ProgramTest, egosgm, grey_png, without_waiting
 
 
 class LongRuns(ProgramTest):
@@ -29,9 +30,9 @@ class LongRuns(ProgramTest):
         """A sequence that takes a while."""
         return self.street_of(self.LONG)
 
-    def start(self, street, out, *arguments, lines=1):
-        """A run that has reported `lines` frames."""
-        return self.started("run", "--odometry", street, "--out", out, *arguments, lines=lines)
+    def start(self, street, out, *arguments, **options):
+        """A run that has reported `lines` frames, one without a word."""
+        return self.started("run", "--odometry", street, "--out", out, *arguments, **options)
 
 
 class Disk(LongRuns):
@@ -65,6 +66,22 @@ class Disk(LongRuns):
             self.assertFalse(report["finished"])
             self.assertTrue(1 <= len(report["frames"]) < self.LONG)
             self.assertEqual(len((out / "poses.txt").read_text().splitlines()), len(report["frames"]))
+
+    def test_an_interrupt_loses_no_frame_that_was_only_read(self):
+        """On a GPU the next frame is read while this one is told of; here by a layer that names the device so. The interrupt breaks off a write to
+        a reader that waits, once a compiler has run, as here with an empty cache."""
+        frames, out = FRAMES + 1, self.new_folder()
+        gpu = dict(os.environ, OPENCL_LAYERS=os.environ["EGOSGM_GPU_LAYER"], POCL_CACHE_DIR=str(self.new_folder()))
+        process = self.start(self.street_of(frames), out, "--disparities", 16, env=gpu)
+        while not (out / "disparity/000002.png").exists():  # after which its line finds no room
+            self.assertIsNone(process.poll())
+            time.sleep(0.01)
+        time.sleep(0.2)  # until it waits, which a busy machine may do later: then there is less to see
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=600)
+        self.assertEqual(process.returncode, 130, errors)
+        report = self.report(out)
+        self.assertEqual((report["finished"], len(report["frames"]), report["device"]["type"]), (False, frames - 1, "GPU"))
 
     def test_a_kill_leaves_only_whole_files(self):
         street = self.long_street()
@@ -135,10 +152,11 @@ class Disk(LongRuns):
         self.assertEqual(len((folder / "poses.txt").read_text().splitlines()), FRAMES)
         self.assertEqual(self.cut_short("synth", "--out", folder / "synth", "--frames", 3, "--width", 64, "--height", 48), (0, ""))
         self.assertTrue((folder / "synth/poses.txt").exists())
-        self.assertEqual(self.cut_short("rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib",
-                                        street / "calib.txt", "--out", folder / "rectified"), (0, ""))
-        self.assertEqual(len(list((folder / "rectified/image_0").iterdir())), FRAMES)
-        self.assertTrue((folder / "rectified/calib.txt").exists())
+        if HAS_PACKAGE:
+            self.assertEqual(self.cut_short("rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib",
+                                            street / "calib.txt", "--out", folder / "rectified"), (0, ""))
+            self.assertEqual(len(list((folder / "rectified/image_0").iterdir())), FRAMES)
+            self.assertTrue((folder / "rectified/calib.txt").exists())
         for command in (["eval", "--estimate", out, "--truth", self.street / "truth/left_disp_noc"], ["run", "--help"], ["devices"]):
             self.assertEqual(self.cut_short(*command, lines=0), (0, ""))
 

@@ -6,7 +6,7 @@ import signal
 import subprocess
 import unittest
 
-from program_case import FEW_KERNELS, PROGRAM, ProgramTest
+from program_case import FEW_KERNELS, HAS_PACKAGE, PROGRAM, ProgramTest
 
 
 @contextlib.contextmanager
@@ -45,8 +45,8 @@ class StandardError(ProgramTest):
 
     def test_an_interrupt_is_told_by_the_code(self):
         street = self.street
-        for arguments in (["run", "--odometry", street, "--disparities", 16, "--out"], ["odometry", street, "--out"],
-                          ["rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib", street / "calib.txt", "--out"]):
+        rectify = ["rectify", "--left", f"{street}/image_0/*.png", "--right", f"{street}/image_1/*.png", "--calib", street / "calib.txt", "--out"]
+        for arguments in (["run", "--odometry", street, "--disparities", 16, "--out"], ["odometry", street, "--out"], *[rectify] * HAS_PACKAGE):
             with ended_pipe() as ended:
                 process = self.started(*arguments, self.new_folder() / "out", stderr=ended)
             process.send_signal(signal.SIGINT)

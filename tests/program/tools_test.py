@@ -10,9 +10,8 @@ import subprocess
 import sys
 import unittest
 
-from program_case import FRAMES, PROGRAM, ProgramTest, egosgm
+from program_case import FRAMES, HAS_PACKAGE, PROGRAM, ProgramTest, egosgm
 
-HAS_PACKAGE = (pathlib.Path(PROGRAM).parents[1] / "python/egosgm/program.py").exists()
 ODD = "b\udcff\n"  # a name of Latin-1, and of two lines
 
 
@@ -102,6 +101,15 @@ class Tools(ProgramTest):
                 os.close(writing)
                 self.assertEqual((done.returncode, done.stderr.count("\n")), (code, code), f"{arguments}: {done.stderr}")
                 self.assertIn(named, done.stderr)
+
+    def test_a_standard_output_that_is_closed_becomes_no_file(self):
+        out, folder = self.odd(self.out, "run"), self.new_folder()
+        calib = ["--calib", self.street / "calib.txt"]
+        rectify = ["rectify", "--left", self.street / "image_0/*.png", "--right", self.street / "image_1/*.png", *calib, "--out", folder / "new", "--quiet"]
+        for arguments, code in ((["eval-poses", out, self.street], 1), (["cloud", out], 1), (["report", "--help"], 1), (rectify, 0)):
+            done = subprocess.run(["sh", "-c", 'exec "$@" >&- <&-', "sh", PROGRAM, *map(str, arguments)], stderr=subprocess.PIPE, text=True, timeout=600)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (code, code), f"{arguments}: {done.stderr}")
+            self.assertIn("the standard output cannot be written: Bad file descriptor" if code else "", done.stderr)
 
 
 @unittest.skipUnless(HAS_PACKAGE, "built without the Python package")

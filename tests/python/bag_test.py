@@ -100,7 +100,7 @@ def record(kind, path, street, frames, skew_ns=0, left_out=(), times=None, **inf
 
 def program(*arguments):
     """`egosgm run`."""
-    return subprocess.run([sys.executable, "-B", "-m", "egosgm.bag_program", *map(str, arguments)], capture_output=True, text=True, timeout=300)
+    return subprocess.run([sys.executable, "-B", "-m", "egosgm.bag_program", *map(str, arguments)], capture_output=True, text=True, errors="replace", timeout=300)
 
 
 @pytest.mark.parametrize("kind, name", [("mcap", "drive"), ("sqlite", "drive"), ("ros1", "drive.bag")])
@@ -343,11 +343,27 @@ def test_a_folder_is_that_of_any_run(tmp_path, street, frames, street_folder, ca
     refused(capfd, [*given, "--resume", "--set", "p2=99"], "p2")
 
 
+def test_names_that_are_no_text(tmp_path, street, frames, capfd):
+    """Of the bag, of a part that cannot be read, and of the output."""
+    whole = record("mcap", tmp_path / "drive", street, frames).read_bytes()
+    folder, odd = tmp_path / "b\udcff\n", "o\udcff\n"
+    folder.mkdir()
+    (folder / "a.mcap").write_bytes(whole)
+    (folder / "\udcff.mcap").write_bytes(b"nothing")
+    for out in (odd, odd + ".mcap"):
+        assert program("--bag", folder, *TOPICS, *SET, "--out", tmp_path / out).returncode == 0
+        assert (tmp_path / out).exists()
+    assert "1 of 2 parts cannot be read" in json.loads((tmp_path / odd / "report.json").read_text())["notes"][0]
+
+
 def test_some_frames_of_a_bag(tmp_path, street, frames, capfd):
     bag = record("mcap", tmp_path / "drive", street, frames)
     assert "2 frames" in told_of(capfd, bag, "--frames", "1:2")
     assert "1 frame," in told_of(capfd, bag, "--frames", ":0")
     refused(capfd, ["--bag", bag, *TOPICS, *SET, "--frames", "3:"], f"at most {FRAMES} frames")
+    lost = record("mcap", tmp_path / "lost", street, [*frames, frames[0]], left_out=[(1, "right"), (2, "left")])  # three images a side, two pairs
+    refused(capfd, ["--bag", lost, *TOPICS, *SET, "--frames", "2:", "--out", tmp_path / "out"], "--frames", "has 2 frames")
+    assert not json.loads((tmp_path / "out/report.json").read_text())["finished"]
 
 
 @pytest.mark.parametrize("arguments, named", [

@@ -1,7 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations of other programs: one rig, written as each of them does."""
+<<<<<<< HEAD
 import gzip
 import json
+=======
+import contextlib
+import json
+import os
+import random
+import re
+>>>>>>> lanes
 
 import numpy as np
 import pytest
@@ -198,6 +206,9 @@ def test_arrays_of_numpy(tmp_path):
                   rot_mat=np.eye(3), trans_vec=np.array([[-B], [0], [0]]))
     np.savez(tmp_path / "all.npz", **arrays)
     expect_raw(egosgm.read_calibration(tmp_path / "all.npz"))
+    np.savez_compressed(tmp_path / "large.npz", M1=np.zeros(1 << 20))
+    with pytest.raises(egosgm.InvalidArgument, match="large.npz: holds more than 4 MiB"):
+        egosgm.read_calibration(tmp_path / "large.npz")
     folder = tmp_path / "arrays"
     folder.mkdir()
     for name, array in arrays.items():
@@ -230,6 +241,30 @@ def test_what_is_known_and_not_enough_is_named(text, named, tmp_path):
     with pytest.raises(egosgm.InvalidArgument) as refused:
         egosgm.read_calibration(tmp_path / "calib.yaml")
     assert named in str(refused.value)
+
+
+ODD = ("", "nan", "1e400", "[]", "{}", "x", "null", "true", "0", "[[1], [2, 3]]", "{a: 1}", '"a"', "9" * 30)
+
+
+def broken(text, rng):
+    """With a word or a list of it replaced by something odd, or with a line less."""
+    parts = list(re.finditer(rng.choice((r"[-\w.+]+", r"[\[{][^\[\]{}]*[\]}]")), text))
+    if rng.random() < 0.1 or not parts:
+        lines = text.splitlines(True)
+        del lines[rng.randrange(len(lines))]
+        return "".join(lines)
+    part = rng.choice(parts)
+    return text[:part.start()] + rng.choice(ODD) + text[part.end():]
+
+
+def test_what_was_edited_is_read_or_refused(tmp_path):
+    zed = "".join(f"[{side}_CAM_VGA]\nfx={F}\nfy={F}\ncx={CX}\ncy={CY}\nk1=0\n" for side in ("LEFT", "RIGHT")) + "[STEREO]\nBaseline=120\nRX_VGA=0.01\n"
+    rng = random.Random(1)
+    for name, text in {**RECTIFIED, **RAW, "zed.conf": zed}.items():
+        for _ in range(40):
+            (tmp_path / name).write_text(broken(text, rng))
+            with contextlib.suppress(egosgm.InvalidArgument):
+                egosgm.read_calibration(tmp_path / name, size=(672, 376))
 
 
 def test_units_are_never_guessed(tmp_path):

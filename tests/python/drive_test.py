@@ -11,12 +11,13 @@ import pickle
 import re
 import sys
 import types
+import unittest.mock
 
 import numpy as np
 import pytest
 
 import egosgm
-from egosgm import bag_program, cpu_driver, points, ros_images
+from egosgm import bag_program, cpu_driver, points, ros_images, viewer
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -458,3 +459,13 @@ def test_a_cloud_keeps_the_reasons_that_were_chosen():
                         (lambda: egosgm.write_ply("x.ply", [1, 2, 3]), "N x 3")):
         with pytest.raises(egosgm.InvalidArgument, match=named):
             call()
+
+
+def test_the_viewer_repeats_the_last_motion_where_none_was_found(street, frames, monkeypatch):
+    monkeypatch.setitem(sys.modules, "rerun", unittest.mock.MagicMock())
+    output, ahead = viewer.RerunOutput(), np.eye(4)
+    ahead[2, 3] = -1
+    frame = next(iter(egosgm.run([(frames[0].left, frames[0].right)], street.calibration, progress=False, **OPTIONS)))
+    for motion in (None, ahead, None):
+        output.add(frame, frame.maps, motion, frame.calibration)
+    assert output._world_from_camera[2, 3] == 2

@@ -4,6 +4,8 @@ import ast
 import importlib.util
 import inspect
 import pathlib
+import re
+import signal
 import subprocess
 import sys
 import threading
@@ -13,6 +15,7 @@ import numpy as np
 import pytest
 
 import egosgm
+from egosgm import cloud, program
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 WIDTH, HEIGHT, FRAMES = 160, 64, 3
@@ -368,3 +371,13 @@ def test_the_dynamic_map_finds_what_moves():
     assert (marked == (result.dynamic > 0)).all()
     assert marked[moving].mean() > 0.5
     assert marked[~moving].mean() < 0.05
+
+
+def test_a_defect_of_a_tool_is_told_in_one_line(monkeypatch, capfd):
+    def broken(arguments):
+        raise RuntimeError("one\ntwo")
+
+    monkeypatch.setattr(cloud, "main", broken)
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+    assert program.run_tool(["cloud"]) == 1
+    assert re.fullmatch(r"egosgm: error: RuntimeError: one two \(egosgm_test.py:\d+; this is a defect of the program: please report it\)\n", capfd.readouterr().err)

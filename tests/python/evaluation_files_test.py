@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What eval-video and eval-poses read and draw."""
+import os
 import struct
 
 import egosgm
@@ -101,6 +102,10 @@ def test_a_plot_replaces_no_file(tmp_path):
     with pytest.raises(egosgm.IoError, match="has come there meanwhile"):
         plots.write_plot(str(tmp_path / "mine.svg"), plots.paths(corner(1, 1), corner(1, 1)))
     assert (tmp_path / "mine.svg").read_text() == "mine"
+    os.mkfifo(tmp_path / "pipe.svg")  # nobody reads it
+    with pytest.raises(egosgm.Error, match="pipe"):
+        plots.expect_plot("--plot", str(tmp_path / "pipe.svg"))
+        plots.write_plot(str(tmp_path / "pipe.svg"), plots.paths(corner(1, 1), corner(1, 1)))
 
 
 def test_without_matplotlib_its_package_is_named(tmp_path, monkeypatch):

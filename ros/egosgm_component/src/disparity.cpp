@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
@@ -98,8 +99,11 @@ class Disparity : public rclcpp::Node {
     const std::int64_t stamp = rclcpp::Time(image->header.stamp).nanoseconds();
     const auto partner = waiting_[1 - side].find(stamp);
     if (partner == waiting_[1 - side].end()) {
-      waiting_[side].emplace(stamp, std::move(image));
-      if (waiting_[side].size() > kMostWaiting) waiting_[side].erase(waiting_[side].begin());
+      auto& waiting = waiting_[side];
+      const auto place = waiting.emplace(stamp, std::move(image)).first;
+      if (waiting.size() > kMostWaiting) {  // a recording that starts over brings what is before all that waits
+        waiting.erase(place == waiting.begin() ? std::prev(waiting.end()) : waiting.begin());
+      }
       return;
     }
     const Image::ConstSharedPtr other = partner->second;
