@@ -189,10 +189,12 @@ static inline int least_evidence(const int evidence, const int2 part) {
   return part.y > EGOSGM_EVIDENCE_LEAST_COUNT ? min(evidence, mean_evidence(part)) : evidence;
 }
 
-// Whether the block dx and dy beside one is alike, by its code (census.cl).
-static inline int is_alike(const Code code, const int dx, const int dy) {
-  const int place = (dy + 3) * 9 + dx + 4;
-  return place == 31 ? 1 : (int)(code >> (place < 31 ? 61 - place : 62 - place)) & 1;
+// Which of the five blocks around the one dy below a block are alike, by its code (census.cl): the leftmost has the
+// highest bit.
+static inline int alike_in_row(const Code code, const int dy) {
+  if (dy == 0) return (int)(code >> 31 & 3) << 3 | 4 | (int)(code >> 29 & 3);
+  const int last = (dy + 3) * 9 + 6;
+  return (int)(code >> (dy < 0 ? 61 - last : 62 - last)) & 31;
 }
 
 // The evidence of each block: the least of the means over a window of blocks that are alike and over its four halves,
@@ -213,11 +215,12 @@ COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int
     for (int v = max(at.y - radius, 0); v <= min(at.y + radius, blocks.height - 1); ++v) {
       global const int2* of_row = (global const int2*)sums + ((size_t)at.view * blocks.height + v) * blocks.width;
       int2 of_left = 0, of_right = 0;
-      for (int u = max(x - radius, 0); u < x; ++u) of_left += of_row[u] * is_alike(code, u - x, v - at.y);
+      const int alike_here = alike_in_row(code, v - at.y);
+      for (int u = max(x - radius, 0); u < x; ++u) of_left += of_row[u] * (alike_here >> (x + radius - u) & 1);
       for (int u = x + 1; u <= min(x + radius, blocks.width - 1); ++u) {
-        of_right += of_row[u] * is_alike(code, u - x, v - at.y);
+        of_right += of_row[u] * (alike_here >> (x + radius - u) & 1);
       }
-      const int2 of_column = of_row[x] * is_alike(code, 0, v - at.y);
+      const int2 of_column = of_row[x] * (alike_here >> radius & 1);
       left += of_left;
       middle += of_column;
       right += of_right;
