@@ -3,12 +3,9 @@
 import configparser
 import contextlib
 import dataclasses
-<<<<<<< HEAD
+import functools
 import gzip
 import io
-=======
-import functools
->>>>>>> lanes
 import json
 import math
 import os
@@ -16,12 +13,8 @@ import pathlib
 import re
 import types
 import xml.etree.ElementTree as ElementTree
-<<<<<<< HEAD
 import zlib
-from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
-=======
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, TypeVar, Union
->>>>>>> lanes
 
 import numpy as np
 from numpy.typing import NDArray

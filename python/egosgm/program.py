@@ -8,12 +8,8 @@ import pathlib
 import signal
 import sys
 import threading
-<<<<<<< HEAD
-from typing import Optional, Sequence, Tuple
-=======
 import traceback
-from typing import List, Optional, Sequence, Tuple
->>>>>>> lanes
+from typing import Optional, Sequence, Tuple
 
 from .arguments import say
 

@@ -1,15 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations of other programs: one rig, written as each of them does."""
-<<<<<<< HEAD
+import contextlib
 import gzip
 import json
-=======
-import contextlib
-import json
-import os
 import random
 import re
->>>>>>> lanes
 
 import numpy as np
 import pytest
