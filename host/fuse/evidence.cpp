@@ -31,9 +31,8 @@ Evidence::Evidence(ocl::Context& context, shared::ImageSize size, const MethodOp
       padding_(BandedSgm::code_padding(range_of(options))),
       coarse_padding_(BandedSgm::code_padding(CoarseMatch::coarse_range(range_of(options)))),
       coarse_census_(context, coarse_, PixelType::kU16, MatchingCost::kCensus9x7, coarse_padding_, pixels),
-      coarse_alike_(Census::of_alike(context, coarse_, pixels)),
       coarse_codes_(context, Census::words(MatchingCost::kCensus9x7, coarse_, coarse_padding_)),
-      alike_(context, Census::words(MatchingCost::kCensus9x7, coarse_, 0)),
+      alike_(context, Census::words(MatchingCost::kCensus9x7, coarse_, coarse_padding_)),
       sums_(context, 2 * pixel_count(coarse_)),
       compare_(stage_, "compare"),
       gather_(stage_, "gather_evidence"),
@@ -44,13 +43,13 @@ void Evidence::operator()(const ocl::Buffer<cl_uint>& codes, const CoarseView* c
   const ocl::Context::Within within(stage_.enter(), "Evidence");
   if (coarse) {
     coarse_census_.encode(coarse->images, coarse_codes_);
-    coarse_alike_.encode(coarse->images, alike_);
+    coarse_census_.encode_alike(coarse->images, alike_);
   }
   const ocl::Range each = ocl::every_pixels(stage_.enter(), coarse_, stage_.pixels(), count(views));
   stage_.launch(compare_, each, stage_.size(), gate_px_, padding_, codes, coarse != nullptr, coarse_padding_,
                 coarse_codes_, alike_, predicted, measured, sums_);
-  stage_.launch(gather_, each, stage_.size(), coarse != nullptr, coarse ? coarse->disparity : blocks.found, alike_,
-                sums_, blocks.evidence, blocks.found);
+  stage_.launch(gather_, each, stage_.size(), coarse != nullptr, coarse_padding_,
+                coarse ? coarse->disparity : blocks.found, alike_, sums_, blocks.evidence, blocks.found);
 }
 
 void Evidence::begin(FlagMap& evidence) { evidence.fill(stage_.enter(), EGOSGM_EVIDENCE_TRUSTED); }

@@ -50,13 +50,15 @@ class Evidence {
   const shared::ImageSize coarse_;
   const float gate_px_;
   const cl_int padding_, coarse_padding_;
-  Census coarse_census_, coarse_alike_;
+  Census coarse_census_;
   ocl::Buffer<cl_uint> coarse_codes_, alike_;
   Sums sums_;
   ocl::Kernel<const shared::ImageSize, const float, const cl_int, Words, const cl_int, const cl_int, Words, Words,
               const Map, const Map, Sums>
       compare_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const Map, Words, const Sums, ocl::Buffer<cl_int>, Map> gather_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const Map, Words, const Sums, ocl::Buffer<cl_int>,
+              Map>
+      gather_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const Map, const FlagMap, Map> publish_;
 };
 

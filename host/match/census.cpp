@@ -24,9 +24,10 @@ Comparisons comparisons(MatchingCost cost) {
   return {};
 }
 
-ocl::Defines defines(PixelType type, const Comparisons& chosen, int words) {
+ocl::Defines defines(PixelType type, MatchingCost cost, int words) {
+  const Comparisons chosen = comparisons(cost);
   return pixel_define(type)
-      .set("CODE_BYTES", 4 * words)
+      .set("CODE_BYTES", 4 * std::max(words, Census::words(cost)))
       .set("COMPARISONS", chosen.kind)
       .set("RADIUS_X", chosen.radius_x)
       .set("RADIUS_Y", chosen.radius_y);
@@ -36,21 +37,16 @@ ocl::Defines defines(PixelType type, const Comparisons& chosen, int words) {
 
 Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding,
                int pixels, int words)
-    : Census(context, size, padding, pixels, defines(type, comparisons(cost), std::max(words, Census::words(cost)))) {}
+    : stage_(context, "Census", "census.cl", size, pixels, defines(type, cost, words)),
+      padding_(padding),
+      census_(stage_, "census") {}
 
-Census::Census(ocl::Context& context, shared::ImageSize size, int padding, int pixels, const ocl::Defines& defines)
-    : stage_(context, "Census", "census.cl", size, pixels, defines), padding_(padding), census_(stage_, "census") {}
-
-Census Census::of_alike(ocl::Context& context, shared::ImageSize size, int pixels) {
-  return {context, size, 0, pixels, defines(PixelType::kU16, {3, 4, 3}, 2)};
-}
-
-void Census::encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) {
+void Census::encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, bool alike) {
   const shared::ImageSize size = stage_.size();
   ocl::Context& context = stage_.enter();
   const ocl::Range range = stage_.pixels() == 1 ? ocl::every_pixel(context, {size.width + 2 * padding_, size.height})
                                                 : ocl::every_row(context, size);
-  census_(context, range, size, padding_, images, codes);
+  census_(context, range, size, padding_, alike, images, codes);
 }
 
 }  // namespace egosgm

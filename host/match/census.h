@@ -19,11 +19,10 @@ class Census {
   Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding, int pixels = 0,
          int words = 0);
 
-  /// A code of 9x7 pixels says which are alike (COMPARISONS 3), of images of 16 bits; no padding.
-  static Census of_alike(ocl::Context& context, shared::ImageSize size, int pixels = 0);
-
   /// `images`: both views' pixels, the left view first, without gaps.
-  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes);
+  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) { encode(images, codes, false); }
+  /// Which pixels of each window are about as bright as its centre. REQUIRES: the census of 9x7 of 16 bits.
+  void encode_alike(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes) { encode(images, codes, true); }
 
   /// 32-bit words of a code, and of all codes.
   static int words(MatchingCost cost) {
@@ -34,10 +33,11 @@ class Census {
            std::max(code_words, words(cost));
   }
 
-  using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>>;
+  using Kernel = ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const ocl::Buffer<cl_uchar>,
+                             ocl::Buffer<cl_uint>>;
 
  private:
-  Census(ocl::Context& context, shared::ImageSize size, int padding, int pixels, const ocl::Defines& defines);
+  void encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, bool alike);
 
   ocl::Stage stage_;
   const cl_int padding_;

@@ -130,7 +130,7 @@ COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const fl
   const int y = at.y * EGOSGM_COARSE, end = min(y + EGOSGM_COARSE, size.height);
   const size_t first = (size_t)view * size.height;
   const CodeRows coarse = code_rows(coarse_codes, blocks, coarse_padding, view, at.y);
-  const CodeRows alike_row = code_rows(alike, blocks, 0, view, at.y);
+  const CodeRows alike_row = code_rows(alike, blocks, coarse_padding, view, at.y);
   const int middle = y + EGOSGM_COARSE / 2 < size.height ? y + EGOSGM_COARSE / 2 : y;
   global EvidenceSum* row = sums + ((size_t)view * blocks.height + at.y) * blocks.width;
 #if PIXELS == 1
@@ -200,15 +200,15 @@ static inline int alike_in_row(const Code code, const int dy) {
 // The evidence of each block: the least of the means over a window of blocks that are alike and over its four halves,
 // so that a plain place beside a textured one has none. `found`: the disparity that the coarse match found there [px];
 // rows of both have EGOSGM_EVIDENCE_STRIDE places.
-COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int has_coarse, global const float* coarse,
-                              global const uint* alike, global const EvidenceSum* sums, global int* evidence,
-                              global float* found) {
+COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int has_coarse, const int coarse_padding,
+                              global const float* coarse, global const uint* alike, global const EvidenceSum* sums,
+                              global int* evidence, global float* found) {
   const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
                             (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
   const int radius = EGOSGM_EVIDENCE_RADIUS;
   const size_t row = (size_t)at.view * blocks.height + at.y;
   const int stride = EGOSGM_EVIDENCE_STRIDE(size.width);
-  const CodeRows alike_row = code_rows(alike, blocks, 0, at.view, at.y);
+  const CodeRows alike_row = code_rows(alike, blocks, coarse_padding, at.view, at.y);
   for (int x = at.x; x < blocks.width; x += at.items) {
     const Code code = has_coarse ? alike_row.own[own_place(&alike_row, x)] : ~(Code)0;
     int2 left = 0, middle = 0, right = 0, above = 0, below = 0, here = 0;
@@ -241,10 +241,10 @@ COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int
   }
 }
 
-KERNEL void gather_evidence(const ImageSize size, const int has_coarse, global const float* coarse,
-                            global const uint* alike, global const EvidenceSum* sums, global int* evidence,
-                            global float* found) {
-  gather_row(THIS_WORK_ITEM, size, has_coarse, coarse, alike, sums, evidence, found);
+KERNEL void gather_evidence(const ImageSize size, const int has_coarse, const int coarse_padding,
+                            global const float* coarse, global const uint* alike, global const EvidenceSum* sums,
+                            global int* evidence, global float* found) {
+  gather_row(THIS_WORK_ITEM, size, has_coarse, coarse_padding, coarse, alike, sums, evidence, found);
 }
 
 // What is given out of a belief: what has much evidence, and what has little where confirmed pixels around lie on the

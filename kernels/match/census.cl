@@ -3,7 +3,9 @@
 // - Census transform (Zabih and Woodfill 1994): every pixel of the window, row by row, against the centre.
 // - Learned: a census of 5x5, and sums of 3x3 grey values at two places of a 7x7 window against each other, with a
 //   threshold (EGOSGM_LEARNED7X7).
-// - Alike: which pixels of a census window are about as bright as its centre, so that they may lie on its surface.
+// - Alike, in place of the census of 9x7 where it is asked for, of grey values of 16 bits: which pixels of the window
+// are
+//   about as bright as its centre, so that they may lie on its surface.
 // - The grey value itself (8 bits), for sums of absolute differences.
 // Pixels outside the image are those of its border.
 //
@@ -18,8 +20,7 @@
 // lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=1
 // lint: PIXEL_BYTES=1 CODE_BYTES=8 COMPARISONS=2 RADIUS_X=4 RADIUS_Y=4 PIXELS=16
-// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=3 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
-// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=3 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
+// lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=16
 // lint: PIXEL_BYTES=1 CODE_BYTES=4 COMPARISONS=0 RADIUS_X=1 RADIUS_Y=1 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=8 COMPARISONS=1 RADIUS_X=4 RADIUS_Y=3 PIXELS=1
 // lint: PIXEL_BYTES=2 CODE_BYTES=4 COMPARISONS=1 RADIUS_X=2 RADIUS_Y=2 PIXELS=16
@@ -32,7 +33,7 @@
 #error "PIXELS: of a work-item, 1 or 16"
 #endif
 #ifndef COMPARISONS
-#error "COMPARISONS: 0 for the grey value, 1 for a census window, 2 for the learned ones, 3 for those alike"
+#error "COMPARISONS: 0 for the grey value, 1 for a census window, 2 for the learned ones"
 #endif
 #ifndef RADIUS_X
 #error "RADIUS_X: half the window's width"
@@ -110,10 +111,8 @@ inline Code learned_code_at(const int width, const Rows* rows, const int x) {
 }
 #endif
 
-#if COMPARISONS == 3
-#if PIXEL_BYTES != 2
-#error "COMPARISONS: 3 compares grey values of 16 bits"
-#endif
+#define HAS_ALIKE (COMPARISONS == 1 && PIXEL_BYTES == 2 && COUNT == 62)
+#if HAS_ALIKE
 // Pixels side by side on a surface differ by its texture and by noise, and most of the eight around a pixel lie on its
 // surface. So its tolerance follows from the fourth least difference to these. `least`: the four least, in order.
 #define ADD_DIFFERENCE(Greys, least, difference)        \
@@ -130,11 +129,9 @@ inline Code learned_code_at(const int width, const Rows* rows, const int x) {
           (Greys)EGOSGM_ALIKE_LEAST)
 #endif
 
-inline Code code_at(const int width, const Rows* rows, const int x) {
 #define AT(dx, dy) rows->at[RADIUS_Y + (dy)][clamp(x + (dx), 0, width - 1)]
-#if COMPARISONS == 0
-  return to_8_bit(AT(0, 0));
-#elif COMPARISONS == 3
+#if HAS_ALIKE
+inline Code alike_at(const int width, const Rows* rows, const int x) {
   Pixel least[4] = {65535, 65535, 65535, 65535};
 #pragma unroll
   for (int i = 0; i < 9; ++i) {
@@ -145,6 +142,16 @@ inline Code code_at(const int width, const Rows* rows, const int x) {
 #pragma unroll
   for (int i = 0; i < COUNT; ++i) code = code << 1 | (abs_diff(AT(DX(i), DY(i)), AT(0, 0)) <= tolerance ? 1 : 0);
   return code;
+}
+#endif
+
+// alike: whether the code says what is alike, where that can be asked.
+inline Code code_at(const int width, const Rows* rows, const int x, const int alike) {
+#if HAS_ALIKE
+  if (alike) return alike_at(width, rows, x);
+#endif
+#if COMPARISONS == 0
+  return to_8_bit(AT(0, 0));
 #else
   Code code = 0;
 #pragma unroll
@@ -159,7 +166,8 @@ inline Code code_at(const int width, const Rows* rows, const int x) {
 #if PIXELS == 1
 
 // A work-item a code, those of the padding too: they are the border's.
-KERNEL void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
+KERNEL void census(const ImageSize size, const int padding, const int alike, global const uchar* images,
+                   global uint* all_codes) {
   const int at = get_global_id(0), y = get_global_id(1), view = get_global_id(2);
   const int stride = size.width + 2 * padding;
   if (at >= stride) return;
@@ -169,7 +177,7 @@ KERNEL void census(const ImageSize size, const int padding, global const uchar* 
   const int along = clamp(at - padding, 0, size.width - 1);
   const int x = view == EGOSGM_LEFT ? along : size.width - 1 - along;
   const Rows rows = rows_around(size, image, y);
-  ((global Code*)all_codes)[row * stride + at] = code_at(size.width, &rows, x);
+  ((global Code*)all_codes)[row * stride + at] = code_at(size.width, &rows, x, alike);
 }
 
 #else
@@ -286,6 +294,30 @@ inline uchar16 learned_byte(const Sum* sums, const int byte) {
 
 #endif
 
+#define BESIDE(dx, dy) load_greys(rows->at[RADIUS_Y + (dy)] + x + (dx))
+
+#if HAS_ALIKE
+inline void write_alike_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
+  const Greys centre = load_greys(rows->at[RADIUS_Y] + x), most = (Greys)((ushort)65535);
+  Greys least[4] = {most, most, most, most};
+#pragma unroll
+  for (int i = 0; i < 9; ++i) {
+    if (i != 4) ADD_DIFFERENCE(Greys, least, abs_diff(BESIDE(i % 3 - 1, i / 3 - 1), centre));
+  }
+  const Greys tolerance = TOLERANCE(Greys, least);
+  Bytes bytes[CODE_BYTES];
+#pragma unroll
+  for (int byte = 0; byte < CODE_BYTES; ++byte) bytes[byte] = 0;
+#pragma unroll
+  for (int i = 0; i < COUNT; ++i) {
+    const int place = COUNT - 1 - i;
+    const Bytes others = bit_where_less(tolerance, abs_diff(BESIDE(DX(i), DY(i)), centre), 255);
+    bytes[place / 8] |= ~others & (Bytes)((uchar)(1 << place % 8));
+  }
+  write_codes(JOINED(WHOLE, bytes), x, width, view, row);
+}
+#endif
+
 // Where no column needs clamping. Bits are put into bytes: compilers keep these in narrow vectors.
 inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
 #if COMPARISONS == 2
@@ -293,28 +325,13 @@ inline void write_codes_at(const Rows* rows, const int x, const int width, const
   sum_around(rows, x, sums);
 #endif
   const Greys centre = load_greys(rows->at[RADIUS_Y] + x);
-#define BESIDE(dx, dy) load_greys(rows->at[RADIUS_Y + (dy)] + x + (dx))
   Bytes bytes[CODE_BYTES];
 #pragma unroll
   for (int byte = 0; byte < CODE_BYTES; ++byte) bytes[byte] = 0;
-#if COMPARISONS == 3
-  const Greys most = (Greys)((ushort)65535);
-  Greys least[4] = {most, most, most, most};
-#pragma unroll
-  for (int i = 0; i < 9; ++i) {
-    if (i != 4) ADD_DIFFERENCE(Greys, least, abs_diff(BESIDE(i % 3 - 1, i / 3 - 1), centre));
-  }
-  const Greys tolerance = TOLERANCE(Greys, least);
-#endif
 #pragma unroll
   for (int i = 0; i < COUNT; ++i) {
     const int place = COUNT + LEARNED - 1 - i;
-    const Greys beside = BESIDE(DX(i), DY(i));
-#if COMPARISONS == 3
-    bytes[place / 8] |= (uchar16)((uchar)(1 << place % 8)) & ~bit_where_less(tolerance, abs_diff(beside, centre), 255);
-#else
-    bytes[place / 8] |= bit_where_less(beside, centre, 1 << place % 8);
-#endif
+    bytes[place / 8] |= bit_where_less(BESIDE(DX(i), DY(i)), centre, 1 << place % 8);
   }
 #if COMPARISONS == 2
 #pragma unroll
@@ -341,8 +358,8 @@ inline void write_codes_at(const Rows* rows, const int x, const int width, const
 #endif
 
 // A work-item a row and view.
-COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int padding, global const uchar* images,
-                              global uint* all_codes) {
+COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int padding, const int alike,
+                              global const uchar* images, global uint* all_codes) {
   const int y = at.x;
   const int view = at.y;
   if (y >= size.height) return;
@@ -359,10 +376,18 @@ COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int
     const bool inside = last_block >= RADIUS_X && x >= RADIUS_X && x < width - RADIUS_X;
     if (inside) {
       const int first = min(x, last_block);
+#if HAS_ALIKE
+      if (alike) {
+        write_alike_at(&rows, first, width, view, row);
+      } else {
+        write_codes_at(&rows, first, width, view, row);
+      }
+#else
       write_codes_at(&rows, first, width, view, row);
+#endif
       x += first - x + AT_ONCE;
     } else {
-      row[view == EGOSGM_LEFT ? x : width - 1 - x] = code_at(width, &rows, x);
+      row[view == EGOSGM_LEFT ? x : width - 1 - x] = code_at(width, &rows, x, alike);
       x += 1;
     }
   }
@@ -378,8 +403,9 @@ COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int
   }
 }
 
-KERNEL void census(const ImageSize size, const int padding, global const uchar* images, global uint* all_codes) {
-  census_row(THIS_WORK_ITEM, size, padding, images, all_codes);
+KERNEL void census(const ImageSize size, const int padding, const int alike, global const uchar* images,
+                   global uint* all_codes) {
+  census_row(THIS_WORK_ITEM, size, padding, alike, images, all_codes);
 }
 
 #endif

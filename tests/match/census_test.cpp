@@ -121,16 +121,18 @@ TEST_P(AlikeTest, EqualsReference) {
     }
   }
   ocl::Context context(testing::any_device());
-  Census census = Census::of_alike(context, size, pixels);
+  const int padding = 19;
+  Census census(context, size, PixelType::kU16, MatchingCost::kCensus9x7, padding, pixels);
   ocl::Buffer<cl_uchar> images(context, raw.size());
-  ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kCensus9x7, size, 0));
+  ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kCensus9x7, size, padding));
   images.write(context, raw);
-  census.encode(images, codes);
-  const auto expected = reference::padded_codes(size, reference::alike_codes(size, views[0]),
-                                                reference::alike_codes(size, views[1]), 0, MatchingCost::kCensus9x7);
+  census.encode_alike(images, codes);
+  const auto expected =
+      reference::padded_codes(size, reference::alike_codes(size, views[0]), reference::alike_codes(size, views[1]),
+                              padding, MatchingCost::kCensus9x7);
   const auto actual = codes.read(context);
   EXPECT_TRUE(testing::same_bits(std::vector<std::uint32_t>(actual.begin(), actual.end()), expected,
-                                 {2 * size.width, size.height}));
+                                 {2 * (size.width + 2 * padding), size.height}));
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, AlikeTest,
