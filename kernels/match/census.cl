@@ -85,6 +85,11 @@ inline Rows rows_around(const ImageSize size, global const Pixel* image, const i
   return rows;
 }
 
+#define AT(dx, dy) rows->at[RADIUS_Y + (dy)][clamp(x + (dx), 0, width - 1)]
+#define BESIDE(dx, dy) load_greys(rows->at[RADIUS_Y + (dy)] + x + (dx))
+// It asks for pixels of Rows, and compares the window.
+#include "alike.h"
+
 #if COMPARISONS == 2
 // The learned bits of a pixel.
 inline Code learned_code_at(const int width, const Rows* rows, const int x) {
@@ -107,40 +112,6 @@ inline Code learned_code_at(const int width, const Rows* rows, const int x) {
   for (int i = 0; i < LEARNED; ++i) {
     code = code << 1 | (sums[FIRST_PLACE(i, SUMS)] < sums[SECOND_PLACE(i, SUMS)] + THRESHOLD(i) ? 1 : 0);
   }
-  return code;
-}
-#endif
-
-#define HAS_ALIKE (COMPARISONS == 1 && PIXEL_BYTES == 2 && COUNT == 62)
-#if HAS_ALIKE
-// Pixels side by side on a surface differ by its texture and by noise, and most of the eight around a pixel lie on its
-// surface. So its tolerance follows from the fourth least difference to these. `least`: the four least, in order.
-#define ADD_DIFFERENCE(Greys, least, difference)        \
-  {                                                     \
-    Greys other = difference;                           \
-    for (int place = 0; place < 4; ++place) {           \
-      const Greys greater = max(other, (least)[place]); \
-      (least)[place] = min(other, (least)[place]);      \
-      other = greater;                                  \
-    }                                                   \
-  }
-#define TOLERANCE(Greys, least)                                                                      \
-  add_sat((Greys)(min((least)[3], (Greys)(65535 / EGOSGM_ALIKE_TIMES)) * (Greys)EGOSGM_ALIKE_TIMES), \
-          (Greys)EGOSGM_ALIKE_LEAST)
-#endif
-
-#define AT(dx, dy) rows->at[RADIUS_Y + (dy)][clamp(x + (dx), 0, width - 1)]
-#if HAS_ALIKE
-inline Code alike_at(const int width, const Rows* rows, const int x) {
-  Pixel least[4] = {65535, 65535, 65535, 65535};
-#pragma unroll
-  for (int i = 0; i < 9; ++i) {
-    if (i != 4) ADD_DIFFERENCE(Pixel, least, abs_diff(AT(i % 3 - 1, i / 3 - 1), AT(0, 0)));
-  }
-  const Pixel tolerance = TOLERANCE(Pixel, least);
-  Code code = 0;
-#pragma unroll
-  for (int i = 0; i < COUNT; ++i) code = code << 1 | (abs_diff(AT(DX(i), DY(i)), AT(0, 0)) <= tolerance ? 1 : 0);
   return code;
 }
 #endif
@@ -182,66 +153,14 @@ KERNEL void census(const ImageSize size, const int padding, const int alike, glo
 
 #else
 
-#if CODE_BYTES == 4
-#define convert_codes convert_uint16
-#else
-#define convert_codes convert_ulong16
-#endif
-
-// Writes the codes of pixels x .. x + 15 of a row, the right view's from right to left.
-static inline void write_codes(const Codes codes, const int x, const int width, const int view, global Code* row) {
-  if (view == EGOSGM_LEFT) {
-    ((global PackedCodes*)(row + x))->codes = codes;
-  } else {
-    ((global PackedCodes*)(row + width - 16 - x))->codes = codes.sfedcba9876543210;
-  }
-}
-
 #if COMPARISONS == 0
 
-#define AT_ONCE 16
+#define CODES_AT_ONCE 16
 inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
   write_codes(convert_codes(to_8_bit(load_grey(rows->at[RADIUS_Y] + x))), x, width, view, row);
 }
 
 #else
-
-// A block of 8-bit pixels at once, or 16 of 16 bits.
-#if PIXEL_BYTES == 1
-#define AT_ONCE BLOCK
-typedef Block Greys;
-typedef Block Bytes;
-typedef struct __attribute__((packed)) {
-  Block greys;
-} PackedGreys;
-inline Greys load_greys(global const Pixel* from) { return ((global const PackedGreys*)from)->greys; }
-inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
-  return a < b ? (Block)((uchar)bit) : (Block)(0);
-}
-#else
-#define AT_ONCE 16
-typedef Pixels Greys;
-typedef uchar16 Bytes;
-inline Greys load_greys(global const Pixel* from) { return load_grey(from); }
-inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
-  return as_uchar16(convert_char16(a < b)) & (uchar16)((uchar)bit);
-}
-#endif
-
-// Codes of their bytes, the lowest first.
-inline uint16 joined_bytes(const uchar16 b0, const uchar16 b1, const uchar16 b2, const uchar16 b3) {
-  const ushort16 upper = convert_ushort16(b3) << (ushort16)(8) | convert_ushort16(b2);
-  const ushort16 lower = convert_ushort16(b1) << (ushort16)(8) | convert_ushort16(b0);
-  return convert_uint16(upper) << (uint16)(16) | convert_uint16(lower);
-}
-#if CODE_BYTES == 4
-#define JOINED(HALF, bytes) joined_bytes(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))
-#else
-#define JOINED(HALF, bytes)                                                                                         \
-  (convert_ulong16(joined_bytes(HALF(bytes[4]), HALF(bytes[5]), HALF(bytes[6]), HALF(bytes[7]))) << (ulong16)(32) | \
-   convert_ulong16(joined_bytes(HALF(bytes[0]), HALF(bytes[1]), HALF(bytes[2]), HALF(bytes[3]))))
-#endif
-#define WHOLE(bytes) (bytes)
 
 #if COMPARISONS == 2
 
@@ -257,7 +176,7 @@ typedef int16 SumVector;
 typedef struct __attribute__((packed)) {
   SumVector sums;
 } PackedSums;
-#define SUMS_WIDTH (AT_ONCE + SUMS - 1)
+#define SUMS_WIDTH (CODES_AT_ONCE + SUMS - 1)
 #define SUMS_VECTORS ((SUMS_WIDTH + 15) / 16)  // the last one overlaps the one before it
 
 // The sums that the codes of pixels from x on compare: SUMS rows.
@@ -294,30 +213,6 @@ inline uchar16 learned_byte(const Sum* sums, const int byte) {
 
 #endif
 
-#define BESIDE(dx, dy) load_greys(rows->at[RADIUS_Y + (dy)] + x + (dx))
-
-#if HAS_ALIKE
-inline void write_alike_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
-  const Greys centre = load_greys(rows->at[RADIUS_Y] + x), most = (Greys)((ushort)65535);
-  Greys least[4] = {most, most, most, most};
-#pragma unroll
-  for (int i = 0; i < 9; ++i) {
-    if (i != 4) ADD_DIFFERENCE(Greys, least, abs_diff(BESIDE(i % 3 - 1, i / 3 - 1), centre));
-  }
-  const Greys tolerance = TOLERANCE(Greys, least);
-  Bytes bytes[CODE_BYTES];
-#pragma unroll
-  for (int byte = 0; byte < CODE_BYTES; ++byte) bytes[byte] = 0;
-#pragma unroll
-  for (int i = 0; i < COUNT; ++i) {
-    const int place = COUNT - 1 - i;
-    const Bytes others = bit_where_less(tolerance, abs_diff(BESIDE(DX(i), DY(i)), centre), 255);
-    bytes[place / 8] |= ~others & (Bytes)((uchar)(1 << place % 8));
-  }
-  write_codes(JOINED(WHOLE, bytes), x, width, view, row);
-}
-#endif
-
 // Where no column needs clamping. Bits are put into bytes: compilers keep these in narrow vectors.
 inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
 #if COMPARISONS == 2
@@ -336,7 +231,7 @@ inline void write_codes_at(const Rows* rows, const int x, const int width, const
 #if COMPARISONS == 2
 #pragma unroll
   for (int byte = 0; byte < LEARNED / 8; ++byte) {
-#if AT_ONCE == 32
+#if CODES_AT_ONCE == 32
     bytes[byte] = (Bytes)(learned_byte(sums, byte), learned_byte(sums + 16, byte));
 #else
     bytes[byte] = learned_byte(sums, byte);
@@ -347,11 +242,11 @@ inline void write_codes_at(const Rows* rows, const int x, const int width, const
 #pragma unroll
   for (int byte = 0; byte < 4; ++byte) bytes[byte + 4] = bytes[byte];
 #endif
-#if AT_ONCE == 32
-  write_codes(JOINED(FIRST_VECTOR, bytes), x, width, view, row);
-  write_codes(JOINED(SECOND_VECTOR, bytes), x + 16, width, view, row);
+#if CODES_AT_ONCE == 32
+  write_codes(JOINED_BYTES(FIRST_VECTOR, bytes), x, width, view, row);
+  write_codes(JOINED_BYTES(SECOND_VECTOR, bytes), x + 16, width, view, row);
 #else
-  write_codes(JOINED(WHOLE, bytes), x, width, view, row);
+  write_codes(JOINED_BYTES(WHOLE_BYTES, bytes), x, width, view, row);
 #endif
 }
 
@@ -370,7 +265,7 @@ COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int
   global Code* row = (global Code*)all_codes + ((size_t)view * size.height + y) * stride + padding;
 
   // Blocks from RADIUS_X on; the last one overlaps the one before it, to leave few pixels to the slow way.
-  const int last_block = width - RADIUS_X - AT_ONCE;
+  const int last_block = width - RADIUS_X - CODES_AT_ONCE;
   int x = 0;
   while (x < width) {
     const bool inside = last_block >= RADIUS_X && x >= RADIUS_X && x < width - RADIUS_X;
@@ -385,7 +280,7 @@ COMPILED_ONCE void census_row(const WorkItem at, const ImageSize size, const int
 #else
       write_codes_at(&rows, first, width, view, row);
 #endif
-      x += first - x + AT_ONCE;
+      x += first - x + CODES_AT_ONCE;
     } else {
       row[view == EGOSGM_LEFT ? x : width - 1 - x] = code_at(width, &rows, x, alike);
       x += 1;
