@@ -220,11 +220,11 @@ static inline BlockSums load_sums(global const EvidenceSum* row, const int x, co
 static inline Ints alike_in_row(const CodeRows* alike, const int x, const int dy) {
   const int last = (dy + 3) * 9 + 6, shift = dy < 0 ? 61 - last : 62 - last, place = own_place(alike, x);
 #if PIXELS == 1
-#define BITS(shift, mask) ((int)(alike->own[place] >> (shift)) & (mask))
+#define BITS(shift, mask) (int)(alike->own[place] >> (shift) & (mask))
 #else
   Codes codes = load_codes(alike->own + (alike->view == EGOSGM_LEFT ? place : place - (PIXELS - 1)));
   if (alike->view == EGOSGM_RIGHT) codes = codes.sfedcba9876543210;
-#define BITS(shift, mask) (convert_int16(codes >> (Codes)(shift)) & (mask))
+#define BITS(shift, mask) convert_int16(codes >> (Codes)(shift) & (Codes)(mask))
 #endif
   return dy == 0 ? BITS(31, 3) << 3 | 4 | BITS(29, 3) : BITS(shift, 31);
 }
@@ -257,9 +257,9 @@ COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int
 #pragma unroll
       for (int u = -radius; u <= radius; ++u) {
         BlockSums sums_there = load_sums(sums + ((size_t)at.view * blocks.height + v) * width, x + u, width);
-        const Ints counts = is_alike >> (radius - u) & 1;
-        sums_there.sums *= counts;
-        sums_there.counts *= counts;
+        const Ints counts = -(is_alike >> (radius - u) & 1);
+        sums_there.sums &= counts;
+        sums_there.counts &= counts;
         of_row = added(of_row, sums_there);
         if (u < 0) left = added(left, sums_there);
         if (u > 0) right = added(right, sums_there);
@@ -268,7 +268,7 @@ COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int
       if (v < at.y) above = added(above, of_row);
       if (v > at.y) below = added(below, of_row);
     }
-    BlockSums least = {all.sums, max(all.counts, 1)};
+    BlockSums least = {all.sums, max(all.counts, (Ints)(1))};
     keep_least(&least, less(all, right));
     keep_least(&least, less(all, left));
     keep_least(&least, less(all, below));
