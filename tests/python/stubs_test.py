@@ -34,6 +34,7 @@ def differences(stubs, tmp_path):
 
 def test_the_stubs_are_what_runs(tmp_path):
     assert differences(RUNNING, tmp_path) == []
+    assert (RUNNING / "egosgm/py.typed").exists() and "    p2: int" in (RUNNING / "egosgm/_options.pyi").read_text()
 
 
 def test_what_a_stub_has_too_much_or_wrong_is_found(tmp_path):
