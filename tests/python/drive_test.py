@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import bag_program, cpu_driver, points, ros_images, viewer
+from egosgm import bag_program, cpu_driver, examination, points, ros_images, viewer
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -352,6 +352,22 @@ def test_a_doubtful_drive_is_told(street, frames):
     far = egosgm.Calibration(street.calibration.fx, street.calibration.fy, 5, street.calibration.cy, 54)
     with pytest.warns(UserWarning, match="a baseline of 54 m"):
         list(egosgm.run([(frames[0].left, frames[0].right)], far, **OPTIONS))
+def test_a_look_at_what_is_nearer_takes_little_memory_whatever_the_shape():
+    for shape in ((48, 16384), (16384, 48), (16384, 300), (2, 600), (600, 2)):
+        image = np.zeros(shape, np.uint8)
+        assert max(egosgm._egosgm._coarse_map(image, image, 0.0, 0, 16).shape) <= 256
+
+
+@pytest.mark.filterwarnings("error")
+def test_images_of_a_few_rows_or_columns_are_examined():
+    for shape in ((1, 1), (1, 600), (2, 600), (3, 600), (600, 1), (600, 2)):
+        left, right = np.random.default_rng(1).integers(0, 256, (2, *shape), np.uint8)
+        for pair in ((left, right), (left, left)):
+            looked = examination.Examination(None, 0, 16)
+            looked.add(*pair)
+            assert [finding.check for finding in looked.findings(1)][:2] == ["images", "calibration"]
+
+
     wide = egosgm.Calibration(street.calibration.fx, street.calibration.fy, street.calibration.cx, street.calibration.cy, 3)
     with pytest.warns(UserWarning, match="few rigs .* decimetres .0.3 m."):
         list(egosgm.run([(frames[0].left, frames[0].right)], wide, motion=False, **OPTIONS))
