@@ -106,6 +106,10 @@ class BagFeed : public app::Feed {
     });
   }
 
+  bool has_lost_images() const override {
+    return in_python([&] { return bag_["has_lost_images"].cast<bool>(); });
+  }
+
   std::vector<std::string> notes() const override {
     return in_python([&] {
       std::vector<std::string> notes;

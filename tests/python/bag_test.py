@@ -1085,6 +1085,17 @@ def test_poses_of_another_unit_are_told(tmp_path, street, frames, capfd):
     types = recording.types
     world_from_camera = np.eye(4)
     for i in range(FRAMES):
+def test_rows_of_poses_are_of_no_bag_that_lost_images(tmp_path, street, frames, capfd):
+    poses = tmp_path / "poses.txt"
+    egosgm.write_poses(poses, np.stack([np.eye(4)] * FRAMES))
+    for name, left_out, code in (("whole", (), 0), ("right", ((2, "left"),), 0), ("lost", ((1, "right"),), 2)):
+        bag = record("mcap", tmp_path / name, street, frames, left_out=left_out)
+        assert bag_program.main(["--bag", str(bag), *TOPICS, *SET, "--poses", str(poses), "--out", str(tmp_path / f"{name}.out")]) == code
+        said = capfd.readouterr().err
+        assert ("has images that are in no pair: give --pose-topic" in said) == (code == 2), said
+        assert json.loads((tmp_path / f"{name}.out/report.json").read_text())["finished"] == (code == 0)
+
+
         if i:
             world_from_camera = world_from_camera @ np.linalg.inv(street.motion(i).current_from_previous)
         x, y, z, w = ros_images.quaternion_of(world_from_camera[:3, :3])
