@@ -1055,7 +1055,7 @@ def test_an_mcap_that_is_packed_and_one_without_a_profile(tmp_path, street, fram
     from mcap.writer import Writer as McapWriter
     for name, profile, encoding in (("plain", "", "cdr"), ("ros1", "ros1", "ros1")):
         with open(path, "rb") as source, open(tmp_path / f"{name}.mcap", "wb") as target:
-            writer = McapWriter(target)
+            writer = McapWriter(target, chunk_size=1 << 15)
             writer.start(profile=profile)
             schemas, channels = {}, {}
             for schema, channel, message in make_reader(source).iter_messages():
@@ -1067,6 +1067,11 @@ def test_an_mcap_that_is_packed_and_one_without_a_profile(tmp_path, street, fram
             writer.finish()
     assert f"{FRAMES} frames" in told_of(capfd, tmp_path / "plain.mcap")
     refused(capfd, ["--bag", tmp_path / "ros1.mcap", *TOPICS, *SET], "ROS 1")
+    whole = (tmp_path / "plain.mcap").read_bytes()
+    at = whole.rindex(zstandard.FRAME_HEADER)  # of the last chunk
+    (tmp_path / "torn.mcap").write_bytes(whole[:at] + bytes(4) + whole[at + 4:])
+    said = told_of(capfd, tmp_path / "torn.mcap")
+    assert "torn.mcap is cut or damaged (" in said and f"{FRAMES} frames" not in said
 
 
 def test_topics_are_found_where_there_is_one_choice(tmp_path, street, frames, capfd):
@@ -1080,11 +1085,6 @@ def test_topics_are_found_where_there_is_one_choice(tmp_path, street, frames, ca
     refused(capfd, ["--bag", recording.write(tmp_path / "two"), *SET], "more than one pair of cameras", "/front/left/image_rect")
 
 
-def test_poses_of_another_unit_are_told(tmp_path, street, frames, capfd):
-    recording = drive_of(street, frames)
-    types = recording.types
-    world_from_camera = np.eye(4)
-    for i in range(FRAMES):
 def test_rows_of_poses_are_of_no_bag_that_lost_images(tmp_path, street, frames, capfd):
     poses = tmp_path / "poses.txt"
     egosgm.write_poses(poses, np.stack([np.eye(4)] * FRAMES))
@@ -1096,6 +1096,11 @@ def test_rows_of_poses_are_of_no_bag_that_lost_images(tmp_path, street, frames, 
         assert json.loads((tmp_path / f"{name}.out/report.json").read_text())["finished"] == (code == 0)
 
 
+def test_poses_of_another_unit_are_told(tmp_path, street, frames, capfd):
+    recording = drive_of(street, frames)
+    types = recording.types
+    world_from_camera = np.eye(4)
+    for i in range(FRAMES):
         if i:
             world_from_camera = world_from_camera @ np.linalg.inv(street.motion(i).current_from_previous)
         x, y, z, w = ros_images.quaternion_of(world_from_camera[:3, :3])
