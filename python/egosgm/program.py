@@ -98,7 +98,10 @@ def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]
 def run_tool(arguments: Sequence[str]) -> int:
     """Runs a command, and returns its exit code. Never calls the C++ program."""
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
+        for number in (signal.SIGINT, signal.SIGTERM):  # nothing unfinished is left
+            if signal.getsignal(number) == signal.SIG_DFL:
+                signal.signal(number, signal.default_int_handler)
+    os.environ.setdefault("OPENCV_OPENCL_RUNTIME", "disabled")  # OpenCV would load drivers for nothing, whose compilers take interrupts for themselves
     _open_standard_streams()
     _print_any_name()
     code, told = _outcome(arguments, _module_of(arguments))

@@ -111,6 +111,18 @@ class Tools(ProgramTest):
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, code), f"{arguments}: {done.stderr}")
             self.assertIn("the standard output cannot be written: Bad file descriptor" if code else "", done.stderr)
 
+    def test_tools_load_no_driver_which_would_take_their_interrupts(self):
+        code = "import sys; from egosgm.program import run_tool; run_tool(sys.argv[1:]); sys.exit('pocl' in open('/proc/self/maps').read())"
+        done = subprocess.run([sys.executable, "-B", "-c", code, "doctor", self.street], capture_output=True, text=True,
+                              env=dict(os.environ, PYTHONPATH=str(PACKAGE)), timeout=600)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+    def test_an_interrupt_while_the_package_is_loaded_ends_it(self):
+        folder = self.new_folder()
+        (folder / "numpy.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+        done = egosgm("doctor", self.street, env=dict(os.environ, PYTHONPATH=str(folder)))
+        self.assertEqual((done.returncode, done.stderr), (-signal.SIGINT, ""))
+
     def test_an_error_does_not_go_to_the_standard_output(self):
         for redirection in ("2>&-", "2>/dev/full"):
             words = ["sh", "-c", f'exec "$@" {redirection}', "sh", sys.executable, "-B", "-m", "egosgm", "report", self.new_folder()]
