@@ -171,6 +171,10 @@ class Run {
     if (!is_over && poses_.size() + left_out_ < sequence_.frames.size())
       return false;  // what was only read is not done
     if (2 * left_out_ > sequence_.frames.size()) throw InvalidArgument(text_of_left_out());
+    if (motions_.has_file() && feed_.has_lost_images()) {
+      throw InvalidArgument("--poses: the rows of a file belong to images one after the other, and " + sequence_.title +
+                            " has images that are in no pair: give --pose-topic, or leave the poses out");
+    }
     return true;
   }
 

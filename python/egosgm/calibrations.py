@@ -103,7 +103,7 @@ def _of_folder(folder: pathlib.Path, is_fisheye: bool) -> Found:
         found = read_opencv_rig(folder, 1.0, is_fisheye)
         if found is not None:
             return found
-    arrays = sorted(folder.glob("*.npy"))
+    arrays = [file for file in sorted(folder.glob("*.npy")) if file.is_file()]  # NumPy would wait for a pipe
     if arrays:
         return formats.by_names({file.stem: np.load(file, allow_pickle=False) for file in arrays}, folder, "a folder of .npy")
     candidates = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in (".yaml", ".yml", ".json", ".xml", ".txt", ".npz")]

@@ -178,6 +178,12 @@ class Rectify(RectifyTest):
             pairs = len(list((out / "image_3").iterdir()))
             self.assertIn(pairs, range(1, FRAMES))
             self.assertIn(f"{ended} ends after {pairs} image{'s' * (pairs > 1)}, before {longer}: ", text)
+        told = f"{cut} has {FRAMES} images, and only the first {pairs} can be read"
+        self.assertIn(told, text)
+        self.assertIn(told, self.assert_works("rectify", "--left", cut, "--right", shutil.copy(cut, folder / "also.avi"), "--calib", self.street / "calib.txt",
+                                              "--out", self.new_folder() / "out"))
+        both = self.assert_works("rectify", "--side-by-side", cut, "--calib", self.street / "calib.txt", "--out", self.new_folder() / "out")
+        self.assertIn(told, both)
 
     def test_side_by_side_images_and_lists(self):
         both = self.new_folder()

@@ -1049,7 +1049,7 @@ def test_an_mcap_that_is_packed_and_one_without_a_profile(tmp_path, street, fram
     from mcap.writer import Writer as McapWriter
     for name, profile, encoding in (("plain", "", "cdr"), ("ros1", "ros1", "ros1")):
         with open(path, "rb") as source, open(tmp_path / f"{name}.mcap", "wb") as target:
-            writer = McapWriter(target)
+            writer = McapWriter(target, chunk_size=1 << 15)
             writer.start(profile=profile)
             schemas, channels = {}, {}
             for schema, channel, message in make_reader(source).iter_messages():
@@ -1061,6 +1061,11 @@ def test_an_mcap_that_is_packed_and_one_without_a_profile(tmp_path, street, fram
             writer.finish()
     assert f"{FRAMES} frames" in told_of(capfd, tmp_path / "plain.mcap")
     refused(capfd, ["--bag", tmp_path / "ros1.mcap", *TOPICS, *SET], "ROS 1")
+    whole = (tmp_path / "plain.mcap").read_bytes()
+    at = whole.rindex(zstandard.FRAME_HEADER)  # of the last chunk
+    (tmp_path / "torn.mcap").write_bytes(whole[:at] + bytes(4) + whole[at + 4:])
+    said = told_of(capfd, tmp_path / "torn.mcap")
+    assert "torn.mcap is cut or damaged (" in said and f"{FRAMES} frames" not in said
 
 
 def test_topics_are_found_where_there_is_one_choice(tmp_path, street, frames, capfd):
@@ -1072,6 +1077,17 @@ def test_topics_are_found_where_there_is_one_choice(tmp_path, street, frames, ca
     for name in ("left", "right"):
         recording.image(f"/front/{name}/image_rect", START, frames[0].left)
     refused(capfd, ["--bag", recording.write(tmp_path / "two"), *SET], "more than one pair of cameras", "/front/left/image_rect")
+
+
+def test_rows_of_poses_are_of_no_bag_that_lost_images(tmp_path, street, frames, capfd):
+    poses = tmp_path / "poses.txt"
+    egosgm.write_poses(poses, np.stack([np.eye(4)] * FRAMES))
+    for name, left_out, code in (("whole", (), 0), ("right", ((2, "left"),), 0), ("lost", ((1, "right"),), 2)):
+        bag = record("mcap", tmp_path / name, street, frames, left_out=left_out)
+        assert bag_program.main(["--bag", str(bag), *TOPICS, *SET, "--poses", str(poses), "--out", str(tmp_path / f"{name}.out")]) == code
+        said = capfd.readouterr().err
+        assert ("has images that are in no pair: give --pose-topic" in said) == (code == 2), said
+        assert json.loads((tmp_path / f"{name}.out/report.json").read_text())["finished"] == (code == 0)
 
 
 def test_poses_of_another_unit_are_told(tmp_path, street, frames, capfd):

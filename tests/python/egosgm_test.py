@@ -285,6 +285,7 @@ def test_sequences_are_read(tmp_path, frames, street):
     sequence = egosgm.open_patterns(str(tmp_path / "left_%d.png"), str(tmp_path / "right_%d.png"), tmp_path / "c.toml")
     assert len(sequence) == 2 and sequence.size == (WIDTH, HEIGHT) and sequence.frames[1].name == "000001"
     assert sequence.numbers == [0, 1] and sequence.note == ""
+    assert egosgm.open_patterns(str(tmp_path / "left_%d.png"), str(tmp_path / "right_%d.png")).calibration is None
     names = str(tmp_path / "l*_*.png"), str(tmp_path / "r*.png"), tmp_path / "c.toml"
     with pytest.raises(egosgm.InvalidArgument, match="one \\*"):
         egosgm.open_patterns(*names)
