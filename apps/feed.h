@@ -39,6 +39,9 @@ class Feed {
   virtual std::string poses() const { return {}; }
   /// The next frame; none at the end. Called by one thread at a time. Throws InvalidArgument.
   virtual std::optional<FedFrame> next() = 0;
+  /// Whether left images were passed over, so that a frame's number does not count them. Known once the frames have
+  /// come.
+  virtual bool has_lost_images() const { return false; }
   /// What was unusual, once the frames have come.
   virtual std::vector<std::string> notes() const { return {}; }
 

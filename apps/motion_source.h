@@ -43,6 +43,9 @@ class MotionSource {
   /// sequence, grows from call to call.
   FrameMotion next(const FedFrame& fed, std::size_t frame);
 
+  /// Whether a file tells the poses.
+  bool has_file() const { return !poses_.empty(); }
+
   /// What the odometry of the first frames says against the given poses; empty where nothing, and without such. To be
   /// asked from the thread of `next`.
   std::string doubt() const { return vision::suspect_motions(given_, found_); }

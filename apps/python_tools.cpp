@@ -19,7 +19,9 @@ namespace fs = std::filesystem;
 
 /// Run with the package's folder (empty: none is known) and the command's arguments. The current folder is not searched
 /// for modules. run_tool only runs tools in Python, so that it never comes back to this program.
-constexpr const char* kLaunch = R"python(import sys
+constexpr const char* kLaunch = R"python(import signal, sys
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # an interrupt while modules load is none of their errors; run_tool takes it
 folder = sys.argv.pop(1)
 sys.path[:] = [folder] * bool(folder) + [entry for entry in sys.path if entry]
 try:

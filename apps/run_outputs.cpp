@@ -68,8 +68,6 @@ const char* const kWriteListHelp =
     "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none; in metres, PFM\n"
     "  left           the left images as they are matched, grey PNG; always of a bag";
 
-const std::vector<std::string>& write_kinds() { return kKinds; }
-
 std::set<std::string> parse_write_list(const std::string& list) {
   std::set<std::string> kinds;
   std::istringstream stream(list);
@@ -85,12 +83,6 @@ std::set<std::string> parse_write_list(const std::string& list) {
     kinds.insert(kind);
   }
   return kinds;
-}
-
-std::vector<std::string> output_folders() {
-  std::vector<std::string> folders = kKinds;
-  folders.emplace_back("disparity");
-  return folders;
 }
 
 std::string output_file(const std::string& kind, const std::string& frame, const PipelineOptions& options) {

@@ -18,15 +18,12 @@ namespace egosgm::app {
 
 /// What `egosgm run` can write beside OUT/disparity, each into a folder of its own, a file a frame.
 std::set<std::string> parse_write_list(const std::string& list);
-/// The folders that a run may write its maps to.
-std::vector<std::string> output_folders();
 /// A file of a frame, relative to OUT, and those of all frames. Disparities are KITTI's PNG, or PFM where that has no
 /// room for the searched range.
 std::string output_file(const std::string& kind, const std::string& frame, const PipelineOptions& options);
 std::vector<std::string> output_files(const std::set<std::string>& kinds, const vision::StereoSequence& sequence,
                                       const PipelineOptions& options);
-const std::vector<std::string>& write_kinds();
-/// The same, as --help and the README describe it.
+/// What parse_write_list takes, as --help describes it.
 extern const char* const kWriteListHelp;
 
 /// How many points a frame's cloud has, and what it left out.

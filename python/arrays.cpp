@@ -157,7 +157,7 @@ template MapView<std::uint16_t> output_of<std::uint16_t>(const py::object&, cons
 template MapView<std::uint8_t> output_of<std::uint8_t>(const py::object&, const std::string&);
 
 py::array array_of(const cv::Mat& mat) {
-  if (!mat.u) return array_of(mat.clone());  // memory of somebody else's
+  if (!mat.u && !mat.empty()) return array_of(mat.clone());  // memory of somebody else's
   const py::dtype type = mat.depth() == CV_8U    ? py::dtype::of<std::uint8_t>()
                          : mat.depth() == CV_16U ? py::dtype::of<std::uint16_t>()
                                                  : py::dtype::of<float>();

@@ -13,7 +13,6 @@
 #include "host/vision/pair_with_truth.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
-#include "python/other_threads.h"
 #include "python/pickling.h"
 
 namespace egosgm::python {
@@ -25,7 +24,7 @@ using vision::DisparityMetrics;
 DisparityCounts compare(const py::object& estimate, const py::object& truth) {
   py::array keep_estimate, keep_truth;
   const cv::Mat estimated = map_of(estimate, "estimate", keep_estimate), wanted = map_of(truth, "truth", keep_truth);
-  const OtherThreadsRun other_threads_run;
+  const py::gil_scoped_release other_threads_run;
   return vision::compare_disparity(estimated, wanted);
 }
 

@@ -7,7 +7,6 @@
 #include "host/vision/grey_bytes.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
-#include "python/other_threads.h"
 
 namespace egosgm::python {
 namespace {
@@ -22,7 +21,7 @@ void bind_images(py::module_& module) {
         const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
         cv::Mat map;
         {
-          const OtherThreadsRun other_threads_run;
+          const py::gil_scoped_release other_threads_run;
           map = vision::coarse_map(left_image, right_image, row_offset_px, least, end);
         }
         return array_of(map);
@@ -59,7 +58,7 @@ void bind_doubts(py::module_& module) {
           "add",
           [](Doubt& self, const py::object& left, const py::object& right, const FrameReport& report, bool has_motion) {
             const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
-            const OtherThreadsRun other_threads_run;
+            const py::gil_scoped_release other_threads_run;
             self.add(left_image, right_image, report, has_motion);
           },
           py::arg("left"), py::arg("right"), py::arg("report"), py::arg("has_motion"))

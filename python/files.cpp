@@ -13,7 +13,6 @@
 #include "host/vision/image_pairs.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
-#include "python/other_threads.h"
 #include "python/pickling.h"
 
 namespace egosgm::python {
@@ -26,7 +25,7 @@ using vision::StereoSequence;
 py::tuple read_images(const StereoFrame& frame) {
   vision::StereoImages images;
   {
-    const OtherThreadsRun other_threads_run;
+    const py::gil_scoped_release other_threads_run;
     images = vision::read_images(frame);
   }
   return py::make_tuple(array_of(images.left), array_of(images.right));
@@ -89,7 +88,7 @@ void bind_sequences(py::module_& module) {
         return vision::open_patterns(left.string(), right.string(), calibration, range_of(frames),
                                      by_order ? vision::PairBy::kOrder : vision::PairBy::kName);
       },
-      py::arg("left"), py::arg("right"), py::arg("calibration") = path(), py::arg("frames") = "",
+      py::arg("left"), py::arg("right"), py::arg("calibration") = "", py::arg("frames") = "",
       py::arg("by_order") = false,
       "PNG or JPEG files or patterns such as 'left/%06d.png' or 'left/*.jpg'. by_order: the first left image belongs "
       "to\n"
@@ -124,7 +123,7 @@ py::list layers_of_run(vision::FramePanels& panels, const path& folder, const st
 py::bytes read_file(const path& file, std::size_t max_bytes) {
   std::string bytes;
   {
-    const OtherThreadsRun other_threads_run;
+    const py::gil_scoped_release other_threads_run;
     bytes = vision::read_file(file, max_bytes);
   }
   return py::bytes(bytes);
@@ -179,7 +178,7 @@ void write_ply(const path& file, const Floats& points, const std::optional<Bytes
   cloud.points_m = vectors_of<float, cv::Point3f>(points, "points");
   cloud.colors = vectors_of<std::uint8_t, cv::Vec3b>(bgr, "colors");
   cloud.normals = vectors_of<float, cv::Vec3f>(normals, "normals");
-  const OtherThreadsRun other_threads_run;
+  const py::gil_scoped_release other_threads_run;
   std::optional<vision::KeepFiles> others;
   if (is_new) others.emplace();
   vision::write_ply(file, cloud);

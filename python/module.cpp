@@ -5,7 +5,7 @@
 #include "egosgm/image.h"
 #include "egosgm/vision/calibration_io.h"
 #include "python/bindings.h"
-#include "python/other_threads.h"
+#include "python/interpreter_end.h"
 
 namespace egosgm::python {
 
@@ -70,7 +70,6 @@ PYBIND11_MODULE(_egosgm, module) {
   // pybind11 asks for NumPy's functions when it first needs them, and two threads that do so at once wait for each
   // other: before 2.12 with a lock of C++ and Python's.
   pybind11::dtype::of<float>();
-  bind_end(module);
   bind_errors(module);
   bind_values(module);
   bind_pipeline(module);
@@ -79,4 +78,5 @@ PYBIND11_MODULE(_egosgm, module) {
   bind_program(module);
   bind_files(module);
   bind_evaluation(module);
+  count_calls(module);
 }

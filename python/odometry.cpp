@@ -9,7 +9,6 @@
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/option_values.h"
-#include "python/other_threads.h"
 #include "python/pickling.h"
 
 namespace egosgm {
@@ -77,13 +76,13 @@ class LockedOdometry {
     const ImageArray left_image = image_of(left, "left"), right_image = image_of(right, "right");
     std::optional<Eigen::Isometry3d> guess;
     if (!prior.is_none()) guess = transform_of(prior, "prior");
-    const OtherThreadsRun other_threads_run;
+    const py::gil_scoped_release other_threads_run;
     const std::lock_guard one_at_a_time(mutex_);
     return odometry_.process(left_image.view, right_image.view, guess);
   }
 
   void reset() {
-    const OtherThreadsRun other_threads_run;
+    const py::gil_scoped_release other_threads_run;
     const std::lock_guard one_at_a_time(mutex_);
     odometry_.reset();
   }
@@ -122,7 +121,7 @@ void bind_synthetic(py::module_& module) {
       .def_property_readonly("options", [](const SyntheticSequence& s) { return dict_of_fields(s.options()); })
       .def_property_readonly("calibration", &SyntheticSequence::calibration)
       .def("motion", &SyntheticSequence::motion, py::arg("frame"), "From the frame before; identity for frame 0.")
-      .def("render", &SyntheticSequence::render, py::arg("frame"), py::call_guard<OtherThreadsRun>());
+      .def("render", &SyntheticSequence::render, py::arg("frame"), py::call_guard<py::gil_scoped_release>());
   module.def(
       "synthetic_options", [] { return dict_of_fields(vision::SyntheticOptions{}); },
       "All options of SyntheticSequence with their defaults.");

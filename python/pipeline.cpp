@@ -14,7 +14,6 @@
 #include "python/bindings.h"
 #include "python/frame.h"
 #include "python/option_values.h"
-#include "python/other_threads.h"
 #include "python/pickling.h"
 
 namespace egosgm::python {
@@ -103,7 +102,7 @@ class LockedPipeline {
     const FrameOutputs outputs = views_of(frame.maps);
     expect_apart(frame.maps, {});
     {
-      const OtherThreadsRun other_threads_run;
+      const py::gil_scoped_release other_threads_run;
       const auto one_at_a_time = turn();
       frame.report = pipeline_.process(left_image.view, right_image.view, moved, outputs);
     }
@@ -116,7 +115,7 @@ class LockedPipeline {
     Frame frame{.maps = arrays_to_fill(wanted, width_, height_), .report = {}};
     const FrameOutputs outputs = views_of(frame.maps);
     std::deque<Frame> dropped;  // goes when this thread may touch Python's objects again
-    const OtherThreadsRun other_threads_run;
+    const py::gil_scoped_release other_threads_run;
     const auto one_at_a_time = turn();
     {
       const py::gil_scoped_acquire python;
@@ -140,7 +139,7 @@ class LockedPipeline {
     std::deque<Frame> dropped;
     std::optional<Frame> frame;
     {
-      const OtherThreadsRun other_threads_run;
+      const py::gil_scoped_release other_threads_run;
       const auto one_at_a_time = turn();
       FrameReport report;
       try {
@@ -157,13 +156,13 @@ class LockedPipeline {
   }
 
   int under_way() {
-    const OtherThreadsRun other_threads_run;
+    const py::gil_scoped_release other_threads_run;
     const auto one_at_a_time = turn();
     return pipeline_.under_way();
   }
 
   void reset() {
-    const OtherThreadsRun other_threads_run;
+    const py::gil_scoped_release other_threads_run;
     const auto one_at_a_time = turn();
     pipeline_.reset();
   }
@@ -189,7 +188,7 @@ std::unique_ptr<LockedPipeline> make_pipeline(const Calibration& calibration, in
   PipelineOptions options = options_of_preset(preset);
   set_options(options, values);
   options.validate();
-  const OtherThreadsRun other_threads_run;
+  const py::gil_scoped_release other_threads_run;
   return std::make_unique<LockedPipeline>(calibration, width, height, options,
                                           Device::select(device).with_cache(cache));
 }

@@ -20,7 +20,6 @@
 #include "python/bindings.h"
 #include "python/frame.h"
 #include "python/option_values.h"
-#include "python/other_threads.h"
 
 namespace egosgm::python {
 namespace {
@@ -105,6 +104,10 @@ class BagFeed : public app::Feed {
         return fed;
       }
     });
+  }
+
+  bool has_lost_images() const override {
+    return in_python([&] { return bag_["has_lost_images"].cast<bool>(); });
   }
 
   std::vector<std::string> notes() const override {
@@ -202,7 +205,7 @@ vision::StereoSequence open_input(std::vector<std::string> words, const py::obje
   } catch (const CLI::ParseError& error) {
     throw InvalidArgument(std::string(error.what()) + ": give one input");
   }
-  const OtherThreadsRun other_threads_run;
+  const py::gil_scoped_release other_threads_run;
   return arguments.open(/*needs_calibration=*/false, reader_of(read));
 }
 
@@ -239,7 +242,7 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
   std::vector<const char*> words{"egosgm"};
   for (const std::string& argument : arguments) words.push_back(argument.c_str());
   words.push_back(nullptr);
-  const OtherThreadsRun other_threads_run;
+  const py::gil_scoped_release other_threads_run;
   return app::run_program(static_cast<int>(words.size()) - 1, words.data(), &hooks);
 }
 
@@ -262,7 +265,7 @@ void bind_motions(py::module_& module) {
             fed.images = {mat_of(left, "left"), mat_of(right, "right")};
             if (!pose.is_none()) fed.world_from_camera = transform_of(pose, "pose");
             fed.starts_anew = starts_anew;
-            const OtherThreadsRun other_threads_run;
+            const py::gil_scoped_release other_threads_run;
             return self.next(fed, 0);
           },
           py::arg("left"), py::arg("right"), py::arg("pose") = py::none(), py::arg("starts_anew") = false)

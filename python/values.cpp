@@ -9,7 +9,6 @@
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/option_values.h"
-#include "python/other_threads.h"
 #include "python/pickling.h"
 
 namespace egosgm::python {
@@ -92,7 +91,7 @@ void bind_values(py::module_& module) {
       .def_readonly("max_allocation_bytes", &DeviceInfo::max_allocation_bytes)
       .def("__repr__",
            [](const DeviceInfo& info) { return "<DeviceInfo '" + info.name + "' (" + to_string(info.type) + ")>"; });
-  module.def("devices", &devices, py::call_guard<OtherThreadsRun>(),
+  module.def("devices", &devices, py::call_guard<py::gil_scoped_release>(),
              "All OpenCL devices, in the order in which they are preferred.");
   module.def(
       "pipeline_options", [](const std::string& preset) { return dict_of(options_of_preset(preset)); },

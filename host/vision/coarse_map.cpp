@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kClippedShare = 0.01;  // of the points
 constexpr int kLeastSlope = 24;         // of grey levels; where rows are smoother, nothing is sure
-constexpr int kCoarseWidth = 256;       // images are made smaller, down to this
+constexpr int kCoarseSide = 256;        // images are made smaller, down to this
 constexpr double kFewest = 0.03;        // of the pixels; below, the map says nothing
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
@@ -60,7 +60,7 @@ int slope_at(const cv::Mat& image, int x, int y) {
 
 /// As coarse_map, of bytes.
 cv::Mat coarse_map_of(const cv::Mat& left, const cv::Mat& right, double row_offset_px, int least, int end) {
-  const int factor = std::max(1, (left.cols + kCoarseWidth - 1) / kCoarseWidth);
+  const int factor = std::max(1, (std::max(left.cols, left.rows) + kCoarseSide - 1) / kCoarseSide);
   const cv::Size size(left.cols / factor, left.rows / factor);
   cv::Mat map(std::max(size.height, 0), std::max(size.width, 0), CV_32FC1, cv::Scalar(kNothing));
   if (size.width < 32 || size.height < 16) return map;

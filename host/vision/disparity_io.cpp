@@ -188,10 +188,6 @@ std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& d
   return 0;
 }
 
-cv::Mat read_disparity_png(const std::filesystem::path& file) {
-  return parse_disparity_png(read_file(file, kMaxImageFileBytes), file, kKittiStepsPerPx);
-}
-
 std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity) {
   require_map(disparity, file);
   cv::Mat stored(disparity.size(), CV_16UC1);

@@ -2,7 +2,6 @@
 #include "host/vision/pair_with_truth.h"
 
 #include <algorithm>
-#include <charconv>
 #include <map>
 #include <set>
 #include <system_error>
@@ -203,15 +202,6 @@ std::vector<fs::path> list_maps(const fs::path& estimate, const FrameRange& fram
   std::vector<fs::path> files;
   for (const auto& [name, file] : maps) files.push_back(file);
   return files;
-}
-
-std::optional<int> frame_number(const std::string& name) {
-  const Numbers numbers = numbers_in(name);
-  int number = 0;
-  if (numbers.empty()) return std::nullopt;
-  const std::string& last = numbers.back();
-  const bool fits = std::from_chars(last.data(), last.data() + last.size(), number).ec == std::errc();
-  return fits ? std::optional(number) : std::nullopt;
 }
 
 }  // namespace egosgm::vision

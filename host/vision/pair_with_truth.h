@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,8 +42,5 @@ EGOSGM_EXPORT EvaluationPairs pair_with_truth(const std::filesystem::path& estim
 /// there are none. Thread-safe.
 EGOSGM_EXPORT std::vector<std::filesystem::path> list_maps(const std::filesystem::path& estimate,
                                                            const FrameRange& frames = {});
-
-/// The last number in a file's name: 10 for 000010 and for 000151_10.
-EGOSGM_EXPORT std::optional<int> frame_number(const std::string& name);
 
 }  // namespace egosgm::vision

@@ -117,9 +117,9 @@ static inline int of_coarse(const CodeRows* coarse, const CodeRows* alike, const
          62 / bits;
 }
 
-// Sums of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels: the evidence of those that are asked and whose match lies in
-// the other image, and how many these are. `coarse_codes` and `alike` are those of the image at a quarter of the
-// resolution. A work-item a block, or a row of them.
+// Sums of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels: the evidence of those that are asked and whose match
+// lies in the other image, and how many these are. `coarse_codes` and `alike` are those of the image at a quarter of
+// the resolution. A work-item a block, or a row of them.
 COMPILED_ONCE void compare_row(const WorkItem at, const ImageSize size, const float gate, const int padding,
                                global const uint* codes, const int has_coarse, const int coarse_padding,
                                global const uint* coarse_codes, global const uint* alike, global const float* predicted,
@@ -184,17 +184,57 @@ KERNEL void compare(const ImageSize size, const float gate, const int padding, g
               measured, sums);
 }
 
-static inline int mean_evidence(const int2 sums) { return sums.x / sums.y; }
-static inline int least_evidence(const int evidence, const int2 part) {
-  return part.y > EGOSGM_EVIDENCE_LEAST_COUNT ? min(evidence, mean_evidence(part)) : evidence;
+// Sums of blocks side by side.
+typedef struct {
+  Ints sums, counts;
+} BlockSums;
+static inline BlockSums added(const BlockSums a, const BlockSums b) {
+  return (BlockSums){a.sums + b.sums, a.counts + b.counts};
+}
+static inline BlockSums less(const BlockSums a, const BlockSums b) {
+  return (BlockSums){a.sums - b.sums, a.counts - b.counts};
 }
 
-// Which of the five blocks around the one dy below a block are alike, by its code (census.cl): the leftmost has the
+#if PIXELS > 1
+AT_EDGE BlockSums load_sums_at_edge(global const int* row, const int x, const int width) {
+  const Ints at = x + LANE_INDICES, inside = clamp(at, (Ints)(0), (Ints)(width - 1)), places = 2 * inside;
+  const BlockSums loaded = {GATHERED(Ints, row, places), GATHERED(Ints, row + 1, places)};
+  return (BlockSums){at == inside ? loaded.sums : (Ints)(0), at == inside ? loaded.counts : (Ints)(0)};
+}
+#endif
+// Those of blocks x .. x + PIXELS - 1 of a row; outside of it they are 0.
+static inline BlockSums load_sums(global const EvidenceSum* row, const int x, const int width) {
+#if PIXELS == 1
+  const int is_inside = x >= 0 && x < width;
+  return (BlockSums){is_inside ? row[x].sum : 0, is_inside ? row[x].count : 0};
+#else
+  if (x < 0 || x + PIXELS > width) return load_sums_at_edge((global const int*)row, x, width);
+  global const PackedInts* pairs = (global const PackedInts*)(row + x);
+  const Ints first = pairs[0].lanes, second = pairs[1].lanes;
+  return (BlockSums){(Ints)(first.even, second.even), (Ints)(first.odd, second.odd)};
+#endif
+}
+
+// Which of the five blocks around the one dy below each block are alike, by its code (census.cl): the leftmost has the
 // highest bit.
-static inline int alike_in_row(const Code code, const int dy) {
-  if (dy == 0) return (int)(code >> 31 & 3) << 3 | 4 | (int)(code >> 29 & 3);
-  const int last = (dy + 3) * 9 + 6;
-  return (int)(code >> (dy < 0 ? 61 - last : 62 - last)) & 31;
+static inline Ints alike_in_row(const CodeRows* alike, const int x, const int dy) {
+  const int last = (dy + 3) * 9 + 6, shift = dy < 0 ? 61 - last : 62 - last, place = own_place(alike, x);
+#if PIXELS == 1
+#define BITS(shift, mask) (int)(alike->own[place] >> (shift) & (mask))
+#else
+  Codes codes = load_codes(alike->own + (alike->view == EGOSGM_LEFT ? place : place - (PIXELS - 1)));
+  if (alike->view == EGOSGM_RIGHT) codes = codes.sfedcba9876543210;
+#define BITS(shift, mask) convert_int16(codes >> (Codes)(shift) & (Codes)(mask))
+#endif
+  return dy == 0 ? BITS(31, 3) << 3 | 4 | BITS(29, 3) : BITS(shift, 31);
+}
+
+// Makes `least`, a mean of `counts`, that of a part where this has less and is no mean of a few.
+static inline void keep_least(BlockSums* least, const BlockSums part) {
+  const Ints is_less =
+      (part.counts > EGOSGM_EVIDENCE_LEAST_COUNT) & (part.sums * least->counts < least->sums * part.counts);
+  least->sums = is_less ? part.sums : least->sums;
+  least->counts = is_less ? part.counts : least->counts;
 }
 
 // The evidence of each block: the least of the means over a window of blocks that are alike and over its four halves,
@@ -205,39 +245,37 @@ COMPILED_ONCE void gather_row(const WorkItem at, const ImageSize size, const int
                               global int* evidence, global float* found) {
   const ImageSize blocks = {(size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE,
                             (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE};
-  const int radius = EGOSGM_EVIDENCE_RADIUS;
-  const size_t row = (size_t)at.view * blocks.height + at.y;
-  const int stride = EGOSGM_EVIDENCE_STRIDE(size.width);
+  const int radius = EGOSGM_EVIDENCE_RADIUS, width = blocks.width;
+  const size_t row = (size_t)at.view * blocks.height + at.y, places = row * EGOSGM_EVIDENCE_STRIDE(size.width);
   const CodeRows alike_row = code_rows(alike, blocks, coarse_padding, at.view, at.y);
-  for (int x = at.x; x < blocks.width; x += at.items) {
-    const Code code = has_coarse ? alike_row.own[own_place(&alike_row, x)] : ~(Code)0;
-    int2 left = 0, middle = 0, right = 0, above = 0, below = 0, here = 0;
+  FOR_PIXELS(x, width) {
+    const BlockSums none = {0, 0};
+    BlockSums all = none, left = none, right = none, above = none, below = none;
     for (int v = max(at.y - radius, 0); v <= min(at.y + radius, blocks.height - 1); ++v) {
-      global const int2* of_row = (global const int2*)sums + ((size_t)at.view * blocks.height + v) * blocks.width;
-      int2 of_left = 0, of_right = 0;
-      const int alike_here = alike_in_row(code, v - at.y);
-      for (int u = max(x - radius, 0); u < x; ++u) of_left += of_row[u] * (alike_here >> (x + radius - u) & 1);
-      for (int u = x + 1; u <= min(x + radius, blocks.width - 1); ++u) {
-        of_right += of_row[u] * (alike_here >> (x + radius - u) & 1);
+      const Ints is_alike = has_coarse ? alike_in_row(&alike_row, x, v - at.y) : (Ints)(31);
+      BlockSums of_row = none;
+#pragma unroll
+      for (int u = -radius; u <= radius; ++u) {
+        BlockSums sums_there = load_sums(sums + ((size_t)at.view * blocks.height + v) * width, x + u, width);
+        const Ints counts = -(is_alike >> (radius - u) & 1);
+        sums_there.sums &= counts;
+        sums_there.counts &= counts;
+        of_row = added(of_row, sums_there);
+        if (u < 0) left = added(left, sums_there);
+        if (u > 0) right = added(right, sums_there);
       }
-      const int2 of_column = of_row[x] * (alike_here >> radius & 1);
-      left += of_left;
-      middle += of_column;
-      right += of_right;
-      const int2 all = of_left + of_column + of_right;
-      if (v < at.y) above += all;
-      if (v == at.y) here = all;
-      if (v > at.y) below += all;
+      all = added(all, of_row);
+      if (v < at.y) above = added(above, of_row);
+      if (v > at.y) below = added(below, of_row);
     }
-    const int2 whole_window = left + middle + right;
-    int least = whole_window.y > 0 ? mean_evidence(whole_window) : 0;
-    least = least_evidence(least, left + middle);
-    least = least_evidence(least, middle + right);
-    least = least_evidence(least, above + here);
-    least = least_evidence(least, here + below);
-    evidence[row * stride + x] = least;
-    const float d = has_coarse ? coarse[row * blocks.width + x] : EGOSGM_INVALID_DISPARITY;
-    found[row * stride + x] = d > EGOSGM_INVALID_DISPARITY ? EGOSGM_COARSE * d : EGOSGM_INVALID_DISPARITY;
+    BlockSums least = {all.sums, max(all.counts, (Ints)(1))};
+    keep_least(&least, less(all, right));
+    keep_least(&least, less(all, left));
+    keep_least(&least, less(all, below));
+    keep_least(&least, less(all, above));
+    store_words(least.sums / least.counts, (global uchar*)(evidence + places), x, width);
+    const Floats d = has_coarse ? load_pixels(coarse + row * width, x, width) : INVALID;
+    store_pixels(d > INVALID ? (float)EGOSGM_COARSE * d : INVALID, found + places, x, width);
   }
 }
 

@@ -2,6 +2,7 @@
 // Why a left pixel has no value, or one that is doubtful: a byte of EGOSGM_REASON_*. What the stages decided follows
 // from their maps. What the image alone tells (flat, saturated, repeating) is looked for here, only where it is asked
 // for.
+#include "bit_count.h"
 #include "code.h"
 #include "grey.h"
 #include "method.h"
@@ -76,15 +77,27 @@ static inline Floats jump_in_row(global const float* warped, const int x, const 
   return most - least;
 }
 
-// How many bits the codes of a grid around a pixel differ from those around another place, where columns lead in
-// `direction`, in all; a sum beyond `most` need not be whole. `stride`: of rows of codes.
-static inline int bits_apart_around(global const Code* own, global const Code* other, const int direction,
-                                    const long stride, const int y, const int height, const int most) {
-  int bits = 0;
-  for (int v = -EGOSGM_REPEAT_RADIUS; v <= EGOSGM_REPEAT_RADIUS && bits <= most; v += EGOSGM_REPEAT_STEP) {
+// How many bits a code differs from each of PIXELS codes side by side.
+static inline Ints codes_apart(const Code own, global const Code* others) {
+#if PIXELS == 1
+  return (int)popcount(own ^ others[0]);
+#else
+  Codes bits = load_codes(others) ^ own;
+  BIT_COUNT(Codes, bits);
+  return convert_int16(bits);
+#endif
+}
+
+// How many bits the codes of a grid around a pixel differ from those around PIXELS places side by side, the first of
+// which is `other`, where columns of the grid lead in `direction`, in all; sums beyond `most` need not be whole.
+// `stride`: of rows of codes.
+static inline Ints bits_apart_around(global const Code* own, global const Code* other, const int direction,
+                                     const long stride, const int y, const int height, const int most) {
+  Ints bits = 0;
+  for (int v = -EGOSGM_REPEAT_RADIUS; v <= EGOSGM_REPEAT_RADIUS && any_of(bits <= most); v += EGOSGM_REPEAT_STEP) {
     if (y + v < 0 || y + v >= height) continue;
     for (int u = -EGOSGM_REPEAT_RADIUS; u <= EGOSGM_REPEAT_RADIUS; u += EGOSGM_REPEAT_STEP) {
-      bits += (int)popcount(own[v * stride + u] ^ other[v * stride + direction * u]);
+      bits += codes_apart(own[v * stride + u], other + v * stride + direction * u);
     }
   }
   return bits;
@@ -92,7 +105,7 @@ static inline int bits_apart_around(global const Code* own, global const Code* o
 
 // Whether the pixel in the middle of a block looks like another one of its row that a disparity of the range may take
 // for it: by no more bits than noise makes it differ from its match. `measured`: of the left view. REQUIRES: codes with
-// a padding of the number of disparities and of the grid.
+// a padding of the number of disparities, of the grid and of PIXELS.
 COMPILED_ONCE void find_repeats_row(const WorkItem at, const ImageSize size, const int disparities, const int padding,
                                     global const uint* all_codes, global const float* measured, global uchar* repeats) {
   const int width = size.width, height = size.height;
@@ -116,12 +129,15 @@ COMPILED_ONCE void find_repeats_row(const WorkItem at, const ImageSize size, con
     const int match = width - 1 - x + (int)(d + 0.5f);
     int most = EGOSGM_REPEAT_BITS * places;
     if (d > EGOSGM_INVALID_DISPARITY && match >= 0 && match < width) {
-      most = max(most, bits_apart_around(own, right + match, -1, stride, y, height, INT_MAX));
+      const Ints of_match = bits_apart_around(own, right + match, -1, stride, y, height, INT_MAX);
+      most = max(most, LANE(int, of_match, 0));
     }
+    const int end = min(disparities, width - x);
     int found = 0;
-    for (int k = EGOSGM_LEAST_REPEAT_PX; k < disparities && !found; ++k) {
-      if (x >= k) found = bits_apart_around(own, own - k, 1, stride, y, height, most) <= most;
-      if (x < width - k) found |= bits_apart_around(own, own + k, 1, stride, y, height, most) <= most;
+    for (int k = -min(disparities - 1, x); k < end && !found; k += PIXELS) {
+      const Ints other = k + LANE_INDICES;
+      const Ints bits = bits_apart_around(own, own + k, 1, stride, y, height, most);
+      found = any_of((abs(other) >= (Uints)(EGOSGM_LEAST_REPEAT_PX)) & (other < (Ints)(end)) & (bits <= most));
     }
     repeats[(size_t)at.y * columns + block] = (uchar)found;
   }

@@ -50,6 +50,8 @@ def text_argument(text: str) -> bytes:
 
 def say(text: str) -> None:
     """On the standard error, which may be full or closed; on one line, whatever a name in it holds."""
+    if sys.stderr is None:  # which print takes for the standard output
+        return
     with contextlib.suppress(OSError, AttributeError):
         print("egosgm: " + "".join(c if c.isprintable() else " " for c in text), file=sys.stderr, flush=True)
 

@@ -9,6 +9,7 @@ from . import _egosgm
 from .ros_images import needs
 
 _SUFFIXES = (".mcap", ".db3", ".bag")
+_NO_PROFILE = "Profile"  # what rosbags says of an MCAP that does not call its messages ROS 2's begins so
 
 
 class Parts:
@@ -88,7 +89,7 @@ class Parts:
         if file.suffix != ".mcap":
             raise error
         reader, records, writer = needs("mcap.stream_reader"), needs("mcap.records"), needs("mcap.writer")
-        copy, count = self._copy(f"mended_{file.name}"), 0
+        copy, count, reason = self._copy(f"mended_{file.name}"), 0, _first_line(error)
         with open(file, "rb") as source, open(copy, "wb") as target:
             out, schemas, channels = writer.Writer(target), {0: 0}, {}
             out.start(profile="ros2", library="egosgm")
@@ -107,15 +108,14 @@ class Parts:
                     if isinstance(record, records.Message) and record.channel_id in channels:
                         out.add_message(channels[record.channel_id], record.log_time, record.data, record.publish_time, record.sequence)
                         count += 1
-            except _egosgm.InvalidArgument:
+            except (_egosgm.InvalidArgument, OSError):
                 raise
-            except Exception:  # where it was cut
-                pass
+            except Exception as cut:
+                reason = _first_line(cut) if reason.startswith(_NO_PROFILE) else reason
             out.finish()
         if count == 0 or self._opens([copy]) is not None:
             raise error
-        reason = _first_line(error)
-        if not reason.startswith("Profile"):
+        if not reason.startswith(_NO_PROFILE):
             self.notes.append(f"{file.name} is cut or damaged ({reason}): the {count} messages before are read; `mcap recover` mends it")
         return copy
 

@@ -46,6 +46,11 @@ class BagFeed:
         first, self._first = self._first, None
         return first or next(self._frames, None)
 
+    @property
+    def has_lost_images(self) -> bool:
+        gaps = self._bag.gaps
+        return bool(gaps.unpaired_left or gaps.broken or gaps.repeated)
+
     def notes(self) -> List[str]:
         told = self._bag.gaps.text()
         return [told] if told else []

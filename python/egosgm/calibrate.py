@@ -22,6 +22,7 @@ _MOST_LEFT_OUT = 0.3  # of the views; where more are bad, something else is wron
 _CELLS = (8, 6)  # of the image, for its coverage
 _LEAST_COVERAGE, _LEAST_TILT_DEG, _MOST_ERROR_PX = 0.5, 15.0, 1.0
 _MOST_SQUARE_M, _LEAST_SQUARE_M = 0.5, 0.001
+_LEAST_BASELINE_M = 1e-4  # of pictures of one camera next to nothing is found
 
 
 class _View(NamedTuple):
@@ -205,6 +206,8 @@ def _coverage(views: Sequence[_View], side: int, size: Tuple[int, int]) -> float
 
 def _check_stance(stereo: _Stereo) -> None:
     x, y, z = stereo.translation_m
+    if not np.linalg.norm(stereo.translation_m) >= _LEAST_BASELINE_M:
+        raise _egosgm.InvalidArgument("both cameras stand in one place: are left and right pictures of one camera?")
     text = f"the right camera stands at ({-x:.4g}, {-y:.4g}, {-z:.4g}) m, seen by the left one: "
     if abs(x) < abs(y) or abs(x) < abs(z):
         raise _egosgm.InvalidArgument(text + "the cameras do not stand side by side; where one stands above the other, turn the images by 90 degrees")

@@ -96,7 +96,7 @@ def normals_of(disparity: NDArray[np.float32], calibration: _egosgm.Calibration,
     c = calibration
     x, y = (np.rint(f * points[:, i] / points[:, 2] + m).astype(int) for i, f, m in ((0, c.fx, c.cx), (1, c.fy, c.cy)))
     d = np.where(disparity > _egosgm.INVALID_DISPARITY, disparity, np.nan) + c.doffs_px
-    down, across = np.gradient(d)
+    down, across = (np.gradient(d, axis=axis) if d.shape[axis] > 1 else np.zeros_like(d) for axis in (0, 1))
     a, b, here = across[y, x], down[y, x], d[y, x]
     # d = f b / Z, so that a fx X + b fy Y + (d - a (x - cx) - b (y - cy)) Z = fx baseline.
     normal = -np.stack([a * c.fx, b * c.fy, here - a * (x - c.cx) - b * (y - c.cy)], axis=1)

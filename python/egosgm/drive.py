@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """run(): a drive in, a disparity map for each of its frames out."""
+import contextlib
 import dataclasses
 import os
 import warnings
@@ -154,7 +155,9 @@ class Drive:
     def _frames(self) -> Iterator[DriveFrame]:
         """The device matches a frame while the next one is read and its motion is found. Iterations share nothing, so that each may end
         where it likes, and two may run at once."""
-        motions, pipeline = self._motions(), self._spare.pop() if self._spare else None
+        motions, pipeline = self._motions(), None
+        with contextlib.suppress(IndexError):  # none is left, or another thread was quicker
+            pipeline = self._spare.pop()
         pairs, under_way, failure, doubt = self._pairs(), None, None, None
         try:
             while True:

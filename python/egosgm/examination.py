@@ -122,8 +122,9 @@ class Examination:
             self._brightness[side] += image.mean()
             largest = image.max()
             self._saturated[side] += np.mean(image == largest) if largest in (255, 1023, 4095, 16383, 65535) else 0
-        near, far = (np.abs(np.diff(rows, axis=0)).mean() for rows in (left.astype(np.float32), left[::2].astype(np.float32)))
-        self._interlaced += int(near > _LEAST_COMB * far)
+        if self._height > 2:
+            near, far = (np.abs(np.diff(rows, axis=0)).mean() for rows in (left.astype(np.float32), left[::2].astype(np.float32)))
+            self._interlaced += int(near > _LEAST_COMB * far)
         self._matches.append(matches)
         row_offset = float(np.median(matches[:, 3] - matches[:, 1])) if len(matches) else 0.0
         coarse = _egosgm._coarse_map(left, right, row_offset, self._least, self._end)

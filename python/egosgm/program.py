@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 import traceback
-from typing import Optional, Sequence, Tuple
+from typing import Any, Optional, Sequence, Tuple
 
 from .arguments import say
 
@@ -55,12 +55,16 @@ def _output_error() -> Optional[OSError]:
     return None
 
 
+def _lead_interrupts(handler: Any) -> None:
+    """At first they end the process: modules of others lose an error that comes while they load, and Python would wait for C++ to come back."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if threading.current_thread() is threading.main_thread() and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, handler)
+
+
 def _run_program(arguments: Sequence[str]) -> int:
     """A command in C++, in this process."""
     from . import _egosgm, bag_program
-    if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.SIG_DFL)  # Python's handlers would wait for C++ to come back
     return _egosgm._main([os.fsencode(argument) for argument in arguments], bag_program)
 
 
@@ -70,7 +74,9 @@ def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]
     try:
         if module is None:
             return _run_program(arguments), ""
-        return importlib.import_module("." + module, __package__).main(list(arguments[1:])), ""
+        tool = importlib.import_module("." + module, __package__)
+        _lead_interrupts(signal.default_int_handler)  # nothing unfinished is left
+        return tool.main(list(arguments[1:])), ""
     except SystemExit as end:  # of --help
         return int(end.code or 0), ""
     except ModuleNotFoundError as error:
@@ -97,8 +103,8 @@ def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]
 
 def run_tool(arguments: Sequence[str]) -> int:
     """Runs a command, and returns its exit code. Never calls the C++ program."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, signal.default_int_handler)  # as an interrupt: nothing unfinished is left
+    _lead_interrupts(signal.SIG_DFL)
+    os.environ.setdefault("OPENCV_OPENCL_RUNTIME", "disabled")  # OpenCV would load drivers for nothing, whose compilers take interrupts for themselves
     _open_standard_streams()
     _print_any_name()
     code, told = _outcome(arguments, _module_of(arguments))

@@ -18,6 +18,7 @@ import cv2
 _FOREIGN = (".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")  # that only OpenCV reads
 _MOST_SKEW_NS = 2_000_000  # of cameras that are triggered together
 _MOST_LIST_BYTES = 1 << 28
+_LEAST_OF_VIDEO = 0.9  # of the images that it says it has, which many videos only estimate
 
 
 @dataclasses.dataclass
@@ -56,6 +57,8 @@ def _names_files(pattern: str) -> bool:
 
 
 class _Files:
+    note = ""
+
     def __init__(self, pattern: str) -> None:
         self._files = _egosgm._find_images(pattern)
         self.count: Optional[int] = len(self._files)
@@ -67,8 +70,11 @@ class _Files:
 
 
 class _Video:
+    note = ""
+
     def __init__(self, file: str) -> None:
         _expect_file(file)
+        self._file = file
         # By FFmpeg alone where OpenCV has it: other readers, which it would try next, print.
         has_ffmpeg = cv2.CAP_FFMPEG in cv2.videoio_registry.getStreamBackends()
         self._video = cv2.VideoCapture(file, cv2.CAP_FFMPEG if has_ffmpeg else cv2.CAP_ANY)
@@ -83,9 +89,11 @@ class _Video:
             rate = self._video.get(cv2.CAP_PROP_FPS)
             is_there, image = self._video.read()
             if not is_there:
-                return
+                break
             yield image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB), number / rate if rate > 0 else None
             number += 1
+        if self.count and number < _LEAST_OF_VIDEO * self.count:
+            self.note = f"{self._file} has {self.count} images, and only the first {number} can be read: is it cut or damaged?"
 
 
 def _open(pattern: str) -> Any:
@@ -127,9 +135,11 @@ class _TwoSources(RawPairs):
                 break
             yield _same_size(RawPair(left[0], right[0], left[1]), self._names[0][7:])
             pairs += 1
+        notes = [source.note for source in self._sources if source.note]
         if left is not None or right is not None:
             ended, longer = self._names if left is None else self._names[::-1]
-            self.note = f"{ended} ends after {counted(pairs, 'image')}, before {longer}: the rest of that one is left out"
+            notes.append(f"{ended} ends after {counted(pairs, 'image')}, before {longer}: the rest of that one is left out")
+        self.note = "; ".join(notes)
 
 
 class _SideBySide(RawPairs):
@@ -143,6 +153,7 @@ class _SideBySide(RawPairs):
             if width % 2:
                 raise _refuse(f"--side-by-side {self._name}: the images are {width} px wide, which has no half")
             yield RawPair(both[:, :width // 2], both[:, width // 2:], time_s)
+        self.note = self._images.note
 
 
 class _Listed(RawPairs):

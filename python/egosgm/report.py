@@ -180,7 +180,7 @@ class _Page:
         data["scales"] = {"sigma_least_px": _SIGMA_LEAST_PX, "sigma_step": _SIGMA_STEP, "reasons": _egosgm.REASONS}
         data["run"] = _with_short_paths({**self._run, "frames": [frame.entry for frame in self._frames]})
         text = json.dumps(data).replace("<", "\\u003c")  # nothing in a text may end the script element
-        return pathlib.Path(__file__).with_name("report.html").read_text().replace("@DATA@", text, 1)
+        return pathlib.Path(__file__).with_name("report.html").read_text(encoding="utf-8").replace("@DATA@", text, 1)
 
     def _truth(self) -> Dict[str, Any]:
         if not self._given.truth:

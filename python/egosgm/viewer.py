@@ -48,12 +48,12 @@ class RerunOutput:
             self._last_motion = getattr(motion, "current_from_previous", motion)
         if self._last_motion is not None:  # where none was found, the last one is repeated
             self._world_from_camera = self._world_from_camera @ np.linalg.inv(self._last_motion)
-        height, width = frame.left.shape
+        height, width = frame.left.shape[:2]
         depth, variance = depth_maps(maps.disparity, maps.variance, calibration)
         self._log("camera", rerun.Transform3D(translation=self._world_from_camera[:3, 3], mat3x3=self._world_from_camera[:3, :3]))
         self._log("camera/image", rerun.Pinhole(focal_length=(calibration.fx, calibration.fy), principal_point=(calibration.cx, calibration.cy),
                                                 resolution=(width, height)))
-        self._log("camera/image/left", rerun.Image(frame.left, "L"))
+        self._log("camera/image/left", rerun.Image(frame.left, "L" if frame.left.ndim == 2 else {1: "L", 3: "RGB", 4: "RGBA"}[frame.left.shape[2]]))
         self._log("camera/image/depth", rerun.DepthImage(np.nan_to_num(depth), meter=1.0))  # 0: none
         self._log("maps/variance", rerun.DepthImage(np.nan_to_num(variance)))
         if maps.reason is not None:

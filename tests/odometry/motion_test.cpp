@@ -133,15 +133,6 @@ TEST(OdometryMotion, SaysWhyThereIsNone) {
   EXPECT_NE(estimate(calibration, unrelated).reason, "");
 }
 
-TEST(OdometryMotion, DoesNotDependOnAnythingButItsInput) {
-  std::mt19937 generator(5);
-  const Calibration calibration = kitti_calibration();
-  const auto matches = random_matches(generator, calibration, make_motion(0, 0, -1, 1), 300, 0.3);
-  const auto first = estimate(calibration, matches), second = estimate(calibration, matches);
-  EXPECT_EQ(first.motion.current_from_previous.matrix(), second.motion.current_from_previous.matrix());
-  EXPECT_EQ(first.motion.covariance, second.motion.covariance);
-}
-
 // The pair's error grows with x^2 and x y; each frame sees new points.
 TEST(OdometryRectification, LearnsYawAndDistortionButNothingFromAnExactPair) {
   const Calibration c = kitti_calibration();

@@ -103,11 +103,6 @@ class EvalOverTime(ProgramTest):
         self.assertIn("2 frames, 0 pairs of frames", table)
         self.assertRegex(table, r"\nall +\d+ ")
 
-    def test_against_counts_harm_and_help(self):
-        estimate, against, truth = self.maps([10, 13]), self.maps([12, 10]), self.maps([10, 10])
-        figures = self.evaluate(estimate, truth, "--against", against)["figures"]
-        self.assertEqual((figures["changed_percent"], figures["harm_percent"], figures["help_percent"]), (100, 50, 50))
-
     def test_against_counts_what_was_gained_and_lost(self):
         estimate, against, truth = self.maps([10, 0, 14]), self.maps([0, 10, 10]), self.maps([10, 10, 10])
         figures = self.evaluate(estimate, truth, "--against", against)["figures"]

@@ -148,16 +148,6 @@ class RectifyTest(InputTest):
 class Rectify(RectifyTest):
     """Rectified back."""
 
-    def test_what_is_no_rotation_is_refused(self):
-        file = self.new_folder() / "stereo.yml"
-        for given, name, matrix in ((False, "R", 2 * numpy.eye(3)), (False, "R", numpy.diag([1, 1, -1])), (True, "R1", 2 * numpy.eye(3))):
-            text = self.opencv_yaml(given=given)
-            rows = text.split(f"{name}: ")
-            text = rows[0] + self.matrix(name, matrix) + rows[1].split("]\n", 1)[1]
-            file.write_text(text)
-            self.assert_refused(["rectify", *self.PAIRS, "--calib", file, "--out", file.parent / "out"], f"{name} is no rotation")
-            self.assertFalse((file.parent / "out").exists())
-
     def test_raw_pairs_of_a_known_rig_become_the_street_again(self):
         findings = self.run_doctor(*self.PAIRS[:2], "--right", self.raw_folder / "cam1/*.png", "--calib", self.street / "calib.txt")
         self.assertIn("rectify again", findings.stdout)
@@ -188,6 +178,12 @@ class Rectify(RectifyTest):
             pairs = len(list((out / "image_3").iterdir()))
             self.assertIn(pairs, range(1, FRAMES))
             self.assertIn(f"{ended} ends after {pairs} image{'s' * (pairs > 1)}, before {longer}: ", text)
+        told = f"{cut} has {FRAMES} images, and only the first {pairs} can be read"
+        self.assertIn(told, text)
+        self.assertIn(told, self.assert_works("rectify", "--left", cut, "--right", shutil.copy(cut, folder / "also.avi"), "--calib", self.street / "calib.txt",
+                                              "--out", self.new_folder() / "out"))
+        both = self.assert_works("rectify", "--side-by-side", cut, "--calib", self.street / "calib.txt", "--out", self.new_folder() / "out")
+        self.assertIn(told, both)
 
     def test_side_by_side_images_and_lists(self):
         both = self.new_folder()

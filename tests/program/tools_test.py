@@ -10,7 +10,7 @@ import subprocess
 import sys
 import unittest
 
-from program_case import FRAMES, HAS_PACKAGE, PROGRAM, ProgramTest, egosgm
+from program_case import FRAMES, HAS_PACKAGE, PACKAGE, PROGRAM, ProgramTest, egosgm
 
 ODD = "b\udcff\n"  # a name of Latin-1, and of two lines
 
@@ -110,6 +110,25 @@ class Tools(ProgramTest):
             done = subprocess.run(["sh", "-c", 'exec "$@" >&- <&-', "sh", PROGRAM, *map(str, arguments)], stderr=subprocess.PIPE, text=True, timeout=600)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, code), f"{arguments}: {done.stderr}")
             self.assertIn("the standard output cannot be written: Bad file descriptor" if code else "", done.stderr)
+
+    def test_tools_load_no_driver_which_would_take_their_interrupts(self):
+        code = "import sys; from egosgm.program import run_tool; run_tool(sys.argv[1:]); sys.exit('pocl' in open('/proc/self/maps').read())"
+        done = subprocess.run([sys.executable, "-B", "-c", code, "doctor", self.street], capture_output=True, text=True,
+                              env=dict(os.environ, PYTHONPATH=str(PACKAGE)), timeout=600)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+    def test_an_interrupt_while_the_package_is_loaded_ends_it(self):
+        for module in ("numpy", "cv2"):
+            folder = self.new_folder()
+            (folder / f"{module}.py").write_text("import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGINT)\nexcept KeyboardInterrupt:\n    pass\n")
+            done = egosgm("doctor", self.street, env=dict(os.environ, PYTHONPATH=str(folder)))
+            self.assertEqual((done.returncode, done.stderr), (-signal.SIGINT, ""))
+
+    def test_an_error_does_not_go_to_the_standard_output(self):
+        for redirection in ("2>&-", "2>/dev/full"):
+            words = ["sh", "-c", f'exec "$@" {redirection}', "sh", sys.executable, "-B", "-m", "egosgm", "report", self.new_folder()]
+            done = subprocess.run([*map(str, words)], stdout=subprocess.PIPE, env=dict(os.environ, PYTHONPATH=str(PACKAGE)), timeout=600)
+            self.assertEqual((done.returncode, done.stdout), (2, b""), redirection)
 
 
 @unittest.skipUnless(HAS_PACKAGE, "built without the Python package")

@@ -257,12 +257,6 @@ def test_a_calibration_that_changes_is_seen(tmp_path, street, frames):
     assert found == [0, 1]
 
 
-def test_one_topic_is_no_pair(tmp_path, street, frames):
-    bag = record("mcap", tmp_path / "drive", street, frames)
-    with pytest.raises(egosgm.InvalidArgument, match="given as left and as right"):
-        bags.Bag(bag, "/left/image_rect", "/left/image_rect")
-
-
 def test_what_ends_a_run_leaves_nothing_and_is_in_nobodys_way(tmp_path, street, frames):
     bag, out = record("mcap", tmp_path / "drive", street, frames * 40, times=[START + i * RATE_NS for i in range(40 * FRAMES)]), tmp_path / "out.mcap"
     for stop in (signal.SIGTERM, signal.SIGKILL):
@@ -699,7 +693,7 @@ def test_poses_of_the_bag_are_the_motion(tmp_path, street, frames):
 
 @pytest.mark.parametrize("change, named", [
     (dict(left_topic="/none"), r'has no topic "/none"; its topics of images: /left/image_rect, /right/image_rect'),
-    (dict(left_topic="/left/camera_info"), "is of type sensor_msgs/msg/CameraInfo"), (dict(info_topics=["/left/camera_info"]), "give two"),
+    (dict(right_topic="/left/image_rect"), "given as left and as right"), (dict(left_topic="/left/camera_info"), "is of type sensor_msgs/msg/CameraInfo"), (dict(info_topics=["/left/camera_info"]), "give two"),
     (dict(pose_topic="/odom"), "its topics of poses: none"), (dict(max_skew_ms=-1), "max skew -1"), (dict(pose_axes="x"), 'pose axes "x"')])
 def test_wrong_arguments_are_refused_by_name(change, named, tmp_path, street, frames):
     path = record("mcap", tmp_path / "drive", street, frames[:1])
@@ -1055,7 +1049,7 @@ def test_an_mcap_that_is_packed_and_one_without_a_profile(tmp_path, street, fram
     from mcap.writer import Writer as McapWriter
     for name, profile, encoding in (("plain", "", "cdr"), ("ros1", "ros1", "ros1")):
         with open(path, "rb") as source, open(tmp_path / f"{name}.mcap", "wb") as target:
-            writer = McapWriter(target)
+            writer = McapWriter(target, chunk_size=1 << 15)
             writer.start(profile=profile)
             schemas, channels = {}, {}
             for schema, channel, message in make_reader(source).iter_messages():
@@ -1067,6 +1061,11 @@ def test_an_mcap_that_is_packed_and_one_without_a_profile(tmp_path, street, fram
             writer.finish()
     assert f"{FRAMES} frames" in told_of(capfd, tmp_path / "plain.mcap")
     refused(capfd, ["--bag", tmp_path / "ros1.mcap", *TOPICS, *SET], "ROS 1")
+    whole = (tmp_path / "plain.mcap").read_bytes()
+    at = whole.rindex(zstandard.FRAME_HEADER)  # of the last chunk
+    (tmp_path / "torn.mcap").write_bytes(whole[:at] + bytes(4) + whole[at + 4:])
+    said = told_of(capfd, tmp_path / "torn.mcap")
+    assert "torn.mcap is cut or damaged (" in said and f"{FRAMES} frames" not in said
 
 
 def test_topics_are_found_where_there_is_one_choice(tmp_path, street, frames, capfd):
@@ -1078,6 +1077,17 @@ def test_topics_are_found_where_there_is_one_choice(tmp_path, street, frames, ca
     for name in ("left", "right"):
         recording.image(f"/front/{name}/image_rect", START, frames[0].left)
     refused(capfd, ["--bag", recording.write(tmp_path / "two"), *SET], "more than one pair of cameras", "/front/left/image_rect")
+
+
+def test_rows_of_poses_are_of_no_bag_that_lost_images(tmp_path, street, frames, capfd):
+    poses = tmp_path / "poses.txt"
+    egosgm.write_poses(poses, np.stack([np.eye(4)] * FRAMES))
+    for name, left_out, code in (("whole", (), 0), ("right", ((2, "left"),), 0), ("lost", ((1, "right"),), 2)):
+        bag = record("mcap", tmp_path / name, street, frames, left_out=left_out)
+        assert bag_program.main(["--bag", str(bag), *TOPICS, *SET, "--poses", str(poses), "--out", str(tmp_path / f"{name}.out")]) == code
+        said = capfd.readouterr().err
+        assert ("has images that are in no pair: give --pose-topic" in said) == (code == 2), said
+        assert json.loads((tmp_path / f"{name}.out/report.json").read_text())["finished"] == (code == 0)
 
 
 def test_poses_of_another_unit_are_told(tmp_path, street, frames, capfd):

@@ -3,6 +3,7 @@
 import contextlib
 import gzip
 import json
+import os
 import random
 import re
 
@@ -208,6 +209,7 @@ def test_arrays_of_numpy(tmp_path):
     folder.mkdir()
     for name, array in arrays.items():
         np.save(folder / name, array)
+    os.mkfifo(folder / "R_pipe.npy")  # which nobody writes to
     expect_raw(egosgm.read_calibration(folder))
     np.save(tmp_path / "Q.npy", np.array(Q))
     expect_rectified(egosgm.read_calibration(tmp_path / "Q.npy"))

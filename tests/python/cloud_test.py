@@ -7,6 +7,7 @@ import pytest
 
 import egosgm
 from egosgm import cloud
+from egosgm.points import cloud_of_maps
 
 WIDTH, HEIGHT = 6, 4
 CAMERA = dict(fx=100.0, fy=100.0, cx=2.0, cy=1.0, baseline_m=0.5, doffs_px=0.0)
@@ -61,6 +62,14 @@ def test_what_lies_in_one_cube_is_its_mean():
     np.testing.assert_allclose(points, [[0.4, 0.5, 0.5]])
     assert colors.tolist() == [[15, 15, 15]] and normals.tolist() == [[0, 0, -1]]
     assert len(grid.means(1)[0]) == 4
+
+
+def test_a_row_of_pixels_has_no_slope_across():
+    camera = egosgm.Calibration(fx=100, fy=100, cx=2, cy=0, baseline_m=0.5)
+    for shape in ((1, 5), (5, 1)):
+        disparity = np.full(shape, 10, np.float32)
+        cloud_points = cloud_of_maps(disparity, disparity * 0.001, np.zeros(shape, np.uint8), camera, 0.1, None, None, 80, 1).points
+        np.testing.assert_allclose(cloud.normals_of(disparity, camera, cloud_points), np.tile([0, 0, -1], (5, 1)), atol=1e-6)
 
 
 def test_normals_are_of_the_slope():

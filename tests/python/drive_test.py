@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import egosgm
-from egosgm import bag_program, cpu_driver, points, ros_images, viewer
+from egosgm import bag_program, cpu_driver, examination, points, ros_images, viewer
 
 WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
@@ -76,6 +76,13 @@ def test_an_iteration_may_end_where_it_likes_and_two_may_run_at_once(street_fold
     for side in (0, 1):
         np.testing.assert_array_equal([pair[side].disparity for pair in pairs], expected)
     np.testing.assert_array_equal(maps_of(kept), expected[1:])
+
+    class Taken(list):  # what another thread takes between a look and a pop
+        def __bool__(self):
+            return True
+
+    drive._spare = Taken()
+    np.testing.assert_array_equal(maps_of(drive), expected)
 
 
 def test_pairs_of_an_iterator_come_once(street, frames):
@@ -345,6 +352,22 @@ def test_what_is_nearer_than_the_range_is_told():
         list(egosgm.run(pairs, street.calibration, disparities=16, temporal=False))
 
 
+def test_a_look_at_what_is_nearer_takes_little_memory_whatever_the_shape():
+    for shape in ((48, 16384), (16384, 48), (16384, 300), (2, 600), (600, 2)):
+        image = np.zeros(shape, np.uint8)
+        assert max(egosgm._egosgm._coarse_map(image, image, 0.0, 0, 16).shape) <= 256
+
+
+@pytest.mark.filterwarnings("error")
+def test_images_of_a_few_rows_or_columns_are_examined():
+    for shape in ((1, 1), (1, 600), (2, 600), (3, 600), (600, 1), (600, 2)):
+        left, right = np.random.default_rng(1).integers(0, 256, (2, *shape), np.uint8)
+        for pair in ((left, right), (left, left)):
+            looked = examination.Examination(None, 0, 16)
+            looked.add(*pair)
+            assert [finding.check for finding in looked.findings(1)][:2] == ["images", "calibration"]
+
+
 def test_a_doubtful_drive_is_told(street, frames):
     swapped = [(frame.right, frame.left) for frame in frames]
     with pytest.warns(UserWarning, match="density|no motion"):
@@ -469,3 +492,14 @@ def test_the_viewer_repeats_the_last_motion_where_none_was_found(street, frames,
     for motion in (None, ahead, None):
         output.add(frame, frame.maps, motion, frame.calibration)
     assert output._world_from_camera[2, 3] == 2
+
+
+def test_the_viewer_takes_colour(street, frames, monkeypatch):
+    rerun = unittest.mock.MagicMock()
+    monkeypatch.setitem(sys.modules, "rerun", rerun)
+    output, grey = viewer.RerunOutput(), frames[0]
+    for channels, model in ((1, "L"), (3, "RGB"), (4, "RGBA")):
+        left, right = (np.repeat(image[:, :, None], channels, axis=2) for image in (grey.left, grey.right))
+        frame = next(iter(egosgm.run([(left, right)], street.calibration, progress=False, **OPTIONS)))
+        output.add(frame, frame.maps, frame.motion, frame.calibration)
+        assert rerun.Image.call_args.args[1] == model and rerun.Image.call_args.args[0].shape == left.shape

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Python module: same names, same bits, no copies, errors by kind."""
-import ast
 import importlib.util
 import inspect
 import pathlib
@@ -286,6 +285,7 @@ def test_sequences_are_read(tmp_path, frames, street):
     sequence = egosgm.open_patterns(str(tmp_path / "left_%d.png"), str(tmp_path / "right_%d.png"), tmp_path / "c.toml")
     assert len(sequence) == 2 and sequence.size == (WIDTH, HEIGHT) and sequence.frames[1].name == "000001"
     assert sequence.numbers == [0, 1] and sequence.note == ""
+    assert egosgm.open_patterns(str(tmp_path / "left_%d.png"), str(tmp_path / "right_%d.png")).calibration is None
     names = str(tmp_path / "l*_*.png"), str(tmp_path / "r*.png"), tmp_path / "c.toml"
     with pytest.raises(egosgm.InvalidArgument, match="one \\*"):
         egosgm.open_patterns(*names)
@@ -307,27 +307,6 @@ def test_all_errors_are_errors_of_the_library_and_of_python():
         assert issubclass(kind, egosgm.Error) and issubclass(kind, builtin), kind
     with pytest.raises(egosgm.Error, match="fx"):
         egosgm.Calibration(fx=-1, fy=1, cx=0, cy=0, baseline_m=1)
-
-
-def test_the_stub_and_the_module_name_the_same():
-    folder = pathlib.Path(egosgm.__file__).parent
-    stub = ast.parse((folder / "__init__.pyi").read_text())
-
-    def public(names):
-        return {name for name in names if not name.startswith("_")}
-
-    classes = {node.name: node for node in stub.body if isinstance(node, ast.ClassDef)}
-    functions = {node.name for node in stub.body if isinstance(node, ast.FunctionDef)}
-    constants = {node.target.id for node in stub.body if isinstance(node, ast.AnnAssign)}
-    again = {name.asname for node in stub.body if isinstance(node, ast.ImportFrom) for name in node.names} - {None}
-    assert public(classes) | functions | public(constants) | again == public(egosgm.__all__)
-    for name, node in classes.items():
-        members = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
-        if not issubclass(getattr(egosgm, name), Exception):
-            assert public(members) == public(vars(getattr(egosgm, name))), name
-    generated = (folder / "_options.pyi").read_text()
-    assert "p2: int" in generated and "ransac_iterations: int" in generated
-    assert (folder / "py.typed").exists()
 
 
 def test_the_readmes_lines_run(tmp_path, street_folder, monkeypatch):

@@ -6,7 +6,9 @@ import sys
 import pytest
 
 BEGIN = """
-import multiprocessing, os, sys, threading, time
+import atexit, multiprocessing, os, sys, threading, time
+at_end = []
+atexit.register(lambda: [act() for act in at_end])  # after the library, which registers later
 import numpy
 import numpy.core.multiarray
 
@@ -131,3 +133,35 @@ in_threads(work, 2, daemon=True)
 begun.wait()
 time.sleep(0.1)
 """, times=2)
+
+
+@pytest.mark.parametrize("call", ["large.process(Slow(), IMAGE)", "egosgm.read_grey(Slow())", "frame.left"])
+def test_the_interpreter_ends_after_calls_in_which_python_runs(call, tmp_path):
+    """The interpreter would take the lock from their thread there, and end it in the middle of C++."""
+    run(f"""
+import pathlib
+for side in "lr":
+    egosgm.write_disparity(f"{tmp_path}/{{side}}.png", IMAGE.astype(numpy.float32))
+frame, = egosgm.open_patterns("{tmp_path}/l.png", "{tmp_path}/r.png").frames
+large = pipeline()
+begun, ended = threading.Event(), []
+def slow(result, sleep=time.sleep):
+    begun.set()
+    sleep(0.3)
+    ended.append(result)
+    return result
+class Slow:
+    def __array__(self, *_, **__):
+        return slow(IMAGE)
+    def __fspath__(self):
+        return slow("nowhere.png")
+pathlib.Path = slow  # which the library makes of a name
+def work():
+    try:
+        {call}
+    except egosgm.InvalidArgument:
+        pass
+in_threads(work, 1, daemon=True)
+begun.wait()
+at_end.append(lambda: ended or os.write(2, b"ended in the middle of a call"))
+""")

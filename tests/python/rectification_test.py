@@ -33,40 +33,6 @@ def test_cameras_that_are_turned_alike_give_the_images_turned():
     assert np.abs(right[HEIGHT // 2].astype(float) - 100 * (WIDTH - 1 - at))[inside].max() < 5
 
 
-def test_a_file_of_opencv_is_a_rig(tmp_path):
-    def matrix(name, values):
-        values = np.atleast_2d(values)
-        return f"{name}: !!opencv-matrix\n   rows: {values.shape[0]}\n   cols: {values.shape[1]}\n   dt: d\n   data: {values.ravel().tolist()}\n"
-
-    file = tmp_path / "rig.yml"
-    text = "%YAML:1.0\n---\n" + "".join(matrix(name, value) for name, value in (
-        ("K1", MATRIX), ("K2", MATRIX), ("D1", np.zeros((1, 5))), ("D2", np.zeros((1, 5))), ("R", np.eye(3)), ("T", [[-250.0], [0.0], [0.0]])))
-    file.write_text(text + f"image_width: {WIDTH}\nimage_height: {HEIGHT}\n")
-    read = egosgm.read_opencv_rig(file, unit_m=1e-3)
-    assert read.size == (WIDTH, HEIGHT) and not read.is_fisheye
-    assert egosgm.Rectification(read, WIDTH, HEIGHT).calibration.baseline_m == pytest.approx(BASELINE)
-    with pytest.raises(egosgm.InvalidArgument, match="were calibrated"):
-        egosgm.Rectification(read, WIDTH + 2, HEIGHT)
-    (tmp_path / "calib.txt").write_text("P0: 1 0 0 0 0 1 0 0 0 0 1 0\n")
-    assert egosgm.read_opencv_rig(tmp_path / "calib.txt") is None
-    with pytest.raises(egosgm.InvalidArgument, match="sensor.yaml"):
-        egosgm.read_euroc_rig(tmp_path)
-
-
-def test_what_is_no_rig_is_refused():
-    for changes, named in (({"T": [BASELINE, 0, 0]}, "exchange left and right"), ({"T": [-1, 0]}, "T: needs 3x1"),
-                           ({"left_matrix": np.eye(2)}, "M1: needs 3x3"), ({"R": 2 * np.eye(3)}, "R is no rotation"),
-                           ({"left_distortion": np.zeros(3)}, "D1: needs 4"), ({"size": (1, 1)}, "1x1 were calibrated")):
-        with pytest.raises(egosgm.InvalidArgument, match=named):
-            egosgm.Rectification(rig(**changes), WIDTH, HEIGHT)
-    with pytest.raises(egosgm.InvalidArgument, match="dimensions"):
-        rig(R=np.zeros((1, 1, 1)))
-    rectification = egosgm.Rectification(rig(), WIDTH, HEIGHT)
-    image = np.zeros((HEIGHT, WIDTH + 1), np.uint8)
-    with pytest.raises(egosgm.InvalidArgument, match="an image is 161x64"):
-        rectification.rectify(image, image)
-
-
 def test_points_of_rectified_images_lie_in_equal_rows():
     frame = egosgm.SyntheticSequence(frames=1, width=320, height=128, seed=5).render(0)
     matches = egosgm.match_pair(frame.left, frame.right)
@@ -147,8 +113,11 @@ def test_of_rectified_cameras_nothing_changes():
 
 def test_what_no_rig_has_is_named():
     for changes, named in (({"T": [1000 * -BASELINE, 0, 0]}, "unit_m 0.001"), ({"T": [0.004, -BASELINE, 0]}, "side by side"), ({"T": [0, 0, 0]}, "one place"),
-                           ({"T": [[-BASELINE, 0, 0]]}, "T: needs 3x1"), ({"R": [[1, 0, 0], [0, np.nan, 0], [0, 0, 1]]}, "R: needs 3x3"),
-                           ({"right_matrix": np.zeros((3, 3))}, "M2 is no camera matrix"), ({"R": np.diag([1, 1, -1])}, "R is no rotation"),
+                           ({"T": [[-BASELINE, 0, 0]]}, "T: needs 3x1"), ({"T": [BASELINE, 0, 0]}, "exchange left and right"),
+                           ({"left_matrix": np.eye(2)}, "M1: needs 3x3"), ({"left_distortion": np.zeros(3)}, "D1: needs 4"), ({"size": (1, 1)}, "1x1 were calibrated"),
+                           ({"R": [[1, 0, 0], [0, np.nan, 0], [0, 0, 1]]}, "R: needs 3x3"),
+                           ({"right_matrix": np.zeros((3, 3))}, "M2 is no camera matrix"), ({"R": np.diag([1, 1, -1])}, "R is no rotation"), ({"R": 2 * np.eye(3)}, "R is no rotation"),
+                           ({"given": (2 * np.eye(3), np.eye(3), np.eye(3, 4), np.eye(3, 4))}, "R1 is no rotation"),
                            ({"given": (np.eye(3),) * 3}, "belong together")):
         with pytest.raises(egosgm.InvalidArgument, match=named):
             egosgm.Rectification(turned(**changes), 160, 120)
@@ -158,6 +127,10 @@ def test_what_no_rig_has_is_named():
     rectification = egosgm.Rectification(turned(), 160, 120)
     with pytest.raises(egosgm.InvalidArgument, match="left: is float32"):
         rectification.rectify(np.zeros((120, 160), np.float32), np.zeros((120, 160), np.uint8))
+    with pytest.raises(egosgm.InvalidArgument, match="an image is 161x120"):
+        rectification.rectify(*[np.zeros((120, 161), np.uint8)] * 2)
+    with pytest.raises(egosgm.InvalidArgument, match="dimensions"):
+        turned(R=np.zeros((1, 1, 1)))
 
 
 @pytest.mark.parametrize("name", ("rig.yml", "rig.xml", "rig.json"))
@@ -189,6 +162,10 @@ def test_what_opencv_writes_is_read(name, tmp_path):
         egosgm.read_opencv_rig(tmp_path / name)
     with pytest.raises(egosgm.InvalidArgument, match="nothing.yml"):
         egosgm.read_opencv_rig(tmp_path / "nothing.yml")
+    (tmp_path / "calib.txt").write_text("P0: 1 0 0 0 0 1 0 0 0 0 1 0\n")
+    assert egosgm.read_opencv_rig(tmp_path / "calib.txt") is None
+    with pytest.raises(egosgm.InvalidArgument, match="sensor.yaml"):
+        egosgm.read_euroc_rig(tmp_path)
 
 
 def test_nesting_has_a_bound(tmp_path):

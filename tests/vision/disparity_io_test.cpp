@@ -72,7 +72,7 @@ TEST(DisparityIo, OtherPngsAreNoDisparity) {
   write_png(folder / "grey.png", cv::Mat(3, 3, CV_8UC1, cv::Scalar(7)));
   expect_refused([&] { read_disparity(folder / "grey.png"); }, {"grey.png", "16-bit grey", "8 bit"});
   ASSERT_TRUE(cv::imwrite((folder / "flow.png").string(), cv::Mat(3, 3, CV_16UC3, cv::Scalar(1, 2, 3))));
-  expect_refused([&] { read_disparity_png(folder / "flow.png"); }, {"flow.png", "3 channel"});
+  expect_refused([&] { read_disparity(folder / "flow.png"); }, {"flow.png", "3 channel"});
 }
 
 TEST(DisparityIo, PfmRoundTripKeepsEveryBit) {

@@ -65,7 +65,7 @@ TEST(PlainStreet, TheSkyIsReadBackAsNothing) {
   const TemporaryFolder folder;
   write_sequence(options, folder / "street");
   const SyntheticFrame frame = SyntheticSequence(options).render(0);
-  const cv::Mat truth = read_disparity_png(folder / "street/truth/left_disp_occ/000000.png");
+  const cv::Mat truth = read_disparity(folder / "street/truth/left_disp_occ/000000.png");
   int sky = 0;
   for (int y = 0; y < truth.rows; ++y) {
     for (int x = 0; x < truth.cols; ++x) {

@@ -366,8 +366,8 @@ TEST_F(SyntheticFiles, SequenceReadsBackAsItWasRendered) {
   EXPECT_TRUE(same_bits(cv::imread((folder_ / "image_1" / name).string(), cv::IMREAD_UNCHANGED), frame.right));
   EXPECT_TRUE(
       same_bits(cv::imread((folder_ / "truth/left_moving" / name).string(), cv::IMREAD_UNCHANGED), frame.left_moving));
-  const cv::Mat occ = read_disparity_png(folder_ / "truth/right_disp_occ" / name);
-  const cv::Mat noc = read_disparity_png(folder_ / "truth/right_disp_noc" / name);
+  const cv::Mat occ = read_disparity(folder_ / "truth/right_disp_occ" / name);
+  const cv::Mat noc = read_disparity(folder_ / "truth/right_disp_noc" / name);
   EXPECT_LE(cv::norm(occ, frame.right_disparity, cv::NORM_INF), 1.0 / 256);
   for (int y = 0; y < noc.rows; ++y) {
     for (int x = 0; x < noc.cols; ++x) {

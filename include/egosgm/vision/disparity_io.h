@@ -31,11 +31,9 @@ EGOSGM_EXPORT cv::Mat read_values(const std::filesystem::path& file);
 /// write_disparity_png).
 EGOSGM_EXPORT std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& disparity);
 
-/// KITTI's disparity PNG: 16-bit grey, disparity = value / 256, 0 = invalid.
-EGOSGM_EXPORT cv::Mat read_disparity_png(const std::filesystem::path& file);
-
-/// Stores max(d * 256, 1), truncated, as KITTI's development kit does, for 0 <= d < 256. The format has no room for a
-/// negative disparity or one of 256 and more: those become invalid. Returns how many; a PFM keeps them.
+/// KITTI's disparity PNG: 16-bit grey, disparity = value / 256, 0 = invalid. Stores max(d * 256, 1), truncated, as
+/// KITTI's development kit does, for 0 <= d < 256. The format has no room for a negative disparity or one of 256 and
+/// more: those become invalid. Returns how many; a PFM keeps them.
 EGOSGM_EXPORT std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity);
 
 /// How many valid pixels of a CV_32FC1 map that PNG has no room for.

@@ -17,6 +17,9 @@
 
 namespace egosgm::app {
 
+/// The calibration's file in the folder of a run whose images came from no files.
+inline constexpr const char* kRunCalibration = "calibration.txt";
+
 /// A sequence, how to match it, and where its results go.
 struct SequenceJob {
   std::shared_ptr<Feed> feed;
@@ -34,10 +37,9 @@ struct SequenceJob {
   std::optional<LostDevice> lost;  // which this one takes over from
 };
 
-/// What `egosgm run` does once its arguments are read: every frame that is fed into `job.out`, then poses.txt and
-/// report.json, and to the taker. Returns false where an interrupt ended it early. Throws InvalidArgument (input),
-/// IoError, DeviceError; report.json then says why it stopped, where it could be written. Thread-safe for different
-/// folders.
+/// Every frame that is fed into `job.out`, then poses.txt and report.json, and to the taker. Returns false where an
+/// interrupt ended it early. Throws InvalidArgument (input), IoError, DeviceError; report.json then says why it
+/// stopped, where it could be written. Thread-safe for different folders.
 bool run_sequence(const SequenceJob& job, const Device& device);
 
 }  // namespace egosgm::app

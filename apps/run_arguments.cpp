@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/run_arguments.h"
+
+#include <fmt/core.h>
+
+#include <memory>
+#include <vector>
+
+#include "apps/device_arguments.h"
+#include "apps/feed.h"
+#include "apps/motion_source.h"
+#include "apps/output_folder.h"
+#include "apps/run_outputs.h"
+#include "apps/tuning_file.h"
+#include "egosgm/error.h"
+
+namespace egosgm::app {
+namespace {
+
+std::shared_ptr<Feed> feed_of(const RunArguments& arguments, const Package& package) {
+  if (arguments.bag.bag.empty()) {
+    if (!arguments.bag.text().empty()) throw InvalidArgument(arguments.bag.text() + ": give --bag BAG with it");
+    return std::make_shared<FileFeed>(arguments.input.open(/*needs_calibration=*/false, package.read_calibration));
+  }
+  SequenceArguments others = arguments.input;
+  others.calib = others.frames = "";
+  if (!others.text().empty()) {
+    throw InvalidArgument("more than one input: --bag " + arguments.bag.bag + " and " + others.text() +
+                          ": give one of them");
+  }
+  const vision::FrameRange range =
+      arguments.input.frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(arguments.input.frames);
+  return package.open_bag(arguments.bag, arguments.input.calib, range, arguments.out);
+}
+
+/// Throws InvalidArgument for what only a folder takes, or for what the frames have not.
+void expect_takeable(const RunArguments& arguments, const SequenceJob& job) {
+  const vision::StereoSequence& sequence = job.feed->sequence();
+  for (const char* kind : {"cloud", "depth", "depth_m"}) {
+    if (sequence.has_calibration || !job.kinds.contains(kind)) continue;
+    throw InvalidArgument(
+        fmt::format("--write {}: a disparity is no depth without a calibration: give --calib FILE", kind));
+  }
+  if (!arguments.has_recording() && !arguments.rerun) return;
+  const std::string what = arguments.has_recording() ? "--out " + arguments.out : "--rerun";
+  if (!sequence.has_calibration) throw InvalidArgument(what + ": shows depth, which needs a calibration: give --calib");
+  if (arguments.has_recording() && !arguments.out.ends_with(".rrd") && arguments.bag.bag.empty()) {
+    throw InvalidArgument(what + ": its messages have the stamps of a bag: give a folder, or FILE.rrd");
+  }
+  if (!arguments.has_folder() && (!job.kinds.empty() || arguments.resume)) {
+    throw InvalidArgument(what + ": --write, --interpolate and --resume are for a folder: give one as --out");
+  }
+}
+
+OutputFolder folder_of(const RunArguments& arguments, const SequenceJob& job) {
+  std::vector<std::string> files = output_files(job.kinds, job.feed->sequence(), job.options);
+  if (job.feed->has_no_files()) files.emplace_back(kRunCalibration);
+  return {arguments.out, arguments.resume, files};
+}
+
+}  // namespace
+
+void RunArguments::add_to(CLI::App& command) {
+  input.add_to(command);
+  const char* group = "Output";
+  command
+      .add_option("--out", out,
+                  "new or empty folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room "
+                  "for the range), "
+                  "poses.txt, "
+                  "report.json. With the Python package also FILE.rrd, for the viewer Rerun, and of a bag FILE.mcap, "
+                  "for ROS 2")
+      ->type_name("DIR|FILE")
+      ->group(group);
+  command.add_option("--write", write, kWriteListHelp)->type_name("LIST")->group(group);
+  command
+      .add_option(
+          "--cloud-sigma", cloud_sigma_percent,
+          fmt::format(
+              "--write cloud leaves out depths whose standard deviation is larger than this [% of the depth, {:g}]",
+              cloud_sigma_percent))
+      ->type_name("PERCENT")
+      ->group(group);
+  command.add_flag("--interpolate", interpolate, "fill holes from the background, into OUT/interpolated")->group(group);
+  command
+      .add_option("--trace", trace,
+                  "write when every kernel, transfer and step of the host ran, as a Chrome trace (JSON) that "
+                  "https://ui.perfetto.dev opens")
+      ->type_name("FILE")
+      ->group(group);
+  command
+      .add_flag("--resume", resume,
+                "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
+                "before are computed again, for the filter's state")
+      ->group(group);
+  command.add_flag("--rerun", rerun, "show each frame in the viewer Rerun, by the Python package")->group(group);
+  command.add_flag("--quiet", quiet, "no progress, only errors")->group(group);
+  bag.add_to(command);
+  method.add_to(command);
+  add_motion(command, poses, odometry);
+  add_device(command, device);
+  add_fallback(command, fallback);
+  add_programs(command, programs);
+  add_cache(command, cache);
+  add_tuning(command, tuning);
+}
+
+SequenceJob RunArguments::job(const Package& package) const {
+  SequenceJob job;
+  if (out.empty() && !rerun) throw InvalidArgument("--out is required: see `egosgm run --help`");
+  job.options = method.options();
+  job.kinds = parse_write_list(write);
+  if (interpolate) job.kinds.insert("interpolated");
+  job.cloud.max_relative_sigma = cloud_sigma_percent / 100;
+  if (!(cloud_sigma_percent > 0)) {
+    throw InvalidArgument(fmt::format("--cloud-sigma {:g}: choose a number of percent above 0", cloud_sigma_percent));
+  }
+  job.feed = feed_of(*this, package);
+  job.input = bag.bag.empty() ? input.text() : bag.text();
+  job.poses_file = poses;
+  job.odometry = odometry;
+  expect_takeable(*this, job);
+  if (job.feed->has_no_files() && has_folder()) job.kinds.insert("left");
+  if (has_folder()) job.out = folder_of(*this, job);
+  if (has_recording() || rerun) {
+    job.taker = package.take(has_recording() ? out : "", rerun);
+  }
+  job.trace = job.out.named_file("--trace", trace);
+  job.save_config = job.out.named_file("--save-config", method.save_config);
+  job.quiet = quiet;
+  return job;
+}
+
+}  // namespace egosgm::app

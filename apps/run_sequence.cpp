@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/run_sequence.h"
+
+#include <fmt/core.h>
+
+#include <chrono>
+#include <deque>
+#include <future>
+#include <utility>
+
+#include "apps/counted.h"
+#include "apps/interrupt.h"
+#include "apps/motion_source.h"
+#include "apps/option_arguments.h"
+#include "apps/progress.h"
+#include "apps/run_outputs.h"
+#include "apps/standard_output.h"
+#include "apps/trace.h"
+#include "egosgm/error.h"
+#include "egosgm/vision/calibration_io.h"
+#include "egosgm/vision/opencv.h"
+#include "egosgm/vision/poses_io.h"
+#include "host/vision/doubt.h"
+#include "host/vision/file_io.h"
+
+namespace egosgm::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char *kKilled = "a kill, or it is still running", *kInterrupt = "an interrupt";
+
+constexpr const char* kNoCalibration =
+    "no calibration was given: disparities are there, but no depth and no odometry; --calib FILE brings both";
+
+using Clock = std::chrono::steady_clock;
+std::string note_of(const FrameReport& report) {
+  if (!report.searched_everything && !report.unpredicted) return "";
+  const std::string why =
+      !report.unpredicted ? "searched everything" : fmt::format("no prediction: {}", to_string(report.unpredicted));
+  return report.search_fraction < 1.01 ? fmt::format("  ({})", why)
+                                       : fmt::format("  ({}; matched {:.2g} times)", why, report.search_fraction);
+}
+
+std::string text_of(const CloudCounts& clouds, const vision::PointCloudOptions& bounds) {
+  const vision::LeftOut& out = clouds.left_out;
+  const double all = static_cast<double>(clouds.points + out.far + out.uncertain + out.alone);
+  const auto percent = [all](std::int64_t pixels) { return 100 * static_cast<double>(pixels) / std::max(1.0, all); };
+  return fmt::format(
+      "clouds hold {:.1f} % of the pixels with a disparity; left out: {:.1f} % uncertain by more than {:g} % "
+      "(--cloud-sigma), {:.1f} % farther than {:g} m, {:.1f} % without a neighbour",
+      percent(clouds.points), percent(out.uncertain), 100 * bounds.max_relative_sigma, percent(out.far),
+      bounds.max_depth_m, percent(out.alone));
+}
+
+double ms_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+/// What a frame needs before the device can start.
+struct PreparedFrame {
+  FedFrame fed;
+  FrameMotion motion;
+  Clock::time_point read_start, odometry_start;
+  double read_ms = 0;
+};
+
+class Run {
+ public:
+  Run(const SequenceJob& job, const Device& device)
+      : quiet_(job.quiet),
+        folder_(job.out),
+        save_config_(job.save_config),
+        feed_(*job.feed),
+        taker_(job.taker.get()),
+        sequence_(feed_.sequence()),
+        cloud_options_(job.cloud),
+        input_(job.input),
+        size_(feed_.size()),
+        motions_(sequence_, job.poses_file, job.odometry),
+        waiting_(std::in_place,
+                 fmt::format("compiling the kernels for {}, which its driver keeps if it can", device.info().name),
+                 quiet_),
+        pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, feed_.type()),
+        report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height),
+        doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, job.options) {
+    if (job.lost) report_.take_over(*job.lost);
+    if (has_folder()) folder_.begin(report_.identity());
+    if (job.kinds.contains("reason")) report_.add_reasons();
+    outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration, cloud_options_);
+    if (taker_) outputs_->make_shown_maps();
+    if (job.trace.empty()) return;
+    trace_.emplace(job.trace);
+    pipeline_.record_commands(true);
+  }
+
+  bool operator()() {
+    const vision::BeforeWrite recording(
+        [this](const auto& file, auto bytes) { return folder_.is_to_write(file, bytes); });
+    write_report(false, kKilled);
+    try {
+      save_config();
+      pipeline_.prepare(feed_.type(), outputs_->views());
+      waiting_.reset();
+      if (has_folder() && feed_.has_no_files()) {
+        vision::write_calibration(folder_.path() / kRunCalibration, sequence_.calibration);
+      }
+      if (taker_) taker_->begin(pipeline_.options(), sequence_.calibration);
+      const bool finished = process_all();
+      finish(finished, finished ? "" : kInterrupt);
+      if (!finished) {
+        say(has_folder() ? fmt::format("egosgm: interrupted after {} of {} frames: what is in {} is whole",
+                                       poses_.size(), sequence_.frames.size(), folder_.path().string())
+                         : "egosgm: interrupted");
+      }
+      return finished;
+    } catch (const std::exception& error) {
+      finish_after(interrupted() ? kInterrupt : error.what());
+      throw;
+    }
+  }
+
+ private:
+  void save_config() const {
+    const vision::KeepFiles others;
+    if (!save_config_.empty()) vision::write_file(save_config_, config_text(pipeline_.options()));
+  }
+
+  bool has_folder() const { return !folder_.path().empty(); }
+
+  static std::string motion_of(const SequenceJob& job) {
+    if (!job.feed->sequence().has_calibration) return "none: the images have no calibration";
+    if (!job.poses_file.empty()) return "poses of " + job.poses_file;
+    if (const std::string poses = job.feed->poses(); !poses.empty()) return "poses of " + poses;
+    return fmt::format("stereo odometry, at most {} m and {} degrees a frame", job.odometry.max_translation_m,
+                       job.odometry.max_rotation_deg);
+  }
+
+  bool process_all() {
+    // Reading, odometry and writing run while the device works. With a device of its own, the next frame is prepared
+    // beside writing, too; on a CPU device one more thread would only take the kernels' cores.
+    const bool ahead = pipeline_.device().info().type != DeviceType::kCpu;
+    const auto policy = ahead ? std::launch::async : std::launch::deferred;
+    Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
+    if (!sequence_.note.empty()) progress.note(sequence_.note);
+    if (!sequence_.has_calibration) progress.note(kNoCalibration);
+    const auto prepare_later = [&] { return std::async(policy, [this] { return prepare(); }); };
+    auto next = prepare_later();
+    bool is_over = false;
+    while (!interrupted()) {
+      try {
+        std::optional<PreparedFrame> frame = next.get();
+        is_over = !frame;
+        if (is_over) break;
+        if (frame->fed.unreadable.empty()) {
+          submit(std::move(*frame), progress);
+        } else {
+          leave_out(frame->fed, progress);
+        }
+      } catch (const DeviceError&) {
+        throw;
+      } catch (const std::exception&) {  // what is under way does not suffer from a next frame that cannot be read
+        while (!under_way_.empty()) collect(progress);
+        throw;
+      }
+      next = prepare_later();
+      if (under_way_.size() > 1) collect(progress);
+    }
+    while (!under_way_.empty()) collect(progress);
+    if (!quiet_) summary_ = fmt::format("{:.1f} frames/s", progress.frames_per_second());
+    if (!is_over && poses_.size() + left_out_ < sequence_.frames.size())
+      return false;  // what was only read is not done
+    if (2 * left_out_ > sequence_.frames.size()) throw InvalidArgument(text_of_left_out());
+    if (motions_.has_file() && feed_.has_lost_images()) {
+      throw InvalidArgument("--poses: the rows of a file belong to images one after the other, and " + sequence_.title +
+                            " has images that are in no pair: give --pose-topic, or leave the poses out");
+    }
+    return true;
+  }
+
+  std::optional<PreparedFrame> prepare() {
+    PreparedFrame frame;
+    frame.read_start = Clock::now();
+    std::optional<FedFrame> fed = feed_.next();
+    if (!fed) return std::nullopt;
+    frame.fed = std::move(*fed);
+    frame.read_ms = ms_since(frame.read_start);
+    const std::size_t place = fed_++;
+    if (!frame.fed.unreadable.empty()) return frame;
+    const cv::Mat& left = frame.fed.images.left;
+    if (left.size() != size_) {
+      throw InvalidArgument(fmt::format("{} is {}x{} and the sequence {}x{}: all frames need one size",
+                                        frame.fed.frame.left.string(), left.cols, left.rows, size_.width,
+                                        size_.height));
+    }
+    frame.odometry_start = Clock::now();
+    frame.motion = motions_.next(frame.fed, place);
+    return frame;
+  }
+
+  /// A pair that cannot be read costs itself alone: the next motion is over two intervals.
+  void leave_out(const FedFrame& fed, Progress& progress) {
+    if (left_out_++ == 0) first_left_out_ = fed.unreadable;
+    report_.leave_out(fed.frame, fed.unreadable);
+    progress.note(fmt::format("frame {}: left out: {}", fed.frame.name, fed.unreadable));
+    progress.done(fmt::format("frame {}  left out", fed.frame.name));
+  }
+
+  void submit(PreparedFrame frame, Progress& progress) {
+    if (frame.fed.starts_anew && (!poses_.empty() || !under_way_.empty())) {
+      while (!under_way_.empty()) collect(progress);
+      pipeline_.reset();
+    }
+    pipeline_.submit(vision::image_view(frame.fed.images.left), vision::image_view(frame.fed.images.right),
+                     frame.motion.motion, outputs_->views());
+    under_way_.push_back(std::move(frame));
+  }
+
+  /// The oldest frame under way: waits for it, writes and reports it.
+  void collect(Progress& progress) {
+    const FrameReport result = pipeline_.collect();
+    const PreparedFrame prepared = std::move(under_way_.front());
+    under_way_.pop_front();
+    const vision::StereoFrame& frame = prepared.fed.frame;
+    const std::optional<Motion>& motion = prepared.motion.motion;
+    const auto before_write = Clock::now();
+    const WrittenFrame written = has_folder() ? outputs_->write(frame, prepared.fed.images.left) : WrittenFrame();
+    if (taker_) {
+      taker_->take(prepared.fed, outputs_->shown(), result,
+                   motion ? std::optional(motion->current_from_previous) : std::nullopt);
+    }
+    if (written.cloud) add(*written.cloud);
+    const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
+    last_written_ = Clock::now();
+    if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
+    report_.add(prepared.fed, result, prepared.motion, times, written);
+    doubt_.add(prepared.fed.images.left, prepared.fed.images.right, result, motion.has_value());
+    poses_.push_back(prepared.motion.first_from_camera);
+    tell(frame, result, prepared.motion, times, written.unstorable, progress);
+  }
+
+  void add(const CloudCounts& cloud) {
+    if (!clouds_) clouds_.emplace();
+    clouds_->points += cloud.points;
+    clouds_->left_out.far += cloud.left_out.far;
+    clouds_->left_out.uncertain += cloud.left_out.uncertain;
+    clouds_->left_out.alone += cloud.left_out.alone;
+  }
+
+  void trace(const std::string& frame, const PreparedFrame& prepared, const FrameReport& result,
+             Clock::time_point before_write, double write_ms) {
+    trace_->add_host("read", frame, Trace::Row::kPrepare, prepared.read_start, prepared.read_ms);
+    if (!prepared.motion.is_given) {
+      trace_->add_host("odometry", frame, Trace::Row::kPrepare, prepared.odometry_start, prepared.motion.odometry_ms);
+    }
+    trace_->add_device(result.commands, frame);
+    trace_->add_host("write", frame, Trace::Row::kWrite, before_write, write_ms);
+  }
+
+  void tell(const vision::StereoFrame& frame, const FrameReport& result, const FrameMotion& motion,
+            const HostTimes& times, std::int64_t unstorable, Progress& progress) {
+    if (sequence_.has_calibration && poses_.size() > 1 && !motion.motion) {
+      progress.note(
+          fmt::format("frame {}: no motion ({}): searched the full range", frame.name, motion.odometry.reason));
+    }
+    if (unstorable > 0 && !warned_of_range_) {
+      warned_of_range_ = true;
+      progress.note(fmt::format(
+          "frame {}: {} disparities lie outside KITTI's PNG (0 to 256 px) and are missing there: add --write pfm",
+          frame.name, unstorable));
+    }
+    progress.done(fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms{}", frame.name,
+                              100 * std::min(1.0, result.search_fraction), 100 * result.density, times.wall_ms,
+                              note_of(result)));
+  }
+
+  void finish(bool finished, const std::string& why_not) {
+    if (taker_) taker_->end(finished);
+    const std::string doubt = doubt_.text(), of_poses = motions_.doubt();
+    const std::vector<std::string> notes = feed_.notes();
+    report_.set_doubt(doubt.empty() || of_poses.empty() ? doubt + of_poses : doubt + "; " + of_poses, notes);
+    if (has_folder() && sequence_.has_calibration && !poses_.empty())
+      vision::write_poses(folder_.path() / "poses.txt", poses_);
+    write_report(finished, why_not);
+    if (const std::optional<Trace> trace = std::exchange(trace_, std::nullopt)) write_trace(*trace);
+    if (!finished) return;
+    if (quiet_) {
+      if (left_out_ > 0) say("egosgm: " + text_of_left_out());
+      for (const std::string& note : notes) say("egosgm: " + note);
+      return;
+    }
+    fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
+               pipeline_.device().info().name);
+    fmt::print("{}, search {:.1f} % and density {:.1f} % in the mean{}{}\n", summary_,
+               100 * report_.mean("search_fraction"), 100 * report_.mean("density"), has_folder() ? ": " : "",
+               folder_.path().string());
+    if (left_out_ > 0) fmt::print("{}\n", text_of_left_out());
+    if (clouds_) fmt::print("{}\n", text_of(*clouds_, cloud_options_));
+    for (const std::string& note : notes) fmt::print("{}\n", note);
+    if (!of_poses.empty()) fmt::print("{}\n", of_poses);
+    if (!doubt.empty()) fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
+  }
+
+  std::string text_of_left_out() const {
+    return fmt::format("{} of {} could not be read: {}", left_out_, counted(sequence_.frames.size(), "pair"),
+                       first_left_out_);
+  }
+
+  void write_trace(const Trace& trace) {
+    trace.write();
+    if (trace.has_device_times() || quiet_) return;
+    fmt::print("{} gives no times of commands: the trace has those of the host only\n", pipeline_.device().info().name);
+  }
+
+  void write_report(bool finished, const std::string& why_not) {
+    if (has_folder()) report_.write(folder_.path() / "report.json", finished, why_not);
+  }
+
+  /// The first error counts; that something cannot be written either adds nothing.
+  void finish_after(const std::string& why) {
+    try {
+      finish(false, why);
+    } catch (const std::exception&) {
+      try {
+        write_report(false, why);
+      } catch (const std::exception&) {
+      }
+    }
+  }
+
+  const bool quiet_;
+  OutputFolder folder_;
+  const fs::path save_config_;
+  Feed& feed_;
+  Taker* const taker_;
+  const vision::StereoSequence& sequence_;
+  const vision::PointCloudOptions cloud_options_;
+  std::optional<CloudCounts> clouds_;  // of all frames
+  const std::string& input_;
+  const cv::Size size_;
+  MotionSource motions_;
+  std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
+  std::optional<Waiting> waiting_;     // until all is built
+  Pipeline pipeline_;
+  RunReport report_;
+  vision::Doubt doubt_;
+  std::optional<Trace> trace_;
+  std::deque<PreparedFrame> under_way_;
+  Clock::time_point last_written_ = Clock::now();
+  std::vector<Eigen::Isometry3d> poses_;
+  std::string summary_;
+  std::size_t fed_ = 0, left_out_ = 0;
+  std::string first_left_out_;  // why
+  bool warned_of_range_ = false;
+};
+
+}  // namespace
+
+bool run_sequence(const SequenceJob& job, const Device& device) { return Run(job, device)(); }
+
+}  // namespace egosgm::app

@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Calibrations as other programs write them, a function a format."""
+import configparser
+import pathlib
+import re
+import types
+from typing import Any, Dict, List, Optional, Tuple, Union
+
+import numpy as np
+
+from . import _egosgm
+from .calibration_parts import Camera, Matrix, Values, data_of, matrix, of_four, refuse, rotation, size_of, text_of, transform
+from .rectification import StereoRig
+
+Found = Union[StereoRig, _egosgm.Calibration]
+
+
+def kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
+    chain = Values(data, file, "a camera chain of Kalibr")
+    cameras: List[Camera] = []
+    for name in ("cam0", "cam1"):
+        if not isinstance(data.get(name), dict):
+            raise chain.refuse(f" of one camera: {name} is missing")
+        camera = chain.part(data[name])
+        if camera.data.get("camera_model", "pinhole") != "pinhole":
+            raise chain.refuse(f", and {name} is of the model \"{camera.data['camera_model']}\": pinhole is read")
+        lens = camera.lens(camera.data.get("distortion_coeffs"), str(camera.data.get("distortion_model", "")))
+        cameras.append((of_four(camera.matrix((4,), "intrinsics", "camera_matrix")), *lens))
+    first, second = chain.part(data["cam0"]), chain.part(data["cam1"])
+    if "T_cn_cnm1" in second.data:
+        right_from_left = second.matrix((4, 4), "T_cn_cnm1")
+    elif "T_cam_imu" in second.data and "T_cam_imu" in first.data:
+        right_from_left = second.matrix((4, 4), "T_cam_imu") @ np.linalg.inv(first.matrix((4, 4), "T_cam_imu"))
+    else:
+        raise chain.refuse(" and lacks T_cn_cnm1, where the second camera stands")
+    return chain.pair(cameras, right_from_left, first.data.get("resolution"))
+
+
+def euroc(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> StereoRig:
+    """EuRoC's and Kimera's, a file for each camera."""
+    both = [Values(data, file, "one camera of EuRoC or Kimera") for file, data in zip(files, contents)]
+    cameras = [(of_four(camera.matrix((4,), "intrinsics")),
+                *camera.lens(camera.data.get("distortion_coefficients"), str(camera.data.get("distortion_model", "")))) for camera in both]
+    return both[0].pair_on_body(cameras, [camera.matrix((4, 4), "T_BS") for camera in both], contents[0].get("resolution"))
+
+
+class _Info:
+    """A camera of ROS's calibrator, as a camera info has it."""
+
+    def __init__(self, data: Dict[str, Any], file: pathlib.Path) -> None:
+        """data: of the calibrator's file, or of a message as `ros2 topic echo` and `rostopic echo` print it."""
+        camera = Values(data, file, "a camera of ROS's calibrator")
+        self.k, self.p = camera.matrix((9,), "camera_matrix", "k", "K"), camera.matrix((12,), "projection_matrix", "p", "P")
+        rotation, distortion = camera.first((9,), "rectification_matrix", "r", "R"), camera.first((), "distortion_coefficients", "d", "D")
+        self.r = np.eye(3).reshape(-1) if rotation is None else rotation
+        self.d = np.zeros(0) if distortion is None else distortion
+        self.width, self.height = (int(data.get(f"image_{side}", data.get(side, 0))) for side in ("width", "height"))
+        self.distortion_model = str(data.get("distortion_model", ""))
+        self.binning_x, self.binning_y = int(data.get("binning_x", 0)), int(data.get("binning_y", 0))
+        region = data.get("roi")
+        self.roi = types.SimpleNamespace(**{name: int(region.get(name, 0)) for name in ("x_offset", "y_offset", "width", "height")}) \
+            if isinstance(region, dict) else None
+
+
+def is_info(data: Dict[str, Any]) -> bool:
+    return "projection_matrix" in data or any(matrix(data.get(p), (12,)) is not None and k in data for p, k in (("p", "k"), ("P", "K")))
+
+
+def ros(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> Found:
+    from .ros_images import Cameras, are_raw
+    infos = [_Info(data, file) for data, file in zip(contents, files)]
+    cameras = Cameras(*infos, are_raw(infos[0], ""), names=tuple(str(file) for file in files))
+    return cameras.calibration if cameras.rig is None else cameras.rig
+
+
+def orb_slam(data: Dict[str, Any], file: pathlib.Path) -> Found:
+    settings = Values(data, file, "a file of settings of ORB-SLAM")
+    size = [data.get("Camera.width"), data.get("Camera.height")]
+    if "RIGHT.K" in data:  # raw images
+        cameras: List[Camera] = [(settings.matrix((3, 3), f"{side}.K"), settings.matrix((), f"{side}.D"), False) for side in ("LEFT", "RIGHT")]
+        left, right = (settings.matrix((3, 3), f"{side}.R") for side in ("LEFT", "RIGHT"))
+        p = settings.matrix((3, 4), "RIGHT.P")
+        return settings.pair(cameras, transform(right.T @ left, right.T @ [p[0, 3] / p[0, 0], 0, 0]), size)
+    four = settings.numbers("fx fy cx cy", "Camera1." if "Camera1.fx" in data else "Camera.")
+    kind = data.get("Camera.type")
+    if "Stereo.T_c1_c2" in data and kind != "Rectified":
+        model, order = ("equidistant", "k1 k2 k3 k4") if kind == "KannalaBrandt8" else ("radtan", "k1 k2 p1 p2 k3")
+        cameras = [(of_four(settings.numbers("fx fy cx cy", name)), *settings.lens([float(data.get(name + part, 0)) for part in order.split()], model))
+                   for name in ("Camera1.", "Camera2.")]
+        return settings.pair(cameras, np.linalg.inv(settings.matrix((4, 4), "Stereo.T_c1_c2")), size)
+    for name, of_focal in (("Stereo.b", 1.0), ("Camera.bf", four[0])):
+        if name in data:
+            return _egosgm.Calibration(*four, settings.numbers(name)[0] / of_focal)
+    raise settings.refuse(" of one camera: it lacks Stereo.b or Camera.bf, the baseline")
+
+
+def vins(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
+    """VINS-Fusion's, with a file for each camera beside it."""
+    configuration = Values(data, file, "a configuration of VINS")
+    if int(data.get("num_of_cam", 2)) < 2 or "cam1_calib" not in data:
+        raise configuration.refuse(" of one camera: cam1_calib is missing")
+    cameras = [_camodocal(file.parent / str(data[f"cam{i}_calib"])) for i in (0, 1)]
+    body_from = [configuration.matrix((4, 4), f"body_T_cam{i}") for i in (0, 1)]
+    return configuration.pair_on_body(cameras, body_from, [data.get("image_width"), data.get("image_height")])
+
+
+def _camodocal(file: pathlib.Path) -> Camera:
+    camera = Values(data_of(text_of(file), file), file, "a camera of VINS")
+    kind = str(camera.data.get("model_type", "")).upper() if isinstance(camera.data, dict) else ""
+    if kind not in ("PINHOLE", "KANNALA_BRANDT"):
+        raise camera.refuse(f" of the model \"{kind}\": PINHOLE and KANNALA_BRANDT are read")
+    projection = camera.part(camera.data["projection_parameters"])
+    if kind == "KANNALA_BRANDT":
+        return of_four(projection.numbers("mu mv u0 v0")), projection.numbers("k2 k3 k4 k5"), True
+    return of_four(projection.numbers("fx fy cx cy")), camera.part(camera.data["distortion_parameters"]).numbers("k1 k2 p1 p2"), False
+
+
+_BASALT_LENSES = {"pinhole": "", "kb4": "k1 k2 k3 k4", "pinhole-radtan8": "k1 k2 p1 p2 k3 k4 k5 k6"}
+
+
+def basalt(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
+    from .ros_images import rotation_of
+    calibration = Values(data, file, "a calibration of Basalt")
+    cameras, body_from = [], []
+    for camera, pose in zip(data.get("intrinsics", [])[:2], data.get("T_imu_cam", [])[:2]):
+        kind, values = camera.get("camera_type"), calibration.part(camera.get("intrinsics", {}))
+        if kind not in _BASALT_LENSES:
+            raise calibration.refuse(f" of the model \"{kind}\": pinhole, pinhole-radtan8 and kb4 are read")
+        lens = values.numbers(_BASALT_LENSES[kind])
+        cameras.append((of_four(values.numbers("fx fy cx cy")), lens if lens.size else np.zeros(4), kind == "kb4"))
+        p = calibration.part(pose).numbers("px py pz qx qy qz qw")
+        body_from.append(transform(rotation_of(*p[3:]), p[:3]))
+    if len(cameras) < 2:
+        raise calibration.refuse(" of one camera")
+    return calibration.pair_on_body(cameras, body_from, (data.get("resolution") or [None])[0])
+
+
+def oak(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
+    """Of the left and the right camera of an OAK, sockets 1 and 2; where one stands is told from the other, or both from a third one [cm]."""
+    calibration = Values(data, file, "the calibration of an OAK camera")
+    sockets = {int(socket): camera for socket, camera in data["cameraData"]}
+    if not {1, 2} <= set(sockets):
+        raise calibration.refuse(" without a left and a right camera (sockets 1 and 2)")
+
+    def to_root(socket: int) -> Tuple[int, Matrix]:
+        root_from = np.eye(4)
+        for _ in range(len(sockets)):
+            extrinsics = sockets[socket].get("extrinsics", {})
+            turn, t = matrix(extrinsics.get("rotationMatrix"), (3, 3)), extrinsics.get("translation", {})
+            if turn is None or int(extrinsics.get("toCameraSocket", -1)) not in sockets:
+                break
+            root_from = transform(turn, [0.01 * float(t[axis]) for axis in "xyz"]) @ root_from
+            socket = int(extrinsics["toCameraSocket"])
+        return socket, root_from
+
+    both = [calibration.part(sockets[i]) for i in (1, 2)]
+    cameras = [(camera.matrix((3, 3), "intrinsicMatrix"), camera.matrix((14,), "distortionCoeff"), False) for camera in both]
+    (root, left), (other_root, right) = to_root(1), to_root(2)
+    if root != other_root:
+        raise calibration.refuse(", which does not say how the cameras of sockets 1 and 2 stand")
+    return calibration.pair_on_body(cameras, [left, right], [sockets[1].get("width"), sockets[1].get("height")])
+
+
+_ZED_SIZES = {"2K": (2208, 1242), "FHD": (1920, 1080), "HD": (1280, 720), "VGA": (672, 376), "FHD1200": (1920, 1200), "SVGA": (960, 600)}
+
+
+def zed(text: str, file: pathlib.Path, size: Optional[Tuple[int, int]]) -> StereoRig:
+    """The factory calibration of a ZED camera, of several sizes of images; its lengths are millimetres."""
+    parser, factory = configparser.ConfigParser(strict=False), Values({}, file, "the factory calibration of a ZED camera")
+    try:
+        parser.read_string(text)
+    except configparser.Error as error:
+        raise factory.refuse(f" that cannot be read: {str(error).splitlines()[0]}") from None
+    there = [name for name in _ZED_SIZES if parser.has_section(f"LEFT_CAM_{name}") and parser.has_section(f"RIGHT_CAM_{name}")]
+    chosen = [name for name in there if _ZED_SIZES[name] == size] if size else there
+    if len(chosen) != 1:
+        sizes = ", ".join("{}x{}".format(*_ZED_SIZES[name]) for name in there) or "none"
+        raise factory.refuse(f" for images of {sizes}, " + (f"not of {size[0]}x{size[1]}" if size else "and here nothing tells which: `egosgm rectify` "
+                             "goes by the images' size; in Python give read_calibration the size"))
+    name = chosen[0]
+    cameras = []
+    for side in ("LEFT", "RIGHT"):
+        values = dict(parser[f"{side}_CAM_{name}"])
+        lens = np.array([float(values.get(key, 0)) for key in ("k1", "k2", "p1", "p2", "k3")])
+        cameras.append((of_four(factory.part(values).numbers("fx fy cx cy")), lens, False))
+    stereo = dict(parser["STEREO"]) if parser.has_section("STEREO") else {}
+    sized = [float(stereo.get(f"{key}_{name}".lower(), stereo.get(key, 0))) for key in ("ty", "tz", "rx", "cv", "rz")]
+    turn = rotation(sized[2:])
+    assert turn is not None
+    return factory.pair(cameras, transform(turn, 0.001 * np.array([-factory.part(stereo).numbers("baseline")[0], *sized[:2]])), _ZED_SIZES[name])
+
+
+def virtual_kitti(file: pathlib.Path) -> _egosgm.Calibration:
+    """Virtual KITTI 2's intrinsic.txt and extrinsic.txt, of its first frame."""
+    def rows(name: str, count: int) -> Dict[int, Matrix]:
+        path = file.with_name(name)
+        found: Dict[int, Matrix] = {}
+        for row in text_of(path).splitlines()[1:]:
+            numbers = matrix(row.split(), (count + 2,))
+            if numbers is None:
+                raise refuse(path, f"is of Virtual KITTI 2, and a row has not {count + 2} numbers")
+            found.setdefault(int(numbers[1]), numbers[2:])
+        if not {0, 1} <= set(found):
+            raise refuse(path, "is of Virtual KITTI 2 without cameras 0 and 1")
+        return found
+
+    four, poses = rows("intrinsic.txt", 4)[0], rows("extrinsic.txt", 16)
+    right_from_left = poses[1].reshape(4, 4) @ np.linalg.inv(poses[0].reshape(4, 4))
+    return _egosgm.Calibration(*four, -right_from_left[0, 3])
+
+
+def of_q(q: Matrix, file: pathlib.Path) -> _egosgm.Calibration:
+    if not q[3, 2]:
+        raise refuse(file, "its Q has no baseline")
+    return _egosgm.Calibration(q[2, 3], q[2, 3], -q[0, 3], -q[1, 3], abs(1 / q[3, 2]), q[3, 3] / q[3, 2])
+
+
+# How NumPy's users and others call the matrices of stereoCalibrate, and the numbers of a rectified pair (Cityscapes' in two groups), in small letters
+# without marks.
+_NAMES = {
+    "left_matrix": r"(m|k|mtx|cam(era)?(mats?|matrix|matrices)|intrinsics?|cam)(l|left|1)|(l|left|1)(k|m|mtx|cam(era)?(mat|matrix)|intrinsics?)",
+    "right_matrix": r"(m|k|mtx|cam(era)?(mats?|matrix|matrices)|intrinsics?|cam)(r|right|2)|(r|right|2)(k|m|mtx|cam(era)?(mat|matrix)|intrinsics?)",
+    "left_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(l|left|1)|(l|left|1)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
+    "right_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(r|right|2)|(r|right|2)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
+    "R": r"r|om|rot|rotmat|rotation(matrix)?|rmat|rstereo|stereor", "T": r"t|trans|transvec|translation(vector)?|tvec|tstereo|stereot",
+    "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims", "width": r"image_?width", "height": r"image_?height",
+    "R1": r"r1", "R2": r"r2", "P1": r"p1", "P2": r"p2",
+    "fx": r"(intrinsics?)?(f|fx|focal(length)?(px)?)", "fy": r"(intrinsics?)?fy", "cx": r"(intrinsics?)?(cx[0l]?|u0|ppx)", "cy": r"(intrinsics?)?(cy[0l]?|v0|ppy)",
+    "right_cx": r"cx[1r]", "baseline": r"(extrinsics?)?baseline(m|met(er|re)s?)?", "baseline_mm": r"baseline(mm|millimet(er|re)s?)",
+}
+
+
+def named(data: Dict[str, Any]) -> Dict[str, Any]:
+    """The values of a stereo calibration by our names."""
+    found: Dict[str, Any] = {}
+    for key, value in data.items():
+        plain = re.sub(r"[^a-z0-9]", "", str(key).lower())
+        for name, pattern in _NAMES.items():
+            if re.fullmatch(pattern, plain) and value is not None:
+                found.setdefault(name, value)
+    return found
+
+
+def _coefficients(value: Any, name: str, is_fisheye: bool, file: pathlib.Path) -> Matrix:
+    if value is None:
+        return np.zeros(4 if is_fisheye else 5)
+    numbers = matrix(value, ())
+    if numbers is None or numbers.size not in ((4,) if is_fisheye else (4, 5, 8, 12, 14)):
+        count = 0 if numbers is None else numbers.size
+        raise refuse(file, f"{name} has {count} numbers; OpenCV's {'fisheye model has 4' if is_fisheye else 'model has 4, 5, 8, 12 or 14'}")
+    return numbers
+
+
+def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bool = False) -> Found:
+    found = named(data)
+    matrices = {name: matrix(found.get(name), (3, 3)) for name in ("left_matrix", "right_matrix")}
+    matrices["R"], matrices["T"] = rotation(found.get("R")), matrix(found.get("T"), (3,))
+    missing = [name for name, one in matrices.items() if one is None]
+    if not missing:
+        for side, name in enumerate(("left_distortion", "right_distortion"), 1):
+            matrices[name] = _coefficients(found.get(name), f"D{side}", is_fisheye, file)
+        given = tuple(matrix(found.get(name), (3, 3) if name[0] == "R" else (3, 4)) for name in ("R1", "R2", "P1", "P2"))
+        size = size_of(found.get("size"))
+        if size is None and "width" in found and "height" in found:
+            size = size_of([found["width"], found["height"]])
+        return StereoRig(**matrices, is_fisheye=is_fisheye, size=size,  # type: ignore[arg-type]
+                         given=None if any(one is None for one in given) else given)  # type: ignore[arg-type]
+    q = matrix(found["Q"], (4, 4)) if "Q" in found else None
+    if q is not None and len(missing) >= 2:
+        return of_q(q, file)
+    numbers = {name: float(value[0]) for name in ("fx", "fy", "cx", "cy", "right_cx", "baseline", "baseline_mm")
+               if (value := matrix(found.get(name), (1,))) is not None}
+    if {"fx", "cx", "cy"} <= set(numbers):
+        fx, cx, baseline_m = numbers["fx"], numbers["cx"], numbers.get("baseline", 0.001 * numbers.get("baseline_mm", 0))
+        if not baseline_m:
+            raise refuse(file, f"is {what} of fx, cx and cy, and lacks the baseline: give the distance of the two cameras in metres")
+        return _egosgm.Calibration(fx, numbers.get("fy", fx), cx, numbers["cy"], baseline_m, numbers.get("right_cx", cx) - cx)
+    there = ", ".join(str(key) for key in list(data)[:12])
+    raise refuse(file, f"is {what} ({there}) and lacks {', '.join(missing)}: a stereo calibration has the matrix and the distortion of both cameras, "
+                        "R and T, of finite numbers (M1, D1, M2, D2, R, T)")
+
+
+def foundation_stereo(text: str, file: pathlib.Path) -> Optional[_egosgm.Calibration]:
+    """FoundationStereo's K.txt: nine numbers, and the baseline [m]."""
+    try:
+        numbers = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        return None
+    if len(numbers) == 9:
+        raise refuse(file, "is a camera matrix alone, as of FoundationStereo's K.txt without its second row, the baseline in metres")
+    if len(numbers) != 10 or numbers[6:9] != [0, 0, 1]:
+        return None
+    return _egosgm.Calibration(numbers[0], numbers[4], numbers[2], numbers[5], numbers[9])

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What formats of calibrations are made of: texts, matrices, distortions, pairs of cameras."""
+import contextlib
+import gzip
+import io
+import json
+import pathlib
+import re
+import xml.etree.ElementTree as ElementTree
+import zlib
+from typing import Any, Dict, Optional, Sequence, Tuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _egosgm
+from .rectification import StereoRig
+
+Matrix = NDArray[np.float64]
+Camera = Tuple[Matrix, Matrix, bool]  # matrix, distortion, whether that is a fisheye's
+MOST_BYTES, _MOST_PARTS = 1 << 22, 2000
+
+
+def refuse(file: pathlib.Path, text: str) -> _egosgm.InvalidArgument:
+    return _egosgm.InvalidArgument(f"{file}: {text}")
+
+
+def _yaml_of(text: str, file: pathlib.Path) -> Any:
+    try:
+        import yaml
+    except ImportError:
+        raise refuse(file, "YAML of other programs needs the package PyYAML: pip install pyyaml") from None
+
+    class Loader(yaml.SafeLoader):
+        pass
+
+    # OpenCV's matrices are maps with a tag, and its first line is of YAML 1.0.
+    Loader.add_multi_constructor("", lambda loader, suffix, node: loader.construct_mapping(node, deep=True)
+                                 if isinstance(node, yaml.MappingNode) else loader.construct_scalar(node))
+    body = re.sub(r"^%YAML[^\n]*\n", "", text.lstrip("\ufeff"))
+    body = re.sub(r"(?m)^(\s*[\w.]+):(?=[^\s:])", r"\1: ", body)
+    try:
+        documents = [document for document in yaml.load_all(body, Loader) if document is not None]  # a topic's, one message each
+        return documents[0] if documents else None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise refuse(file, "is no YAML that can be read: " + str(error).replace("\n", " ")) from None
+
+
+def matrix(value: Any, shape: Tuple[int, ...]) -> Optional[Matrix]:
+    if isinstance(value, dict):
+        if str(value.get("dt", "d"))[-1:] not in tuple("ucwsifd"):
+            return None
+        value = value.get("data")
+    if isinstance(value, str):  # in XML
+        value = value.split()
+    try:
+        numbers = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        return None
+    if numbers.size == 0 or not np.isfinite(numbers).all() or (shape and numbers.size != int(np.prod(shape))):
+        return None
+    return numbers.reshape(shape or -1)
+
+
+def size_of(value: Any) -> Optional[Tuple[int, int]]:
+    numbers = matrix(value, (2,)) if value is not None else None
+    return (int(numbers[0]), int(numbers[1])) if numbers is not None else None
+
+
+class Values:
+    """What a file holds, or a part of it, by names. what: the kind of file, for errors."""
+
+    def __init__(self, data: Dict[str, Any], file: pathlib.Path, what: str) -> None:
+        self.data, self.file, self.what = data, file, what
+
+    def part(self, data: Dict[str, Any]) -> "Values":
+        return Values(data, self.file, self.what)
+
+    def refuse(self, text: str) -> _egosgm.InvalidArgument:
+        return refuse(self.file, f"is {self.what}{text}")
+
+    def first(self, shape: Tuple[int, ...], *names: str) -> Optional[Matrix]:
+        return next((found for name in names if name in self.data and (found := matrix(self.data[name], shape)) is not None), None)
+
+    def matrix(self, shape: Tuple[int, ...], *names: str) -> Matrix:
+        """Of the first of the names that has one."""
+        found = self.first(shape, *names)
+        if found is None:
+            raise self.refuse(f" and lacks {' or '.join(names)}, {int(np.prod(shape)) if shape else 'some'} finite numbers")
+        return found
+
+    def numbers(self, names: str, prefix: str = "") -> Matrix:
+        return np.array([self.matrix((1,), prefix + name)[0] for name in names.split()])
+
+    def lens(self, values: Any, model: str) -> Tuple[Matrix, bool]:
+        """OpenCV's coefficients of what others call the same, and whether they are a fisheye's."""
+        numbers = matrix(values, ()) if values is not None else None
+        model = model.lower().replace("-", "").replace("_", "")
+        if model in ("", "none", "pinhole") and (numbers is None or not numbers.any()):
+            return np.zeros(5), False
+        if numbers is None:
+            numbers = np.zeros(4)
+        if model in ("", "radtan", "radialtangential", "plumbbob", "brown", "opencv", "pinhole", "rationalpolynomial"):
+            return (numbers if numbers.size in (4, 5, 8, 12, 14) else np.pad(numbers, (0, max(0, 5 - numbers.size)))), False
+        if model in ("equi", "equidistant", "fisheye", "kannalabrandt8", "kannalabrandt"):
+            return numbers[:4], True
+        raise refuse(self.file, f"its distortion is of the model \"{model}\": radtan and equidistant are read")
+
+    def pair(self, cameras: Sequence[Camera], right_from_left: Matrix, size: Any) -> StereoRig:
+        left, right = cameras
+        if left[2] != right[2]:
+            raise refuse(self.file, "one camera is a fisheye and the other one is not: calibrate both by one model")
+        return StereoRig(left[0], left[1], right[0], right[1], right_from_left[:3, :3], right_from_left[:3, 3], left[2], size_of(size))
+
+    def pair_on_body(self, cameras: Sequence[Camera], body_from: Sequence[Matrix], size: Any) -> StereoRig:
+        return self.pair(cameras, np.linalg.inv(body_from[1]) @ body_from[0], size)
+
+
+def of_four(numbers: Matrix) -> Matrix:
+    fx, fy, cx, cy = numbers
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+
+def transform(rotation: Matrix, translation: Sequence[float]) -> Matrix:
+    transform = np.eye(4)
+    transform[:3, :3], transform[:3, 3] = rotation, translation
+    return transform
+
+
+def rotation(value: Any) -> Optional[Matrix]:
+    """Of a matrix, or of a vector along the axis whose length is the angle."""
+    vector = matrix(value, (3,))
+    if vector is None:
+        return matrix(value, (3, 3))
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector / (angle or 1.0)
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def _check_parts(text: str, file: pathlib.Path) -> None:
+    """Readers call themselves for what is nested, as deep as it is: what begins something is counted."""
+    begun = len(re.findall(r"[\[{<]|[:-](?=\s|$)", text))
+    if begun > _MOST_PARTS:
+        raise refuse(file, f"has {begun} nested or named parts, the most is {_MOST_PARTS}; give a calibration alone")
+
+
+def text_of(file: pathlib.Path) -> str:
+    if not file.exists():
+        raise refuse(file, "no such file")
+    content = _egosgm._read_file(file, MOST_BYTES)
+    if content[:2] == b"\x1f\x8b":
+        with contextlib.suppress(EOFError, OSError, zlib.error):
+            content = gzip.GzipFile(fileobj=io.BytesIO(content)).read(MOST_BYTES)
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise refuse(file, "is UTF-16, as some editors write: save it as UTF-8")
+    return content.decode("utf-8-sig", errors="replace")
+
+
+def _of_element(element: Any) -> Any:
+    return {part.tag: _of_element(part) for part in element} if len(element) else element.text
+
+
+def data_of(text: str, file: pathlib.Path) -> Any:
+    """What XML, JSON or YAML holds."""
+    _check_parts(text, file)
+    start = text.lstrip()[:1]
+    try:
+        if start == "<":
+            return _of_element(ElementTree.fromstring(text))
+        return json.loads(text) if start in ("{", "[") and start else _yaml_of(text, file)
+    except (ValueError, RecursionError, ElementTree.ParseError) as error:
+        if isinstance(error, _egosgm.InvalidArgument):
+            raise
+        raise refuse(file, f"is no {'XML' if start == '<' else 'JSON'} that can be read: {error}") from None
