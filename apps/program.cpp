@@ -151,6 +151,12 @@ int parse_and_run(int argc, const char* const* argv, const Package* package) {
   return flushed(chosen->run());
 }
 
+/// What an interrupt came into is no error of it: PoCL's compiler takes one for itself, too, and a pipe that is waited for ends.
+int failed_or_interrupted(int code, const std::string& what) {
+  if (interrupted()) return say("egosgm: interrupted"), kInterrupted;
+  return fail(code, what);
+}
+
 }  // namespace
 
 int run_program(int argc, const char* const* argv, const Package* package) {
@@ -159,13 +165,11 @@ int run_program(int argc, const char* const* argv, const Package* package) {
   try {
     return parse_and_run(argc, argv, package);
   } catch (const MissingPath& error) {
-    return fail(kBadInput, error.what() + meant_path(error));
+    return failed_or_interrupted(kBadInput, error.what() + meant_path(error));
   } catch (const InvalidArgument& error) {
-    return fail(kBadInput, error.what());
+    return failed_or_interrupted(kBadInput, error.what());
   } catch (const Error& error) {  // of a file or of the device
-    // PoCL's compiler takes an interrupt for itself, too, and then fails.
-    if (interrupted()) return say("egosgm: interrupted"), kInterrupted;
-    return fail(kFailed, error.what());
+    return failed_or_interrupted(kFailed, error.what());
   } catch (
       const std::filesystem::filesystem_error& error) {  // a loop of links, a name too long, a folder without rights
     return fail(kBadInput, error.what() + std::string(": give another path"));

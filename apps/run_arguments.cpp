@@ -19,7 +19,6 @@ namespace {
 
 std::shared_ptr<Feed> feed_of(const RunArguments& arguments, const Package& package) {
   if (arguments.bag.bag.empty()) {
-    if (!arguments.bag.text().empty()) throw InvalidArgument(arguments.bag.text() + ": give --bag BAG with it");
     return std::make_shared<FileFeed>(arguments.input.open(/*needs_calibration=*/false, package.read_calibration));
   }
   SequenceArguments others = arguments.input;
@@ -98,6 +97,7 @@ void RunArguments::add_to(CLI::App& command) {
   bag.add_to(command);
   method.add_to(command);
   add_motion(command, poses, odometry);
+  command.get_option("--poses")->excludes("--pose-topic");
   add_device(command, device);
   add_fallback(command, fallback);
   add_programs(command, programs);

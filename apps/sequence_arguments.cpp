@@ -170,10 +170,13 @@ std::string SequenceArguments::text() const {
 
 void BagArguments::add_to(CLI::App& command) {
   const char* group = "Bags, by the Python package with its extra \"bag\"";
+  CLI::Option* const of_bag =
+      command.add_option("--bag", bag, "ROS 2 (MCAP, SQLite) or ROS 1: a .mcap, a .bag, or a bag's folder")
+          ->type_name("BAG")
+          ->group(group);
   const auto add = [&](const char* name, auto& value, const char* text, const char* type) {
-    return command.add_option(name, value, text)->type_name(type)->group(group);
+    return command.add_option(name, value, text)->type_name(type)->group(group)->needs(of_bag);
   };
-  add("--bag", bag, "ROS 2 (MCAP, SQLite) or ROS 1: a .mcap, a .bag, or a bag's folder", "BAG");
   add("--left-topic", left_topic, "raw or compressed images [where names tell, and there is one choice, that one]",
       "TOPIC");
   add("--right-topic", right_topic, "", "TOPIC");

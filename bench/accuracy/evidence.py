@@ -11,6 +11,7 @@ FIGURES = ("gained_percent", "gained_right_percent", "lost_right_percent", "wron
 HEADINGS = ["place", "filled, first frame", "filled, last frame", "filled, single frame", "bad of valid, first frame", "bad of valid, last frame",
             "bad of valid, single frame", "wrong of all, last frame", "wrong of all, single frame", "gained", "gained, right", "lost, right",
             "wrong of trusted", "trusted of wrong", "bad of valid / single frame's"]
+PAPER, PAPER_PLACES = ("--preset", "paper"), ("sky", "corridor", "fence")
 PLAIN = ("--plain", "--frames", 10, "--height", 480, "--noise", 2, "--pole-width", 5)
 TIMES = 10  # that one pair is given
 POLE_WIDTHS = {1: 3, 2: 4, 3: 6, 4: 8, 5: 14}  # [px], by the numbers in ids.npz
@@ -67,7 +68,7 @@ def places_of(bench):
 
 def run(bench, place, arguments=()):
     """The folder of the maps, and its report."""
-    out = bench.work / "evidence" / (place.name + ("_single" if arguments else ""))
+    out = bench.work / "evidence" / "_".join([place.name, *(word.strip("-") for word in arguments)])
     if out not in bench.results:
         shutil.rmtree(out, ignore_errors=True)
         bench.egosgm("run", *place.run_arguments, *arguments, "--out", out, "--write", "reason", "--quiet")
@@ -186,6 +187,17 @@ def poles(bench, only):
     return {"headings": ["width of a pole", f"within {POLE_PX} px, last frame", "single frame"], "rows": rows}
 
 
+def paper_row(bench, place):
+    runs = (run(bench, place, PAPER + more) for more in (SINGLE_FRAME, ()))
+    return [place.title, *(figures_of(bench, out, place.truth, frames[-1]["frame"])["wrong_of_all"] for out, frames in runs)]
+
+
+def paper(bench, only):
+    """What the paper's filter makes of places where nothing is seen."""
+    rows = [measured(name, lambda n=name: paper_row(bench, planes(bench, n))) for name in PAPER_PLACES if only.search(name)]
+    return {"headings": ["place", "wrong of all, single frame", "wrong of all, last frame"], "rows": rows}
+
+
 def print_table(found):
     print("\n" + " | ".join(found["headings"]))
     for row in found["rows"]:
@@ -195,7 +207,7 @@ def print_table(found):
 def evidence_tables(bench, only):
     """`only`: a compiled pattern of the places' titles."""
     found = {}
-    for name, measure in (("places", places), ("repeated", repeated), ("poles", poles)):
+    for name, measure in (("places", places), ("repeated", repeated), ("poles", poles), ("paper", paper)):
         found[name] = measure(bench, only)
         print_table(found[name])
     return found

@@ -83,6 +83,22 @@ class Disk(LongRuns):
         report = self.report(out)
         self.assertEqual((report["finished"], len(report["frames"]), report["device"]["type"]), (False, frames - 1, "GPU"))
 
+    def test_an_interrupt_is_no_error_of_a_pipe_that_is_waited_for(self):
+        pipe, out, writer = self.new_folder() / "pipe", self.folder / "never", None
+        os.mkfifo(pipe)
+        process = subprocess.Popen([PROGRAM, "run", "--odometry", self.street, "--poses", pipe, "--out", out], stderr=subprocess.PIPE, text=True)
+        while writer is None:
+            try:
+                writer = os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+            except OSError:  # nobody reads it yet
+                self.assertIsNone(process.poll())
+                time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        os.close(writer)
+        _, errors = process.communicate(timeout=600)
+        self.assertEqual((process.returncode, errors), (130, "egosgm: interrupted\n"))
+        self.assertFalse(out.exists())
+
     def test_a_kill_leaves_only_whole_files(self):
         street = self.long_street()
         for lines in (1, 2, 3):

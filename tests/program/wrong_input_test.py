@@ -23,6 +23,10 @@ class WrongArguments(ProgramTest):
         self.assert_refused(self.run_with("--set", "p_2=64"), "p_2", "p2")
         self.assert_refused(self.run_with("--write", "colour"), "colour", "did you mean color?")
 
+    def test_options_of_bags_need_one(self):
+        for option in (["--left-topic", "/left"], ["--pose-topic", "/odom"], ["--max-skew-ms", 1], ["--rectify", "off"]):
+            self.assert_refused(self.run_with(*option), option[0], "--bag")
+
     def test_mistyped_paths_get_a_suggestion(self):
         mistyped = self.street.parent / "stret"
         self.assert_refused(["run", "--odometry", mistyped, "--out", self.folder / "never"], mistyped, f"did you mean {self.street}?")

@@ -1090,6 +1090,10 @@ def test_rows_of_poses_are_of_no_bag_that_lost_images(tmp_path, street, frames, 
         assert json.loads((tmp_path / f"{name}.out/report.json").read_text())["finished"] == (code == 0)
 
 
+def test_poses_come_from_one_source(tmp_path, capfd):
+    refused(capfd, ["--bag", tmp_path, "--pose-topic", "/odom", "--poses", "poses.txt", "--out", tmp_path / "out", *SET], "--pose-topic", "--poses")
+
+
 def test_poses_of_another_unit_are_told(tmp_path, street, frames, capfd):
     recording = drive_of(street, frames)
     types = recording.types
