@@ -30,6 +30,8 @@ namespace fs = std::filesystem;
 
 constexpr const char *kKilled = "a kill, or it is still running", *kInterrupt = "an interrupt";
 
+constexpr std::uint64_t kManyMib = 1024;  // from there on what the device holds is told
+
 constexpr const char* kNoCalibration =
     "no calibration was given: disparities are there, but no depth and no odometry; --calib FILE brings both";
 
@@ -144,6 +146,10 @@ class Run {
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
     if (!sequence_.note.empty()) progress.note(sequence_.note);
     if (!sequence_.has_calibration) progress.note(kNoCalibration);
+    if (const std::uint64_t mib = pipeline_.device_memory_bytes() >> 20; mib >= kManyMib) {
+      progress.note(
+          fmt::format("{} MiB of the device are in use; --set max_memory_mib=N bounds the matcher's part", mib));
+    }
     const auto prepare_later = [&] { return std::async(policy, [this] { return prepare(); }); };
     auto next = prepare_later();
     bool is_over = false;

@@ -104,7 +104,7 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
   int rows = size.height;
   while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
   const int least = 3 * BandedSgm::kStripeOverlap;
-  if (rows >= least) return rows;
+  if (rows >= least) return fewest_rows(size.height, rows, BandedSgm::kStripeOverlap);
   const std::uint64_t needed =
       demand(context, {size.width, std::min(size.height, least)}, range, options, chunks).total;
   throw DeviceError(

@@ -12,6 +12,12 @@ constexpr int kViews = 2;
 
 }  // namespace
 
+int fewest_rows(int height, int most_rows, int overlap) {
+  if (most_rows >= height) return height;
+  const int inner = most_rows - 2 * overlap, count = (height + inner - 1) / inner;
+  return std::min(most_rows, (height + count - 1) / count + 2 * overlap);
+}
+
 std::vector<Stripe> cut_into_stripes(int height, int rows, int overlap) {
   if (rows >= height) return {{0, height, 0, height}};
   const int inner = rows - 2 * overlap, count = (height + inner - 1) / inner;

@@ -20,6 +20,9 @@ struct Stripe {
   int first_row, rows, kept_begin, kept_end;
 };
 
+/// How few rows stripes may match, at most `most_rows`, without being more: what is more is matched twice.
+int fewest_rows(int height, int most_rows, int overlap);
+
 /// Stripes of `rows` matched rows each. Of every stripe, `overlap` rows at either end are not kept, except at the
 /// image's edges. REQUIRES: rows > 2 * overlap or rows == height.
 std::vector<Stripe> cut_into_stripes(int height, int rows, int overlap);

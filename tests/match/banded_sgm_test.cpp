@@ -191,6 +191,13 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
   return expected;
 }
 
+/// Whether stripes are no higher than their number asks for.
+void expect_few_rows(const std::vector<Stripe>& stripes, int height) {
+  int rows = 0;
+  for (const Stripe& stripe : stripes) rows += stripe.rows;
+  EXPECT_LE(rows, height + static_cast<int>(stripes.size()) * (2 * BandedSgm::kStripeOverlap + 1));
+}
+
 TEST(BandedSgmStripes, EqualTheTwinOfEach) {
   for (const Scheduling scheduling : {Scheduling::kWavefront, Scheduling::kPaths}) {
     for (const MatchingCost cost : {MatchingCost::kCensus5x5, MatchingCost::kSad3x3}) {
@@ -203,6 +210,7 @@ TEST(BandedSgmStripes, EqualTheTwinOfEach) {
                    .reads_off = reads_off};
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
+      expect_few_rows(m.stripes, c.size.height);
       const auto expected = stripe_by_stripe(m, c.size);
       expect_same(m.measured, expected, c.size);
     }
@@ -232,6 +240,21 @@ TEST(BandedSgmPathsGroup, LargerThanTheDeviceAllowsNamesTheLimit) {
     for (const std::string& part : {std::string("BandedSgm: kernel follow_paths"), std::to_string(16 * lines),
                                     "the device allows " + std::to_string(limit), std::string("another device")}) {
       EXPECT_NE(text.find(part), std::string::npos) << text;
+    }
+  }
+}
+
+TEST(BandedSgmStripes, MatchFewRowsTwice) {
+  constexpr int kOverlap = BandedSgm::kStripeOverlap;
+  for (const int height : {97, 301, 1080, 2160}) {
+    EXPECT_EQ(fewest_rows(height, height, kOverlap), height);
+    for (const int most : {96, 97, 301, 600, 1079, 2050}) {
+      if (most >= height) continue;
+      const int rows = fewest_rows(height, most, kOverlap);
+      const std::vector<Stripe> stripes = cut_into_stripes(height, rows, kOverlap);
+      EXPECT_LE(rows, most);
+      EXPECT_LE(stripes.size(), cut_into_stripes(height, most, kOverlap).size());
+      expect_few_rows(stripes, height);
     }
   }
 }

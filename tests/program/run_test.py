@@ -428,11 +428,15 @@ class Limits(ProgramTest):
     def test_a_range_that_does_not_fit_is_matched_in_stripes(self):
         folder, out = self.new_folder(), self.new_folder()
         for side in ("left", "right"):
-            (folder / f"{side}.png").write_bytes(grey_png(640, 200))
-        (folder / "calib.toml").write_text("fx = 400\nfy = 400\ncx = 320\ncy = 100\nbaseline_m = 0.5\n")
+            (folder / f"{side}.png").write_bytes(grey_png(640, 400))
+        (folder / "calib.toml").write_text("fx = 400\nfy = 400\ncx = 320\ncy = 200\nbaseline_m = 0.5\n")
         run = ["run", "--left", folder / "left.png", "--right", folder / "right.png", "--calib", folder / "calib.toml", "--out", out]
         gigabyte = dict(os.environ, POCL_MEMORY_LIMIT="1")
-        self.assert_works(*run, "--disparities", 2048, env=gigabyte)
+        run[run.index("--out") + 1] = whole = self.new_folder()
+        told = self.assert_works(*run, "--disparities", 4096)
+        self.assertIn(f"{self.report(whole)['device_memory_bytes'] >> 20} MiB of the device are in use; --set max_memory_mib=N", told)
+        run[run.index("--out") + 1] = out
+        self.assertNotIn("MiB of the device", self.assert_works(*run, "--disparities", 2048, env=gigabyte))
         report = self.report(out)
         self.assertGreater(report["frames"][0]["stripes"], 1)
         self.assertLess(report["device_memory_bytes"], 1 << 30)
