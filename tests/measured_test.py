@@ -140,13 +140,14 @@ class Page(unittest.TestCase):
         self.assertEqual(self.write(), 0)
         self.assertNotIn("without evidence", (self.docs / "measured.md").read_text())
         tables = {"places": {"headings": ["place", "filled", "ratio"], "rows": [["sky", 98.5, 7.5], ["fence", "skipped: not there"], ["median of the ratios", None, 7.5]]},
-                  "repeated": {"headings": ["pair", "time 10"], "rows": [["sky, first pair", 94.5]]}, "poles": {"headings": ["width", "found"], "rows": [["3 px", 23.5]]}}
+                  "repeated": {"headings": ["pair", "time 10"], "rows": [["sky, first pair", 94.5]]}, "poles": {"headings": ["width", "found"], "rows": [["3 px", 23.5]]},
+                  "paper": {"headings": ["place", "wrong"], "rows": [["fence", 67.5]]}}
         file = self.docs / "measured/evidence.json"
         file.write_text(json.dumps({**MACHINE, "evidence": tables}))
         self.put(video={"video": {**VIDEO, "ratios": {"headings": ["video", "ratio"], "rows": [["street", 1.5], ["median of the ratios", 1.25]]}}})
         self.assertEqual(self.write(), 0)
         page = (self.docs / "measured.md").read_text()
-        for text in ("| sky | 98.50 | 7.50 |", "| median of the ratios |  | 7.50 |", "| sky, first pair | 94.50 |", "| 3 px | 23.50 |", "- fence: skipped: not there",
+        for text in ("| sky | 98.50 | 7.50 |", "| median of the ratios |  | 7.50 |", "| sky, first pair | 94.50 |", "| 3 px | 23.50 |", "| fence | 67.50 |", "- fence: skipped: not there",
                      "| street | 1.50 |", "| median of the ratios | 1.25 |"):
             self.assertIn(text, page)
         file.write_text(json.dumps({**MACHINE, "evidence": tables, "commit": "9876543210"}))
