@@ -112,11 +112,17 @@ typedef struct {
   float from, to;
 } Span;
 
+static inline bool is_thin(const ImageSize blocks, const int x, global const BlockRange* row) {
+  const float left = row[max(x - EGOSGM_THIN_BLOCKS, 0)].max;
+  const float right = row[min(x + EGOSGM_THIN_BLOCKS, blocks.width - 1)].max;
+  return row[x].count > 0 && row[x].max > fmax(left, right) + EGOSGM_THIN_JUMP_PX;
+}
+
 // What the predictions in the 3x3 blocks around it and the coarse match span, and the whole range where few are
 // predicted: a few beside each other may be wrong together, and what searches near them alone would confirm them, as
 // where texture repeats. `found`: what the predictions in the block and in those above and below it, and the coarse
-// match span. Thin things stand upright: where a frame lost a part of one, the parts above and below it say where to
-// search.
+// match span. Thin things stand upright: where a frame lost a part of one, the parts farther above and below it say
+// where to search, so that paths along it meet its disparity all the way.
 static inline Span span_around(const ImageSize blocks, const int view, const int x, const int y,
                                const int from_neighbours, const float margin, const int min_count,
                                const float coarse_margin, global const BlockRange* ranges,
@@ -133,6 +139,11 @@ static inline Span span_around(const ImageSize blocks, const int view, const int
       count += block.count;
       if (u == x) upright = joined(upright, block);
     }
+  }
+  for (int v = y - EGOSGM_THIN_REACH; v <= y + EGOSGM_THIN_REACH; v += 2) {
+    if (v < 0 || v >= blocks.height) continue;
+    global const BlockRange* row = ranges + index_of(blocks, view, 0, v);
+    if (is_thin(blocks, x, row)) upright = joined(upright, row[x]);
   }
   const size_t here = index_of(blocks, view, x, y);
   const BlockRange coarse = coarse_ranges[here];

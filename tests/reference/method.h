@@ -6,6 +6,9 @@ namespace egosgm::reference {
 
 inline constexpr int kCoarseMinCount = 8;
 inline constexpr int kCoarseOutliers = 2;
+inline constexpr float kThinJumpPx = 3.0f;
+inline constexpr int kThinBlocks = 2;
+inline constexpr int kThinReach = 8;
 // Evidence, in sixteenths of a bit; controls in pixels from the match.
 inline constexpr int kControls[4] = {-14, -8, 8, 14};
 inline constexpr int kCoarseControls[8] = {-19, -14, -10, -7, 7, 10, 14, 19};

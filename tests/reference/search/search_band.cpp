@@ -77,6 +77,24 @@ Predicted predicted_in(shared::ImageSize size, const std::vector<float>& dispari
   return found;
 }
 
+/// What is predicted in a block and in those above and below it, and in those farther above and below it that hold a
+/// thin thing.
+Predicted predicted_upright(shared::ImageSize size, const std::vector<float>& disparity, int view, int x, int y) {
+  const int last = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK - 1;
+  Predicted found = predicted_in(size, disparity, view, x, y - 1, x, y + 1);
+  for (int v = y - kThinReach; v <= y + kThinReach; v += 2) {
+    const auto in = [&](int u) {
+      return predicted_in(size, disparity, view, std::clamp(u, 0, last), v, std::clamp(u, 0, last), v);
+    };
+    const Predicted own = in(x);
+    if (own.count == 0 || !(own.most > std::max(in(x - kThinBlocks).most, in(x + kThinBlocks).most) + kThinJumpPx)) {
+      continue;
+    }
+    found.least = std::min(found.least, own.least), found.most = std::max(found.most, own.most);
+  }
+  return found;
+}
+
 shared::Band from_neighbours(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
                              const std::vector<float>& predicted, std::pair<float, float> coarse, int view, int x,
                              int y) {
@@ -133,8 +151,7 @@ SearchBands search_band(shared::ImageSize size, shared::DisparityRange range, co
         of_blocks.push_back(options.from_neighbours
                                 ? from_neighbours(size, range, options, disparity, of_coarse, view, x, y)
                                 : band_of(range, -kInfinity, kInfinity));
-        const Predicted own =
-            options.from_neighbours ? predicted_in(size, disparity, view, x, y - 1, x, y + 1) : Predicted{};
+        const Predicted own = options.from_neighbours ? predicted_upright(size, disparity, view, x, y) : Predicted{};
         found.push_back({std::min(of_coarse.first, own.least), std::max(of_coarse.second, own.most)});
       }
     }
