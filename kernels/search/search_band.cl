@@ -143,7 +143,7 @@ static inline Span span_around(const ImageSize blocks, const int view, const int
   for (int v = y - EGOSGM_THIN_REACH; v <= y + EGOSGM_THIN_REACH; v += 2) {
     if (v < 0 || v >= blocks.height) continue;
     global const BlockRange* row = ranges + index_of(blocks, view, 0, v);
-    if (is_thin(blocks, x, row)) upright = joined(upright, row[x]);
+    if (is_thin(blocks, x, row)) upright.max = fmax(upright.max, row[x].max);  // what lies behind it changes
   }
   const size_t here = index_of(blocks, view, x, y);
   const BlockRange coarse = coarse_ranges[here];

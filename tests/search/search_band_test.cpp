@@ -265,10 +265,11 @@ TEST(SearchBand, PredictedPixelReachesWhatItsBlockSpans) {
 TEST(SearchBand, PredictedPixelReachesAThinThingFarBelow) {
   const shared::ImageSize size{72, 160};
   const SearchBandOptions options{.min_half_width_px = 2, .coarse_tolerance_px = 3, .coarse_margin_px = 1};
-  const auto last_at = [&](int first_x, int last_x, float disparity, int x, int block_y) {
+  const auto last_at = [&](int first_x, int last_x, float disparity, int x, int block_y, float behind = 40) {
     auto maps = nothing(size);
     std::fill_n(maps.disparity.begin(), pixel_count(size), 40.0f);
     for (int y = 96; y < size.height; ++y) {
+      std::fill_n(maps.disparity.begin() + y * size.width, size.width, behind);
       for (int u = first_x; u <= last_x; ++u) maps.disparity[y * size.width + u] = disparity;
     }
     return run(size, {0, 128}, options, maps).bands[8 * block_y * size.width + x].last;
@@ -278,7 +279,8 @@ TEST(SearchBand, PredictedPixelReachesAThinThingFarBelow) {
   EXPECT_EQ(last_at(36, 38, 60, 44, 4), 42) << "the blocks beside hold none of it";
   EXPECT_EQ(last_at(36, 41, 60, 44, 4), 61) << "two columns of blocks";
   EXPECT_EQ(last_at(20, 60, 60, 36, 4), 42) << "a wide thing";
-  EXPECT_EQ(last_at(36, 38, 43, 36, 4), 42) << "no jump";
+  EXPECT_EQ(last_at(36, 38, 47, 36, 4, 44), 42) << "no jump";
+  EXPECT_EQ(last_at(36, 38, 48, 36, 4, 44), 49);
   EXPECT_EQ(last_at(0, 2, 60, 0, 4), 42) << "at the edge nobody knows how wide it is";
 }
 

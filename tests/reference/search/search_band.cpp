@@ -77,8 +77,7 @@ Predicted predicted_in(shared::ImageSize size, const std::vector<float>& dispari
   return found;
 }
 
-/// What is predicted in a block and in those above and below it, and in those farther above and below it that hold a
-/// thin thing.
+/// What is predicted in a block and in those above and below it, and the thin things farther above and below it.
 Predicted predicted_upright(shared::ImageSize size, const std::vector<float>& disparity, int view, int x, int y) {
   const int last = (size.width + EGOSGM_BLOCK - 1) / EGOSGM_BLOCK - 1;
   Predicted found = predicted_in(size, disparity, view, x, y - 1, x, y + 1);
@@ -90,7 +89,7 @@ Predicted predicted_upright(shared::ImageSize size, const std::vector<float>& di
     if (own.count == 0 || !(own.most > std::max(in(x - kThinBlocks).most, in(x + kThinBlocks).most) + kThinJumpPx)) {
       continue;
     }
-    found.least = std::min(found.least, own.least), found.most = std::max(found.most, own.most);
+    found.most = std::max(found.most, own.most);
   }
   return found;
 }
