@@ -13,8 +13,8 @@
 #define EGOSGM_COARSE_MIN_COUNT 8
 // Of these, so many of the least and of the largest are taken for mismatches. REQUIRES: less than half of the count.
 #define EGOSGM_COARSE_OUTLIERS 2
-// A block is of a thin thing where it holds predictions by so much nearer than the blocks EGOSGM_THIN_BLOCKS to the left
-// and to the right do [px]. So many blocks above and below it, that thing may go on; every second one is asked.
+// A block is of a thin thing where it holds predictions by so much nearer than the blocks EGOSGM_THIN_BLOCKS to the
+// left and to the right do [px]. So many blocks above and below it, that thing may go on; every second one is asked.
 #define EGOSGM_THIN_JUMP_PX 3.0f
 #define EGOSGM_THIN_BLOCKS 2
 #define EGOSGM_THIN_REACH 8

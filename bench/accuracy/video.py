@@ -274,6 +274,7 @@ def link_frames(folder, frames, source):
 
 def video_tables(bench, only):
     """`only`: a compiled pattern of the videos' titles."""
+    shutil.rmtree(bench.work / "video", ignore_errors=True)  # figures are of this build's maps
     print(f"{'':<89} " + " ".join(f"{heading[:7]:>7}" for heading in HEADINGS[2:]))
     methods = compared(bench, only)
     ratios = ratios_of(methods["rows"], OURS, SINGLE, HEADINGS.index("bad of valid"))
