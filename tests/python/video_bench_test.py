@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What bench/accuracy --video compares with: averages in time, and wrong motions."""
 import pathlib
+import re
 import sys
+import types
 
 import numpy as np
 import pytest
@@ -30,3 +32,10 @@ def test_every_motion_is_off_by_so_much(degrees, metres):
         assert np.degrees(np.arccos(np.clip((np.trace(off[:3, :3]) - 1) / 2, -1, 1))) == pytest.approx(degrees, abs=1e-5)
         assert np.linalg.norm(off[:3, 3]) == pytest.approx(metres, abs=1e-12)
         np.testing.assert_allclose(off[:3, :3] @ off[:3, :3].T, np.eye(3), atol=1e-12)
+
+
+def test_maps_of_an_earlier_build_are_no_figures_of_this_one(tmp_path):
+    left = tmp_path / "video/street/EgoSGM"
+    left.mkdir(parents=True)
+    video.video_tables(types.SimpleNamespace(work=tmp_path), re.compile("no video"))
+    assert not left.exists()
