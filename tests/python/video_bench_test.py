@@ -37,5 +37,5 @@ def test_every_motion_is_off_by_so_much(degrees, metres):
 def test_maps_of_an_earlier_build_are_no_figures_of_this_one(tmp_path):
     left = tmp_path / "video/street/EgoSGM"
     left.mkdir(parents=True)
-    video.video_tables(types.SimpleNamespace(work=tmp_path), re.compile("no video"))
+    video.video_tables(types.SimpleNamespace(work=tmp_path, data=tmp_path), re.compile("no video"))
     assert not left.exists()
