@@ -112,12 +112,6 @@ typedef struct {
   float from, to;
 } Span;
 
-static inline bool is_thin(const ImageSize blocks, const int x, global const BlockRange* row) {
-  const float left = row[max(x - EGOSGM_THIN_BLOCKS, 0)].max;
-  const float right = row[min(x + EGOSGM_THIN_BLOCKS, blocks.width - 1)].max;
-  return row[x].count > 0 && row[x].max > fmax(left, right) + EGOSGM_THIN_JUMP_PX;
-}
-
 // What the predictions in the 3x3 blocks around it and the coarse match span, and the whole range where few are
 // predicted: a few beside each other may be wrong together, and what searches near them alone would confirm them, as
 // where texture repeats. `found`: what the predictions in the block and in those above and below it, and the coarse

@@ -76,6 +76,13 @@ BlockRange joined(const BlockRange a, const BlockRange b) {
   return both;
 }
 
+// Of a block of a row of them.
+bool is_thin(const ImageSize blocks, const int x, global const BlockRange* row) {
+  const float left = row[max(x - EGOSGM_THIN_BLOCKS, 0)].max;
+  const float right = row[min(x + EGOSGM_THIN_BLOCKS, blocks.width - 1)].max;
+  return row[x].max > fmax(left, right) + EGOSGM_THIN_JUMP_PX;
+}
+
 // Keeps the EGOSGM_COARSE_OUTLIERS + 1 least values of each lane, in rising order; the most, in falling order.
 void insert_least(float4* least, float4 value) {
 #pragma unroll

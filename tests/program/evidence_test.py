@@ -48,7 +48,7 @@ class Evidence(ProgramTest):
 
     def test_a_place_has_the_figures_of_eval(self):
         row = dict(zip(self.found["places"]["headings"], self.row("places", "sky")))
-        video, single = self.evaluated("sky", "--against", self.work / "evidence/sky_single"), self.evaluated("sky_single")
+        video, single = self.evaluated("sky", "--against", self.work / "evidence/sky_temporal_off"), self.evaluated("sky_temporal_off")
         for name, heading in (("filled", "filled"), ("bad_of_valid", "bad of valid"), ("wrong_of_all", "wrong of all")):
             self.assertEqual(row[f"{heading}, last frame"], video["regions"]["all"][name])
             self.assertEqual(row[f"{heading}, single frame"], single["regions"]["all"][name])
