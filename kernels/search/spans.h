@@ -76,7 +76,7 @@ BlockRange joined(const BlockRange a, const BlockRange b) {
   return both;
 }
 
-// Of a block of a row of them.
+// Whether the block at x of a row of blocks holds a thin thing (method.h).
 bool is_thin(const ImageSize blocks, const int x, global const BlockRange* row) {
   const float left = row[max(x - EGOSGM_THIN_BLOCKS, 0)].max;
   const float right = row[min(x + EGOSGM_THIN_BLOCKS, blocks.width - 1)].max;
