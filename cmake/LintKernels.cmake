@@ -15,7 +15,7 @@ file(WRITE ${preamble} "#pragma OPENCL FP_CONTRACT OFF\n")
 add_test(NAME kernels.block.refuses_32_lanes_in_spirv
          COMMAND ${EGOSGM_CLANG} -x cl -cl-std=CL1.2 -target spir64-unknown-unknown -Xclang -finclude-default-header -DBLOCK=32
                  -I ${PROJECT_SOURCE_DIR}/kernels -fsyntax-only ${PROJECT_SOURCE_DIR}/kernels/match/block.h)
-set_tests_properties(kernels.block.refuses_32_lanes_in_spirv PROPERTIES TIMEOUT 60 PASS_REGULAR_EXPRESSION "BLOCK: 16")
+set_tests_properties(kernels.block.refuses_32_lanes_in_spirv PROPERTIES PASS_REGULAR_EXPRESSION "BLOCK: 16")
 
 file(GLOB kernels CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/kernels/*/*.cl)
 foreach(kernel IN LISTS kernels)
@@ -35,6 +35,5 @@ foreach(kernel IN LISTS kernels)
     add_test(NAME ${test}
              COMMAND ${EGOSGM_CLANG} -x cl -cl-std=CL1.2 -target spir64-unknown-unknown -Xclang -finclude-default-header
                      -include ${preamble} -I ${PROJECT_SOURCE_DIR}/kernels -Wall -Wextra -Wno-unused-parameter -Werror ${defines} -fsyntax-only ${kernel})
-    set_tests_properties(${test} PROPERTIES TIMEOUT 60)
   endforeach()
 endforeach()

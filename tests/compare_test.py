@@ -16,7 +16,7 @@ class Compare(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "compare.json"
             done = subprocess.run([PROGRAM, "--size", "320x96", "--disparities", "32", "--rounds", "1", "--threads", str(threads), "--json", file],
-                                  capture_output=True, text=True, timeout=100)
+                                  capture_output=True, text=True, timeout=900)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertIn(f"\n{threads} threads allowed\n", done.stdout)
             found = json.loads(file.read_text())

@@ -23,7 +23,7 @@ ARITHMETIC = re.compile(r"f(add|sub|mul|div|cmp)|and|or|xor|shl|[al]shr|select")
 
 
 def ruler(*arguments):
-    return subprocess.run([sys.executable, "-B", SOURCE / "bench/kernels.py", "--program", PROGRAM, *arguments], capture_output=True, text=True, timeout=500)
+    return subprocess.run([sys.executable, "-B", SOURCE / "bench/kernels.py", "--program", PROGRAM, *arguments], capture_output=True, text=True, timeout=900)
 
 
 def expect(test, schema, value, where="file"):
@@ -105,7 +105,7 @@ class Ruler(unittest.TestCase):
         self.assertNotEqual(ruler(*SIZE, "--export", folder).returncode, 0, "written over a folder that is there")
         if subprocess.run([sys.executable, "-c", "import pyopencl"], capture_output=True).returncode != 0:
             self.skipTest("no pyopencl, which runs them")
-        done = subprocess.run([sys.executable, "-B", folder / "run.py"], capture_output=True, text=True, timeout=500)
+        done = subprocess.run([sys.executable, "-B", folder / "run.py"], capture_output=True, text=True, timeout=900)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
 
 
@@ -141,7 +141,7 @@ class Counted(unittest.TestCase):
         costs, counted, told = json.loads(kernels.COSTS.read_text()), counts(PROGRAM, SIZE), {}
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "rows.json"
-            subprocess.run([PROGRAM, *SIZE, "--json", file], check=True, capture_output=True, timeout=300)
+            subprocess.run([PROGRAM, *SIZE, "--json", file], check=True, capture_output=True, timeout=900)
             rows = json.loads(file.read_text())["rows"]
         for row in rows:  # Oclgrind names kernels, which several stages may share
             frame, _, kernel = row["name"].split(".")

@@ -33,7 +33,7 @@ class Scripts(unittest.TestCase):
     def called(self, script, *arguments):
         words = [script] if os.access(script, os.X_OK) else [sys.executable, script]
         environment = dict(os.environ, PATH=f"{self.folder.name}:{os.environ['PATH']}", PYTHONDONTWRITEBYTECODE="1", COLUMNS="200")
-        return subprocess.run([*words, *arguments], env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60)
+        return subprocess.run([*words, *arguments], env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=900)
 
     def test_help_is_the_comment_at_the_head(self):
         for script in self.scripts:

@@ -27,7 +27,7 @@ class ProgramCaches(ProgramTest):
         environment = dict(os.environ, EGOSGM_CACHE=str(cache))
         for _ in range(2):  # into an empty folder, and from a full one
             started = [subprocess.Popen([PROGRAM, *map(str, self.run_command(out))], env=environment) for out in outs]
-            self.assertEqual([process.wait(timeout=600) for process in started], [0] * len(outs))
+            self.assertEqual([process.wait(timeout=900) for process in started], [0] * len(outs))
             for out in outs:
                 self.assertEqual(self.maps_of(out), expected)
                 shutil.rmtree(out)
@@ -70,7 +70,7 @@ class ProgramCaches(ProgramTest):
         if shutil.which("unshare") is None:
             self.skipTest("no small file system can be mounted here")
         done = subprocess.run(["unshare", "--map-root-user", "--mount", "sh", "-c", mounted, "sh", PROGRAM, *map(str, self.run_command(out))],
-                              capture_output=True, text=True, timeout=600, env=dict(os.environ, EGOSGM_CACHE=str(cache)))
+                              capture_output=True, text=True, timeout=900, env=dict(os.environ, EGOSGM_CACHE=str(cache)))
         if "mount" in done.stderr or "unshare" in done.stderr:
             self.skipTest("no small file system can be mounted here")
         self.assertEqual(done.returncode, 0, done.stderr)

@@ -25,7 +25,7 @@ class Camera(InputTest):
 
     def run_camera(self, *arguments, **display):
         headless = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-        return subprocess.run([EXAMPLES / "egosgm_example_camera", *map(str, arguments)], capture_output=True, text=True, timeout=600,
+        return subprocess.run([EXAMPLES / "egosgm_example_camera", *map(str, arguments)], capture_output=True, text=True, timeout=900,
                               env={**headless, **display})
 
     def test_frames_are_dropped_rather_than_late(self):

@@ -84,7 +84,7 @@ class Eval(ProgramTest):
         truth = self.street / "truth/left_disp_occ/000000.png"
         with open("/dev/full", "w") as full:
             done = subprocess.run([PROGRAM, "eval", "--estimate", truth, "--truth", truth], stdout=full, stderr=subprocess.PIPE,
-                                  text=True, timeout=60)
+                                  text=True, timeout=900)
         self.assertEqual(done.returncode, 1)
         self.assertIn("standard output", done.stderr)
 

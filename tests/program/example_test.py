@@ -10,7 +10,7 @@ from program_case import EXAMPLES, SOURCE, ProgramTest
 
 class Example(ProgramTest):
     def run_example(self, name, *arguments, **options):
-        return subprocess.run([EXAMPLES / f"egosgm_example_{name}", *arguments], capture_output=True, text=True, timeout=600, **options)
+        return subprocess.run([EXAMPLES / f"egosgm_example_{name}", *arguments], capture_output=True, text=True, timeout=900, **options)
 
     def assert_gives_what_the_program_gives(self, example, options=(), arguments=()):
         out, own = self.new_folder(), self.new_folder()

@@ -150,7 +150,7 @@ class CameMeanwhile(FilesTest):
         process = self.started(*command, out)
         out.parent.mkdir(exist_ok=True)
         out.write_text("mine")
-        _, errors = process.communicate(timeout=600)
+        _, errors = process.communicate(timeout=900)
         self.assertEqual((process.returncode, out.read_text()), (1, "mine"), errors)
         self.assertIn("has come there meanwhile, and stays", errors)
         self.assertEqual(sorted(file.name for file in out.parent.iterdir()), [out.name])
@@ -290,7 +290,7 @@ class Streams(FilesTest):
             self.assertIn("\ndisparities = 16\n", text)
         with open(out / "saved.toml", "w") as saved:
             subprocess.run([PROGRAM, "run", "--odometry", self.street, "--out", out / "more", "--frames", "0", *map(str, METHOD), "--save-config", "/dev/stdout"],
-                           stdout=saved, check=True, timeout=600)
+                           stdout=saved, check=True, timeout=900)
         self.assertIn("\ndisparities = 16\n", (out / "saved.toml").read_text())
 
     @unittest.skipUnless(os.geteuid() == 0, "devices are made by root alone")
@@ -326,7 +326,7 @@ class TuneFiles(FilesTest):
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=600)
+        _, errors = process.communicate(timeout=900)
         self.assertNotEqual(process.returncode, 0)
         self.assertNotIn("stays", errors)
         self.assertEqual(file.read_bytes(), before)

@@ -60,7 +60,7 @@ class Help(ProgramTest):
         folder = self.new_folder()
         copy = shutil.copy(PROGRAM, folder / "egosgm")
         for path, code, named in ((str(folder), 1, "python3 cannot be started"), (os.environ["PATH"], 1, "needs the Python package egosgm, which")):
-            done = subprocess.run([copy, "run", "--bag", "drive.mcap", "--out", folder / "out"], capture_output=True, text=True, timeout=600,
+            done = subprocess.run([copy, "run", "--bag", "drive.mcap", "--out", folder / "out"], capture_output=True, text=True, timeout=900,
                                   env={"PATH": path, "LD_LIBRARY_PATH": ":".join(folders), "PYTHONNOUSERSITE": "1"})
             if path != str(folder) and "drive.mcap" in done.stderr.split("egosgm")[-1]:
                 self.skipTest("the package is installed here")
@@ -78,7 +78,7 @@ class Help(ProgramTest):
         self.assert_refused(["run", "--bag"], "--bag: 1 required BAG missing", cwd=folder)
         self.assertIn("--left-topic", self.assert_works("run", "--bag=x", "--help", cwd=folder))
         with open("/dev/full", "w") as full:
-            done = subprocess.run([PROGRAM, "run", "--bag=x", "--help"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=600)
+            done = subprocess.run([PROGRAM, "run", "--bag=x", "--help"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=900)
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stderr, r"^egosgm: error: [^\n]*No space left on device\n$")
         package = pathlib.Path(PROGRAM).parents[1] / "python"
@@ -86,7 +86,7 @@ class Help(ProgramTest):
         if subprocess.run([sys.executable, "-c", "import egosgm"], capture_output=True, cwd=package).returncode:
             self.skipTest("the package is of another Python")
         for arguments in (["--help"], ["run", "--bag=x", "--help"], ["rnu"]):
-            done = subprocess.run([*module, *arguments], capture_output=True, text=True, timeout=600, cwd=package)
+            done = subprocess.run([*module, *arguments], capture_output=True, text=True, timeout=900, cwd=package)
             own = egosgm(*arguments)
             self.assertEqual((done.returncode, done.stdout, done.stderr), (own.returncode, own.stdout, own.stderr), arguments)
 
@@ -118,7 +118,7 @@ class Help(ProgramTest):
         def run_with(options):
             mounted = f"mount -t tmpfs -o size=100k{options} tmpfs '{cache}' && exec \"$@\"; exit 77"
             return subprocess.run(["unshare", "--map-root-user", "--mount", "sh", "-c", mounted, "sh", PROGRAM, "run", "--odometry",
-                                   self.street, "--out", out], capture_output=True, text=True, timeout=600,
+                                   self.street, "--out", out], capture_output=True, text=True, timeout=900,
                                   env=dict(os.environ, POCL_CACHE_DIR=str(cache)))
 
         if shutil.which("unshare") is None or run_with("").returncode in (77, 0):

@@ -76,7 +76,7 @@ class DeviceBuffers(ProgramTest):
     def test_depth_is_that_of_runs_disparities(self):
         out, own = self.new_folder(), self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", out, "--write", "pfm", "--quiet")
-        subprocess.run([EXAMPLES / "egosgm_example_device_buffers", self.street], cwd=own, check=True, timeout=600)
+        subprocess.run([EXAMPLES / "egosgm_example_device_buffers", self.street], cwd=own, check=True, timeout=900)
         camera = self.report(out)["calibration"]
         single = lambda value: struct.unpack("<f", struct.pack("<f", value))[0]
         focal_times_baseline = single(camera["fx"] * camera["baseline_m"])
@@ -107,7 +107,7 @@ class ManySequences(ProgramTest):
 
     def run_line(self, index, out, code=0):
         done = subprocess.run([SOURCE / "examples/cluster/run_line", self.list, str(index), out, *map(str, METHOD), "--quiet"],
-                              capture_output=True, text=True, timeout=600, env=dict(os.environ, EGOSGM=PROGRAM))
+                              capture_output=True, text=True, timeout=900, env=dict(os.environ, EGOSGM=PROGRAM))
         self.assertEqual(done.returncode, code, done.stderr)
         return done.stderr
 
@@ -151,7 +151,7 @@ class ManySequences(ProgramTest):
         (tools / "run_line").symlink_to(SOURCE / "examples/cluster/run_line")
         reports, pixels, bad = [], 0, 0
         for index, name in enumerate(self.names):
-            done = subprocess.run(command, capture_output=True, text=True, timeout=600,
+            done = subprocess.run(command, capture_output=True, text=True, timeout=900,
                                   env=dict(os.environ, JOB_COMPLETION_INDEX=str(index), EGOSGM=PROGRAM, PATH=f"{tools}:{os.environ['PATH']}"))
             self.assertEqual((done.returncode, done.stderr), (0, ""))
             reports.append(out / f"{index}.json")

@@ -63,7 +63,7 @@ def egosgm(*arguments, cwd=None, **options):
     if arguments and arguments[0] in TOOLS and not options and threading.current_thread() is threading.main_thread():
         if done := in_this_process(arguments, cwd):
             return done
-    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=600, cwd=cwd, **options)
+    done = subprocess.run([PROGRAM, *arguments], capture_output=True, text=True, timeout=900, cwd=cwd, **options)
     if isinstance(done.stderr, str):
         done.stderr = without_waiting(done.stderr)
         if "needs the Python package egosgm, which" in done.stderr and not TOOLS:

@@ -228,7 +228,7 @@ class Browser:
 
     def close(self):
         self.process.terminate()
-        self.process.wait(timeout=30)
+        self.process.wait(timeout=900)
         os.close(self.to_browser), os.close(self.from_browser)
         try:
             self.profile.cleanup()

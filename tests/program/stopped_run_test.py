@@ -48,7 +48,7 @@ class Disk(LongRuns):
         street, out = self.long_street(), self.new_folder()
         process = self.start(street, out, lines=3)  # by then the driver has written its kernel cache
         resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (4096, 4096))  # EFBIG: ENOSPC without a file system of its own
-        _, errors = process.communicate(timeout=600)
+        _, errors = process.communicate(timeout=900)
         self.assertEqual(process.returncode, 1, errors)
         self.assertRegex(errors, r"^egosgm: error: .*disparity/\d{6}\.png.*\n$")
         self.assert_whole(out, at_least=3)
@@ -59,7 +59,7 @@ class Disk(LongRuns):
             out = self.new_folder()
             process = self.start(street, out)
             process.send_signal(stop)
-            _, errors = process.communicate(timeout=600)
+            _, errors = process.communicate(timeout=900)
             self.assertEqual(process.returncode, 130, errors)
             self.assertIn("interrupted", errors)
             report = self.report(out)
@@ -78,7 +78,7 @@ class Disk(LongRuns):
             time.sleep(0.01)
         time.sleep(0.2)  # until it waits, which a busy machine may do later: then there is less to see
         process.send_signal(signal.SIGINT)
-        _, errors = process.communicate(timeout=600)
+        _, errors = process.communicate(timeout=900)
         self.assertEqual(process.returncode, 130, errors)
         report = self.report(out)
         self.assertEqual((report["finished"], len(report["frames"]), report["device"]["type"]), (False, frames - 1, "GPU"))
@@ -95,7 +95,7 @@ class Disk(LongRuns):
                 time.sleep(0.01)
         process.send_signal(signal.SIGINT)
         os.close(writer)
-        _, errors = process.communicate(timeout=600)
+        _, errors = process.communicate(timeout=900)
         self.assertEqual((process.returncode, errors), (130, "egosgm: interrupted\n"))
         self.assertFalse(out.exists())
 
@@ -114,7 +114,7 @@ class Disk(LongRuns):
         street, out = self.long_street(), self.new_folder()
         process = self.start(street, out, lines=2)
         broken(street)
-        _, errors = process.communicate(timeout=600)
+        _, errors = process.communicate(timeout=900)
         self.assertEqual((process.returncode, errors), (0, ""))
         report = self.report(out)
         self.assertTrue(report["finished"])
@@ -130,7 +130,7 @@ class Disk(LongRuns):
             out = self.new_folder()
             process = self.start(street, out)
             (out / name).write_text("mine")
-            _, errors = process.communicate(timeout=600)
+            _, errors = process.communicate(timeout=900)
             self.assertEqual(process.returncode, 1, errors)
             self.assertIn(f"{name}: has come there while the run wrote, and stays", errors)
             self.assertEqual((out / name).read_text(), "mine")
@@ -180,7 +180,7 @@ class Disk(LongRuns):
         reading, writing = os.pipe()
         os.close(reading)
         done = subprocess.run([PROGRAM, "run", "--odometry", "nowhere", "--out", self.new_folder()], stderr=writing, stdout=subprocess.DEVNULL,
-                              timeout=60)
+                              timeout=900)
         os.close(writing)
         self.assertEqual(done.returncode, 2)
 
@@ -188,7 +188,7 @@ class Disk(LongRuns):
         out = self.new_folder()
         with open("/dev/full", "w") as full:
             done = subprocess.run([PROGRAM, "run", "--odometry", self.long_street(), "--out", out], stdout=full, stderr=subprocess.PIPE,
-                                  text=True, timeout=600)
+                                  text=True, timeout=900)
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stderr, r"^(egosgm: compiling .*\n)?egosgm: error: the standard output cannot be written: No space left on device\n$")
         self.assertTrue(self.report(out)["finished"])
@@ -200,7 +200,7 @@ class Disk(LongRuns):
         if shutil.which("unshare") is None or subprocess.run([*small, "true"], capture_output=True).returncode != 0:
             self.skipTest("no small file system can be mounted here")
         inside = f"'{PROGRAM}' run --odometry '{self.long_street()}' --out '{out}'; echo code $?; ls -A '{out}/disparity'; cat '{out}/report.json'"
-        done = subprocess.run([*small, "sh", "-c", inside], capture_output=True, text=True, timeout=600)
+        done = subprocess.run([*small, "sh", "-c", inside], capture_output=True, text=True, timeout=900)
         self.assertIn("code 1\n", done.stdout)
         self.assertRegex(done.stderr, r"^(egosgm: compiling .*\n)?egosgm: error: .*disparity/\d{6}\.png.*No space left on device.*\n$")
         left = done.stdout.split("code 1\n")[1]

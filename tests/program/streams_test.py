@@ -24,7 +24,7 @@ class StandardError(ProgramTest):
         """Of the program, whose standard error is led by the shell's `redirection`."""
         with ended_pipe() as ended:
             words = ["sh", "-c", f'exec "$@" {redirection.replace("ENDED", str(ended))}', "sh", PROGRAM, *map(str, arguments)]
-            return subprocess.run(words, stdout=subprocess.PIPE, pass_fds=[ended], timeout=600, **options).returncode
+            return subprocess.run(words, stdout=subprocess.PIPE, pass_fds=[ended], timeout=900, **options).returncode
 
     REDIRECTIONS = "2>&ENDED", "2>/dev/full", "2>&-", "2>&- <&-"
 

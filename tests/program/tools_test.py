@@ -32,7 +32,7 @@ class Tools(ProgramTest):
 
     def printed(self, *arguments):
         """Bytes, as a name need not be text."""
-        done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, timeout=600)
+        done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, timeout=900)
         self.assertEqual((done.returncode, done.stderr), (0, b""), arguments)
         return done.stdout
 
@@ -97,7 +97,7 @@ class Tools(ProgramTest):
                 reading, writing = (None, os.open(target, os.O_WRONLY)) if target else os.pipe()
                 if reading is not None:
                     os.close(reading)
-                done = subprocess.run(words, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=600)
+                done = subprocess.run(words, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=900)
                 os.close(writing)
                 self.assertEqual((done.returncode, done.stderr.count("\n")), (code, code), f"{arguments}: {done.stderr}")
                 self.assertIn(named, done.stderr)
@@ -107,14 +107,14 @@ class Tools(ProgramTest):
         calib = ["--calib", self.street / "calib.txt"]
         rectify = ["rectify", "--left", self.street / "image_0/*.png", "--right", self.street / "image_1/*.png", *calib, "--out", folder / "new", "--quiet"]
         for arguments, code in ((["eval-poses", out, self.street], 1), (["cloud", out], 1), (["report", "--help"], 1), (rectify, 0)):
-            done = subprocess.run(["sh", "-c", 'exec "$@" >&- <&-', "sh", PROGRAM, *map(str, arguments)], stderr=subprocess.PIPE, text=True, timeout=600)
+            done = subprocess.run(["sh", "-c", 'exec "$@" >&- <&-', "sh", PROGRAM, *map(str, arguments)], stderr=subprocess.PIPE, text=True, timeout=900)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (code, code), f"{arguments}: {done.stderr}")
             self.assertIn("the standard output cannot be written: Bad file descriptor" if code else "", done.stderr)
 
     def test_tools_load_no_driver_which_would_take_their_interrupts(self):
         code = "import sys; from egosgm.program import run_tool; run_tool(sys.argv[1:]); sys.exit('pocl' in open('/proc/self/maps').read())"
         done = subprocess.run([sys.executable, "-B", "-c", code, "doctor", self.street], capture_output=True, text=True,
-                              env=dict(os.environ, PYTHONPATH=str(PACKAGE)), timeout=600)
+                              env=dict(os.environ, PYTHONPATH=str(PACKAGE)), timeout=900)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
 
     def test_an_interrupt_while_the_package_is_loaded_ends_it(self):
@@ -127,7 +127,7 @@ class Tools(ProgramTest):
     def test_an_error_does_not_go_to_the_standard_output(self):
         for redirection in ("2>&-", "2>/dev/full"):
             words = ["sh", "-c", f'exec "$@" {redirection}', "sh", sys.executable, "-B", "-m", "egosgm", "report", self.new_folder()]
-            done = subprocess.run([*map(str, words)], stdout=subprocess.PIPE, env=dict(os.environ, PYTHONPATH=str(PACKAGE)), timeout=600)
+            done = subprocess.run([*map(str, words)], stdout=subprocess.PIPE, env=dict(os.environ, PYTHONPATH=str(PACKAGE)), timeout=900)
             self.assertEqual((done.returncode, done.stdout), (2, b""), redirection)
 
 
@@ -148,13 +148,13 @@ class ReadCalibration(ProgramTest):
         words = ["run", "--left", street / "image_0/*.png", "--right", street / "image_1/*.png", "--calib", street / "chain.yaml", "--disparities", 16, "--out"]
         with self.subTest("whole"):
             environment = dict(os.environ, PYTHONPATH=str(package), TMPDIR=str(temporary))
-            done = subprocess.run([sys.executable, "-B", "-m", "egosgm", *map(str, words), out], env=environment, capture_output=True, text=True, timeout=600)
+            done = subprocess.run([sys.executable, "-B", "-m", "egosgm", *map(str, words), out], env=environment, capture_output=True, text=True, timeout=900)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertAlmostEqual(self.report(out)["calibration"]["fx"], fx, places=3)
         stopped = self.new_folder() / "out"
         process = self.started(*words, stopped, command=[sys.executable, "-B", "-m", "egosgm"], env=environment)
         process.send_signal(signal.SIGINT)  # as `timeout` and schedulers do, to this process alone
-        _, errors = process.communicate(timeout=600)
+        _, errors = process.communicate(timeout=900)
         self.assertEqual((process.returncode, errors.count("\n")), (130, 1), errors)
         self.assertTrue(self.report(stopped)["frames"])
         self.assertEqual(list(temporary.iterdir()), [])

@@ -100,7 +100,7 @@ def record(kind, path, street, frames, skew_ns=0, left_out=(), times=None, **inf
 
 def program(*arguments):
     """`egosgm run`."""
-    return subprocess.run([sys.executable, "-B", "-m", "egosgm.bag_program", *map(str, arguments)], capture_output=True, text=True, errors="replace", timeout=300)
+    return subprocess.run([sys.executable, "-B", "-m", "egosgm.bag_program", *map(str, arguments)], capture_output=True, text=True, errors="replace", timeout=900)
 
 
 @pytest.mark.parametrize("kind, name", [("mcap", "drive"), ("sqlite", "drive"), ("ros1", "drive.bag")])
@@ -266,7 +266,7 @@ def test_what_ends_a_run_leaves_nothing_and_is_in_nobodys_way(tmp_path, street, 
             assert process.poll() is None, process.stderr.read()
             time.sleep(0.01)
         process.send_signal(stop)
-        _, errors = process.communicate(timeout=120)
+        _, errors = process.communicate(timeout=900)
         assert not out.exists()
         if stop == signal.SIGTERM:
             assert (process.returncode, errors) == (130, "egosgm: interrupted\n")
@@ -837,7 +837,7 @@ def limited(self):
 bag.Bag.frames = limited
 sys.exit(bag_program.main(sys.argv[1:]))"""
     for out, left in (("out.mcap", ["drive"]), ("out", ["drive", "out"])):
-        told = subprocess.run([sys.executable, "-B", "-c", limited, "--bag", bag, *TOPICS, *SET, "--out", tmp_path / out], capture_output=True, text=True, timeout=300)
+        told = subprocess.run([sys.executable, "-B", "-c", limited, "--bag", bag, *TOPICS, *SET, "--out", tmp_path / out], capture_output=True, text=True, timeout=900)
         assert told.returncode == 1 and told.stderr.startswith("egosgm: error: ") and told.stderr.count("\n") == 1, told.stderr
         assert sorted(os.listdir(tmp_path)) == left
     assert sorted(os.listdir(tmp_path / "out/disparity")) == ["000000.png", "000001.png"]

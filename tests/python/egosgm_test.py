@@ -316,7 +316,7 @@ def test_the_readmes_lines_run(tmp_path, street_folder, monkeypatch):
 
 def test_the_example_runs(tmp_path):
     example = SOURCE / "examples/show_disparity.py"
-    done = subprocess.run([sys.executable, "-B", example, "--out", tmp_path / "picture.png"], capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, "-B", example, "--out", tmp_path / "picture.png"], capture_output=True, text=True, timeout=900)
     assert "median depth" in done.stdout, done.stderr
     if importlib.util.find_spec("matplotlib"):
         assert done.returncode == 0 and (tmp_path / "picture.png").stat().st_size > 10000

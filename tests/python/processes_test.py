@@ -37,7 +37,7 @@ def in_threads(work, count=3, daemon=False):
 def run(code, times=1):
     """In new processes; what the last one printed."""
     for _ in range(times):
-        done = subprocess.run([sys.executable, "-c", BEGIN + code], capture_output=True, text=True, timeout=30)
+        done = subprocess.run([sys.executable, "-c", BEGIN + code], capture_output=True, text=True, timeout=900)
         assert done.returncode == 0 and not done.stderr, (done.returncode, done.stderr)
     return done.stdout
 
