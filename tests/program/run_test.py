@@ -138,6 +138,12 @@ class Run(ProgramTest):
         reasons = self.report(out)["reasons"]
         self.assertEqual((reasons[0], reasons[9], len(reasons)), ("trusted", "predicted", 10))
 
+    def test_depths_that_have_no_room_in_their_png_are_told_once(self):
+        run = ["run", "--odometry", self.street, "--disparities", 48, "--frames", ":1", "--out"]
+        told = self.assert_works(*run, self.new_folder(), "--write", "depth,depth_m").splitlines()
+        self.assertEqual([bool(re.search(r"^frame 000000: [1-9]\d* depths beyond 65.535 m .*depth_m", line)) for line in told].count(True), 1, told)
+        self.assertNotIn("65.535", self.assert_works(*run, self.new_folder(), "--write", "depth_m"))
+
     def assert_doubted(self, arguments, *named):
         """The last line of run names doctor, which finds a problem with the very arguments."""
         out = self.new_folder()
