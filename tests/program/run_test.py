@@ -446,6 +446,10 @@ class Limits(ProgramTest):
         report = self.report(out)
         self.assertGreater(report["frames"][0]["stripes"], 1)
         self.assertLess(report["device_memory_bytes"], 1 << 30)
+        run[run.index("--out") + 1] = out = self.new_folder()  # that just fits, and leaves less than what is left to all else
+        self.assert_works(*run, "--disparities", 336, "--set", "constants.banded_sgm.scheduling=paths", env=gigabyte)
+        self.assertEqual(self.report(out)["frames"][0]["stripes"], 1)
+        self.assertGreater(self.report(out)["device_memory_bytes"], 3 << 28)
         run[run.index("--out") + 1] = self.new_folder()
         run += ["--disparities", 64, "--set"]
         self.assert_refused([*run, "max_memory_mib=3"], "BandedSgm: a stripe of 96 rows needs", " MiB, max_memory_mib allows 3 MiB", "fewer disparities",
