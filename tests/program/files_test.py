@@ -158,6 +158,15 @@ class CameMeanwhile(FilesTest):
     def test_poses(self):
         self.assert_stays("poses.txt", "odometry", self.street, "--out")
 
+    def test_images(self):
+        out = self.new_folder() / "street"
+        process = self.started("synth", "--frames", 9, "--width", 32, "--height", 16, "--out", out)
+        (out / "image_0/000008.png").write_text("mine")
+        _, errors = process.communicate(timeout=900)
+        self.assertEqual(process.returncode, 1, errors)
+        self.assertIn("image_0/000008.png: has come there meanwhile, and stays", errors)
+        self.assertEqual((out / "image_0/000008.png").read_text(), "mine")
+
     def test_a_stream_is_written_through(self):
         written = self.assert_works("odometry", self.street, "--quiet", "--out", "/dev/stdout")
         self.assertEqual(len(written.splitlines()), 4)
