@@ -342,6 +342,18 @@ class Run(ProgramTest):
         options = self.report(folder / "out")["options"]
         self.assertEqual((options["disparities"], options["p1"], options["p2"]), (42, 7, 88))
 
+    def test_a_preset_that_would_undo_what_was_chosen_is_refused(self):
+        folder = self.new_folder()
+        config = folder / "config.toml"
+        run = ["run", "--odometry", self.street, "--frames", "0", "--quiet", "--out", folder / "out"]
+        config.write_text("disparities = 40\npreset = 'paper'\n")
+        self.assert_refused([*run, "--config", config], f"{config}:2: ", "preset", "put it first")
+        self.assert_refused([*run, "--set", "disparities=40", "--set", "preset=paper"], "preset", "put it first")
+        config.write_text("preset = 'paper'\ndisparities = 40\n")
+        self.assert_works(*run, "--set", "p2=77", "--config", config, "--preset", "default")
+        options = self.report(folder / "out")["options"]
+        self.assertEqual((options["preset"], options["disparities"], options["p2"]), ("paper", 40, 77))
+
     def test_paper_preset_searches_everything_that_is_not_predicted(self):
         default, paper = self.new_folder(), self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", default)
