@@ -974,6 +974,17 @@ def test_a_broken_message_costs_its_pair(tmp_path, street, frames, capfd):
     assert "3 frames" in said and "1 broken message, whose pairs are left out: /right/image_rect at 1700000000.200000000 s: an image of 1x1 px" in said
 
 
+def test_the_first_message_may_be_broken(tmp_path, street, frames, monkeypatch):
+    """Cut, so that no decoder reads it."""
+    recording = drive_of(street, frames)
+    first = next(message for _, topic, _, message in sorted(recording.messages, key=lambda item: item[0]) if topic == "/left/image_rect")
+    whole = recording.store.serialize_cdr
+    monkeypatch.setattr(recording.store, "serialize_cdr", lambda message, kind: whole(message, kind)[:20 if message is first else None])
+    bag = bags.Bag(recording.write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect")
+    assert len(list(bag.frames())) == FRAMES - 1
+    assert "1 broken message, whose pairs are left out: /left/image_rect" in bag.gaps.text()
+
+
 def test_a_mosaic_that_was_compressed():
     pixels = np.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH)).astype(np.uint8)
     expected = ros_images._of_bayer(pixels)
@@ -1134,3 +1145,16 @@ def test_doctor_looks_at_bags(tmp_path, street, frames, capfd):
     findings = examined(capfd, between, "--max-skew-ms", 50)
     assert findings["times"]["verdict"] == "problem" and "other moments" in findings["times"]["text"]
     assert list(findings) == ["images", "calibration", "times"]
+
+
+def test_doctor_takes_the_files_of_both_cameras(tmp_path, street, frames, capfd):
+    """And not the one that lies beside the first, by its name."""
+    pytest.importorskip("cv2")
+    c = street.calibration
+    for name, baseline_m in (("left", 0), ("right", 2 * c.baseline_m), ("other", c.baseline_m)):
+        (tmp_path / f"{name}.yaml").write_text(
+            f"image_width: {WIDTH}\nimage_height: {HEIGHT}\ncamera_matrix: {{rows: 3, cols: 3, data: [{c.fx}, 0, {c.cx}, 0, {c.fy}, {c.cy}, 0, 0, 1]}}\n"
+            f"projection_matrix: {{rows: 3, cols: 4, data: [{c.fx}, 0, {c.cx}, {-c.fx * baseline_m}, 0, {c.fy}, {c.cy}, 0, 0, 0, 1, 0]}}\n")
+    bag = record("mcap", tmp_path / "drive", street, frames)
+    found = examined(capfd, bag, "--calib", tmp_path / "left.yaml", tmp_path / "other.yaml")
+    assert "baseline 0.54 m" in found["calibration"]["text"]
