@@ -54,7 +54,7 @@ class Scripts(unittest.TestCase):
 
     def test_a_word_too_many_is_refused(self):
         for name, arguments in {"install-dependencies": ["--program", "again"], "format": ["--check", "all"], "measure": ["--build", "b", "c"],
-                                "build-site": ["now"], "try-arm": ["now"], "lanes": ["asan", "usan"]}.items():
+                                "build-site": ["now"], "try-arm": ["now"], "lanes": ["asan", "usan"], "build-wheel": ["python9.9"]}.items():
             with self.subTest(script=name):
                 done = self.called(SCRIPTS / name, *arguments)
                 self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
