@@ -39,7 +39,8 @@ def _without_rectification(rig: StereoRig) -> Optional[_egosgm.Calibration]:
     """The calibration of images that need no rectification; None where they need one."""
     k, other, t = np.asarray(rig.left_matrix), np.asarray(rig.right_matrix), np.ravel(rig.T)
     is_level = np.allclose(rig.R, np.eye(3), atol=1e-6) and np.allclose(t[1:], 0, atol=1e-6 * abs(t[0]))
-    if rig.given is not None or np.any(rig.left_distortion) or np.any(rig.right_distortion) or not is_level or not t[0] < 0:
+    # A fisheye without coefficients is still none of straight lines.
+    if rig.given is not None or rig.is_fisheye or np.any(rig.left_distortion) or np.any(rig.right_distortion) or not is_level or not t[0] < 0:
         return None
     if not np.allclose([k[0, 0], k[1, 1], k[1, 2]], [other[0, 0], other[1, 1], other[1, 2]], rtol=1e-6):
         return None

@@ -223,6 +223,8 @@ def test_what_is_packed(tmp_path):
 def test_a_fisheye(tmp_path):
     (tmp_path / "chain.yaml").write_text(kalibr([0.01, 0, 0, 0], "equidistant"))
     assert egosgm.read_calibration(tmp_path / "chain.yaml").is_fisheye
+    (tmp_path / "ideal.yaml").write_text(kalibr([0, 0, 0, 0], "equidistant"))
+    assert egosgm.read_calibration(tmp_path / "ideal.yaml").is_fisheye
     lenses = dict(M1=np.array(K), D1=np.array(LENS), M2=np.array(K), D2=np.array(LENS), R=np.array(EYE), T=np.array([-B, 0, 0]))
     np.savez(tmp_path / "rig.npz", **lenses)
     assert egosgm.read_calibration(tmp_path / "rig.npz", is_fisheye=True).is_fisheye
