@@ -689,6 +689,9 @@ def test_poses_of_the_bag_are_the_motion(tmp_path, street, frames):
     moved = np.linalg.inv(found[1].world_from_camera) @ found[0].world_from_camera
     np.testing.assert_allclose(moved[:3, 3], (0, 0, -0.8), atol=1e-9)  # z is forward
     np.testing.assert_allclose(moved[:3, :3], np.eye(3), atol=1e-9)
+    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", pose_topic="/odom")
+    assert [frame.motion is not None for frame in egosgm.run(bag, **OPTIONS)] == [False, True, True]
+    assert [frame.motion for frame in egosgm.run(bag, motion=False, **OPTIONS)] == [None] * FRAMES
 
 
 @pytest.mark.parametrize("change, named", [
