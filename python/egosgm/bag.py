@@ -257,7 +257,7 @@ class Bag:
             self.is_rectified_here = isinstance(self._rig_or_calibration, StereoRig)
             height, width = grey_of(found[0]).shape
             return Cameras.of_calibration(self._rig_or_calibration, width, height)
-        self.is_rectified_here = are_raw(found[0], self.images[0]) if self._rectify is None else self._rectify
+        self.is_rectified_here = any(map(are_raw, found, self.images)) if self._rectify is None else self._rectify
         return Cameras(*found, self.is_rectified_here, self.infos)
 
     def _first_whole(self, reader: Any, topic: str) -> Any:

@@ -69,7 +69,7 @@ def is_info(data: Dict[str, Any]) -> bool:
 def ros(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> Found:
     from .ros_images import Cameras, are_raw
     infos = [_Info(data, file) for data, file in zip(contents, files)]
-    cameras = Cameras(*infos, are_raw(infos[0], ""), names=tuple(str(file) for file in files))
+    cameras = Cameras(*infos, any(are_raw(info, "") for info in infos), names=tuple(str(file) for file in files))
     return cameras.calibration if cameras.rig is None else cameras.rig
 
 

@@ -671,6 +671,18 @@ def test_raw_images_are_rectified_by_their_infos(street):
         assert places[0][1] - places[1][1] == pytest.approx(cameras.calibration.fx * c.baseline_m / point[2] - cameras.calibration.doffs_px, abs=0.5)
 
 
+def test_either_camera_may_be_the_raw_one(tmp_path, street, frames):
+    raw = []
+    for side, name in enumerate(("left", "right")):
+        recording = Recording("mcap")
+        for other, topic in enumerate(("left", "right")):
+            recording.info(f"/{topic}/camera_info", street.calibration, other, distortion=(0.1 * (side == other), 0, 0, 0, 0))
+            recording.image(f"/{topic}/image", START, (frames[0].left, frames[0].right)[other])
+        bag = bags.Bag(recording.write(tmp_path / name), "/left/image", "/right/image")
+        raw.append(bool(bag.find_cameras()) and bag.is_rectified_here)
+    assert raw == [True, True]
+
+
 @pytest.mark.filterwarnings("error")
 def test_next_to_no_disparity_is_infinitely_uncertain(street):
     depth, variance = ros_images.depth_maps(np.full((1, 1), 1e-20, np.float32), np.ones((1, 1), np.float32), street.calibration)

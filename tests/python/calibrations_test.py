@@ -122,6 +122,8 @@ def test_two_files_of_ros_and_of_kimera(tmp_path):
     for given in ("left.yaml", "right.yaml", "."):
         expect_rectified(egosgm.read_calibration(tmp_path / given))
     lens = [*LENS, 0]
+    (tmp_path / "right.yaml").write_text(ros(RIGHT_P, lens))
+    assert isinstance(egosgm.read_calibration(tmp_path), egosgm.StereoRig)
     (tmp_path / "left.yaml").write_text(ros(P, lens))
     (tmp_path / "right.yaml").write_text(ros(RIGHT_P, lens))
     expect_raw(egosgm.read_calibration(tmp_path))
