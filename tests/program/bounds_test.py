@@ -79,6 +79,14 @@ class Bounds(ProgramTest):
             file.write_text(text)
             self.assert_bounded(file, "rectify", *pairs, "--calib", file, says="more than 100000 values")
 
+    def test_values_of_a_zed_are_taken_as_they_stand(self):
+        file = self.new_folder() / "SN1.conf"
+        values = "".join(f"{name} = {f'%({after})s' * 10}\n" for name, after in zip("abcdefghi", "bcdefghij"))
+        file.write_text(f"[LEFT_CAM_HD]\n{values}j = 1\n[RIGHT_CAM_HD]\n[STEREO]\n")
+        both = file.parent / "both.png"
+        both.write_bytes(png(2560, 720, 8, [bytes(2560)] * 720))
+        self.assert_bounded(file, "rectify", "--side-by-side", both, "--calib", file, "--out", file.parent / "out", says="lacks fx")
+
     def test_reports_of_more_frames_than_there_are(self):
         out = self.new_folder() / "out"
         self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0", "--disparities", 16, "--quiet")
