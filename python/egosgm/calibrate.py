@@ -285,7 +285,7 @@ def main(arguments: Sequence[str]) -> int:
         raise _egosgm.InvalidArgument(f"the views do not tell the cameras ({reason}): give pictures of the board tilted to all sides") from None
     _check_stance(stereo)
     coverage = [_coverage(views, side, found.size) for side in (0, 1)]
+    _egosgm._write_new_file(out, _text(stereo, found.size).encode())  # first: the standard output may be full
     _tell(found, stereo, views, left_out, coverage, _rows_px(board, views, stereo, found.size))
-    _egosgm._write_new_file(out, _text(stereo, found.size).encode())
     tell(f"{given.out}: {_next_step(given)}")
     return 0

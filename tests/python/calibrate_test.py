@@ -132,6 +132,15 @@ def test_what_it_writes_rectifies(pictures, calibrated, tmp_path):
     assert np.abs(corners[0][:, 1] - corners[1][:, 1]).max() < 0.5
 
 
+def test_a_standard_output_that_is_full_costs_no_calibration(pictures, tmp_path, monkeypatch):
+    def full(text):
+        raise egosgm.IoError("the standard output cannot be written")
+
+    monkeypatch.setattr("egosgm.calibrate.tell", full)
+    assert program.run_tool(command(pictures, tmp_path / "calib.yml")) == 1
+    expect_the_cameras(tmp_path / "calib.yml")
+
+
 def test_a_charuco_board(tmp_path, capsys):
     pytest.importorskip("cv2.aruco")
     folder = write_pictures(tmp_path / "views", charuco(8, 6, 0.02), 7, 5, count=14)
