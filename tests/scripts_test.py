@@ -54,12 +54,30 @@ class Scripts(unittest.TestCase):
 
     def test_a_word_too_many_is_refused(self):
         for name, arguments in {"install-dependencies": ["--program", "again"], "format": ["--check", "all"], "measure": ["--build", "b", "c"],
-                                "build-site": ["now"], "try-arm": ["now"], "lanes": ["asan", "usan"]}.items():
+                                "build-site": ["now"], "try-arm": ["now"], "lanes": ["asan", "usan"], "build-wheel": ["python9.9"]}.items():
             with self.subTest(script=name):
                 done = self.called(SCRIPTS / name, *arguments)
                 self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
                 self.assertIn(f"{arguments[-1]}", done.stderr)
 
+
+    def test_figures_of_an_earlier_run_are_not_those_of_one_that_crashed(self):
+        """With tests that pass, and benchmarks that end by a signal before they write."""
+        root = pathlib.Path(self.folder.name, "source")
+        for name, text in {"scripts/bench-device": (SCRIPTS / "bench-device").read_text(), "scripts/usage.sh": (SCRIPTS / "usage.sh").read_text(),
+                           "build-device/tests/egosgm_stage_test": "#!/bin/sh\n", "build-device/bench/egosgm_stages": "#!/bin/sh\nkill -SEGV $$\n",
+                           "build-device/stages.json": "{}", "mine.json": "{}"}.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(text)
+            (root / name).chmod(0o755)
+        pathlib.Path(self.folder.name, "cmake").write_text("#!/bin/sh\n")
+        for arguments in ([], ["--json", root / "mine.json"]):
+            done = self.called(root / "scripts/bench-device", *arguments)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertNotIn("Written", done.stdout)
+            self.assertIn("ended without figures", done.stderr)
+        self.assertFalse((root / "build-device/stages.json").exists())
+        self.assertTrue((root / "mine.json").exists())
 
     def test_the_lane_of_threads_names_tests_that_there_are(self):
         names = re.search(r"^threaded='\^\((.*)\)'$", (SCRIPTS / "lanes").read_text(), re.MULTILINE)[1]

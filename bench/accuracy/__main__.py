@@ -69,31 +69,38 @@ def figure_or_reason(bench):
         return f"skipped: {reason}"
 
 
+def reasons_of(rows):
+    """Why rows have no figures."""
+    return [str(row[1]) for row in rows if re.search("(skipped|failed): ", str(row[1]))]
+
+
 def main():
     arguments = parse_arguments()
     bench = Bench(arguments)
     content = {"commit": commit(), "date": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds")}
     if arguments.paper:
         content["paper"], table = paper_table(bench, arguments)
-        skipped = [row for row in content["paper"] if "skipped" in row]
-        code = table.exit_code() or (3 if skipped else 0)
+        rows, skipped, code = content["paper"], [row["skipped"] for row in content["paper"] if "skipped" in row], table.exit_code()
         print("the stages of a frame: " + figure_or_reason(bench))
     elif arguments.ablation:
-        content["ablation"] = ablation(bench, arguments.inputs)
-        skipped, code = [], 0
+        content["ablation"], skipped = ablation(bench, arguments.inputs)
+        rows, code = content["ablation"], 0
     elif arguments.evidence:
         content["evidence"] = evidence_tables(bench, re.compile(arguments.only))
-        skipped = [row for table in content["evidence"].values() for row in table["rows"] if str(row[1]).startswith("skipped")]
-        code = 3 if skipped else 0
+        rows = [row for table in content["evidence"].values() for row in table["rows"]]
+        skipped, code = reasons_of(rows), 0
     elif arguments.video:
         content["video"] = video_tables(bench, re.compile(arguments.only))
-        skipped = [row for row in content["video"]["methods"]["rows"] if "skipped" in row[1]]
-        code = 3 if skipped else 0
+        rows = content["video"]["methods"]["rows"]
+        skipped, code = reasons_of(rows), 0
     else:
         table = ego_motion_table(bench, arguments) if arguments.ego_motion else main_table(bench, arguments)
         table.print()
         content["rows"], content["curves"] = table.rows, table.curves
-        skipped, code = table.skipped(), table.exit_code()
+        rows, skipped, code = table.rows, [row["figure"] for row in table.skipped()], table.exit_code()
+    if not rows and not skipped:
+        sys.exit("accuracy: nothing was measured: --only and --inputs are patterns of titles, see --help")
+    code = code or (1 if any("failed: " in reason for reason in skipped) else 3 if skipped else 0)
     content["device"] = bench.device.get("name", "")
     content["driver"] = bench.device.get("driver", "")
     print(f"\n{content['device']}, driver {content['driver']}, commit {content['commit']}, {content['date']}")

@@ -2,7 +2,7 @@
 """Every correction on and off, on four kinds of input apart, with bootstrap intervals."""
 import re
 
-from inputs import STEADY_FROM, Missing, expect
+from inputs import STEADY_FROM, Missing, expect, told
 
 # What is switched, and why it is there.
 ABLATION = [
@@ -54,7 +54,7 @@ class Darkened:
 
 
 def cases(bench, pattern):
-    """The inputs at hand whose title matches."""
+    """The inputs at hand whose title matches, and why others are not at hand."""
     figures = bench.video_figures()
     last = 9
 
@@ -72,14 +72,15 @@ def cases(bench, pattern):
     openers += [("streets", f"street {seed}{', moving' if moving else ''}",
                  lambda s=seed, m=moving: (street(s, m), range(last), range(STEADY_FROM, last)))
                 for moving, seeds in ((False, range(1, 10)), (True, (1, 2, 3))) for seed in seeds]
-    found = []
+    found, skipped = [], []
     for kind, title, opener in openers:
         if not re.search(pattern, title):
             continue
         try:
             found.append(Case(kind, title, *opener()))
         except Missing as reason:
-            print(f"skipped: {reason}")
+            skipped.append(told(reason))
+            print(skipped[-1])
     for title, opener in [(name, lambda n=name: figures.Street(expect(bench.data / "rendered" / n))) for name in ("warehouse", "kitchen")] + \
             [(f"street {seed}{', moving' if moving else ''}", lambda s=seed, m=moving: street(s, m)) for seed, moving in ((1, False), (2, False), (1, True))]:
         if not re.search(pattern, title):
@@ -91,7 +92,7 @@ def cases(bench, pattern):
         found += [Case("disturbances", f"{title}, yaw wrong by 1 degree", video, range(7), (4, 5, 6), wrong={4: figures.turned(1, 1)}),
                   Case("disturbances", f"{title}, a gap of 3 frames", video, (0, 1, 2, 6, 7, 8), (6, 7, 8)),
                   Case("disturbances", f"{title}, an exposure step", Darkened(video, 4), range(7), (4, 5, 6))]
-    return found
+    return found, skipped
 
 
 def counts_by_block(figures, case, options):
@@ -122,12 +123,12 @@ def percentages(counts):
 
 
 def ablation(bench, pattern):
-    """Rows: a configuration's figures, the mean over the inputs of a kind, and what they are above the default's, with a 95 % interval by
+    """Rows, and why inputs were skipped. A row: a configuration's figures, the mean over the inputs of a kind, and what they are above the default's, with a 95 % interval by
     drawing each input's blocks anew, the same ones for both."""
     figures = bench.video_figures()
     np, device = figures.np, figures.egosgm.devices()[0]
     bench.device = {"name": device.name, "driver": device.driver}
-    inputs = cases(bench, pattern)
+    inputs, skipped = cases(bench, pattern)
     kinds = list(dict.fromkeys(case.kind for case in inputs))
     random, draws, of_default, rows = np.random.default_rng(1), {}, {}, []
     for name, options, why in ABLATION:
@@ -148,7 +149,7 @@ def ablation(bench, pattern):
                                   for i, figure in enumerate(FIGURES)}
         rows.append(row)
         print_ablation_row(row)
-    return rows
+    return rows if inputs else [], skipped
 
 
 def print_ablation_row(row):

@@ -5,7 +5,7 @@ import json
 import shutil
 import statistics
 
-from inputs import SINGLE_FRAME, Failed, Missing, expect
+from inputs import SINGLE_FRAME, Failed, Missing, expect, told
 
 FIGURES = ("gained_percent", "gained_right_percent", "lost_right_percent", "wrong_of_trusted_percent", "trusted_of_wrong_percent")
 HEADINGS = ["place", "filled, first frame", "filled, last frame", "filled, single frame", "bad of valid, first frame", "bad of valid, last frame",
@@ -122,7 +122,7 @@ def measured(title, measure):
     try:
         return measure()
     except (Missing, Failed) as reason:
-        return [title, f"skipped: {reason}"]
+        return [title, told(reason)]
 
 
 def repeat(bench, place):
@@ -183,7 +183,7 @@ def poles(bench, only):
         try:
             rows = pole_rows(bench, planes(bench, "poles"))
         except (Missing, Failed) as reason:
-            rows = [["poles", f"skipped: {reason}"]]
+            rows = [["poles", told(reason)]]
     return {"headings": ["width of a pole", f"within {POLE_PX} px, last frame", "single frame"], "rows": rows}
 
 

@@ -30,6 +30,11 @@ class Failed(Exception):
     """The program refused or crashed."""
 
 
+def told(reason):
+    """What stands in a row in place of its figures."""
+    return f"{'failed' if isinstance(reason, Failed) else 'skipped'}: {reason}"
+
+
 def expect(path):
     if not path.exists():
         raise Missing(f"{path} is not there: --data DIR or EGOSGM_DATA tell where the sequences are")

@@ -5,7 +5,7 @@ import pathlib
 import re
 import statistics
 
-from inputs import PAPER, SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect, program_at, scored_frames, settings
+from inputs import PAPER, SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect, program_at, scored_frames, settings, told
 from tables import Table, shown
 
 HOST_TIMES = {"total", "odometry", "read", "write", "wall"}  # in a report; all others are stages'
@@ -76,8 +76,8 @@ def paper_table(bench, arguments):
             try:
                 row.update(measured(bench, opener(), configuration))
             except (Missing, Failed) as reason:
-                row["skipped"] = str(reason)
-                print(f"{title:<42} {name:<18} skipped: {reason}")
+                row["skipped"] = told(reason)
+                print(f"{title:<42} {name:<18} {row['skipped']}")
                 continue
             percent = [f"{shown(row[column])} %" if row[column] is not None else "" for column in COLUMNS]
             print(f"{title:<42} {name:<18} {percent[0]:>14} {percent[1]:>10} {percent[2]:>14} {percent[3]:>8} {row['time']:>7.2f}", flush=True)

@@ -11,7 +11,7 @@ import pathlib
 import shutil
 
 from evidence import print_table, ratios_of
-from inputs import SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect
+from inputs import SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect, told
 
 ALPHA = 0.4
 OURS, SINGLE = "EgoSGM", "EgoSGM, single frame"
@@ -176,13 +176,13 @@ def compared(bench, only):
         try:
             maps = Maps(bench, opener())
         except (Missing, Failed) as reason:
-            rows.append([title, f"skipped: {reason}"])
+            rows.append([title, told(reason)])
             continue
         for method in METHODS:
             try:
                 rows.append(row_of(bench, maps, method))
             except (Missing, Failed) as reason:
-                rows.append([title, f"{method}: skipped: {reason}"])
+                rows.append([title, f"{method}: {told(reason)}"])
             print_row(rows[-1])
     return {"headings": HEADINGS, "rows": rows}
 

@@ -154,7 +154,7 @@ class Bag:
 
     def __init__(self, path: "str | os.PathLike[str]", left_topic: str = "", right_topic: str = "", info_topics: Sequence[str] = (),
                  pose_topic: str = "", max_skew_ms: float = 0.0, rectify: Optional[bool] = None, pose_axes: str = "body",
-                 calib: "str | os.PathLike[str]" = "") -> None:
+                 calib: "str | os.PathLike[str] | Sequence[str | os.PathLike[str]]" = "") -> None:
         highlevel = needs("rosbags.highlevel")
         self.path = pathlib.Path(path)
         if not (self.path.is_file() or self.path.is_dir()):
@@ -237,8 +237,14 @@ class Bag:
         return self.cameras
 
     def _first_messages(self, reader: Any, topic: str) -> Iterator[Any]:
+        """Those that can be read of the first few."""
         connections = [c for c in reader.connections if c.topic == topic]
-        return (reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(connections=connections))
+        for connection, _, raw in itertools.islice(reader.messages(connections=connections), _MOST_BROKEN):
+            try:
+                message = reader.deserialize(raw, connection.msgtype)
+            except Exception:  # of what is broken, which is named when its turn comes
+                continue
+            yield message
 
     def _find_cameras(self, reader: Any) -> Cameras:
         found = []
@@ -251,7 +257,7 @@ class Bag:
             self.is_rectified_here = isinstance(self._rig_or_calibration, StereoRig)
             height, width = grey_of(found[0]).shape
             return Cameras.of_calibration(self._rig_or_calibration, width, height)
-        self.is_rectified_here = are_raw(found[0], self.images[0]) if self._rectify is None else self._rectify
+        self.is_rectified_here = any(map(are_raw, found, self.images)) if self._rectify is None else self._rectify
         return Cameras(*found, self.is_rectified_here, self.infos)
 
     def _first_whole(self, reader: Any, topic: str) -> Any:

@@ -22,6 +22,7 @@ _MOST_LEFT_OUT = 0.3  # of the views; where more are bad, something else is wron
 _CELLS = (8, 6)  # of the image, for its coverage
 _LEAST_COVERAGE, _LEAST_TILT_DEG, _MOST_ERROR_PX = 0.5, 15.0, 1.0
 _MOST_SQUARE_M, _LEAST_SQUARE_M = 0.5, 0.001
+_DICTIONARY = "DICT_4X4_50"
 _LEAST_BASELINE_M = 1e-4  # of pictures of one camera next to nothing is found
 
 
@@ -61,7 +62,7 @@ def _parser() -> Parser:
     add("--board", required=True, metavar="CxR", help="9x6: a chessboard's inner corners, where four squares meet; with --marker a ChArUco board's squares")
     add("--square", required=True, type=decimal, metavar="M", help="side of a square, as measured on the board [m]")
     add("--marker", type=decimal, metavar="M", help="the board is a ChArUco board with markers of this side [m]")
-    add("--dictionary", default="DICT_4X4_50", metavar="NAME", help="of its markers, by OpenCV's name; without: %(default)s")
+    add("--dictionary", metavar="NAME", help=f"of its markers, by OpenCV's name; without: {_DICTIONARY}")
     add("--pictures", metavar="DIR", help="new folder for pictures of all pairs with the corners that were found")
     add("--out", required=True, metavar="FILE.yml", help="the calibration: a new file of OpenCV's (M1, D1, M2, D2, R, T)")
     return parser
@@ -76,11 +77,13 @@ def _board_of(given: argparse.Namespace) -> Tuple[Board, int, int]:
         if side_m is not None and not _LEAST_SQUARE_M <= side_m <= _MOST_SQUARE_M:
             hint = f": are these millimetres? Give {side_m / 1000:g}" if _LEAST_SQUARE_M <= side_m / 1000 <= _MOST_SQUARE_M else ""
             raise _egosgm.InvalidArgument(f"{name} {side_m:g}: is in metres, from {_LEAST_SQUARE_M} to {_MOST_SQUARE_M}{hint}")
+    if given.marker is None and given.dictionary:
+        raise _egosgm.InvalidArgument(f"--dictionary {given.dictionary}: a chessboard has no markers: give --marker, the side of one [m], for a ChArUco board")
     if given.marker is None:
         return chessboard(columns, rows, given.square), columns, rows
     if not given.marker < given.square:
         raise _egosgm.InvalidArgument(f"--marker {given.marker:g}: a marker is smaller than its square, {given.square:g} m")
-    return charuco(columns, rows, given.square, given.marker, given.dictionary), columns, rows
+    return charuco(columns, rows, given.square, given.marker, given.dictionary or _DICTIONARY), columns, rows
 
 
 def _grey(pair: RawPair) -> Tuple[NDArray[np.uint8], NDArray[np.uint8]]:
@@ -124,12 +127,13 @@ class _Views:
                 picture = np.hstack([drawn(grey, found, board, columns, rows) for grey, found in zip(greys, corners)])
                 _egosgm._write_new_file(pathlib.Path(given.pictures) / f"{self.pairs:06d}.png", cv2.imencode(".png", picture)[1].tobytes())
             self.pairs += 1
+        self.note = pairs.note
         if len(self.views) < _FEWEST_VIEWS:
             there = other_size(without, columns, rows) if not board.is_charuco and not self.views else None
             hint = f"; one of {there[0]}x{there[1]} is there: inner corners count, where four squares meet" if there else \
                 "; give more pictures of the whole board in both images at once, sharp and evenly lit"
             raise _egosgm.InvalidArgument(f"{board.name} was found in {self.found[0]} left and {self.found[1]} right images of {counted(self.pairs, 'pair')}, in "
-                                          f"both at once in {len(self.views)}; {_FEWEST_VIEWS} are needed{hint}")
+                                          f"both at once in {len(self.views)}; {_FEWEST_VIEWS} are needed{hint}" + (f"; {self.note}" if self.note else ""))
 
 
 def _points(board: Board, numbers: Sequence[int], corners: Corners) -> Tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -253,7 +257,7 @@ def _tell(found: _Views, stereo: _Stereo, views: Sequence[_View], out: Sequence[
     turn = float(np.degrees(np.linalg.norm(cv2.Rodrigues(stereo.rotation)[0])))
     tell(f"pair:  baseline {np.linalg.norm(stereo.translation_m):.4f} m, turned by {turn:.2f} degrees; error {stereo.error_px:.3f} px; rows agree within "
           f"{np.quantile(rows, 0.9):.2f} px after rectification (90 % of the corners)")
-    for text in _advice(stereo, coverage, len(views)):
+    for text in filter(None, [found.note, *_advice(stereo, coverage, len(views))]):
         tell(f"note:  {text}")
 
 
@@ -281,7 +285,7 @@ def main(arguments: Sequence[str]) -> int:
         raise _egosgm.InvalidArgument(f"the views do not tell the cameras ({reason}): give pictures of the board tilted to all sides") from None
     _check_stance(stereo)
     coverage = [_coverage(views, side, found.size) for side in (0, 1)]
+    _egosgm._write_new_file(out, _text(stereo, found.size).encode())  # first: the standard output may be full
     _tell(found, stereo, views, left_out, coverage, _rows_px(board, views, stereo, found.size))
-    _egosgm._write_new_file(out, _text(stereo, found.size).encode())
     tell(f"{given.out}: {_next_step(given)}")
     return 0

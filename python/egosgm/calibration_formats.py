@@ -69,7 +69,7 @@ def is_info(data: Dict[str, Any]) -> bool:
 def ros(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> Found:
     from .ros_images import Cameras, are_raw
     infos = [_Info(data, file) for data, file in zip(contents, files)]
-    cameras = Cameras(*infos, are_raw(infos[0], ""), names=tuple(str(file) for file in files))
+    cameras = Cameras(*infos, any(are_raw(info, "") for info in infos), names=tuple(str(file) for file in files))
     return cameras.calibration if cameras.rig is None else cameras.rig
 
 
@@ -166,7 +166,7 @@ _ZED_SIZES = {"2K": (2208, 1242), "FHD": (1920, 1080), "HD": (1280, 720), "VGA":
 
 def zed(text: str, file: pathlib.Path, size: Optional[Tuple[int, int]]) -> StereoRig:
     """The factory calibration of a ZED camera, of several sizes of images; its lengths are millimetres."""
-    parser, factory = configparser.ConfigParser(strict=False), Values({}, file, "the factory calibration of a ZED camera")
+    parser, factory = configparser.ConfigParser(strict=False, interpolation=None), Values({}, file, "the factory calibration of a ZED camera")
     try:
         parser.read_string(text)
     except configparser.Error as error:

@@ -18,7 +18,7 @@ from .rectification import StereoRig
 
 Matrix = NDArray[np.float64]
 Camera = Tuple[Matrix, Matrix, bool]  # matrix, distortion, whether that is a fisheye's
-MOST_BYTES, _MOST_PARTS = 1 << 22, 2000
+MOST_BYTES, _MOST_PARTS, _MOST_VALUES = 1 << 22, 2000, 100_000
 
 
 def refuse(file: pathlib.Path, text: str) -> _egosgm.InvalidArgument:
@@ -32,7 +32,8 @@ def _yaml_of(text: str, file: pathlib.Path) -> Any:
         raise refuse(file, "YAML of other programs needs the package PyYAML: pip install pyyaml") from None
 
     class Loader(yaml.SafeLoader):
-        pass
+        def flatten_mapping(self, node: Any) -> None:
+            """Nothing is merged, which calibrations never ask for: a few bytes can ask for any number of copies."""
 
     # OpenCV's matrices are maps with a tag, and its first line is of YAML 1.0.
     Loader.add_multi_constructor("", lambda loader, suffix, node: loader.construct_mapping(node, deep=True)
@@ -145,6 +146,18 @@ def _check_parts(text: str, file: pathlib.Path) -> None:
         raise refuse(file, f"has {begun} nested or named parts, the most is {_MOST_PARTS}; give a calibration alone")
 
 
+def _expect_few_values(data: Any, file: pathlib.Path) -> Any:
+    """By YAML's aliases, a few bytes can stand for any number of values."""
+    waiting, taken = [data], 0
+    while waiting:
+        part = waiting.pop()
+        taken += 1
+        waiting.extend(part.values() if isinstance(part, dict) else part if isinstance(part, (list, tuple)) else ())
+        if taken + len(waiting) > _MOST_VALUES:
+            raise refuse(file, f"has more than {_MOST_VALUES} values; give a calibration alone")
+    return data
+
+
 def text_of(file: pathlib.Path) -> str:
     if not file.exists():
         raise refuse(file, "no such file")
@@ -168,7 +181,7 @@ def data_of(text: str, file: pathlib.Path) -> Any:
     try:
         if start == "<":
             return _of_element(ElementTree.fromstring(text))
-        return json.loads(text) if start in ("{", "[") and start else _yaml_of(text, file)
+        return _expect_few_values(json.loads(text) if start in ("{", "[") and start else _yaml_of(text, file), file)
     except (ValueError, RecursionError, ElementTree.ParseError) as error:
         if isinstance(error, _egosgm.InvalidArgument):
             raise

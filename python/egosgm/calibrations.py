@@ -39,7 +39,8 @@ def _without_rectification(rig: StereoRig) -> Optional[_egosgm.Calibration]:
     """The calibration of images that need no rectification; None where they need one."""
     k, other, t = np.asarray(rig.left_matrix), np.asarray(rig.right_matrix), np.ravel(rig.T)
     is_level = np.allclose(rig.R, np.eye(3), atol=1e-6) and np.allclose(t[1:], 0, atol=1e-6 * abs(t[0]))
-    if rig.given is not None or np.any(rig.left_distortion) or np.any(rig.right_distortion) or not is_level or not t[0] < 0:
+    # A fisheye without coefficients is still none of straight lines.
+    if rig.given is not None or rig.is_fisheye or np.any(rig.left_distortion) or np.any(rig.right_distortion) or not is_level or not t[0] < 0:
         return None
     if not np.allclose([k[0, 0], k[1, 1], k[1, 2]], [other[0, 0], other[1, 1], other[1, 2]], rtol=1e-6):
         return None
@@ -105,7 +106,7 @@ def _of_folder(folder: pathlib.Path, is_fisheye: bool) -> Found:
             return found
     arrays = [file for file in sorted(folder.glob("*.npy")) if file.is_file()]  # NumPy would wait for a pipe
     if arrays:
-        return formats.by_names({file.stem: np.load(file, allow_pickle=False) for file in arrays}, folder, "a folder of .npy")
+        return formats.by_names({file.stem: np.load(file, allow_pickle=False) for file in arrays}, folder, "a folder of .npy", is_fisheye)
     candidates = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in (".yaml", ".yml", ".json", ".xml", ".txt", ".npz")]
     lefts = [file for file in candidates if re.search("left|cam0|_l[.]", file.name, re.IGNORECASE)]
     if len(lefts) == 1:
@@ -131,7 +132,7 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
             with np.load(file, allow_pickle=False) as archive:
                 if sum(part.file_size for part in archive.zip.infolist()) > parts.MOST_BYTES:
                     raise parts.refuse(file, f"holds more than {parts.MOST_BYTES >> 20} MiB of arrays: give a calibration alone")
-                return formats.by_names({name: archive[name] for name in archive.files}, file, "an archive of NumPy arrays")
+                return formats.by_names({name: archive[name] for name in archive.files}, file, "an archive of NumPy arrays", is_fisheye)
         except (ValueError, OSError) as error:
             raise parts.refuse(file, f"is no archive of NumPy arrays: {error}") from None
     if start.startswith(b"\x93NUMPY"):
@@ -210,9 +211,13 @@ def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fis
         raise _egosgm.InvalidArgument(f"a calibration is one file, or one for each camera, left and right, not {len(files)}")
     path = files[0]
     found = _found(path, is_fisheye, size) if len(files) == 1 else _of_two_files(files)
+    if is_fisheye and not (isinstance(found, StereoRig) and found.is_fisheye):
+        raise parts.refuse(path, "is of rectified images, or says itself what its lenses are: --fisheye (is_fisheye) belongs to OpenCV's M1, D1, M2, D2, R, T")
     if not isinstance(found, StereoRig):
+        if unit_m not in (None, 1):
+            raise parts.refuse(path, "is of rectified images, and its format says the unit of the baseline (OpenCV's Q: metres): leave --unit (unit_m) out")
         return found
-    found = dataclasses.replace(_in_unit(found, unit_m or 1.0), is_fisheye=found.is_fisheye or is_fisheye)
+    found = _in_unit(found, 1.0 if unit_m is None else unit_m)
     baseline_m = float(np.linalg.norm(found.T))
     if unit_m is None and math.isfinite(baseline_m) and baseline_m > 1e-3:
         doubt = _egosgm._suspect_baseline(baseline_m, 0.0)

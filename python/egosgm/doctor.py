@@ -2,7 +2,6 @@
 """egosgm doctor: looks for what is wrong with a sequence before it is matched. Needs no device."""
 import argparse
 import itertools
-import json
 import math
 from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -10,7 +9,7 @@ import cv2  # noqa: F401  who lacks it is told at once
 import numpy as np
 
 from . import _egosgm
-from .arguments import counted, Parser, tell, whole_number
+from .arguments import counted, json_text, Parser, tell, whole_number
 from .examination import FEWEST_MATCHES, Examination, Finding, match_pair
 from .rectification import Rectification, StereoRig
 from .sequences import add_input, frame_times, open_input, open_without_calibration, words_of_input
@@ -88,7 +87,7 @@ class _OfBag(_Source):
     def __init__(self, given: argparse.Namespace) -> None:
         from .bag import Bag
         self._bag = Bag(given.bag, given.left_topic or "", given.right_topic or "", given.info_topics or (), max_skew_ms=given.max_skew_ms,
-                        calib=given.calib[0] if given.calib else "")
+                        calib=given.calib or "")
         self._stamps: List[int] = []
         self._frames = itertools.islice(self._bag.frames(), _MOST_OF_BAG)
         self._next: Any = next(self._frames, None)  # then its cameras are known
@@ -264,7 +263,7 @@ def main(arguments: Sequence[str]) -> int:
     findings = _findings(given)
     problems = sum(finding.verdict == "problem" for finding in findings)
     if given.json:
-        tell(json.dumps([finding._asdict() for finding in findings], indent=2, ensure_ascii=False))
+        tell(json_text([finding._asdict() for finding in findings]))
         return 2 if problems else 0
     for finding in findings:
         tell(f"{finding.verdict:<8} {finding.check:<12} {finding.text}")

@@ -131,7 +131,8 @@ class Drive:
                 yield (frame.number, frame.name, *images, None, False)
         elif isinstance(self._source, Bag):
             for frame in self._source.frames():
-                yield frame.number, f"{frame.number:06d}", frame.left, frame.right, frame.world_from_camera, frame.starts_anew and frame.number > 0
+                pose = frame.world_from_camera if self._odometry_options is not None else None
+                yield frame.number, f"{frame.number:06d}", frame.left, frame.right, pose, frame.starts_anew and frame.number > 0
         else:
             for number, pair in enumerate(self._source):
                 if not isinstance(pair, (tuple, list)) or len(pair) != 2:

@@ -11,6 +11,7 @@ from . import _egosgm
 
 LENGTHS_M, FRAME_STEP = range(100, 801, 100), 10
 SHORT_LENGTHS_M, SHORT_FRAME_STEP = range(5, 51, 5), 1
+_MOST_ROTATION_ERROR = 1e-2  # of R R^T: products of many float32 poses drift
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,6 +62,11 @@ def poses_of(matrices: ArrayLike, name: str) -> np.ndarray:
         raise _egosgm.InvalidArgument(f"{name}: an array of shape {poses.shape}: give poses as an (N, 4, 4) array")
     if not np.isfinite(poses).all():
         raise _egosgm.InvalidArgument(f"{name} holds a value that is not finite")
+    with np.errstate(over="ignore", invalid="ignore"):
+        turned = poses[:, :3, :3] @ np.swapaxes(poses[:, :3, :3], 1, 2) - np.eye(3)
+        is_rigid = (np.abs(turned) <= _MOST_ROTATION_ERROR).all(axis=(1, 2)) & (np.linalg.det(poses[:, :3, :3]) > 0) & (poses[:, 3] == [0, 0, 0, 1]).all(axis=1)
+    if not is_rigid.all():
+        raise _egosgm.InvalidArgument(f"{name}: matrix {int(np.argmin(is_rigid))} is no rotation with a translation, [R t; 0 1]: give poses as they were found")
     return poses
 
 

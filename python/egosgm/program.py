@@ -68,6 +68,15 @@ def _run_program(arguments: Sequence[str]) -> int:
     return _egosgm._main([os.fsencode(argument) for argument in arguments], bag_program)
 
 
+def _lacking(command: str, error: Exception) -> str:
+    """Of a package that is not there, or that lacks a library; empty of any other error."""
+    package = (error.name or "").partition(".")[0] if isinstance(error, ImportError) else ""
+    if package in ("", "egosgm"):
+        return ""
+    why = f"{sys.executable} does not find" if isinstance(error, ModuleNotFoundError) else f"does not load ({error})"
+    return f"error: {command}: needs the Python module {package}, which {why}: {_PACKAGES.get(package, f'pip install {package}')}"
+
+
 def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]:
     """A tool's exit code, and what is to be said of it."""
     from . import _egosgm
@@ -79,12 +88,6 @@ def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]
         return tool.main(list(arguments[1:])), ""
     except SystemExit as end:  # of --help
         return int(end.code or 0), ""
-    except ModuleNotFoundError as error:
-        package = error.name or ""
-        if package.startswith("egosgm"):
-            raise
-        remedy = _PACKAGES.get(package, f"pip install {package}")
-        return 1, f"error: {arguments[0]}: needs the Python module {package}, which {sys.executable} does not find: {remedy}"
     except BrokenPipeError:
         return 0, ""
     except _egosgm.Error as error:
@@ -97,7 +100,7 @@ def _outcome(arguments: Sequence[str], module: Optional[str]) -> Tuple[int, str]
         return 1, "error: out of memory: choose smaller images or fewer of them"
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
-        return 1, (f"error: {type(error).__name__}: {error} ({pathlib.Path(place.filename).name}:{place.lineno}; this is a defect of the program: "
+        return 1, _lacking(arguments[0], error) or (f"error: {type(error).__name__}: {error} ({pathlib.Path(place.filename).name}:{place.lineno}; this is a defect of the program: "
                    "please report it)")
 
 

@@ -62,6 +62,8 @@ class _Rectifier:
         self._alpha, self.rectification = given.alpha, None
         self.rig: Optional[StereoRig] = None
         if given.euroc:
+            if given.calib or given.unit is not None or given.fisheye:
+                raise _egosgm.InvalidArgument("--euroc has its own calibration: leave --calib, --unit and --fisheye out, or give --left and --right")
             self.rig = read_euroc_rig(given.euroc)
             return
         if not given.calib:
@@ -70,8 +72,8 @@ class _Rectifier:
         found = find(given.calib, given.unit, given.fisheye, size)
         if isinstance(found, StereoRig):
             self.rig = found
-        elif given.fisheye:
-            raise _egosgm.InvalidArgument(f"--fisheye: {' '.join(given.calib)} is no calibration of OpenCV's (K1, D1, K2, D2, R, T)")
+        elif given.alpha:
+            raise _egosgm.InvalidArgument(f"--alpha {given.alpha:g}: {' '.join(given.calib)} is of rectified images, which stay as they are: leave it out")
         else:
             self.calibration = found
 

@@ -609,6 +609,9 @@ def evaluate_video(estimates: Sequence[ArrayLike], truths: _Maps = None, *, cali
                "uncertainty": (uncertainties, "uncertainties", _map_of), "next_truth": (next_truths, "next_truths", _map_of),
                "moving": (moving, "moving", _mask_of), "image": (images, "images", _grey_of), "reason": (reasons, "reasons", _grey_of),
                "flow_to_next": (flows, "flows", _flow_of)}
+    for items, name, _ in sources.values():
+        if items is not None and len(items) != number:
+            raise _egosgm.InvalidArgument(f"{name} has {len(items)} of {number} frames: give one for each estimate, None where there is none")
 
     def frame(i: int) -> Frame:
         now = Frame(_map_of(estimates[i], "estimates"))

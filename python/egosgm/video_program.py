@@ -295,6 +295,13 @@ def _text_of(found: VideoInput, total: VideoCounts) -> str:
     return "\n".join(lines + found.notes + found.reader.doubts(found.given.scale))
 
 
+def _expect_partners(given: argparse.Namespace) -> None:
+    """That no option is passed over for want of another one. REQUIRES: the truth is resolved."""
+    for name, partners in (("mask", ["truth"]), ("next_truth", ["flow"]), ("plot_density", ["variance", "confidence"])):
+        if getattr(given, name) and not any(getattr(given, partner) for partner in partners):
+            raise _egosgm.InvalidArgument(f"--{name.replace('_', '-')} {getattr(given, name)}: belongs to --{' or --'.join(partners)}: give that, too, or leave it out")
+
+
 def _work(arguments: Sequence[str]) -> str:
     given = _parser().parse(arguments)
     for option, file in (("--plot-frames", given.plot_frames), ("--plot-density", given.plot_density)):
@@ -303,6 +310,7 @@ def _work(arguments: Sequence[str]) -> str:
     resolve_comparison(given, truth_is_needed=not given.sequence)
     if not given.truth and (given.scene or _Path(given.sequence, "truth").is_dir()):
         given.truth = given.sequence  # its own
+    _expect_partners(given)
     found = VideoInput(given)
     total, over_frames, errors = VideoCounts(), [], []
     for counts in found.counts(given.near):

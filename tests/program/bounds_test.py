@@ -71,6 +71,21 @@ class Bounds(ProgramTest):
         for text in ("%YAML:1.0\n---\nM1: " + "[" * 60000, "%YAML:1.0\n---\nM1: " + "a: " * 20000, '{"M1":' + '{"data":' * 7000, "<?xml version='1.0'?>" + "<a>" * 20000):
             file.write_text(text)
             self.assert_bounded(file, "rectify", *pairs, "--calib", file, says="nested or named parts")
+        ten = lambda name: "[" + ", ".join([name] * 10) + "]"  # noqa: E731
+        aliases = f"a: &a {ten('1.0')}\n" + "".join(f"{name}: &{name} {ten('*' + before)}\n" for before, name in zip("abcdefgh", "bcdefghi"))
+        groups = "a: &a {" + ", ".join(f"k{i}: 1" for i in range(900)) + "}\n" + "".join(f"m{i}: *a\n" for i in range(900))
+        merged = "a: &a {k: 1}\n" + "".join(f"{name}: &{name} {{<<: {ten('*' + before)}}}\n" for before, name in zip("abcdefgh", "bcdefghi"))
+        for text in (merged, aliases + "K1: *i\n", groups, aliases + "cam0: {camera_model: *i}\ncam1: {camera_model: *i}\n"):
+            file.write_text(text)
+            self.assert_bounded(file, "rectify", *pairs, "--calib", file, says="more than 100000 values")
+
+    def test_values_of_a_zed_are_taken_as_they_stand(self):
+        file = self.new_folder() / "SN1.conf"
+        values = "".join(f"{name} = {f'%({after})s' * 10}\n" for name, after in zip("abcdefghi", "bcdefghij"))
+        file.write_text(f"[LEFT_CAM_HD]\n{values}j = 1\n[RIGHT_CAM_HD]\n[STEREO]\n")
+        both = file.parent / "both.png"
+        both.write_bytes(png(2560, 720, 8, [bytes(2560)] * 720))
+        self.assert_bounded(file, "rectify", "--side-by-side", both, "--calib", file, "--out", file.parent / "out", says="lacks fx")
 
     def test_reports_of_more_frames_than_there_are(self):
         out = self.new_folder() / "out"

@@ -157,7 +157,11 @@ class EvalOverTime(ProgramTest):
         self.assertIn("TEPE same pixel", (out / "frames.svg").read_text())
         self.assertTrue((out / "density.png").read_bytes().startswith(b"\x89PNG"))
         self.assert_refused(["eval-video", estimate, truth, "--plot-frames", out / "frames.gif"], "--plot-frames", ".svg")
-        self.assert_refused(["eval-video", estimate, truth, "--plot-density", out / "none.svg"], "variance")
+        self.assert_refused(["eval-video", estimate, truth, "--plot-density", out / "none.svg"], "--plot-density", "belongs to --variance or --confidence")
+        self.assert_refused(["eval-video", estimate, truth, "--next-truth", truth], "--next-truth", "belongs to --flow")
+        plain = self.new_folder() / "plain"
+        shutil.copytree(self.street, plain, ignore=shutil.ignore_patterns("truth"))
+        self.assert_refused(["eval-video", estimate, "--sequence", plain, "--mask", truth], "--mask", "belongs to --truth")
         self.assertFalse((out / "none.svg").exists())
 
     def test_wrong_input_gives_one_line_and_no_table(self):

@@ -32,6 +32,10 @@ class Evidence(ProgramTest):
         cls.code, cls.said = done.returncode, done.stderr
         cls.found = json.loads((cls.folder / "evidence.json").read_text())["evidence"]
 
+    def measured(self, *arguments):
+        return subprocess.run([sys.executable, "-B", SOURCE / "bench/accuracy", "--egosgm", PROGRAM, "--data", self.folder / "data", "--work", self.work, *arguments],
+                              capture_output=True, text=True)
+
     def row(self, table, title):
         return next(row for row in self.found[table]["rows"] if row[0] == title)
 
@@ -45,6 +49,17 @@ class Evidence(ProgramTest):
         self.assertEqual(self.code, 3, self.said)
         self.assertIn("fence is not there", self.row("places", "fence")[1])
         self.assertIn("web25 is not there", self.row("repeated", "web25, first pair")[1])
+
+    def test_what_fails_or_measures_nothing_is_no_success(self):
+        broken = self.folder / "data/evidence/corridor"
+        shutil.copytree(self.folder / "data/evidence/sky", broken)
+        (broken / "calib.txt").write_text("none")
+        for arguments, code, said in ((("--evidence", "--only", "^corridor$"), 1, "calib.txt"), (("--evidence", "--only", "no place"), 1, "nothing was measured"),
+                                      (("--no-speed", "--only", "no group"), 1, "nothing was measured"), (("--ablation", "--inputs", "no input"), 1, "nothing was measured"),
+                                      (("--ablation", "--inputs", "^2012"), 3, "2 rows skipped")):
+            done = self.measured(*arguments)
+            self.assertEqual(done.returncode, code, done.stderr)
+            self.assertIn(said, done.stdout + done.stderr)
 
     def test_a_place_has_the_figures_of_eval(self):
         row = dict(zip(self.found["places"]["headings"], self.row("places", "sky")))

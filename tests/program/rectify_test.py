@@ -244,6 +244,8 @@ class Rectify(RectifyTest):
         text = self.assert_works("rectify", "--euroc", self.euroc(drop=[(1, 0)]), "--out", out.parent / "fewer")
         self.assertIn("1 image without the other one", text)
         self.assertEqual(len(list((out.parent / "fewer/image_0").iterdir())), 1)
+        for ignored in (["--calib", self.street / "calib.txt"], ["--unit", "m"], ["--fisheye"]):
+            self.assert_refused(["rectify", "--euroc", folder, *ignored, "--out", out.parent / "never"], "has its own calibration")
 
     def test_euroc_folders_as_others_write_them(self):
         """The right camera is 12 us late, the header has no mark, and the model has Kalibr's name."""
@@ -292,6 +294,7 @@ class Rectify(RectifyTest):
         refused(good, "calib.txt", arguments=["--side-by-side", self.street / "calib.txt"])
         refused(good, "--unit inch", arguments=[*self.PAIRS, "--unit", "inch"])
         refused(good, "--alpha 2", arguments=[*self.PAIRS, "--alpha", 2])
+        refused((self.street / "calib.txt").read_text(), "--alpha 0.5", "rectified images", arguments=[*self.PAIRS, "--alpha", 0.5])
         for name, cut in {"cut.png": self.street / "image_0/000000.png", "cut.jpg": None}.items():  # one line, whole or not at all
             broken = self.raw_folder / name
             broken.write_bytes(cut.read_bytes()[:-2000] if cut else b"\xff\xd8\xff\xe0" + bytes(200))

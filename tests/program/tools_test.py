@@ -47,6 +47,7 @@ class Tools(ProgramTest):
             shutil.copy(file, maps / f"\udcff_{file.name}")
         self.assertIn(b"3 pairs", self.printed("eval-video", maps, "--sequence", street))
         self.assertEqual(len(json.loads(self.printed("eval-video", maps, "--sequence", street, "--json"))["over_frames"]), FRAMES)
+        self.assertIn("times.txt", json.loads(self.printed("doctor", street, "--disparities", 48, "--json"))[-1]["text"])
         calib, rectified = street / "calib.txt", self.new_folder() / ODD
         told = self.printed("rectify", "--left", street / "image_0/*.png", "--right", street / "image_1/*.png", "--calib", calib, "--out", rectified)
         self.assertIn(b"4 pairs in " + os.fsencode(rectified), told)

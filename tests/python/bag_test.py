@@ -671,6 +671,18 @@ def test_raw_images_are_rectified_by_their_infos(street):
         assert places[0][1] - places[1][1] == pytest.approx(cameras.calibration.fx * c.baseline_m / point[2] - cameras.calibration.doffs_px, abs=0.5)
 
 
+def test_either_camera_may_be_the_raw_one(tmp_path, street, frames):
+    raw = []
+    for side, name in enumerate(("left", "right")):
+        recording = Recording("mcap")
+        for other, topic in enumerate(("left", "right")):
+            recording.info(f"/{topic}/camera_info", street.calibration, other, distortion=(0.1 * (side == other), 0, 0, 0, 0))
+            recording.image(f"/{topic}/image", START, (frames[0].left, frames[0].right)[other])
+        bag = bags.Bag(recording.write(tmp_path / name), "/left/image", "/right/image")
+        raw.append(bool(bag.find_cameras()) and bag.is_rectified_here)
+    assert raw == [True, True]
+
+
 @pytest.mark.filterwarnings("error")
 def test_next_to_no_disparity_is_infinitely_uncertain(street):
     depth, variance = ros_images.depth_maps(np.full((1, 1), 1e-20, np.float32), np.ones((1, 1), np.float32), street.calibration)
@@ -689,6 +701,9 @@ def test_poses_of_the_bag_are_the_motion(tmp_path, street, frames):
     moved = np.linalg.inv(found[1].world_from_camera) @ found[0].world_from_camera
     np.testing.assert_allclose(moved[:3, 3], (0, 0, -0.8), atol=1e-9)  # z is forward
     np.testing.assert_allclose(moved[:3, :3], np.eye(3), atol=1e-9)
+    bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", pose_topic="/odom")
+    assert [frame.motion is not None for frame in egosgm.run(bag, **OPTIONS)] == [False, True, True]
+    assert [frame.motion for frame in egosgm.run(bag, motion=False, **OPTIONS)] == [None] * FRAMES
 
 
 @pytest.mark.parametrize("change, named", [
@@ -974,6 +989,17 @@ def test_a_broken_message_costs_its_pair(tmp_path, street, frames, capfd):
     assert "3 frames" in said and "1 broken message, whose pairs are left out: /right/image_rect at 1700000000.200000000 s: an image of 1x1 px" in said
 
 
+def test_the_first_message_may_be_broken(tmp_path, street, frames, monkeypatch):
+    """Cut, so that no decoder reads it."""
+    recording = drive_of(street, frames)
+    first = next(message for _, topic, _, message in sorted(recording.messages, key=lambda item: item[0]) if topic == "/left/image_rect")
+    whole = recording.store.serialize_cdr
+    monkeypatch.setattr(recording.store, "serialize_cdr", lambda message, kind: whole(message, kind)[:20 if message is first else None])
+    bag = bags.Bag(recording.write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect")
+    assert len(list(bag.frames())) == FRAMES - 1
+    assert "1 broken message, whose pairs are left out: /left/image_rect" in bag.gaps.text()
+
+
 def test_a_mosaic_that_was_compressed():
     pixels = np.random.default_rng(1).integers(0, 255, (HEIGHT, WIDTH)).astype(np.uint8)
     expected = ros_images._of_bayer(pixels)
@@ -1134,3 +1160,16 @@ def test_doctor_looks_at_bags(tmp_path, street, frames, capfd):
     findings = examined(capfd, between, "--max-skew-ms", 50)
     assert findings["times"]["verdict"] == "problem" and "other moments" in findings["times"]["text"]
     assert list(findings) == ["images", "calibration", "times"]
+
+
+def test_doctor_takes_the_files_of_both_cameras(tmp_path, street, frames, capfd):
+    """And not the one that lies beside the first, by its name."""
+    pytest.importorskip("cv2")
+    c = street.calibration
+    for name, baseline_m in (("left", 0), ("right", 2 * c.baseline_m), ("other", c.baseline_m)):
+        (tmp_path / f"{name}.yaml").write_text(
+            f"image_width: {WIDTH}\nimage_height: {HEIGHT}\ncamera_matrix: {{rows: 3, cols: 3, data: [{c.fx}, 0, {c.cx}, 0, {c.fy}, {c.cy}, 0, 0, 1]}}\n"
+            f"projection_matrix: {{rows: 3, cols: 4, data: [{c.fx}, 0, {c.cx}, {-c.fx * baseline_m}, 0, {c.fy}, {c.cy}, 0, 0, 0, 1, 0]}}\n")
+    bag = record("mcap", tmp_path / "drive", street, frames)
+    found = examined(capfd, bag, "--calib", tmp_path / "left.yaml", tmp_path / "other.yaml")
+    assert "baseline 0.54 m" in found["calibration"]["text"]

@@ -76,7 +76,9 @@ def write_pictures(folder, texture, columns, rows, count=12, spoilt=()):
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory):
-    return write_pictures(tmp_path_factory.mktemp("board") / "views", chessboard(7, 5), 7, 5, spoilt=(4,))
+    folder = write_pictures(tmp_path_factory.mktemp("board") / "views", chessboard(7, 5), 7, 5, spoilt=(4,))
+    shutil.copy(folder / "left/0.png", folder / "left/alone.png")
+    return folder
 
 
 def command(folder, out, board="7x5"):
@@ -113,7 +115,8 @@ def expect_the_cameras(file, within_px=4):
 def test_a_chessboard_gives_the_cameras_and_a_view_of_another_moment_is_left_out(calibrated):
     folder, said = calibrated
     expect_the_cameras(folder / "calib.yml")
-    assert "pairs (11 left, 12 right)" in said and said.count("left out") == 1 and "pair   4: left out" in said
+    assert "pairs (11 left, 12 right)" in said and said.count("left out") == 2 and "pair   4: left out" in said
+    assert "note:  1 image without the other camera's left out, the first is " in said and "left/alone.png" in said
     rows = float(said.split("rows agree within ")[1].split()[0])
     assert rows < 0.3
     assert len(list((folder / "corners").iterdir())) == 12
@@ -127,6 +130,15 @@ def test_what_it_writes_rectifies(pictures, calibrated, tmp_path):
     left, right = (cv2.imread(str(tmp_path / f"sequence/image_{side}/000002.png"), cv2.IMREAD_GRAYSCALE) for side in (0, 1))
     corners = [cv2.findChessboardCornersSB(image, (7, 5))[1].reshape(-1, 2) for image in (left, right)]
     assert np.abs(corners[0][:, 1] - corners[1][:, 1]).max() < 0.5
+
+
+def test_a_standard_output_that_is_full_costs_no_calibration(pictures, tmp_path, monkeypatch):
+    def full(text):
+        raise egosgm.IoError("the standard output cannot be written")
+
+    monkeypatch.setattr("egosgm.calibrate.tell", full)
+    assert program.run_tool(command(pictures, tmp_path / "calib.yml")) == 1
+    expect_the_cameras(tmp_path / "calib.yml")
 
 
 def test_a_charuco_board(tmp_path, capsys):
@@ -157,6 +169,10 @@ def test_too_few_views_sides_and_units_are_named(pictures, tmp_path, capsys):
             cv2.imwrite(str(few / side / f"{i}.png"), image if i < 4 else np.full_like(image, 90))
     code, said = calibrate(few, tmp_path / "calib.yml", capsys)
     assert code == 2 and "found in 4 left and 4 right images of 6 pairs" in said and "5 are needed" in said, said
+    (few / "right/0.png").unlink()
+    assert "1 image without the other camera's left out" in calibrate(few, tmp_path / "calib.yml", capsys)[1]
+    assert program.run_tool([*command(few, tmp_path / "calib.yml"), "--dictionary", "DICT_5X5_50"]) == 2
+    assert "a chessboard has no markers: give --marker" in capsys.readouterr().err
     swapped = ["calibrate", "--left", str(pictures / "right/*.png"), "--right", str(pictures / "left/*.png"), "--board", "7x5", "--out", str(tmp_path / "calib.yml")]
     assert program.run_tool([*swapped, "--square", "0.03"]) == 2
     assert "left and right are swapped" in capsys.readouterr().err

@@ -122,6 +122,8 @@ def test_two_files_of_ros_and_of_kimera(tmp_path):
     for given in ("left.yaml", "right.yaml", "."):
         expect_rectified(egosgm.read_calibration(tmp_path / given))
     lens = [*LENS, 0]
+    (tmp_path / "right.yaml").write_text(ros(RIGHT_P, lens))
+    assert isinstance(egosgm.read_calibration(tmp_path), egosgm.StereoRig)
     (tmp_path / "left.yaml").write_text(ros(P, lens))
     (tmp_path / "right.yaml").write_text(ros(RIGHT_P, lens))
     expect_raw(egosgm.read_calibration(tmp_path))
@@ -223,6 +225,15 @@ def test_what_is_packed(tmp_path):
 def test_a_fisheye(tmp_path):
     (tmp_path / "chain.yaml").write_text(kalibr([0.01, 0, 0, 0], "equidistant"))
     assert egosgm.read_calibration(tmp_path / "chain.yaml").is_fisheye
+    (tmp_path / "ideal.yaml").write_text(kalibr([0, 0, 0, 0], "equidistant"))
+    assert egosgm.read_calibration(tmp_path / "ideal.yaml").is_fisheye
+    lenses = dict(M1=np.array(K), D1=np.array(LENS), M2=np.array(K), D2=np.array(LENS), R=np.array(EYE), T=np.array([-B, 0, 0]))
+    np.savez(tmp_path / "rig.npz", **lenses)
+    assert egosgm.read_calibration(tmp_path / "rig.npz", is_fisheye=True).is_fisheye
+    for name, text in {"radtan.yaml": kalibr(LENS), "own.txt": RECTIFIED["own.txt"], "q.yml": RECTIFIED["q.yml"]}.items():
+        (tmp_path / name).write_text(text)
+        with pytest.raises(egosgm.InvalidArgument, match=f"{name}: is of rectified images, or says itself what its lenses are"):
+            egosgm.read_calibration(tmp_path / name, is_fisheye=True)
 
 
 @pytest.mark.parametrize("text, named", [
@@ -269,3 +280,8 @@ def test_units_are_never_guessed(tmp_path):
     with pytest.raises(egosgm.InvalidArgument, match="centimetres .0.3 m. or millimetres .0.03 m."):
         egosgm.read_calibration(tmp_path / "chain.yaml")
     expect_raw(egosgm.read_calibration(tmp_path / "chain.yaml", unit_m=0.01))
+    for name in ("own.txt", "q.yml"):
+        (tmp_path / name).write_text(RECTIFIED[name])
+        with pytest.raises(egosgm.InvalidArgument, match=f"{name}: is of rectified images.*leave --unit"):
+            egosgm.read_calibration(tmp_path / name, unit_m=0.001)
+        expect_rectified(egosgm.read_calibration(tmp_path / name, unit_m=1))

@@ -356,7 +356,13 @@ def test_a_defect_of_a_tool_is_told_in_one_line(monkeypatch, capfd):
     def broken(arguments):
         raise RuntimeError("one\ntwo")
 
-    monkeypatch.setattr(cloud, "main", broken)
+    def without_a_library(arguments):
+        raise ImportError("libGL.so.1: cannot open shared object file", name="cv2")
+
     monkeypatch.setattr(signal, "signal", lambda *_: None)
+    monkeypatch.setattr(cloud, "main", without_a_library)
+    assert program.run_tool(["cloud"]) == 1
+    assert "cv2, which does not load (libGL.so.1: cannot open shared object file): pip install opencv-python-headless" in capfd.readouterr().err
+    monkeypatch.setattr(cloud, "main", broken)
     assert program.run_tool(["cloud"]) == 1
     assert re.fullmatch(r"egosgm: error: RuntimeError: one two \(egosgm_test.py:\d+; this is a defect of the program: please report it\)\n", capfd.readouterr().err)

@@ -73,7 +73,10 @@ def test_standing_still_has_no_percent():
 
 
 @pytest.mark.parametrize("estimate, truth, named", [(drive(3, 1), drive(4, 1), "3 estimated and 4 true"), (drive(1, 1), drive(1, 1), "at least two"),
-                                                    (np.zeros((3, 3, 4)), drive(3, 1), "N, 4, 4"), ("a", drive(3, 1), "no array of numbers"), (drive(3, math.nan), drive(3, 1), "not finite")])
+                                                    (np.zeros((3, 3, 4)), drive(3, 1), "N, 4, 4"), ("a", drive(3, 1), "no array of numbers"), (drive(3, math.nan), drive(3, 1), "not finite"),
+                                                    (drive(3, 1), drive(3, 1) * [[[1], [2], [1], [1]]], "truth: matrix 0 is no rotation"), (np.zeros((3, 4, 4)), drive(3, 1), "estimate: matrix 0"),
+                                                    (drive(3, 1) * [[[1]], [[-1]], [[1]]], drive(3, 1), "estimate: matrix 1"),
+                                                    (drive(3, 1) + [[[0]], [[0]], [[1e200]]], drive(3, 1), "estimate: matrix 2")])
 def test_wrong_input_is_refused(estimate, truth, named):
     with pytest.raises(egosgm.InvalidArgument, match=named):
         egosgm.evaluate_poses(estimate, truth)

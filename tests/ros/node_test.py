@@ -305,7 +305,7 @@ class Parameters(unittest.TestCase):
 
     def test_what_cannot_work_is_not_configured(self):
         from rclpy.lifecycle import TransitionCallbackReturn
-        for parameters in (dict(max_skew_ms=-1.0), dict(preset="papr"), dict(p2=-1), dict(max_depth_sigma=0.0), dict(point_reasons="trused")):
+        for parameters in (dict(max_skew_ms=-1.0), dict(max_skew_ms=float("inf")), dict(preset="papr"), dict(p2=-1), dict(max_depth_sigma=0.0), dict(point_reasons="trused")):
             node = self.node(**parameters)
             self.assertEqual(node.trigger_configure(), TransitionCallbackReturn.FAILURE, parameters)
             self.assertIn(next(iter(parameters)), node._problem)
@@ -449,6 +449,25 @@ class Parameters(unittest.TestCase):
         node._warned_at = {cause: at - 60 for cause, at in node._warned_at.items()}
         node._tell()
         self.assertEqual(len(warned), 2)
+
+    def test_a_pipeline_that_could_not_be_made_is_made_for_the_next_pair(self):
+        import egosgm
+        from sensor_msgs.msg import CameraInfo, Image
+        from unittest import mock
+        node = self.node(disparities=16)
+        node.trigger_configure()
+        image = Image(height=32, width=64, step=64, encoding="mono8", data=array.array("B", bytes(64 * 32)))
+        for focal in (100.0, 101.0):
+            for side in (0, 1):
+                info = CameraInfo(height=32, width=64, k=[focal, 0, 32.0, 0, focal, 16.0, 0, 0, 1.0], p=[focal, 0, 32.0, -focal * side, 0, focal, 16.0, 0, 0, 0, 1.0, 0])
+                node._on_info(("left", "right")[side], info)
+            image.header.stamp.sec += 1
+            before = node._pipeline
+            with mock.patch.object(egosgm, "Pipeline", side_effect=egosgm.DeviceError("no memory")), self.assertRaises(egosgm.DeviceError):
+                node._process(image, image)
+            node._process(image, image)
+            self.assertIsNot(node._pipeline, before)
+            self.assertEqual(node._cameras.calibration.fx, focal)
 
     def test_infos_that_change_and_the_range_that_messages_tell(self):
         from sensor_msgs.msg import CameraInfo, Image

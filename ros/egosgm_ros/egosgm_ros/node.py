@@ -119,7 +119,7 @@ class EgosgmNode(LifecycleNode):
     def on_configure(self, state: Any) -> TransitionCallbackReturn:
         self._clear()
         try:
-            if not self._value("max_skew_ms") >= 0:
+            if not 0 <= self._value("max_skew_ms") < np.inf:
                 raise ValueError(f"max_skew_ms {self._value('max_skew_ms')}: give 0 for equal stamps, or how far they may differ")
             if not self._value("max_depth_sigma") > 0:
                 raise ValueError(f"max_depth_sigma {self._value('max_depth_sigma')}: give the largest sigma of a point's depth as a part of the depth, 0.1 or .inf")
@@ -233,9 +233,10 @@ class EgosgmNode(LifecycleNode):
             raise ValueError(f"no camera info yet on {' and '.join(f'{side}/camera_info' for side in SIDES if side not in self._infos)}")
         infos = self._infos["left"], self._infos["right"]
         if self._cameras is None or any(map(_differ, infos, self._made_for)):
-            self._cameras, self._made_for = Cameras(*infos, False), infos
-            self._pipeline = egosgm.Pipeline(self._cameras.calibration, *self._cameras.size, device=self._value("device"), **self._options())
-            self._odometry = egosgm.StereoOdometry(self._cameras.calibration)
+            cameras = Cameras(*infos, False)
+            self._pipeline = egosgm.Pipeline(cameras.calibration, *cameras.size, device=self._value("device"), **self._options())
+            self._odometry = egosgm.StereoOdometry(cameras.calibration)
+            self._cameras, self._made_for = cameras, infos  # last: where one cannot be made, all are made for the next pair
             self._last_stamp = self._path.motion = None
         images = grey_of(left), grey_of(right)
         for side, image in zip(SIDES, images):
