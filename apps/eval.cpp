@@ -183,6 +183,13 @@ bool read_count(const Json& json, Count& count) {
   return value == static_cast<double>(count);
 }
 
+/// Whether no part is larger than its whole.
+bool are_possible(const DisparityCounts& c) {
+  return c.sky <= c.truth && c.sky_valid <= c.sky && c.sky_valid <= c.valid &&
+         c.valid - c.sky_valid <= c.truth - c.sky && c.bad <= c.valid && c.d1 <= c.bad &&
+         c.bad_interpolated <= c.truth && c.d1_interpolated <= c.bad_interpolated;
+}
+
 /// The counts of each pair of a report. Throws InvalidArgument and IoError.
 std::vector<DisparityCounts> counts_of(const std::string& file) {
   const Json report = parse_json(vision::read_file(file, kMaxReportBytes), file);
@@ -193,6 +200,7 @@ std::vector<DisparityCounts> counts_of(const std::string& file) {
       for_each_count(all.emplace_back(), [&](const char* name, auto& count) {
         is_sound = read_count(pair.at("counts").at(name), count) && is_sound;
       });
+      is_sound = is_sound && are_possible(all.back());
     }
   } catch (const Json::exception&) {
     is_sound = false;

@@ -12,7 +12,13 @@ namespace egosgm::app {
 FileFeed::FileFeed(vision::StereoSequence sequence) {
   sequence_ = std::move(sequence);
   size_ = vision::check_image_sizes(sequence_);
-  type_ = vision::read_pixel_type(sequence_.frames.front().left);
+  for (const vision::StereoFrame& frame : sequence_.frames) {
+    try {
+      type_ = vision::read_pixel_type(frame.left);
+      break;
+    } catch (const Error&) {  // the pair is left out
+    }
+  }
 }
 
 std::optional<FedFrame> FileFeed::next() {

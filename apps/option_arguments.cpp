@@ -57,7 +57,24 @@ void check_rows(const std::string& text, const std::string& file) {
   }
 }
 
-void apply_config(PipelineOptions& options, const std::string& file) {
+/// Options as they are chosen one after the other.
+class Choices {
+ public:
+  void set(const std::string& name, const std::string& value) {
+    if (name == "preset" && !is_first_) {
+      throw InvalidArgument("option preset: would undo what was chosen before it: put it first, or give --preset");
+    }
+    is_first_ = is_first_ && name == "preset";
+    set_option(options, name, value);
+  }
+
+  PipelineOptions options;
+
+ private:
+  bool is_first_ = true;  // nothing but presets was chosen
+};
+
+void apply_config(Choices& choices, const std::string& file) {
   const std::string bytes = vision::read_file(file, kMaxConfigBytes);
   const std::string read(vision::without_mark(bytes));
   check_rows(read, file);
@@ -72,7 +89,7 @@ void apply_config(PipelineOptions& options, const std::string& file) {
     if (item.name == "++" || item.name == "--") continue;  // CLI11's marks of where a section begins and ends
     if (item.inputs.size() != 1) throw InvalidArgument(file + ": " + item.fullname() + " needs one value");
     try {
-      set_option(options, item.fullname(), item.inputs.front());
+      choices.set(item.fullname(), item.inputs.front());
     } catch (const InvalidArgument& error) {
       const int line = line_of(read, item.fullname());
       throw InvalidArgument(fmt::format("{}{}: {}", file, line > 0 ? fmt::format(":{}", line) : "", error.what()));
@@ -80,19 +97,19 @@ void apply_config(PipelineOptions& options, const std::string& file) {
   }
 }
 
-void apply_setting(PipelineOptions& options, const std::string& setting) {
+void apply_setting(Choices& choices, const std::string& setting) {
   const auto equals = setting.find('=');
   if (equals == std::string::npos) throw InvalidArgument("--set " + setting + ": write --set NAME=VALUE");
-  set_option(options, setting.substr(0, equals), setting.substr(equals + 1));
+  choices.set(setting.substr(0, equals), setting.substr(equals + 1));
 }
 
-void set_preset(PipelineOptions& options, const std::string& name) {
+void set_preset(Choices& choices, const std::string& name) {
   const std::string nearest = suggestion(name, {"default", "paper"});
   if (nearest != name) {
     throw InvalidArgument("--preset \"" + name + "\": " + (nearest.empty() ? "" : "did you mean " + nearest + "? ") +
                           "choose default or paper");
   }
-  set_option(options, "preset", name);
+  choices.set("preset", name);
 }
 
 std::string options_help() {
@@ -147,17 +164,17 @@ void OptionArguments::add_to(CLI::App& command) {
 }
 
 PipelineOptions OptionArguments::options() const {
-  PipelineOptions options;
-  if (!preset.empty()) set_preset(options, preset);
-  if (!config.empty()) apply_config(options, config);
-  for (const std::string& setting : settings) apply_setting(options, setting);
+  Choices choices;
+  if (!preset.empty()) set_preset(choices, preset);
+  if (!config.empty()) apply_config(choices, config);
+  for (const std::string& setting : settings) apply_setting(choices, setting);
   const std::pair<const char*, const std::string&> named[] = {
       {"temporal", temporal}, {"paths", paths}, {"disparities", disparities}, {"min_disparity", min_disparity}};
   for (const auto& [name, value] : named) {
-    if (!value.empty()) set_option(options, name, value);
+    if (!value.empty()) choices.set(name, value);
   }
-  options.validate();
-  return options;
+  choices.options.validate();
+  return choices.options;
 }
 
 void OptionArguments::expect_saves(const std::string& out) const {

@@ -66,9 +66,10 @@ bool is_regular(const fs::path& path) {
   return fs::is_regular_file(fs::symlink_status(path, none));
 }
 
+/// A frame's name is its number or its time.
 bool is_map(const fs::path& file) {
   const std::string stem = file.stem().string();
-  return !stem.empty() && file.has_extension() && stem.find_first_not_of("0123456789") == std::string::npos;
+  return !stem.empty() && file.has_extension() && stem.find_first_not_of("0123456789.") == std::string::npos;
 }
 
 std::set<std::string> folders_of(const std::set<std::string>& files) {

@@ -82,7 +82,7 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
 
 /// Whether what --help calls the value is a number.
 bool takes_number(const CLI::Option& option) {
-  static const std::set<std::string> numbers{"N", "W", "H", "S", "M", "DEG", "G", "PX", "A", "D", "STEPS"};
+  static const std::set<std::string> numbers{"N", "W", "H", "S", "M", "DEG", "G", "PX", "PERCENT", "A", "D", "STEPS"};
   const std::string type = option.get_type_name();
   return numbers.contains(type.substr(0, type.find(':')));
 }

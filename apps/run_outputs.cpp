@@ -65,7 +65,7 @@ const char* const kWriteListHelp =
     "  color          disparity in colours, PNG\n"
     "  overview       image, disparity, search width and error (or variance) in one PNG\n"
     "  cloud          points with colours [m], PLY, without those whose depth is uncertain (--cloud-sigma)\n"
-    "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none; in metres, PFM\n"
+    "  depth, depth_m depth in millimetres, 16-bit PNG, 0 where there is none or more than 65.535 m; in metres, PFM\n"
     "  left           the left images as they are matched, grey PNG; always of a bag";
 
 std::set<std::string> parse_write_list(const std::string& list) {
@@ -176,7 +176,7 @@ WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
          vision::write_ply(path, cloud);
          written.cloud = {static_cast<std::int64_t>(cloud.points_m.size()), cloud.left_out};
        }},
-      {"depth", [&](const Path& path) { vision::write_depth_png(path, depth_m()); }},
+      {"depth", [&](const Path& path) { written.too_far = vision::write_depth_png(path, depth_m()); }},
       {"depth_m", [&](const Path& path) { vision::write_pfm(path, depth_m()); }}};
   for (const auto& [kind, write] : writers) {
     if (wants(kind)) write(folder_ / output_file(kind, frame.name, options_));

@@ -242,7 +242,7 @@ class Run {
     report_.add(prepared.fed, result, prepared.motion, times, written);
     doubt_.add(prepared.fed.images.left, prepared.fed.images.right, result, motion.has_value());
     poses_.push_back(prepared.motion.first_from_camera);
-    tell(frame, result, prepared.motion, times, written.unstorable, progress);
+    tell(frame, result, prepared.motion, times, written, progress);
   }
 
   void add(const CloudCounts& cloud) {
@@ -264,16 +264,22 @@ class Run {
   }
 
   void tell(const vision::StereoFrame& frame, const FrameReport& result, const FrameMotion& motion,
-            const HostTimes& times, std::int64_t unstorable, Progress& progress) {
+            const HostTimes& times, const WrittenFrame& written, Progress& progress) {
     if (sequence_.has_calibration && poses_.size() > 1 && !motion.motion) {
       progress.note(
           fmt::format("frame {}: no motion ({}): searched the full range", frame.name, motion.odometry.reason));
     }
-    if (unstorable > 0 && !warned_of_range_) {
+    if (written.unstorable > 0 && !warned_of_range_) {
       warned_of_range_ = true;
       progress.note(fmt::format(
           "frame {}: {} disparities lie outside KITTI's PNG (0 to 256 px) and are missing there: add --write pfm",
-          frame.name, unstorable));
+          frame.name, written.unstorable));
+    }
+    if (written.too_far > 0 && !warned_of_depth_) {
+      warned_of_depth_ = true;
+      progress.note(fmt::format(
+          "frame {}: {} depths beyond 65.535 m have no room in OUT/depth and are 0 there: add --write depth_m",
+          frame.name, written.too_far));
     }
     progress.done(fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms{}", frame.name,
                               100 * std::min(1.0, result.search_fraction), 100 * result.density, times.wall_ms,
@@ -357,7 +363,7 @@ class Run {
   std::string summary_;
   std::size_t fed_ = 0, left_out_ = 0;
   std::string first_left_out_;  // why
-  bool warned_of_range_ = false;
+  bool warned_of_range_ = false, warned_of_depth_ = false;
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
 #include "egosgm/vision/synthetic.h"
+#include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
@@ -21,6 +22,7 @@ int render(const SynthArguments& arguments) {
   arguments.options.validate();
   const std::filesystem::path folder = new_folder("--out", arguments.out);
   {
+    const vision::KeepFiles others;
     Progress progress(arguments.options.frames, arguments.quiet);
     vision::write_sequence(arguments.options, folder, [&](int done, int frames) {
       progress.done(fmt::format("rendered {} of {}", done, frames));

@@ -60,6 +60,30 @@ std::vector<Trial> trials(bool is_gpu) {
   return all;
 }
 
+/// Of `stage`, or all where that is empty. Throws InvalidArgument where the device has none of it.
+std::vector<Trial> trials_of(const std::string& stage, const DeviceInfo& device) {
+  std::vector<Trial> all = trials(device.type == DeviceType::kGpu);
+  if (stage.empty()) return all;
+  std::erase_if(all, [&](const Trial& trial) {
+    return std::find(trial.stages.begin(), trial.stages.end(), stage) == trial.stages.end();
+  });
+  if (!all.empty()) return all;
+  throw InvalidArgument(
+      fmt::format("--stage {}: has no sizes to choose on a {}: choose another stage", stage, to_string(device.type)));
+}
+
+/// What is kept for the device, but the sizes that are tried.
+Tuning kept_beside(const std::vector<Trial>& trials, const std::filesystem::path& file, const DeviceInfo& device) {
+  Tuning tuning;
+  if (std::filesystem::is_regular_file(file)) tuning = kept_tuning(file, device).value_or(tuning);
+  for (const Trial& trial : trials) {
+    for (const std::vector<NamedOption>& sizes : trial.candidates) {
+      for (const auto& [name, value] : sizes) set_tuning(tuning, name, "0");
+    }
+  }
+  return tuning;
+}
+
 /// A short drive, and what a device with some tuning takes for it.
 class Course {
  public:
@@ -137,14 +161,14 @@ int tune(const TuneArguments& arguments) {
   const std::filesystem::path file =
       arguments.file.empty() ? user_tuning_file() : std::filesystem::path(arguments.file);
   if (file.empty()) throw InvalidArgument("tune: neither XDG_CONFIG_HOME nor HOME is set: give --file FILE");
+  const std::vector<Trial> trials = trials_of(arguments.stage, device.info());
   expect_tuning_file(file);
   catch_interrupts();
   Course course(arguments, device);
-  Tuning best;
+  Tuning best = kept_beside(trials, file, device.info());
   const std::vector<StageTime> untuned = course.run(best);
   constexpr double kGain = 0.98;  // less than 2 % is noise
-  for (const Trial& trial : trials(device.info().type == DeviceType::kGpu)) {
-    if (!arguments.stage.empty() && trial.stages.front() != arguments.stage) continue;
+  for (const Trial& trial : trials) {
     double least = ms_of(untuned, trial.stages);
     print_now(fmt::format("{}: {:.3f} ms with the defaults\n", fmt::join(trial.stages, " + "), least));
     for (const std::vector<NamedOption>& sizes : trial.candidates) {
@@ -197,7 +221,7 @@ Command add_tune(CLI::App& program) {
       ->type_name("N")
       ->group(group)
       ->check(CLI::Range(2, 1000));
-  command->add_option("--stage", arguments->stage, "only the sizes of this one")
+  command->add_option("--stage", arguments->stage, "only the sizes of this one; the others stay")
       ->type_name("NAME")
       ->group(group)
       ->check(CLI::IsMember({"BandedSgm", "ForwardWarp", "SpeckleRemoval", "SearchBand"}));

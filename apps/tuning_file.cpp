@@ -53,17 +53,18 @@ std::filesystem::path user_tuning_file() {
   return home && *home ? std::filesystem::path(home) / ".config/egosgm/tuning.json" : std::filesystem::path();
 }
 
-Device tuned(const Device& device, const std::filesystem::path& file) {
+std::optional<Tuning> kept_tuning(const std::filesystem::path& file, const DeviceInfo& device) {
   const Json json = read(file);
-  const auto sizes = json.find(tuning_key(device.info()));
-  return sizes == json.end() ? device : device.with_tuning(tuning_of(*sizes, file));
+  const auto sizes = json.find(tuning_key(device));
+  return sizes == json.end() ? std::nullopt : std::optional(tuning_of(*sizes, file));
 }
 
 Device tuned_by_argument(const Device& device, const std::string& argument) {
   if (argument == "none") return device;
-  if (!argument.empty()) return tuned(device, argument);
-  const std::filesystem::path file = user_tuning_file();
-  return std::filesystem::exists(file) ? tuned(device, file) : device;
+  const std::filesystem::path file = argument.empty() ? user_tuning_file() : std::filesystem::path(argument);
+  if (argument.empty() && !std::filesystem::exists(file)) return device;
+  const std::optional<Tuning> sizes = kept_tuning(file, device.info());
+  return sizes ? device.with_tuning(*sizes) : device;
 }
 
 void expect_tuning_file(const std::filesystem::path& file) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "egosgm/device.h"
@@ -11,11 +12,12 @@ namespace egosgm::app {
 /// $XDG_CONFIG_HOME/egosgm/tuning.json, or ~/.config/egosgm/tuning.json; empty where neither variable is set.
 std::filesystem::path user_tuning_file();
 
-/// `device` with the sizes that `file` has for it and its driver; as it is where it has none. Throws InvalidArgument,
-/// naming the file, for one that cannot be read or is not what `egosgm tune` writes.
-Device tuned(const Device& device, const std::filesystem::path& file);
+/// The sizes that `file` has for a device and its driver, if it has any. Throws InvalidArgument, naming the file, for
+/// one that cannot be read or is not what `egosgm tune` writes.
+std::optional<Tuning> kept_tuning(const std::filesystem::path& file, const DeviceInfo& device);
 
-/// What `--tuning` says: a file, "none", or empty for the user's file where there is one.
+/// `device` with what `--tuning` says: the sizes of a file, "none", or empty for the user's file where there is one.
+/// Throws as kept_tuning.
 Device tuned_by_argument(const Device& device, const std::string& argument);
 
 /// Throws InvalidArgument where the file exists and is no tuning file, and IoError where it cannot be
@@ -23,7 +25,7 @@ Device tuned_by_argument(const Device& device, const std::string& argument);
 void expect_tuning_file(const std::filesystem::path& file);
 
 /// Puts the sizes of a device and its driver into the file, beside those of others. Throws IoError, or InvalidArgument
-/// as `tuned`.
+/// as kept_tuning.
 void store_tuning(const std::filesystem::path& file, const DeviceInfo& device, const Tuning& tuning);
 
 }  // namespace egosgm::app

@@ -105,16 +105,16 @@ int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::Di
   while (rows > 0 && !fits(rows, StripeMemory::bytes(size.width, rows, words))) --rows;
   const int least = 3 * BandedSgm::kStripeOverlap;
   if (rows >= least) return fewest_rows(size.height, rows, BandedSgm::kStripeOverlap);
-  const std::uint64_t needed =
-      demand(context, {size.width, std::min(size.height, least)}, range, options, chunks).total;
-  throw DeviceError(
-      CL_MEM_OBJECT_ALLOCATION_FAILURE,
-      "BandedSgm: a stripe of " + std::to_string(std::min(size.height, least)) + " rows needs " +
-          std::to_string((needed >> 20) + 1) + " MiB, " +
-          (chosen > 0 && chosen < device_limit ? "banded_sgm.max_memory_mib allows " : "the device has left ") +
-          std::to_string(total_limit >> 20) + " MiB and buffers of at most " +
-          std::to_string(context.max_allocation_bytes() >> 20) +
-          " MiB: choose fewer disparities, a smaller image or another device");
+  const int fewest = std::min(size.height, least);
+  const std::uint64_t needed = demand(context, {size.width, fewest}, range, options, chunks).total +
+                               (fewest < size.height ? StripeMemory::bytes(size.width, fewest, words) : 0);
+  throw DeviceError(CL_MEM_OBJECT_ALLOCATION_FAILURE,
+                    "BandedSgm: a stripe of " + std::to_string(fewest) + " rows needs " +
+                        std::to_string((needed >> 20) + 1) + " MiB, " +
+                        (chosen > 0 && chosen < device_limit ? "max_memory_mib allows " : "the device has left ") +
+                        std::to_string(total_limit >> 20) + " MiB and buffers of at most " +
+                        std::to_string(context.max_allocation_bytes() >> 20) +
+                        " MiB: choose fewer disparities, a smaller image or another device");
 }
 
 }  // namespace

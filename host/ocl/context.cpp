@@ -127,7 +127,10 @@ Context::Context(const cl::Device& device, const cl::Context& context, const cl:
       cache_(folder_ ? std::nullopt : ProgramCache::of(device, cache)) {}
 
 Context::Apart::Apart(Context& context)
-    : context_(context), kernels_(context.queue()), allocated_bytes_(context.allocated_bytes_), stage_(context.stage_) {
+    : context_(context),
+      kernels_(context.queue()),
+      allocated_bytes_(std::exchange(context.allocated_bytes_, 0)),
+      stage_(context.stage_) {
   context.queue() = make_queue(context.context_, context.device_);
 }
 

@@ -74,8 +74,8 @@ class Context {
   };
   const char* stage() const { return stage_; }
 
-  /// While it lives, kernels run on a queue of its own, and memory is not counted. REQUIRES: all recorded commands were
-  /// taken.
+  /// While it lives, kernels run on a queue of its own, and memory is counted from 0: what a device has left for what
+  /// is small does not shape it. REQUIRES: all recorded commands were taken.
   class Apart {
    public:
     explicit Apart(Context& context);

@@ -23,6 +23,8 @@ cv::Mat grey_of(const cv::Mat& image, const char* name) {
   return grey_of_colors(image, ColorOrder::kBgr);
 }
 
+constexpr int kAnyDifference_px = 4096;  // no range is wider
+
 /// That the options are valid, and their disparities fit.
 void expect_sixteenths(const PipelineOptions& options) {
   options.validate();
@@ -124,7 +126,7 @@ int Matcher::getSpeckleWindowSize() const { return options().max_speckle_px; }
 void Matcher::setSpeckleWindowSize(int most_px) { state_->change(&PipelineOptions::max_speckle_px, most_px); }
 int Matcher::getDisp12MaxDiff() const { return cvRound(options().left_right_px); }
 void Matcher::setDisp12MaxDiff(int most_px) {
-  state_->change(&PipelineOptions::left_right_px, static_cast<float>(most_px > 0 ? most_px : options().disparities));
+  state_->change(&PipelineOptions::left_right_px, static_cast<float>(most_px > 0 ? most_px : kAnyDifference_px));
 }
 
 int Matcher::getBlockSize() const {

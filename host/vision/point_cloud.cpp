@@ -67,9 +67,9 @@ PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const 
       const float d = disparity.at<float>(y, x);
       const double shift_px = d + calibration.doffs_px;
       if (!is_valid_disparity(d)) continue;
-      const double depth_m = shift_px > 0 ? calibration.fx * calibration.baseline_m / shift_px : HUGE_VAL;
+      const double depth_m = calibration.fx * calibration.baseline_m / shift_px;
       const double relative_sigma = std::sqrt(variance.at<float>(y, x)) / shift_px;
-      std::int64_t* const why = !(depth_m <= options.max_depth_m)                          ? &cloud.left_out.far
+      std::int64_t* const why = !(shift_px > 0 && depth_m <= options.max_depth_m)          ? &cloud.left_out.far
                                 : !(relative_sigma <= options.max_relative_sigma)          ? &cloud.left_out.uncertain
                                 : judges_reasons && !stays[reasons.at<std::uint8_t>(y, x)] ? &cloud.left_out.reason
                                 : !has_neighbour_within(disparity, x, y, static_cast<float>(options.max_jump_px))

@@ -34,8 +34,7 @@ EGOSGM_EXPORT std::vector<NamedOption> list_options(const PipelineOptions& optio
 EGOSGM_EXPORT const std::vector<OptionText>& option_texts();
 
 /// Sets one. `preset` sets all others, too. `constants.NAME` sets a constant of the method, for experiments. Throws
-/// InvalidArgument for a value that does not parse, and for a name that does not exist: with the nearest that does, or,
-/// for a name of an earlier version, with where it went.
+/// InvalidArgument for a value that does not parse, and for a name that does not exist: with the nearest that does.
 EGOSGM_EXPORT void set_option(PipelineOptions& options, std::string_view name, std::string_view value);
 
 }  // namespace egosgm

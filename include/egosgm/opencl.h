@@ -36,7 +36,8 @@ struct DeviceMaps {
 };
 
 /// A Pipeline whose kernels run on the caller's queue, between the caller's own commands, on images that are there
-/// already: no copy, and the host waits for nothing. Same bits as Pipeline. Not thread-safe.
+/// already: no copy, and the host waits for nothing. Same bits as Pipeline, but for a pair that repeats: what the host
+/// does not see counts as a new one. Not thread-safe.
 class EGOSGM_EXPORT DevicePipeline {
  public:
   /// The caller's queue is retained. `programs`: a folder of compiled programs, as in Device::with_programs; empty:

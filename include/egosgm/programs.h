@@ -20,8 +20,8 @@ struct ProgramFile {
 /// Builds for `device` every program of a pipeline with `options`, for images of any size and of 8 and 16 bits. Returns
 /// the binaries, as the driver gives them, and last `manifest.json`: device, platform and driver with their versions,
 /// and for each program its kernel file, build options with all defines, and hashes of source and binary. Write them
-/// into one folder in this order. Of the options only the disparity range, `cost` and `paths` matter, of the device's
-/// tuning `scheduling`. Throws InvalidArgument (option), DeviceError or BuildError. Thread-safe.
+/// into one folder in this order. Of the options the preset, its constants, the disparity range, `cost` and `paths`
+/// matter, and so does the device's tuning. Throws InvalidArgument (option), DeviceError or BuildError. Thread-safe.
 EGOSGM_EXPORT std::vector<ProgramFile> compile_programs(const Device& device, const PipelineOptions& options = {});
 
 /// A program as a compiler gets it: OpenCL C 1.2, with options like -DNAME=VALUE.

@@ -158,6 +158,15 @@ class CameMeanwhile(FilesTest):
     def test_poses(self):
         self.assert_stays("poses.txt", "odometry", self.street, "--out")
 
+    def test_images(self):
+        out = self.new_folder() / "street"
+        process = self.started("synth", "--frames", 9, "--width", 32, "--height", 16, "--out", out)
+        (out / "image_0/000008.png").write_text("mine")
+        _, errors = process.communicate(timeout=900)
+        self.assertEqual(process.returncode, 1, errors)
+        self.assertIn("image_0/000008.png: has come there meanwhile, and stays", errors)
+        self.assertEqual((out / "image_0/000008.png").read_text(), "mine")
+
     def test_a_stream_is_written_through(self):
         written = self.assert_works("odometry", self.street, "--quiet", "--out", "/dev/stdout")
         self.assertEqual(len(written.splitlines()), 4)
@@ -319,16 +328,32 @@ class TuneFiles(FilesTest):
         file = self.new_folder() / "tuning.json"
         self.assert_works("tune", "--file", file, "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "ForwardWarp")
         kept = json.loads(file.read_text())
-        next(iter(kept.values()))["tile_width"] = 96
+        next(iter(kept.values())).update(tile_width=96, tile_height=8)
         file.write_text(json.dumps(kept))
         before = file.read_bytes()
-        process = subprocess.Popen([PROGRAM, "tune", "--file", file, "--width", "64", "--height", "24", "--disparities", "16", "--rounds", "1000"],
+        process = subprocess.Popen([PROGRAM, "tune", "--file", file, "--width", "64", "--height", "24", "--disparities", "16", "--rounds", "100"],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=900)
         self.assertNotEqual(process.returncode, 0)
-        self.assertNotIn("stays", errors)
+        self.assertNotIn("error", errors)
+        self.assertEqual(file.read_bytes(), before)
+
+    def test_one_stage_leaves_the_sizes_of_the_others(self):
+        file = self.new_folder() / "tuning.json"
+        tune = ["tune", "--file", file, "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage"]
+        self.assert_works(*tune, "ForwardWarp")
+        kept = json.loads(file.read_text())
+        sizes = next(iter(kept.values()))
+        sizes.update(tile_width=96, tile_height=8, warp_band_rows=3)
+        file.write_text(json.dumps(kept))
+        self.assert_works(*tune, "ForwardWarp")
+        after = next(iter(json.loads(file.read_text()).values()))
+        self.assertNotEqual(after["warp_band_rows"], 3)
+        self.assertEqual({**after, "warp_band_rows": 3}, sizes)
+        before = file.read_bytes()
+        self.assert_refused([*tune, "SearchBand"], "--stage SearchBand", "CPU", "another stage")
         self.assertEqual(file.read_bytes(), before)
 
     def test_a_file_that_is_no_tuning_file_stays(self):

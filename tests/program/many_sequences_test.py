@@ -165,7 +165,7 @@ class ManySequences(ProgramTest):
         self.assertEqual(json.loads(self.assert_works("eval", "--merge", reports[0], "--json"))["pooled"], json.loads(reports[0].read_text())["pooled"])
         self.assertIn("pooled", self.assert_works("eval", "--merge", *reports))
         text = reports[0].read_text()
-        for broken in ('{"pairs": [{}]}', '{"pairs": []}', *(re.sub(r'"truth": \d+', f'"truth": {count}', text) for count in ("-5", "1.5", "1e300", "true"))):
+        for broken in ('{"pairs": [{}]}', '{"pairs": []}', *(re.sub(r'"truth": \d+', f'"truth": {count}', text) for count in ("-5", "1", "1.5", "1e300", "true"))):
             (out / "no.json").write_text(broken)
             self.assert_refused(["eval", "--merge", reports[1], out / "no.json"], "no.json", "egosgm eval --json")
         self.assert_refused(["eval", "--merge", reports[0], out / f"../{out.name}/0.json"], "0.json", "is given twice")

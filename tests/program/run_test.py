@@ -138,6 +138,12 @@ class Run(ProgramTest):
         reasons = self.report(out)["reasons"]
         self.assertEqual((reasons[0], reasons[9], len(reasons)), ("trusted", "predicted", 10))
 
+    def test_depths_that_have_no_room_in_their_png_are_told_once(self):
+        run = ["run", "--odometry", self.street, "--disparities", 48, "--frames", ":1", "--out"]
+        told = self.assert_works(*run, self.new_folder(), "--write", "depth,depth_m").splitlines()
+        self.assertEqual([bool(re.search(r"^frame 000000: [1-9]\d* depths beyond 65.535 m .*depth_m", line)) for line in told].count(True), 1, told)
+        self.assertNotIn("65.535", self.assert_works(*run, self.new_folder(), "--write", "depth_m"))
+
     def assert_doubted(self, arguments, *named):
         """The last line of run names doctor, which finds a problem with the very arguments."""
         out = self.new_folder()
@@ -336,6 +342,18 @@ class Run(ProgramTest):
         options = self.report(folder / "out")["options"]
         self.assertEqual((options["disparities"], options["p1"], options["p2"]), (42, 7, 88))
 
+    def test_a_preset_that_would_undo_what_was_chosen_is_refused(self):
+        folder = self.new_folder()
+        config = folder / "config.toml"
+        run = ["run", "--odometry", self.street, "--frames", "0", "--quiet", "--out", folder / "out"]
+        config.write_text("disparities = 40\npreset = 'paper'\n")
+        self.assert_refused([*run, "--config", config], f"{config}:2: ", "preset", "put it first")
+        self.assert_refused([*run, "--set", "disparities=40", "--set", "preset=paper"], "preset", "put it first")
+        config.write_text("preset = 'paper'\ndisparities = 40\n")
+        self.assert_works(*run, "--set", "p2=77", "--config", config, "--preset", "default")
+        options = self.report(folder / "out")["options"]
+        self.assertEqual((options["preset"], options["disparities"], options["p2"]), ("paper", 40, 77))
+
     def test_paper_preset_searches_everything_that_is_not_predicted(self):
         default, paper = self.new_folder(), self.new_folder()
         self.assert_works("run", "--odometry", self.street, "--out", default)
@@ -440,9 +458,16 @@ class Limits(ProgramTest):
         report = self.report(out)
         self.assertGreater(report["frames"][0]["stripes"], 1)
         self.assertLess(report["device_memory_bytes"], 1 << 30)
+        run[run.index("--out") + 1] = out = self.new_folder()  # that just fits, and leaves less than what is left to all else
+        self.assert_works(*run, "--disparities", 336, "--set", "constants.banded_sgm.scheduling=paths", env=gigabyte)
+        self.assertEqual(self.report(out)["frames"][0]["stripes"], 1)
+        self.assertGreater(self.report(out)["device_memory_bytes"], 3 << 28)
         run[run.index("--out") + 1] = self.new_folder()
-        self.assert_refused([*run, "--disparities", 64, "--set", "max_memory_mib=3"],
-                            "BandedSgm: a stripe of 96 rows needs", "max_memory_mib allows 3 MiB", "fewer disparities", code=1)
+        run += ["--disparities", 64, "--set"]
+        self.assert_refused([*run, "max_memory_mib=3"], "BandedSgm: a stripe of 96 rows needs", " MiB, max_memory_mib allows 3 MiB", "fewer disparities",
+                            code=1)
+        least = int(re.search(r"needs (\d+) MiB", egosgm(*run, "max_memory_mib=3").stderr)[1])
+        self.assert_works(*run, f"max_memory_mib={least}")
 
     def test_stripes_are_almost_as_good(self):
         street, bad = self.new_folder(), {}

@@ -346,13 +346,25 @@ class Resume(LongRuns):
         broken(lambda: poses.write_text("\n".join([rows[0], rows[2], rows[1], rows[3]]) + "\n"))
         broken(lambda: shutil.copy(street / "image_0/000002.png", street / "image_0/000001.png"))
 
-    def test_fewer_frames_leave_the_run_as_it_is(self):
+    def assert_fewer_frames_change_nothing(self, *run, first_map):
         out = self.new_folder()
-        run = ["run", "--odometry", self.street, "--disparities", 16, "--out", out, "--quiet"]
+        run = ["run", *run, "--disparities", 16, "--out", out, "--quiet"]
         self.assert_works(*run)
         before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
-        self.assert_refused([*run, "--frames", "0:1", "--resume"], "--resume", "disparity/000002.png", "another --out")
+        self.assert_refused([*run, "--frames", "0:1", "--resume"], "--resume", f"disparity/{first_map}", "another --out")
         self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
+
+    def test_fewer_frames_leave_the_run_as_it_is(self):
+        self.assert_fewer_frames_change_nothing("--odometry", self.street, first_map="000002.png")
+
+    def test_fewer_frames_whose_names_are_times_leave_it_too(self):
+        folder = self.new_folder()
+        for side, name in ((0, "left"), (1, "right")):
+            (folder / name).mkdir()
+            for i in range(FRAMES):
+                shutil.copy(self.street / f"image_{side}/{i:06d}.png", folder / name / f"{1300 + i}.25.png")
+        shutil.copy(self.street / "calib.txt", folder)
+        self.assert_fewer_frames_change_nothing(folder, first_map="1302.25.png")
 
     def test_names_that_are_no_utf8(self):
         name = os.fsencode(self.new_folder()) + b"/b\xffseq"

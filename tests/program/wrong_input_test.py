@@ -60,13 +60,13 @@ class WrongArguments(ProgramTest):
         self.assertFalse((folder / "never").exists())
 
     def test_numbers_are_decimal(self):
-        commands = (self.run_with("--max-translation"), self.run_with("--max-rotation"), self.run_with("--disparities"), self.run_with("--min-disparity"),
+        commands = (self.run_with("--max-translation"), self.run_with("--cloud-sigma"), self.run_with("--max-rotation"), self.run_with("--disparities"), self.run_with("--min-disparity"),
                     *(["synth", "--out", self.folder / "never", option] for option in ("--frames", "--width", "--seed", "--speed", "--noise")),
                     ["eval-video", self.street, self.street, "--near"], ["eval", "--estimate", self.street, "--truth", self.street, "--truth-scale"], ["tune", "--rounds"], ["tune", "--width"],
                     ["report", self.street, "--picture-width"],
                     ["rectify", "--alpha"], ["doctor", self.street, "--disparities"])
         for command in commands:
-            for value in ("0x10", "010", " 16", "16 ", "+16", "nan", "inf", "1e999", "1,5", "1e", "0x1p3") if command is commands[0] else ("0x10", "010"):
+            for value in ("0x10", "010", " 16", "16 ", "+16", "nan", "inf", "1e999", "1,5", "1e", "0x1p3") if command in commands[:2] else ("0x10", "010"):
                 with self.subTest(command=command, value=value):
                     self.assert_refused([*command, value])
 
@@ -236,10 +236,11 @@ class BrokenInput(ProgramTest):
         self.assert_sequence_refused(street, "000004.png", "--frames", options=["--frames", "1:4"])
 
     def test_what_is_there_but_no_file(self):
-        street = self.broken_street()
-        (street / "image_0/000001.png").unlink()
-        (street / "image_0/000001.png").symlink_to("nowhere.png")
-        self.assert_left_out(street, "image_0/000001.png: is a link to what is not there; give an existing, readable file")
+        for image in ("image_0/000000.png", "image_0/000001.png"):  # the first tells the type of all
+            street = self.broken_street()
+            (street / image).unlink()
+            (street / image).symlink_to("nowhere.png")
+            self.assert_left_out(street, f"{image}: is a link to what is not there; give an existing, readable file")
         (street / "calib.txt").unlink()
         (street / "calib.txt").mkdir()
         self.assert_sequence_refused(street, "calib.txt: is no file")

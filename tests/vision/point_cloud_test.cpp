@@ -47,6 +47,9 @@ TEST(PointCloud, LeavesOutWhatIsUncertainFarInvalidOrAlone) {
   EXPECT_EQ(left_out.reason, 0);
   EXPECT_EQ(point_cloud(disparity, variance, grey(), kCamera, {.max_depth_m = 4.9}).points_m.size(), 0u);
   EXPECT_EQ(point_cloud(disparity, variance, grey(), kCamera, {.max_jump_px = 4}).points_m.size(), 24u - 4u);
+  disparity.at<float>(0, 3) = -6;  // d + doffs = -1
+  const PointCloudOptions any{.max_relative_sigma = INFINITY, .max_depth_m = INFINITY, .max_jump_px = 100};
+  EXPECT_EQ(point_cloud(disparity, variance, grey(), kCamera, any).left_out.far, 2);
 }
 
 TEST(PointCloud, KeepsPixelsOfTheReasonsThatWereChosen) {

@@ -37,7 +37,8 @@ EGOSGM_EXPORT bool holds_8_bits_in_16(const cv::Mat& grey);
 /// Thread-safe.
 EGOSGM_EXPORT cv::Size read_image_size(const std::filesystem::path& file);
 
-/// What the header of a PNG or JPEG says of its grey values; kU8 of anything else. Throws IoError.
+/// What the header of a PNG or JPEG says of its grey values; kU8 of anything else. Throws InvalidArgument where it
+/// cannot be read.
 EGOSGM_EXPORT PixelType read_pixel_type(const std::filesystem::path& file);
 
 /// Writes CV_8UC1, CV_8UC3 (BGR) or CV_16UC1, whole or not at all. Throws IoError, and InvalidArgument for another type

@@ -14,7 +14,7 @@ namespace egosgm::vision {
 
 /// Pixels with a disparity that became no points, by the first of the bounds that left them out.
 struct LeftOut {
-  std::int64_t far = 0;        // beyond max_depth_m
+  std::int64_t far = 0;        // beyond max_depth_m, or at infinity and behind it: d + doffs <= 0
   std::int64_t uncertain = 0;  // max_relative_sigma
   std::int64_t reason = 0;     // one that is not among `reasons`
   std::int64_t alone = 0;      // max_jump_px

@@ -81,7 +81,7 @@ class EGOSGM_EXPORT SyntheticSequence {
 ///   truth/right_disp_occ, right_disp_noc  likewise for the right view
 ///   truth/left_moving, right_moving       with moving_object only: 255 on moving objects
 /// Every file appears whole or not at all; existing ones are replaced. `progress(done, frames)` is called after each
-/// frame, if given. Throws InvalidArgument, naming the file, where the folder cannot be written.
+/// frame, if given. Throws as SyntheticSequence does, and IoError.
 EGOSGM_EXPORT void write_sequence(const SyntheticOptions& options, const std::filesystem::path& folder,
                                   const std::function<void(int done, int frames)>& progress = {});
 
