@@ -154,6 +154,9 @@ void OutputFolder::look() {
     throw InvalidArgument(fmt::format("--resume: {} is no report of a run: give another --out", file.string()));
   }
   expect_maps_of_this_run();
+  lacks_nothing_ =
+      earlier_.value("finished", Json()) == true &&
+      std::all_of(planned_.begin(), planned_.end(), [&](const auto& file) { return is_there(path_ / file); });
 }
 
 /// A run that goes on loses no frame, and maps of two runs do not mix.

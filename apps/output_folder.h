@@ -35,6 +35,9 @@ class OutputFolder {
 
   const std::filesystem::path& path() const { return path_; }
 
+  /// Whether the run that is to go on had finished, and wrote all that this one would.
+  bool lacks_nothing() const { return lacks_nothing_; }
+
   /// The file that `option` names, which may lie in OUT. An empty name is none. Throws InvalidArgument as
   /// expect_new_file does, and where the run writes that one anyway.
   std::filesystem::path named_file(const std::string& option, const std::string& file);
@@ -53,7 +56,7 @@ class OutputFolder {
 
   std::filesystem::path path_;
   std::string shown_;  // as the user wrote it
-  bool resume_ = false;
+  bool resume_ = false, lacks_nothing_ = false;
   std::set<std::string> planned_, named_;
   nlohmann::ordered_json earlier_;  // the report of the run that goes on, null without one
 };

@@ -206,6 +206,13 @@ class Run {
 
   /// A pair that cannot be read costs itself alone: the next motion is over two intervals.
   void leave_out(const FedFrame& fed, Progress& progress) {
+    const fs::path map = folder_.path() / output_file("disparity", fed.frame.name, pipeline_.options());
+    if (has_folder() && fs::exists(map)) {
+      throw InvalidArgument(
+          fmt::format("--resume: {} is there, but its pair cannot be read any more: {}; give another "
+                      "--out",
+                      map.string(), fed.unreadable));
+    }
     if (left_out_++ == 0) first_left_out_ = fed.unreadable;
     report_.leave_out(fed.frame, fed.unreadable);
     progress.note(fmt::format("frame {}: left out: {}", fed.frame.name, fed.unreadable));
@@ -324,8 +331,10 @@ class Run {
     fmt::print("{} gives no times of commands: the trace has those of the host only\n", pipeline_.device().info().name);
   }
 
+  /// The report of a run that lacks nothing stays until this one is found equal.
   void write_report(bool finished, const std::string& why_not) {
-    if (has_folder()) report_.write(folder_.path() / "report.json", finished, why_not);
+    if (!has_folder() || (!finished && folder_.lacks_nothing())) return;
+    report_.write(folder_.path() / "report.json", finished, why_not);
   }
 
   /// The first error counts; that something cannot be written either adds nothing.

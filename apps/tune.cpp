@@ -95,7 +95,8 @@ class Course {
     for (int i = 0; i < street_.frames(); ++i) frames_.push_back(street_.render(i));
   }
 
-  /// Least device time [ms] of each stage in a steady frame. The first call's maps are what all later ones must give.
+  /// Least device time [ms] of each stage in a steady frame, or in a first one where a steady one has it not. The first
+  /// call's maps are what all later ones must give.
   std::vector<StageTime> run(const Tuning& tuning) {
     Pipeline pipeline(street_.calibration(), arguments_.width, arguments_.height, options_,
                       device_.with_tuning(tuning));
@@ -104,12 +105,14 @@ class Course {
     outputs.disparity = vision::map_view(disparity);
     std::vector<std::vector<StageTime>> rounds;
     for (int round = 0; round < arguments_.rounds; ++round) {
+      std::vector<StageTime> first;
       pipeline.reset();
       for (int i = 0; i < street_.frames(); ++i) {
         const std::optional<Motion> motion = i > 0 ? std::optional(street_.motion(i)) : std::nullopt;
         const FrameReport report = pipeline.process(vision::image_view(frames_[i].left),
                                                     vision::image_view(frames_[i].right), motion, outputs);
-        if (i + 1 == street_.frames() && round > 0) rounds.push_back(report.stages);
+        if (i == 0) first = report.stages;
+        if (i + 1 == street_.frames() && round > 0) rounds.push_back(with_missing(report.stages, first));
       }
     }
     expect_same(disparity);
@@ -117,6 +120,15 @@ class Course {
   }
 
  private:
+  static std::vector<StageTime> with_missing(std::vector<StageTime> stages, const std::vector<StageTime>& others) {
+    for (const StageTime& other : others) {
+      if (std::none_of(stages.begin(), stages.end(), [&](const auto& s) { return s.stage == other.stage; })) {
+        stages.push_back(other);
+      }
+    }
+    return stages;
+  }
+
   void expect_same(const cv::Mat& disparity) {
     if (expected_.empty()) expected_ = disparity.clone();
     if (!std::equal(disparity.begin<float>(), disparity.end<float>(), expected_.begin<float>()))

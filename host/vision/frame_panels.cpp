@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
 #include "host/vision/picture_sheet.h"
@@ -26,6 +27,10 @@ Layer variance_layer(const ShownFrame& shown) {
 
 Layer error_layer(const ShownFrame& shown) {
   const cv::Mat truth = read_disparity(shown.frame.truth_noc);
+  if (truth.size() != shown.disparity.size()) {
+    throw InvalidArgument(shown.frame.truth_noc.string() + ": is of another size than the frame's images: remove it, " +
+                          "or write no overview");
+  }
   return {"error [px]", color_error(shown.disparity, truth), error_bar(truth.cols)};
 }
 

@@ -356,6 +356,12 @@ class TuneFiles(FilesTest):
         self.assert_refused([*tune, "SearchBand"], "--stage SearchBand", "CPU", "another stage")
         self.assertEqual(file.read_bytes(), before)
 
+    def test_a_stage_of_first_frames_alone_has_times(self):
+        told = self.assert_works("tune", "--file", self.new_folder() / "tuning.json", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2,
+                                 "--stage", "SpeckleRemoval")
+        self.assertRegex(told, r"^SpeckleRemoval: ")
+        self.assertNotIn(" 0.000 ms", told)
+
     def test_a_file_that_is_no_tuning_file_stays(self):
         folder = self.new_folder()
         tune = ["tune", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "ForwardWarp", "--file"]

@@ -138,6 +138,13 @@ class Run(ProgramTest):
         reasons = self.report(out)["reasons"]
         self.assertEqual((reasons[0], reasons[9], len(reasons)), ("trusted", "predicted", 10))
 
+    def test_truth_of_another_size_is_named(self):
+        street = self.broken_street()
+        truth = street / "truth/left_disp_noc/000001.png"
+        truth.write_bytes(grey_png(WIDTH // 2, HEIGHT, depth=16))
+        self.assert_refused(["run", "--odometry", street, "--disparities", 16, "--write", "overview", "--out", self.new_folder(), "--quiet"], truth,
+                            "another size", "no overview")
+
     def test_depths_that_have_no_room_in_their_png_are_told_once(self):
         run = ["run", "--odometry", self.street, "--disparities", 48, "--frames", ":1", "--out"]
         told = self.assert_works(*run, self.new_folder(), "--write", "depth,depth_m").splitlines()

@@ -366,6 +366,17 @@ class Resume(LongRuns):
         shutil.copy(self.street / "calib.txt", folder)
         self.assert_fewer_frames_change_nothing(folder, first_map="1302.25.png")
 
+    def test_a_finished_run_stays_where_it_cannot_be_made_again(self):
+        for broken in (FRAMES - 1, FRAMES - 2):  # the last frame alone; one on which the next rests, too
+            street, out = self.broken_street(), self.new_folder() / "out"
+            run = ["run", "--odometry", street, "--out", out, "--quiet"]
+            self.assert_works(*run)
+            before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+            image = street / f"image_1/{broken:06d}.png"
+            os.truncate(image, 1000)
+            self.assert_refused([*run, "--resume"], "--resume", f"disparity/{broken:06d}.png", image, "another --out")
+            self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
+
     def test_names_that_are_no_utf8(self):
         name = os.fsencode(self.new_folder()) + b"/b\xffseq"
         shutil.copytree(os.fsencode(self.street), name)
