@@ -80,13 +80,11 @@ class Outputs:
     def end(self, finished: bool) -> None:
         outputs, self._outputs = self._outputs, []
         try:
-            for output in outputs if finished else ():
-                output.finish()
-        except Exception:
-            finished = False
-            raise
+            while finished and outputs:
+                outputs[0].finish()
+                outputs.pop(0)  # what is finished stays, whatever becomes of the others
         finally:
-            for output in () if finished else outputs:
+            for output in outputs:
                 output.give_up()
 
 

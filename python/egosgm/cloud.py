@@ -65,7 +65,8 @@ class VoxelGrid:
         self._sums = np.empty((0, 11))  # points, colours, normals, count, frames
 
     def add(self, points: NDArray[Any], colors: NDArray[Any], normals: NDArray[Any]) -> None:
-        ones, cubes = np.ones((len(points), 1)), np.floor(points / self._side_m)
+        with np.errstate(over="ignore"):
+            ones, cubes = np.ones((len(points), 1)), np.floor(points / self._side_m)
         if not (np.abs(cubes) < 2**31).all():
             raise _egosgm.InvalidArgument(f"--voxel {self._side_m:g}: is too small for points that lie {np.abs(points).max():.4g} m away: choose larger cubes")
         keys, sums = self._of(cubes.astype(np.int32), np.hstack([points, colors, normals, ones, ones]))

@@ -96,6 +96,8 @@ class Drive:
         self._source, self._outputs, self._options = source, outputs, options
         self._bar = _bar(progress)
         self._odometry_options = (odometry or {}) if motion and calibration is not None else None
+        if odometry and self._odometry_options is None:
+            raise _egosgm.InvalidArgument("odometry: has options, but without a calibration, or with motion=False, there is none: leave them out")
         self._begun = False
         # What an iteration has of its own, ready for the next one. Made now where the size is known: what is wrong is said at once.
         self._motions()

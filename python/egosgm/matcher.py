@@ -18,6 +18,8 @@ class Matcher:
         if not (min_disparity > -2047 and min_disparity + disparities <= 2047):
             raise _egosgm.InvalidArgument(f"disparities {min_disparity} to {min_disparity + disparities - 1} do not fit into 16 bits with 16 steps "
                                           "a pixel; Pipeline gives float")
+        if options.pop("temporal", False):
+            raise _egosgm.InvalidArgument("temporal: a Matcher matches each pair alone: leave it out; Pipeline and run() predict")
         self.min_disparity, self.disparities = min_disparity, disparities
         self._options = {"device": device, "preset": preset, "paths": 8, **options, "min_disparity": min_disparity, "disparities": disparities, "temporal": False}
         self._pipeline: Optional[_egosgm.Pipeline] = None

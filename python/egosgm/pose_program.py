@@ -34,6 +34,10 @@ def read_pairs(estimate_name: str, truth_name: str, frames: str) -> Tuple[np.nda
     is_chosen = lambda number: (first is None or number >= first) and (last is None or number <= last)
     # Which frames the estimate's rows are of: the run tells, or --frames where they are as many, or they are all.
     run = frames_of_run(estimate_file)
+    is_of_run = estimate_file.name == "poses.txt" and estimate_file.with_name("report.json").is_file()
+    if run and is_of_run and len(run.numbers) != len(estimate):
+        raise _egosgm.InvalidArgument(f"{estimate_file} holds {counted(len(estimate), 'pose')}, and the report beside it lists {counted(len(run.numbers), 'frame')}: let "
+                                      "the run end, or run it again with --resume")
     if run and len(run.numbers) == len(estimate):
         numbers, sequence = run.numbers, run.sequence
     else:

@@ -120,6 +120,8 @@ class RawPairs:
 
 class _TwoSources(RawPairs):
     def __init__(self, left: str, right: str) -> None:
+        if os.path.exists(left) and os.path.exists(right) and os.path.samefile(left, right):
+            raise _refuse(f"--left {left} --right {right}: are one file: give one of each camera, or --side-by-side where it holds both views")
         self._names = f"--left {left}", f"--right {right}"
         self._sources = _open(left), _open(right)
         counts = [source.count for source in self._sources]

@@ -14,6 +14,7 @@ _Rectangle = Tuple[int, int, int, int]
 _MOST_BASELINE_M = 10.0
 _LEAST_DISTANCE_M = 1e-6
 _MOST_ROTATION_ERROR = 1e-2  # files round to a few digits
+_MOST_FOCAL_DIFFERENCE, _MOST_ROWS_PX = 1e-3, 1e-2  # of P1 and P2, which round to a few digits, too
 _MOST_SIDE = 16384
 
 
@@ -98,7 +99,11 @@ def _check(rig: Any) -> None:
         if name[0] == "R":
             _check_rotation(name, matrix)
     _check_stance(rig.T.ravel())
-    if rig.given is None:
+    if rig.given is not None:
+        apart = np.abs(rig.given[2] - rig.given[3])
+        if max(apart[0, 0], apart[1, 1]) > _MOST_FOCAL_DIFFERENCE * abs(rig.given[2][0, 0]) or apart[1, 2] > _MOST_ROWS_PX:
+            raise _egosgm.InvalidArgument("P1 and P2 have different focal lengths or rows: they are not of one rectified pair; give both as stereoRectify found them, or neither")
+    else:
         for name, matrix in (("M1", rig.left_matrix), ("M2", rig.right_matrix)):
             if not (matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[2, 2] == 1):
                 raise _egosgm.InvalidArgument(f"{name} is no camera matrix: fx and fy are above 0, its last row is 0 0 1")

@@ -2,6 +2,7 @@
 """egosgm synth and eval."""
 import json
 import shlex
+import shutil
 import subprocess
 import unittest
 
@@ -155,6 +156,10 @@ class EvalPoses(ProgramTest):
         (out / "report.json").write_text(json.dumps(report))
         self.assert_refused(["eval-poses", out, self.street / "poses.txt"], "frame 900000000")
         self.assert_refused(["report", out, "--pictures", 0, "--poses", self.street / "poses.txt"], "frame 900000000")
+        del report["frames"][2:]
+        (out / "report.json").write_text(json.dumps(report))
+        self.assert_refused(["eval-poses", out, self.street / "poses.txt"], "holds 4 poses", "lists 2 frames")
+        self.assert_works("eval-poses", shutil.copy(out / "poses.txt", out / "others.txt"), self.street / "poses.txt")
 
 
 if __name__ == "__main__":

@@ -184,6 +184,8 @@ class Rectify(RectifyTest):
                                               "--out", self.new_folder() / "out"))
         both = self.assert_works("rectify", "--side-by-side", cut, "--calib", self.street / "calib.txt", "--out", self.new_folder() / "out")
         self.assertIn(told, both)
+        self.assert_refused(["rectify", "--left", whole, "--right", folder / "../" / folder.name / "whole.avi", "--calib", self.street / "calib.txt", "--out",
+                             folder / "never"], "are one file", "--side-by-side")
 
     def test_side_by_side_images_and_lists(self):
         both = self.new_folder()

@@ -309,6 +309,31 @@ def test_a_viewer_gets_what_a_file_gets(tmp_path, street, frames, monkeypatch, c
     assert bag_program.main([*given, "--set", "disparities=-1"]) == 2 and outputs == []
 
 
+def test_a_recording_that_is_finished_stays_where_the_viewer_fails():
+    said = []
+
+    class Output:
+        def __init__(self, name):
+            self.name = name
+
+        def finish(self):
+            said.append(f"{self.name} finished")
+            if self.name == "viewer":
+                raise OSError("the viewer is gone")
+
+        def give_up(self):
+            said.append(f"{self.name} given up")
+
+    outputs = bag_program.Outputs("", False)
+    outputs._outputs = [Output("recording"), Output("viewer"), Output("other")]
+    with pytest.raises(OSError, match="gone"):
+        outputs.end(True)
+    assert said == ["recording finished", "viewer finished", "viewer given up", "other given up"]
+    outputs._outputs = [Output("recording")]
+    outputs.end(False)
+    assert said[4:] == ["recording given up"]
+
+
 def test_a_folder_is_that_of_any_run(tmp_path, street, frames, street_folder, capfd):
     """The maps of a folder with the same images, and what report and cloud read; options, doubts and --resume are those of any run."""
     bag, out = record("sqlite", tmp_path / "drive", street, frames), tmp_path / "result"

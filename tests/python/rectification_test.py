@@ -111,6 +111,10 @@ def test_of_rectified_cameras_nothing_changes():
     assert (rectification.rectify(image, image)[1] == image).all()
 
 
+def projection(fx=150, fy=150, cy=59.5):
+    return np.array([[fx, 0, 79.5, -fx * BASELINE], [0, fy, cy, 0], [0, 0, 1, 0]])
+
+
 def test_what_no_rig_has_is_named():
     for changes, named in (({"T": [1000 * -BASELINE, 0, 0]}, "unit_m 0.001"), ({"T": [0.004, -BASELINE, 0]}, "side by side"), ({"T": [0, 0, 0]}, "one place"),
                            ({"T": [[-BASELINE, 0, 0]]}, "T: needs 3x1"), ({"T": [BASELINE, 0, 0]}, "exchange left and right"),
@@ -118,7 +122,9 @@ def test_what_no_rig_has_is_named():
                            ({"R": [[1, 0, 0], [0, np.nan, 0], [0, 0, 1]]}, "R: needs 3x3"),
                            ({"right_matrix": np.zeros((3, 3))}, "M2 is no camera matrix"), ({"R": np.diag([1, 1, -1])}, "R is no rotation"), ({"R": 2 * np.eye(3)}, "R is no rotation"),
                            ({"given": (2 * np.eye(3), np.eye(3), np.eye(3, 4), np.eye(3, 4))}, "R1 is no rotation"),
-                           ({"given": (np.eye(3),) * 3}, "belong together")):
+                           ({"given": (np.eye(3),) * 3}, "belong together"),
+                           *(({"given": (np.eye(3), np.eye(3), projection(), projection(**{name: value}))}, "P1 and P2 have different")
+                             for name, value in (("fx", 151), ("fy", 151), ("cy", 60)))):
         with pytest.raises(egosgm.InvalidArgument, match=named):
             egosgm.Rectification(turned(**changes), 160, 120)
     for size, alpha, named in (((160, 120), 1.5, "alpha 1.5"), ((0, 5), 0, "size 0x5")):
