@@ -18,6 +18,6 @@ typedef struct __attribute__((packed)) {
   Codes codes;
 } PackedCodes;
 
-inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
+static inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
 
 #endif

@@ -103,7 +103,7 @@ typedef struct {
 
 #ifndef __cplusplus
 // By one load of eight bytes, which compilers do not make of four members of two.
-inline Band band_at(global const Band* bands, const size_t at) {
+static inline Band band_at(global const Band* bands, const size_t at) {
   const short4 members = ((global const short4*)bands)[at];
   const Band band = {members.x, (ushort)members.y, members.z, members.w};
   return band;

@@ -23,7 +23,7 @@
   add_sat((Greys)(min((least)[3], (Greys)(65535 / EGOSGM_ALIKE_TIMES)) * (Greys)EGOSGM_ALIKE_TIMES), \
           (Greys)EGOSGM_ALIKE_LEAST)
 
-inline Code alike_at(const int width, const Rows* rows, const int x) {
+static inline Code alike_at(const int width, const Rows* rows, const int x) {
   Pixel least[4] = {65535, 65535, 65535, 65535};
 #pragma unroll
   for (int i = 0; i < 9; ++i) {
@@ -37,7 +37,7 @@ inline Code alike_at(const int width, const Rows* rows, const int x) {
 }
 
 #if PIXELS > 1
-inline void write_alike_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
+static inline void write_alike_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
   const Greys centre = load_greys(rows->at[RADIUS_Y] + x), most = (Greys)((ushort)65535);
   Greys least[4] = {most, most, most, most};
 #pragma unroll

@@ -259,7 +259,7 @@ ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmPa
 // a work-item takes all tiles of a sweep, those that take half of the time: as long as a row's cells and so many a
 // pixel.
 #define CELLS_A_PIXEL 16
-inline int rows_to_middle(const SgmParameters q, const int view, const int wave, global const RowSum* row_sums) {
+static inline int rows_to_middle(const SgmParameters q, const int view, const int wave, global const RowSum* row_sums) {
   if (wave != EGOSGM_ALL_TILES) return q.height - q.height / 2;
   global const RowSum* rows = row_sums + (size_t)view * q.height;
   const ulong a_row = (ulong)q.width * CELLS_A_PIXEL;

@@ -90,12 +90,12 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
 
 // Offers ranks to right pixels: that of lane i to the one i before `seen`.
 #if ONE_A_ROW
-inline void offer_to(global uint* seen, const Ranks offered) {
+static inline void offer_to(global uint* seen, const Ranks offered) {
   global PackedRanks* at = (global PackedRanks*)(seen - (VECTOR - 1));
   at->ranks = min(at->ranks, BACKWARD(offered));
 }
 #else
-inline void offer_to(global uint* seen, const Ranks offered) {
+static inline void offer_to(global uint* seen, const Ranks offered) {
   uint each[VECTOR];
   OF(vstore, VECTOR)(offered, 0, each);
   for (int i = 0; i < VECTOR; ++i) atomic_min(seen - i, each[i]);
@@ -105,8 +105,8 @@ inline void offer_to(global uint* seen, const Ranks offered) {
 // Offers a left pixel to the right ones that a vector of its cells says it may be. `totals`: in the upper halves, the
 // whole of it NO_WINNER where the band has no cell. `least`: of all its totals. `lane`: of the first disparity in the
 // range.
-inline void offer(const SgmParameters q, const int x, const int y, const int lane, const Ranks totals, const uint least,
-                  global const uint* all_codes, global uint* ranks) {
+static inline void offer(const SgmParameters q, const int x, const int y, const int lane, const Ranks totals,
+                         const uint least, global const uint* all_codes, global uint* ranks) {
   const size_t stride = (size_t)q.width + 2 * (size_t)q.padding;
   global const Code* codes = (global const Code*)all_codes + q.padding;
   global const Code* own = codes + y * stride + x;
@@ -118,12 +118,12 @@ inline void offer(const SgmParameters q, const int x, const int y, const int lan
 }
 
 // LANES work-items look at a pixel's cells, one of them at the winner's neighbours. Group ids 1 and 2: row, view.
-inline void find_winner(const SgmParameters q, const int x, const int lane, local uint* minima,
-                        global const uint* codes, global const Band* bands, global const uint* offsets,
-                        global const uchar* forward_first, global const uchar* forward_second,
-                        global const uchar* backward_first, global const uchar* backward_second,
-                        global float* disparities, global float* variances, global uchar* doubtful,
-                        global uint* ranks) {
+static inline void find_winner(const SgmParameters q, const int x, const int lane, local uint* minima,
+                               global const uint* codes, global const Band* bands, global const uint* offsets,
+                               global const uchar* forward_first, global const uchar* forward_second,
+                               global const uchar* backward_first, global const uchar* backward_second,
+                               global float* disparities, global float* variances, global uchar* doubtful,
+                               global uint* ranks) {
   const size_t row_start = ((size_t)get_group_id(2) * q.height + get_group_id(1)) * q.width;
   const bool is_inside = x < q.width;
   const size_t pixel = row_start + (is_inside ? x : 0);

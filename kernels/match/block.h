@@ -39,8 +39,8 @@ typedef ushort Ushorts __attribute__((ext_vector_type(32)));
                           21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32)
 
 // In forms that clang turns into one instruction.
-inline Block least_of(const Block a, const Block b) { return a < b ? a : b; }
-inline Block saturated_sum(const Block a, const Block b) {
+static inline Block least_of(const Block a, const Block b) { return a < b ? a : b; }
+static inline Block saturated_sum(const Block a, const Block b) {
   const Block sum = a + b;
   return sum < a ? (Block)(255) : sum;
 }
@@ -56,13 +56,13 @@ typedef ushort16 Ushorts;
 #define SECOND_VECTOR(block) (block)
 #define LEAST_OF_VECTORS(block) (block)
 
-inline Block least_of(const Block a, const Block b) { return min(a, b); }
-inline Block saturated_sum(const Block a, const Block b) { return add_sat(a, b); }
+static inline Block least_of(const Block a, const Block b) { return min(a, b); }
+static inline Block saturated_sum(const Block a, const Block b) { return add_sat(a, b); }
 
 #endif
 
 // (a + b + 1) / 2 in the form that compilers turn into one instruction; rhadd goes a longer way (PoCL 3.1).
-inline Block mean_of(const Block a, const Block b) {
+static inline Block mean_of(const Block a, const Block b) {
   return BLOCK_OF((USHORTS_OF(a) + USHORTS_OF(b) + (Ushorts)(1)) >> (Ushorts)(1));
 }
 

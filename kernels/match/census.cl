@@ -76,7 +76,7 @@ typedef struct {
   global const Pixel* at[2 * RADIUS_Y + 1];
 } Rows;
 
-inline Rows rows_around(const ImageSize size, global const Pixel* image, const int y) {
+static inline Rows rows_around(const ImageSize size, global const Pixel* image, const int y) {
   Rows rows;
 #pragma unroll
   for (int dy = -RADIUS_Y; dy <= RADIUS_Y; ++dy) {
@@ -92,7 +92,7 @@ inline Rows rows_around(const ImageSize size, global const Pixel* image, const i
 
 #if COMPARISONS == 2
 // The learned bits of a pixel.
-inline Code learned_code_at(const int width, const Rows* rows, const int x) {
+static inline Code learned_code_at(const int width, const Rows* rows, const int x) {
   int sums[SUMS * SUMS];
 #pragma unroll
   for (int row = 0; row < SUMS; ++row) {
@@ -117,7 +117,7 @@ inline Code learned_code_at(const int width, const Rows* rows, const int x) {
 #endif
 
 // alike: whether the code says what is alike, where that can be asked.
-inline Code code_at(const int width, const Rows* rows, const int x, const int alike) {
+static inline Code code_at(const int width, const Rows* rows, const int x, const int alike) {
 #if HAS_ALIKE
   if (alike) return alike_at(width, rows, x);
 #endif
@@ -156,7 +156,7 @@ KERNEL void census(const ImageSize size, const int padding, const int alike, glo
 #if COMPARISONS == 0
 
 #define CODES_AT_ONCE 16
-inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
+static inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
   write_codes(convert_codes(to_8_bit(load_grey(rows->at[RADIUS_Y] + x))), x, width, view, row);
 }
 
@@ -180,7 +180,7 @@ typedef struct __attribute__((packed)) {
 #define SUMS_VECTORS ((SUMS_WIDTH + 15) / 16)  // the last one overlaps the one before it
 
 // The sums that the codes of pixels from x on compare: SUMS rows.
-inline void sum_around(const Rows* rows, const int x, Sum* sums) {
+static inline void sum_around(const Rows* rows, const int x, Sum* sums) {
 #pragma unroll
   for (int vector = 0; vector < SUMS_VECTORS; ++vector) {
     const int at = min(vector * 16, SUMS_WIDTH - 16);
@@ -199,7 +199,7 @@ inline void sum_around(const Rows* rows, const int x, Sum* sums) {
 }
 
 // Eight learned bits of 16 pixels, from the lowest but 8 `byte` on.
-inline uchar16 learned_byte(const Sum* sums, const int byte) {
+static inline uchar16 learned_byte(const Sum* sums, const int byte) {
   SumVector bits = 0;
 #pragma unroll
   for (int bit = 0; bit < 8; ++bit) {
@@ -214,7 +214,7 @@ inline uchar16 learned_byte(const Sum* sums, const int byte) {
 #endif
 
 // Where no column needs clamping. Bits are put into bytes: compilers keep these in narrow vectors.
-inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
+static inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
 #if COMPARISONS == 2
   Sum sums[SUMS * SUMS_WIDTH];
   sum_around(rows, x, sums);

@@ -36,22 +36,22 @@ typedef Block Bytes;
 typedef struct __attribute__((packed)) {
   Block greys;
 } PackedGreys;
-inline Greys load_greys(global const Pixel* from) { return ((global const PackedGreys*)from)->greys; }
-inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
+static inline Greys load_greys(global const Pixel* from) { return ((global const PackedGreys*)from)->greys; }
+static inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
   return a < b ? (Block)((uchar)bit) : (Block)(0);
 }
 #else
 #define CODES_AT_ONCE 16
 typedef Pixels Greys;
 typedef uchar16 Bytes;
-inline Greys load_greys(global const Pixel* from) { return load_grey(from); }
-inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
+static inline Greys load_greys(global const Pixel* from) { return load_grey(from); }
+static inline Bytes bit_where_less(const Greys a, const Greys b, const int bit) {
   return as_uchar16(convert_char16(a < b)) & (uchar16)((uchar)bit);
 }
 #endif
 
 // Codes of their bytes, the lowest first.
-inline uint16 joined_bytes(const uchar16 b0, const uchar16 b1, const uchar16 b2, const uchar16 b3) {
+static inline uint16 joined_bytes(const uchar16 b0, const uchar16 b1, const uchar16 b2, const uchar16 b3) {
   const ushort16 upper = convert_ushort16(b3) << (ushort16)(8) | convert_ushort16(b2);
   const ushort16 lower = convert_ushort16(b1) << (ushort16)(8) | convert_ushort16(b0);
   return convert_uint16(upper) << (uint16)(16) | convert_uint16(lower);

@@ -6,9 +6,9 @@
 // Compilers that are made for many CPUs take this one for an older (PoCL as distributions build it). In a function that
 // says so, and is not inlined, they count bits in one instruction. Defined by the host where the CPU has it.
 #ifdef COUNTS_BITS
-#define WITH_BIT_COUNT __attribute__((noinline, target("avx512vpopcntdq")))
+#define WITH_BIT_COUNT static __attribute__((noinline, target("avx512vpopcntdq")))
 #else
-#define WITH_BIT_COUNT inline
+#define WITH_BIT_COUNT static inline
 #endif
 
 // The least of eight 16-bit lanes, in the first one: an instruction of x86 that paths wait for, in place of six.
@@ -20,9 +20,9 @@ typedef short ShortsOfX86 __attribute__((vector_size(16)));
 // Functions that must become part of the kernel's loop. Unoptimised code, which oclgrind and valgrind run, needs no
 // such thing, and oclgrind does not know what compilers note where they inline.
 #ifdef __OPTIMIZE__
-#define ALWAYS_INLINE __attribute__((always_inline)) inline
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
 #else
-#define ALWAYS_INLINE inline
+#define ALWAYS_INLINE static inline
 #endif
 
 #endif

@@ -17,7 +17,9 @@ typedef struct __attribute__((packed)) {
   ChunkCodes codes;
 } PackedChunkCodes;
 
-inline ChunkCodes load_chunk_codes(global const Code* from) { return ((global const PackedChunkCodes*)from)->codes; }
+static inline ChunkCodes load_chunk_codes(global const Code* from) {
+  return ((global const PackedChunkCodes*)from)->codes;
+}
 
 // Matching cost of 16 disparities, or 8. `own` and `other` point at the pixel's code and at the first disparity's in
 // their padded rows, which run in opposite directions.
@@ -39,12 +41,13 @@ inline ChunkCodes load_chunk_codes(global const Code* from) { return ((global co
   return COST_SCALE == 2 ? add_sat(distance, distance) : distance
 #endif
 
-inline uchar16 matching_cost(global const Code* own, global const Code* other, const long above, const long below) {
+static inline uchar16 matching_cost(global const Code* own, global const Code* other, const long above,
+                                    const long below) {
   MATCHING_COST(16, Codes, load_codes);
 }
 
-inline Block matching_cost_of_block(global const Code* own, global const Code* other, const long above,
-                                    const long below) {
+static inline Block matching_cost_of_block(global const Code* own, global const Code* other, const long above,
+                                           const long below) {
   const uchar16 first = matching_cost(own, other, above, below);
 #if BLOCK == 32
   return (Block)(first, matching_cost(own, other + VECTOR, above, below));
@@ -53,8 +56,8 @@ inline Block matching_cost_of_block(global const Code* own, global const Code* o
 #endif
 }
 
-inline uchar8 matching_cost_of_chunk(global const Code* own, global const Code* other, const long above,
-                                     const long below) {
+static inline uchar8 matching_cost_of_chunk(global const Code* own, global const Code* other, const long above,
+                                            const long below) {
   MATCHING_COST(8, ChunkCodes, load_chunk_codes);
 }
 

@@ -36,23 +36,23 @@ typedef struct __attribute__((packed)) {
   ushort8 totals;
 } HalfTotals;
 
-inline uchar16 load(global const uchar* from) { return ((global const Lanes*)from)->lanes; }
-inline void store(const uchar16 lanes, global uchar* to) { ((global Lanes*)to)->lanes = lanes; }
-inline uchar8 load_chunk(global const uchar* from) { return ((global const Chunk*)from)->lanes; }
-inline void store_chunk(const uchar8 lanes, global uchar* to) { ((global Chunk*)to)->lanes = lanes; }
-inline Block load_block(global const uchar* from) { return ((global const PackedBlock*)from)->lanes; }
-inline void store_block(const Block lanes, global uchar* to) { ((global PackedBlock*)to)->lanes = lanes; }
-inline ushort8 load_totals(const ushort* from) { return ((const HalfTotals*)from)->totals; }
-inline void store_totals(const ushort16 totals, ushort* to) { ((Totals*)to)->totals = totals; }
-inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535); }
+static inline uchar16 load(global const uchar* from) { return ((global const Lanes*)from)->lanes; }
+static inline void store(const uchar16 lanes, global uchar* to) { ((global Lanes*)to)->lanes = lanes; }
+static inline uchar8 load_chunk(global const uchar* from) { return ((global const Chunk*)from)->lanes; }
+static inline void store_chunk(const uchar8 lanes, global uchar* to) { ((global Chunk*)to)->lanes = lanes; }
+static inline Block load_block(global const uchar* from) { return ((global const PackedBlock*)from)->lanes; }
+static inline void store_block(const Block lanes, global uchar* to) { ((global PackedBlock*)to)->lanes = lanes; }
+static inline ushort8 load_totals(const ushort* from) { return ((const HalfTotals*)from)->totals; }
+static inline void store_totals(const ushort16 totals, ushort* to) { ((Totals*)to)->totals = totals; }
+static inline void store_end(ushort* to) { ((HalfTotals*)to)->totals = (ushort8)(65535); }
 
 constant uchar16 kLane = (uchar16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 
 #ifdef LEAST_OF_WORDS
-inline ushort8 least_word(const ushort8 v) { return LEAST_OF_WORDS(v); }
+static inline ushort8 least_word(const ushort8 v) { return LEAST_OF_WORDS(v); }
 
 // The least lane of each vector, in all lanes.
-inline void minima(const uchar16* v, uchar16* least) {
+static inline void minima(const uchar16* v, uchar16* least) {
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) {
     const uchar16 of_pairs = min(v[n], as_uchar16(as_ushort8(v[n]) >> (ushort8)(8)));
@@ -60,14 +60,14 @@ inline void minima(const uchar16* v, uchar16* least) {
   }
 }
 #else
-inline ushort8 least_word(ushort8 v) {
+static inline ushort8 least_word(ushort8 v) {
   v = min(v, v.s45670123);
   v = min(v, v.s23016745);
   return min(v, v.s10325476);
 }
 
 // The least lane of each vector, in all lanes.
-inline void minima(const uchar16* v, uchar16* least) {
+static inline void minima(const uchar16* v, uchar16* least) {
 #if PATHS == 8
   const uchar16 a = min((uchar16)(v[0].lo, v[1].lo), (uchar16)(v[0].hi, v[1].hi));
   const uchar16 b = min((uchar16)(v[2].lo, v[3].lo), (uchar16)(v[2].hi, v[3].hi));
@@ -90,7 +90,7 @@ inline void minima(const uchar16* v, uchar16* least) {
 #endif
 
 // The same of vectors that hold two paths, a chunk of each.
-inline void minima_of_chunks(const uchar16* v, uchar16* least) {
+static inline void minima_of_chunks(const uchar16* v, uchar16* least) {
 #if PATHS == 8
   uchar16 of_four = min((uchar16)(v[0].s0123, v[0].s89ab, v[1].s0123, v[1].s89ab),
                         (uchar16)(v[0].s4567, v[0].scdef, v[1].s4567, v[1].scdef));
@@ -106,7 +106,9 @@ inline void minima_of_chunks(const uchar16* v, uchar16* least) {
 }
 
 // 255 in the lanes from `first` on, 0 in those before it.
-inline uchar16 lanes_from(const int first) { return as_uchar16(kLane >= (uchar16)((uchar)clamp(first, 0, VECTOR))); }
+static inline uchar16 lanes_from(const int first) {
+  return as_uchar16(kLane >= (uchar16)((uchar)clamp(first, 0, VECTOR)));
+}
 
 // The lanes that lie outside of the disparity range, `first` being its end. In a range of whole vectors there are none.
 #if PARTIAL_CHUNKS
@@ -116,7 +118,7 @@ inline uchar16 lanes_from(const int first) { return as_uchar16(kLane >= (uchar16
 #endif
 
 // The same of a block.
-inline Block block_from(const int first) {
+static inline Block block_from(const int first) {
   return BLOCK_LANE >= (Block)((uchar)clamp(first, 0, BLOCK)) ? (Block)(ABSENT) : (Block)(0);
 }
 #if PARTIAL_CHUNKS
@@ -126,10 +128,10 @@ inline Block block_from(const int first) {
 #endif
 
 // 65535 where a lane is 255; lanes are 0 or 255.
-inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
+static inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
 
-inline ushort minimum_of_chunk(const ushort8 v) { return least_word(v).s0; }
+static inline ushort minimum_of_chunk(const ushort8 v) { return least_word(v).s0; }
 
-inline ushort minimum_of_totals(const ushort16 totals) { return minimum_of_chunk(min(totals.lo, totals.hi)); }
+static inline ushort minimum_of_totals(const ushort16 totals) { return minimum_of_chunk(min(totals.lo, totals.hi)); }
 
 #endif

@@ -49,7 +49,7 @@ typedef struct {
 } Pixel;
 
 // Directions: 0 from the left, 1 from above, 2 from the upper left, 3 from the upper right.
-inline Line line_of(const SgmParameters q, const int direction, const int index) {
+static inline Line line_of(const SgmParameters q, const int direction, const int index) {
   const int lines = direction == 0 ? q.height : direction == 1 ? q.width : q.width + q.height - 1;
   const int diagonal = index - (q.height - 1);
   Line line = {0, 0, 0};
@@ -63,7 +63,8 @@ inline Line line_of(const SgmParameters q, const int direction, const int index)
 }
 
 // Backward sweeps see the image turned by 180 degrees; codes of the right view lie mirrored.
-inline Path path_of(const SgmParameters q, const int direction, const bool backward, const int view, const Line line) {
+static inline Path path_of(const SgmParameters q, const int direction, const bool backward, const int view,
+                           const Line line) {
   const int sign = backward ? -1 : 1, view_sign = view == EGOSGM_LEFT ? 1 : -1;
   const int stride = q.width + 2 * q.padding;
   Path path;
@@ -87,15 +88,15 @@ inline Path path_of(const SgmParameters q, const int direction, const bool backw
 // A pixel's vectors have so many cells more than its band, as it may begin and end within one.
 #define SPARE_CELLS (VECTOR == 4 ? 4 : VECTOR + EGOSGM_LANES)
 
-inline size_t cells_of(const size_t row_start, const size_t pixel, const uint offset) {
+static inline size_t cells_of(const size_t row_start, const size_t pixel, const uint offset) {
   return (row_start * MAX_CHUNKS + offset) * EGOSGM_LANES + SPARE_CELLS * pixel;
 }
 
 // The lane of the range that a pixel's cells begin with, whose band begins with `first`: that of its vector, where
 // vectors are dealt out.
-inline int first_cell_of(const int first) { return LANES == 1 ? first : first & -VECTOR; }
+static inline int first_cell_of(const int first) { return LANES == 1 ? first : first & -VECTOR; }
 
-inline Stored stored_at(const Path path, const int i, const Pixels pixels) {
+static inline Stored stored_at(const Path path, const int i, const Pixels pixels) {
   Stored stored = {0, 0, 0};
   if (i < path.length) {
     const uint at = path.pixel + i * path.pixel_step;
@@ -107,7 +108,7 @@ inline Stored stored_at(const Path path, const int i, const Pixels pixels) {
   return stored;
 }
 
-inline Pixel pixel_of(const SgmParameters q, const Path path, const int i, const Stored stored) {
+static inline Pixel pixel_of(const SgmParameters q, const Path path, const int i, const Stored stored) {
   const uint at = path.pixel + i * path.pixel_step;
   const uint row_start = at - (path.x + i * path.x_step);
   const int first = stored.band.x - q.min_disparity;
@@ -119,8 +120,8 @@ inline Pixel pixel_of(const SgmParameters q, const Path path, const int i, const
 
 // The costs of VECTOR disparities from `at` on: the matching costs and the least way from those of the pixel before
 // (`same`, `behind` by one disparity, `ahead`), which are less their least. Absent outside of the band.
-inline Costs path_costs(const SgmParameters q, const Pixel pixel, const int at, const Costs matching, const Costs same,
-                        const Costs behind, const Costs ahead) {
+static inline Costs path_costs(const SgmParameters q, const Pixel pixel, const int at, const Costs matching,
+                               const Costs same, const Costs behind, const Costs ahead) {
   const Costs costs = matching + min(min(same, min(behind, ahead) + (Costs)(q.p1)), (Costs)(pixel.p2));
   return are_below((Costs)(at - pixel.first) + (Costs)(INDEX), pixel.end - pixel.first) ? costs : (Costs)(ABSENT);
 }

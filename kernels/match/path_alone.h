@@ -11,15 +11,15 @@
 #define ROW_COSTS (MAX_CHUNKS * EGOSGM_LANES + VECTOR + 2)
 #define MINIMA 1
 
-inline uint minimum_of_line(local uint* minima, const int lane, const uint value) { return value; }
+static inline uint minimum_of_line(local uint* minima, const int lane, const uint value) { return value; }
 
 typedef struct __attribute__((packed, aligned(sizeof(Cost)))) {
   Costs costs;
 } PackedCosts;
-inline Costs costs_at(const Cost* from) { return ((const PackedCosts*)from)->costs; }
-inline void leave_costs(const Costs costs, Cost* to) { ((PackedCosts*)to)->costs = costs; }
+static inline Costs costs_at(const Cost* from) { return ((const PackedCosts*)from)->costs; }
+static inline void leave_costs(const Costs costs, Cost* to) { ((PackedCosts*)to)->costs = costs; }
 
-inline void follow_alone(const SgmParameters q, const Path path, const Pixels memory, const Sums sums) {
+static inline void follow_alone(const SgmParameters q, const Path path, const Pixels memory, const Sums sums) {
   Cost rows[2][ROW_COSTS];
   for (int i = 0; i < ROW_COSTS; ++i) rows[0][i] = rows[1][i] = ABSENT;
   Pixel pixels[2] = {{0, 0, 0, 0}, {0, 0, 0, 0}};  // whose costs the rows hold

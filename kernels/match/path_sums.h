@@ -20,7 +20,7 @@ typedef struct {
   Bytes first, second;
 } Earlier;
 
-inline Earlier earlier_at(const Sums sums, const long cell) {
+static inline Earlier earlier_at(const Sums sums, const long cell) {
   Earlier earlier = {0, 0};
   if (sums.stage > 0) {
     earlier.first = load(sums.first + cell);
@@ -29,7 +29,7 @@ inline Earlier earlier_at(const Sums sums, const long cell) {
   return earlier;
 }
 
-inline void add_path(const Sums sums, const Earlier earlier, const Costs costs, const long cell) {
+static inline void add_path(const Sums sums, const Earlier earlier, const Costs costs, const long cell) {
   const Bytes bytes = BYTES_OF(min(costs, (Costs)(255)));
   if (sums.stage == 0) {
     store(bytes, (sums.vertical ? sums.second : sums.first) + cell);
@@ -48,7 +48,7 @@ typedef struct {
 } Cells;
 
 // Half the sums over all paths, of a vector of cells.
-inline Totals totals_of(const Cells cells, const int at) {
+static inline Totals totals_of(const Cells cells, const int at) {
   Bytes forward = load(cells.forward_first + at), backward = load(cells.backward_first + at);
 #if PATHS == 4
   forward = saturated_sum(forward, load(cells.forward_second + at));
@@ -59,14 +59,14 @@ inline Totals totals_of(const Cells cells, const int at) {
 
 // The same in the upper halves, the index in the lower ones, so that the smallest disparity wins a tie; NO_WINNER
 // outside of the band.
-inline Ranks allowed_of(const Cells cells, const int at, const int first, const int last) {
+static inline Ranks allowed_of(const Cells cells, const int at, const int first, const int last) {
   const Ranks index = (Ranks)((uint)at) + (Ranks)(INDEX);
   const Ranks ranked = RANKS_OF(totals_of(cells, at)) << (Ranks)(16) | index;
   return index < (Ranks)((uint)first) || index > (Ranks)((uint)last) ? (Ranks)(NO_WINNER) : ranked;
 }
 
 // The total of one.
-inline int total_of(const Cells cells, const int at) {
+static inline int total_of(const Cells cells, const int at) {
   uchar forward = cells.forward_first[at], backward = cells.backward_first[at];
 #if PATHS == 4
   forward = add_sat(forward, cells.forward_second[at]);
@@ -76,7 +76,7 @@ inline int total_of(const Cells cells, const int at) {
 }
 
 // Steps to one side of the winner until the sums above its own add up to `limit`.
-inline int count_steps(const Cells cells, const int winner, const int total, const int step, const int limit) {
+static inline int count_steps(const Cells cells, const int winner, const int total, const int step, const int limit) {
   int sum = 0, steps = 0;
   for (int at = winner + step; steps < MAX_STEPS && at >= cells.first && at < cells.end; at += step) {
     sum += max(0, total_of(cells, at) - total);

@@ -29,12 +29,12 @@ typedef struct {
   Earlier earlier[VECTORS_A_LANE];
 } Matches;
 
-inline bool holds(const Pixel pixel, const int vector) {
+static inline bool holds(const Pixel pixel, const int vector) {
   return VECTOR * vector + VECTOR > pixel.first && VECTOR * vector < pixel.end;
 }
 
-inline Matches fetch(const SgmParameters q, const Path path, const int i, const Pixel pixel, const int lane,
-                     const Pixels memory, const Sums sums) {
+static inline Matches fetch(const SgmParameters q, const Path path, const int i, const Pixel pixel, const int lane,
+                            const Pixels memory, const Sums sums) {
   Matches matches;
   global const Code* own = memory.codes + (path.own + i * path.own_step);
   matches.own = pixel.end > 0 ? own[0] : 0;
@@ -52,7 +52,7 @@ inline Matches fetch(const SgmParameters q, const Path path, const int i, const 
 
 // The least value of a line's lanes, by one barrier or more for all work-items of the group. `minima`: MINIMA values,
 // others than the call before was given.
-inline uint minimum_of_line(local uint* minima, const int lane, const uint value) {
+static inline uint minimum_of_line(local uint* minima, const int lane, const uint value) {
   minima[lane] = value;
   int count = LANES;
   for (; count > AT_ONCE; count /= 8) {
@@ -71,8 +71,8 @@ inline uint minimum_of_line(local uint* minima, const int lane, const uint value
 }
 
 // `edges`, `minima`: those of the first of two pixels; LINES lines on lie those of the second.
-inline void follow_together(const SgmParameters q, const Path path, const int longest, const int lane,
-                            const Pixels memory, const Sums sums, local uint* edges, local uint* minima) {
+static inline void follow_together(const SgmParameters q, const Path path, const int longest, const int lane,
+                                   const Pixels memory, const Sums sums, local uint* edges, local uint* minima) {
   Costs costs[VECTORS_A_LANE];
   UNROLLED for (int v = 0; v < VECTORS_A_LANE; ++v) costs[v] = ABSENT;
   // What a pixel needs is loaded while the one before is under way, its band one pixel earlier still, and nobody waits

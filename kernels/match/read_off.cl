@@ -6,7 +6,7 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-inline Uints load_ranks(global const uint* row, const int x) {
+static inline Uints load_ranks(global const uint* row, const int x) {
 #if PIXELS == 1
   return row[x];
 #else

@@ -16,7 +16,7 @@
 
 // Disparity with its sub-pixel part, by a symmetric V through the winner and its neighbours, whose sums lie that much
 // above its own; 0 both where one is missing.
-inline Floats refined(const Ints winner, const Ints rise_before, const Ints rise_after) {
+static inline Floats refined(const Ints winner, const Ints rise_before, const Ints rise_after) {
   const Floats before = FLOATS_OF_INTS(rise_before), after = FLOATS_OF_INTS(rise_after);
   const Floats slope = max(before, after);
   const Ints is_risen = slope > 0.0f;
@@ -25,12 +25,12 @@ inline Floats refined(const Ints winner, const Ints rise_before, const Ints rise
 }
 
 // Where the sums fall on beyond the end of a band, the true disparity rather lies outside.
-inline Ints falls_on(const SgmParameters q, const Ints rise_before, const Ints rise_after) {
+static inline Ints falls_on(const SgmParameters q, const Ints rise_before, const Ints rise_after) {
   return ((rise_before < 0) | (rise_after < 0)) & ((Ints)(q.doubts_band_ends) != 0);
 }
 
 // The matching variance (options.h).
-inline Floats matching_variance(const SgmParameters q, const Ints steps, const Ints is_doubtful) {
+static inline Floats matching_variance(const SgmParameters q, const Ints steps, const Ints is_doubtful) {
   const Floats n = FLOATS_OF_INTS(steps);
   const Floats counted = q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n);
   return is_doubtful ? (Floats)(EGOSGM_DOUBTFUL_VARIANCE_PX2) : counted;

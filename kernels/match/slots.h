@@ -6,23 +6,23 @@
 #include "lanes.h"
 
 // Of a band what says where a pixel's costs lie in a slot, in one word: its origin and its chunks.
-inline uint extent_at(global const Band* band) { return *(global const uint*)band; }
-inline int origin_of(const uint extent) { return (short)extent; }
-inline int chunks_of(const uint extent) { return extent >> 16; }
+static inline uint extent_at(global const Band* band) { return *(global const uint*)band; }
+static inline int origin_of(const uint extent) { return (short)extent; }
+static inline int chunks_of(const uint extent) { return extent >> 16; }
 // Bands that fit one vector, one block of several, one chunk.
-inline bool is_narrow(const uint extent) { return extent < 3u << 16; }
-inline bool is_block(const uint extent) { return extent >> 16 == BLOCK / EGOSGM_LANES; }
-inline bool is_chunk(const uint extent) { return extent < 2u << 16; }
+static inline bool is_narrow(const uint extent) { return extent < 3u << 16; }
+static inline bool is_block(const uint extent) { return extent >> 16 == BLOCK / EGOSGM_LANES; }
+static inline bool is_chunk(const uint extent) { return extent < 2u << 16; }
 
 // Makes what a predecessor with `extent` left in a slot absent, `at` being its first disparity's place. More may be
 // wiped: all else is absent.
-inline void wipe(global uchar* at, const uint extent) {
+static inline void wipe(global uchar* at, const uint extent) {
   store_block((Block)(ABSENT), at);
   for (int v = BLOCK_VECTORS; v < chunks_of(extent) / 2; ++v) store((uchar16)(ABSENT), at + VECTOR * v);
 }
 
 // Whether what a predecessor with `extent` left in a slot is overwritten by a pixel with `own`.
-inline bool covers(const uint own, const uint extent) {
+static inline bool covers(const uint own, const uint extent) {
   return origin_of(own) <= origin_of(extent) &&
          origin_of(extent) + EGOSGM_LANES * chunks_of(extent) <= origin_of(own) + EGOSGM_LANES * chunks_of(own);
 }
@@ -35,7 +35,8 @@ typedef struct {
 
 // P2 of the steps to the next pixel, a byte a path. They lie at a step's lower or right pixel: for a backward sweep
 // that is the one it comes from.
-inline uint penalties_to(const bool backward, Penalties* around, global const uint* here, const long above_right) {
+static inline uint penalties_to(const bool backward, Penalties* around, global const uint* here,
+                                const long above_right) {
   const uint own = here[0];
   if (!backward) return own;
   const uint right = here[above_right];

@@ -12,7 +12,7 @@
 
 // Whether a pixel has one chunk, all of it in the disparity range, as the one to its left, and those above it fit a
 // vector, as most pixels in bands. Then the path from the left stays in a register.
-inline bool goes_straight(const SgmParameters q, const uint extent, const uint* before) {
+static inline bool goes_straight(const SgmParameters q, const uint extent, const uint* before) {
   if (!is_chunk(extent)) return false;
 #if PARTIAL_CHUNKS
   if ((int)((uint)origin_of(extent) - (uint)q.min_disparity) + EGOSGM_LANES > q.disparities) return false;
@@ -30,10 +30,10 @@ typedef struct {
 } Places;
 
 // A chunk of path n's predecessor in the lower half, one of path n + PATH_PAIRS's in the upper half.
-inline uchar16 load_pair(const Places* to, const int n, const uint along, const int beside) {
+static inline uchar16 load_pair(const Places* to, const int n, const uint along, const int beside) {
   return (uchar16)(load_chunk(to->at[n] + along + beside), load_chunk(to->at[n + PATH_PAIRS] + along + beside));
 }
-inline uchar16 load_upper(const ulong2 lower, global const uchar* upper) {
+static inline uchar16 load_upper(const ulong2 lower, global const uchar* upper) {
   return (uchar16)(as_uchar16(lower).lo, load_chunk(upper));
 }
 
@@ -44,7 +44,7 @@ typedef struct {
   uchar16 t, least;
 } FromLeft;
 
-inline uchar8 path_costs_of(const FromLeft left) { return left.t.lo - left.least.lo; }
+static inline uchar8 path_costs_of(const FromLeft left) { return left.t.lo - left.least.lo; }
 
 // A chunk as it lies at a pixel's own disparities, and at those one below and one above. The upper halves are not used.
 typedef struct {
@@ -52,7 +52,7 @@ typedef struct {
 } Before;
 
 // A chunk so many lanes further up.
-inline ulong2 moved(const ulong2 chunk, const int lanes) {
+static inline ulong2 moved(const ulong2 chunk, const int lanes) {
   const ulong2 left = ~chunk;  // of what is absent, nothing
   const ulong2 up = lanes < EGOSGM_LANES ? left >> (ulong2)((ulong)(8 * lanes)) : (ulong2)(0),
                down = lanes > -EGOSGM_LANES ? left << (ulong2)((ulong)(-8 * lanes)) : (ulong2)(0);
@@ -60,21 +60,21 @@ inline ulong2 moved(const ulong2 chunk, const int lanes) {
 }
 
 // `lanes`: how far the pixel's origin lies above that of the one before.
-inline Before before_at(const uchar16 t, const int lanes) {
+static inline Before before_at(const uchar16 t, const int lanes) {
   const ulong2 chunk = as_ulong2(t);
   const Before before = {moved(chunk, lanes), moved(chunk, lanes - 1), moved(chunk, lanes + 1)};
   return before;
 }
 
 // The same of an origin as before.
-inline Before straight_before(const uchar16 t) {
+static inline Before straight_before(const uchar16 t) {
   const ulong2 chunk = as_ulong2(t);
   const Before before = {chunk, chunk << (ulong2)(8) | (ulong2)(ABSENT),
                          chunk >> (ulong2)(8) | (ulong2)((ulong)ABSENT << 56)};
   return before;
 }
 
-inline uchar16 in_lower_lanes(const ushort8 v) { return (uchar16)(as_uchar16(v).s00000000, (uchar8)(0)); }
+static inline uchar16 in_lower_lanes(const ushort8 v) { return (uchar16)(as_uchar16(v).s00000000, (uchar8)(0)); }
 
 // The path costs of a pixel that goes straight, but for those from the left left in the slots in place of those before
 // it, and half of their sum.
@@ -121,15 +121,15 @@ typedef struct {
   uint8 ranks;
 } Seen;
 
-inline Seen seen_from(global uint* first) {
+static inline Seen seen_from(global uint* first) {
   Seen seen = {first, 0};
   if (first) seen.ranks = load_ranks(first);
   return seen;
 }
-inline void leave_seen(const Seen* seen) {
+static inline void leave_seen(const Seen* seen) {
   if (seen->at) store_ranks(seen->ranks, seen->at);
 }
-inline void move_seen(const bool backward, Seen* seen) {
+static inline void move_seen(const bool backward, Seen* seen) {
   if (!seen->at) return;
   if (backward) {
     seen->at[EGOSGM_LANES - 1] = seen->ranks.s7;
@@ -163,7 +163,7 @@ ALWAYS_INLINE void leave_chunk(const bool meets, const SgmParameters q, const Ro
   candidate->disparity = origin + (rank & 15);
 }
 
-inline Seen seen_of(const Row* row, const Place* place, const int origin) {
+static inline Seen seen_of(const Row* row, const Place* place, const int origin) {
   return seen_from(row->seen ? row->seen + place->k - origin - (EGOSGM_LANES - 1) : 0);
 }
 

@@ -36,19 +36,19 @@ typedef int4 Costs;
 #define AHEAD(v, edge) (Costs)((v).yzw, edge)
 #define LAST(v) (v).w
 #define BACKWARD(v) (v).wzyx
-inline uint least_rank(const Ranks v) { return min(min(v.x, v.y), min(v.z, v.w)); }
-inline int least_cost(const Costs v) { return min(min(v.x, v.y), min(v.z, v.w)); }
+static inline uint least_rank(const Ranks v) { return min(min(v.x, v.y), min(v.z, v.w)); }
+static inline int least_cost(const Costs v) { return min(min(v.x, v.y), min(v.z, v.w)); }
 
-inline Codes load_codes(global const Code* from) { return vload4(0, from); }
-inline Bytes load(global const uchar* from) { return *(global const Bytes*)from; }
-inline void store(const Bytes bytes, global uchar* to) { *(global Bytes*)to = bytes; }
+static inline Codes load_codes(global const Code* from) { return vload4(0, from); }
+static inline Bytes load(global const uchar* from) { return *(global const Bytes*)from; }
+static inline void store(const Bytes bytes, global uchar* to) { *(global Bytes*)to = bytes; }
 
 // (a + b + 1) / 2 and a saturated sum, of four bytes in one word: compilers for GPUs would go byte by byte.
-inline Bytes mean(const Bytes a, const Bytes b) {
+static inline Bytes mean(const Bytes a, const Bytes b) {
   const uint x = as_uint(a), y = as_uint(b);
   return as_uchar4((x | y) - ((x ^ y) >> 1 & 0x7f7f7f7f));
 }
-inline Bytes saturated_sum(const Bytes a, const Bytes b) {
+static inline Bytes saturated_sum(const Bytes a, const Bytes b) {
   const uint x = as_uint(a), y = as_uint(b);
   const uint sum = ((x & 0x7f7f7f7f) + (y & 0x7f7f7f7f)) ^ ((x ^ y) & 0x80808080);
   const uint over = ((x & y) | ((x | y) & ~sum)) >> 7 & 0x01010101;
@@ -64,12 +64,12 @@ typedef short16 Costs;
 #define AHEAD(v, edge) (Costs)((v).s1234, (v).s5678, (v).s9abc, (v).sde, (v).sf, edge)
 #define LAST(v) (v).sf
 #define BACKWARD(v) (v).sfedcba9876543210
-inline uint least_rank(const Ranks v) {
+static inline uint least_rank(const Ranks v) {
   const uint8 a = min(v.lo, v.hi);
   const uint4 b = min(a.lo, a.hi);
   return min(min(b.x, b.y), min(b.z, b.w));
 }
-inline int least_cost(const Costs v) {
+static inline int least_cost(const Costs v) {
   const short8 a = min(v.lo, v.hi);
   const short4 b = min(a.lo, a.hi);
   return min(min(b.x, b.y), min(b.z, b.w));
@@ -82,15 +82,15 @@ typedef struct __attribute__((packed)) {
 typedef struct __attribute__((packed)) {
   Bytes bytes;
 } PackedVector;
-inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
-inline Bytes load(global const uchar* from) { return ((global const PackedVector*)from)->bytes; }
-inline void store(const Bytes bytes, global uchar* to) { ((global PackedVector*)to)->bytes = bytes; }
+static inline Codes load_codes(global const Code* from) { return ((global const PackedCodes*)from)->codes; }
+static inline Bytes load(global const uchar* from) { return ((global const PackedVector*)from)->bytes; }
+static inline void store(const Bytes bytes, global uchar* to) { ((global PackedVector*)to)->bytes = bytes; }
 
 // (a + b + 1) / 2; rhadd goes a longer way on some compilers (PoCL 3.1).
-inline Bytes mean(const Bytes a, const Bytes b) {
+static inline Bytes mean(const Bytes a, const Bytes b) {
   return BYTES_OF((TOTALS_OF(a) + TOTALS_OF(b) + (Totals)(1)) >> (Totals)(1));
 }
-inline Bytes saturated_sum(const Bytes a, const Bytes b) { return add_sat(a, b); }
+static inline Bytes saturated_sum(const Bytes a, const Bytes b) { return add_sat(a, b); }
 #endif
 
 typedef struct __attribute__((packed)) {
@@ -98,11 +98,11 @@ typedef struct __attribute__((packed)) {
 } PackedRanks;
 
 // Which of `values` lie in [0, end), with one comparison each.
-inline Costs are_below(const Costs values, const int end) { return UNSIGNED(values) < UNSIGNED((Costs)(end)); }
+static inline Costs are_below(const Costs values, const int end) { return UNSIGNED(values) < UNSIGNED((Costs)(end)); }
 
 // The matching costs of a pixel whose code is `own` with those whose codes are `others`; with COST_SAD these are the
 // costs.
-inline Costs cost_of(const Code own, const Codes others) {
+static inline Costs cost_of(const Code own, const Codes others) {
 #if COST_SAD
   return COSTS_OF(others);
 #elif VECTOR == 4
@@ -115,7 +115,7 @@ inline Costs cost_of(const Code own, const Codes others) {
 }
 
 // The codes of a vector of matches from `other` on; with COST_SAD their costs. `y`: the pixel's row.
-inline Codes fetch_vector(const SgmParameters q, global const Code* own, global const Code* other, const int y) {
+static inline Codes fetch_vector(const SgmParameters q, global const Code* own, global const Code* other, const int y) {
 #if COST_SAD
   const long stride = (long)q.width + 2 * (long)q.padding;
   const long above = y > 0 ? -stride : 0, below = y + 1 < q.height ? stride : 0;

@@ -30,7 +30,7 @@ typedef struct {
 } PathCosts;
 
 // The first pass: path costs of a block, and their least in each lane.
-inline void follow_paths(const Pixel* pixel, const int b, const Block absent, PathCosts* costs, Block* least) {
+static inline void follow_paths(const Pixel* pixel, const int b, const Block absent, PathCosts* costs, Block* least) {
   const int at = BLOCK * b;
   const Block cost = absent | matching_cost_of_block(pixel->own, pixel->other + at, pixel->row_above, pixel->row_below);
   costs->cost[b] = cost;
@@ -50,8 +50,8 @@ typedef struct {
 } Best;
 
 // Adds the other sweep's sums of a vector, and remembers the least.
-inline void add_sums(const Pixel* pixel, const int v, const uchar16 absent, const uchar16 sum, ushort* totals,
-                     Best* best) {
+static inline void add_sums(const Pixel* pixel, const int v, const uchar16 absent, const uchar16 sum, ushort* totals,
+                            Best* best) {
   const int at = VECTOR * v;
   const ushort16 total = (convert_ushort16(sum) + convert_ushort16(load(pixel->cells + at))) | widened(absent);
   store_totals(total, totals + at);
@@ -63,8 +63,9 @@ inline void add_sums(const Pixel* pixel, const int v, const uchar16 absent, cons
 }
 
 // The second pass: leaves a block's path costs in their slots, and half of their sum, or adds the other half.
-inline void leave_block(const bool meets, const bool is_tail, const Pixel* pixel, const int b, const Block absent,
-                        const PathCosts* costs, const Block* least, ushort* totals, Best* best) {
+static inline void leave_block(const bool meets, const bool is_tail, const Pixel* pixel, const int b,
+                               const Block absent, const PathCosts* costs, const Block* least, ushort* totals,
+                               Best* best) {
   Block r[DIRECTIONS];
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) {
@@ -85,8 +86,8 @@ inline void leave_block(const bool meets, const bool is_tail, const Pixel* pixel
 }
 
 // The winner and its neighbourhood; and offers the pixel to the right ones.
-inline void find_winner(const Pixel* pixel, const int vectors, const PathCosts* costs, ushort* totals, const Best* best,
-                        Candidate* candidate) {
+static inline void find_winner(const Pixel* pixel, const int vectors, const PathCosts* costs, ushort* totals,
+                               const Best* best, Candidate* candidate) {
   store_end(totals - MAX_STEPS);
   store_end(totals + VECTOR * vectors);
   const ushort winner_total = minimum_of_totals(best->total);

@@ -15,7 +15,7 @@ typedef struct __attribute__((packed)) {
 
 // Both together: steps to the left and to the right of the winner until the sums above its own add up to `limit`.
 // `beside` holds the sums of the eight lanes before the winner, the nearest first, and of the eight after it.
-inline uint count_steps(const ushort16 beside, const ushort winner, const ushort limit) {
+static inline uint count_steps(const ushort16 beside, const ushort winner, const ushort limit) {
   const ushort16 from_1 = (ushort16)(0, -1, -1, -1, -1, -1, -1, -1, 0, -1, -1, -1, -1, -1, -1, -1);
   const ushort16 from_2 = (ushort16)(0, 0, -1, -1, -1, -1, -1, -1, 0, 0, -1, -1, -1, -1, -1, -1);
   const ushort16 from_4 = (ushort16)(0, 0, 0, 0, -1, -1, -1, -1, 0, 0, 0, 0, -1, -1, -1, -1);
@@ -36,7 +36,7 @@ typedef struct {
 } Candidate;
 
 // A winner with its neighbourhood in lane 0. `totals`: at the winner's, of MAX_STEPS on both sides.
-inline void put_window(const ushort* totals, const int winner_total, Candidate* candidate) {
+static inline void put_window(const ushort* totals, const int winner_total, Candidate* candidate) {
   ushort* window = (ushort*)&candidate->totals;
   store_totals(((const Totals*)(totals - MAX_STEPS))->totals, window);
   window[2 * MAX_STEPS] = totals[MAX_STEPS];
@@ -45,7 +45,7 @@ inline void put_window(const ushort* totals, const int winner_total, Candidate* 
 
 // What `leave_winners` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one
 // is missing), steps; 16 bits each.
-inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
+static inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
   const int here = candidate->rank >> 4;
   const ushort* at = (const ushort*)&candidate->totals + MAX_STEPS + (candidate->rank & 15);
   const int before = at[-1], after = at[1];
@@ -58,24 +58,25 @@ inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
 }
 
 // 65535 in the lanes outside of [first, last]: the others are no more than last - first above first.
-inline ushort16 barred(const int first, const int last) {
+static inline ushort16 barred(const int first, const int last) {
   return as_ushort16(convert_ushort16(kLane) - (ushort16)((ushort)first) > (ushort16)((ushort)(last - first)));
 }
-inline ushort8 barred_of_chunk(const int first, const int last) {
+static inline ushort8 barred_of_chunk(const int first, const int last) {
   return as_ushort8(convert_ushort8(kLane.lo) - (ushort8)((ushort)first) > (ushort8)((ushort)(last - first)));
 }
 
 // The least total of 16 lanes in its upper bits, its lane in the lower four: the smallest disparity wins a tie.
-inline int ranked(const ushort16 totals) {
+static inline int ranked(const ushort16 totals) {
   return minimum_of_totals((totals << (ushort16)(4)) | convert_ushort16(kLane));
 }
-inline int ranked_in_chunk(const ushort8 totals) {
+static inline int ranked_in_chunk(const ushort8 totals) {
   return minimum_of_chunk((totals << (ushort8)(4)) | convert_ushort8(kLane.lo));
 }
 
 // Offers a left pixel to the right pixels of 16 lanes, or 8: the one of lane i lies i before `seen`. `least`: of all
 // its totals. `behind`: of the first lane. Lanes outside of the band have totals of 65535.
-inline void offer(const ushort16 totals, const int least, const uchar16 cost, const int behind, global uint* seen) {
+static inline void offer(const ushort16 totals, const int least, const uchar16 cost, const int behind,
+                         global uint* seen) {
   const ushort16 each = (ushort16)((ushort)behind) - convert_ushort16(kLane);
   const uint16 ranks =
       convert_uint16(RANK(totals, least, convert_ushort16(cost))) << (uint16)(16) | convert_uint16(each);
@@ -84,13 +85,13 @@ inline void offer(const ushort16 totals, const int least, const uchar16 cost, co
 }
 
 // The same of 8 lanes, what is offered alone: the last lane's first.
-inline uint8 offered_by_chunk(const ushort8 totals, const int least, const uchar8 cost, const int behind) {
+static inline uint8 offered_by_chunk(const ushort8 totals, const int least, const uchar8 cost, const int behind) {
   const ushort8 each = (ushort8)((ushort)behind) - convert_ushort8(kLane.lo);
   const uint8 ranks = convert_uint8(RANK(totals, least, convert_ushort8(cost))) << (uint8)(16) | convert_uint8(each);
   return ranks.s76543210;
 }
-inline uint8 load_ranks(global const uint* from) { return ((global const ChunkRanks*)from)->ranks; }
-inline void store_ranks(const uint8 ranks, global uint* to) { ((global ChunkRanks*)to)->ranks = ranks; }
+static inline uint8 load_ranks(global const uint* from) { return ((global const ChunkRanks*)from)->ranks; }
+static inline void store_ranks(const uint8 ranks, global uint* to) { ((global ChunkRanks*)to)->ranks = ranks; }
 
 // Winners of PIXELS pixels, and a field of each.
 #if PIXELS == 1
@@ -101,7 +102,7 @@ typedef ulong16 Winners;
 #define FIELD(winners, bit) convert_int16(as_long16((winners) << (48 - (bit))) >> 48)
 #endif
 
-inline Winners load_winners(const ulong* from) {
+static inline Winners load_winners(const ulong* from) {
 #if PIXELS == 1
   return from[0];
 #else
