@@ -62,7 +62,7 @@ class Choices {
  public:
   void set(const std::string& name, const std::string& value) {
     if (name == "preset" && !is_first_) {
-      throw InvalidArgument("option preset: would undo what was chosen before it: put it first, or give --preset");
+      throw InvalidArgument("option preset: would undo what was chosen before it: put it first");
     }
     is_first_ = is_first_ && name == "preset";
     set_option(options, name, value);

@@ -83,6 +83,17 @@ void expect_named(const std::string& option, const std::string& path) {
   if (path.empty()) throw InvalidArgument(option + " \"\": give a name");
 }
 
+/// Of the frames whose pairs an earlier run could not read.
+std::set<std::string> names_left_out(const Json& report) {
+  std::set<std::string> names;
+  const auto left_out = report.find("left_out");
+  if (left_out == report.end() || !left_out->is_array()) return names;
+  for (const Json& pair : *left_out) {
+    if (const Json name = pair.is_object() ? pair.value("name", Json()) : Json(); name.is_string()) names.insert(name);
+  }
+  return names;
+}
+
 /// Throws InvalidArgument, naming the first figure in which the run that is recorded in `folder` differs.
 void expect_same(const std::string& folder, const Json& earlier, const Json& identity) {
   const Json flat = as_in_file(identity).flatten(), flat_earlier = earlier.flatten();
@@ -154,9 +165,11 @@ void OutputFolder::look() {
     throw InvalidArgument(fmt::format("--resume: {} is no report of a run: give another --out", file.string()));
   }
   expect_maps_of_this_run();
-  lacks_nothing_ =
-      earlier_.value("finished", Json()) == true &&
-      std::all_of(planned_.begin(), planned_.end(), [&](const auto& file) { return is_there(path_ / file); });
+  const std::set<std::string> left_out = names_left_out(earlier_);
+  lacks_nothing_ = earlier_.value("finished", Json()) == true &&
+                   std::all_of(planned_.begin(), planned_.end(), [&](const fs::path& file) {
+                     return is_there(path_ / file) || left_out.contains(file.stem().string());
+                   });
 }
 
 /// A run that goes on loses no frame, and maps of two runs do not mix.
@@ -204,13 +217,26 @@ fs::path OutputFolder::named_file(const std::string& option, const std::string& 
   return vision::is_stream(file) ? fs::path(file) : path;
 }
 
-void OutputFolder::begin(const Json& identity) {
+void OutputFolder::begin(Json identity) {
   vision::make_folder(path_);
-  if (!earlier_.is_null()) expect_same(shown_, earlier_, identity);
+  if (earlier_.is_null()) return;
+  // One that lost its device went on elsewhere, with the same bits.
+  const Json fallback = earlier_.value("fallback", Json());
+  if (fallback.is_object() && identity.contains("device") &&
+      fallback.value("from", Json()) == as_in_file(identity["device"])) {
+    identity.erase("device");
+  }
+  expect_same(shown_, earlier_, identity);
 }
 
 bool OutputFolder::is_to_write(const fs::path& file, std::string_view bytes) const {
   const std::string name = file.lexically_relative(path_).string();
+  if (lacks_nothing_ && planned_.contains(name) && !is_there(file)) {
+    throw InvalidArgument(
+        fmt::format("--resume: {} was left out by the run that finished, and its pair can be read this time: give "
+                    "another --out",
+                    file.string()));
+  }
   if (!(planned_.contains(name) || name == "poses.txt") || !is_there(file)) return true;
   const std::string earlier = is_regular(file) ? vision::read_file(file, kAnySize) : std::string();
   if (earlier == bytes) return false;

@@ -35,7 +35,7 @@ class OutputFolder {
 
   const std::filesystem::path& path() const { return path_; }
 
-  /// Whether the run that is to go on had finished, and wrote all that this one would.
+  /// Whether the run that is to go on had finished, and wrote all that this one would, but what it could not read.
   bool lacks_nothing() const { return lacks_nothing_; }
 
   /// The file that `option` names, which may lie in OUT. An empty name is none. Throws InvalidArgument as
@@ -44,7 +44,7 @@ class OutputFolder {
 
   /// Makes OUT. Throws InvalidArgument where the run that is there differs in `identity` (RunReport::identity) from the
   /// one that is to go on.
-  void begin(const nlohmann::ordered_json& identity);
+  void begin(nlohmann::ordered_json identity);
 
   /// To be called before a file is written. Returns whether it is to be written: of a run that goes on, what is there
   /// stays. Throws InvalidArgument where that has other bytes, and IoError where another put it there meanwhile.

@@ -182,7 +182,7 @@ int tune(const TuneArguments& arguments) {
   constexpr double kGain = 0.98;  // less than 2 % is noise
   for (const Trial& trial : trials) {
     double least = ms_of(untuned, trial.stages);
-    print_now(fmt::format("{}: {:.3f} ms with the defaults\n", fmt::join(trial.stages, " + "), least));
+    print_now(fmt::format("{}: {:.3f} ms with its defaults\n", fmt::join(trial.stages, " + "), least));
     for (const std::vector<NamedOption>& sizes : trial.candidates) {
       if (interrupted()) {
         say(fmt::format("egosgm: interrupted: nothing is kept, {} is as it was", file.string()));

@@ -23,7 +23,7 @@ import sys
 from ablation import ablation
 from ego_motion import ego_motion_table
 from evidence import evidence_tables
-from inputs import PROJECT, Bench, Missing
+from inputs import PROJECT, Bench, Failed, Missing, told
 from paper import paper_figure, paper_table
 from rows import main_table
 from video import video_tables
@@ -65,8 +65,8 @@ def parse_arguments():
 def figure_or_reason(bench):
     try:
         return paper_figure(bench)
-    except Missing as reason:
-        return f"skipped: {reason}"
+    except (Missing, Failed) as reason:
+        return told(reason)
 
 
 def reasons_of(rows):
@@ -81,7 +81,9 @@ def main():
     if arguments.paper:
         content["paper"], table = paper_table(bench, arguments)
         rows, skipped, code = content["paper"], [row["skipped"] for row in content["paper"] if "skipped" in row], table.exit_code()
-        print("the stages of a frame: " + figure_or_reason(bench))
+        figure = figure_or_reason(bench)
+        print("the stages of a frame: " + figure)
+        skipped += reasons_of([("", figure)])
     elif arguments.ablation:
         content["ablation"], skipped = ablation(bench, arguments.inputs)
         rows, code = content["ablation"], 0

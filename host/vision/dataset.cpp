@@ -143,19 +143,21 @@ KittiCameras cameras_of(const fs::path& folder) {
   return KittiCameras::kAny;
 }
 
-bool is_in_colour(const fs::path& image) {
-  try {
-    return read_stored_image(image).channels() == 3;
-  } catch (const Error&) {  // who reads the pair says so
-    return false;
+bool are_in_colour(const std::vector<StereoFrame>& frames) {
+  for (const StereoFrame& frame : frames) {
+    try {
+      return read_stored_image(frame.left).channels() == 3;
+    } catch (const Error&) {  // who reads the pair says so
+    }
   }
+  return false;
 }
 
 /// Of a file with both of KITTI's pairs of cameras, images in colour are of the second one, whatever their folder is
 /// called.
-Calibration calibration_of(const fs::path& file, const fs::path& folder, const fs::path& image) {
+Calibration calibration_of(const fs::path& file, const fs::path& folder, const std::vector<StereoFrame>& frames) {
   const KittiCameras cameras = cameras_of(folder);
-  if (cameras == KittiCameras::kAny && is_in_colour(image)) {
+  if (cameras == KittiCameras::kAny && are_in_colour(frames)) {
     try {
       return read_calibration(file, KittiCameras::kColor);
     } catch (const InvalidArgument&) {  // it has one pair alone, or is told below
@@ -287,7 +289,7 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   sequence.calibration_file = calibration_file;
   sequence.has_calibration = !calibration_file.empty();
   if (sequence.has_calibration) {
-    sequence.calibration = calibration_of(calibration_file, left_pattern.folder, sequence.frames.front().left);
+    sequence.calibration = calibration_of(calibration_file, left_pattern.folder, sequence.frames);
   } else {
     const cv::Size size = read_image_size(sequence.frames.front().left);
     sequence.calibration = {.fx = static_cast<double>(size.width),

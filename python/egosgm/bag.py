@@ -311,9 +311,9 @@ class Bag:
                     return None
 
             def broken(topic: str, stamp: int, error: Exception) -> None:
-                self.gaps.broken.append(f"{topic} at {stamp // 10**9}.{stamp % 10**9:09d} s: {str(error).partition(chr(10))[0] or type(error).__name__}")
-                if number == 0 and len(self.gaps.broken) >= _MOST_BROKEN:
-                    raise _egosgm.InvalidArgument(f"{self.path}: {self.gaps.broken[0]}")
+                pairing.gaps.broken.append(f"{topic} at {stamp // 10**9}.{stamp % 10**9:09d} s: {str(error).partition(chr(10))[0] or type(error).__name__}")
+                if number == 0 and len(pairing.gaps.broken) >= _MOST_BROKEN:
+                    raise _egosgm.InvalidArgument(f"{self.path}: {pairing.gaps.broken[0]}")
 
             def frame_of(pair: Any) -> Iterator[BagFrame]:
                 nonlocal number, last, interval
@@ -365,8 +365,8 @@ class Bag:
                 yield from frame_of(pair)
         if changed:
             raise _egosgm.InvalidArgument(changed)
-        if number == 0 and self.gaps.broken:
-            raise _egosgm.InvalidArgument(f"{self.path}: no pair is whole: {self.gaps.broken[0]}")
+        if number == 0 and pairing.gaps.broken:
+            raise _egosgm.InvalidArgument(f"{self.path}: no pair is whole: {pairing.gaps.broken[0]}")
         if number == 0:
             apart = pairing.gaps.nearest_ms
             if apart is not None and pairing.gaps.are_other_moments(apart):

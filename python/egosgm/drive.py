@@ -189,7 +189,7 @@ class Drive:
                     raise failure
                 under_way = next_one
                 if under_way is None:
-                    self._tell(doubt.text() if doubt else "", motions.doubt())
+                    self._tell(doubt.text() if doubt else "", motions.doubt(), self._source.gaps.text() if isinstance(self._source, Bag) else "")
                     return
                 if starts_anew:
                     pipeline.reset()

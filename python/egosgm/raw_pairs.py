@@ -195,6 +195,8 @@ def _of_list(file: pathlib.Path) -> RawPairs:
         is_time = len(words) < 3 or bool(re.fullmatch(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", words[2]))
         if len(words) not in (2, 3) or not is_time or (len(words) == 3 and not math.isfinite(float(words[2]))):
             raise _refuse(f"{file}:{number}: give LEFT RIGHT or LEFT RIGHT SECONDS")
+        if words[0] == words[1]:
+            raise _refuse(f"{file}:{number}: {words[0]} is the left and the right image; give one of each camera")
         pairs.append((file.parent / words[0], file.parent / words[1], float(words[2]) if len(words) == 3 else None))
     if not pairs:
         raise _refuse(f"{file}: lists no pair")

@@ -119,6 +119,13 @@ class ManySequences(ProgramTest):
             self.assertEqual(file.read_bytes(), (out / "street-1/disparity" / file.name).read_bytes(), file.name)
         self.assertEqual(len(list(out.glob("street-1/disparity/*"))), 2)
         self.assertIn("has no line 4", self.run_line(self.SEQUENCES, out, code=2))
+        whole = self.list.read_text()
+        try:
+            for text, said in (("# none\n", "has no line 0"), (f"name '{self.folder}/s 1' --set \"p1=5\n", "a quote without an end")):
+                self.list.write_text(text)
+                self.assertIn(said, self.run_line(0, out, code=2))
+        finally:
+            self.list.write_text(whole)
 
     def test_a_stopped_sequence_goes_on_and_a_finished_one_is_left_alone(self):
         out = self.new_folder()

@@ -306,6 +306,8 @@ class Rectify(RectifyTest):
             refused(good, name, "neither an image nor a video", arguments=["--side-by-side", self.raw_folder / name])
         (self.raw_folder / "bad.txt").write_text("cam0/9.png\n")
         refused(good, "bad.txt:1", arguments=["--list", self.raw_folder / "bad.txt"])
+        (self.raw_folder / "bad.txt").write_text("cam0/9.png cam0/9.png\n")
+        refused(good, "bad.txt:1", "is the left and the right image", arguments=["--list", self.raw_folder / "bad.txt"])
         self.assertFalse(out.exists())
         self.assert_refused(["rectify", *self.PAIRS, "--calib", file, "--out", self.street], "not empty")
         self.assert_refused(["rectify", *self.PAIRS, "--out", out], "--calib FILE")

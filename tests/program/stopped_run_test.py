@@ -377,6 +377,36 @@ class Resume(LongRuns):
             self.assert_refused([*run, "--resume"], "--resume", f"disparity/{broken:06d}.png", image, "another --out")
             self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
 
+    def test_a_finished_run_that_left_a_pair_out_stays_too(self):
+        street, out = self.broken_street(), self.new_folder() / "out"
+        image = street / f"image_1/{FRAMES - 1:06d}.png"
+        whole = image.read_bytes()
+        os.truncate(image, 1000)
+        run = ["run", "--odometry", street, "--out", out, "--quiet"]
+        self.assertEqual(egosgm(*run).returncode, 0)
+        before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+        image.write_bytes(whole)
+        self.assert_refused([*run, "--resume"], f"disparity/{FRAMES - 1:06d}.png", "left out", "another --out")
+        os.truncate(image, 1000)
+        os.truncate(street / "image_0/000000.png", 1000)
+        self.assert_refused([*run, "--resume"], "disparity/000000.png", "another --out")
+        self.assertEqual({file: file.read_bytes() for file in out.rglob("*") if file.is_file()}, before)
+
+    def test_a_run_that_lost_its_device_goes_on_there(self):
+        """By a report that says so: another device than the one that is here cannot be had."""
+        out = self.new_folder()
+        run = ["run", "--odometry", self.street, "--out", out, "--quiet"]
+        self.assert_works(*run, "--frames", ":1")
+        report = json.loads((out / "report.json").read_text())
+        lost = report["device"]
+        report["device"] = {**lost, "name": "another one"}
+        (out / "report.json").write_text(json.dumps(report))
+        self.assert_refused([*run, "--resume"], "device/name", "another one")
+        report["fallback"] = {"from": lost, "why": "it is gone"}
+        (out / "report.json").write_text(json.dumps(report))
+        self.assert_works(*run, "--resume")
+        self.assertEqual(self.assert_whole(out), FRAMES)
+
     def test_names_that_are_no_utf8(self):
         name = os.fsencode(self.new_folder()) + b"/b\xffseq"
         shutil.copytree(os.fsencode(self.street), name)

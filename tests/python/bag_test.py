@@ -1014,6 +1014,22 @@ def test_a_broken_message_costs_its_pair(tmp_path, street, frames, capfd):
     assert "3 frames" in said and "1 broken message, whose pairs are left out: /right/image_rect at 1700000000.200000000 s: an image of 1x1 px" in said
 
 
+def test_a_drive_warns_of_broken_messages_and_iterations_keep_theirs(tmp_path, street, frames):
+    recording = drive_of(street, [frames[i % FRAMES] for i in range(4)])
+    for received, topic, _, message in recording.messages:
+        if topic == "/right/image_rect" and received == START + 2 * RATE_NS + 1:
+            message.height, message.width, message.step, message.data = 1, 1, 1, np.zeros(1, np.uint8)
+    bag = bags.Bag(recording.write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect")
+    with pytest.warns(UserWarning, match="1 broken message"):
+        assert len(list(egosgm.run(bag, disparities=16))) == 3
+    first = bag.frames()
+    next(first)
+    of_first = bag.gaps
+    next(bag.frames())
+    assert len(list(first)) == 2
+    assert len(of_first.broken) == 1 and not bag.gaps.broken
+
+
 def test_the_first_message_may_be_broken(tmp_path, street, frames, monkeypatch):
     """Cut, so that no decoder reads it."""
     recording = drive_of(street, frames)

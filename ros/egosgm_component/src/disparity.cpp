@@ -107,7 +107,8 @@ class Disparity : public rclcpp::Node {
       return;
     }
     const Image::ConstSharedPtr other = partner->second;
-    for (auto& waiting : waiting_) waiting.clear();  // what is older has lost its partner
+    for (auto& waiting : waiting_)
+      waiting.erase(waiting.begin(), waiting.upper_bound(stamp));  // what is older has lost its partner
     try {
       side == 0 ? process(*image, *other) : process(*other, *image);
     } catch (const std::exception& error) {  // whatever a message held: the next one may be whole

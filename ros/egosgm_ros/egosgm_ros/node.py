@@ -46,7 +46,11 @@ QUEUE_SIZE = 5  # of the middleware, as topics of sensors have it: the node empt
 
 
 def _differ(a: CameraInfo, b: CameraInfo) -> bool:
-    return bool((a.p != b.p).any()) or (a.width, a.height) != (b.width, b.height)
+    def size(info: CameraInfo) -> Tuple[int, ...]:
+        region = info.roi
+        return info.width, info.height, info.binning_x, info.binning_y, region.x_offset, region.y_offset, region.width, region.height
+
+    return bool((a.p != b.p).any()) or size(a) != size(b)
 
 
 class EgosgmNode(LifecycleNode):
@@ -119,6 +123,8 @@ class EgosgmNode(LifecycleNode):
     def on_configure(self, state: Any) -> TransitionCallbackReturn:
         self._clear()
         try:
+            if not 0 <= self._value("tf_wait_s") < np.inf:
+                raise ValueError(f"tf_wait_s {self._value('tf_wait_s')}: give how long an image waits for its motion, 0 or more")
             if not 0 <= self._value("max_skew_ms") < np.inf:
                 raise ValueError(f"max_skew_ms {self._value('max_skew_ms')}: give 0 for equal stamps, or how far they may differ")
             if not self._value("max_depth_sigma") > 0:
