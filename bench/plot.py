@@ -111,7 +111,10 @@ def ablation_table(content):
         above = f"{at['above']:+.2f}"
         return f"{at['value']:.2f} ({f'**{above}**' if at['low'] * at['high'] > 0 else above})"
     header = ["configuration"] + [f"{kind}: bad or missing, bad of valid, interpolated [%]" for kind in kinds] + ["why"]
-    rows = [[row["name"], *(", ".join(map(cell, row["kinds"][kind].values())) for kind in kinds), row["why"]] for row in content["ablation"]]
+
+    def cells(kind):
+        return kind.get("skipped") or ", ".join(map(cell, kind.values()))
+    rows = [[row["name"], *(cells(row["kinds"][kind]) for kind in kinds), row["why"]] for row in content["ablation"]]
     return "### Ablation\n\n" + markdown(header, rows)
 
 

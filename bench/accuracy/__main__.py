@@ -65,7 +65,7 @@ def parse_arguments():
 def figure_or_reason(bench):
     try:
         return paper_figure(bench)
-    except (Missing, Failed) as reason:
+    except Exception as reason:
         return told(reason)
 
 
@@ -93,7 +93,7 @@ def main():
         skipped, code = reasons_of(rows), 0
     elif arguments.video:
         content["video"] = video_tables(bench, re.compile(arguments.only))
-        rows = content["video"]["methods"]["rows"]
+        rows = [row for table in content["video"].values() for row in table["rows"]]
         skipped, code = reasons_of(rows), 0
     else:
         table = ego_motion_table(bench, arguments) if arguments.ego_motion else main_table(bench, arguments)
@@ -117,5 +117,5 @@ def main():
 if __name__ == "__main__":
     try:
         sys.exit(main())
-    except OSError as error:  # a folder or file that cannot be written or read
+    except (OSError, Missing, Failed) as error:  # a folder or file that cannot be written or read, or a module that every row needs
         sys.exit(f"accuracy: {error}")

@@ -2,7 +2,7 @@
 """Every correction on and off, on four kinds of input apart, with bootstrap intervals."""
 import re
 
-from inputs import STEADY_FROM, Missing, expect, told
+from inputs import STEADY_FROM, Failed, expect, told
 
 # What is switched, and why it is there.
 ABLATION = [
@@ -73,21 +73,26 @@ def cases(bench, pattern):
                  lambda s=seed, m=moving: (street(s, m), range(last), range(STEADY_FROM, last)))
                 for moving, seeds in ((False, range(1, 10)), (True, (1, 2, 3))) for seed in seeds]
     found, skipped = [], []
+
+    def skip(title, reason):
+        if (line := f"{title}: {told(reason)}") not in skipped:
+            skipped.append(line)
+            print(line)
     for kind, title, opener in openers:
         if not re.search(pattern, title):
             continue
         try:
             found.append(Case(kind, title, *opener()))
-        except Missing as reason:
-            skipped.append(told(reason))
-            print(skipped[-1])
+        except Exception as reason:
+            skip(title, reason)
     for title, opener in [(name, lambda n=name: figures.Street(expect(bench.data / "rendered" / n))) for name in ("warehouse", "kitchen")] + \
             [(f"street {seed}{', moving' if moving else ''}", lambda s=seed, m=moving: street(s, m)) for seed, moving in ((1, False), (2, False), (1, True))]:
         if not re.search(pattern, title):
             continue
         try:
             video = opener()
-        except Missing:
+        except Exception as reason:
+            skip(title, reason)
             continue
         found += [Case("disturbances", f"{title}, yaw wrong by 1 degree", video, range(7), (4, 5, 6), wrong={4: figures.turned(1, 1)}),
                   Case("disturbances", f"{title}, a gap of 3 frames", video, (0, 1, 2, 6, 7, 8), (6, 7, 8)),
@@ -131,22 +136,35 @@ def ablation(bench, pattern):
     inputs, skipped = cases(bench, pattern)
     kinds = list(dict.fromkeys(case.kind for case in inputs))
     random, draws, of_default, rows = np.random.default_rng(1), {}, {}, []
-    for name, options, why in ABLATION:
-        drawn, found = {kind: [] for kind in kinds}, {kind: [] for kind in kinds}
+
+    def of_kind(kind, options):
+        found, drawn = [], []
         for case in inputs:
+            if case.kind != kind:
+                continue
             counts = counts_by_block(figures, case, options)
             blocks = counts.shape[1]
             if case.title not in draws:
                 draws[case.title] = random.multinomial(blocks, np.full(blocks, 1 / blocks), ROUNDS).T
-            found[case.kind].append(percentages(counts.sum(axis=1)))
-            drawn[case.kind].append(percentages(counts @ draws[case.title]))
+            found.append(percentages(counts.sum(axis=1)))
+            drawn.append(percentages(counts @ draws[case.title]))
+        mean, rounds = np.mean(found, axis=0), np.mean(drawn, axis=0)
+        if not options:
+            of_default[kind] = mean, rounds
+        if kind not in of_default:
+            raise Failed("the default, which all others are compared with")
+        base, base_rounds = of_default[kind]
+        low, high = np.percentile(rounds - base_rounds, [2.5, 97.5], axis=1)
+        return {figure: {"value": float(mean[i]), "above": float(mean[i] - base[i]), "low": float(low[i]), "high": float(high[i])}
+                for i, figure in enumerate(FIGURES)}
+    for name, options, why in ABLATION:
         row = {"name": name, "why": why, "kinds": {}}
         for kind in kinds:
-            mean, rounds = np.mean(found[kind], axis=0), np.mean(drawn[kind], axis=0)
-            base, base_rounds = of_default.setdefault(kind, (mean, rounds))
-            low, high = np.percentile(rounds - base_rounds, [2.5, 97.5], axis=1)
-            row["kinds"][kind] = {figure: {"value": float(mean[i]), "above": float(mean[i] - base[i]), "low": float(low[i]), "high": float(high[i])}
-                                  for i, figure in enumerate(FIGURES)}
+            try:
+                row["kinds"][kind] = of_kind(kind, options)
+            except Exception as reason:
+                row["kinds"][kind] = {"skipped": told(reason)}
+                skipped.append(f"{name}, {kind}: {told(reason)}")
         rows.append(row)
         print_ablation_row(row)
     return rows if inputs else [], skipped
@@ -156,6 +174,7 @@ def print_ablation_row(row):
     """A star: the interval does not hold 0."""
     print(f"\n{row['name']}: {row['why']}")
     for kind, by_figure in row["kinds"].items():
-        cells = [f"{figure} {at['value']:.2f} ({at['above']:+.2f}, {at['low']:+.2f} to {at['high']:+.2f}){'*' if at['low'] * at['high'] > 0 else ''}"
-                 for figure, at in by_figure.items()]
+        cells = [by_figure["skipped"]] if "skipped" in by_figure else [
+            f"{figure} {at['value']:.2f} ({at['above']:+.2f}, {at['low']:+.2f} to {at['high']:+.2f}){'*' if at['low'] * at['high'] > 0 else ''}"
+            for figure, at in by_figure.items()]
         print(f"  {kind:<14} " + "  ".join(cells), flush=True)

@@ -5,7 +5,7 @@ import json
 import shutil
 import statistics
 
-from inputs import SINGLE_FRAME, Failed, Missing, expect, told
+from inputs import SINGLE_FRAME, Missing, expect, measured, told
 
 FIGURES = ("gained_percent", "gained_right_percent", "lost_right_percent", "wrong_of_trusted_percent", "trusted_of_wrong_percent")
 HEADINGS = ["place", "filled, first frame", "filled, last frame", "filled, single frame", "bad of valid, first frame", "bad of valid, last frame",
@@ -118,13 +118,6 @@ def places(bench, only):
     return {"headings": HEADINGS, "rows": with_median(rows, HEADINGS)}
 
 
-def measured(title, measure):
-    try:
-        return measure()
-    except (Missing, Failed) as reason:
-        return [title, told(reason)]
-
-
 def repeat(bench, place):
     """The first pair of a place as a video of its own."""
     folder = bench.work / "evidence" / f"repeated_{place.name}"
@@ -182,7 +175,7 @@ def poles(bench, only):
     if only.search("poles"):
         try:
             rows = pole_rows(bench, planes(bench, "poles"))
-        except (Missing, Failed) as reason:
+        except Exception as reason:
             rows = [["poles", told(reason)]]
     return {"headings": ["width of a pole", f"within {POLE_PX} px, last frame", "single frame"], "rows": rows}
 

@@ -32,7 +32,17 @@ class Failed(Exception):
 
 def told(reason):
     """What stands in a row in place of its figures."""
-    return f"{'failed' if isinstance(reason, Failed) else 'skipped'}: {reason}"
+    if isinstance(reason, Missing):
+        return f"skipped: {reason}"
+    return f"failed: {reason}" if isinstance(reason, Failed) else f"failed: {type(reason).__name__}: {reason}"
+
+
+def measured(title, measure, *parts):
+    """The row that `measure` returns, or one that says why there is none: whatever a row raises, the others are written."""
+    try:
+        return measure()
+    except Exception as reason:
+        return [title, ": ".join((*parts, told(reason)))]
 
 
 def expect(path):

@@ -5,7 +5,7 @@ import pathlib
 import re
 import statistics
 
-from inputs import PAPER, SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect, program_at, scored_frames, settings, told
+from inputs import PAPER, SINGLE_FRAME, STEADY_FROM, Missing, expect, program_at, scored_frames, settings, told
 from tables import Table, shown
 
 HOST_TIMES = {"total", "odometry", "read", "write", "wall"}  # in a report; all others are stages'
@@ -75,7 +75,7 @@ def paper_table(bench, arguments):
             rows.append(row)
             try:
                 row.update(measured(bench, opener(), configuration))
-            except (Missing, Failed) as reason:
+            except Exception as reason:
                 row["skipped"] = told(reason)
                 print(f"{title:<42} {name:<18} {row['skipped']}")
                 continue

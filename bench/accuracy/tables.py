@@ -5,7 +5,7 @@ import math
 import pathlib
 import re
 
-from inputs import Failed, Missing
+from inputs import Missing, told
 
 
 def shown(value):
@@ -47,9 +47,9 @@ class Table:
         try:
             measure()
         except Missing as reason:
-            self.rows.append({"input": source, "figure": f"skipped: {reason}", "skipped": True, "passed": None})
-        except Failed as reason:
-            self.rows.append({"input": source, "figure": f"failed: {reason}", "passed": False})
+            self.rows.append({"input": source, "figure": told(reason), "skipped": True, "passed": None})
+        except Exception as reason:
+            self.rows.append({"input": source, "figure": told(reason), "passed": False})
 
     def print(self):
         print(f"{'input':<42} {'figure':<44} {'value':>10} {'single':>9} {'limit':>10} {'goal':>8}")

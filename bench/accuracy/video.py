@@ -6,12 +6,13 @@ The filters are those of RealSense cameras with their defaults: where a pixel's 
 becomes 0.4 of the new and 0.6 of the old one; else the new one is taken. Holes stay holes. The cameras' unit is 1/32 px; a step of 20 px stands
 beside it. One filter takes the same pixel, the other the pixel that the motion leads to (the nearest surface on top; the motion is EgoSGM's odometry).
 """
+import functools
 import json
 import pathlib
 import shutil
 
 from evidence import print_table, ratios_of
-from inputs import SINGLE_FRAME, STEADY_FROM, Failed, Missing, expect, told
+from inputs import SINGLE_FRAME, STEADY_FROM, Missing, expect, measured, told
 
 ALPHA = 0.4
 OURS, SINGLE = "EgoSGM", "EgoSGM, single frame"
@@ -100,6 +101,11 @@ class Maps:
         (folder / "done").touch()
         return folder
 
+    @functools.cached_property
+    def single(self):
+        """The row of the single frame."""
+        return row_of(self.bench, self, SINGLE)
+
     def run(self, folder, arguments):
         shutil.rmtree(folder)
         self.bench.egosgm("run", *self.video.run_arguments(), *arguments, "--out", folder, "--write", "variance", "--quiet")
@@ -168,23 +174,28 @@ def certainty(maps, method):
     return [float(100 * kept_bad / kept), float(np.mean(np.concatenate(ratios)))] if kept else [None, None]
 
 
-def compared(bench, only):
+def rows_of(bench, openers, steps, row_of_step):
+    """The row of each video and each of `steps`, values by name; None is no row."""
     rows = []
-    for title, opener in videos_of(bench).items():
-        if not only.search(title):
-            continue
+
+    def add(row):
+        if row:
+            rows.append(row)
+            print_row(row)
+    for title, opener in openers.items():
         try:
             maps = Maps(bench, opener())
-        except (Missing, Failed) as reason:
-            rows.append([title, told(reason)])
+        except Exception as reason:
+            add([title, told(reason)])
             continue
-        for method in METHODS:
-            try:
-                rows.append(row_of(bench, maps, method))
-            except (Missing, Failed) as reason:
-                rows.append([title, f"{method}: {told(reason)}"])
-            print_row(rows[-1])
-    return {"headings": HEADINGS, "rows": rows}
+        for name, step in steps.items():
+            add(measured(title, lambda: row_of_step(bench, maps, step), name))
+    return rows
+
+
+def compared(bench, only):
+    openers = {title: opener for title, opener in videos_of(bench).items() if only.search(title)}
+    return {"headings": HEADINGS, "rows": rows_of(bench, openers, {method: method for method in METHODS}, row_of)}
 
 
 def print_row(row):
@@ -210,56 +221,53 @@ def disturbed(np, world_from_camera, degrees, metres, seed=1):
     return np.stack(poses)
 
 
-def curve_videos(bench, only):
-    for title, opener in videos_of(bench).items():
-        if title.startswith(("rendered", "street, seed 1")) and only.search(title):
-            try:
-                yield Maps(bench, opener())
-            except Missing:
-                continue
+def curve(bench, only, steps, row_of_step):
+    openers = {title: opener for title, opener in videos_of(bench).items() if title.startswith(("rendered", "street, seed 1")) and only.search(title)}
+    return rows_of(bench, openers, steps, row_of_step)
+
+
+def noise_name(degrees, metres):
+    return f"{degrees} degrees, {100 * metres:.0f} cm"
+
+
+def noise_row(bench, maps, noise):
+    out = maps.folder / "noise_{}_degrees_{}_m".format(*noise)
+    if not (out / "report.json").exists():
+        poses = maps.folder / f"{out.name}.txt"
+        maps.egosgm.write_poses(poses, disturbed(maps.figures.np, maps.egosgm.read_poses(maps.video.folder / "poses.txt"), *noise))
+        bench.egosgm("run", *maps.video.run_arguments(), "--poses", poses, "--out", out, "--quiet")
+    result = json.loads(bench.egosgm("eval-video", "--estimate", out, *maps.video.eval_arguments(out), "--json"))
+    figures, single = result["figures"], maps.single
+    return [maps.video.title, noise_name(*noise), result["regions"]["all"]["bad_or_missing"], figures["tepe_dynamicstereo_px"], figures["flicker_px"],
+            single[2], single[7], single[12]]
 
 
 def pose_noise(bench, only):
     """True poses, each motion off by so much; the covariance is zero, so that the filter believes them."""
-    rows = []
-    for maps in curve_videos(bench, only):
-        truth = maps.egosgm.read_poses(maps.video.folder / "poses.txt")
-        single = row_of(bench, maps, SINGLE)
-        for degrees, metres in NOISE:
-            out = maps.folder / f"noise_{degrees}_degrees_{metres}_m"
-            if not (out / "report.json").exists():
-                poses = maps.folder / f"{out.name}.txt"
-                maps.egosgm.write_poses(poses, disturbed(maps.figures.np, truth, degrees, metres))
-                bench.egosgm("run", *maps.video.run_arguments(), "--poses", poses, "--out", out, "--quiet")
-            result = json.loads(bench.egosgm("eval-video", "--estimate", out, *maps.video.eval_arguments(out), "--json"))
-            figures = result["figures"]
-            rows.append([maps.video.title, f"{degrees} degrees, {100 * metres:.0f} cm", result["regions"]["all"]["bad_or_missing"],
-                         figures["tepe_dynamicstereo_px"], figures["flicker_px"], single[2], single[7], single[12]])
-            print_row(rows[-1])
+    rows = curve(bench, only, {noise_name(*noise): noise for noise in NOISE}, noise_row)
     return {"headings": ["video", "each motion is off by", "bad or missing", "TEPE, same pixel [px]", "flicker [px]", "single frame: bad or missing",
                          "single frame: TEPE [px]", "single frame: flicker [px]"], "rows": rows}
 
 
+def dropped_row(bench, maps, dropped):
+    frames = maps.sequence.frames
+    last = frames[-1]
+    if dropped + 1 >= len(frames):
+        return None
+
+    def error(folder):
+        truth = maps.video.folder / "truth/left_disp_noc" / f"{last.name}.png"
+        return json.loads(bench.egosgm("eval", folder / f"disparity/{last.name}.png", truth, "--json"))["pooled"]["bad_or_missing"]
+    played, out = maps.folder / f"without_{dropped}", maps.folder / f"out_without_{dropped}"
+    if not (out / "report.json").exists():
+        link_frames(played, [*frames[:len(frames) - 1 - dropped], last], maps.video.folder)
+        bench.egosgm("run", "--odometry", played, "--out", out, "--quiet")
+    return [maps.video.title, str(dropped), error(out), error(maps.of(SINGLE))]
+
+
 def dropped_frames(bench, only):
     """The last frame, when so many frames before it are missing; odometry finds the motion over the gap, or does not."""
-    rows = []
-    for maps in curve_videos(bench, only):
-        frames = maps.sequence.frames
-        last = frames[-1]
-        truth = maps.video.folder / "truth/left_disp_noc" / f"{last.name}.png"
-
-        def error(folder):
-            return json.loads(bench.egosgm("eval", folder / f"disparity/{last.name}.png", truth, "--json"))["pooled"]["bad_or_missing"]
-        single = error(maps.of(SINGLE))
-        for dropped in DROPPED:
-            if dropped + 1 >= len(frames):
-                continue
-            played, out = maps.folder / f"without_{dropped}", maps.folder / f"out_without_{dropped}"
-            if not (out / "report.json").exists():
-                link_frames(played, [*frames[:len(frames) - 1 - dropped], last], maps.video.folder)
-                bench.egosgm("run", "--odometry", played, "--out", out, "--quiet")
-            rows.append([maps.video.title, str(dropped), error(out), single])
-            print_row(rows[-1])
+    rows = curve(bench, only, {str(dropped): dropped for dropped in DROPPED}, dropped_row)
     return {"headings": ["video", "frames dropped before the last one", "bad or missing", "single frame"], "rows": rows}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What bench/accuracy --video compares with: averages in time, and wrong motions."""
+"""What bench/accuracy --video compares with: averages in time, and wrong motions. What its tables hold where a row fails."""
 import pathlib
 import re
 import sys
@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[2] / "bench" / folder) for folder in ("accuracy", "")]
+import ablation  # noqa: E402
+import inputs  # noqa: E402
+import tables  # noqa: E402
 import video  # noqa: E402
 import video_figures as figures  # noqa: E402
 
@@ -39,3 +42,45 @@ def test_maps_of_an_earlier_build_are_no_figures_of_this_one(tmp_path):
     left.mkdir(parents=True)
     video.video_tables(types.SimpleNamespace(work=tmp_path, data=tmp_path), re.compile("no video"))
     assert not left.exists()
+
+
+def fail(*_):
+    raise KeyError("depth")
+
+
+def refuse():
+    raise inputs.Failed("egosgm synth: no room")
+
+
+def test_a_row_that_raises_says_so_and_the_others_are_written(monkeypatch):
+    monkeypatch.setattr(video, "Maps", lambda bench, opened: opened)
+    monkeypatch.setattr(video, "videos_of", lambda bench: {"rendered a": lambda: "a", "rendered b": refuse, "street, seed 1": lambda: "c", "no curve": fail})
+    rows = video.curve(None, re.compile(""), {"whole": 1.0, "broken": None, "no row": 0}, lambda bench, maps, step: [maps, "whole", 1 / step] if step != 0 else None)
+    broken = "broken: failed: TypeError: unsupported operand type(s) for /: 'int' and 'NoneType'"
+    assert rows == [["a", "whole", 1], ["rendered a", broken], ["rendered b", "failed: egosgm synth: no room"], ["c", "whole", 1], ["street, seed 1", broken]]
+
+
+def test_a_group_of_limits_that_raises_says_so():
+    table = tables.Table()
+    table.fill("street", fail)
+    assert table.rows == [{"input": "street", "figure": "failed: KeyError: 'depth'", "passed": False}]
+    assert table.exit_code() == 1
+
+
+def test_an_ablation_keeps_what_was_measured_of_other_kinds(monkeypatch):
+    cases = [ablation.Case(kind, kind, None, [], []) for kind in ("KITTI", "streets", "never")]
+
+    def counts(figures, case, options):
+        if (case.kind == "never" and not options) or (case.kind == "streets" and options.get("paths") == 8):
+            fail()
+        return np.array([[100, 100], [80, 90], [options.get("paths", 4), 4], [10, 10], [10, 10]])
+    monkeypatch.setattr(ablation, "cases", lambda bench, pattern: (cases, []))
+    monkeypatch.setattr(ablation, "counts_by_block", counts)
+    monkeypatch.setattr(ablation, "ABLATION", [("default", {}, ""), ("eight paths", {"paths": 8}, ""), ("no gate", {"gate_px": 0}, "")])
+    egosgm = types.SimpleNamespace(devices=lambda: [types.SimpleNamespace(name="a", driver="b")])
+    rows, skipped = ablation.ablation(types.SimpleNamespace(video_figures=lambda: types.SimpleNamespace(np=np, egosgm=egosgm)), "")
+    assert [[list(row["kinds"][kind])[0] for kind in ("KITTI", "streets", "never")] for row in rows] == [
+        ["bad_or_missing", "bad_or_missing", "skipped"], ["bad_or_missing", "skipped", "skipped"], ["bad_or_missing", "bad_or_missing", "skipped"]]
+    assert rows[1]["kinds"]["KITTI"]["bad_of_valid"]["above"] == pytest.approx(100 * 4 / 170)
+    assert skipped[:2] == ["default, never: failed: KeyError: 'depth'", "eight paths, streets: failed: KeyError: 'depth'"]
+    assert rows[2]["kinds"]["never"]["skipped"] == "failed: the default, which all others are compared with"
