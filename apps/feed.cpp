@@ -5,20 +5,14 @@
 
 #include "apps/interrupt.h"
 #include "egosgm/error.h"
-#include "egosgm/vision/image_io.h"
+#include "host/vision/image_pairs.h"
 
 namespace egosgm::app {
 
 FileFeed::FileFeed(vision::StereoSequence sequence) {
   sequence_ = std::move(sequence);
   size_ = vision::check_image_sizes(sequence_);
-  for (const vision::StereoFrame& frame : sequence_.frames) {
-    try {
-      type_ = vision::read_pixel_type(frame.left);
-      break;
-    } catch (const Error&) {  // the pair is left out
-    }
-  }
+  type_ = vision::first_readable_image(sequence_.frames).depth() == CV_16U ? PixelType::kU16 : PixelType::kU8;
 }
 
 std::optional<FedFrame> FileFeed::next() {

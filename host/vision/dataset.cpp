@@ -143,21 +143,11 @@ KittiCameras cameras_of(const fs::path& folder) {
   return KittiCameras::kAny;
 }
 
-bool are_in_colour(const std::vector<StereoFrame>& frames) {
-  for (const StereoFrame& frame : frames) {
-    try {
-      return read_stored_image(frame.left).channels() == 3;
-    } catch (const Error&) {  // who reads the pair says so
-    }
-  }
-  return false;
-}
-
 /// Of a file with both of KITTI's pairs of cameras, images in colour are of the second one, whatever their folder is
 /// called.
 Calibration calibration_of(const fs::path& file, const fs::path& folder, const std::vector<StereoFrame>& frames) {
   const KittiCameras cameras = cameras_of(folder);
-  if (cameras == KittiCameras::kAny && are_in_colour(frames)) {
+  if (cameras == KittiCameras::kAny && first_readable_image(frames).channels() == 3) {
     try {
       return read_calibration(file, KittiCameras::kColor);
     } catch (const InvalidArgument&) {  // it has one pair alone, or is told below
@@ -291,7 +281,8 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   if (sequence.has_calibration) {
     sequence.calibration = calibration_of(calibration_file, left_pattern.folder, sequence.frames);
   } else {
-    const cv::Size size = read_image_size(sequence.frames.front().left);
+    const cv::Mat image = first_readable_image(sequence.frames);
+    const cv::Size size = image.empty() ? read_image_size(sequence.frames.front().left) : image.size();
     sequence.calibration = {.fx = static_cast<double>(size.width),
                             .fy = static_cast<double>(size.width),
                             .cx = size.width / 2.0,

@@ -4,6 +4,7 @@
 #include <system_error>
 
 #include "egosgm/error.h"
+#include "egosgm/vision/image_io.h"
 
 namespace egosgm::vision {
 namespace {
@@ -45,6 +46,16 @@ ImagePairs find_pairs(const std::string& left, const std::string& right, PairBy 
     }
   }
   return result;
+}
+
+cv::Mat first_readable_image(const std::vector<StereoFrame>& frames) {
+  for (const StereoFrame& frame : frames) {
+    try {
+      return read_stored_image(frame.left);
+    } catch (const Error&) {  // who reads the pair says so
+    }
+  }
+  return {};
 }
 
 std::vector<fs::path> find_images(const std::string& pattern) { return files_in_order(parse_pattern(pattern)); }

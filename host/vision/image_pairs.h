@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <opencv2/core.hpp>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,9 @@ EGOSGM_EXPORT ImagePairs find_pairs(const std::string& left, const std::string& 
 
 /// The files that one pattern names, in order. Throws as open_patterns. Thread-safe.
 EGOSGM_EXPORT std::vector<std::filesystem::path> find_images(const std::string& pattern);
+
+/// The first left image that can be read, as it is stored; empty where there is none. Thread-safe.
+EGOSGM_EXPORT cv::Mat first_readable_image(const std::vector<StereoFrame>& frames);
 
 /// pair_files, where both patterns name one image or both many.
 std::vector<NamedPair> pairs_of_patterns(const NamePattern& left, const NamePattern& right,

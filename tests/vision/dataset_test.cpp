@@ -395,6 +395,7 @@ TEST_F(DatasetTest, ImagesInColourAreOfKittisColourCameras) {
   EXPECT_DOUBLE_EQ(baseline_m("colour", "own.txt"), 0.5);
   add_text("colour/left/0.png", "x"), add_image("colour/right/0.png", 8, 4, CV_8UC3);
   EXPECT_DOUBLE_EQ(baseline_m("colour", "both.txt"), 0.4) << "the first image cannot be read";
+  EXPECT_DOUBLE_EQ(open_patterns(path("colour/left/*.png"), path("colour/right/*.png"), "").calibration.fx, 8);
 }
 
 TEST_F(DatasetTest, TimesAreThoseOfTheSequencesFolder) {
