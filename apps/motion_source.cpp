@@ -97,7 +97,8 @@ void MotionSource::take(const Eigen::Isometry3d& pose, FrameMotion& result) {
 void MotionSource::follow(FrameMotion& result) {
   if (result.motion) last_motion_ = result.motion->current_from_previous;
   if (!poses_.empty()) {
-    first_from_camera_ = poses_.front().inverse() * *last_pose_;
+    if (frames_ == 0) first_pose_ = *last_pose_;
+    first_from_camera_ = first_pose_.inverse() * *last_pose_;
   } else if (frames_ > 0) {
     first_from_camera_ = first_from_camera_ * last_motion_.inverse();
   }

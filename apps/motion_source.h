@@ -19,7 +19,8 @@ struct FrameMotion {
   bool is_given = false;         // else estimated:
   OdometryResult odometry;
   double odometry_ms = 0;
-  Eigen::Isometry3d first_from_camera = Eigen::Isometry3d::Identity();  // the pose in the first frame's system
+  Eigen::Isometry3d first_from_camera =
+      Eigen::Isometry3d::Identity();  // the pose, in the system of the first frame that came
 };
 
 /// Adds --poses, --max-translation and --max-rotation to the group "Method".
@@ -59,6 +60,7 @@ class MotionSource {
   std::optional<StereoOdometry> odometry_;
   std::size_t frames_ = 0;
   std::optional<Eigen::Isometry3d> last_pose_;
+  Eigen::Isometry3d first_pose_ = Eigen::Isometry3d::Identity();  // of the file, of the first frame that came
   Eigen::Isometry3d first_from_camera_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d last_motion_ = Eigen::Isometry3d::Identity();
   std::vector<Eigen::Isometry3d> given_;  // of the first frames, and what odometry found

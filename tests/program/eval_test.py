@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """egosgm synth and eval."""
 import json
+import os
 import shlex
 import shutil
 import subprocess
 import unittest
 
-from program_case import FRAMES, PROGRAM, ProgramTest, grey_png
+from program_case import FRAMES, PROGRAM, ProgramTest, egosgm, grey_png
 
 
 class Synth(ProgramTest):
@@ -118,6 +119,16 @@ class EvalPoses(ProgramTest):
         two = self.new_folder() / "two.txt"
         two.write_text("".join(truth.read_text().splitlines(True)[:2]))
         self.assert_refused(["eval-poses", out, two], two, "holds 2 poses", out / "poses.txt")
+
+    def test_a_run_without_its_first_or_an_inner_pair_against_the_whole_truth(self):
+        for broken in (0, 2):
+            street, out = self.broken_street(), self.new_folder() / "out"
+            os.truncate(street / f"image_0/{broken:06d}.png", 60)
+            self.assertEqual(egosgm("run", street, "--poses", self.street / "poses.txt", "--disparities", 48, "--out", out, "--quiet").returncode, 0)
+            for truth in (self.street / "poses.txt", street):
+                frames, drift = self.drift(out, truth)
+                self.assertEqual(frames, FRAMES - 1)
+                self.assertLess(drift, 1e-5, truth)
 
     def renumbered(self, by):
         """The sequence with other numbers in its names."""
