@@ -13,6 +13,7 @@
 #include "apps/run_outputs.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
+#include "host/vision/frame_panels.h"
 
 namespace egosgm::app {
 namespace {
@@ -39,6 +40,9 @@ void expect_takeable(const RunArguments& arguments, const SequenceJob& job) {
     if (sequence.has_calibration || !job.kinds.contains(kind)) continue;
     throw InvalidArgument(
         fmt::format("--write {}: a disparity is no depth without a calibration: give --calib FILE", kind));
+  }
+  if (job.kinds.contains("overview")) {
+    for (const vision::StereoFrame& frame : sequence.frames) vision::expect_truth_of_size(frame, job.feed->size());
   }
   if (!arguments.has_recording() && !arguments.rerun) return;
   const std::string what = arguments.has_recording() ? "--out " + arguments.out : "--rerun";

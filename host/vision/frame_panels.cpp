@@ -13,6 +13,12 @@ namespace {
 
 constexpr int kOverviewCellWidth = 800;
 
+void expect_size(const std::filesystem::path& truth, cv::Size of_truth, cv::Size of_images) {
+  if (of_truth == of_images) return;
+  throw InvalidArgument(truth.string() +
+                        ": is of another size than the frame's images: remove it, or write no overview");
+}
+
 CaptionedPicture panel(const Layer& layer) {
   if (layer.bar.empty()) return {layer.picture, layer.name};
   cv::Mat both;
@@ -27,14 +33,15 @@ Layer variance_layer(const ShownFrame& shown) {
 
 Layer error_layer(const ShownFrame& shown) {
   const cv::Mat truth = read_disparity(shown.frame.truth_noc);
-  if (truth.size() != shown.disparity.size()) {
-    throw InvalidArgument(shown.frame.truth_noc.string() + ": is of another size than the frame's images: remove it, " +
-                          "or write no overview");
-  }
+  expect_size(shown.frame.truth_noc, truth.size(), shown.disparity.size());
   return {"error [px]", color_error(shown.disparity, truth), error_bar(truth.cols)};
 }
 
 }  // namespace
+
+void expect_truth_of_size(const StereoFrame& frame, cv::Size images) {
+  if (!frame.truth_noc.empty()) expect_size(frame.truth_noc, read_image_size(frame.truth_noc), images);
+}
 
 const ColorRange& FramePanels::disparity_range(const cv::Mat& disparity) {
   if (!range_) range_ = vision::disparity_range(disparity);

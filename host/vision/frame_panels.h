@@ -21,6 +21,9 @@ struct ShownFrame {
   const cv::Mat reasons = {};
 };
 
+/// Throws InvalidArgument where the frame's truth, a PNG, is of another size than its images. Reads the header alone.
+EGOSGM_EXPORT void expect_truth_of_size(const StereoFrame& frame, cv::Size images);
+
 /// A map as a picture, and its colour scale of the same width (none for an image).
 struct Layer {
   std::string name;
