@@ -176,7 +176,11 @@ WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
          vision::write_ply(path, cloud);
          written.cloud = {static_cast<std::int64_t>(cloud.points_m.size()), cloud.left_out};
        }},
-      {"depth", [&](const Path& path) { written.too_far = vision::write_depth_png(path, depth_m()); }},
+      {"depth",
+       [&](const Path& path) {
+         const std::int64_t too_far = vision::write_depth_png(path, depth_m());
+         if (!wants("depth_m")) written.too_far = too_far;
+       }},
       {"depth_m", [&](const Path& path) { vision::write_pfm(path, depth_m()); }}};
   for (const auto& [kind, write] : writers) {
     if (wants(kind)) write(folder_ / output_file(kind, frame.name, options_));

@@ -34,7 +34,7 @@ struct CloudCounts {
 
 struct WrittenFrame {
   std::int64_t unstorable = 0;       // disparities that KITTI's PNG has no room for
-  std::int64_t too_far = 0;          // depths that the PNG of depths has no room for
+  std::int64_t too_far = 0;          // depths that the PNG of depths has no room for, and no other file holds
   std::optional<CloudCounts> cloud;  // where one was written
 };
 

@@ -144,7 +144,7 @@ class Run {
     const bool ahead = pipeline_.device().info().type != DeviceType::kCpu;
     const auto policy = ahead ? std::launch::async : std::launch::deferred;
     Progress progress(static_cast<int>(sequence_.frames.size()), quiet_);
-    if (!sequence_.note.empty()) progress.note(sequence_.note);
+    if (!sequence_.note.empty()) note(sequence_.note, progress);
     if (!sequence_.has_calibration) progress.note(kNoCalibration);
     if (const std::uint64_t mib = pipeline_.device_memory_bytes() >> 20; mib >= kManyMib) {
       progress.note(
@@ -278,26 +278,35 @@ class Run {
     }
     if (written.unstorable > 0 && !warned_of_range_) {
       warned_of_range_ = true;
-      progress.note(fmt::format(
-          "frame {}: {} disparities lie outside KITTI's PNG (0 to 256 px) and are missing there: add --write pfm",
-          frame.name, written.unstorable));
+      note(fmt::format(
+               "frame {}: {} disparities lie outside KITTI's PNG (0 to 256 px) and are missing there: add --write pfm",
+               frame.name, written.unstorable),
+           progress);
     }
     if (written.too_far > 0 && !warned_of_depth_) {
       warned_of_depth_ = true;
-      progress.note(fmt::format(
-          "frame {}: {} depths beyond 65.535 m have no room in OUT/depth and are 0 there: add --write depth_m",
-          frame.name, written.too_far));
+      note(fmt::format(
+               "frame {}: {} depths beyond 65.535 m have no room in OUT/depth and are 0 there: add --write depth_m",
+               frame.name, written.too_far),
+           progress);
     }
     progress.done(fmt::format("frame {}  search {:5.1f} %  density {:5.1f} %  {:.0f} ms{}", frame.name,
                               100 * std::min(1.0, result.search_fraction), 100 * result.density, times.wall_ms,
                               note_of(result)));
   }
 
+  /// Told at once, or at the end where quiet; the report has it, too.
+  void note(const std::string& text, Progress& progress) {
+    progress.note(text);
+    notes_.push_back(text);
+  }
+
   void finish(bool finished, const std::string& why_not) {
     if (taker_) taker_->end(finished);
     const std::string doubt = doubt_.text(), of_poses = motions_.doubt();
-    const std::vector<std::string> notes = feed_.notes();
-    report_.set_doubt(doubt.empty() || of_poses.empty() ? doubt + of_poses : doubt + "; " + of_poses, notes);
+    const std::size_t told = notes_.size();
+    for (std::string& of_feed : feed_.notes()) notes_.push_back(std::move(of_feed));
+    report_.set_doubt(doubt.empty() || of_poses.empty() ? doubt + of_poses : doubt + "; " + of_poses, notes_);
     if (has_folder() && sequence_.has_calibration && !poses_.empty())
       vision::write_poses(folder_.path() / "poses.txt", poses_);
     write_report(finished, why_not);
@@ -305,7 +314,7 @@ class Run {
     if (!finished) return;
     if (quiet_) {
       if (left_out_ > 0) say("egosgm: " + text_of_left_out());
-      for (const std::string& note : notes) say("egosgm: " + note);
+      for (const std::string& note : notes_) say("egosgm: " + note);
       return;
     }
     fmt::print("{}, {}, {}x{}, on {}\n", sequence_.title, counted(poses_.size(), "frame"), size_.width, size_.height,
@@ -315,7 +324,7 @@ class Run {
                folder_.path().string());
     if (left_out_ > 0) fmt::print("{}\n", text_of_left_out());
     if (clouds_) fmt::print("{}\n", text_of(*clouds_, cloud_options_));
-    for (const std::string& note : notes) fmt::print("{}\n", note);
+    for (std::size_t i = told; i < notes_.size(); ++i) fmt::print("{}\n", notes_[i]);
     if (!of_poses.empty()) fmt::print("{}\n", of_poses);
     if (!doubt.empty()) fmt::print("{}: `egosgm doctor {}` tells why\n", doubt, input_);
   }
@@ -372,6 +381,7 @@ class Run {
   std::string summary_;
   std::size_t fed_ = 0, left_out_ = 0;
   std::string first_left_out_;  // why
+  std::vector<std::string> notes_;
   bool warned_of_range_ = false, warned_of_depth_ = false;
 };
 
