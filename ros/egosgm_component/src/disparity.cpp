@@ -48,10 +48,16 @@ struct Matching {
         pipeline(calibration, width, height, options, device),
         odometry(calibration) {}
 
+  void reset() {
+    pipeline.reset();
+    odometry.reset();
+  }
+
   egosgm::Calibration calibration;
   int width, height;
   egosgm::Pipeline pipeline;
   egosgm::StereoOdometry odometry;
+  std::optional<std::int64_t> last_stamp;
 };
 
 class Disparity : public rclcpp::Node {
@@ -112,10 +118,7 @@ class Disparity : public rclcpp::Node {
     try {
       side == 0 ? process(*image, *other) : process(*other, *image);
     } catch (const std::exception& error) {  // whatever a message held: the next one may be whole
-      if (matching_) {                       // one of them may have gone on without the other
-        matching_->pipeline.reset();
-        matching_->odometry.reset();
-      }
+      if (matching_) matching_->reset();     // one of its parts may have gone on without the other
       RCLCPP_ERROR_THROTTLE(get_logger(), *get_clock(), 1000, "%s", error.what());
     }
   }
@@ -132,6 +135,9 @@ class Disparity : public rclcpp::Node {
     if (!infos_[0] || !infos_[1]) throw std::runtime_error("no camera info yet of both cameras");
     if (!matching_) matching_ = std::make_unique<Matching>(*infos_[0], *infos_[1], options_, device_);
     Matching& m = *matching_;
+    const std::int64_t stamp = rclcpp::Time(left.header.stamp).nanoseconds();
+    if (m.last_stamp && stamp <= *m.last_stamp) m.reset();  // a bag that starts over
+    m.last_stamp = stamp;
 
     auto found = std::make_unique<DisparityImage>();
     found->header = left.header;
