@@ -201,9 +201,13 @@ class Cameras:
         return self._rectification.rectify(left, right) if self._rectification else (left, right)
 
 
+def is_named_rect(topic: str) -> bool:
+    return any(re.search("(^|_)rect", part) for part in topic.split("/")[-2:])
+
+
 def are_raw(info: Any, topic: str) -> bool:
     """Whether images of this camera need rectifying, by its name and its distortion."""
-    if any(re.search("(^|_)rect", part) for part in topic.split("/")[-2:]):
+    if is_named_rect(topic):
         return False
     return bool(np.any(_distortion(info) != 0)) or not np.allclose(_matrix(info, "R", 3, 3), np.eye(3), atol=1e-9)
 

@@ -271,10 +271,10 @@ class Parameters(unittest.TestCase):
         rclpy.init(domain_id=os.getpid() % 100)
         self.addCleanup(rclpy.shutdown)
 
-    def node(self, **parameters):
+    def node(self, *arguments, **parameters):
         from egosgm_ros.node import EgosgmNode
         from rclpy.parameter import Parameter
-        node = EgosgmNode(parameter_overrides=[Parameter(name, value=value) for name, value in parameters.items()])
+        node = EgosgmNode(parameter_overrides=[Parameter(name, value=value) for name, value in parameters.items()], cli_args=arguments)
         self.addCleanup(node.destroy_node)
         return node
 
@@ -351,6 +351,22 @@ class Parameters(unittest.TestCase):
             node.destroy_node()
         self.assertRegex(told[0][0], r"^\d+ % of the image is nearer than the range \(disparities:=\d+\)$")
         self.assertEqual([told[0][1], *told[1]], [1, "", 0])
+
+    def test_a_rectified_and_a_raw_topic_are_told(self):
+        for left, right, is_told in (("cam/left/image_rect", "cam/right/image_raw", True), ("image_raw", "image_rect_color", True), ("a/image_rect", "b/image_rect", False),
+                                     ("a/image_raw", "b/image_raw", False)):
+            node = self.node("--ros-args", "-r", f"left/image_rect:={left}", "-r", f"right/image_rect:={right}")
+            said, warned = [], []
+            node.get_logger().warning = warned.append
+            node._diagnostics.publish = lambda message: said.append(message.status[0])
+            node.trigger_configure()
+            node.trigger_activate()
+            node._count += 1
+            node._tell()
+            node.trigger_deactivate()
+            self.assertEqual([text.startswith("by their names, /") and f"/{left}" in text and f"/{right}" in text for text in warned], [True] * is_told, warned)
+            self.assertEqual((said[-1].level, said[-1].message), (b"\1", warned[0]) if is_told else (b"\0", "matching"))
+            node.destroy_node()
 
     def test_the_newest_pair_comes_next(self):
         """Whatever waited meanwhile."""

@@ -27,7 +27,7 @@ from stereo_msgs.msg import DisparityImage
 
 import egosgm
 from egosgm.bag import Pairing
-from egosgm.ros_images import Cameras, grey_of, rgb_of, stamp_ns, variance_of_depth
+from egosgm.ros_images import Cameras, grey_of, is_named_rect, rgb_of, stamp_ns, variance_of_depth
 from egosgm_ros.messages import Path, disparity_of, image_of, odometry_of, points_of, transform_of
 from egosgm_ros.tf_motion import TfMotion, tf2_ros
 
@@ -97,6 +97,7 @@ class EgosgmNode(LifecycleNode):
         self._report: Optional[egosgm.FrameReport] = None
         self._latency_ms = 0.0
         self._suspicion, self._suspicion_told = "", False
+        self._topics_doubt = ""
         self._told_at = time.monotonic()
         self._warned_at: Dict[str, float] = {}
         self._waits_since = self._told_at  # for a pair
@@ -172,7 +173,18 @@ class EgosgmNode(LifecycleNode):
         self._waits_since = time.monotonic()
         topics = " ".join(subscription.topic_name for subscription in self._inputs)
         self.get_logger().info(f"active: waits for {topics} ({'reliable' if self._value('reliable') else 'best effort'})")
+        self._topics_doubt = self._doubt_of(*(subscription.topic_name for subscription in self._inputs[1::2]))
+        if self._topics_doubt:
+            self.get_logger().warning(self._topics_doubt)
         return super().on_activate(state)
+
+    @staticmethod
+    def _doubt_of(left: str, right: str) -> str:
+        """What speaks against two topics of images."""
+        if is_named_rect(left) == is_named_rect(right):
+            return ""
+        rectified, raw = (left, right) if is_named_rect(left) else (right, left)
+        return f"by their names, {rectified} is rectified and {raw} is not: remap both cameras' image_rect to rectified images"
 
     def on_deactivate(self, state: Any) -> TransitionCallbackReturn:
         self._stop()
@@ -360,8 +372,8 @@ class EgosgmNode(LifecycleNode):
             status.level, status.message = DiagnosticStatus.WARN, "; ".join(losses)
         elif self._doubt:
             status.level, status.message = DiagnosticStatus.WARN, self._doubt
-        elif self._suspicion:
-            status.level, status.message = DiagnosticStatus.WARN, self._suspicion
+        elif self._topics_doubt or self._suspicion:
+            status.level, status.message = DiagnosticStatus.WARN, self._topics_doubt or self._suspicion
         values = {"rate_hz": f"{rate:.2f}", "frames": str(self._count), "replaced": str(self._replaced), "lost_on_the_way": str(self._lost_on_the_way)}
         if self._is_active:
             values["listened_to"] = " ".join(sorted(self._listened_to()))
