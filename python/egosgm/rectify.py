@@ -122,11 +122,10 @@ class _SequenceFolder:
         _egosgm._write_new_file(self._folder / name, cv2.imencode(".png", image)[1].tobytes())
 
     def _writable(self, image: Any) -> Any:
-        """PNGs here are grey of 8 or 16 bits, or colour of 8."""
+        """Grey, or all in colour as the first one."""
         if not self._is_colour:
             return image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-        image = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR if image.ndim == 2 else cv2.COLOR_RGB2BGR)
-        return cv2.convertScaleAbs(image, alpha=1 / 257) if image.dtype == "uint16" else image
+        return cv2.cvtColor(image, cv2.COLOR_GRAY2BGR if image.ndim == 2 else cv2.COLOR_RGB2BGR)
 
 
 class _Lines:

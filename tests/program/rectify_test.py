@@ -228,6 +228,17 @@ class Rectify(RectifyTest):
             self.assertTrue((read_grey(out / f"image_{side}/000000.png") == images[side]).all())
         self.assertIn("rectified already", text)
 
+    def test_colour_of_16_bits_stays_so(self):
+        import cv2
+        both = self.new_folder() / "both.png"
+        image = numpy.random.default_rng(1).integers(0, 65536, (HEIGHT, 2 * WIDTH, 3)).astype(numpy.uint16)
+        cv2.imwrite(str(both), image)
+        out, _ = self.rectify("--side-by-side", both, calib=(self.street / "calib.txt").read_text())
+        for side in (0, 1):
+            found = cv2.imread(str(out / f"image_{side + 2}/000000.png"), cv2.IMREAD_UNCHANGED)
+            numpy.testing.assert_array_equal(found, image[:, side * WIDTH:(side + 1) * WIDTH])
+        self.assert_works("run", out, "--disparities", 16, "--write", "cloud", "--out", self.new_folder(), "--quiet")
+
     def test_a_bad_file_leaves_the_pairs_before_it_as_a_sequence(self):
         street, out = self.broken_street(), self.new_folder() / "out"
         os.truncate(street / "image_1/000003.png", 1000)
