@@ -5,6 +5,7 @@ import importlib
 import json
 import os
 import pathlib
+import re
 import signal
 import sys
 import threading
@@ -68,9 +69,23 @@ def _run_program(arguments: Sequence[str]) -> int:
     return _egosgm._main([os.fsencode(argument) for argument in arguments], bag_program)
 
 
+def _package_of(error: ImportError) -> str:
+    """What does not load: by the error's name; without one, whose code raised it, or what a line of this package was to load."""
+    if error.name:
+        return error.name.partition(".")[0]
+    for (frame, _), place in zip([*traceback.walk_tb(error.__traceback__)][::-1], traceback.extract_tb(error.__traceback__)[::-1]):
+        package = frame.f_globals.get("__name__", "").partition(".")[0]
+        if package == "egosgm":
+            loaded = re.match(r"(?:import|from) (\w+)", place.line or "")
+            return loaded[1] if loaded else ""
+        if "importlib" not in package:
+            return package
+    return ""
+
+
 def _lacking(command: str, error: Exception) -> str:
     """Of a package that is not there, or that lacks a library; empty of any other error."""
-    package = (error.name or "").partition(".")[0] if isinstance(error, ImportError) else ""
+    package = _package_of(error) if isinstance(error, ImportError) else ""
     if package in ("", "egosgm"):
         return ""
     why = f"{sys.executable} does not find" if isinstance(error, ModuleNotFoundError) else f"does not load ({error})"

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 
 import numpy as np
 import pytest
@@ -352,7 +353,24 @@ def test_the_dynamic_map_finds_what_moves():
     assert marked[~moving].mean() < 0.05
 
 
-def test_a_defect_of_a_tool_is_told_in_one_line(monkeypatch, capfd):
+def nameless_import_error(name, monkeypatch, folder):
+    """A tool that loads the module `name`, which raises an error: by a line of its own, or, as one in C does, without."""
+    if name == "by_hand":
+        (folder / "by_hand.py").write_text("raise ImportError('too old')\n")
+        monkeypatch.syspath_prepend(folder)
+    else:
+        loader = {"__name__": "importlib.of_c"}  # a frame of no module
+        exec("def find_spec(name, *_):\n if name == 'in_c': raise ImportError('too old')", loader)
+        monkeypatch.setattr(sys, "meta_path", [types.SimpleNamespace(find_spec=loader["find_spec"]), *sys.meta_path])
+    tool = folder / f"tool_{name}.py"
+    tool.write_text(f"def main(arguments):\n    import {name}\n")
+    spec = importlib.util.spec_from_file_location(f"egosgm.{tool.stem}", tool)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.main
+
+
+def test_a_defect_of_a_tool_is_told_in_one_line(monkeypatch, capfd, tmp_path):
     def broken(arguments):
         raise RuntimeError("one\ntwo")
 
@@ -363,6 +381,10 @@ def test_a_defect_of_a_tool_is_told_in_one_line(monkeypatch, capfd):
     monkeypatch.setattr(cloud, "main", without_a_library)
     assert program.run_tool(["cloud"]) == 1
     assert "cv2, which does not load (libGL.so.1: cannot open shared object file): pip install opencv-python-headless" in capfd.readouterr().err
+    for name in ("by_hand", "in_c"):  # whose import errors name no module
+        monkeypatch.setattr(cloud, "main", nameless_import_error(name, monkeypatch, tmp_path))
+        assert program.run_tool(["cloud"]) == 1
+        assert capfd.readouterr().err == f"egosgm: error: cloud: needs the Python module {name}, which does not load (too old): pip install {name}\n"
     monkeypatch.setattr(cloud, "main", broken)
     assert program.run_tool(["cloud"]) == 1
     assert re.fullmatch(r"egosgm: error: RuntimeError: one two \(egosgm_test.py:\d+; this is a defect of the program: please report it\)\n", capfd.readouterr().err)
