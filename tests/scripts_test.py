@@ -3,10 +3,12 @@
 import os
 import pathlib
 import re
+import runpy
 import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 
 SCRIPTS = pathlib.Path(__file__).resolve().parents[1] / "scripts"
 SHARED = ("usage.sh", "usage.py")
@@ -51,6 +53,15 @@ class Scripts(unittest.TestCase):
                     self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
                     self.assertRegex(done.stderr, r"\A[^\n]+\n\Z")
                     self.assertIn(arguments[0], done.stderr)
+
+    def test_same_bits_names_what_differs_is_missing_or_came(self):
+        with unittest.mock.patch.object(sys, "path", [str(SCRIPTS), *sys.path]):
+            differences = runpy.run_path(str(SCRIPTS / "same-bits"))["differences"]
+        before = {"images": {"street": {"image_0": ["a"]}}, "runs": {"default": {"disparity": ["a", "b", "c"], "pfm": ["d"]}}}
+        for change, named in (({"disparity": ["a", "b", "c"], "pfm": ["d"]}, []), ({"disparity": ["a", "x", "c"], "pfm": ["d"]}, ["default: disparity of frame 1"]),
+                              ({"disparity": ["a"], "pfm": ["d"]}, ["default: disparity of frame 1, 2"]), ({"disparity": ["a", "b", "c"]}, ["default: pfm of frame 0"]),
+                              ({"disparity": ["a", "b", "c", "e"], "pfm": ["d"], "right": ["f"]}, ["default: disparity of frame 3", "default: right of frame 0"])):
+            self.assertEqual(differences(before, {"images": before["images"], "runs": {"default": change, "new": {"pfm": ["g"]}}}), named)
 
     def test_a_word_too_many_is_refused(self):
         for name, arguments in {"install-dependencies": ["--program", "again"], "format": ["--check", "all"], "measure": ["--build", "b", "c"],
