@@ -3,9 +3,9 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "apps/command.h"
 #include "apps/counted.h"
@@ -190,9 +190,8 @@ bool are_possible(const DisparityCounts& c) {
          c.bad_interpolated <= c.truth && c.d1_interpolated <= c.bad_interpolated;
 }
 
-/// The counts of each pair of a report. Throws InvalidArgument and IoError.
-std::vector<DisparityCounts> counts_of(const std::string& file) {
-  const Json report = parse_json(vision::read_file(file, kMaxReportBytes), file);
+/// The counts of each pair of a report. Throws InvalidArgument.
+std::vector<DisparityCounts> counts_of(const Json& report, const std::string& file) {
   std::vector<DisparityCounts> all;
   bool is_sound = true;
   try {
@@ -213,12 +212,15 @@ std::vector<DisparityCounts> counts_of(const std::string& file) {
 int merge(const EvalArguments& arguments) {
   Result result;
   DisparityCounts pooled;
-  std::set<std::filesystem::path> read;
+  std::map<std::string, std::string> read;  // pairs of a report, and the first file that holds them
   for (const std::string& file : arguments.reports) {
-    if (!read.insert(std::filesystem::weakly_canonical(file)).second) {
-      throw InvalidArgument("--merge " + file + ": is given twice, so that its pixels would count twice");
+    const Json report = parse_json(vision::read_file(file, kMaxReportBytes), file);
+    const std::vector<DisparityCounts> all = counts_of(report, file);
+    if (const auto [first, is_new] = read.emplace(report["pairs"].dump(), file); !is_new) {
+      throw InvalidArgument("--merge " + file + ": holds the pairs of " + first->second +
+                            ", whose pixels would count twice: give each report once");
     }
-    for (const DisparityCounts& counts : counts_of(file)) {
+    for (const DisparityCounts& counts : all) {
       result.each.push_back(vision::metrics_of(counts));
       pooled += counts;
     }

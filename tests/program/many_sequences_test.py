@@ -175,7 +175,10 @@ class ManySequences(ProgramTest):
         for broken in ('{"pairs": [{}]}', '{"pairs": []}', *(re.sub(r'"truth": \d+', f'"truth": {count}', text) for count in ("-5", "1", "1.5", "1e300", "true"))):
             (out / "no.json").write_text(broken)
             self.assert_refused(["eval", "--merge", reports[1], out / "no.json"], "no.json", "egosgm eval --json")
-        self.assert_refused(["eval", "--merge", reports[0], out / f"../{out.name}/0.json"], "0.json", "is given twice")
+        copy = self.new_folder() / "copy.json"
+        copy.write_text(json.dumps(json.loads(reports[0].read_text())))
+        for again in (out / f"../{out.name}/0.json", copy):
+            self.assert_refused(["eval", "--merge", *reports, again], again, f"holds the pairs of {reports[0]}", "once")
         self.assert_refused(["eval", "--merge", reports[0], "--mask", reports[1]], "--merge")
         self.assert_refused(["eval", out / "street-0", "--merge", reports[0]], "--merge")
 
