@@ -14,8 +14,10 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/device_arguments.h"
+#include "apps/interrupt.h"
 #include "apps/option_arguments.h"
 #include "apps/output_folder.h"
+#include "apps/standard_output.h"
 #include "egosgm/error.h"
 #include "egosgm/programs.h"
 #include "host/vision/file_io.h"
@@ -29,7 +31,7 @@ struct CompileArguments {
   bool spirv = false;
 };
 
-/// Ends with an error where `command` does, which says itself what is wrong.
+/// Ends with an error where `command` does, which says itself what is wrong, or where an interrupt came meanwhile.
 void expect_success(const std::vector<std::string>& command) {
   std::vector<char*> words;
   for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));
@@ -42,7 +44,8 @@ void expect_success(const std::vector<std::string>& command) {
   }
   while (waitpid(process, &status, 0) < 0 && errno == EINTR) {
   }
-  if (status != 0) throw InvalidArgument("compile --il: " + command.front() + " failed: choose another version of it");
+  if (status != 0 || interrupted())
+    throw InvalidArgument("compile --il: " + command.front() + " failed: choose another version of it");
 }
 
 /// A folder that goes with it.
@@ -100,12 +103,17 @@ std::vector<ProgramFile> compile_to_spirv(const Device& device, const PipelineOp
 }
 
 int compile(const CompileArguments& arguments) {
+  catch_interrupts();
   const PipelineOptions options = arguments.method.options();
   arguments.method.expect_saves(arguments.out);
   const std::filesystem::path folder = new_folder("--out", arguments.out);
   const Device device = Device::select(arguments.device);
   const std::vector<ProgramFile> files =
       arguments.spirv ? compile_to_spirv(device, options, arguments) : compile_programs(device, options);
+  if (interrupted()) {
+    say("egosgm: interrupted: nothing is written");
+    return kInterrupted;
+  }
   const vision::KeepFiles others;
   arguments.method.save(options);
   vision::make_folder(folder);

@@ -3,14 +3,21 @@
 
 #include "apps/command.h"
 #include "apps/counted.h"
+#include "apps/interrupt.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
+#include "apps/standard_output.h"
 #include "egosgm/vision/synthetic.h"
 #include "host/vision/file_io.h"
 
 namespace egosgm::app {
 namespace {
+
+/// By an interrupt, after so many frames.
+struct Stopped {
+  int frames;
+};
 
 struct SynthArguments {
   std::string out;
@@ -21,12 +28,18 @@ struct SynthArguments {
 int render(const SynthArguments& arguments) {
   arguments.options.validate();
   const std::filesystem::path folder = new_folder("--out", arguments.out);
-  {
+  catch_interrupts();
+  try {
     const vision::KeepFiles others;
     Progress progress(arguments.options.frames, arguments.quiet);
     vision::write_sequence(arguments.options, folder, [&](int done, int frames) {
       progress.done(fmt::format("rendered {} of {}", done, frames));
+      if (done < frames && interrupted()) throw Stopped{done};
     });
+  } catch (const Stopped& stopped) {
+    say(fmt::format("egosgm: interrupted after {} of {} frames, which are whole in {}", stopped.frames,
+                    arguments.options.frames, arguments.out));
+    return kInterrupted;
   }
   if (!arguments.quiet) {
     fmt::print("{} in {}: egosgm run --odometry {} --out OUT\n", counted(arguments.options.frames, "frame"),

@@ -168,14 +168,19 @@ std::string text_of(const std::vector<NamedOption>& sizes) {
   return text;
 }
 
+int stopped(const std::filesystem::path& file) {
+  say(fmt::format("egosgm: interrupted: nothing is kept, {} is as it was", file.string()));
+  return kInterrupted;
+}
+
 int tune(const TuneArguments& arguments) {
+  catch_interrupts();
   const Device device = Device::select(arguments.device).with_cache(arguments.cache);
   const std::filesystem::path file =
       arguments.file.empty() ? user_tuning_file() : std::filesystem::path(arguments.file);
   if (file.empty()) throw InvalidArgument("tune: neither XDG_CONFIG_HOME nor HOME is set: give --file FILE");
   const std::vector<Trial> trials = trials_of(arguments.stage, device.info());
   expect_tuning_file(file);
-  catch_interrupts();
   Course course(arguments, device);
   Tuning best = kept_beside(trials, file, device.info());
   const std::vector<StageTime> untuned = course.run(best);
@@ -184,10 +189,7 @@ int tune(const TuneArguments& arguments) {
     double least = ms_of(untuned, trial.stages);
     print_now(fmt::format("{}: {:.3f} ms with its defaults\n", fmt::join(trial.stages, " + "), least));
     for (const std::vector<NamedOption>& sizes : trial.candidates) {
-      if (interrupted()) {
-        say(fmt::format("egosgm: interrupted: nothing is kept, {} is as it was", file.string()));
-        return kInterrupted;
-      }
+      if (interrupted()) return stopped(file);
       Tuning candidate = best;
       for (const auto& [name, value] : sizes) set_tuning(candidate, name, value);
       double ms = 0;
@@ -202,6 +204,7 @@ int tune(const TuneArguments& arguments) {
       if (is_better) best = candidate, least = ms;
     }
   }
+  if (interrupted()) return stopped(file);
   store_tuning(file, device.info(), best);
   fmt::print("Kept for {}, driver {}: {}\n", device.info().name, device.info().driver, file.string());
   return kOk;

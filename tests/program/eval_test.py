@@ -4,6 +4,7 @@ import json
 import os
 import shlex
 import shutil
+import signal
 import subprocess
 import unittest
 
@@ -27,6 +28,17 @@ class Synth(ProgramTest):
             result = json.loads(self.assert_works("eval", "--estimate", truth, "--truth", truth, "--json"))
             self.assertEqual(any(pair["counts"]["sky"] for pair in result["pairs"]), sky)
             self.assertEqual(result["pooled"]["wrong_of_all"], 0)
+
+    def test_an_interrupt_leaves_whole_frames(self):
+        street = self.new_folder() / "street"
+        process = self.started("synth", "--out", street, "--frames", 40, "--width", 80, "--height", 40)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=900)
+        self.assertEqual(process.returncode, 130, errors)
+        self.assertRegex(errors, r"\Aegosgm: interrupted after [1-9]\d* of 40 frames, .*street\n\Z")
+        frames = int(errors.split()[3])
+        for folder in ("image_0", "image_1", "truth/left_disp_occ", "truth/left_disp_noc", "truth/right_disp_occ", "truth/right_disp_noc"):
+            self.assertEqual(sorted(file.name for file in (street / folder).iterdir()), [f"{i:06d}.png" for i in range(frames)], folder)
 
     def test_the_command_that_it_names_can_be_pasted(self):
         street = self.new_folder() / "it's a street"

@@ -20,6 +20,19 @@ METHOD = ("--disparities", 32)
 
 
 class Compile(ProgramTest):
+    def test_an_interrupt_leaves_nothing(self):
+        """It comes while a compiler runs, which may end by it, too, or have done its part."""
+        tools, scratch, out = self.new_folder(), self.new_folder(), self.folder / "never"
+        compiler = tools / "compiler"
+        for code in (0, 1):
+            compiler.write_text(f"#!/bin/sh\nkill -INT $PPID\nfor file; do :; done\necho >> {tools}/calls\ntouch $file\nexit {code}\n")
+            compiler.chmod(0o755)
+            done = egosgm("compile", "--il", "--clang", compiler, "--llvm-spirv", compiler, "--out", out, *METHOD, env=dict(os.environ, TMPDIR=str(scratch)))
+            self.assertEqual((done.returncode, done.stdout, done.stderr), (130, "", "egosgm: interrupted\n"))
+            self.assertFalse(out.exists())
+            self.assertEqual(list(scratch.iterdir()), [])
+        self.assertEqual(len((tools / "calls").read_text()), 2)  # once each time
+
     def test_the_same_bits_as_compiling_and_refused_elsewhere(self):
         programs, compiled, loaded = self.new_folder() / "programs", self.new_folder(), self.new_folder()
         self.assertIn("programs for", self.assert_works("compile", "--out", programs, "--disparities", 32))
