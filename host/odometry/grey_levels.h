@@ -9,8 +9,8 @@
 
 namespace egosgm::odometry {
 
-/// How values of 16 bits become 8: what nearly all pixels hold fills the 8 bits. A pedestal below and a few hot pixels
-/// above do not count; where neither is there, values are shifted alone.
+/// How values become 8 bits: what nearly all pixels hold fills the 8 bits. A pedestal below and a few hot pixels
+/// above do not count; where neither is there, values of 16 bits are shifted alone, and those of 8 bits stay.
 struct GreyLevels {
   int pedestal = 0, gain = 1, shift = 0;
 
@@ -19,7 +19,7 @@ struct GreyLevels {
   }
 };
 
-/// Of both images of a pair, so that they stay comparable. REQUIRES: both are kU16.
+/// Of both images of a pair, so that they stay comparable. REQUIRES: both are of one type.
 EGOSGM_EXPORT GreyLevels levels_of(const ImageView& left, const ImageView& right);
 
 }  // namespace egosgm::odometry
