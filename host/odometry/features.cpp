@@ -120,7 +120,11 @@ void to_grey(const ImageView& image, const GreyLevels& levels, GreyImage& grey) 
     const std::uint8_t* source = view_row(image, y);
     std::uint8_t* row = grey.row(y);
     if (image.type == PixelType::kU8) {
-      for (int x = 0; x < image.width; ++x) row[x] = levels(source[x]);
+      if (levels == GreyLevels{}) {
+        std::memcpy(row, source, image.width);
+      } else {
+        std::transform(source, source + image.width, row, levels);
+      }
       continue;
     }
     const auto* wide = reinterpret_cast<const std::uint16_t*>(source);

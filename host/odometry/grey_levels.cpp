@@ -10,7 +10,7 @@ constexpr std::int64_t kOutliers = 2000;   // one in so many pixels may lie belo
 constexpr std::int64_t kHighlights = 100;  // or one in so many above, where all else is kFarAbove times darker
 constexpr int kFarAbove = 4;
 constexpr int kFewLevels = 64;  // a range that fills no more of the 255 is stretched
-constexpr int kRowStep = 4;     // of 8 bits, that say what is dark with fewer pixels
+constexpr int kRowStep = 16;    // of 8 bits, that say what is dark with fewer pixels
 
 template <typename Pixel>
 void count(const char* pixels, int width, std::vector<std::int64_t>& counts) {

@@ -14,6 +14,7 @@ namespace egosgm::odometry {
 struct GreyLevels {
   int pedestal = 0, gain = 1, shift = 0;
 
+  bool operator==(const GreyLevels&) const = default;
   std::uint8_t operator()(int value) const {
     return static_cast<std::uint8_t>(std::min(255, (std::max(0, value - pedestal) * gain) >> shift));
   }
