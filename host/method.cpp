@@ -96,8 +96,8 @@ Method::Method(ocl::Context& context, shared::ImageSize size, const Calibration&
                   alignment = options.vertical_alignment](PixelType type) {
         return VerticalAlignment(context, size, type, alignment, sums, tuning.row_group);
       }),
-      search_(context, size, options, tuning),
       match_(context, size, options, tuning),
+      search_(context, size, options, tuning),
       publish_(context, size, options) {
   if (!options.temporal) return;
   predict_.emplace(context, size, calibration, options, tuning);

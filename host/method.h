@@ -79,8 +79,8 @@ class Method {
   const VerticalOffset unknown_;
   std::optional<PredictRoom> predict_;
   OfEachType<VerticalAlignment> alignment_;
+  MatchRoom match_;  // before SearchRoom: what it allocates is large enough for the coarse match, too
   SearchRoom search_;
-  MatchRoom match_;
   std::optional<FuseRoom> fuse_;
   PublishRoom publish_;
 };

@@ -124,8 +124,8 @@ BandedSgm::Wavefront::Wavefront(ocl::Context& context, shared::ImageSize size, s
     : stage(context, "BandedSgm", "banded_sgm.cl", size, 0, defines(context, range, options, chosen), ocl::Joins::kNo),
       tile(chosen),
       views(at_once),
-      slots(context, slot_bytes(size, chunks_of(range, tile), options.paths, views)),
-      sums(context, sum_bytes(size, chunks_of(range, tile), views)),
+      slots(context, ocl::Scratch::kOfStage1, slot_bytes(size, chunks_of(range, tile), options.paths, views)),
+      sums(context, ocl::Scratch::kOfStage0, sum_bytes(size, chunks_of(range, tile), views)),
       to_middle(stage, "sweep_to_middle"),
       from_middle(stage, "sweep_from_middle") {}
 

@@ -68,10 +68,10 @@ BandedSgmPaths::BandedSgmPaths(ocl::Context& context, shared::ImageSize size, sh
              ocl::Joins::kNo),
       paths_(options.paths),
       group_(group),
-      forward_first_(context, sum_bytes(context, size, range)),
-      forward_second_(context, sum_bytes(context, size, range)),
-      backward_first_(context, sum_bytes(context, size, range)),
-      backward_second_(context, sum_bytes(context, size, range)),
+      forward_first_(context, ocl::Scratch::kOfStage0, sum_bytes(context, size, range)),
+      forward_second_(context, ocl::Scratch::kOfStage1, sum_bytes(context, size, range)),
+      backward_first_(context, ocl::Scratch::kOfStage2, sum_bytes(context, size, range)),
+      backward_second_(context, ocl::Scratch::kOfStage3, sum_bytes(context, size, range)),
       follow_paths_(stage_, "follow_paths"),
       find_winners_(stage_, "find_winners") {}
 
