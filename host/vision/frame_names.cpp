@@ -29,7 +29,8 @@ std::string without_zeros(const std::string& digits) {
   return digits.substr(std::min(digits.find_first_not_of('0'), digits.size() - 1));
 }
 
-/// What stands between prefix and suffix; nothing where the name does not match. A `%d` gives digits without zeros.
+/// What stands between prefix and suffix; nothing where the name does not match. The number of a frame has no zeros
+/// before it.
 std::optional<std::string> text_in(const std::string& name, const NamePattern& pattern) {
   std::string suffix = pattern.suffix;
   if (suffix.find('.') == std::string::npos) {
@@ -40,7 +41,7 @@ std::optional<std::string> text_in(const std::string& name, const NamePattern& p
   const std::size_t end = name.size() - suffix.size();
   if (!name.starts_with(pattern.prefix) || lower(name.substr(end)) != lower(suffix)) return std::nullopt;
   const std::string text = name.substr(pattern.prefix.size(), end - pattern.prefix.size());
-  if (pattern.kind == Kind::kAnything) return text;
+  if (pattern.kind == Kind::kAnything) return parse_frame_number(text) ? without_zeros(text) : text;
   if (!is_digits(text)) return std::nullopt;
   const std::string number = without_zeros(text);
   if (!pattern.any_width && text != padded(number, pattern.digits)) return std::nullopt;
@@ -59,15 +60,6 @@ Files find_files(const NamePattern& pattern) {
                           "; remove one of them, or give a pattern that only one fits");
   }
   return files;
-}
-
-/// Digits alone without zeros before them, unless two of them become the same.
-Files with_plain_numbers(const Files& files) {
-  Files plain;
-  for (const auto& [text, file] : files) {
-    if (!plain.emplace(is_digits(text) ? without_zeros(text) : text, file).second) return files;
-  }
-  return plain;
 }
 
 bool is_decimal(const std::string& text) {
@@ -273,11 +265,7 @@ NamePattern parse_pattern(const std::string& pattern) {
 }
 
 std::vector<NamedPair> pair_files(const NamePattern& left, const NamePattern& right, PairBy pair_by) {
-  Files left_files = find_files(left), right_files = find_files(right);
-  if (left.kind != right.kind) {
-    left_files = with_plain_numbers(left_files);
-    right_files = with_plain_numbers(right_files);
-  }
+  const Files left_files = find_files(left), right_files = find_files(right);
   std::vector<NamedPair> pairs =
       pair_by == PairBy::kOrder ? pair_by_order(left_files, right_files) : pair_by_name(left_files, right_files);
   for (const NamedPair& pair : pairs) {

@@ -279,7 +279,7 @@ TEST_F(DatasetTest, NumbersInNamesCountByTheirValue) {
 
 TEST_F(DatasetTest, TwoFramesNeverShareAName) {
   add_text("c.toml", kOwnCalibration);
-  add_images({"l/1", "l/01", "l/2", "r/1", "r/01", "r/2"});
+  add_images({"l/a1", "l/a01", "l/2", "r/a1", "r/a01", "r/2"});
   const StereoSequence sequence = open_patterns(path("l/*"), path("r/*"), root_ / "c.toml");
   EXPECT_EQ(numbers_of(sequence), (std::vector<int>{0, 1, 2}));
   std::set<std::string> names;
@@ -292,6 +292,11 @@ TEST_F(DatasetTest, TwoFramesNeverShareAName) {
   add_image("image_0/1.png");
   expect_refused([&] { open_folder(root_); }, {"image_0/000001.png", "means the same frame as 1.png"});
   expect_refused([&] { open_patterns(path("l/*"), path("l/*"), root_ / "c.toml"); }, {"is the left and the right"});
+  add_image("l/02.png");
+  expect_refused([&] { open_patterns(path("l/*"), path("r/*"), root_ / "c.toml"); },
+                 {"l/02.png", "means the same frame as 2.png"});
+  add_images({"n/7", "m/007"});
+  EXPECT_EQ(open_patterns(path("n/*"), path("m/*"), root_ / "c.toml").frames[0].right, root_ / "m/007.png");
 }
 
 TEST_F(DatasetTest, JpegIsAnImageLikeAnother) {
