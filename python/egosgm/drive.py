@@ -87,7 +87,7 @@ class Drive:
                 raise _egosgm.InvalidArgument("calibration: a bag has its own: give it to the Bag, as calib")
             calibration = source.find_cameras().calibration
         if isinstance(calibration, (str, os.PathLike)):
-            calibration = read_calibration(calibration)
+            calibration = read_calibration(calibration, size=self.sequence.size if self.sequence is not None else None)
         if isinstance(calibration, StereoRig):
             raise _egosgm.InvalidArgument("calibration: is of raw images: rectify them first (egosgm.Rectification, egosgm rectify)")
         if calibration is not None and not isinstance(calibration, _egosgm.Calibration):

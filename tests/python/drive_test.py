@@ -50,6 +50,14 @@ def test_a_folder_and_its_pairs_give_the_maps_of_the_pipeline(street_folder, sha
         np.testing.assert_array_equal(a.disparity, c)
 
 
+def test_a_calibration_of_images_of_another_size_is_refused(street_folder, tmp_path):
+    camera = dict(intrinsics=[185.6, 185.6, 159.5, 43.7], resolution=[2 * WIDTH, 2 * HEIGHT])
+    shift = [[1, 0, 0, -0.54], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    (tmp_path / "chain.json").write_text(json.dumps(dict(cam0=camera, cam1=dict(camera, T_cn_cnm1=shift))))
+    with pytest.raises(egosgm.InvalidArgument, match="is of images of 640x192, and these have 320x96"):
+        egosgm.run(street_folder, tmp_path / "chain.json")
+
+
 def maps_of(frames):
     return [frame.disparity for frame in frames]
 
