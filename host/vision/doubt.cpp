@@ -109,6 +109,7 @@ void Doubt::add(const cv::Mat& left, const cv::Mat& right, const FrameReport& re
     const bool stands_still = digests[side] == seen_[side] && digests[1 - side] != seen_[1 - side];
     if (frames_ > 0 && stands_still) ++frozen_[side];
   }
+  if (digests[0] == digests[1]) ++same_;
   std::copy(std::begin(digests), std::end(digests), seen_);
   size_ = left.size();
   density_ += report.density;
@@ -129,6 +130,7 @@ std::string Doubt::text() const {
     append(text, formatted("rows of the two views lie %g px apart, the most that is mended, or farther",
                            static_cast<double>(EGOSGM_MAX_OFFSET_PX)));
   }
+  if (same_ == frames_) append(text, "the left and the right images are the same (give those of both cameras)");
   for (const auto& [side, name] : {std::pair{0, "left"}, {1, "right"}}) {
     if (frozen_[side] == 0) continue;
     append(text,
