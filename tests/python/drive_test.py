@@ -110,6 +110,15 @@ def test_the_last_good_frame_comes_before_the_error(street, frames):
     np.testing.assert_array_equal(found, maps_of(egosgm.run(pairs, street.calibration, **OPTIONS))[:2])
 
 
+def test_pairs_of_two_sizes_and_a_motion_for_all_are_named(street, frames):
+    pairs = [(frames[0].left, frames[0].right), (frames[1].left[:40], frames[1].right[:40])]
+    for motion in (True, False):
+        with pytest.raises(egosgm.InvalidArgument, match=r"pair 1: its left image is of the shape \(40, 320\).*\(96, 320\): all need one size"):
+            list(egosgm.run(pairs, street.calibration, motion=motion, **OPTIONS))
+    with pytest.raises(egosgm.InvalidArgument, match="motion: is a ndarray"):
+        egosgm.run(pairs, street.calibration, motion=np.eye(4))
+
+
 def test_a_pair_of_a_folder_that_cannot_be_read_costs_itself_alone(street_folder):
     drive, expected = egosgm.run(street_folder, **OPTIONS), maps_of(egosgm.run(street_folder, **OPTIONS))
     os.truncate(street_folder / "image_1/000002.png", 1000)
