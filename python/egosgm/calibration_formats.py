@@ -214,9 +214,9 @@ def virtual_kitti(file: pathlib.Path) -> _egosgm.Calibration:
 
 
 def of_q(q: Matrix, file: pathlib.Path) -> _egosgm.Calibration:
-    if not q[3, 2]:
-        raise refuse(file, "its Q has no baseline")
-    return _egosgm.Calibration(q[2, 3], q[2, 3], -q[0, 3], -q[1, 3], abs(1 / q[3, 2]), q[3, 3] / q[3, 2])
+    if not q[3, 2] > 0:
+        raise refuse(file, f"its Q has a baseline of {1 / q[3, 2]:.4g} m: are left and right swapped?" if q[3, 2] else "its Q has no baseline")
+    return _egosgm.Calibration(q[2, 3], q[2, 3], -q[0, 3], -q[1, 3], 1 / q[3, 2], q[3, 3] / q[3, 2])
 
 
 # How NumPy's users and others call the matrices of stereoCalibrate, and the numbers of a rectified pair (Cityscapes' in two groups), in small letters

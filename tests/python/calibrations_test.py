@@ -130,6 +130,13 @@ def test_of_rectified_images_of_another_size(tmp_path):
     expect_raw(read("kalibr_lens.yaml", (WIDTH, HEIGHT)))
 
 
+def test_a_q_of_swapped_cameras_is_refused(tmp_path):
+    for last, named in ((-1 / B, "a baseline of -0.3 m: are left and right swapped"), (0, "no baseline")):
+        (tmp_path / "q.json").write_text(json.dumps(dict(Q=[*Q[:3], [0, 0, last, 0]])))
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            egosgm.read_calibration(tmp_path / "q.json")
+
+
 def test_two_files_of_ros_and_of_kimera(tmp_path):
     (tmp_path / "left.yaml").write_text(ros(P))
     with pytest.raises(egosgm.InvalidArgument, match="is the calibration of one camera"):
