@@ -238,8 +238,10 @@ NamePattern parse_pattern(const std::string& pattern) {
   };
   NamePattern parts;
   parts.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  if (name.empty() || parts.folder.string().find_first_of("*%") != std::string::npos) return refuse();
-  const std::size_t begin = name.find_first_of("*%");
+  const auto first_wild = [](const std::string& text) { return text.find_first_of("*%"); };
+  const bool is_wild = first_wild(parts.folder.string()) != std::string::npos && !is_folder(parts.folder);
+  if (name.empty() || is_wild) return refuse();
+  const std::size_t begin = is_file(path) ? std::string::npos : first_wild(name);
   if (begin == std::string::npos) {
     parts.prefix = name;
     return parts;

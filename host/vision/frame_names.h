@@ -24,7 +24,8 @@ struct NamePattern {
   std::filesystem::path file_of(const std::string& text) const;
 };
 
-/// Throws InvalidArgument where `pattern` holds more than one `%d` or `*`, or one in a folder's name.
+/// A file or a folder that is there stands for itself, whatever its name holds. Throws InvalidArgument where `pattern`
+/// otherwise holds more than one `%d` or `*`, or one in a folder's name.
 NamePattern parse_pattern(const std::string& pattern);
 
 /// Files of one moment; one of the paths is empty where only the other camera has one.

@@ -299,6 +299,18 @@ TEST_F(DatasetTest, TwoFramesNeverShareAName) {
   EXPECT_EQ(open_patterns(path("n/*"), path("m/*"), root_ / "c.toml").frames[0].right, root_ / "m/007.png");
 }
 
+TEST_F(DatasetTest, NamesThatAreThereAreNoPatterns) {
+  for (const std::string folder : {"a%20b", "a*b", "100%"}) {
+    add_text(folder + "/calib.txt", kOwnCalibration);
+    for (const char* name : {"/left/0", "/right/0", "/l%20c", "/r%20c"}) add_images({folder + name});
+    EXPECT_EQ(open_folder(root_ / folder).frames[0].left, root_ / folder / "left/0.png");
+    const StereoSequence pair = open_patterns(path(folder + "/l%20c.png"), path(folder + "/r%20c.png"), "");
+    EXPECT_EQ(pair.frames[0].right, root_ / folder / "r%20c.png");
+    expect_refused([&] { open_patterns(path(folder + "/l%20d.png"), path(folder + "/r%20d.png"), ""); }, {"l%20d.png"});
+  }
+  expect_refused([&] { open_patterns(path("b*/*.png"), path("b*/*.png"), ""); }, {"b*/*.png", "its folder none"});
+}
+
 TEST_F(DatasetTest, JpegIsAnImageLikeAnother) {
   add_text("c.toml", kOwnCalibration), add_text("calib.txt", kProjections);
   for (const char* name : {"image_0/000000.jpg", "image_1/000000.JPEG", "image_0/000001.png", "image_1/000001.Jpg",
