@@ -115,6 +115,17 @@ std::vector<NamedPair> pair_by_order(const Files& left, const Files& right) {
   return pairs;
 }
 
+/// Where the pairs are numbers, what only one camera has under another name is no frame: a mask, say. It would move the
+/// numbers of all.
+void drop_other_pictures(std::vector<NamedPair>& pairs) {
+  const auto is_whole = [](const NamedPair& pair) { return !pair.left.empty() && !pair.right.empty(); };
+  const auto is_other = [](const NamedPair& pair) { return !parse_frame_number(pair.text); };
+  if (std::none_of(pairs.begin(), pairs.end(), is_whole)) return;
+  if (std::any_of(pairs.begin(), pairs.end(), [&](const auto& pair) { return is_whole(pair) && is_other(pair); }))
+    return;
+  std::erase_if(pairs, is_other);
+}
+
 std::vector<NamedPair> pair_by_name(const Files& left, const Files& right) {
   std::set<std::string> texts = texts_of(left);
   texts.merge(texts_of(right));
@@ -131,6 +142,7 @@ std::vector<NamedPair> pair_by_name(const Files& left, const Files& right) {
   for (const std::string& text : in_order(texts)) {
     pairs.push_back({text, 0, file_in(left, text), file_in(right, text)});
   }
+  drop_other_pictures(pairs);
   return pairs;
 }
 

@@ -299,6 +299,19 @@ TEST_F(DatasetTest, TwoFramesNeverShareAName) {
   EXPECT_EQ(open_patterns(path("n/*"), path("m/*"), root_ / "c.toml").frames[0].right, root_ / "m/007.png");
 }
 
+TEST_F(DatasetTest, APictureBesideOneCamerasFramesMovesNoNumber) {
+  add_images({"l/10", "l/11", "l/mean", "r/10", "r/11", "r/9_mask"});
+  const StereoSequence sequence = open_patterns(path("l/*"), path("r/*"), "");
+  EXPECT_EQ(numbers_of(sequence), (std::vector<int>{10, 11}));
+  EXPECT_EQ(sequence.numbers, (std::vector<int>{10, 11}));
+  EXPECT_EQ(sequence.note, "");
+  add_images({"r/mean"});  // a frame as others
+  EXPECT_EQ(numbers_of(open_patterns(path("l/*"), path("r/*"), "")), (std::vector<int>{1, 2, 3}));
+  add_images({"a/one", "b/two", "b/three"});
+  std::filesystem::remove(root_ / "a/one.png");
+  expect_refused([&] { open_patterns(path("a/*"), path("b/*"), ""); }, {"has no partner"});
+}
+
 TEST_F(DatasetTest, NamesThatAreThereAreNoPatterns) {
   for (const std::string folder : {"a%20b", "a*b", "100%"}) {
     add_text(folder + "/calib.txt", kOwnCalibration);
