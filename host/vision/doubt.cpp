@@ -85,12 +85,17 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, cv::Size size
       "give the calibration of images of this size: scale fx, fy, cx, cy as the images were scaled, and subtract what "
       "was cropped from cx, cy";
   const std::string of_size = formatted("%dx%d", size.width, size.height);
-  const bool centred =
-      c.cx > 0.25 * size.width && c.cx < 0.75 * size.width && c.cy > 0.2 * size.height && c.cy < 0.8 * size.height;
-  if (!centred) {
+  const auto is_centred = [&](double cx) { return cx > 0.25 * size.width && cx < 0.75 * size.width; };
+  if (!(is_centred(c.cx) && c.cy > 0.2 * size.height && c.cy < 0.8 * size.height)) {
     return Suspicion{
         "the principal point is far from the middle of " + of_size + formatted(" (cx %.1f, cy %.1f)", c.cx, c.cy),
         remedy};
+  }
+  if (!is_centred(c.cx + c.doffs_px)) {
+    return Suspicion{formatted("with doffs_px %.4g the right principal point is at x %.1f in images of ", c.doffs_px,
+                               c.cx + c.doffs_px) +
+                         of_size,
+                     "give the right image's cx less the left one's as doffs_px"};
   }
   const double least = std::min(c.fx, c.fy), largest = std::max(c.fx, c.fy);
   if (least < kMinFocal * size.width || largest > kMaxFocal * size.width || largest > 2 * least) {
