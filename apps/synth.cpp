@@ -72,6 +72,9 @@ Command add_synth(CLI::App& program) {
   command->add_option("--turn", options.turn_deg, "largest turn per frame [deg]")
       ->type_name("DEG")
       ->capture_default_str();
+  command->add_option("--exposure", options.exposure, "scale of the grey values before noise; night: 0.08")
+      ->type_name("F")
+      ->capture_default_str();
   command->add_option("--noise", options.noise_grey, "sensor noise, standard deviation [grey values]")
       ->type_name("G")
       ->capture_default_str();

@@ -45,6 +45,7 @@ void for_each_field(SyntheticOptions& o, Visit&& visit) {
   visit("turn_deg", o.turn_deg);
   visit("wobble", o.wobble);
   visit("noise_grey", o.noise_grey);
+  visit("exposure", o.exposure);
   visit("pole_width_px", o.pole_width_px);
   visit("pole_spacing_m", o.pole_spacing_m);
   visit("supersampling", o.supersampling);

@@ -118,12 +118,16 @@ void to_grey(const ImageView& image, const GreyLevels& levels, GreyImage& grey) 
   grey.pixels.resize(static_cast<std::size_t>(image.width) * image.height);
   for (int y = 0; y < image.height; ++y) {
     const std::uint8_t* source = view_row(image, y);
+    std::uint8_t* row = grey.row(y);
     if (image.type == PixelType::kU8) {
-      std::memcpy(grey.row(y), source, image.width);
+      if (levels == GreyLevels{}) {
+        std::memcpy(row, source, image.width);
+      } else {
+        std::transform(source, source + image.width, row, levels);
+      }
       continue;
     }
     const auto* wide = reinterpret_cast<const std::uint16_t*>(source);
-    std::uint8_t* row = grey.row(y);
     for (int x = 0; x < image.width; ++x) row[x] = levels(wide[x]);
   }
 }

@@ -10,24 +10,31 @@ constexpr std::int64_t kOutliers = 2000;   // one in so many pixels may lie belo
 constexpr std::int64_t kHighlights = 100;  // or one in so many above, where all else is kFarAbove times darker
 constexpr int kFarAbove = 4;
 constexpr int kFewLevels = 64;  // a range that fills no more of the 255 is stretched
+constexpr int kRowStep = 16;    // of 8 bits, that say what is dark with fewer pixels
+
+template <typename Pixel>
+void count(const char* pixels, int width, std::vector<std::int64_t>& counts) {
+  const auto* row = reinterpret_cast<const Pixel*>(pixels);
+  for (int x = 0; x < width; ++x) ++counts[row[x]];
+}
 
 }  // namespace
 
 GreyLevels levels_of(const ImageView& left, const ImageView& right) {
-  std::vector<std::int64_t> counts(65536);
+  const bool is_wide = left.type == PixelType::kU16;
+  std::vector<std::int64_t> counts(is_wide ? 65536 : 256);
   std::int64_t pixels = 0;
   for (const ImageView* image : {&left, &right}) {
-    pixels += static_cast<std::int64_t>(image->width) * image->height;
-    for (int y = 0; y < image->height; ++y) {
-      const auto* row =
-          reinterpret_cast<const std::uint16_t*>(static_cast<const char*>(image->data) + y * image->stride_bytes);
-      for (int x = 0; x < image->width; ++x) ++counts[row[x]];
+    for (int y = 0; y < image->height; y += is_wide ? 1 : kRowStep) {
+      const char* row = static_cast<const char*>(image->data) + y * image->stride_bytes;
+      is_wide ? count<std::uint16_t>(row, image->width, counts) : count<std::uint8_t>(row, image->width, counts);
+      pixels += image->width;
     }
   }
-  int low = 0, high = 65535;
+  int low = 0, high = static_cast<int>(counts.size()) - 1;
   for (std::int64_t below = counts[0]; below <= pixels / kOutliers && low < high; below += counts[++low]) {
   }
-  std::int64_t above = counts[65535];
+  std::int64_t above = counts.back();
   for (; above <= pixels / kOutliers && high > low; above += counts[--high]) {
   }
   int most = high;

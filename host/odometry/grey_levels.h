@@ -9,17 +9,18 @@
 
 namespace egosgm::odometry {
 
-/// How values of 16 bits become 8: what nearly all pixels hold fills the 8 bits. A pedestal below and a few hot pixels
-/// above do not count; where neither is there, values are shifted alone.
+/// How values become 8 bits: what nearly all pixels hold fills the 8 bits. A pedestal below and a few hot pixels
+/// above do not count; where neither is there, values of 16 bits are shifted alone, and those of 8 bits stay.
 struct GreyLevels {
   int pedestal = 0, gain = 1, shift = 0;
 
+  bool operator==(const GreyLevels&) const = default;
   std::uint8_t operator()(int value) const {
     return static_cast<std::uint8_t>(std::min(255, (std::max(0, value - pedestal) * gain) >> shift));
   }
 };
 
-/// Of both images of a pair, so that they stay comparable. REQUIRES: both are kU16.
+/// Of both images of a pair, so that they stay comparable. REQUIRES: both are of one type.
 EGOSGM_EXPORT GreyLevels levels_of(const ImageView& left, const ImageView& right);
 
 }  // namespace egosgm::odometry

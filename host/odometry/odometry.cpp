@@ -105,7 +105,7 @@ struct StereoOdometry::State {
 };
 
 void StereoOdometry::State::read_frame(const ImageView& left, const ImageView& right) {
-  const GreyLevels levels = left.type == PixelType::kU16 ? levels_of(left, right) : GreyLevels{};
+  const GreyLevels levels = levels_of(left, right);
   to_grey(left, levels, current.left);
   to_grey(right, levels, current.right);
   const double cells = std::ceil(left.width / static_cast<double>(kFeatureCell_px)) *

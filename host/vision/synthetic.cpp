@@ -79,6 +79,7 @@ void SyntheticOptions::validate() const {
   require_range("turn_deg", turn_deg, -4, 4);
   require_range("wobble", wobble, 0, 3);
   require_range("noise_grey", noise_grey, 0, 20);
+  require_range("exposure", exposure, 0.01, 4);
   require_range("pole_width_px", pole_width_px, 1, 20);
   require_range("pole_spacing_m", pole_spacing_m, 1, 1000);
   require_range("supersampling", supersampling, 1, 8);

@@ -254,7 +254,8 @@ void render_view(const View& view, const View& other, int towards_other, const s
                  const SyntheticOptions& options, uint32_t noise_seed, ViewMaps out) {
   const Camera& camera = view.camera();
   const cv::Size size(camera.width, camera.height);
-  const double numerator = camera.focal_px * kBaseline_m, gain = towards_other > 0 ? kRightGain : 1;
+  const double numerator = camera.focal_px * kBaseline_m,
+               gain = options.exposure * (towards_other > 0 ? kRightGain : 1);
   out.image.create(size, CV_8UC1), out.disparity.create(size, CV_32FC1);
   out.noc.create(size, CV_8UC1), out.moving.create(size, CV_8UC1);
   for (int y = 0; y < camera.height; ++y) {

@@ -211,14 +211,16 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, global c
     const Ints is_speckle = has_runs ? has_run(runs + row, x, width) & !is_measured : (Ints)(0);
     const Ints is_uncovered = has_prediction ? (jump_in_row(warped + row, x, width) > jump) & !is_warped : (Ints)(0);
     const Texture texture = texture_around(size, (global const Pixel*)images, x, y);
-    Ints is_weak = 0;
+    Ints is_weak = 0, is_sure = 0;  // sure: more than a full-range match begins with, so images have confirmed it
     if (has_evidence) {
-      is_weak = has_value      ? is_measured & (load_bytes(evidence + row, x, width) < EGOSGM_EVIDENCE_TRUSTED)
+      const Ints of_pixel = load_bytes(evidence + row, x, width);
+      is_sure = has_value & (of_pixel > EGOSGM_EVIDENCE_TRUSTED);
+      is_weak = has_value      ? is_measured & (of_pixel < EGOSGM_EVIDENCE_TRUSTED)
                 : is_uncovered ? (Ints)(0)
                                : is_like_noise(evidence_of_blocks, x);
     }
-    const Ints is_flat =
-        (texture.changes < (Floats)(EGOSGM_LEAST_CHANGE * STEPS_PER_GREY * texture.pixels)) | (is_weak != 0);
+    const Ints is_plain = texture.changes < (Floats)(EGOSGM_LEAST_CHANGE * STEPS_PER_GREY * texture.pixels);
+    const Ints is_flat = (is_weak != 0) | (is_plain & !is_sure);
     const Ints is_saturated = 2.0f * texture.extremes >= (Floats)(texture.pixels);
 
     Ints reason = has_value ? (Ints)(EGOSGM_REASON_TRUSTED) : (Ints)(EGOSGM_REASON_UNCONFIRMED);

@@ -237,6 +237,18 @@ TEST(Reasons, TrustsNothingThatTheImagesHardlySay) {
   EXPECT_EQ(scene.in_the_middle(), Reason::kTrusted) << "it has a value";
 }
 
+TEST(Reasons, TrustsWhatHasEvidenceHoweverDarkItIs) {
+  Scene scene;
+  scene.paint([](int x, int) { return 4 + x % 2; });
+  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat) << "a value without evidence";
+  scene.inputs.evidence.assign(scene.inputs.doubtful.size(), 96);
+  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat) << "it began with that much";
+  scene.inputs.evidence[Scene::kMiddle] = 97;
+  EXPECT_NE(scene.in_the_middle(), Reason::kFlat);
+  scene.inputs.belief.disparity[Scene::kMiddle] = kNone;
+  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat) << "a hole says why it is one";
+}
+
 TEST(Reasons, TellsWhatTheImageCannotTell) {
   Scene scene;
   scene.paint([](int x, int) { return 100 + x % 2; });

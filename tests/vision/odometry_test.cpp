@@ -355,6 +355,16 @@ TEST(StereoOdometry, SixteenBitImagesGiveTheSameMotion) {
   }
 }
 
+TEST(StereoOdometry, FindsTheMotionAtNight) {
+  SyntheticOptions options;
+  options.frames = 4;
+  options.exposure = 0.08;  // most of the picture holds less than twenty grey levels
+  options.noise_grey = 0.5;
+  options.supersampling = 2;
+  const Drive night(options);
+  expect_all_motions(night.sequence, night.frames, {0.03, 0.1});
+}
+
 TEST(StereoOdometry, PriorGuidesAndAWrongOneDoesNotMislead) {
   const Drive& drive = turning_drive();
   const Eigen::Isometry3d truth = drive.sequence.motion(1).current_from_previous;

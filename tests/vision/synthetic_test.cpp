@@ -269,6 +269,25 @@ TEST(Synthetic, NoiseHasItsStandardDeviationAndDiffersBetweenTheImages) {
   EXPECT_LT(std::abs(left.dot(right)) / (16.0 * left.total()), 0.03);
 }
 
+TEST(Synthetic, ExposureScalesTheGreyValuesAndNotTheNoise) {
+  SyntheticOptions options = small_options();
+  options.noise_grey = 0;
+  const SyntheticFrame day = SyntheticSequence(options).render(0);
+  options.exposure = 0.1;
+  const SyntheticFrame night = SyntheticSequence(options).render(0);
+  options.noise_grey = 4;
+  const SyntheticFrame noisy = SyntheticSequence(options).render(0);
+  cv::Mat expected, difference;
+  day.right.convertTo(expected, CV_32F, 0.1);
+  cv::subtract(night.right, expected, difference, cv::noArray(), CV_32F);
+  EXPECT_LE(cv::norm(difference, cv::NORM_INF), 0.5 + 0.05 + 1e-3);  // both are rounded
+  EXPECT_EQ(cv::norm(night.left_disparity, day.left_disparity, cv::NORM_INF), 0);
+  cv::Mat mean, deviation;
+  cv::subtract(noisy.right, night.right, difference, night.right >= 14, CV_32F);  // what noise does not cut at black
+  cv::meanStdDev(difference, mean, deviation, night.right >= 14);
+  EXPECT_NEAR(deviation.at<double>(0), 4, 0.2);
+}
+
 TEST(Synthetic, PosesAreRigidStartAtIdentityAndFollowSpeedAndTurn) {
   SyntheticOptions options = small_options();
   options.frames = 100, options.turn_deg = 2, options.wobble = 0;
@@ -331,6 +350,7 @@ TEST(Synthetic, BadOptionsAreRefusedByName) {
   expect_refused("turn_deg", [](SyntheticOptions& o) { o.turn_deg = 90; });
   expect_refused("turn_deg", [](SyntheticOptions& o) { o.turn_deg = 3, o.speed_m = 0.2; });
   expect_refused("noise_grey", [](SyntheticOptions& o) { o.noise_grey = -1; });
+  expect_refused("exposure", [](SyntheticOptions& o) { o.exposure = 0; });
   expect_refused("wobble", [](SyntheticOptions& o) { o.wobble = 1e9; });
   expect_refused("pole_width_px", [](SyntheticOptions& o) { o.pole_width_px = 0; });
   expect_refused("pole_spacing_m", [](SyntheticOptions& o) { o.pole_spacing_m = 0; });

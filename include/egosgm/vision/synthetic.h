@@ -26,6 +26,7 @@ struct EGOSGM_EXPORT SyntheticOptions {
   double turn_deg = 1.0;    // largest turn per frame [deg], -4..4, positive: to the right first; radius at least 15 m
   double wobble = 1.0;      // scale of pitch, roll, sway and heave (1: 0.25 deg, 0.15 deg, 6 cm, 2 cm), 0..3
   double noise_grey = 1.5;  // standard deviation of the sensor noise, independent in both images, 0..20
+  double exposure = 1.0;    // scale of the grey values before noise, 0.01..4; night: 0.08
   double pole_width_px = 3.0;   // mean width of a pole 10 m ahead [px], 1..20; single ones from 2/3 to 4/3 of it
   double pole_spacing_m = 6.0;  // mean distance of poles on either side of the road [m], 1..1000
   int supersampling = 3;        // rays per pixel and axis at the edges of surfaces, 1..8

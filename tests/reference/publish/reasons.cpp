@@ -30,7 +30,10 @@ class Pixels {
     }
     const Window window = around(x, y);
     if (2 * window.extreme >= window.pixels) return Reason::kSaturated;
-    if (static_cast<float>(window.changes) < kLeastChange * static_cast<float>(in_.white / 255 * window.pixels)) {
+    const bool is_judged = d != kNone && !in_.evidence.empty();
+    const bool is_sure = is_judged && in_.evidence[i] > kTrustedEvidence;  // more than a full-range match begins with
+    if (!is_sure &&
+        static_cast<float>(window.changes) < kLeastChange * static_cast<float>(in_.white / 255 * window.pixels)) {
       return Reason::kFlat;
     }
     const bool is_uncovered = !in_.warped.empty() && w == kNone && jump_beside(x, y) > kUncoveredJumpPx;
@@ -38,7 +41,7 @@ class Pixels {
     const bool removes_speckles = options_.speckle_removal.max_size_px > 0;
     if (removes_speckles && d == kNone && z == kNone && in_.consistent[i] != kNone) return Reason::kSpeckle;
     if (d != kNone && z == kNone) return Reason::kPredicted;
-    if (d != kNone && !in_.evidence.empty() && in_.evidence[i] < kTrustedEvidence) return Reason::kFlat;
+    if (is_judged && in_.evidence[i] < kTrustedEvidence) return Reason::kFlat;
     if (is_uncovered) return Reason::kUncovered;
     if (options_.banded_sgm.cost != MatchingCost::kSad3x3 && repeats(x, y)) return Reason::kAmbiguous;
     return d == kNone ? Reason::kUnconfirmed : Reason::kTrusted;
