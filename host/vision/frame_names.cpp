@@ -92,15 +92,18 @@ std::set<std::string> texts_of(const Files& files) {
   return texts;
 }
 
-/// The texts themselves, if they are different numbers, else their order.
+/// The texts themselves, if those of pairs are different numbers, else their order. What only one camera has under
+/// another name, as a mask, has no number then: it moves none.
 void number(std::vector<NamedPair>& pairs) {
   std::set<int> used;
   const bool numbers = std::all_of(pairs.begin(), pairs.end(), [&](const NamedPair& pair) {
     const std::optional<int> own = parse_frame_number(pair.text);
-    return own && used.insert(*own).second;
+    return own ? used.insert(*own).second : pair.is_alone();
   });
   int position = 0;
-  for (NamedPair& pair : pairs) pair.number = numbers ? *parse_frame_number(pair.text) : position++;
+  for (NamedPair& pair : pairs) {
+    pair.number = numbers && !used.empty() ? parse_frame_number(pair.text).value_or(NamedPair::kNoNumber) : position++;
+  }
 }
 
 std::vector<NamedPair> pair_by_order(const Files& left, const Files& right) {
@@ -113,17 +116,6 @@ std::vector<NamedPair> pair_by_order(const Files& left, const Files& right) {
   std::size_t i = 0;
   for (const std::string& text : in_order(texts_of(right))) pairs[i++].right = right.at(text);
   return pairs;
-}
-
-/// Where the pairs are numbers, what only one camera has under another name is no frame: a mask, say. It would move the
-/// numbers of all.
-void drop_other_pictures(std::vector<NamedPair>& pairs) {
-  const auto is_whole = [](const NamedPair& pair) { return !pair.left.empty() && !pair.right.empty(); };
-  const auto is_other = [](const NamedPair& pair) { return !parse_frame_number(pair.text); };
-  if (std::none_of(pairs.begin(), pairs.end(), is_whole)) return;
-  if (std::any_of(pairs.begin(), pairs.end(), [&](const auto& pair) { return is_whole(pair) && is_other(pair); }))
-    return;
-  std::erase_if(pairs, is_other);
 }
 
 std::vector<NamedPair> pair_by_name(const Files& left, const Files& right) {
@@ -142,7 +134,6 @@ std::vector<NamedPair> pair_by_name(const Files& left, const Files& right) {
   for (const std::string& text : in_order(texts)) {
     pairs.push_back({text, 0, file_in(left, text), file_in(right, text)});
   }
-  drop_other_pictures(pairs);
   return pairs;
 }
 
@@ -318,8 +309,10 @@ std::vector<fs::path> files_in_order(const NamePattern& pattern) {
 
 void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left, FrameRange range,
                    const std::string& what, StereoSequence& sequence) {
-  for (const NamedPair& pair : pairs) sequence.numbers.push_back(pair.number);
-  const int lowest = pairs.front().number, highest = pairs.back().number;
+  for (const NamedPair& pair : pairs) {
+    if (pair.number != NamedPair::kNoNumber) sequence.numbers.push_back(pair.number);
+  }
+  const int lowest = sequence.numbers.front(), highest = sequence.numbers.back();
   const int first = range.first.value_or(lowest), last = range.last.value_or(highest);
   const std::string there = "there are frames " + std::to_string(lowest) + ".." + std::to_string(highest);
   const std::string remedy = "; " + there + ", select whole ones with --frames FIRST:LAST";
@@ -335,8 +328,8 @@ void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left,
   if (first < lowest) refuse_missing(first);
   if (last > highest) refuse_missing(last);
   for (const NamedPair& pair : pairs) {
-    if (pair.number < first || pair.number > last) continue;
-    if (pair.left.empty() || pair.right.empty()) {
+    if (pair.number != NamedPair::kNoNumber && (pair.number < first || pair.number > last)) continue;
+    if (pair.is_alone()) {
       alone.push_back(pair.left.empty() ? pair.right.string() : pair.left.string());
       continue;
     }

@@ -30,9 +30,14 @@ NamePattern parse_pattern(const std::string& pattern);
 
 /// Files of one moment; one of the paths is empty where only the other camera has one.
 struct NamedPair {
+  static constexpr int kNoNumber = -1;
+
   std::string text;  // what stands in the place of `%06d` or `*`
-  int number = 0;    // the text, where all of them are different numbers, else the position
+  int number = 0;  // the text, where those of pairs are different numbers (then what is alone may have none), else the
+                   // position
   std::filesystem::path left, right;
+
+  bool is_alone() const { return left.empty() || right.empty(); }
 };
 
 /// Files that match, in order. Throws InvalidArgument where none belongs to the other camera's, and where two files of
