@@ -267,7 +267,7 @@ std::string_view foreign_format(std::string_view text) {
       file.string() + ": is " + std::string(format) +
       ", not one of EgoSGM's formats for rectified images (fx, fy, cx, cy, baseline_m in rows; KITTI's; "
       "Middlebury's). A stereo calibration of OpenCV goes to `egosgm rectify`; the Python package "
-      "reads more of them: egosgm.read_calibration, and its `egosgm` command");
+      "reads more of them: egosgm.read_calibration, and --calib of its `egosgm` command");
 }
 
 }  // namespace
