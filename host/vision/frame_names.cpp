@@ -92,18 +92,15 @@ std::set<std::string> texts_of(const Files& files) {
   return texts;
 }
 
-/// The texts themselves, if those of pairs are different numbers, else their order. What only one camera has under
-/// another name, as a mask, has no number then: it moves none.
+/// The texts themselves, if those of pairs are numbers, else their order. What only one camera has under another name,
+/// as a mask, has no number then: it moves none.
 void number(std::vector<NamedPair>& pairs) {
-  std::set<int> used;
-  const bool numbers = std::all_of(pairs.begin(), pairs.end(), [&](const NamedPair& pair) {
-    const std::optional<int> own = parse_frame_number(pair.text);
-    return own ? used.insert(*own).second : pair.is_alone();
-  });
+  const auto own = [](const NamedPair& pair) { return parse_frame_number(pair.text); };
+  const bool numbers =
+      std::any_of(pairs.begin(), pairs.end(), own) &&
+      std::all_of(pairs.begin(), pairs.end(), [&](const NamedPair& pair) { return own(pair) || pair.is_alone(); });
   int position = 0;
-  for (NamedPair& pair : pairs) {
-    pair.number = numbers && !used.empty() ? parse_frame_number(pair.text).value_or(NamedPair::kNoNumber) : position++;
-  }
+  for (NamedPair& pair : pairs) pair.number = numbers ? own(pair).value_or(NamedPair::kNoNumber) : position++;
 }
 
 std::vector<NamedPair> pair_by_order(const Files& left, const Files& right) {

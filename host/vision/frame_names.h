@@ -33,8 +33,7 @@ struct NamedPair {
   static constexpr int kNoNumber = -1;
 
   std::string text;  // what stands in the place of `%06d` or `*`
-  int number = 0;  // the text, where those of pairs are different numbers (then what is alone may have none), else the
-                   // position
+  int number = 0;    // the text, where those of pairs are numbers (then what is alone may have none), else the position
   std::filesystem::path left, right;
 
   bool is_alone() const { return left.empty() || right.empty(); }
