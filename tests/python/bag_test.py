@@ -1136,13 +1136,13 @@ def test_an_mcap_that_is_packed_and_one_without_a_profile(tmp_path, street, fram
                     channels[channel.topic] = writer.register_channel(channel.topic, encoding, schemas[schema.name])
                 writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
             writer.finish()
-    assert f"{FRAMES} frames" in told_of(capfd, tmp_path / "plain.mcap")
+    assert f", {FRAMES} frames" in told_of(capfd, tmp_path / "plain.mcap")
     refused(capfd, ["--bag", tmp_path / "ros1.mcap", *TOPICS, *SET], "ROS 1")
     whole = (tmp_path / "plain.mcap").read_bytes()
     at = whole.rindex(zstandard.FRAME_HEADER)  # of the last chunk
     (tmp_path / "torn.mcap").write_bytes(whole[:at] + bytes(4) + whole[at + 4:])
     said = told_of(capfd, tmp_path / "torn.mcap")
-    assert "torn.mcap is cut or damaged (" in said and f"{FRAMES} frames" not in said
+    assert "torn.mcap is cut or damaged (" in said and f", {FRAMES} frames" not in said
 
 
 def test_topics_are_found_where_there_is_one_choice(tmp_path, street, frames, capfd):
