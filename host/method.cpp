@@ -27,7 +27,7 @@ FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const 
     const Prediction* prediction = plan.predicts() ? &w.prediction : nullptr;
     publish_.write(plan,
                    {images, match_.matcher().codes(), prediction, measured, match_.speckle_runs(plan), after.maps,
-                    result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence},
+                    result, w.fusion.doubtful, evidence_of(plan, after), w.fusion.evidence.evidence, plan.grey_step},
                    {given_out.variance, w.dynamic, w.reasons});
   });
   return {{result, given_out.variance}, measured, offset, images};

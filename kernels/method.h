@@ -101,7 +101,7 @@
 #define EGOSGM_DYNAMIC_MIN_COUNT 9
 
 // Reasons looks this many pixels to all sides for texture: it is flat where grey values two columns apart differ by
-// less than this in the mean, on the 8-bit scale.
+// less than this in the mean, of the 255 levels that the image fills (host/grey_levels.h).
 #define EGOSGM_TEXTURE_RADIUS 4
 #define EGOSGM_LEAST_CHANGE 2.0f
 // A pixel that nothing was warped to was uncovered where what was warped this near in its row lies that far apart.

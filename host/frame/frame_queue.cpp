@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "host/grey_levels.h"
 #include "host/tuning_defaults.h"
 
 namespace egosgm {
@@ -97,7 +98,8 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
   release_results();
   if (Evidence::is_of(method_options_)) pack(left, right, *frame.after.images);
   const bool repeats = !belief_.images->empty() && *belief_.images == *frame.after.images;
-  const Plan plan = plan_of(method_options_, belief_.why_not, belief_.offset.is_known, motion, wanted, repeats);
+  Plan plan = plan_of(method_options_, belief_.why_not, belief_.offset.is_known, motion, wanted, repeats);
+  if (wanted.reasons) plan.grey_step = levels_of(left, right).step();
   const FrameImages& images = frame.transfer->upload(left, right);
   if (under_way() > 0) context_.let_wait(ocl::Queue::kKernels, under_way_.back().transfer->scratch_fetched());
   const FrameResults results = method_.frame(plan, images, belief_, frame.after, frame.transfer->given_out());

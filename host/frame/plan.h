@@ -29,7 +29,8 @@ struct Plan {
   Views matched;  // where it is the left one, the right one is read off its match
   int matches;    // 2 where the first one gives the vertical offset
   bool has_coarse_match;
-  bool repeats;  // the images are those of the frame before
+  bool repeats;         // the images are those of the frame before
+  float grey_step = 1;  // GreyLevels::step of the images
   Wanted wanted;
 
   bool predicts() const { return !why_not; }

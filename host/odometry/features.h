@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "egosgm/image.h"
-#include "host/odometry/grey_levels.h"
+#include "host/grey_levels.h"
 
 namespace egosgm::odometry {
 

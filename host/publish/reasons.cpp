@@ -4,6 +4,7 @@
 #include "host/match/banded_sgm.h"
 #include "host/match/census.h"
 #include "host/search/coarse_match.h"
+#include "kernels/method.h"
 
 namespace egosgm {
 namespace {
@@ -73,12 +74,12 @@ void Reasons::explain(const Inputs& inputs, Bytes& reasons) {
     stage_.launch(find_repeats_, each_block, stage_.size(), disparities_, padding_, inputs.codes,
                   inputs.measured.disparity, repeats_);
   }
-  stage_.launch_pixels(explain_, /*views=*/1, bytes, has_census_, repeats_, has_prediction,
-                       inputs.prediction ? inputs.prediction->warped.disparity : inputs.measured.disparity,
-                       inputs.prediction ? inputs.prediction->hidden : bytes, inputs.measured.disparity, has_runs,
-                       inputs.runs ? *inputs.runs : no_runs, inputs.given_out, inputs.doubtful,
-                       inputs.evidence != nullptr, inputs.evidence ? *inputs.evidence : inputs.doubtful,
-                       inputs.block_evidence, reasons);
+  stage_.launch_pixels(
+      explain_, /*views=*/1, EGOSGM_LEAST_CHANGE * inputs.grey_step, bytes, has_census_, repeats_, has_prediction,
+      inputs.prediction ? inputs.prediction->warped.disparity : inputs.measured.disparity,
+      inputs.prediction ? inputs.prediction->hidden : bytes, inputs.measured.disparity, has_runs,
+      inputs.runs ? *inputs.runs : no_runs, inputs.given_out, inputs.doubtful, inputs.evidence != nullptr,
+      inputs.evidence ? *inputs.evidence : inputs.doubtful, inputs.block_evidence, reasons);
 }
 
 }  // namespace egosgm

@@ -26,6 +26,7 @@ class Reasons {
     const FlagMap& doubtful;                    // what KalmanUpdate says; not read without a prediction
     const FlagMap* evidence;                    // the same; null: the method has none
     const ocl::Buffer<cl_int>& block_evidence;  // of Evidence; not read without evidence
+    const float grey_step;                      // Plan's
   };
 
   /// Of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels, a byte each: whether its texture repeats.
@@ -45,9 +46,9 @@ class Reasons {
   const cl_int disparities_, has_census_, padding_;
   Bytes repeats_;  // of blocks
   ocl::Kernel<const shared::ImageSize, const cl_int, const cl_int, const ocl::Buffer<cl_uint>, In, Bytes> find_repeats_;
-  ocl::Kernel<const shared::ImageSize, const Bytes, const cl_int, const Bytes, const cl_int, In, const FlagMap, In,
-              const cl_int, const ocl::Buffer<cl_ushort>, In, const FlagMap, const cl_int, const FlagMap,
-              const ocl::Buffer<cl_int>, Bytes>
+  ocl::Kernel<const shared::ImageSize, const float, const Bytes, const cl_int, const Bytes, const cl_int, In,
+              const FlagMap, In, const cl_int, const ocl::Buffer<cl_ushort>, In, const FlagMap, const cl_int,
+              const FlagMap, const ocl::Buffer<cl_int>, Bytes>
       explain_;
 };
 

@@ -2,13 +2,13 @@
 #include "host/vision/grey_bytes.h"
 
 #include "egosgm/vision/opencv.h"
-#include "host/odometry/grey_levels.h"
+#include "host/grey_levels.h"
 
 namespace egosgm::vision {
 
 std::pair<cv::Mat, cv::Mat> bytes_of(const cv::Mat& left, const cv::Mat& right) {
   if (left.depth() == CV_8U) return {left, right};
-  const odometry::GreyLevels levels = odometry::levels_of(image_view(left), image_view(right));
+  const GreyLevels levels = levels_of(image_view(left), image_view(right));
   const auto bytes = [&](const cv::Mat& image) {
     cv::Mat result(image.size(), CV_8UC1);
     for (int y = 0; y < image.rows; ++y) {

@@ -15,10 +15,8 @@
 
 #if PIXEL_BYTES == 1
 #define WHITE 255.0f
-#define STEPS_PER_GREY 1.0f
 #else
 #define WHITE 65535.0f
-#define STEPS_PER_GREY 257.0f
 #endif
 #define NO_RUN 0xffff  // of a pixel that SpeckleRemoval did not look at
 
@@ -180,14 +178,15 @@ static inline Ints has_run(global const ushort* runs, const int x, const int wid
 #endif
 }
 
-// `repeats`: of find_repeats. `runs`: of SpeckleRemoval. `doubtful`, `evidence`: of KalmanUpdate. `block_evidence`: of
+// `least_change`: the image is flat where grey values two columns apart differ by less in the mean. `repeats`: of
+// find_repeats. `runs`: of SpeckleRemoval. `doubtful`, `evidence`: of KalmanUpdate. `block_evidence`: of
 // Evidence. What there is not (has_repeats, has_prediction, has_runs, has_evidence) may be any buffer.
-COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, global const uchar* images,
-                               const int has_repeats, global const uchar* repeats, const int has_prediction,
-                               global const float* warped, global const uchar* hidden, global const float* measured,
-                               const int has_runs, global const ushort* runs, global const float* disparity,
-                               global const uchar* doubtful, const int has_evidence, global const uchar* evidence,
-                               global const int* block_evidence, global uchar* reasons) {
+COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, const float least_change,
+                               global const uchar* images, const int has_repeats, global const uchar* repeats,
+                               const int has_prediction, global const float* warped, global const uchar* hidden,
+                               global const float* measured, const int has_runs, global const ushort* runs,
+                               global const float* disparity, global const uchar* doubtful, const int has_evidence,
+                               global const uchar* evidence, global const int* block_evidence, global uchar* reasons) {
   const int y = at.y;
   const int width = size.width;
   const size_t row = (size_t)y * width;
@@ -219,7 +218,7 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, global c
                 : is_uncovered ? (Ints)(0)
                                : is_like_noise(evidence_of_blocks, x);
     }
-    const Ints is_plain = texture.changes < (Floats)(EGOSGM_LEAST_CHANGE * STEPS_PER_GREY * texture.pixels);
+    const Ints is_plain = texture.changes < (Floats)(least_change * texture.pixels);
     const Ints is_flat = (is_weak != 0) | (is_plain & !is_sure);
     const Ints is_saturated = 2.0f * texture.extremes >= (Floats)(texture.pixels);
 
@@ -237,12 +236,12 @@ COMPILED_ONCE void explain_row(const WorkItem at, const ImageSize size, global c
   }
 }
 
-KERNEL void explain(const ImageSize size, global const uchar* images, const int has_repeats,
+KERNEL void explain(const ImageSize size, const float least_change, global const uchar* images, const int has_repeats,
                     global const uchar* repeats, const int has_prediction, global const float* warped,
                     global const uchar* hidden, global const float* measured, const int has_runs,
                     global const ushort* runs, global const float* disparity, global const uchar* doubtful,
                     const int has_evidence, global const uchar* evidence, global const int* block_evidence,
                     global uchar* reasons) {
-  explain_row(THIS_WORK_ITEM, size, images, has_repeats, repeats, has_prediction, warped, hidden, measured, has_runs,
-              runs, disparity, doubtful, has_evidence, evidence, block_evidence, reasons);
+  explain_row(THIS_WORK_ITEM, size, least_change, images, has_repeats, repeats, has_prediction, warped, hidden,
+              measured, has_runs, runs, disparity, doubtful, has_evidence, evidence, block_evidence, reasons);
 }

@@ -72,7 +72,7 @@ std::vector<cl_uchar> reasons_of(shared::ImageSize size, const MethodOptions& op
   Reasons reasons(context, size, images.type, options, Reasons::repeats(context, size), pixels);
   reasons.explain({images, codes, inputs.warped.empty() ? nullptr : &prediction, measured,
                    options.speckle_removal.max_size_px > 0 ? &runs : nullptr, belief, belief.disparity, doubtful,
-                   inputs.evidence.empty() ? nullptr : &evidence, block_evidence},
+                   inputs.evidence.empty() ? nullptr : &evidence, block_evidence, inputs.grey_step},
                   found);
   return found.read(context);
 }
@@ -83,6 +83,7 @@ reference::ReasonInputs random_inputs(shared::ImageSize size, int white, unsigne
   std::uniform_int_distribution<int> grey(1, white - 1), tenth(0, 9), little(0, 2);
   reference::ReasonInputs inputs;
   inputs.white = white;
+  inputs.grey_step = static_cast<float>(white / 255);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const int part = 5 * x / size.width;
@@ -253,6 +254,11 @@ TEST(Reasons, TellsWhatTheImageCannotTell) {
   Scene scene;
   scene.paint([](int x, int) { return 100 + x % 2; });
   EXPECT_EQ(scene.in_the_middle(), Reason::kFlat);
+  scene.paint([](int x, int y) { return 10 + (x * 37 + y * 53) % 3; });
+  EXPECT_EQ(scene.in_the_middle(), Reason::kFlat);
+  scene.inputs.grey_step = 0.25f;
+  EXPECT_NE(scene.in_the_middle(), Reason::kFlat) << "a dark image fills few levels";
+  scene.inputs.grey_step = 1;
   scene.paint([](int, int) { return 255; });
   EXPECT_EQ(scene.in_the_middle(), Reason::kSaturated);
   scene.paint([](int, int) { return 0; });

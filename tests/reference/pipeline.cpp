@@ -26,6 +26,30 @@
 #include "tests/reference/search/coarse_match.h"
 
 namespace egosgm::reference {
+namespace {
+
+/// How far apart values are that differ by one of the 255 levels that nearly all pixels fill.
+float grey_step(int width, const Images& images) {
+  const std::size_t rows_apart = images.bits == 8 ? 16 : 1;
+  std::vector<int> greys;
+  for (std::size_t i = 0; i < images.greys.size(); ++i) {
+    const std::size_t row = i % (images.greys.size() / 2) / width;
+    if (row % rows_apart == 0) greys.push_back(images.greys[i]);
+  }
+  std::sort(greys.begin(), greys.end());
+  const auto above = [&](std::size_t part) { return greys[greys.size() - 1 - greys.size() / part]; };
+  const int low = greys[greys.size() / 2000];
+  const int high = above(2000) / 4 > above(100) ? above(100) : above(2000);
+  const auto step_of = [](int largest) {
+    int step = 1;
+    while (largest / step > 255) step *= 2;
+    return step;
+  };
+  if (high == low || (high - low) / step_of(high) >= 64) return static_cast<float>(step_of(high));
+  return static_cast<float>(step_of(high - low)) / static_cast<float>(std::max(1, 255 / (high - low)));
+}
+
+}  // namespace
 
 Pipeline::Pipeline(shared::ImageSize size, const MethodOptions& options, int code_padding)
     : size_(size), range_{options.min_disparity, options.disparities}, options_(options), code_padding_(code_padding) {}
@@ -88,6 +112,7 @@ std::vector<std::uint8_t> Pipeline::explain(const Images& images, const Frame& f
       size_, options_,
       {.images = pass.images,
        .white = images.bits == 8 ? 255 : 65535,
+       .grey_step = grey_step(size_.width, images),
        .codes = pass.codes,
        .code_padding = code_padding_,
        .warped = frame.warped.disparity,

@@ -33,7 +33,7 @@ class Pixels {
     const bool is_judged = d != kNone && !in_.evidence.empty();
     const bool is_sure = is_judged && in_.evidence[i] > kTrustedEvidence;  // more than a full-range match begins with
     if (!is_sure &&
-        static_cast<float>(window.changes) < kLeastChange * static_cast<float>(in_.white / 255 * window.pixels)) {
+        static_cast<float>(window.changes) < kLeastChange * in_.grey_step * static_cast<float>(window.pixels)) {
       return Reason::kFlat;
     }
     const bool is_uncovered = !in_.warped.empty() && w == kNone && jump_beside(x, y) > kUncoveredJumpPx;

@@ -14,6 +14,7 @@ namespace egosgm::reference {
 struct ReasonInputs {
   std::vector<int> images;
   int white = 255;                   // the largest grey value
+  float grey_step = 1;               // of values, a level of 8 bits
   std::vector<std::uint32_t> codes;  // as kernels/match/census.cl lays them out, with `code_padding`
   int code_padding = 0;
   std::vector<float> warped;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/odometry/grey_levels.h"
+#include "host/grey_levels.h"
 
 #include <vector>
 
-namespace egosgm::odometry {
+namespace egosgm {
 namespace {
 
 constexpr std::int64_t kOutliers = 2000;   // one in so many pixels may lie below, and one above
@@ -55,4 +55,4 @@ GreyLevels levels_of(const ImageView& left, const ImageView& right) {
   return levels;
 }
 
-}  // namespace egosgm::odometry
+}  // namespace egosgm
