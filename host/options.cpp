@@ -133,7 +133,9 @@ void PipelineOptions::validate() const {
   expect("disparities", disparities, disparities >= 1 && disparities <= 4096, "choose 1 to 4096");
   expect("min_disparity", min_disparity, min_disparity >= -16384 && min_disparity <= 16384, "choose -16384 to 16384");
   for_each(*this, [](const OptionText& text, const auto& value) {
-    if constexpr (std::is_same_v<std::decay_t<decltype(value)>, float>) expect_not_negative(text.name, value);
+    using Value = std::decay_t<decltype(value)>;
+    if constexpr (std::is_same_v<Value, float>) expect_not_negative(text.name, value);
+    if constexpr (std::is_enum_v<Value>) expect(text.name, value, text_of(value) != "?", "choose a named value");
   });
   expect("paths", paths, paths == 4 || paths == 8, "choose 4 or 8");
   expect("p2", p2, p2 >= 0 && p2 <= 190, "choose 0 to 190: path costs have 8 bits");

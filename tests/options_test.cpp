@@ -266,6 +266,12 @@ TEST(Options, RangesEndWhereTheyAreSaidTo) {
   }
 }
 
+TEST(Options, AChoiceIsOneThatHasAName) {
+  PipelineOptions options;
+  options.cost = static_cast<MatchingCost>(4);
+  expect_refused([&] { options.validate(); }, {"option cost is ?: choose a named value"});
+}
+
 TEST(Options, NumbersAreFiniteAndNotNegative) {
   for (const std::string name :
        {"left_right_px", "search_sigmas", "min_half_width_px", "process_noise_px2", "gate_px"}) {

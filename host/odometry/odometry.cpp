@@ -207,6 +207,7 @@ StereoOdometry& StereoOdometry::operator=(StereoOdometry&&) noexcept = default;
 OdometryResult StereoOdometry::process(const ImageView& left, const ImageView& right,
                                        const std::optional<Eigen::Isometry3d>& prior) {
   check_images(left, right);
+  if (prior) Motion{*prior}.validate();
   State& state = *state_;
   if (state.has_previous && (left.width != state.previous.left.width || left.height != state.previous.left.height)) {
     std::ostringstream text;

@@ -15,6 +15,7 @@
 #include "egosgm/error.h"
 #include "host/vision/file_io.h"
 #include "host/vision/text_rows.h"
+#include "kernels/method.h"
 
 namespace egosgm::vision {
 namespace {
@@ -106,11 +107,19 @@ void check_focal_length(const Entries& entries, const Entry& entry, double fx, d
                  " px; it must be positive");
 }
 
-void check_same_focal_length(const Entries& entries, const Entry& right, double left_f, double right_f) {
-  if (std::abs(left_f - right_f) <= kMaxRelativeFocalDifference * left_f) return;
+/// Of left and right, each fx, fy and cy: the pixels of a row of one image are on that row of the other one.
+void check_rectified(const Entries& entries, const Entry& right, const std::array<double, 3>& left,
+                     const std::array<double, 3>& other) {
+  for (const int i : {0, 1}) {
+    if (std::abs(left[i] - other[i]) <= kMaxRelativeFocalDifference * left[i]) continue;
+    refuse_row(entries.file(), right.row,
+               std::string(right.key) + ": the focal lengths of left and right, " + std::to_string(left[i]) + " and " +
+                   std::to_string(other[i]) + " px, differ; give the calibration of a rectified pair");
+  }
+  if (std::abs(left[2] - other[2]) <= EGOSGM_MAX_OFFSET_PX) return;
   refuse_row(entries.file(), right.row,
-             std::string(right.key) + ": the focal lengths of left and right, " + std::to_string(left_f) + " and " +
-                 std::to_string(right_f) + " px, differ; give the calibration of a rectified pair");
+             std::string(right.key) + ": the rows of left and right, cy " + std::to_string(left[2]) + " and " +
+                 std::to_string(other[2]) + " px, differ; give the calibration of a rectified pair");
 }
 
 void check_baseline(const Entries& entries, const Entry& entry, double baseline_m) {
@@ -129,7 +138,7 @@ Calibration from_projections(const Entries& entries, const std::string& left_key
   const std::vector<double> p_right = parse_numbers(entries, right, right.value, 12);
   check_focal_length(entries, left, p_left[0], p_left[5]);
   check_focal_length(entries, right, p_right[0], p_right[5]);
-  check_same_focal_length(entries, right, p_left[0], p_right[0]);
+  check_rectified(entries, right, {p_left[0], p_left[5], p_left[6]}, {p_right[0], p_right[5], p_right[6]});
   const double baseline_m = (p_left[3] - p_right[3]) / p_left[0];
   check_baseline(entries, right, baseline_m);
   return {.fx = p_left[0],
@@ -162,7 +171,7 @@ Calibration from_middlebury(const Entries& entries) {
   const std::vector<double> k_right = parse_middlebury_matrix(entries, right);
   check_focal_length(entries, left, k_left[0], k_left[4]);
   check_focal_length(entries, right, k_right[0], k_right[4]);
-  check_same_focal_length(entries, right, k_left[0], k_right[0]);
+  check_rectified(entries, right, {k_left[0], k_left[4], k_left[5]}, {k_right[0], k_right[4], k_right[5]});
   const double baseline_m = parse_finite(entries, baseline, baseline.value) / 1000.0;
   check_baseline(entries, baseline, baseline_m);
   const double doffs_px = entries.has("doffs")
@@ -258,7 +267,7 @@ std::string_view foreign_format(std::string_view text) {
       file.string() + ": is " + std::string(format) +
       ", not one of EgoSGM's formats for rectified images (fx, fy, cx, cy, baseline_m in rows; KITTI's; "
       "Middlebury's). A stereo calibration of OpenCV goes to `egosgm rectify`; the Python package "
-      "reads more of them: egosgm.read_calibration, and its `egosgm` command");
+      "reads more of them: egosgm.read_calibration, and --calib of its `egosgm` command");
 }
 
 }  // namespace

@@ -85,12 +85,17 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, cv::Size size
       "give the calibration of images of this size: scale fx, fy, cx, cy as the images were scaled, and subtract what "
       "was cropped from cx, cy";
   const std::string of_size = formatted("%dx%d", size.width, size.height);
-  const bool centred =
-      c.cx > 0.25 * size.width && c.cx < 0.75 * size.width && c.cy > 0.2 * size.height && c.cy < 0.8 * size.height;
-  if (!centred) {
+  const auto is_centred = [&](double cx) { return cx > 0.25 * size.width && cx < 0.75 * size.width; };
+  if (!(is_centred(c.cx) && c.cy > 0.2 * size.height && c.cy < 0.8 * size.height)) {
     return Suspicion{
         "the principal point is far from the middle of " + of_size + formatted(" (cx %.1f, cy %.1f)", c.cx, c.cy),
         remedy};
+  }
+  if (!is_centred(c.cx + c.doffs_px)) {
+    return Suspicion{formatted("with doffs_px %.4g the right principal point is at x %.1f in images of ", c.doffs_px,
+                               c.cx + c.doffs_px) +
+                         of_size,
+                     "give the right image's cx less the left one's as doffs_px"};
   }
   const double least = std::min(c.fx, c.fy), largest = std::max(c.fx, c.fy);
   if (least < kMinFocal * size.width || largest > kMaxFocal * size.width || largest > 2 * least) {
@@ -109,6 +114,7 @@ void Doubt::add(const cv::Mat& left, const cv::Mat& right, const FrameReport& re
     const bool stands_still = digests[side] == seen_[side] && digests[1 - side] != seen_[1 - side];
     if (frames_ > 0 && stands_still) ++frozen_[side];
   }
+  if (digests[0] == digests[1]) ++same_;
   std::copy(std::begin(digests), std::end(digests), seen_);
   size_ = left.size();
   density_ += report.density;
@@ -129,6 +135,7 @@ std::string Doubt::text() const {
     append(text, formatted("rows of the two views lie %g px apart, the most that is mended, or farther",
                            static_cast<double>(EGOSGM_MAX_OFFSET_PX)));
   }
+  if (same_ == frames_) append(text, "the left and the right images are the same (give those of both cameras)");
   for (const auto& [side, name] : {std::pair{0, "left"}, {1, "right"}}) {
     if (frozen_[side] == 0) continue;
     append(text,

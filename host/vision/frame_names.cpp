@@ -29,7 +29,8 @@ std::string without_zeros(const std::string& digits) {
   return digits.substr(std::min(digits.find_first_not_of('0'), digits.size() - 1));
 }
 
-/// What stands between prefix and suffix; nothing where the name does not match. A `%d` gives digits without zeros.
+/// What stands between prefix and suffix; nothing where the name does not match. The number of a frame has no zeros
+/// before it.
 std::optional<std::string> text_in(const std::string& name, const NamePattern& pattern) {
   std::string suffix = pattern.suffix;
   if (suffix.find('.') == std::string::npos) {
@@ -40,7 +41,7 @@ std::optional<std::string> text_in(const std::string& name, const NamePattern& p
   const std::size_t end = name.size() - suffix.size();
   if (!name.starts_with(pattern.prefix) || lower(name.substr(end)) != lower(suffix)) return std::nullopt;
   const std::string text = name.substr(pattern.prefix.size(), end - pattern.prefix.size());
-  if (pattern.kind == Kind::kAnything) return text;
+  if (pattern.kind == Kind::kAnything) return parse_frame_number(text) ? without_zeros(text) : text;
   if (!is_digits(text)) return std::nullopt;
   const std::string number = without_zeros(text);
   if (!pattern.any_width && text != padded(number, pattern.digits)) return std::nullopt;
@@ -59,15 +60,6 @@ Files find_files(const NamePattern& pattern) {
                           "; remove one of them, or give a pattern that only one fits");
   }
   return files;
-}
-
-/// Digits alone without zeros before them, unless two of them become the same.
-Files with_plain_numbers(const Files& files) {
-  Files plain;
-  for (const auto& [text, file] : files) {
-    if (!plain.emplace(is_digits(text) ? without_zeros(text) : text, file).second) return files;
-  }
-  return plain;
 }
 
 bool is_decimal(const std::string& text) {
@@ -100,15 +92,15 @@ std::set<std::string> texts_of(const Files& files) {
   return texts;
 }
 
-/// The texts themselves, if they are different numbers, else their order.
+/// The texts themselves, if those of pairs are numbers, else their order. What only one camera has under another name,
+/// as a mask, has no number then: it moves none.
 void number(std::vector<NamedPair>& pairs) {
-  std::set<int> used;
-  const bool numbers = std::all_of(pairs.begin(), pairs.end(), [&](const NamedPair& pair) {
-    const std::optional<int> own = parse_frame_number(pair.text);
-    return own && used.insert(*own).second;
-  });
+  const auto own = [](const NamedPair& pair) { return parse_frame_number(pair.text); };
+  const bool numbers =
+      std::any_of(pairs.begin(), pairs.end(), own) &&
+      std::all_of(pairs.begin(), pairs.end(), [&](const NamedPair& pair) { return own(pair) || pair.is_alone(); });
   int position = 0;
-  for (NamedPair& pair : pairs) pair.number = numbers ? *parse_frame_number(pair.text) : position++;
+  for (NamedPair& pair : pairs) pair.number = numbers ? own(pair).value_or(NamedPair::kNoNumber) : position++;
 }
 
 std::vector<NamedPair> pair_by_order(const Files& left, const Files& right) {
@@ -246,8 +238,10 @@ NamePattern parse_pattern(const std::string& pattern) {
   };
   NamePattern parts;
   parts.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  if (name.empty() || parts.folder.string().find_first_of("*%") != std::string::npos) return refuse();
-  const std::size_t begin = name.find_first_of("*%");
+  const auto first_wild = [](const std::string& text) { return text.find_first_of("*%"); };
+  const bool is_wild = first_wild(parts.folder.string()) != std::string::npos && !is_folder(parts.folder);
+  if (name.empty() || is_wild) return refuse();
+  const std::size_t begin = is_file(path) ? std::string::npos : first_wild(name);
   if (begin == std::string::npos) {
     parts.prefix = name;
     return parts;
@@ -273,11 +267,7 @@ NamePattern parse_pattern(const std::string& pattern) {
 }
 
 std::vector<NamedPair> pair_files(const NamePattern& left, const NamePattern& right, PairBy pair_by) {
-  Files left_files = find_files(left), right_files = find_files(right);
-  if (left.kind != right.kind) {
-    left_files = with_plain_numbers(left_files);
-    right_files = with_plain_numbers(right_files);
-  }
+  const Files left_files = find_files(left), right_files = find_files(right);
   std::vector<NamedPair> pairs =
       pair_by == PairBy::kOrder ? pair_by_order(left_files, right_files) : pair_by_name(left_files, right_files);
   for (const NamedPair& pair : pairs) {
@@ -316,8 +306,10 @@ std::vector<fs::path> files_in_order(const NamePattern& pattern) {
 
 void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left, FrameRange range,
                    const std::string& what, StereoSequence& sequence) {
-  for (const NamedPair& pair : pairs) sequence.numbers.push_back(pair.number);
-  const int lowest = pairs.front().number, highest = pairs.back().number;
+  for (const NamedPair& pair : pairs) {
+    if (pair.number != NamedPair::kNoNumber) sequence.numbers.push_back(pair.number);
+  }
+  const int lowest = sequence.numbers.front(), highest = sequence.numbers.back();
   const int first = range.first.value_or(lowest), last = range.last.value_or(highest);
   const std::string there = "there are frames " + std::to_string(lowest) + ".." + std::to_string(highest);
   const std::string remedy = "; " + there + ", select whole ones with --frames FIRST:LAST";
@@ -333,8 +325,8 @@ void select_frames(const std::vector<NamedPair>& pairs, const NamePattern& left,
   if (first < lowest) refuse_missing(first);
   if (last > highest) refuse_missing(last);
   for (const NamedPair& pair : pairs) {
-    if (pair.number < first || pair.number > last) continue;
-    if (pair.left.empty() || pair.right.empty()) {
+    if (pair.number != NamedPair::kNoNumber && (pair.number < first || pair.number > last)) continue;
+    if (pair.is_alone()) {
       alone.push_back(pair.left.empty() ? pair.right.string() : pair.left.string());
       continue;
     }

@@ -24,14 +24,19 @@ struct NamePattern {
   std::filesystem::path file_of(const std::string& text) const;
 };
 
-/// Throws InvalidArgument where `pattern` holds more than one `%d` or `*`, or one in a folder's name.
+/// A file or a folder that is there stands for itself, whatever its name holds. Throws InvalidArgument where `pattern`
+/// otherwise holds more than one `%d` or `*`, or one in a folder's name.
 NamePattern parse_pattern(const std::string& pattern);
 
 /// Files of one moment; one of the paths is empty where only the other camera has one.
 struct NamedPair {
+  static constexpr int kNoNumber = -1;
+
   std::string text;  // what stands in the place of `%06d` or `*`
-  int number = 0;    // the text, where all of them are different numbers, else the position
+  int number = 0;    // the text, where those of pairs are numbers (then what is alone may have none), else the position
   std::filesystem::path left, right;
+
+  bool is_alone() const { return left.empty() || right.empty(); }
 };
 
 /// Files that match, in order. Throws InvalidArgument where none belongs to the other camera's, and where two files of

@@ -39,7 +39,7 @@ std::vector<NamedPair> pairs_of_patterns(const NamePattern& left, const NamePatt
 ImagePairs find_pairs(const std::string& left, const std::string& right, PairBy pair_by) {
   ImagePairs result;
   for (NamedPair& pair : pairs_of_patterns(parse_pattern(left), parse_pattern(right), left, right, pair_by)) {
-    if (pair.left.empty() || pair.right.empty()) {
+    if (pair.is_alone()) {
       result.alone.push_back(pair.left.empty() ? pair.right : pair.left);
     } else {
       result.pairs.emplace_back(std::move(pair.left), std::move(pair.right));

@@ -173,7 +173,7 @@ class Bag:
             left_topic, right_topic = self._find_topics(left_topic, right_topic)
         self.images = left_topic, right_topic
         self.infos = () if calib else tuple(info_topics) or tuple(_info_topic(topic) for topic in self.images)
-        self._rig_or_calibration = calibrations.read_calibration(calib) if calib else None
+        self._calib = calib
         self._pose_topic, self._bound_ns, self._rectify, self._pose_axes = pose_topic, int(max_skew_ms * 1e6), rectify, pose_axes
         self.cameras: Optional[Cameras] = None
         self.is_rectified_here = False
@@ -253,10 +253,11 @@ class Bag:
             found.append(self._first_whole(reader, topic))
             if self.infos:
                 self._first_infos[topic] = _values_of(found[-1])
-        if self._rig_or_calibration is not None:
-            self.is_rectified_here = isinstance(self._rig_or_calibration, StereoRig)
+        if self._calib:
             height, width = grey_of(found[0]).shape
-            return Cameras.of_calibration(self._rig_or_calibration, width, height)
+            calibration = calibrations.read_calibration(self._calib, size=(width, height))
+            self.is_rectified_here = isinstance(calibration, StereoRig)
+            return Cameras.of_calibration(calibration, width, height)
         self.is_rectified_here = any(map(are_raw, found, self.images)) if self._rectify is None else self._rectify
         return Cameras(*found, self.is_rectified_here, self.infos)
 

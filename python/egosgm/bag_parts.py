@@ -51,6 +51,8 @@ class Parts:
         files: List[pathlib.Path] = []
         for suffix in _SUFFIXES:
             files = files or sorted(file for file in self._path.iterdir() if file.suffix == suffix or file.name.endswith(suffix + ".zstd"))
+        if not files and not is_described:
+            raise _egosgm.InvalidArgument(f"{self._path}: holds no bag, neither metadata.yaml nor {', '.join(_SUFFIXES)}: give a .mcap, a .bag, or a bag's folder")
         if not files:
             return [self._path]
         whole, broken = [], []

@@ -9,7 +9,7 @@ from typing import Any, Dict, List, Optional, Tuple, Union
 import numpy as np
 
 from . import _egosgm
-from .calibration_parts import Camera, Matrix, Values, data_of, matrix, of_four, refuse, rotation, size_of, text_of, transform
+from .calibration_parts import Camera, Matrix, Values, data_of, expect_size, matrix, of_four, refuse, rotation, size_of, text_of, transform
 from .rectification import StereoRig
 
 Found = Union[StereoRig, _egosgm.Calibration]
@@ -66,14 +66,17 @@ def is_info(data: Dict[str, Any]) -> bool:
     return "projection_matrix" in data or any(matrix(data.get(p), (12,)) is not None and k in data for p, k in (("p", "k"), ("P", "K")))
 
 
-def ros(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> Found:
+def ros(files: List[pathlib.Path], contents: List[Dict[str, Any]], size: Optional[Tuple[int, int]]) -> Found:
     from .ros_images import Cameras, are_raw
     infos = [_Info(data, file) for data, file in zip(contents, files)]
     cameras = Cameras(*infos, any(are_raw(info, "") for info in infos), names=tuple(str(file) for file in files))
-    return cameras.calibration if cameras.rig is None else cameras.rig
+    if cameras.rig is not None:
+        return cameras.rig
+    expect_size(cameras.size, size, files[0])
+    return cameras.calibration
 
 
-def orb_slam(data: Dict[str, Any], file: pathlib.Path) -> Found:
+def orb_slam(data: Dict[str, Any], file: pathlib.Path, images_size: Optional[Tuple[int, int]]) -> Found:
     settings = Values(data, file, "a file of settings of ORB-SLAM")
     size = [data.get("Camera.width"), data.get("Camera.height")]
     if "RIGHT.K" in data:  # raw images
@@ -90,6 +93,7 @@ def orb_slam(data: Dict[str, Any], file: pathlib.Path) -> Found:
         return settings.pair(cameras, np.linalg.inv(settings.matrix((4, 4), "Stereo.T_c1_c2")), size)
     for name, of_focal in (("Stereo.b", 1.0), ("Camera.bf", four[0])):
         if name in data:
+            expect_size(size_of(size), images_size, file)
             return _egosgm.Calibration(*four, settings.numbers(name)[0] / of_focal)
     raise settings.refuse(" of one camera: it lacks Stereo.b or Camera.bf, the baseline")
 
@@ -210,9 +214,9 @@ def virtual_kitti(file: pathlib.Path) -> _egosgm.Calibration:
 
 
 def of_q(q: Matrix, file: pathlib.Path) -> _egosgm.Calibration:
-    if not q[3, 2]:
-        raise refuse(file, "its Q has no baseline")
-    return _egosgm.Calibration(q[2, 3], q[2, 3], -q[0, 3], -q[1, 3], abs(1 / q[3, 2]), q[3, 3] / q[3, 2])
+    if not q[3, 2] > 0:
+        raise refuse(file, f"its Q has a baseline of {1 / q[3, 2]:.4g} m: are left and right swapped?" if q[3, 2] else "its Q has no baseline")
+    return _egosgm.Calibration(q[2, 3], q[2, 3], -q[0, 3], -q[1, 3], 1 / q[3, 2], q[3, 3] / q[3, 2])
 
 
 # How NumPy's users and others call the matrices of stereoCalibrate, and the numbers of a rectified pair (Cityscapes' in two groups), in small letters

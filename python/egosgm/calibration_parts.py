@@ -68,6 +68,12 @@ def size_of(value: Any) -> Optional[Tuple[int, int]]:
     return (int(numbers[0]), int(numbers[1])) if numbers is not None else None
 
 
+def expect_size(calibrated: Optional[Tuple[int, int]], size: Optional[Tuple[int, int]], file: pathlib.Path) -> None:
+    """Of images that stay as they are, where both sizes are known: a calibration of others gives wrong depths."""
+    if calibrated and size and 0 not in calibrated and calibrated != size:
+        raise refuse(file, "is of images of {}x{}, and these have {}x{}: give the calibration of this size".format(*calibrated, *size))
+
+
 class Values:
     """What a file holds, or a part of it, by names. what: the kind of file, for errors."""
 

@@ -60,14 +60,14 @@ def _other_side(file: pathlib.Path) -> Tuple[pathlib.Path, pathlib.Path]:
     raise parts.refuse(file, "is the calibration of one camera: put the other one's beside it, of the same name with left and right (or cam0 and cam1) in it")
 
 
-def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool) -> Found:
+def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]) -> Found:
     if not isinstance(data, dict):
         raise parts.refuse(file, "holds no names with values: it is no calibration that is known")
     flat = {str(key): value for key, value in data.items()}
     if isinstance(flat.get("cam0"), dict):
         return formats.kalibr(flat, file)
     if "T_BS" in flat or formats.is_info(flat):
-        return _of_two_files(list(_other_side(file)))
+        return _of_two_files(list(_other_side(file)), size)
     if "projection_parameters" in flat:
         raise parts.refuse(file, "is one camera of VINS: give the configuration that names both, with cam0_calib and cam1_calib")
     if "cam0_calib" in flat:
@@ -80,23 +80,23 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool) -> Found:
         name = next((name for name in ("cams_12", "cams_03") if name in flat["disparity_to_depth"]), "cams_12")
         return formats.of_q(parts.Values(flat["disparity_to_depth"], file, "DSEC's cam_to_cam.yaml").matrix((4, 4), name), file)
     if "Camera.fx" in flat or "Camera1.fx" in flat:
-        return formats.orb_slam(flat, file)
+        return formats.orb_slam(flat, file, size)
     nested = {f"{outer}_{inner}": value for outer, group in flat.items() if isinstance(group, dict) and "data" not in group
               for inner, value in group.items()}
     return formats.by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye)
 
 
-def _of_two_files(files: List[pathlib.Path]) -> Found:
+def _of_two_files(files: List[pathlib.Path], size: Optional[Tuple[int, int]] = None) -> Found:
     contents = [parts.data_of(parts.text_of(path), path) for path in files]
     for file, data in zip(files, contents):
         if not isinstance(data, dict) or not ("T_BS" in data or formats.is_info(data)):
             raise parts.refuse(file, "is not the calibration of one camera, as of ROS (camera_matrix, projection_matrix) or EuRoC (T_BS, intrinsics)")
     if ("T_BS" in contents[0]) != ("T_BS" in contents[1]):
         raise parts.refuse(files[1], f"is of another kind than {files[0]}: give both cameras' files of one program")
-    return (formats.euroc if "T_BS" in contents[0] else formats.ros)(files, contents)
+    return formats.euroc(files, contents) if "T_BS" in contents[0] else formats.ros(files, contents, size)
 
 
-def _of_folder(folder: pathlib.Path, is_fisheye: bool) -> Found:
+def _of_folder(folder: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]) -> Found:
     for mav0 in (folder, folder / "mav0"):
         if (mav0 / "cam0/sensor.yaml").exists():
             return read_euroc_rig(mav0)
@@ -110,15 +110,15 @@ def _of_folder(folder: pathlib.Path, is_fisheye: bool) -> Found:
     candidates = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in (".yaml", ".yml", ".json", ".xml", ".txt", ".npz")]
     lefts = [file for file in candidates if re.search("left|cam0|_l[.]", file.name, re.IGNORECASE)]
     if len(lefts) == 1:
-        return _found(lefts[0], is_fisheye)
+        return _found(lefts[0], is_fisheye, size)
     if len(candidates) == 1:
-        return _found(candidates[0], is_fisheye)
+        return _found(candidates[0], is_fisheye, size)
     raise parts.refuse(folder, "is a folder without one calibration: give the file" + (", of " + ", ".join(c.name for c in candidates[:8]) if candidates else ""))
 
 
 def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]] = None) -> Found:
     if file.is_dir():
-        return _of_folder(file, is_fisheye)
+        return _of_folder(file, is_fisheye, size)
     if not file.is_file():
         raise parts.refuse(file, "is a pipe or a device; give a file" if file.exists() else "no such file")
     with open(file, "rb") as stream:
@@ -158,7 +158,7 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
     data = parts.data_of(text, file)
     if not isinstance(data, dict):
         raise own_error
-    return _of_data(data, file, is_fisheye)
+    return _of_data(data, file, is_fisheye, size)
 
 
 def _in_unit(rig: StereoRig, unit_m: float) -> StereoRig:
@@ -204,13 +204,13 @@ def read_euroc_rig(mav0: _Path) -> StereoRig:
 @_with_words
 def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fisheye: bool = False, size: Optional[Tuple[int, int]] = None) -> Found:
     """The calibration of a file or a folder, of whichever program, or of a file for each camera: a Calibration of rectified images, or a rig of raw ones.
-    unit_m: metres in a unit of the translation; None: 1, and a baseline that no rig has is refused. size: (width, height) of the images, for files that
-    are of several. Throws InvalidArgument with what the file is, and what it lacks."""
+    unit_m: metres in a unit of the translation; None: 1, and a baseline that no rig has is refused. size: (width, height) of the images: a file may be of
+    several sizes, or of another one, which is refused for rectified images, and by Rectification for raw ones. Throws InvalidArgument with what the file is, and what it lacks."""
     files = [pathlib.Path(part) for part in ([file] if isinstance(file, (str, os.PathLike)) else file)]
     if not 1 <= len(files) <= 2:
         raise _egosgm.InvalidArgument(f"a calibration is one file, or one for each camera, left and right, not {len(files)}")
     path = files[0]
-    found = _found(path, is_fisheye, size) if len(files) == 1 else _of_two_files(files)
+    found = _found(path, is_fisheye, size) if len(files) == 1 else _of_two_files(files, size)
     if is_fisheye and not (isinstance(found, StereoRig) and found.is_fisheye):
         raise parts.refuse(path, "is of rectified images, or says itself what its lenses are: --fisheye (is_fisheye) belongs to OpenCV's M1, D1, M2, D2, R, T")
     if not isinstance(found, StereoRig):
@@ -224,12 +224,16 @@ def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fis
         if doubt and doubt.is_certain:
             raise parts.refuse(path, f"T gives {doubt.what}: {doubt.remedy} Give --unit cm or --unit mm (unit_m 0.01 or 0.001), whichever it is; the side of a square in metres where T "
                                 "counts a board's squares (--unit 0.025, unit_m 0.025); or --unit m (unit_m 1) where it is right")
-    return _without_rectification(found) or found
+    calibration = _without_rectification(found)
+    if calibration is not None:
+        parts.expect_size(found.size, size, path)
+    return calibration or found
 
 
 def read_calibration(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fisheye: bool = False,
                      size: Optional[Tuple[int, int]] = None) -> Found:
     """Reads a calibration, of whichever program: EgoSGM's, KITTI's, Middlebury's, Cityscapes', DSEC's, ORB-SLAM's, FoundationStereo's and Virtual KITTI's of
     rectified images give a Calibration; OpenCV's, ROS's, Kalibr's, EuRoC's, VINS', Basalt's, an OAK's, a ZED's, and NumPy's arrays, of raw ones a
-    StereoRig. file: one, or (left, right). size: (width, height) of the images, for a ZED's file."""
+    StereoRig. file: one, or (left, right). size: (width, height) of the images: it chooses in a ZED's file, and a
+    calibration of rectified images of another size is refused."""
     return find(file, unit_m, is_fisheye, size)

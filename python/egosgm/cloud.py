@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
-from .arguments import decimal, expect_new_file, Parser, read_json, tell
+from .arguments import counted, decimal, expect_new_file, Parser, read_json, tell
 from .points import cloud_of_maps, write_new_ply
 
 
@@ -35,25 +35,26 @@ def _map_of(folder: pathlib.Path, name: str, kind: str) -> NDArray[np.float32]:
                                   if kind != "disparity" else f"{folder / kind}: has no map of frame {name}: give the folder that `egosgm run` wrote")
 
 
-def _frames_of(folder: pathlib.Path) -> Tuple[_egosgm.Calibration, List[Tuple[str, str]], NDArray[np.float64]]:
-    """The calibration, names and left images, and the poses."""
+def _frames_of(folder: pathlib.Path) -> Tuple[_egosgm.Calibration, List[Tuple[str, str]], NDArray[np.float64], int]:
+    """The calibration, names and left images, the poses, and how many of them are the one before, as odometry found no motion."""
     file = folder / "report.json"
     if not file.exists():
         raise _egosgm.InvalidArgument(f"{file}: no such file: give the folder that `egosgm run --out` wrote")
     poses = folder / "poses.txt"
     if not poses.exists():
         raise _egosgm.InvalidArgument(f"{poses}: no such file: a run with a calibration (--calib) writes it when it ends")
+    report = read_json(file)
     try:
-        report = read_json(file)
         calibration = _egosgm.Calibration(**report["calibration"])
         frames = [(str(entry.get("name") or f"{entry['frame']:06d}"), os.fsdecode(entry["left"])) for entry in report["frames"]]
+        lost = sum(entry["odometry"]["motion"] is None for entry in report["frames"][1:] if "odometry" in entry)
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise _egosgm.InvalidArgument(f"{file}: is no report of a run: {error}") from None
     world_from_camera = _egosgm.read_poses(poses)
     if len(world_from_camera) != len(frames) or not frames:
         raise _egosgm.InvalidArgument(f"{poses}: has {len(world_from_camera)} poses and {file.name} {len(frames)} frames: let the run end, "
                                       "or run it again with --resume")
-    return calibration, frames, world_from_camera
+    return calibration, frames, world_from_camera, lost
 
 
 class VoxelGrid:
@@ -112,7 +113,7 @@ def main(arguments: Sequence[str]) -> int:
         if not getattr(given, name) > 0:
             raise _egosgm.InvalidArgument(f"--{name.replace('_', '-')} {getattr(given, name)}: choose a number above 0")
     folder = pathlib.Path(given.run)
-    calibration, frames, poses = _frames_of(folder)
+    calibration, frames, poses, lost = _frames_of(folder)
     file = pathlib.Path(given.out) if given.out else folder / "cloud.ply"
     expect_new_file("--out", file)
     grid, taken, pixels = VoxelGrid(given.voxel), 0, 0
@@ -130,4 +131,6 @@ def main(arguments: Sequence[str]) -> int:
         raise _egosgm.InvalidArgument(f"{folder}: no point is left: raise --cloud-sigma or --max-depth, or lower --least-frames")
     write_new_ply(file, points, colors, normals if given.normals else None)
     tell(f"{file}: {len(points)} points, of {100 * taken / pixels:.1f} % of the pixels with a disparity in {len(frames)} frames")
+    if lost:
+        tell(f"odometry found no motion in {counted(lost, 'frame')}, whose pose is that of the frame before: what was seen before and after does not meet")
     return 0

@@ -79,6 +79,8 @@ class Drive:
             source = _egosgm.open_folder(source, frames)
         elif frames:
             raise _egosgm.InvalidArgument(f"frames={frames!r}: only a folder's are chosen here")
+        if not isinstance(motion, (int, np.bool_)):
+            raise _egosgm.InvalidArgument(f"motion: is a {type(motion).__name__}: choose True or False; Pipeline.process takes motions that are known")
         self.sequence = source if isinstance(source, _egosgm.StereoSequence) else None
         if calibration is None and self.sequence is not None:
             calibration = self.sequence.calibration
@@ -87,7 +89,7 @@ class Drive:
                 raise _egosgm.InvalidArgument("calibration: a bag has its own: give it to the Bag, as calib")
             calibration = source.find_cameras().calibration
         if isinstance(calibration, (str, os.PathLike)):
-            calibration = read_calibration(calibration)
+            calibration = read_calibration(calibration, size=self.sequence.size if self.sequence is not None else None)
         if isinstance(calibration, StereoRig):
             raise _egosgm.InvalidArgument("calibration: is of raw images: rectify them first (egosgm.Rectification, egosgm rectify)")
         if calibration is not None and not isinstance(calibration, _egosgm.Calibration):
@@ -136,11 +138,16 @@ class Drive:
                 pose = frame.world_from_camera if self._odometry_options is not None else None
                 yield frame.number, f"{frame.number:06d}", frame.left, frame.right, pose, frame.starts_anew and frame.number > 0
         else:
+            first: Tuple[int, ...] = ()
             for number, pair in enumerate(self._source):
                 if not isinstance(pair, (tuple, list)) or len(pair) != 2:
                     raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}: give (left, right), each an image")
-                # Copies: a camera may use its buffers again before the frame is handed out.
-                yield (number, f"{number:06d}", *(np.array(image) for image in pair), None, False)
+                left, right = (np.array(image) for image in pair)  # copies: a camera may use its buffers again before the frame is handed out
+                first = first or left.shape[:2]
+                if left.shape[:2] != first:
+                    raise _egosgm.InvalidArgument(f"pair {number}: its left image is of the shape {left.shape}, and the first one's began with {first}: "
+                                                  "all need one size")
+                yield number, f"{number:06d}", left, right, None, False
 
     def _motions(self) -> _egosgm._MotionSource:
         return _egosgm._MotionSource(None if self._odometry_options is None else self.calibration, **(self._odometry_options or {}))

@@ -103,8 +103,8 @@ def _open(pattern: str) -> Any:
 def _same_size(pair: RawPair, what: str) -> RawPair:
     left, right = pair.left, pair.right
     if left.shape[:2] != right.shape[:2] or left.dtype != right.dtype:
-        raise _refuse(f"{what}: the left image is {left.shape[1]}x{left.shape[0]}, the right one {right.shape[1]}x{right.shape[0]}: both need one size "
-                      "and depth")
+        sizes = [f"{image.shape[1]}x{image.shape[0]} of {8 * image.itemsize} bits" for image in (left, right)]
+        raise _refuse(f"{what}: the left image is {sizes[0]}, the right one {sizes[1]}: both need one size and depth")
     return pair
 
 

@@ -105,7 +105,7 @@ def _check(rig: Any) -> None:
             raise _egosgm.InvalidArgument("P1 and P2 have different focal lengths or rows: they are not of one rectified pair; give both as stereoRectify found them, or neither")
     else:
         for name, matrix in (("M1", rig.left_matrix), ("M2", rig.right_matrix)):
-            if not (matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[2, 2] == 1):
+            if not (matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[2].tolist() == [0, 0, 1]):
                 raise _egosgm.InvalidArgument(f"{name} is no camera matrix: fx and fy are above 0, its last row is 0 0 1")
 
 

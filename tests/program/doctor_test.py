@@ -146,6 +146,7 @@ class Doctor(InputTest):
         for file in (street / "image_0").iterdir():
             shutil.copy(file, street / "image_1" / file.name)
         self.assertIn("are the same", self.assert_only_problem("matches", street)["text"])
+        self.assertIn("images are the same", self.assert_works("run", street, "--out", self.new_folder() / "out"))
 
     def blurred(self, change):
         street = self.broken_street()

@@ -11,7 +11,7 @@ import unittest
 import numpy
 
 from input_case import InputTest, read_grey, rotation, sampled, write_grey
-from program_case import FRAMES, HEIGHT, WIDTH
+from program_case import FRAMES, HEIGHT, WIDTH, png
 
 
 def write_avi(file, images):
@@ -319,6 +319,9 @@ class Rectify(RectifyTest):
         refused(good, "bad.txt:1", arguments=["--list", self.raw_folder / "bad.txt"])
         (self.raw_folder / "bad.txt").write_text("cam0/9.png cam0/9.png\n")
         refused(good, "bad.txt:1", "is the left and the right image", arguments=["--list", self.raw_folder / "bad.txt"])
+        for bits in (8, 16):
+            (self.raw_folder / f"{bits}.png").write_bytes(png(8, 8, bits, [bytes(bits)] * 8))
+        refused(good, "8x8 of 8 bits", "8x8 of 16 bits", arguments=["--left", self.raw_folder / "8.png", "--right", self.raw_folder / "16.png"])
         self.assertFalse(out.exists())
         self.assert_refused(["rectify", *self.PAIRS, "--calib", file, "--out", self.street], "not empty")
         self.assert_refused(["rectify", *self.PAIRS, "--out", out], "--calib FILE")

@@ -527,7 +527,11 @@ def test_the_parts_of_a_bag_in_a_folder_that_nothing_describes(kind, suffix, tmp
         written = recording.write(tmp_path / f"part_{part}{suffix if kind == 'ros1' else ''}")
         written = next(written.glob("*.db3")) if kind == "sqlite" else written
         written.rename(tmp_path / "parts" / f"part_{part}{suffix}")
-    (tmp_path / "parts/notes.txt").write_text("not a bag")
+    (tmp_path / "none").mkdir()
+    for folder in (tmp_path / "none", tmp_path / "parts"):
+        (folder / "notes.txt").write_text("not a bag")
+    with pytest.raises(egosgm.InvalidArgument, match="none: holds no bag, neither metadata.yaml nor .mcap"):
+        bags.Bag(tmp_path / "none")
     bag = bags.Bag(tmp_path / "parts", "/left/image_rect", "/right/image_rect")
     assert [(frame.stamp_ns - START) // RATE_NS for frame in bag.frames()] == [0, 1] and len(bag) == 2
     with pytest.raises(egosgm.InvalidArgument, match='no topic "/left/camera_info"; its topics of camera infos: none; without them give --calib'):
@@ -547,6 +551,12 @@ def test_a_calibration_takes_the_place_of_camera_infos(tmp_path, street, frames,
     np.testing.assert_array_equal(frame.left, frames[0].left)
     c = bag.cameras.calibration
     assert (c.fx, c.baseline_m) == pytest.approx((street.calibration.fx, street.calibration.baseline_m)) and not bag.is_rectified_here
+
+    camera = dict(intrinsics=[c.fx, c.fy, c.cx, c.cy], resolution=[WIDTH // 2, HEIGHT // 2])
+    shift = [[1, 0, 0, -c.baseline_m], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    (tmp_path / "chain.json").write_text(json.dumps(dict(cam0=camera, cam1=dict(camera, T_cn_cnm1=shift))))
+    with pytest.raises(egosgm.InvalidArgument, match=f"is of images of {WIDTH // 2}x.*, and these have {WIDTH}x{HEIGHT}"):
+        next(bags.Bag(path, *topics, calib=tmp_path / "chain.json").frames())
 
     for camera in (0, 1):  # of EuRoC, turned by a little
         folder = tmp_path / f"mav0/cam{camera}"
@@ -1126,13 +1136,13 @@ def test_an_mcap_that_is_packed_and_one_without_a_profile(tmp_path, street, fram
                     channels[channel.topic] = writer.register_channel(channel.topic, encoding, schemas[schema.name])
                 writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
             writer.finish()
-    assert f"{FRAMES} frames" in told_of(capfd, tmp_path / "plain.mcap")
+    assert f", {FRAMES} frames" in told_of(capfd, tmp_path / "plain.mcap")
     refused(capfd, ["--bag", tmp_path / "ros1.mcap", *TOPICS, *SET], "ROS 1")
     whole = (tmp_path / "plain.mcap").read_bytes()
     at = whole.rindex(zstandard.FRAME_HEADER)  # of the last chunk
     (tmp_path / "torn.mcap").write_bytes(whole[:at] + bytes(4) + whole[at + 4:])
     said = told_of(capfd, tmp_path / "torn.mcap")
-    assert "torn.mcap is cut or damaged (" in said and f"{FRAMES} frames" not in said
+    assert "torn.mcap is cut or damaged (" in said and f", {FRAMES} frames" not in said
 
 
 def test_topics_are_found_where_there_is_one_choice(tmp_path, street, frames, capfd):

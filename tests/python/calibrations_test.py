@@ -114,6 +114,29 @@ def test_of_raw_images(name, tmp_path):
     expect_raw(egosgm.read_calibration(tmp_path / name))
 
 
+def test_of_rectified_images_of_another_size(tmp_path):
+    def read(name, size):
+        return egosgm.read_calibration(tmp_path / name, size=size)
+
+    (tmp_path / "kalibr.yaml").write_text(kalibr())
+    (tmp_path / "left.yaml").write_text(ros(P))
+    (tmp_path / "right.yaml").write_text(ros(RIGHT_P))
+    (tmp_path / "orb_slam.yaml").write_text(RECTIFIED["orb_slam3.yaml"] + f"Camera.width: {WIDTH}\nCamera.height: {HEIGHT}\n")
+    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml"):
+        expect_rectified(read(name, (WIDTH, HEIGHT)))
+        with pytest.raises(egosgm.InvalidArgument, match=f"{name}.*is of images of 640x480, and these have 320x240"):
+            read(name, (WIDTH // 2, HEIGHT // 2))
+    (tmp_path / "kalibr_lens.yaml").write_text(RAW["kalibr_lens.yaml"])
+    expect_raw(read("kalibr_lens.yaml", (WIDTH, HEIGHT)))
+
+
+def test_a_q_of_swapped_cameras_is_refused(tmp_path):
+    for last, named in ((-1 / B, "a baseline of -0.3 m: are left and right swapped"), (0, "no baseline")):
+        (tmp_path / "q.json").write_text(json.dumps(dict(Q=[*Q[:3], [0, 0, last, 0]])))
+        with pytest.raises(egosgm.InvalidArgument, match=named):
+            egosgm.read_calibration(tmp_path / "q.json")
+
+
 def test_two_files_of_ros_and_of_kimera(tmp_path):
     (tmp_path / "left.yaml").write_text(ros(P))
     with pytest.raises(egosgm.InvalidArgument, match="is the calibration of one camera"):

@@ -53,6 +53,16 @@ def test_frames_meet_by_their_poses(run, capsys):
     assert corner.sum() == 2 and (rows["rgb"][corner] == 255).all() and (rows["rgb"][~corner] == 51).all()
 
 
+def test_poses_that_stand_still_for_want_of_a_motion_are_told(run, capsys):
+    report = json.loads((run / "report.json").read_text())
+    for motion, is_told in ((None, True), ({"translation_m": [0, 0, 0]}, False)):
+        for entry, own in zip(report["frames"], (None, motion)):  # a first frame has none
+            entry["odometry"] = dict(source="estimated", motion=own)
+        (run / "report.json").write_text(json.dumps(report))
+        assert cloud.main([str(run), "--out", str(run / f"{is_told}.ply")]) == 0
+        assert ("no motion in 1 frame," in capsys.readouterr().out) == is_told
+
+
 def test_what_lies_in_one_cube_is_its_mean():
     grid = cloud.VoxelGrid(1)
     for x, colour in ((0.2, 10), (0.6, 20)):

@@ -50,6 +50,14 @@ def test_a_folder_and_its_pairs_give_the_maps_of_the_pipeline(street_folder, sha
         np.testing.assert_array_equal(a.disparity, c)
 
 
+def test_a_calibration_of_images_of_another_size_is_refused(street_folder, tmp_path):
+    camera = dict(intrinsics=[185.6, 185.6, 159.5, 43.7], resolution=[2 * WIDTH, 2 * HEIGHT])
+    shift = [[1, 0, 0, -0.54], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    (tmp_path / "chain.json").write_text(json.dumps(dict(cam0=camera, cam1=dict(camera, T_cn_cnm1=shift))))
+    with pytest.raises(egosgm.InvalidArgument, match="is of images of 640x192, and these have 320x96"):
+        egosgm.run(street_folder, tmp_path / "chain.json")
+
+
 def maps_of(frames):
     return [frame.disparity for frame in frames]
 
@@ -100,6 +108,15 @@ def test_the_last_good_frame_comes_before_the_error(street, frames):
         for frame in egosgm.run(broken, street.calibration, **OPTIONS):
             found.append(frame.disparity)
     np.testing.assert_array_equal(found, maps_of(egosgm.run(pairs, street.calibration, **OPTIONS))[:2])
+
+
+def test_pairs_of_two_sizes_and_a_motion_for_all_are_named(street, frames):
+    pairs = [(frames[0].left, frames[0].right), (frames[1].left[:40], frames[1].right[:40])]
+    for motion in (True, False):
+        with pytest.raises(egosgm.InvalidArgument, match=r"pair 1: its left image is of the shape \(40, 320\).*\(96, 320\): all need one size"):
+            list(egosgm.run(pairs, street.calibration, motion=motion, **OPTIONS))
+    with pytest.raises(egosgm.InvalidArgument, match="motion: is a ndarray"):
+        egosgm.run(pairs, street.calibration, motion=np.eye(4))
 
 
 def test_a_pair_of_a_folder_that_cannot_be_read_costs_itself_alone(street_folder):

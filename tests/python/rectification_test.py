@@ -120,7 +120,8 @@ def test_what_no_rig_has_is_named():
                            ({"T": [[-BASELINE, 0, 0]]}, "T: needs 3x1"), ({"T": [BASELINE, 0, 0]}, "exchange left and right"),
                            ({"left_matrix": np.eye(2)}, "M1: needs 3x3"), ({"left_distortion": np.zeros(3)}, "D1: needs 4"), ({"size": (1, 1)}, "1x1 were calibrated"),
                            ({"R": [[1, 0, 0], [0, np.nan, 0], [0, 0, 1]]}, "R: needs 3x3"),
-                           ({"right_matrix": np.zeros((3, 3))}, "M2 is no camera matrix"), ({"R": np.diag([1, 1, -1])}, "R is no rotation"), ({"R": 2 * np.eye(3)}, "R is no rotation"),
+                           ({"right_matrix": np.zeros((3, 3))}, "M2 is no camera matrix"),
+                           ({"left_matrix": projection()[:, :3].T}, "M1 is no camera matrix"), ({"R": np.diag([1, 1, -1])}, "R is no rotation"), ({"R": 2 * np.eye(3)}, "R is no rotation"),
                            ({"given": (2 * np.eye(3), np.eye(3), np.eye(3, 4), np.eye(3, 4))}, "R1 is no rotation"),
                            ({"given": (np.eye(3),) * 3}, "belong together"),
                            *(({"given": (np.eye(3), np.eye(3), projection(), projection(**{name: value}))}, "P1 and P2 have different")

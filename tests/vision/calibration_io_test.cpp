@@ -100,6 +100,11 @@ TEST_F(CalibrationIo, BrokenFilesAreNamedWithTheirRow) {
   expect_text_refused("P0: " + kP0 + "\nP1: " + kP0, {":2:", "baseline is 0.0", "must be positive"});
   expect_text_refused("P0: " + kP1 + "\nP1: " + kP0, {":2:", "baseline is -0.5", "swapped"});
   expect_text_refused("P0: " + kP0 + "\nP1: 800 0 600 -350 0 710 180 0 0 0 1 0", {":2:", "differ", "rectified"});
+  expect_text_refused("P0: " + kP0 + "\nP1: 700 0 600 -350 0 720 180 0 0 0 1 0",
+                      {":2:", "710.0", "720.0", "rectified"});
+  expect_text_refused("P0: " + kP0 + "\nP1: 700 0 600 -350 0 710 183 0 0 0 1 0", {":2:", "rows", "183.0", "rectified"});
+  expect_text_refused("cam0=[700 0 600; 0 710 180; 0 0 1]\ncam1=[700 0 600; 0 710 177; 0 0 1]\nbaseline=1",
+                      {":2:", "rows", "177.0"});
   expect_text_refused("cam0=[700 0 600; 0 710 180]\ncam1=[700 0 600; 0 710 180; 0 0 1]\nbaseline=1",
                       {":1:", "6 numbers"});
   expect_text_refused("cam0=[700 0 600; 0 710 180; 0 0 1]\ncam1=[700 0 600; 0 710 180; 0 0 1]\n", {"no row baseline"});

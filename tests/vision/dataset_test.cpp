@@ -279,7 +279,7 @@ TEST_F(DatasetTest, NumbersInNamesCountByTheirValue) {
 
 TEST_F(DatasetTest, TwoFramesNeverShareAName) {
   add_text("c.toml", kOwnCalibration);
-  add_images({"l/1", "l/01", "l/2", "r/1", "r/01", "r/2"});
+  add_images({"l/a1", "l/a01", "l/2", "r/a1", "r/a01", "r/2"});
   const StereoSequence sequence = open_patterns(path("l/*"), path("r/*"), root_ / "c.toml");
   EXPECT_EQ(numbers_of(sequence), (std::vector<int>{0, 1, 2}));
   std::set<std::string> names;
@@ -292,6 +292,36 @@ TEST_F(DatasetTest, TwoFramesNeverShareAName) {
   add_image("image_0/1.png");
   expect_refused([&] { open_folder(root_); }, {"image_0/000001.png", "means the same frame as 1.png"});
   expect_refused([&] { open_patterns(path("l/*"), path("l/*"), root_ / "c.toml"); }, {"is the left and the right"});
+  add_image("l/02.png");
+  expect_refused([&] { open_patterns(path("l/*"), path("r/*"), root_ / "c.toml"); },
+                 {"l/02.png", "means the same frame as 2.png"});
+  add_images({"n/7", "m/007"});
+  EXPECT_EQ(open_patterns(path("n/*"), path("m/*"), root_ / "c.toml").frames[0].right, root_ / "m/007.png");
+}
+
+TEST_F(DatasetTest, APictureBesideOneCamerasFramesMovesNoNumber) {
+  add_images({"l/10", "l/11", "l/mean", "r/10", "r/11", "r/9_mask"});
+  const StereoSequence sequence = open_patterns(path("l/*"), path("r/*"), "");
+  EXPECT_EQ(numbers_of(sequence), (std::vector<int>{10, 11}));
+  EXPECT_EQ(sequence.numbers, (std::vector<int>{10, 11}));
+  EXPECT_NE(sequence.note.find("2 images without the other camera's left out"), std::string::npos) << sequence.note;
+  add_images({"r/mean"});  // a frame as others
+  EXPECT_EQ(numbers_of(open_patterns(path("l/*"), path("r/*"), "")), (std::vector<int>{1, 2, 3}));
+  add_images({"a/one", "b/two", "b/three"});
+  std::filesystem::remove(root_ / "a/one.png");
+  expect_refused([&] { open_patterns(path("a/*"), path("b/*"), ""); }, {"has no partner"});
+}
+
+TEST_F(DatasetTest, NamesThatAreThereAreNoPatterns) {
+  for (const std::string folder : {"a%20b", "a*b", "100%"}) {
+    add_text(folder + "/calib.txt", kOwnCalibration);
+    for (const char* name : {"/left/0", "/right/0", "/l%20c", "/r%20c"}) add_images({folder + name});
+    EXPECT_EQ(open_folder(root_ / folder).frames[0].left, root_ / folder / "left/0.png");
+    const StereoSequence pair = open_patterns(path(folder + "/l%20c.png"), path(folder + "/r%20c.png"), "");
+    EXPECT_EQ(pair.frames[0].right, root_ / folder / "r%20c.png");
+    expect_refused([&] { open_patterns(path(folder + "/l%20d.png"), path(folder + "/r%20d.png"), ""); }, {"l%20d.png"});
+  }
+  expect_refused([&] { open_patterns(path("b*/*.png"), path("b*/*.png"), ""); }, {"b*/*.png", "its folder none"});
 }
 
 TEST_F(DatasetTest, JpegIsAnImageLikeAnother) {

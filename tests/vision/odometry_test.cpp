@@ -414,6 +414,10 @@ TEST(StereoOdometry, RefusesWhatItCannotUse) {
   expect_refused([&] { odometry.process(image_view(drive.frames[0].left), image_view(small)); }, {"50x40"});
   process(odometry, drive.frames[0].left, drive.frames[0].right);
   expect_refused([&] { process(odometry, small, small); }, {"size changed", "50x40", "reset"});
+  Eigen::Isometry3d prior = Eigen::Isometry3d::Identity();
+  prior.translation().z() = std::nan("");
+  const ImageView image = image_view(drive.frames[0].left);
+  expect_refused([&] { odometry.process(image, image, prior); }, {"motion: not all values are finite"});
   EXPECT_TRUE(process(odometry, drive.frames[1].left, drive.frames[1].right).motion)
       << "a refused call changes nothing";
 }

@@ -69,11 +69,12 @@ EGOSGM_EXPORT StereoSequence open_kitti_raw(const std::filesystem::path& folder,
 EGOSGM_EXPORT StereoSequence open_middlebury(const std::filesystem::path& folder, FrameRange range = {});
 
 /// Any pair of images or patterns. A pattern's file name holds one `%d`, `%06d`, ... (the frame's number) or one `*`;
-/// without an extension it means PNG and JPEG. Left and right files with equal text there belong together, or, with
-/// PairBy::kOrder, the first ones, the second ones, and so on. The (left) text is the frame's number if all of them are
-/// different numbers, else frames are counted from 0 in the order of names, numbers in them by their value. Without
-/// `%d` or `*` it names one pair, number 0. A left folder called image_2 or image_02 takes the colour cameras of
-/// KITTI's calibration, and so do images in colour; any other the grey ones. An empty `calibration_file` is none.
+/// without an extension it means PNG and JPEG. Left and right files with equal text there, or one number, belong
+/// together, or, with PairBy::kOrder, the first ones, the second ones, and so on. The (left) text is the frame's number
+/// if all of them are numbers, else frames are counted from 0 in the order of names, numbers in them by their value.
+/// Without `%d` or `*`, or where it is there, it names one pair, number 0. A left folder called image_2 or image_02
+/// takes the colour cameras of KITTI's calibration, and so do images in colour; any other the grey ones. An empty
+/// `calibration_file` is none.
 EGOSGM_EXPORT StereoSequence open_patterns(const std::string& left, const std::string& right,
                                            const std::filesystem::path& calibration_file, FrameRange range = {},
                                            PairBy pair_by = PairBy::kName);
