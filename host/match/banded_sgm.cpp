@@ -87,12 +87,15 @@ std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCo
   return Census::words(cost, {width, 1}, BandedSgm::code_padding(range), tile.code_words) / 2;
 }
 
-/// How many rows can be matched at once. A quarter of the memory is left to all else.
+/// How many rows can be matched at once. A quarter of the memory is left to all else; what stages share can be had
+/// again.
 int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                  const BandedSgmOptions& options, BandedSgm::Tile tile) {
   const int chunks = chunks_of(range, tile);
   const std::uint64_t memory = context.device().getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>() / 4 * 3;
-  const std::uint64_t device_limit = memory - std::min(memory, context.allocated_bytes());
+  const std::uint64_t allocated = context.allocated_bytes();
+  const std::uint64_t device_limit =
+      memory - std::min(memory, allocated - std::min(allocated, context.bytes_of_stages()));
   const std::uint64_t chosen = static_cast<std::uint64_t>(options.max_memory_mib) << 20;
   const std::uint64_t total_limit = chosen > 0 ? std::min(chosen, device_limit) : device_limit;
   const auto fits = [&](int rows, std::uint64_t copies) {

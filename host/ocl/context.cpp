@@ -234,6 +234,14 @@ cl::Buffer Context::scratch(Scratch place, std::uint64_t bytes) {
   return found != end ? found->second : scratch_.emplace(place, allocate(bytes))->second;
 }
 
+std::uint64_t Context::bytes_of_stages() const {
+  std::uint64_t bytes = 0;
+  for (const auto& [place, buffer] : scratch_) {
+    if (place <= Scratch::kOfStage4) bytes += buffer.getInfo<CL_MEM_SIZE>();
+  }
+  return bytes;
+}
+
 /// What is built together.
 struct Context::Group {
   Defines defines;

@@ -145,6 +145,8 @@ class Context {
   /// For tests: all of it.
   const std::multimap<Scratch, cl::Buffer>& scratch() const { return scratch_; }
   std::uint64_t allocated_bytes() const { return allocated_bytes_; }
+  /// What stages share; also what was allocated before a context was Apart.
+  std::uint64_t bytes_of_stages() const;
   /// The largest buffer that the device allows.
   std::uint64_t max_allocation_bytes() const { return max_allocation_bytes_; }
 

@@ -476,7 +476,7 @@ class Limits(ProgramTest):
         self.assertGreater(report["frames"][0]["stripes"], 1)
         self.assertLess(report["device_memory_bytes"], 1 << 30)
         run[run.index("--out") + 1] = out = self.new_folder()  # that just fits, and leaves less than what is left to all else
-        self.assert_works(*run, "--disparities", 336, "--set", "constants.banded_sgm.scheduling=paths", env=gigabyte)
+        self.assert_works(*run, "--disparities", 352, "--set", "constants.banded_sgm.scheduling=paths", env=gigabyte)
         self.assertEqual(self.report(out)["frames"][0]["stripes"], 1)
         self.assertGreater(self.report(out)["device_memory_bytes"], 3 << 28)
         run[run.index("--out") + 1] = self.new_folder()
