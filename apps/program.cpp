@@ -142,7 +142,8 @@ int parse_and_run(int argc, const char* const* argv, const Package* package) {
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return flushed(program.exit(error));  // --help, --version
+    const bool is_no_command = program.get_subcommands().empty() && argc > 1 && argv[1][0] != '-';
+    if (error.get_exit_code() == 0 && !is_no_command) return flushed(program.exit(error));  // --help, --version
     return refuse_arguments(program, error);
   }
   const auto chosen =

@@ -17,6 +17,7 @@ class WrongArguments(ProgramTest):
 
     def test_mistyped_names_get_a_suggestion(self):
         self.assert_refused(["rnu"], "rnu", "did you mean run?")
+        self.assert_refused(["rnu", "--help"], "rnu", "did you mean run?")
         self.assert_refused(["--versoin"], "--version")
         self.assert_refused(self.run_with("--disparites", 64), "--disparites", "did you mean --disparities?")
         self.assert_refused(self.run_with("--disparites=64"), "did you mean --disparities?")
