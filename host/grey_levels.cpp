@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/grey_levels.h"
 
+#include <cstring>
 #include <vector>
 
 namespace egosgm {
@@ -14,8 +15,11 @@ constexpr int kRowStep = 16;    // of 8 bits, that say what is dark with fewer p
 
 template <typename Pixel>
 void count(const char* pixels, int width, std::vector<std::int64_t>& counts) {
-  const auto* row = reinterpret_cast<const Pixel*>(pixels);
-  for (int x = 0; x < width; ++x) ++counts[row[x]];
+  for (int x = 0; x < width; ++x, pixels += sizeof(Pixel)) {
+    Pixel value;
+    std::memcpy(&value, pixels, sizeof(value));  // rows of 16 bits may lie at odd places
+    ++counts[value];
+  }
 }
 
 }  // namespace

@@ -127,8 +127,11 @@ void to_grey(const ImageView& image, const GreyLevels& levels, GreyImage& grey) 
       }
       continue;
     }
-    const auto* wide = reinterpret_cast<const std::uint16_t*>(source);
-    for (int x = 0; x < image.width; ++x) row[x] = levels(wide[x]);
+    for (int x = 0; x < image.width; ++x) {
+      std::uint16_t wide;
+      std::memcpy(&wide, source + 2 * x, sizeof(wide));  // it may lie at an odd place
+      row[x] = levels(wide);
+    }
   }
 }
 
