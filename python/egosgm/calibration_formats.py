@@ -52,9 +52,11 @@ class _Info:
         camera = Values(data, file, "a camera of ROS's calibrator")
         self.k, self.p = camera.matrix((9,), "camera_matrix", "k", "K"), camera.matrix((12,), "projection_matrix", "p", "P")
         rotation, distortion = camera.first((9,), "rectification_matrix", "r", "R"), camera.first((), "distortion_coefficients", "d", "D")
+        if not {"distortion_coefficients", "d", "D"} & set(data):
+            raise camera.refuse(" and lacks distortion_coefficients: give zeros where there is no distortion")
         self.r = np.eye(3).reshape(-1) if rotation is None else rotation
         self.d = np.zeros(0) if distortion is None else distortion
-        self.width, self.height = (int(data.get(f"image_{side}", data.get(side, 0))) for side in ("width", "height"))
+        self.width, self.height = (int(camera.matrix((1,), f"image_{side}", side)[0]) for side in ("width", "height"))
         self.distortion_model = str(data.get("distortion_model", ""))
         self.binning_x, self.binning_y = int(data.get("binning_x", 0)), int(data.get("binning_y", 0))
         region = data.get("roi")
@@ -88,8 +90,10 @@ def orb_slam(data: Dict[str, Any], file: pathlib.Path, images_size: Optional[Tup
     kind = data.get("Camera.type")
     if "Stereo.T_c1_c2" in data and kind != "Rectified":
         model, order = ("equidistant", "k1 k2 k3 k4") if kind == "KannalaBrandt8" else ("radtan", "k1 k2 p1 p2 k3")
-        cameras = [(of_four(settings.numbers("fx fy cx cy", name)), *settings.lens([float(data.get(name + part, 0)) for part in order.split()], model))
-                   for name in ("Camera1.", "Camera2.")]
+        cameras = []
+        for name in ("Camera1.", "Camera2."):
+            there = [part for part in order.split() if name + part in data or (part != "k3" and any(key.startswith((f"{name}k", f"{name}p")) for key in data))]
+            cameras.append((of_four(settings.numbers("fx fy cx cy", name)), *settings.lens(settings.numbers(" ".join(there), name).tolist() or [0.0] * 4, model)))
         return settings.pair(cameras, np.linalg.inv(settings.matrix((4, 4), "Stereo.T_c1_c2")), size)
     for name, of_focal in (("Stereo.b", 1.0), ("Camera.bf", four[0])):
         if name in data:
@@ -246,8 +250,6 @@ def named(data: Dict[str, Any]) -> Dict[str, Any]:
 
 
 def _coefficients(value: Any, name: str, is_fisheye: bool, file: pathlib.Path) -> Matrix:
-    if value is None:
-        return np.zeros(4 if is_fisheye else 5)
     numbers = matrix(value, ())
     if numbers is None or numbers.size not in ((4,) if is_fisheye else (4, 5, 8, 12, 14)):
         count = 0 if numbers is None else numbers.size
@@ -261,8 +263,11 @@ def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bo
     matrices["R"], matrices["T"] = rotation(found.get("R")), matrix(found.get("T"), (3,))
     missing = [name for name, one in matrices.items() if one is None]
     if not missing:
+        lacking = [f"D{side}" for side, name in enumerate(("left_distortion", "right_distortion"), 1) if name not in found]
+        if lacking:
+            raise refuse(file, f"is {what} and lacks {' and '.join(lacking)}, the distortion: give zeros where there is none")
         for side, name in enumerate(("left_distortion", "right_distortion"), 1):
-            matrices[name] = _coefficients(found.get(name), f"D{side}", is_fisheye, file)
+            matrices[name] = _coefficients(found[name], f"D{side}", is_fisheye, file)
         given = tuple(matrix(found.get(name), (3, 3) if name[0] == "R" else (3, 4)) for name in ("R1", "R2", "P1", "P2"))
         size = size_of(found.get("size"))
         if size is None and "width" in found and "height" in found:

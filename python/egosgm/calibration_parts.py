@@ -87,7 +87,15 @@ class Values:
         return refuse(self.file, f"is {self.what}{text}")
 
     def first(self, shape: Tuple[int, ...], *names: str) -> Optional[Matrix]:
-        return next((found for name in names if name in self.data and (found := matrix(self.data[name], shape)) is not None), None)
+        """Of the first of the names that is there; None where none is, or it is empty. Throws InvalidArgument where it is no numbers."""
+        name = next((name for name in names if name in self.data), None)
+        value = self.data.get(name)
+        if name is None or (value.get("data", value) if isinstance(value, dict) else value) == []:
+            return None
+        found = matrix(value, shape)
+        if found is None:
+            raise self.refuse(f", and {name} is not {int(np.prod(shape)) if shape else 'of'} finite numbers")
+        return found
 
     def matrix(self, shape: Tuple[int, ...], *names: str) -> Matrix:
         """Of the first of the names that has one."""
@@ -103,10 +111,10 @@ class Values:
         """OpenCV's coefficients of what others call the same, and whether they are a fisheye's."""
         numbers = matrix(values, ()) if values is not None else None
         model = model.lower().replace("-", "").replace("_", "")
-        if model in ("", "none", "pinhole") and (numbers is None or not numbers.any()):
+        if model in ("", "none", "pinhole") and (values in (None, []) or (numbers is not None and not numbers.any())):
             return np.zeros(5), False
         if numbers is None:
-            numbers = np.zeros(4)
+            raise self.refuse(f" without coefficients of its distortion ({model}): give finite numbers, zeros where there is none")
         if model in ("", "radtan", "radialtangential", "plumbbob", "brown", "opencv", "pinhole", "rationalpolynomial"):
             return (numbers if numbers.size in (4, 5, 8, 12, 14) else np.pad(numbers, (0, max(0, 5 - numbers.size)))), False
         if model in ("equi", "equidistant", "fisheye", "kannalabrandt8", "kannalabrandt"):

@@ -170,6 +170,11 @@ def test_a_file_for_each_camera_of_any_name(tmp_path):
         for name, text in (("a.yaml", echoed(P, lens)), ("b.yaml", echoed(RIGHT_P, lens))):
             (tmp_path / name).write_text(text)
         expect(egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "b.yaml")))
+    for change, named in ((("\nd:", "\nlens:"), "lacks distortion_coefficients"), (("d:\n- 0.0", "d:\n- x"), "d is not of finite numbers"),
+                          (("r:\n- 1.0", "r:\n- x"), "r is not 9 finite numbers"), (("width: 640\n", ""), "lacks image_width or width")):
+        (tmp_path / "edited.yaml").write_text(echoed(RIGHT_P, [0.0] * 5).replace(*change))
+        with pytest.raises(egosgm.InvalidArgument, match=f"edited.yaml: is a camera of ROS's calibrator,? and {named}"):
+            egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "edited.yaml"))
     with pytest.raises(egosgm.InvalidArgument, match="one file, or one for each camera"):
         egosgm.read_calibration([tmp_path / "a.yaml"] * 3)
     (tmp_path / "c.yaml").write_text("a: 1\n")
@@ -266,6 +271,9 @@ def test_a_fisheye(tmp_path):
     (json.dumps(dict(mtx=K, dist=LENS)), "lacks left_matrix, right_matrix"), ("- 1\n- 2\n", "not `key: value`"), ("a: [1, 2", "no YAML"),
     (" ".join(map(str, flat(K))), "a camera matrix alone"),
     (opencv_yaml(M1=K, D1=LENS, R=EYE, T=[[-B], [0], [0]]), "right_matrix"),
+    (RAW["opencv.yml"].replace("D2:", "lens2:"), "lacks D2, the distortion: give zeros"), (kalibr("x"), "without coefficients of its distortion (radtan)"),
+    (kalibr(LENS).replace("distortion_coeffs", "distortion"), "without coefficients of its distortion (radtan)"),
+    (RAW["orb_slam3_raw.yaml"].replace("Camera2.k1", "Camera2.k"), "lacks Camera2.k1"),
 ])
 def test_what_is_known_and_not_enough_is_named(text, named, tmp_path):
     (tmp_path / "calib.yaml").write_text(text)
