@@ -36,6 +36,7 @@ class Gaps:
     nearest_unpaired_ms: float = math.inf
     steps_back: int = 0
     repeated: int = 0
+    without_pose: int = 0
     has_no_stamps: bool = False
     gaps: List[Tuple[int, float]] = dataclasses.field(default_factory=list)
     largest_skew_ms: float = 0.0
@@ -69,6 +70,8 @@ class Gaps:
             parts.append(f"{len(self.gaps)} gap{'s' if len(self.gaps) > 1 else ''}, the longest of {longest:.3f} s before frame {at}")
         if self.repeated:
             parts.append(f"{self.repeated} pairs have the stamp of the one before, and are left out")
+        if self.without_pose:
+            parts.append(f"{self.without_pose} frames lie outside of the poses' times, or in a gap of half a second: odometry finds the motion there")
         if self.steps_back:
             parts.append(f"time steps back {self.steps_back} times, where the method starts anew")
         return "; ".join(parts)
@@ -338,7 +341,9 @@ class Bag:
                 if images[0].dtype != images[1].dtype:
                     raise _egosgm.InvalidArgument(f"{self.images[0]} has {images[0].dtype}, {self.images[1]} has {images[1].dtype}: both need one depth")
                 images = self.cameras.rectified(*images)
-                frame = BagFrame(number, stamp, left.header.frame_id, *images, last is None or steps_back, _pose_at(times, poses, stamp))
+                pose = _pose_at(times, poses, stamp)
+                pairing.gaps.without_pose += bool(self._pose_topic) and pose is None
+                frame = BagFrame(number, stamp, left.header.frame_id, *images, last is None or steps_back, pose)
                 number, last = number + 1, stamp
                 yield frame
 
@@ -380,7 +385,7 @@ class Bag:
 
     def _read_poses(self, reader: Any) -> Tuple[List[int], List[NDArray[np.float64]]]:
         poses = []
-        for connection, _, raw in reader.messages(connections=[c for c in reader.connections if c.topic == self._pose_topic]):
+        for connection, time, raw in reader.messages(connections=[c for c in reader.connections if c.topic == self._pose_topic]):
             message = reader.deserialize(raw, connection.msgtype)
             pose = message.pose.pose if hasattr(message.pose, "pose") else message.pose
             world_from_body = np.eye(4)
@@ -388,7 +393,7 @@ class Bag:
             world_from_body[:3, 3] = pose.position.x, pose.position.y, pose.position.z
             if not np.isfinite(world_from_body).all():
                 raise _egosgm.InvalidArgument(f"{self._pose_topic}: pose {len(poses)} is not finite")
-            poses.append((stamp_ns(message), world_from_body @ BODY_FROM_OPTICAL if self._pose_axes == "body" else world_from_body))
+            poses.append((stamp_ns(message) or time, world_from_body @ BODY_FROM_OPTICAL if self._pose_axes == "body" else world_from_body))
         poses.sort(key=lambda item: item[0])
         return [time for time, _ in poses], [pose for _, pose in poses]
 

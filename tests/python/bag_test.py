@@ -725,13 +725,22 @@ def test_next_to_no_disparity_is_infinitely_uncertain(street):
 
 
 def test_poses_of_the_bag_are_the_motion(tmp_path, street, frames):
-    recording = drive_of(street, frames)
-    types = recording.types
-    for i in (-1, 0, 1, 2, 3):  # between the frames, of a constant speed of 8 m/s, forward
-        recording.add("/odom", "geometry_msgs/msg/PoseStamped", START + i * RATE_NS + RATE_NS // 2, pose=types["geometry_msgs/msg/Pose"](
-            position=types["geometry_msgs/msg/Point"](x=0.8 * i, y=0.0, z=0.0),
-            orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)))
-    path = recording.write(tmp_path / "drive")
+    def recorded(name, times, received=None):
+        recording = drive_of(street, frames, times=times)
+        types = recording.types
+        for i in (-1, 0, 1, 2, 3):  # between the frames, of a constant speed of 8 m/s, forward
+            recording.add("/odom", "geometry_msgs/msg/PoseStamped", 0 if received else START + i * RATE_NS + RATE_NS // 2, received, pose=types["geometry_msgs/msg/Pose"](
+                position=types["geometry_msgs/msg/Point"](x=0.8 * i, y=0.0, z=0.0),
+                orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)))
+        return recording.write(tmp_path / name)
+
+    path = recorded("drive", None)
+    for name, times, without in (("drive", None, 0), ("half", [START, START + RATE_NS, START + 10 * RATE_NS], 1)):
+        bag = bags.Bag(path if name == "drive" else recorded(name, times), "/left/image_rect", "/right/image_rect", pose_topic="/odom")
+        assert [frame.world_from_camera is None for frame in bag.frames()].count(True) == without
+        assert (f"{without} frames lie outside of the poses' times" in bag.gaps.text()) == bool(without)
+    unset = bags.Bag(recorded("unset", [START] * FRAMES, received=START), "/left/image_rect", "/right/image_rect", pose_topic="/odom")
+    assert next(unset.frames()).world_from_camera is not None  # without a stamp, a pose is of the time at which it was recorded
     found = list(bags.Bag(path, "/left/image_rect", "/right/image_rect", pose_topic="/odom").frames())
     moved = np.linalg.inv(found[1].world_from_camera) @ found[0].world_from_camera
     np.testing.assert_allclose(moved[:3, 3], (0, 0, -0.8), atol=1e-9)  # z is forward
