@@ -532,6 +532,8 @@ def count_frames(frames: Iterable[Frame], calibration: Optional[Any] = None, mot
                  follows: Callable[[int], bool] = lambda i: True, near_px: float = 32.0) -> Iterator[VideoCounts]:
     """Counts of each frame, and of the pair that it makes with the one before where frame i follows it. Takes them one after the other and counts
     a few at once, so that memory does not grow with their number. motions: current_from_previous of frame i, 4x4; asked with a calibration only."""
+    if not near_px > 0:
+        raise _egosgm.InvalidArgument(f"near {near_px:g} px: the region `near` begins at a disparity above 0")
     at_once = os.cpu_count() or 1
     before: Optional[Frame] = None
     with concurrent.futures.ThreadPoolExecutor(at_once) as pool:

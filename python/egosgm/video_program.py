@@ -160,6 +160,10 @@ class VideoInput:
         place = _Path(folder, inside) if inside and _Path(folder, inside).is_dir() else _Path(folder)
         estimates = self.frames[0].estimate if len(self.frames) == 1 else self.frames[0].estimate.parent
         files = {pair.name: pair.truth for pair in self._pairs_with(estimates, place)[0]}
+        is_of_pairs = field in ("flow", "next_truth")  # which the last frame of a video has none of
+        alone = [frame.name for i, frame in enumerate(self.frames) if frame.name not in files and (not is_of_pairs or any(self.follows[i + 1:i + 2]))]
+        if alone:
+            self.notes.append(f"{folder} has nothing for {counted(len(alone), 'frame')}, the first is {alone[0]}: its figures are of the others")
         for frame in self.frames:
             setattr(frame, field, files.get(frame.name, getattr(frame, field)))
 
@@ -267,7 +271,7 @@ def _json_of(found: VideoInput, over_frames: List[VideoFigures], total: VideoCou
     return {"frames": len(found.frames), "pairs": found.successors, "motion": found.motion_source, "figures": vars(figures_of(total)),
             "regions": {name: vars(region) for name, region in regions_of(total).items()},
             "over_frames": [{"name": files.name, **vars(figures)} for files, figures in zip(found.frames, over_frames)],
-            **({"density": _density_json(density)} if density else {}), **({"doubts": doubts} if (doubts := found.reader.doubts(found.given.scale)) else {})}
+            **({"density": _density_json(density)} if density else {}), **({"notes": found.notes} if found.notes else {}), **({"doubts": doubts} if (doubts := found.reader.doubts(found.given.scale)) else {})}
 
 
 def _cell(value: float, width: int, unit: str) -> str:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What eval-video and eval-poses read and draw."""
+import json
 import os
 import struct
 
@@ -129,3 +130,22 @@ def test_curves_over_frames_and_density():
     assert by_variance.get_ydata()[-1] == oracle.get_ydata()[-1] == 50 and by_variance.get_ydata()[24] == 0
     with pytest.raises(egosgm.InvalidArgument, match="variance"):
         plots.against_density(None)
+
+
+def test_what_has_no_map_for_a_frame_is_told(tmp_path, capfd):
+    for folder, frames in (("estimate", range(4)), ("other", (0, 2)), ("flow", (0, 1, 2))):
+        (tmp_path / folder).mkdir()
+        for i in frames:
+            name = str(tmp_path / folder / f"{i:06d}")
+            if folder == "flow":
+                (tmp_path / folder / f"{i:06d}.flo").write_bytes(flo(20, 4, [0.0] * 160))
+            else:
+                egosgm.write_disparity(name + ".png", np.full((4, 20), 10 + i, np.float32))
+    estimate = str(tmp_path / "estimate")
+    arguments = [estimate, estimate, "--against", str(tmp_path / "other"), "--flow", str(tmp_path / "flow")]
+    assert video_program.main(arguments) == 0
+    note = f"{tmp_path / 'other'} has nothing for 2 frames, the first is 000001: its figures are of the others"
+    assert capfd.readouterr().out.splitlines()[-1] == note  # the last frame needs no flow
+    assert video_program.main([*arguments, "--json"]) == 0 and json.loads(capfd.readouterr().out)["notes"] == [note]
+    with pytest.raises(egosgm.InvalidArgument, match="near -1 px"):
+        video_program.main([*arguments, "--near", "-1"])
