@@ -21,12 +21,17 @@ _Reader = TypeVar("_Reader", bound=Callable[..., Any])
 
 
 def _with_words(reader: _Reader) -> _Reader:
-    """The reader, for which whatever a part of another kind than it should be raises is an InvalidArgument."""
+    """The reader, for which whatever a part of another kind than it should be raises is an InvalidArgument, and each of these names a file."""
     @functools.wraps(reader)
     def read(file: Any, *arguments: Any, **options: Any) -> Any:
         try:
             with np.errstate(all="ignore"):  # what comes of it is refused
                 return reader(file, *arguments, **options)
+        except _egosgm.InvalidArgument as error:  # of a value, perhaps
+            names = [os.fspath(part) for part in ([file] if isinstance(file, (str, os.PathLike)) else file)]
+            if any(name in str(error) for name in names):
+                raise
+            raise type(error)(f"{' and '.join(names)}: {error}") from None
         except (_egosgm.Error, OSError, ImportError):
             raise
         except Exception as error:

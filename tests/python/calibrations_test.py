@@ -175,6 +175,9 @@ def test_a_file_for_each_camera_of_any_name(tmp_path):
         (tmp_path / "edited.yaml").write_text(echoed(RIGHT_P, [0.0] * 5).replace(*change))
         with pytest.raises(egosgm.InvalidArgument, match=f"edited.yaml: is a camera of ROS's calibrator,? and {named}"):
             egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "edited.yaml"))
+    with pytest.raises(egosgm.InvalidArgument, match="a.yaml and .*b.yaml: camera info: P of both cameras have different focal lengths"):
+        (tmp_path / "b.yaml").write_text(echoed(2 * np.array(RIGHT_P), [0.0] * 5))
+        egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "b.yaml"))
     with pytest.raises(egosgm.InvalidArgument, match="one file, or one for each camera"):
         egosgm.read_calibration([tmp_path / "a.yaml"] * 3)
     (tmp_path / "c.yaml").write_text("a: 1\n")
@@ -274,6 +277,7 @@ def test_a_fisheye(tmp_path):
     (RAW["opencv.yml"].replace("D2:", "lens2:"), "lacks D2, the distortion: give zeros"), (kalibr("x"), "without coefficients of its distortion (radtan)"),
     (kalibr(LENS).replace("distortion_coeffs", "distortion"), "without coefficients of its distortion (radtan)"),
     (RAW["orb_slam3_raw.yaml"].replace("Camera2.k1", "Camera2.k"), "lacks Camera2.k1"),
+    (RECTIFIED["orb_slam2.yaml"].replace(f"fx: {F}", "fx: -1"), "calib.yaml: calibration: fx is -1"),
 ])
 def test_what_is_known_and_not_enough_is_named(text, named, tmp_path):
     (tmp_path / "calib.yaml").write_text(text)
