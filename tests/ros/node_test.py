@@ -299,6 +299,16 @@ class Parameters(unittest.TestCase):
         node.set_parameters([Parameter("p2", value=170)])
         self.assert_runs_with(node, "paper", p2=170)
 
+    def test_a_parameter_is_not_set_where_it_would_change_nothing(self):
+        from rclpy.parameter import Parameter
+        node = self.node()
+        for transition, is_set in ((node.trigger_configure, False), (node.trigger_activate, False), (node.trigger_deactivate, False), (node.trigger_cleanup, True)):
+            transition()
+            for parameter in (Parameter("p2", value=120), Parameter("max_depth_sigma", value=0.2)):
+                result = node.set_parameters([parameter])[0]
+                self.assertEqual((result.successful, f"{parameter.name} is read when the node is configured" in result.reason), (is_set, not is_set))
+        self.assertEqual(node._options()["p2"], 120)
+
     def test_whole_numbers_are_texts_and_fractions_too(self):
         node = self.node(device=0, max_skew_ms=5, gate_px=3)
         self.assertEqual([repr(node._value(name)) for name in ("device", "max_skew_ms", "gate_px")], ["'0'", "5.0", "3.0"])

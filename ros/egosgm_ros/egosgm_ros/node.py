@@ -87,7 +87,7 @@ class EgosgmNode(LifecycleNode):
         self._path = Path()
         self._newest: Optional[Tuple[Any, Any]] = None  # the pair that is matched next
         self._wake = threading.Condition()
-        self._is_active = False
+        self._is_active = self._is_configured = False
         self._count = self._replaced = self._lost_on_the_way = self._frames_told = 0
         self._lost_told = [0, 0]
         self._problem = self._doubt = ""
@@ -118,6 +118,9 @@ class EgosgmNode(LifecycleNode):
         return {"preset": self._value("preset"), **{name.replace(".", "__"): value for name, value in changed.items()}}
 
     def _on_set(self, parameters: Any) -> SetParametersResult:
+        late = [parameter.name for parameter in parameters if self._is_configured and parameter.name in (*OWN, *self._of_preset)]
+        if late:
+            return SetParametersResult(successful=False, reason=f"{late[0]} is read when the node is configured: clean it up, set the parameter, configure it again")
         self._set_later.update(parameter.name for parameter in parameters)
         return SetParametersResult(successful=True)
 
@@ -154,6 +157,7 @@ class EgosgmNode(LifecycleNode):
         for index, side in enumerate(SIDES):
             self._inputs.append(self.create_subscription(CameraInfo, f"{side}/camera_info", lambda info, side=side: self._on_info(side, info), qos))
             self._inputs.append(self._image_subscription(index, qos))
+        self._is_configured = True
         return TransitionCallbackReturn.SUCCESS
 
     def _image_subscription(self, index: int, qos: QoSProfile) -> Any:
