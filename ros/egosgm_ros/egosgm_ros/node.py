@@ -27,7 +27,7 @@ from stereo_msgs.msg import DisparityImage
 
 import egosgm
 from egosgm.bag import Pairing
-from egosgm.ros_images import Cameras, grey_of, is_named_rect, rgb_of, stamp_ns, variance_of_depth
+from egosgm.ros_images import Cameras, are_raw, grey_of, is_named_rect, rgb_of, stamp_ns, variance_of_depth
 from egosgm_ros.messages import Path, disparity_of, image_of, odometry_of, points_of, transform_of
 from egosgm_ros.tf_motion import TfMotion, tf2_ros
 
@@ -260,6 +260,11 @@ class EgosgmNode(LifecycleNode):
             self._odometry = egosgm.StereoOdometry(cameras.calibration)
             self._cameras, self._made_for = cameras, infos  # last: where one cannot be made, all are made for the next pair
             self._last_stamp = self._path.motion = None
+            raw = [topic.topic_name for info, topic in zip(infos, self._inputs[1::2]) if are_raw(info, topic.topic_name)]
+            if raw and not self._topics_doubt:
+                self._topics_doubt = (f"by {' and '.join(raw)}'s name and camera info, which has a distortion or a rotation, it is not rectified: remap both "
+                                      "cameras' image_rect to rectified images")
+                self.get_logger().warning(self._topics_doubt)
         images = grey_of(left), grey_of(right)
         for side, image in zip(SIDES, images):
             if image.shape != (self._cameras.size[1], self._cameras.size[0]):
