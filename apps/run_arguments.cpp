@@ -119,6 +119,9 @@ SequenceJob RunArguments::job(const Package& package) const {
   if (!(cloud_sigma_percent > 0)) {
     throw InvalidArgument(fmt::format("--cloud-sigma {:g}: choose a number of percent above 0", cloud_sigma_percent));
   }
+  if (!job.kinds.contains("cloud") && cloud_sigma_percent != RunArguments().cloud_sigma_percent) {
+    throw InvalidArgument(fmt::format("--cloud-sigma {:g}: is of clouds: give --write cloud, too", cloud_sigma_percent));
+  }
   job.feed = feed_of(*this, package);
   job.input = bag.bag.empty() ? input.text() : bag.text();
   job.poses_file = poses;

@@ -32,6 +32,7 @@ class Run(ProgramTest):
         self.assertLess(counts[1], counts[None])
         self.assertLess(counts[None], counts[50])
         self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder() / "out", "--cloud-sigma", 0], "--cloud-sigma 0", "above 0")
+        self.assert_refused(["run", "--odometry", self.street, "--out", self.new_folder() / "out", "--cloud-sigma", 5], "--cloud-sigma 5", "give --write cloud")
 
     def test_steps_names_by_order_and_a_folder_as_it_is(self):
         skip, other = self.new_folder(), self.new_folder()
