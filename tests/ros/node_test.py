@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -395,6 +396,14 @@ class Parameters(unittest.TestCase):
         node._process = lambda left, right: (processed.append(left.header.stamp.sec), setattr(node, "_is_active", False))
         node._work()
         self.assertEqual((processed, node._newest), ([3], None))
+        told = []
+        node.get_logger().error = told.append
+        for is_ok in (True, False):  # a process that ends can publish nothing
+            node._process = lambda left, right: (setattr(node, "_is_active", False), getattr(node, f"no_{is_ok}"))
+            node._is_active, node._newest = True, (image, image)
+            with mock.patch.object(node.context, "ok", return_value=is_ok):
+                node._work()
+        self.assertEqual(len(told), 1)
 
     def test_each_kind_of_loss_has_its_own_words(self):
         node = self.node()
@@ -424,7 +433,6 @@ class Parameters(unittest.TestCase):
             node.destroy_node()
 
     def test_the_middleware_has_room_for_maps_unless_somebody_chose(self):
-        from unittest import mock
         from egosgm_ros import node
         for chosen in ({}, {"FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}, {"FASTRTPS_DEFAULT_PROFILES_FILE": "mine.xml"}):
             with mock.patch.dict(os.environ, chosen, clear=True):
@@ -479,7 +487,6 @@ class Parameters(unittest.TestCase):
     def test_a_pipeline_that_could_not_be_made_is_made_for_the_next_pair(self):
         import egosgm
         from sensor_msgs.msg import CameraInfo, Image
-        from unittest import mock
         node = self.node(disparities=16)
         node.trigger_configure()
         image = Image(height=32, width=64, step=64, encoding="mono8", data=array.array("B", bytes(64 * 32)))

@@ -243,6 +243,8 @@ class EgosgmNode(LifecycleNode):
                 self._process(left, right)
                 self._problem = ""
             except Exception as error:  # whatever a message held: the next one may be whole
+                if not self.context.ok():  # the process ends: nothing can be published
+                    return
                 for tool in (self._pipeline, self._odometry):
                     if tool:
                         tool.reset()  # one of them may have gone on without the other
