@@ -23,6 +23,11 @@ py::array as_array(const py::object& object, const std::string& name, const char
     PyErr_Clear();
     throw InvalidArgument(name + " is no array: give " + wanted);
   }
+  if (py::hasattr(object, "mask") && py::module_::import("numpy.ma").attr("is_masked")(object).cast<bool>()) {
+    throw InvalidArgument(name +
+                          " has a mask, which nobody looks at: give its filled(value), with "
+                          "egosgm.INVALID_DISPARITY for the value where it is a disparity");
+  }
   return array;
 }
 

@@ -40,8 +40,9 @@ void bind_sequences(py::module_& module) {
       .def_readonly("name", &StereoFrame::name, "The number with six digits.")
       .def_readonly("left", &StereoFrame::left)
       .def_readonly("right", &StereoFrame::right)
-      .def_readonly("truth_noc", &StereoFrame::truth_noc, "Left disparity of non-occluded pixels; empty: none.")
-      .def_readonly("truth_occ", &StereoFrame::truth_occ, "Left disparity of all pixels; empty: none.")
+      .def_readonly("truth_noc", &StereoFrame::truth_noc,
+                    "Left disparity of non-occluded pixels; pathlib.Path(): none.")
+      .def_readonly("truth_occ", &StereoFrame::truth_occ, "Left disparity of all pixels; pathlib.Path(): none.")
       .def("read", &read_images, "Both images as grey: (left, right).");
   auto sequence =
       py::class_<StereoSequence>(module, "StereoSequence", "Frames of one rectified camera pair, one after the other.");
@@ -59,8 +60,8 @@ void bind_sequences(py::module_& module) {
           [](const StereoSequence& s) { return s.has_calibration ? std::optional(s.calibration) : std::nullopt; },
           "None where the images came without one.")
       .def_readonly("times_file", &StereoSequence::times_file,
-                    "When the frames were taken; empty where no file says so.")
-      .def_readonly("poses_file", &StereoSequence::poses_file, "The true poses; empty where there are none.")
+                    "When the frames were taken; pathlib.Path() where no file says so.")
+      .def_readonly("poses_file", &StereoSequence::poses_file, "The true poses; pathlib.Path() where there are none.")
       .def_property_readonly(
           "size",
           [](const StereoSequence& s) {

@@ -559,6 +559,8 @@ def _size(array: np.ndarray) -> str:
 
 
 def _map_of(item: Any, name: str) -> np.ndarray:
+    if np.ma.is_masked(item):
+        raise _egosgm.InvalidArgument(f"{name}: has a mask, which nobody looks at: give its filled(egosgm.INVALID_DISPARITY)")
     array = np.asarray(item, np.float32)
     if array.ndim != 2 or not array.size:
         raise _egosgm.InvalidArgument(f"{name}: an array of shape {array.shape}: give H x W arrays")

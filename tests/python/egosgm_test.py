@@ -139,7 +139,7 @@ def test_programs_are_kept_where_the_pipeline_says(street, tmp_path, monkeypatch
 @pytest.mark.parametrize("image, named", [
     (np.zeros((HEIGHT, WIDTH, 2), np.uint8), "left is"), (np.zeros((HEIGHT, WIDTH), np.float32), "uint8 or uint16"),
     (np.zeros((HEIGHT, WIDTH + 1), np.uint8), str(WIDTH + 1)), (np.zeros((HEIGHT, WIDTH), np.uint16), "type"), (None, "no array"),
-    (np.zeros((0, 0), np.uint8), "")])
+    (np.zeros((0, 0), np.uint8), ""), (np.ma.masked_equal(np.zeros((HEIGHT, WIDTH), np.uint8), 0), "left has a mask")])
 def test_wrong_images_are_refused_and_change_nothing(pipeline, street, frames, image, named):
     expected = disparities_of(pipeline, street, [(f.left, f.right) for f in frames[:2]])[1]
     pipeline.reset()
@@ -261,6 +261,11 @@ def test_metrics_and_pictures(frames, street):
     counts = egosgm.compare_disparity(wrong, truth)
     assert counts.bad == counts.truth == truth.size and counts.metrics.mae_px == pytest.approx(10, abs=1e-3)
     assert (counts + egosgm.compare_disparity(truth, truth)).metrics.bad_or_missing == 50
+    masked = np.ma.masked_greater(truth, 5)
+    for compare in (egosgm.compare_disparity, lambda estimate, truth: egosgm.evaluate_video([estimate], [truth])):
+        with pytest.raises(egosgm.InvalidArgument, match="truths?:? has a mask"):
+            compare(wrong, masked)
+        compare(wrong, masked.filled(egosgm.INVALID_DISPARITY))
     sky = egosgm.compare_disparity(wrong, np.zeros_like(truth))
     assert sky.sky == sky.sky_valid == truth.size and sky.metrics.wrong_of_all == sky.metrics.filled == 100
     poses = np.stack([street.render(i).world_from_camera for i in range(FRAMES)])
