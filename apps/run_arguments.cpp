@@ -120,7 +120,8 @@ SequenceJob RunArguments::job(const Package& package) const {
     throw InvalidArgument(fmt::format("--cloud-sigma {:g}: choose a number of percent above 0", cloud_sigma_percent));
   }
   if (!job.kinds.contains("cloud") && cloud_sigma_percent != RunArguments().cloud_sigma_percent) {
-    throw InvalidArgument(fmt::format("--cloud-sigma {:g}: is of clouds: give --write cloud, too", cloud_sigma_percent));
+    throw InvalidArgument(
+        fmt::format("--cloud-sigma {:g}: is of clouds: give --write cloud, too", cloud_sigma_percent));
   }
   job.feed = feed_of(*this, package);
   job.input = bag.bag.empty() ? input.text() : bag.text();

@@ -52,7 +52,7 @@ class _Info:
         camera = Values(data, file, "a camera of ROS's calibrator")
         self.k, self.p = camera.matrix((9,), "camera_matrix", "k", "K"), camera.matrix((12,), "projection_matrix", "p", "P")
         rotation, distortion = camera.first((9,), "rectification_matrix", "r", "R"), camera.first((), "distortion_coefficients", "d", "D")
-        if not {"distortion_coefficients", "d", "D"} & set(data):
+        if data.get("distortion_model") and not {"distortion_coefficients", "d", "D"} & set(data):
             raise camera.refuse(" and lacks distortion_coefficients: give zeros where there is no distortion")
         self.r = np.eye(3).reshape(-1) if rotation is None else rotation
         self.d = np.zeros(0) if distortion is None else distortion
