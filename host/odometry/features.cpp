@@ -6,13 +6,14 @@
 #include <bit>
 #include <cstdlib>
 #include <cstring>
+#include <utility>
 
 #include "host/cpu_clones.h"
 
 namespace egosgm::odometry {
 namespace {
 
-constexpr int kSuppressionRadius = 3;
+constexpr int kSuppressionRadius = 2;
 constexpr int kRingRows = 8;  // a power of two that holds 2 * kSuppressionRadius + 1 rows
 constexpr int kMargin = 9;    // the descriptor's reach, and one pixel of smoothing
 constexpr int kCell = 64;
@@ -52,15 +53,13 @@ void filter_columns(const std::uint16_t* __restrict column3, const std::uint16_t
   }
 }
 
-// Extrema over x - 3 .. x + 3.
+// Extrema over x - 2 .. x + 2.
 EGOSGM_CPU_CLONES
 void row_extrema(const std::int16_t* __restrict in, std::int16_t* __restrict maxima, std::int16_t* __restrict minima,
                  int width) {
   for (int x = kSuppressionRadius; x < width - kSuppressionRadius; ++x) {
-    const std::int16_t high = std::max(std::max(std::max(in[x - 3], in[x - 2]), std::max(in[x - 1], in[x])),
-                                       std::max(std::max(in[x + 1], in[x + 2]), in[x + 3]));
-    const std::int16_t low = std::min(std::min(std::min(in[x - 3], in[x - 2]), std::min(in[x - 1], in[x])),
-                                      std::min(std::min(in[x + 1], in[x + 2]), in[x + 3]));
+    const std::int16_t high = std::max(std::max(std::max(in[x - 2], in[x - 1]), std::max(in[x], in[x + 1])), in[x + 2]);
+    const std::int16_t low = std::min(std::min(std::min(in[x - 2], in[x - 1]), std::min(in[x], in[x + 1])), in[x + 2]);
     maxima[x] = high;
     minima[x] = low;
   }
@@ -76,16 +75,24 @@ EGOSGM_CPU_CLONES
 void flag_extrema(const std::int16_t* upper, const std::int16_t* lower, const RingRows& high, const RingRows& low,
                   const std::int16_t* above, const std::int16_t* below, std::uint8_t* __restrict upper_flags,
                   std::uint8_t* __restrict lower_flags, int width) {
-  const auto [a, b, c, d, e, f, g, h] = high;
-  const auto [i, j, k, l, m, n, o, p] = low;
+  const auto [a, b, c, d, e, f] = high;
+  const auto [i, j, k, l, m, n] = low;
   for (int x = 0; x < width; ++x) {
-    std::int16_t most = std::max(std::max(std::max(b[x], c[x]), std::max(d[x], e[x])), std::max(f[x], g[x]));
-    std::int16_t least = std::min(std::min(std::min(j[x], k[x]), std::min(l[x], m[x])), std::min(n[x], o[x]));
+    std::int16_t most = std::max(std::max(b[x], c[x]), std::max(d[x], e[x]));
+    std::int16_t least = std::min(std::min(j[x], k[x]), std::min(l[x], m[x]));
     most = std::max(most, above[x]);
     least = std::min(least, static_cast<std::int16_t>(-below[x]));
     const std::int16_t u = upper[x], v = lower[x];
     upper_flags[x] = static_cast<std::uint8_t>((u >= std::max(most, a[x])) | ((u <= std::min(least, i[x])) << 1));
-    lower_flags[x] = static_cast<std::uint8_t>((v >= std::max(most, h[x])) | ((v <= std::min(least, p[x])) << 1));
+    lower_flags[x] = static_cast<std::uint8_t>((v >= std::max(most, f[x])) | ((v <= std::min(least, n[x])) << 1));
+  }
+}
+
+EGOSGM_CPU_CLONES
+void halve_row(const std::uint8_t* __restrict upper, const std::uint8_t* __restrict lower, std::uint8_t* __restrict to,
+               int width) {
+  for (int x = 0; x < width; ++x) {
+    to[x] = static_cast<std::uint8_t>((upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1] + 2) >> 2);
   }
 }
 
@@ -132,6 +139,28 @@ void to_grey(const ImageView& image, const GreyLevels& levels, GreyImage& grey) 
       std::memcpy(&wide, source + 2 * x, sizeof(wide));  // it may lie at an odd place
       row[x] = levels(wide);
     }
+  }
+}
+
+void halve(const GreyImage& image, GreyImage& half) {
+  half.width = image.width / 2;
+  half.height = image.height / 2;
+  half.pixels.resize(static_cast<std::size_t>(half.width) * half.height);
+  for (int y = 0; y < half.height; ++y) halve_row(image.row(2 * y), image.row(2 * y + 1), half.row(y), half.width);
+}
+
+void enlarge(FeatureSet& set, int height) {
+  std::vector<int> row_begin(kFeatureClasses * (height + 1));
+  for (int c = 0; c < kFeatureClasses; ++c) {
+    for (int y = 0; y <= height; ++y) {
+      row_begin[c * (height + 1) + y] = set.first_of_row(c, std::min((y + 1) / 2, set.height));
+    }
+  }
+  set.height = height;
+  set.row_begin = std::move(row_begin);
+  for (Feature& feature : set.features) {
+    feature.x *= 2;
+    feature.y *= 2;
   }
 }
 

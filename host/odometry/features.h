@@ -24,6 +24,9 @@ struct GreyImage {
 /// `image` as 8 bit; values of 16 bits become so by `levels`.
 void to_grey(const ImageView& image, const GreyLevels& levels, GreyImage& grey);
 
+/// Means of 2x2 pixels. An odd last row or column is left out.
+void halve(const GreyImage& image, GreyImage& half);
+
 enum FeatureClass : int { kBlobMax, kBlobMin, kCornerMax, kCornerMin, kFeatureClasses };
 
 struct Feature {
@@ -49,8 +52,11 @@ struct FeatureSet {
   int first_of_row(int feature_class, int y) const { return row_begin[feature_class * (height + 1) + y]; }
 };
 
+/// Makes features of an image at half the size those of the image, which has `height` rows.
+void enlarge(FeatureSet& set, int height);
+
 /// Extrema of the 5x5 blob and corner filters of Geiger et al. (StereoScan, IV 2011), each the only one of its
-/// class within three pixels. Keeps its rows between calls.
+/// class within two pixels. Keeps its rows between calls.
 class FeatureDetector {
  public:
   /// REQUIRES: `threshold` > 0. Keeps the `per_cell` strongest of every 64x64 cell.

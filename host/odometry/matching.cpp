@@ -16,7 +16,7 @@ constexpr int kMaxDistance = 20 * kDescriptorSize;  // of descriptors; unrelated
 constexpr int kStereoRows_px = 2;                   // rectification error
 constexpr int kBeyondInfinity_px = 2;               // and in the direction of the search
 constexpr float kFarthestDisparity_px = -1;         // noise and rectification error at infinity
-constexpr float kMinCorrelation = 0.8f;
+constexpr float kMinCorrelation = 0.5f;
 constexpr float kMaxRowError_px = 2.5f;
 constexpr float kCannot = -std::numeric_limits<float>::infinity();
 

@@ -23,6 +23,9 @@ using namespace odometry;
 
 namespace {
 
+// From so many pixels on, features are sought at half the size, where noise is half as strong; their places are refined
+// at the full size. Half of a smaller image has too few features.
+constexpr int kPixelsToHalve = 200'000;
 constexpr int kFeatureCell_px = 64;
 constexpr int kRoughCell_px = 80, kRoughPerCell = 8;  // few strong features find the motion roughly
 constexpr SearchWindow kPriorWindow{40, 24};
@@ -92,6 +95,7 @@ struct StereoOdometry::State {
   Calibration calibration;
   StereoOdometryOptions options;
   FeatureDetector detector;
+  GreyImage half;
   TrackedFrame previous, current;
   bool has_previous = false;
   RectificationError rectification;
@@ -111,11 +115,17 @@ void StereoOdometry::State::read_frame(const ImageView& left, const ImageView& r
   const GreyLevels levels = levels_of(left, right);
   to_grey(left, levels, current.left);
   to_grey(right, levels, current.right);
-  const double cells = std::ceil(left.width / static_cast<double>(kFeatureCell_px)) *
-                       std::ceil(left.height / static_cast<double>(kFeatureCell_px));
+  const bool halves = current.left.pixels.size() >= kPixelsToHalve;
+  const double cell_px = (halves ? 2 : 1) * kFeatureCell_px;
+  const double cells = std::ceil(left.width / cell_px) * std::ceil(left.height / cell_px);
   const int per_cell = static_cast<int>(std::ceil(options.max_features / cells));
-  detector.detect(current.left, options.corner_threshold, per_cell, current.left_features);
-  detector.detect(current.right, options.corner_threshold, per_cell, current.right_features);
+  const auto detect = [&](const GreyImage& image, FeatureSet& set) {
+    if (halves) halve(image, half);
+    detector.detect(halves ? half : image, options.corner_threshold, per_cell, set);
+    if (halves) enlarge(set, image.height);
+  };
+  detect(current.left, current.left_features);
+  detect(current.right, current.right_features);
   current.reset_matches();
 }
 

@@ -42,8 +42,8 @@ TEST(OdometryFeatures, EqualsFiltersAndSuppressionAsWrittenInThePaper) {
       for (int x = 9; x < image.width - 9; ++x) {
         const int response = sign * filter_response(image, x, y, c >= 2);
         bool largest = response >= 300;
-        for (int i = -3; i <= 3 && largest; ++i) {
-          for (int j = -3; j <= 3; ++j) {
+        for (int i = -2; i <= 2 && largest; ++i) {
+          for (int j = -2; j <= 2; ++j) {
             if (sign * filter_response(image, x + j, y + i, c >= 2) > response) largest = false;
           }
         }
@@ -60,6 +60,39 @@ TEST(OdometryFeatures, EqualsFiltersAndSuppressionAsWrittenInThePaper) {
   }
   EXPECT_EQ(set.size(), expected);
   EXPECT_GT(expected, 100);
+}
+
+TEST(OdometryFeatures, ThoseOfHalfTheSizeLieInTheImageAtTwiceTheirPlace) {
+  std::mt19937 generator(13);
+  const odometry::GreyImage image = random_image(generator, 203, 145);
+  odometry::GreyImage half;
+  odometry::halve(image, half);
+  ASSERT_EQ(half.width, 101);
+  ASSERT_EQ(half.height, 72);
+  for (int y = 0; y < half.height; ++y) {
+    for (int x = 0; x < half.width; ++x) {
+      const int sum = image.row(2 * y)[2 * x] + image.row(2 * y)[2 * x + 1] + image.row(2 * y + 1)[2 * x] +
+                      image.row(2 * y + 1)[2 * x + 1];
+      ASSERT_EQ(half.row(y)[x], (sum + 2) / 4) << x << ", " << y;
+    }
+  }
+  odometry::FeatureDetector detector;
+  odometry::FeatureSet small, set;
+  detector.detect(half, 100, 1 << 20, small);
+  set = small;
+  odometry::enlarge(set, image.height);
+  ASSERT_GT(set.size(), 100);
+  for (int c = 0; c < odometry::kFeatureClasses; ++c) {
+    int k = small.first_of_row(c, 0);
+    for (int y = 0; y < image.height; ++y) {
+      ASSERT_EQ(set.first_of_row(c, y), k) << "class " << c << ", row " << y;
+      for (; k < set.size() && set.classes[k] == c && 2 * small.features[k].y == y; ++k) {
+        EXPECT_EQ(set.features[k].x, 2 * small.features[k].x);
+        EXPECT_EQ(set.features[k].y, y);
+      }
+    }
+    EXPECT_EQ(set.first_of_row(c, image.height), k);
+  }
 }
 
 TEST(OdometryFeatures, KeepsTheStrongestOfEveryCell) {

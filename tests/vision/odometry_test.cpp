@@ -122,9 +122,11 @@ TEST(StereoOdometry, CovarianceIsConsistentWithTheError) {
   options.seed = 24;
   options.supersampling = 2;
   const Drive straight(options);
-  double sum = 0;
-  int motions = 0;
-  for (const Drive* drive : {&turning_drive(), &straight}) {
+  options.height = 360;  // features are sought at half the size
+  const Drive large(options);
+  for (const Drive* drive : {&turning_drive(), &straight, &large}) {
+    double sum = 0;
+    int motions = 0;
     StereoOdometry odometry(drive->sequence.calibration());
     for (int k = 0; k < drive->sequence.frames(); ++k) {
       const OdometryResult result = process(odometry, drive->frames[k].left, drive->frames[k].right);
@@ -138,9 +140,9 @@ TEST(StereoOdometry, CovarianceIsConsistentWithTheError) {
       sum += xi.dot(result.motion->covariance.inverse() * xi);
       ++motions;
     }
+    EXPECT_GT(sum / motions, 0.5 * 6);
+    EXPECT_LT(sum / motions, 2.0 * 6);
   }
-  EXPECT_GT(sum / motions, 0.5 * 6);
-  EXPECT_LT(sum / motions, 2.0 * 6);
 }
 
 TEST(StereoOdometry, ThreadsChangeNoBit) {
@@ -363,6 +365,10 @@ TEST(StereoOdometry, FindsTheMotionAtNight) {
   options.supersampling = 2;
   const Drive night(options);
   expect_all_motions(night.sequence, night.frames, {0.03, 0.1});
+  options.height = 480;
+  options.noise_grey = 2;
+  const Drive noisy(options);
+  expect_all_motions(noisy.sequence, noisy.frames, {0.05, 0.1});
 }
 
 TEST(StereoOdometry, PriorGuidesAndAWrongOneDoesNotMislead) {
