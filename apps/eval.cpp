@@ -212,32 +212,38 @@ std::vector<DisparityCounts> counts_of(const Json& report, const std::string& fi
 int merge(const EvalArguments& arguments) {
   Result result;
   DisparityCounts pooled;
-  std::map<std::string, std::string> read;  // pairs of a report, and the first file that holds them
+  std::map<std::string, std::string> read;  // pairs, and the first file that holds them
   for (const std::string& file : arguments.reports) {
     const Json report = parse_json(vision::read_file(file, kMaxReportBytes), file);
     const std::vector<DisparityCounts> all = counts_of(report, file);
-    if (const auto [first, is_new] = read.emplace(report["pairs"].dump(), file); !is_new) {
-      throw InvalidArgument("--merge " + file + ": holds the pairs of " + first->second +
-                            ", whose pixels would count twice: give each report once");
-    }
+    auto pair = report.at("pairs").begin();
     for (const DisparityCounts& counts : all) {
+      if (const auto [first, is_new] = read.emplace((pair++)->dump(), file); !is_new && counts.valid > 0) {
+        throw InvalidArgument("--merge " + file + ": holds pairs of " + first->second +
+                              ", whose pixels would count twice: give each pair once");
+      }
       result.each.push_back(vision::metrics_of(counts));
       pooled += counts;
+    }
+    for (const Json& doubt : report.value("doubts", Json::array())) {
+      if (doubt.is_string()) result.doubts.push_back(file + ": " + doubt.get<std::string>());
     }
   }
   result.pooled = vision::metrics_of(pooled);
   result.mean = vision::mean_of(result.each);
   if (arguments.json) {
-    const Json json{{"reports", arguments.reports.size()},
-                    {"pairs", result.each.size()},
-                    {"pooled", app::json_of(result.pooled)},
-                    {"mean", app::json_of(result.mean)}};
+    Json json{{"reports", arguments.reports.size()},
+              {"pairs", result.each.size()},
+              {"pooled", app::json_of(result.pooled)},
+              {"mean", app::json_of(result.mean)}};
+    if (!result.doubts.empty()) json["doubts"] = result.doubts;
     fmt::print("{}\n", dumped(json, 2));
     return kOk;
   }
   print_header();
   print_row("pooled", result.pooled);
   print_row("mean", result.mean);
+  for (const std::string& doubt : result.doubts) fmt::print("{}\n", doubt);
   return kOk;
 }
 

@@ -168,6 +168,12 @@ std::string text_of(const std::vector<NamedOption>& sizes) {
   return text;
 }
 
+/// Whether a device only has no such sizes: blocks of 32 lanes, of which its compiler makes no vectors, or groups.
+bool is_of_sizes(const DeviceError& error) {
+  constexpr int kInvalidWorkGroupSize = -54;  // as OpenCL numbers it
+  return dynamic_cast<const BuildError*>(&error) || error.code() == kInvalidWorkGroupSize;
+}
+
 int stopped(const std::filesystem::path& file) {
   say(fmt::format("egosgm: interrupted: nothing is kept, {} is as it was", file.string()));
   return kInterrupted;
@@ -195,7 +201,8 @@ int tune(const TuneArguments& arguments) {
       double ms = 0;
       try {
         ms = ms_of(course.run(candidate), trial.stages);
-      } catch (const BuildError&) {  // blocks of 32 lanes, of which its compiler has no vectors
+      } catch (const DeviceError& error) {
+        if (!is_of_sizes(error)) throw;
         print_now(fmt::format("  {:<36} not on this device\n", text_of(sizes)));
         continue;
       }

@@ -204,6 +204,20 @@ TEST_F(DevicePipelineTest, GoesOnAfterAFrameThatFailed) {
       clReleaseEvent(done);
     }
   }
+  Pipeline& host = frames.device.host();
+  for (const bool is_of_host : {false, true}) {  // with another frame behind it
+    layer_.arm(5, CL_OUT_OF_RESOURCES, testing::FaultLayer::kHeld);
+    frames.enqueue(0);
+    if (is_of_host) {
+      host.submit(frames.video.image(1, EGOSGM_LEFT), frames.video.image(1, EGOSGM_RIGHT), std::nullopt, {});
+    } else {
+      frames.enqueue(1);
+    }
+    layer_.disarm();
+    EXPECT_THROW(is_of_host ? void(host.collect()) : void(frames.enqueue(2)), DeviceError);
+    EXPECT_EQ(host.under_way(), 0);
+    layer_.disarm();
+  }
   for (int index = 0; index < ShortVideo::kFrames; ++index) {
     const DeviceMaps maps = frames.enqueue(index);
     EXPECT_EQ(maps.unpredicted, index == 0 ? std::optional(Unpredicted::kReset) : std::nullopt);

@@ -22,13 +22,7 @@ void check_image(const char* name, const ImageView& image, shared::ImageSize siz
     throw InvalidArgument(view + size_text(image.width, image.height) + ", the pipeline was built for " +
                           size_text(size.width, size.height) + ": build another pipeline for another size");
   }
-  if (image.type != PixelType::kU8 && image.type != PixelType::kU16)
-    throw InvalidArgument(view + "unknown pixel type: give kU8 or kU16");
-  const std::int64_t row = static_cast<std::int64_t>(image.width) * (image.type == PixelType::kU8 ? 1 : 2);
-  if (image.height > 1 && std::abs(static_cast<std::int64_t>(image.stride_bytes)) < row) {
-    throw InvalidArgument(view + "a stride of " + std::to_string(image.stride_bytes) +
-                          " bytes is shorter than a row of " + std::to_string(row));
-  }
+  check_rows(view, image);
 }
 
 template <typename T>
@@ -51,6 +45,16 @@ void check_map(const char* name, const MapView<T>& map, shared::ImageSize size) 
 void check_size(int width, int height) {
   if (width >= 1 && height >= 1 && width <= kMaxSide && height <= kMaxSide) return;
   throw InvalidArgument("image size " + size_text(width, height) + ": choose 1x1 to " + size_text(kMaxSide, kMaxSide));
+}
+
+void check_rows(const std::string& view, const ImageView& image) {
+  if (image.type != PixelType::kU8 && image.type != PixelType::kU16)
+    throw InvalidArgument(view + "unknown pixel type: give kU8 or kU16");
+  const std::int64_t row = static_cast<std::int64_t>(image.width) * (image.type == PixelType::kU8 ? 1 : 2);
+  if (image.height > 1 && std::abs(static_cast<std::int64_t>(image.stride_bytes)) < row) {
+    throw InvalidArgument(view + "a stride of " + std::to_string(image.stride_bytes) +
+                          " bytes is shorter than a row of " + std::to_string(row));
+  }
 }
 
 void check_frame(shared::ImageSize size, const ImageView& left, const ImageView& right, const FrameOutputs& outputs) {

@@ -89,7 +89,7 @@ void FrameQueue::prepare(PixelType type, const Wanted& wanted) {
 
 void FrameQueue::submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
                         const FrameOutputs& outputs) {
-  expect_device_frame_not_failed();
+  expect_device_frames_not_failed();
   expect_none_failed();
   const Wanted wanted = wanted_of(outputs);
   build(left.type, wanted);
@@ -126,7 +126,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
 
 DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done,
                                bool wants_dynamic) {
-  expect_device_frame_not_failed();
+  expect_device_frames_not_failed();
   build(images.type, {});
   FrameTransfer& transfer = free_transfer();
   Belief after = free_memory();
@@ -139,7 +139,7 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
 
   drain.is_dismissed = true;
-  device_frame_ = context_.take_commands();
+  for (ocl::Command& command : context_.take_commands()) device_frames_.push_back(std::move(command));
   if (done) {
     *done = end();
     ::clRetainEvent(*done);
@@ -158,6 +158,7 @@ FrameReport FrameQueue::collect() {
     if (records_commands_) report_commands(context_, frame.commands, frame.report);
   });
   expect_none_failed();
+  expect_device_frames_not_failed();
   frame.transfer->collect(frame.report);
   const Clock::time_point now = Clock::now();
   frame.report.total_ms = std::chrono::duration<double, std::milli>(now - std::max(frame.start, collected_)).count();
@@ -194,12 +195,14 @@ void FrameQueue::release_results() {
   }
 }
 
-void FrameQueue::expect_device_frame_not_failed() {
-  const std::vector<ocl::Command> commands = std::exchange(device_frame_, {});
+/// Those that have not ended may still fail, also with later frames behind them.
+void FrameQueue::expect_device_frames_not_failed() {
+  std::vector<ocl::Command> commands = std::exchange(device_frames_, {});
   try {
-    context_.expect_none_failed(commands);
+    device_frames_ = context_.unfinished(std::move(commands));
   } catch (...) {
     context_.drain();
+    under_way_.clear();
     reset();
     throw;
   }

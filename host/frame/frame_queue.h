@@ -67,7 +67,7 @@ class FrameQueue {
   FrameTransfer& free_transfer();
   Belief& free_memory();
   void release_results();
-  void expect_device_frame_not_failed();
+  void expect_device_frames_not_failed();
   void expect_none_failed();
   template <typename F>
   void or_go_back(F&& f);
@@ -85,7 +85,7 @@ class FrameQueue {
   Belief belief_;                                          // of the last frame submitted; in one of them
   std::vector<FrameUnderWay> under_way_;                   // the oldest first
   Clock::time_point collected_;                            // the last one before them
-  std::vector<ocl::Command> device_frame_;                 // of the last `enqueue`
+  std::vector<ocl::Command> device_frames_;                // of each `enqueue`, as long as they may fail
   bool records_commands_ = false;
 };
 

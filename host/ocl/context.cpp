@@ -208,6 +208,14 @@ void Context::expect_none_failed(const std::vector<Command>& commands) {
   }
 }
 
+std::vector<Command> Context::unfinished(std::vector<Command> commands) {
+  expect_none_failed(commands);
+  std::erase_if(commands, [](const Command& command) {
+    return command.event.getInfo<CL_EVENT_COMMAND_EXECUTION_STATUS>() == CL_COMPLETE;
+  });
+  return commands;
+}
+
 void Context::drain() noexcept {
   for (const cl::CommandQueue& queue : queues_) ::clFinish(queue());
   commands_.clear();

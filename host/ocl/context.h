@@ -135,6 +135,9 @@ class Context {
   /// Throws if one of `commands` has failed by now. Does not wait.
   void expect_none_failed(const std::vector<Command>& commands);
 
+  /// Those of `commands` that have not ended. Throws if one of them has failed by now.
+  std::vector<Command> unfinished(std::vector<Command> commands);
+
   /// Lets all that was enqueued end, and forgets what was recorded.
   void drain() noexcept;
 

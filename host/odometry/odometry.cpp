@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "egosgm/error.h"
+#include "host/frame/check_frame.h"
 #include "host/odometry/features.h"
 #include "host/odometry/matching.h"
 #include "host/odometry/motion.h"
@@ -45,6 +46,8 @@ void check_images(const ImageView& left, const ImageView& right) {
          << "x" << right.height << "; give a rectified pair of one size and type";
     throw InvalidArgument(text.str());
   }
+  check_rows("stereo odometry: left image: ", left);
+  check_rows("stereo odometry: right image: ", right);
 }
 
 /// Milliseconds from lap to lap.

@@ -292,6 +292,7 @@ Calibration read_calibration(const std::filesystem::path& file, KittiCameras cam
 }
 
 void write_calibration(const std::filesystem::path& file, const Calibration& calibration) {
+  calibration.validate();
   const std::array<double, 6> values = {calibration.fx, calibration.fy,         calibration.cx,
                                         calibration.cy, calibration.baseline_m, calibration.doffs_px};
   std::string text;

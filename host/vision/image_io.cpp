@@ -69,7 +69,7 @@ cv::Mat read_stored_image(const std::filesystem::path& file) {
 cv::Mat read_color_image(const std::filesystem::path& file) {
   cv::Mat pixels = decode_image(file);
   if (pixels.channels() == 1) return color_grey(pixels);
-  if (pixels.depth() == CV_16U) pixels.convertTo(pixels, CV_8U, 1.0 / 256.0, -0.5);  // rounds, so half a step down
+  if (pixels.depth() == CV_16U) pixels.convertTo(pixels, CV_8U, 1.0 / 256.0, -0.499);  // rounds, halves to even numbers
   reverse_colors(pixels);
   return pixels;
 }

@@ -56,6 +56,7 @@ PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const 
   require(!judges_reasons || (reasons.type() == CV_8UC1 && reasons.size() == disparity.size()),
           "a choice of reasons needs their map, CV_8UC1, of the disparity's size");
   options.validate();
+  calibration.validate();
   std::array<bool, 256> stays{};
   for (const Reason reason : options.reasons) stays[static_cast<std::uint8_t>(reason)] = true;
   const cv::Mat picture = colors.type() == CV_8UC3 ? colors : color_grey(colors);

@@ -281,6 +281,7 @@ cv::Mat color_grey(const cv::Mat& grey) {
 
 cv::Mat depth_from_disparity(const cv::Mat& disparity, const Calibration& calibration) {
   require_map(disparity, "depth_from_disparity");
+  calibration.validate();
   const double numerator = calibration.fx * calibration.baseline_m;
   cv::Mat depth_m(disparity.size(), CV_32FC1, cv::Scalar(kInvalidDisparity));
   for (int y = 0; y < disparity.rows; ++y) {

@@ -77,8 +77,8 @@ class EGOSGM_EXPORT StereoOdometry {
 
   /// The next frame. `prior` (current_from_previous, for example an IMU's rotation with the last motion's translation)
   /// only guides the search; without it, the last frame's motion does. The first frame has no motion.
-  /// Throws InvalidArgument where the images are empty, differ in size or type, or changed size since the last
-  /// frame, or the prior is no motion; the state is then as before the call.
+  /// Throws InvalidArgument where the images are empty, differ in size or type, have rows that overlap, or
+  /// changed size since the last frame, or the prior is no motion; the state is then as before the call.
   OdometryResult process(const ImageView& left, const ImageView& right,
                          const std::optional<Eigen::Isometry3d>& prior = std::nullopt);
 

@@ -2,6 +2,7 @@
 """What the program may write: it removes nothing, and replaces only report and poses of a run that goes on. Environment as for program_case.py."""
 import json
 import os
+import re
 import shutil
 import signal
 import stat
@@ -358,6 +359,12 @@ class TuneFiles(FilesTest):
                                  "--stage", "SpeckleRemoval")
         self.assertRegex(told, r"^SpeckleRemoval: ")
         self.assertNotIn(" 0.000 ms", told)
+
+    def test_groups_that_a_gpu_has_not_are_left_out(self):
+        gpu = dict(os.environ, OPENCL_LAYERS=os.environ["EGOSGM_GPU_LAYER"], POCL_MAX_WORK_GROUP_SIZE="64")
+        told = self.assert_works("tune", "--file", self.new_folder() / "tuning.json", "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2,
+                                 "--stage", "SearchBand", env=gpu)
+        self.assertEqual(re.findall(r"row_group (\d+) +not on this device", told), ["128", "256"])
 
     def test_a_file_that_is_no_tuning_file_stays(self):
         folder = self.new_folder()

@@ -188,10 +188,13 @@ class ManySequences(ProgramTest):
         for broken in ('{"pairs": [{}]}', '{"pairs": []}', *(re.sub(r'"truth": \d+', f'"truth": {count}', text) for count in ("-5", "1", "1.5", "1e300", "true"))):
             (out / "no.json").write_text(broken)
             self.assert_refused(["eval", "--merge", reports[1], out / "no.json"], "no.json", "egosgm eval --json")
-        copy = self.new_folder() / "copy.json"
-        copy.write_text(json.dumps(json.loads(reports[0].read_text())))
-        for again in (out / f"../{out.name}/0.json", copy):
-            self.assert_refused(["eval", "--merge", *reports, again], again, f"holds the pairs of {reports[0]}", "once")
+        part, first = self.new_folder() / "part.json", json.loads(text)
+        part.write_text(json.dumps(first | {"pairs": first["pairs"][1:]}))
+        for again in (out / f"../{out.name}/0.json", part):
+            self.assert_refused(["eval", "--merge", *reports, again], again, f"holds pairs of {reports[0]}", "once")
+        part.write_text(json.dumps(first | {"doubts": ["another scale?"]}))
+        self.assertIn(f"{part}: another scale?", self.assert_works("eval", "--merge", part))
+        self.assertEqual(json.loads(self.assert_works("eval", "--merge", part, "--json"))["doubts"], [f"{part}: another scale?"])
         self.assert_refused(["eval", "--merge", reports[0], "--mask", reports[1]], "--merge")
         self.assert_refused(["eval", out / "street-0", "--merge", reports[0]], "--merge")
 

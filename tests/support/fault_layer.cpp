@@ -23,7 +23,10 @@ cl_icd_dispatch layer{};
 
 std::atomic<int> calls = 0, enqueues = 0, releases = 0;
 int failing = -1;
-enum { kAtOnce = 0, kLater = 1, kRelease = 2 } kind = kAtOnce;
+enum { kAtOnce = 0, kLater = 1, kRelease = 2, kHeld = 3 } kind = kAtOnce;
+// A command that says until the next `fault_arm` that it has not ended, and then that it failed. PoCL 3.1 ends the
+// program where one fails that others wait for.
+cl_event held = nullptr, failed = nullptr;
 bool separate_memory = false, svm_is_hidden = false;
 cl_int status = CL_OUT_OF_RESOURCES;
 // EGOSGM_FAILING_CONTEXT=N/M, for programs that do not know of this layer: from command M on, all of context N fail
@@ -77,7 +80,7 @@ void finish_all_queues() {
 // (tests/support/pocl_late_failure.c).
 template <typename Enqueue>
 cl_int enqueue(cl_command_queue queue, cl_uint count, const cl_event* given, cl_event* done, Enqueue&& enqueue_with) {
-  const bool fails_later = kind == kLater && enqueues == failing;
+  const bool fails_later = kind == kLater && enqueues == failing, is_held = kind == kHeld && enqueues == failing;
   ++enqueues;
   if (failing_context && context_of(queue) == failing_context && commands_of_it++ >= last_good_command)
     return CL_DEVICE_NOT_AVAILABLE;
@@ -95,6 +98,7 @@ cl_int enqueue(cl_command_queue queue, cl_uint count, const cl_event* given, cl_
     result = enqueue_with(count, given);
   }
   if (result == CL_SUCCESS && done) ++references;
+  if (is_held) next->clRetainEvent(held = *done);  // its address is no other's
   return result;
 }
 
@@ -272,7 +276,11 @@ cl_int CL_API_CALL queue_info(cl_command_queue q, cl_command_queue_info i, size_
   return fails() ? status : next->clGetCommandQueueInfo(q, i, n, v, s);
 }
 cl_int CL_API_CALL event_info(cl_event e, cl_event_info i, size_t n, void* v, size_t* s) {
-  return fails() ? status : next->clGetEventInfo(e, i, n, v, s);
+  if (fails()) return status;
+  const cl_int result = next->clGetEventInfo(e, i, n, v, s);
+  const bool is_told = (e == held || e == failed) && i == CL_EVENT_COMMAND_EXECUTION_STATUS && v;
+  if (is_told) *static_cast<cl_int*>(v) = e == held ? CL_QUEUED : CL_OUT_OF_RESOURCES;
+  return result;
 }
 cl_int CL_API_CALL unmap(cl_command_queue q, cl_mem b, void* p, cl_uint c, const cl_event* g, cl_event* e) {
   ++transfers;
@@ -333,10 +341,12 @@ void unknown_call() {
 }  // namespace
 
 extern "C" void fault_arm(int at, int code, int how) {
+  if (failed) next->clReleaseEvent(failed);
+  failed = std::exchange(held, nullptr);
   calls = enqueues = releases = 0;
   failing = at;
   status = code;
-  kind = how == 2 ? kRelease : how == 1 ? kLater : kAtOnce;
+  kind = how == 3 ? kHeld : how == 2 ? kRelease : how == 1 ? kLater : kAtOnce;
 }
 extern "C" void fault_forbid_sources(int forbidden) { sources_forbidden = forbidden != 0; }
 extern "C" void fault_reuse_builds(int reused) { builds_are_reused = reused != 0; }

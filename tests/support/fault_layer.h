@@ -15,10 +15,10 @@ namespace egosgm::testing {
 /// The layer between this program and its OpenCL driver. Exists only where OPENCL_LAYERS named it before the first
 /// OpenCL call.
 struct FaultLayer {
-  enum How { kAtOnce, kLate, kRelease };
+  enum How { kAtOnce, kLate, kRelease, kHeld };
 
   /// Counts from zero; lets call `at` return `code`, or command `at` fail after it was enqueued, or release `at` return
-  /// `code` after it was done. -1: none.
+  /// `code` after it was done. -1: none. Held: the command says from the next `arm` to the one behind that it failed.
   void (*arm)(int at, int code, int how);
   void (*forbid_sources)(int forbidden);  // 1: no program can be made of its source from now on
   void (*reuse_builds)(int reused);       // 1: a program built before is taken from its binary from now on, at once

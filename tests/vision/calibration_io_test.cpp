@@ -84,6 +84,7 @@ TEST_F(CalibrationIo, WrittenCalibrationIsReadBackExactly) {
   EXPECT_EQ(read_back.cy, written.cy);
   EXPECT_EQ(read_back.baseline_m, written.baseline_m);
   EXPECT_EQ(read_back.doffs_px, written.doffs_px);
+  expect_refused([&] { write_calibration(file_, {}); }, {"calibration: fx"});
 }
 
 TEST_F(CalibrationIo, BrokenFilesAreNamedWithTheirRow) {

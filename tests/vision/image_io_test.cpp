@@ -88,9 +88,11 @@ TEST(ImageIo, ColorIsReadAsItIs) {
   write_png(folder / "image.png", image);
   expect_equal(read_color_image(folder / "image.png"), image);
   cv::Mat deep;
-  image.convertTo(deep, CV_16U, 256, 255);  // the upper byte counts, the lower one is full
-  ASSERT_TRUE(cv::imwrite((folder / "deep.png").string(), deep));
-  expect_equal(read_color_image(folder / "deep.png"), image);
+  for (const int lower_byte : {0, 255}) {
+    image.convertTo(deep, CV_16U, 256, lower_byte);
+    ASSERT_TRUE(cv::imwrite((folder / "deep.png").string(), deep));
+    expect_equal(read_color_image(folder / "deep.png"), image);
+  }
   write_png(folder / "grey.png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(7)));
   expect_equal(read_color_image(folder / "grey.png"), cv::Mat(3, 4, CV_8UC3, cv::Scalar::all(7)));
 }

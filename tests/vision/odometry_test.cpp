@@ -423,6 +423,9 @@ TEST(StereoOdometry, RefusesWhatItCannotUse) {
   Eigen::Isometry3d prior = Eigen::Isometry3d::Identity();
   prior.translation().z() = std::nan("");
   const ImageView image = image_view(drive.frames[0].left);
+  ImageView flat = image;
+  flat.stride_bytes = 0;
+  expect_refused([&] { odometry.process(image, flat); }, {"right image: a stride of 0 bytes is shorter than a row"});
   expect_refused([&] { odometry.process(image, image, prior); }, {"motion: not all values are finite"});
   EXPECT_TRUE(process(odometry, drive.frames[1].left, drive.frames[1].right).motion)
       << "a refused call changes nothing";

@@ -71,6 +71,7 @@ TEST(PointCloud, RefusesWhatDoesNotBelongTogether) {
   EXPECT_THROW(point_cloud(filled(5), filled(1, {5, 4}), grey(), kCamera), InvalidArgument);
   EXPECT_THROW(point_cloud(filled(5), filled(1), grey({6, 5}), kCamera), InvalidArgument);
   EXPECT_THROW(point_cloud(grey(), filled(1), grey(), kCamera), InvalidArgument);
+  EXPECT_THROW(point_cloud(filled(5), filled(1), grey(), {}), InvalidArgument);
   EXPECT_THROW(point_cloud(filled(5), filled(1), grey(), kCamera, {.max_relative_sigma = 0}), InvalidArgument);
   EXPECT_THROW(write_ply("cloud.ply", {.points_m = {{1, 2, 3}}, .colors = {{1, 2, 3}, {4, 5, 6}}}), InvalidArgument);
   EXPECT_THROW(write_ply("cloud.ply", {.points_m = {{1, 2, 3}}, .normals = {{1, 2, 3}, {4, 5, 6}}}), InvalidArgument);

@@ -139,6 +139,7 @@ TEST(Render, WrongInputIsRefused) {
   expect_refused([&] { compose({}, 1, 10); }, {"at least one"});
   expect_refused([&] { compose({{bytes, ""}}, 1, 10); }, {"CV_8UC3"});
   expect_refused([&] { depth_from_disparity(cv::Mat(), {}); }, {"CV_32FC1"});
+  expect_refused([&] { depth_from_disparity(map, {}); }, {"calibration: fx"});
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ class EGOSGM_EXPORT NegativeBaseline : public InvalidArgument {
 EGOSGM_EXPORT Calibration read_calibration(const std::filesystem::path& file,
                                            KittiCameras cameras = KittiCameras::kAny);
 
-/// Writes EgoSGM's own format (TOML). Throws IoError. Thread-safe for different files.
+/// Writes EgoSGM's own format (TOML). Throws IoError, and as Calibration::validate. Thread-safe for different files.
 EGOSGM_EXPORT void write_calibration(const std::filesystem::path& file, const Calibration& calibration);
 
 }  // namespace egosgm::vision

@@ -43,7 +43,7 @@ struct EGOSGM_EXPORT PointCloudOptions {
 /// The points of a disparity map [px] with its variance [px^2], both CV_32FC1, in the left camera's frame (x right, y
 /// down, z forward), row by row. `colors` is the left image, CV_8UC1, CV_16UC1 (stretched to its maximum) or CV_8UC3;
 /// `reasons` are FrameOutputs::reason, CV_8UC1, which options.reasons needs. Throws InvalidArgument for other types,
-/// for maps of different sizes, and as PointCloudOptions::validate does. Thread-safe.
+/// for maps of different sizes, as Calibration::validate and as PointCloudOptions::validate. Thread-safe.
 EGOSGM_EXPORT PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const cv::Mat& colors,
                                      const Calibration& calibration, const PointCloudOptions& options = {},
                                      const cv::Mat& reasons = {});

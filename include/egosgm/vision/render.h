@@ -55,7 +55,7 @@ EGOSGM_EXPORT cv::Mat reason_bar(int width);
 EGOSGM_EXPORT cv::Mat color_grey(const cv::Mat& grey);
 
 /// Depth [m] = fx * baseline_m / (d + doffs_px), CV_32FC1; kInvalidDisparity where the disparity is invalid or d +
-/// doffs_px <= 0.
+/// doffs_px <= 0. Throws as Calibration::validate, too.
 EGOSGM_EXPORT cv::Mat depth_from_disparity(const cv::Mat& disparity, const Calibration& calibration);
 
 }  // namespace egosgm::vision
