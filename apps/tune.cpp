@@ -246,7 +246,7 @@ Command add_tune(CLI::App& program) {
   command->add_option("--stage", arguments->stage, "only the sizes of this one; the others stay")
       ->type_name("NAME")
       ->group(group)
-      ->check(CLI::IsMember({"BandedSgm", "ForwardWarp", "SpeckleRemoval", "SearchBand"}));
+      ->check(CLI::IsMember({"BandedSgm", "ForwardWarp", "SpeckleRemoval", "SearchBand", "VerticalAlignment"}));
   add_device(*command, arguments->device);
   add_cache(*command, arguments->cache);
   return {command, [arguments] { return tune(*arguments); }};

@@ -351,7 +351,8 @@ class TuneFiles(FilesTest):
         self.assertNotEqual(after["warp_band_rows"], 3)
         self.assertEqual({**after, "warp_band_rows": 3}, sizes)
         before = file.read_bytes()
-        self.assert_refused([*tune, "SearchBand"], "--stage SearchBand", "CPU", "another stage")
+        for of_gpus in ("SearchBand", "VerticalAlignment"):
+            self.assert_refused([*tune, of_gpus], f"--stage {of_gpus}", "CPU", "another stage")
         self.assertEqual(file.read_bytes(), before)
 
     def test_a_stage_of_first_frames_alone_has_times(self):
