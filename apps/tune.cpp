@@ -10,6 +10,7 @@
 #include "apps/command.h"
 #include "apps/device_arguments.h"
 #include "apps/interrupt.h"
+#include "apps/output_folder.h"
 #include "apps/standard_output.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
@@ -185,6 +186,7 @@ int tune(const TuneArguments& arguments) {
   const std::filesystem::path file =
       arguments.file.empty() ? user_tuning_file() : std::filesystem::path(arguments.file);
   if (file.empty()) throw InvalidArgument("tune: neither XDG_CONFIG_HOME nor HOME is set: give --file FILE");
+  expect_no_folder("--file", file);
   const std::vector<Trial> trials = trials_of(arguments.stage, device.info());
   expect_tuning_file(file);
   Course course(arguments, device);

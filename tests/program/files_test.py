@@ -242,6 +242,8 @@ class OwnFiles(FilesTest):
         for option in ("--trace", "--save-config"):
             for name in ("new", "new/out", "new/./out", "new/out/../out"):
                 self.assert_refused_and_untouched(folder, ["run", "--odometry", self.street, *METHOD, "--out", folder / "new/out", option, f"{folder}/{name}"], "is a folder")
+        for command in (["odometry", self.street, "--out"], ["compile", "--out", folder / "out", "--save-config"], ["tune", "--file"]):
+            self.assert_refused_and_untouched(folder, [*command, f"{folder}/new/"], "is a folder: give the name of a file")
         for command in (["compile", "--out"],):
             for name in ("new", "new/out"):
                 self.assert_refused_and_untouched(folder, [*command, folder / "new/out", "--save-config", folder / name], "or is that folder")
