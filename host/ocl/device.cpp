@@ -265,6 +265,7 @@ Device Device::select(const std::string& wanted) {
 }
 
 Device Device::compute_units(int first, int last) const {
+  ocl::expect_own_process("compute_units");
   Handle part = *handle_;
   part.device = sub_device(handle_->device, handle_->info, first, last);
   part.info.name += "/" + std::to_string(first) + (last > first ? "-" + std::to_string(last) : "");
