@@ -39,7 +39,8 @@ int estimate(const OdometryArguments& arguments, const CalibrationReader& read) 
   FileFeed feed(arguments.input.open(/*needs_calibration=*/true, read));
   const vision::StereoSequence& sequence = feed.sequence();
   MotionSource motions(sequence, {}, arguments.options);
-  if (!arguments.out.empty()) vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
+  expect_no_folder("--out", arguments.out);
+  vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
   expect_new_file("--out", arguments.out);
   std::vector<Eigen::Isometry3d> poses;
   std::exception_ptr failure;

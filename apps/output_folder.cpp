@@ -118,11 +118,17 @@ fs::path new_folder(const std::string& option, const std::string& folder) {
   return path;
 }
 
+void expect_no_folder(const std::string& option, const fs::path& file) {
+  std::error_code none;
+  if (!file.has_filename() || fs::is_directory(file, none))
+    throw InvalidArgument(option + " " + file.string() + ": is a folder: give the name of a file");
+}
+
 void expect_new_file(const std::string& option, const std::string& file) {
   expect_named(option, file);
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
-  if (fs::is_directory(status)) throw InvalidArgument(option + " " + file + ": is a folder: give the name of a file");
+  expect_no_folder(option, file);
   if (fs::is_regular_file(status) && !vision::is_stream(file)) {
     throw InvalidArgument(option + " " + file + ": is there already: give another name, or remove it first");
   }

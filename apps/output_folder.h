@@ -16,6 +16,9 @@ namespace egosgm::app {
 /// The folder of `option`, which is to be new or empty. Throws InvalidArgument, having made nothing.
 std::filesystem::path new_folder(const std::string& option, const std::string& folder);
 
+/// Throws InvalidArgument where `file`, which `option` names, is a folder, or one by the slash at its end.
+void expect_no_folder(const std::string& option, const std::filesystem::path& file);
+
 /// Throws InvalidArgument where a regular file, or a folder, has the name that `option` gave, and IoError where none
 /// can be written there. Pipes and devices are written through. An empty name is none.
 void expect_new_file(const std::string& option, const std::string& file);

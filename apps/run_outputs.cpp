@@ -73,6 +73,7 @@ std::set<std::string> parse_write_list(const std::string& list) {
   std::istringstream stream(list);
   for (std::string part; std::getline(stream, part, ',');) {
     const std::string kind = CLI::detail::trim_copy(part);
+    if (kind == "disparity") continue;  // always written
     if (std::find(kKinds.begin(), kKinds.end(), kind) == kKinds.end()) {
       const std::string nearest = suggestion(kind, kKinds);
       std::string all;

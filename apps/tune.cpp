@@ -10,6 +10,7 @@
 #include "apps/command.h"
 #include "apps/device_arguments.h"
 #include "apps/interrupt.h"
+#include "apps/output_folder.h"
 #include "apps/standard_output.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
@@ -185,6 +186,7 @@ int tune(const TuneArguments& arguments) {
   const std::filesystem::path file =
       arguments.file.empty() ? user_tuning_file() : std::filesystem::path(arguments.file);
   if (file.empty()) throw InvalidArgument("tune: neither XDG_CONFIG_HOME nor HOME is set: give --file FILE");
+  expect_no_folder("--file", file);
   const std::vector<Trial> trials = trials_of(arguments.stage, device.info());
   expect_tuning_file(file);
   Course course(arguments, device);
@@ -246,7 +248,7 @@ Command add_tune(CLI::App& program) {
   command->add_option("--stage", arguments->stage, "only the sizes of this one; the others stay")
       ->type_name("NAME")
       ->group(group)
-      ->check(CLI::IsMember({"BandedSgm", "ForwardWarp", "SpeckleRemoval", "SearchBand"}));
+      ->check(CLI::IsMember({"BandedSgm", "ForwardWarp", "SpeckleRemoval", "SearchBand", "VerticalAlignment"}));
   add_device(*command, arguments->device);
   add_cache(*command, arguments->cache);
   return {command, [arguments] { return tune(*arguments); }};

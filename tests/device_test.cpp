@@ -213,6 +213,8 @@ TEST_F(DeviceTest, ComputeUnitsAreDevicesOfTheirOwn) {
     EXPECT_EQ(Device::select().info().name, part.info().name);
   }
   EXPECT_EQ(Device::select("0/0").info().name, Device::list().front().info().name + "/0");
+  const std::string unit_of_part = whole->compute_units(0, info.compute_units - 1).compute_units(0, 0).info().name;
+  EXPECT_EQ(Device::select(unit_of_part).info().name, unit_of_part);
 }
 
 TEST_F(DeviceTest, PartsShareUnitsWithTheWholeAndWhereTheyOverlap) {

@@ -179,6 +179,10 @@ TEST(Pipeline, RefusesWhatItCannotBeBuiltFor) {
   expect_refused(build(5, 16385, calibration, small), {"image size 5x16385"});
   expect_refused(build(5, 5, {}, small), {"calibration: fx"});
   expect_refused(build(5, 5, calibration, options(0, 0)), {"option disparities is 0"});
+  constexpr auto kNone = static_cast<PixelType>(5);
+  expect_refused([&] { Pipeline(calibration, 5, 5, small, Device::select(), kNone); }, {"unknown pixel type"});
+  Pipeline pipeline(calibration, 5, 5, small);
+  expect_refused([&] { pipeline.prepare(kNone, {}); }, {"unknown pixel type"});
 }
 
 }  // namespace

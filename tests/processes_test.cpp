@@ -119,6 +119,7 @@ TEST(Forked, TellsInPlaceOfWaiting) {
     submit();
     const int forked = status_of([&] {
       const bool all = tells_of_fork([] { Device::list(); }) && tells_of_fork([] { Device::select(); }) &&
+                       tells_of_fork([&] { pipeline->device().compute_units(0, 0); }) &&
                        tells_of_fork([&] { video.pipeline(pipeline->device()); }) && tells_of_fork(submit) &&
                        tells_of_fork([&] { pipeline->collect(); }) &&
                        tells_of_fork([&] { pipeline->prepare(video.type(), memory.views()); });

@@ -47,9 +47,13 @@ void check_size(int width, int height) {
   throw InvalidArgument("image size " + size_text(width, height) + ": choose 1x1 to " + size_text(kMaxSide, kMaxSide));
 }
 
+void check_type(const std::string& what, PixelType type) {
+  if (type != PixelType::kU8 && type != PixelType::kU16)
+    throw InvalidArgument(what + "unknown pixel type: give kU8 or kU16");
+}
+
 void check_rows(const std::string& view, const ImageView& image) {
-  if (image.type != PixelType::kU8 && image.type != PixelType::kU16)
-    throw InvalidArgument(view + "unknown pixel type: give kU8 or kU16");
+  check_type(view, image.type);
   const std::int64_t row = static_cast<std::int64_t>(image.width) * (image.type == PixelType::kU8 ? 1 : 2);
   if (image.height > 1 && std::abs(static_cast<std::int64_t>(image.stride_bytes)) < row) {
     throw InvalidArgument(view + "a stride of " + std::to_string(image.stride_bytes) +

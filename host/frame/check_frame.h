@@ -11,6 +11,9 @@ namespace egosgm {
 /// Throws InvalidArgument for a size that no pipeline can have.
 void check_size(int width, int height);
 
+/// Throws InvalidArgument, with `what` before the rest, for a type that is none.
+void check_type(const std::string& what, PixelType type);
+
 /// Throws InvalidArgument, with `view` before the rest, for a type that is none, and for rows that overlap.
 void check_rows(const std::string& view, const ImageView& image);
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "host/frame/check_frame.h"
 #include "host/grey_levels.h"
 #include "host/tuning_defaults.h"
 
@@ -65,6 +66,7 @@ FrameQueue::FrameQueue(const Calibration& calibration, shared::ImageSize size, c
 }
 
 void FrameQueue::build(PixelType type, const Wanted& wanted) {
+  check_type("", type);
   method_.prepare(type, wanted);
   context_.build();
 }

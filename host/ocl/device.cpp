@@ -223,6 +223,16 @@ const Device* find(const std::vector<Device>& devices, const std::string& name, 
                         another->info().name + ": give its number or more of its name: " + numbered(devices));
 }
 
+/// The same, or compute units of what is found so.
+std::optional<Device> find_whole_or_units(const std::vector<Device>& devices, const std::string& name,
+                                          const std::string& origin) {
+  if (name.empty()) return std::nullopt;
+  if (const Device* device = find(devices, name, origin)) return *device;
+  const std::optional<UnitRange> units = unit_range(name);
+  const auto device = units ? find_whole_or_units(devices, units->device, origin) : std::nullopt;
+  return device ? std::optional(device->compute_units(units->first, units->last)) : std::nullopt;
+}
+
 }  // namespace
 
 const char* to_string(DeviceType type) {
@@ -247,12 +257,7 @@ Device Device::select(const std::string& wanted) {
   const std::string given = !wanted.empty() ? wanted : from_environment ? from_environment : "";
   if (given.empty()) return found.devices.front();
   const std::string origin = wanted.empty() ? " (EGOSGM_DEVICE)" : "";
-  if (const Device* device = find(found.devices, lower(given), origin)) return *device;
-  if (const auto units = unit_range(lower(given)); units && !units->device.empty()) {
-    if (const Device* device = find(found.devices, units->device, origin)) {
-      return device->compute_units(units->first, units->last);
-    }
-  }
+  if (const auto device = find_whole_or_units(found.devices, lower(given), origin)) return *device;
   throw InvalidArgument("no OpenCL device fits \"" + given + "\"" + origin + ": choose one of " +
                         numbered(found.devices) +
                         (is_name_of_device(given) ? "" : ": by its number, or three letters or more of its name") +
@@ -260,6 +265,7 @@ Device Device::select(const std::string& wanted) {
 }
 
 Device Device::compute_units(int first, int last) const {
+  ocl::expect_own_process("compute_units");
   Handle part = *handle_;
   part.device = sub_device(handle_->device, handle_->info, first, last);
   part.info.name += "/" + std::to_string(first) + (last > first ? "-" + std::to_string(last) : "");

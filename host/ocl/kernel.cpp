@@ -49,10 +49,10 @@ cl::NDRange halved_to(const cl::NDRange& local, std::size_t limit) {
 
 void expect_work_group(const Context& context, const char* kernel, const cl::NDRange& local, std::size_t limit) {
   if (work_items(local) <= limit) return;
-  throw DeviceError(CL_INVALID_WORK_GROUP_SIZE, std::string(context.stage()) + ": kernel " + kernel +
-                                                    " needs work-groups of " + std::to_string(work_items(local)) +
-                                                    " work-items, the device allows " + std::to_string(limit) +
-                                                    " for it: choose fewer disparities or another device");
+  throw DeviceError(CL_INVALID_WORK_GROUP_SIZE,
+                    std::string(context.stage()) + ": kernel " + kernel + " needs work-groups of " +
+                        std::to_string(work_items(local)) + " work-items, the device allows " + std::to_string(limit) +
+                        " for it: choose fewer disparities, other sizes (--tuning none) or another device");
 }
 
 }  // namespace egosgm::ocl

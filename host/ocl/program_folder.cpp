@@ -146,7 +146,7 @@ std::vector<unsigned char> ProgramFolder::binary(const ProgramSource& source) co
   const std::string options = is_spirv_ ? portable(source).options : source.options;
   const auto found = entries_.find({source.kernel_file, options});
   if (found == entries_.end()) {
-    throw InvalidArgument(manifest + ": has no " + source.kernel_file + " built with" + options + kRemedy);
+    throw InvalidArgument(manifest + ": has no " + source.kernel_file + " built with " + options + kRemedy);
   }
   const Entry& entry = found->second;
   if (entry.source_hash != hash_of(source.text)) {

@@ -186,7 +186,8 @@ std::vector<PointMatch> refine_matches(const Calibration& calibration, TrackedFr
     // A patch looks larger by the ratio of its depths, that is, of its disparities.
     const Eigen::Vector3d before = triangulate(calibration, previous.u[i], previous.v[i], d1);
     const Eigen::Vector3d after = motion * before;
-    const double scale = std::clamp(before.z() / std::max(after.z(), kMinDepth_m), 0.5, 2.0);
+    // In this order, what is not a number becomes one: a calibration may be anything that is finite.
+    const double scale = std::max(0.5, std::min(2.0, before.z() / std::max(kMinDepth_m, after.z())));
     Patch patch;
     if (!make_patch(previous.left, previous.u[i], previous.v[i], static_cast<float>(scale), patch)) continue;
     float u = feature.x, v = feature.y;

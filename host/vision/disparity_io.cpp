@@ -199,6 +199,7 @@ std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Ma
 }
 
 std::int64_t count_outside_png(const cv::Mat& disparity) {
+  if (disparity.type() != CV_32FC1) throw InvalidArgument("count_outside_png: the map must be CV_32FC1");
   std::int64_t outside = 0;
   for (int y = 0; y < disparity.rows; ++y) outside += count_outside(disparity.ptr<float>(y), disparity.cols);
   return outside;

@@ -242,6 +242,8 @@ class OwnFiles(FilesTest):
         for option in ("--trace", "--save-config"):
             for name in ("new", "new/out", "new/./out", "new/out/../out"):
                 self.assert_refused_and_untouched(folder, ["run", "--odometry", self.street, *METHOD, "--out", folder / "new/out", option, f"{folder}/{name}"], "is a folder")
+        for command in (["odometry", self.street, "--out"], ["compile", "--out", folder / "out", "--save-config"], ["tune", "--file"]):
+            self.assert_refused_and_untouched(folder, [*command, f"{folder}/new/"], "is a folder: give the name of a file")
         for command in (["compile", "--out"],):
             for name in ("new", "new/out"):
                 self.assert_refused_and_untouched(folder, [*command, folder / "new/out", "--save-config", folder / name], "or is that folder")
@@ -351,7 +353,8 @@ class TuneFiles(FilesTest):
         self.assertNotEqual(after["warp_band_rows"], 3)
         self.assertEqual({**after, "warp_band_rows": 3}, sizes)
         before = file.read_bytes()
-        self.assert_refused([*tune, "SearchBand"], "--stage SearchBand", "CPU", "another stage")
+        for of_gpus in ("SearchBand", "VerticalAlignment"):
+            self.assert_refused([*tune, of_gpus], f"--stage {of_gpus}", "CPU", "another stage")
         self.assertEqual(file.read_bytes(), before)
 
     def test_a_stage_of_first_frames_alone_has_times(self):

@@ -96,7 +96,7 @@ class WrongArguments(ProgramTest):
 
     def test_no_is_off_and_blanks_in_a_list_are_none(self):
         out = self.new_folder()
-        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0:1", "--temporal", "no", "--write", "color, overview ",
+        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "0:1", "--temporal", "no", "--write", "color, disparity, overview ",
                           "--quiet")
         self.assertFalse(self.report(out)["options"]["temporal"])
         self.assertEqual(len(list((out / "color").iterdir())), 2)

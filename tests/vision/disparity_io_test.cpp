@@ -43,6 +43,7 @@ TEST(DisparityIo, PngStoresAsTheDevelopmentKit) {
   const cv::Mat png = cv::imread((folder / "d.png").string(), cv::IMREAD_UNCHANGED);
   ASSERT_EQ(png.type(), CV_16UC1);
   for (int x = 0; x < png.cols; ++x) EXPECT_EQ(png.at<std::uint16_t>(0, x), stored[static_cast<std::size_t>(x)]) << x;
+  EXPECT_THROW(count_outside_png(png), InvalidArgument);
 }
 
 TEST(DisparityIo, PngReadsValueBy256) {

@@ -406,6 +406,17 @@ TEST(StereoOdometry, ImagesTooSmallForFeaturesGiveNoMotion) {
   }
 }
 
+TEST(StereoOdometry, BearsACalibrationThatNoCameraHas) {
+  const Drive& drive = turning_drive();
+  Calibration calibration = drive.sequence.calibration();
+  calibration.fx = 1e6;
+  calibration.fy = 1e-300;  // what is seen through it lies at infinity
+  StereoOdometryOptions options;
+  options.max_flow_y_px = 1e4;
+  StereoOdometry odometry(calibration, options);
+  for (const SyntheticFrame& frame : drive.frames) EXPECT_FALSE(process(odometry, frame.left, frame.right).motion);
+}
+
 TEST(StereoOdometry, RefusesWhatItCannotUse) {
   const Drive& drive = turning_drive();
   const Calibration calibration = drive.sequence.calibration();
