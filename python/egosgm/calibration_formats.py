@@ -173,7 +173,7 @@ _ZED_SIZES = {"2K": (2208, 1242), "FHD": (1920, 1080), "HD": (1280, 720), "VGA":
 
 
 def zed(text: str, file: pathlib.Path, size: Optional[Tuple[int, int]]) -> StereoRig:
-    """The factory calibration of a ZED camera, of several sizes of images; its lengths are millimetres."""
+    """The factory calibration of a ZED camera, of several sizes of images; its lengths are millimetres, of all three axes against OpenCV's T."""
     parser, factory = configparser.ConfigParser(strict=False, interpolation=None), Values({}, file, "the factory calibration of a ZED camera")
     try:
         parser.read_string(text)
@@ -195,7 +195,7 @@ def zed(text: str, file: pathlib.Path, size: Optional[Tuple[int, int]]) -> Stere
     sized = [float(stereo.get(f"{key}_{name}".lower(), stereo.get(key, 0))) for key in ("ty", "tz", "rx", "cv", "rz")]
     turn = rotation(sized[2:])
     assert turn is not None
-    return factory.pair(cameras, transform(turn, 0.001 * np.array([-factory.part(stereo).numbers("baseline")[0], *sized[:2]])), _ZED_SIZES[name])
+    return factory.pair(cameras, transform(turn, -0.001 * np.array([factory.part(stereo).numbers("baseline")[0], *sized[:2]])), _ZED_SIZES[name])
 
 
 def virtual_kitti(file: pathlib.Path) -> _egosgm.Calibration:

@@ -201,9 +201,9 @@ def test_a_zed_is_read_for_the_size_of_the_images(tmp_path):
     file = tmp_path / "SN1.conf"
     camera = "".join(f"{name}={value}\n" for name, value in dict(fx=F, fy=F, cx=CX, cy=CY, k1=LENS[0], k2=LENS[1], p1=LENS[2], p2=LENS[3]).items())
     file.write_text("".join(f"[{side}_CAM_{size}]\n{camera if size == 'VGA' else camera.replace(str(F), '1')}" for side in ("LEFT", "RIGHT") for size in ("HD", "VGA"))
-                    + f"[STEREO]\nBaseline={1000 * B}\nTY=0\nTZ=0\nRX_VGA=0.01\nCV_VGA=0.02\nRZ_VGA=-0.03\n")
+                    + f"[STEREO]\nBaseline={1000 * B}\nTY=0.3\nTZ=-0.6\nRX_VGA=0.01\nCV_VGA=0.02\nRZ_VGA=-0.03\n")
     rig = egosgm.read_calibration(file, size=(672, 376))
-    assert rig.size == (672, 376) and rig.T.tolist() == pytest.approx([-B, 0, 0])
+    assert rig.size == (672, 376) and rig.T.tolist() == pytest.approx([-B, -0.0003, 0.0006])  # as Stereolabs' own samples rectify
     np.testing.assert_allclose(rig.left_matrix, K)
     np.testing.assert_allclose(rig.left_distortion[:4], LENS)
     np.testing.assert_allclose([rig.R[2, 1], rig.R[0, 2], rig.R[1, 0]], [0.01, 0.02, -0.03], atol=5e-4)
