@@ -162,7 +162,10 @@ def oak(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
         return socket, root_from
 
     both = [calibration.part(sockets[i]) for i in (1, 2)]
-    cameras = [(camera.matrix((3, 3), "intrinsicMatrix"), camera.matrix((14,), "distortionCoeff"), False) for camera in both]
+    kinds = [camera.data.get("cameraType", 0) for camera in both]
+    if not set(kinds) <= {0, 1}:  # perspective and fisheye
+        raise calibration.refuse(f" of the lenses cameraType {kinds[0]} and {kinds[1]}: 0 and 1 are read")
+    cameras = [(camera.matrix((3, 3), "intrinsicMatrix"), camera.matrix((), "distortionCoeff")[:4 if kind else 14], bool(kind)) for camera, kind in zip(both, kinds)]
     (root, left), (other_root, right) = to_root(1), to_root(2)
     if root != other_root:
         raise calibration.refuse(", which does not say how the cameras of sockets 1 and 2 stand")

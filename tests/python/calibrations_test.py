@@ -265,6 +265,15 @@ def test_a_fisheye(tmp_path):
         (tmp_path / name).write_text(text)
         with pytest.raises(egosgm.InvalidArgument, match=f"{name}: is of rectified images, or says itself what its lenses are"):
             egosgm.read_calibration(tmp_path / name, is_fisheye=True)
+    oak = json.loads(RAW["oak.json"])
+    for kind in (1, 2):  # as DepthAI numbers its models of lenses
+        for _, camera in oak["cameraData"][:2]:
+            camera["cameraType"] = kind
+        (tmp_path / f"oak{kind}.json").write_text(json.dumps(oak))
+    rig = egosgm.read_calibration(tmp_path / "oak1.json")
+    assert rig.is_fisheye and rig.left_distortion.tolist() == LENS
+    with pytest.raises(egosgm.InvalidArgument, match="lenses cameraType 2 and 2"):
+        egosgm.read_calibration(tmp_path / "oak2.json")
 
 
 @pytest.mark.parametrize("text, named", [
