@@ -122,7 +122,9 @@ def test_of_rectified_images_of_another_size(tmp_path):
     (tmp_path / "left.yaml").write_text(ros(P))
     (tmp_path / "right.yaml").write_text(ros(RIGHT_P))
     (tmp_path / "orb_slam.yaml").write_text(RECTIFIED["orb_slam3.yaml"] + f"Camera.width: {WIDTH}\nCamera.height: {HEIGHT}\n")
-    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml"):
+    (tmp_path / "flat.json").write_text(RECTIFIED["flat.json"])
+    (tmp_path / "q.json").write_text(json.dumps(dict(Q=Q, image_size=[WIDTH, HEIGHT])))
+    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json"):
         expect_rectified(read(name, (WIDTH, HEIGHT)))
         with pytest.raises(egosgm.InvalidArgument, match=f"{name}.*is of images of 640x480, and these have 320x240"):
             read(name, (WIDTH // 2, HEIGHT // 2))
@@ -285,6 +287,9 @@ def test_a_fisheye(tmp_path):
     (opencv_yaml(M1=K, D1=LENS, R=EYE, T=[[-B], [0], [0]]), "right_matrix"),
     (RAW["opencv.yml"].replace("D2:", "lens2:"), "lacks D2, the distortion: give zeros"), (kalibr("x"), "without coefficients of its distortion (radtan)"),
     (kalibr(LENS).replace("distortion_coeffs", "distortion"), "without coefficients of its distortion (radtan)"),
+    (kalibr().replace("resolution", "resolutoin"), "resolutoin stands in place of resolution"),
+    (kalibr([-0, 28, 0.07, 0.001, 0.002], "equidistant"), "distortion_coeffs of cam0 are 5 numbers, not 4: does a decimal comma"),
+    (RECTIFIED["flat.json"].replace("width", "widht"), "the images' height alone"),
     (RAW["orb_slam3_raw.yaml"].replace("Camera2.k1", "Camera2.k"), "lacks Camera2.k1"),
     (RECTIFIED["orb_slam2.yaml"].replace(f"fx: {F}", "fx: -1"), "calib.yaml: calibration: fx is -1"),
 ])
