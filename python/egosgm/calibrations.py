@@ -214,7 +214,9 @@ def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fis
     files = [pathlib.Path(part) for part in ([file] if isinstance(file, (str, os.PathLike)) else file)]
     if not 1 <= len(files) <= 2:
         raise _egosgm.InvalidArgument(f"a calibration is one file, or one for each camera, left and right, not {len(files)}")
-    path = files[0]
+    path, given, size = files[0], size, parts.size_of(size)
+    if given is not None and size is None:
+        raise _egosgm.InvalidArgument(f"size {given}: give (width, height)")
     found = _found(path, is_fisheye, size) if len(files) == 1 else _of_two_files(files, size)
     if is_fisheye and not (isinstance(found, StereoRig) and found.is_fisheye):
         raise parts.refuse(path, "is of rectified images, or says itself what its lenses are: --fisheye (is_fisheye) belongs to OpenCV's M1, D1, M2, D2, R, T")

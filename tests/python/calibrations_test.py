@@ -125,9 +125,11 @@ def test_of_rectified_images_of_another_size(tmp_path):
     (tmp_path / "flat.json").write_text(RECTIFIED["flat.json"])
     (tmp_path / "q.json").write_text(json.dumps(dict(Q=Q, image_size=[WIDTH, HEIGHT])))
     for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json"):
-        expect_rectified(read(name, (WIDTH, HEIGHT)))
+        expect_rectified(read(name, np.array([WIDTH, HEIGHT])))
         with pytest.raises(egosgm.InvalidArgument, match=f"{name}.*is of images of 640x480, and these have 320x240"):
             read(name, (WIDTH // 2, HEIGHT // 2))
+    with pytest.raises(egosgm.InvalidArgument, match="size 640: give .width, height."):
+        read("kalibr.yaml", WIDTH)
     (tmp_path / "kalibr_lens.yaml").write_text(RAW["kalibr_lens.yaml"])
     expect_raw(read("kalibr_lens.yaml", (WIDTH, HEIGHT)))
 
