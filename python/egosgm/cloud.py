@@ -130,7 +130,7 @@ def main(arguments: Sequence[str]) -> int:
         disparity, variance = (_map_of(folder, name, kind) for kind in ("disparity", "variance"))
         if not pathlib.Path(left).exists():
             raise _egosgm.InvalidArgument(f"{left}: no such file: the colours come from the left images of the run")
-        points, colors, left_out = cloud_of_maps(disparity, variance, _egosgm.read_color(left), calibration, given.cloud_sigma / 100, None, None,
+        points, colors, left_out = cloud_of_maps(disparity, variance, _egosgm._read_stored_image(pathlib.Path(left)), calibration, given.cloud_sigma / 100, None, None,
                                                  given.max_depth, 1)
         normals = normals_of(disparity, calibration, points) if given.normals else np.zeros_like(points)
         grid.add(points @ pose[:3, :3].T + pose[:3, 3], colors, normals @ pose[:3, :3].T)
