@@ -37,7 +37,7 @@ void bind_sequences(py::module_& module) {
   pickle_members<&StereoFrame::number, &StereoFrame::name, &StereoFrame::left, &StereoFrame::right,
                  &StereoFrame::truth_noc, &StereoFrame::truth_occ>(frame);
   frame.def_readonly("number", &StereoFrame::number)
-      .def_readonly("name", &StereoFrame::name, "The number with six digits.")
+      .def_readonly("name", &StereoFrame::name, "The number with six digits, or a time of more digits.")
       .def_readonly("left", &StereoFrame::left)
       .def_readonly("right", &StereoFrame::right)
       .def_readonly("truth_noc", &StereoFrame::truth_noc,
@@ -237,7 +237,7 @@ void bind_files(py::module_& module) {
   module.def("write_calibration", &vision::write_calibration, py::arg("file"), py::arg("calibration"));
   module.def(
       "read_grey", [](const path& file) { return array_of(vision::read_grey_image(file)); }, py::arg("file"),
-      "Reads a PNG of any colour type as grey, uint8 or uint16.");
+      "Reads a PNG or JPEG of any colour type as grey, uint8 or uint16.");
   module.def(
       "read_color", [](const path& file) { return array_of(vision::read_color_image(file)); }, py::arg("file"),
       "Reads a PNG or JPEG as RGB, H x W x 3 of uint8.");
@@ -248,7 +248,7 @@ void bind_files(py::module_& module) {
              py::arg("kept"), py::arg("reasons"));
   module.def(
       "read_disparity", [](const path& file) { return array_of(vision::read_disparity(file)); }, py::arg("file"),
-      "Reads KITTI's PNG or a PFM into float32; INVALID_DISPARITY where there is none.");
+      "Reads KITTI's PNG, a PFM or .npy into float32; INVALID_DISPARITY where there is none.");
   module.def("write_disparity", &write_disparity, py::arg("file"), py::arg("disparity"),
              "Writes KITTI's PNG or a PFM by the extension. Returns how many disparities the format has no room for.");
   module.def("write_pfm", &write_pfm, py::arg("file"), py::arg("map"), "Writes any map; infinity where invalid.");

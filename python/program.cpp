@@ -172,8 +172,9 @@ class Outputs : public app::Taker {
   const Held outputs_;
 };
 
+/// `read` outlives it: who copies it need not hold the interpreter's lock.
 app::CalibrationReader reader_of(const py::object& read) {
-  return [read](const std::string& file, cv::Size size) {
+  return [&read](const std::string& file, cv::Size size) {
     return in_python([&] {
       const py::object found = read(std::filesystem::path(file), py::make_tuple(size.width, size.height));
       return found.cast<std::optional<Calibration>>();
@@ -238,7 +239,8 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
       return std::make_shared<Outputs>(package.attr("Outputs")(text_of(file), viewer));
     });
   };
-  hooks.read_calibration = reader_of(package.attr("read_calibration"));
+  const py::object read = package.attr("read_calibration");
+  hooks.read_calibration = reader_of(read);
   std::vector<const char*> words{"egosgm"};
   for (const std::string& argument : arguments) words.push_back(argument.c_str());
   words.push_back(nullptr);

@@ -25,6 +25,9 @@ def kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
         if camera.data.get("camera_model", "pinhole") != "pinhole":
             raise chain.refuse(f", and {name} is of the model \"{camera.data['camera_model']}\": pinhole is read")
         lens = camera.lens(camera.data.get("distortion_coeffs"), str(camera.data.get("distortion_model", "")))
+        numbers = matrix(camera.data.get("distortion_coeffs"), ())
+        if numbers is not None and numbers.size > 4 and numbers.any():
+            raise chain.refuse(f", and distortion_coeffs of {name} are {numbers.size} numbers, not 4: does a decimal comma part one of them?")
         cameras.append((of_four(camera.matrix((4,), "intrinsics", "camera_matrix")), *lens))
     first, second = chain.part(data["cam0"]), chain.part(data["cam1"])
     if "T_cn_cnm1" in second.data:
@@ -33,7 +36,7 @@ def kalibr(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
         right_from_left = second.matrix((4, 4), "T_cam_imu") @ np.linalg.inv(first.matrix((4, 4), "T_cam_imu"))
     else:
         raise chain.refuse(" and lacks T_cn_cnm1, where the second camera stands")
-    return chain.pair(cameras, right_from_left, first.data.get("resolution"))
+    return chain.pair(cameras, right_from_left, first.resolution())
 
 
 def euroc(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> StereoRig:
@@ -41,7 +44,7 @@ def euroc(files: List[pathlib.Path], contents: List[Dict[str, Any]]) -> StereoRi
     both = [Values(data, file, "one camera of EuRoC or Kimera") for file, data in zip(files, contents)]
     cameras = [(of_four(camera.matrix((4,), "intrinsics")),
                 *camera.lens(camera.data.get("distortion_coefficients"), str(camera.data.get("distortion_model", "")))) for camera in both]
-    return both[0].pair_on_body(cameras, [camera.matrix((4, 4), "T_BS") for camera in both], contents[0].get("resolution"))
+    return both[0].pair_on_body(cameras, [camera.matrix((4, 4), "T_BS") for camera in both], both[0].resolution())
 
 
 class _Info:
@@ -162,7 +165,10 @@ def oak(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
         return socket, root_from
 
     both = [calibration.part(sockets[i]) for i in (1, 2)]
-    cameras = [(camera.matrix((3, 3), "intrinsicMatrix"), camera.matrix((14,), "distortionCoeff"), False) for camera in both]
+    kinds = [camera.data.get("cameraType", 0) for camera in both]
+    if not set(kinds) <= {0, 1}:  # perspective and fisheye
+        raise calibration.refuse(f" of the lenses cameraType {kinds[0]} and {kinds[1]}: 0 and 1 are read")
+    cameras = [(camera.matrix((3, 3), "intrinsicMatrix"), camera.matrix((), "distortionCoeff")[:4 if kind else 14], bool(kind)) for camera, kind in zip(both, kinds)]
     (root, left), (other_root, right) = to_root(1), to_root(2)
     if root != other_root:
         raise calibration.refuse(", which does not say how the cameras of sockets 1 and 2 stand")
@@ -173,7 +179,7 @@ _ZED_SIZES = {"2K": (2208, 1242), "FHD": (1920, 1080), "HD": (1280, 720), "VGA":
 
 
 def zed(text: str, file: pathlib.Path, size: Optional[Tuple[int, int]]) -> StereoRig:
-    """The factory calibration of a ZED camera, of several sizes of images; its lengths are millimetres."""
+    """The factory calibration of a ZED camera, of several sizes of images; its lengths are millimetres, of all three axes against OpenCV's T."""
     parser, factory = configparser.ConfigParser(strict=False, interpolation=None), Values({}, file, "the factory calibration of a ZED camera")
     try:
         parser.read_string(text)
@@ -195,7 +201,7 @@ def zed(text: str, file: pathlib.Path, size: Optional[Tuple[int, int]]) -> Stere
     sized = [float(stereo.get(f"{key}_{name}".lower(), stereo.get(key, 0))) for key in ("ty", "tz", "rx", "cv", "rz")]
     turn = rotation(sized[2:])
     assert turn is not None
-    return factory.pair(cameras, transform(turn, 0.001 * np.array([-factory.part(stereo).numbers("baseline")[0], *sized[:2]])), _ZED_SIZES[name])
+    return factory.pair(cameras, transform(turn, -0.001 * np.array([factory.part(stereo).numbers("baseline")[0], *sized[:2]])), _ZED_SIZES[name])
 
 
 def virtual_kitti(file: pathlib.Path) -> _egosgm.Calibration:
@@ -231,7 +237,7 @@ _NAMES = {
     "left_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(l|left|1)|(l|left|1)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
     "right_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(r|right|2)|(r|right|2)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
     "R": r"r|om|rot|rotmat|rotation(matrix)?|rmat|rstereo|stereor", "T": r"t|trans|transvec|translation(vector)?|tvec|tstereo|stereot",
-    "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims", "width": r"image_?width", "height": r"image_?height",
+    "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims", "width": r"(image|img)?width", "height": r"(image|img)?height",
     "R1": r"r1", "R2": r"r2", "P1": r"p1", "P2": r"p2",
     "fx": r"(intrinsics?)?(f|fx|focal(length)?(px)?)", "fy": r"(intrinsics?)?fy", "cx": r"(intrinsics?)?(cx[0l]?|u0|ppx)", "cy": r"(intrinsics?)?(cy[0l]?|v0|ppy)",
     "right_cx": r"cx[1r]", "baseline": r"(extrinsics?)?baseline(m|met(er|re)s?)?", "baseline_mm": r"baseline(mm|millimet(er|re)s?)",
@@ -257,8 +263,13 @@ def _coefficients(value: Any, name: str, is_fisheye: bool, file: pathlib.Path) -
     return numbers
 
 
-def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bool = False) -> Found:
+def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bool = False, images_size: Optional[Tuple[int, int]] = None) -> Found:
     found = named(data)
+    size = size_of(found.get("size"))
+    if size is None and ("width" in found) != ("height" in found):
+        raise refuse(file, f"is {what} with the images' {'width' if 'width' in found else 'height'} alone: give image_width and image_height, or neither")
+    if size is None and "width" in found:
+        size = size_of([found["width"], found["height"]])
     matrices = {name: matrix(found.get(name), (3, 3)) for name in ("left_matrix", "right_matrix")}
     matrices["R"], matrices["T"] = rotation(found.get("R")), matrix(found.get("T"), (3,))
     missing = [name for name, one in matrices.items() if one is None]
@@ -269,13 +280,11 @@ def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bo
         for side, name in enumerate(("left_distortion", "right_distortion"), 1):
             matrices[name] = _coefficients(found[name], f"D{side}", is_fisheye, file)
         given = tuple(matrix(found.get(name), (3, 3) if name[0] == "R" else (3, 4)) for name in ("R1", "R2", "P1", "P2"))
-        size = size_of(found.get("size"))
-        if size is None and "width" in found and "height" in found:
-            size = size_of([found["width"], found["height"]])
         return StereoRig(**matrices, is_fisheye=is_fisheye, size=size,  # type: ignore[arg-type]
                          given=None if any(one is None for one in given) else given)  # type: ignore[arg-type]
     q = matrix(found["Q"], (4, 4)) if "Q" in found else None
     if q is not None and len(missing) >= 2:
+        expect_size(size, images_size, file)
         return of_q(q, file)
     numbers = {name: float(value[0]) for name in ("fx", "fy", "cx", "cy", "right_cx", "baseline", "baseline_mm")
                if (value := matrix(found.get(name), (1,))) is not None}
@@ -283,6 +292,7 @@ def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bo
         fx, cx, baseline_m = numbers["fx"], numbers["cx"], numbers.get("baseline", 0.001 * numbers.get("baseline_mm", 0))
         if not baseline_m:
             raise refuse(file, f"is {what} of fx, cx and cy, and lacks the baseline: give the distance of the two cameras in metres")
+        expect_size(size, images_size, file)
         return _egosgm.Calibration(fx, numbers.get("fy", fx), cx, numbers["cy"], baseline_m, numbers.get("right_cx", cx) - cx)
     there = ", ".join(str(key) for key in list(data)[:12])
     raise refuse(file, f"is {what} ({there}) and lacks {', '.join(missing)}: a stereo calibration has the matrix and the distortion of both cameras, "

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What formats of calibrations are made of: texts, matrices, distortions, pairs of cameras."""
 import contextlib
+import difflib
 import gzip
 import io
 import json
@@ -120,6 +121,13 @@ class Values:
         if model in ("equi", "equidistant", "fisheye", "kannalabrandt8", "kannalabrandt"):
             return numbers[:4], True
         raise refuse(self.file, f"its distortion is of the model \"{model}\": radtan and equidistant are read")
+
+    def resolution(self) -> Any:
+        """None where it is missing. Throws InvalidArgument where it is misspelt: the size of the images would not be checked."""
+        near = [] if "resolution" in self.data else difflib.get_close_matches("resolution", map(str, self.data), 1, 0.8)
+        if near:
+            raise self.refuse(f", and {near[0]} stands in place of resolution")
+        return self.data.get("resolution")
 
     def pair(self, cameras: Sequence[Camera], right_from_left: Matrix, size: Any) -> StereoRig:
         left, right = cameras

@@ -88,7 +88,7 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool, size: Optional[Tup
         return formats.orb_slam(flat, file, size)
     nested = {f"{outer}_{inner}": value for outer, group in flat.items() if isinstance(group, dict) and "data" not in group
               for inner, value in group.items()}
-    return formats.by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye)
+    return formats.by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye, size)
 
 
 def _of_two_files(files: List[pathlib.Path], size: Optional[Tuple[int, int]] = None) -> Found:
@@ -111,7 +111,7 @@ def _of_folder(folder: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int,
             return found
     arrays = [file for file in sorted(folder.glob("*.npy")) if file.is_file()]  # NumPy would wait for a pipe
     if arrays:
-        return formats.by_names({file.stem: np.load(file, allow_pickle=False) for file in arrays}, folder, "a folder of .npy", is_fisheye)
+        return formats.by_names({file.stem: np.load(file, allow_pickle=False) for file in arrays}, folder, "a folder of .npy", is_fisheye, size)
     candidates = [file for file in sorted(folder.iterdir()) if file.suffix.lower() in (".yaml", ".yml", ".json", ".xml", ".txt", ".npz")]
     lefts = [file for file in candidates if re.search("left|cam0|_l[.]", file.name, re.IGNORECASE)]
     if len(lefts) == 1:
@@ -137,7 +137,7 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
             with np.load(file, allow_pickle=False) as archive:
                 if sum(part.file_size for part in archive.zip.infolist()) > parts.MOST_BYTES:
                     raise parts.refuse(file, f"holds more than {parts.MOST_BYTES >> 20} MiB of arrays: give a calibration alone")
-                return formats.by_names({name: archive[name] for name in archive.files}, file, "an archive of NumPy arrays", is_fisheye)
+                return formats.by_names({name: archive[name] for name in archive.files}, file, "an archive of NumPy arrays", is_fisheye, size)
         except (ValueError, OSError) as error:
             raise parts.refuse(file, f"is no archive of NumPy arrays: {error}") from None
     if start.startswith(b"\x93NUMPY"):
@@ -214,7 +214,9 @@ def find(file: "_Path | Sequence[_Path]", unit_m: Optional[float] = None, is_fis
     files = [pathlib.Path(part) for part in ([file] if isinstance(file, (str, os.PathLike)) else file)]
     if not 1 <= len(files) <= 2:
         raise _egosgm.InvalidArgument(f"a calibration is one file, or one for each camera, left and right, not {len(files)}")
-    path = files[0]
+    path, given, size = files[0], size, parts.size_of(size)
+    if given is not None and size is None:
+        raise _egosgm.InvalidArgument(f"size {given}: give (width, height)")
     found = _found(path, is_fisheye, size) if len(files) == 1 else _of_two_files(files, size)
     if is_fisheye and not (isinstance(found, StereoRig) and found.is_fisheye):
         raise parts.refuse(path, "is of rectified images, or says itself what its lenses are: --fisheye (is_fisheye) belongs to OpenCV's M1, D1, M2, D2, R, T")

@@ -64,6 +64,7 @@ class VoxelGrid:
         self._side_m = side_m
         self._keys = np.empty((0, 3), np.int32)
         self._sums = np.empty((0, 11))  # points, colours, normals, count, frames
+        self._waiting: List[Tuple[NDArray[np.int32], NDArray[np.float64]]] = []  # of frames that are not yet among them
 
     def add(self, points: NDArray[Any], colors: NDArray[Any], normals: NDArray[Any]) -> None:
         with np.errstate(over="ignore"):
@@ -72,7 +73,14 @@ class VoxelGrid:
             raise _egosgm.InvalidArgument(f"--voxel {self._side_m:g}: is too small for points that lie {np.abs(points).max():.4g} m away: choose larger cubes")
         keys, sums = self._of(cubes.astype(np.int32), np.hstack([points, colors, normals, ones, ones]))
         sums[:, 10] = 1
-        self._keys, self._sums = self._of(np.vstack([self._keys, keys]), np.vstack([self._sums, sums]))
+        self._waiting.append((keys, sums))
+        if 4 * sum(len(keys) for keys, _ in self._waiting) > len(self._keys):  # else each frame would take as long as all that there is
+            self._merge()
+
+    def _merge(self) -> None:
+        keys, sums = zip((self._keys, self._sums), *self._waiting)
+        self._waiting = []
+        self._keys, self._sums = self._of(np.vstack(keys), np.vstack(sums))
 
     @staticmethod
     def _of(keys: NDArray[np.int32], rows: NDArray[np.float64]) -> Tuple[NDArray[np.int32], NDArray[np.float64]]:
@@ -86,6 +94,7 @@ class VoxelGrid:
 
     def means(self, least_frames: int) -> Tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.float32]]:
         """Points, colours and unit normals."""
+        self._merge()
         sums = self._sums[self._sums[:, 10] >= least_frames]
         count = sums[:, 9:10]
         length = np.linalg.norm(sums[:, 6:9], axis=1, keepdims=True)
@@ -121,7 +130,7 @@ def main(arguments: Sequence[str]) -> int:
         disparity, variance = (_map_of(folder, name, kind) for kind in ("disparity", "variance"))
         if not pathlib.Path(left).exists():
             raise _egosgm.InvalidArgument(f"{left}: no such file: the colours come from the left images of the run")
-        points, colors, left_out = cloud_of_maps(disparity, variance, _egosgm.read_color(left), calibration, given.cloud_sigma / 100, None, None,
+        points, colors, left_out = cloud_of_maps(disparity, variance, _egosgm._read_stored_image(pathlib.Path(left)), calibration, given.cloud_sigma / 100, None, None,
                                                  given.max_depth, 1)
         normals = normals_of(disparity, calibration, points) if given.normals else np.zeros_like(points)
         grid.add(points @ pose[:3, :3].T + pose[:3, 3], colors, normals @ pose[:3, :3].T)

@@ -22,8 +22,9 @@ def _rgb(image: ArrayLike) -> NDArray[np.uint8]:
     image = np.asarray(image)
     if image.ndim not in (2, 3) or image.shape[2:] not in ((), (1,), (3,), (4,)) or image.dtype not in (np.uint8, np.uint16):
         raise _egosgm.InvalidArgument(f"colors is {image.shape} of {image.dtype}: give H x W or H x W x 3 (RGB) of uint8 or uint16")
-    if image.dtype == np.uint16:  # as wide as the values are
-        image = (image * (255 / max(1, image.max(initial=0)))).astype(np.uint8)
+    if image.dtype == np.uint16:  # as wide as the values are, but those of a few hot pixels
+        largest = np.quantile(image, 0.999) if image.size else 0
+        image = np.minimum(image * (255 / max(1, largest)), 255).astype(np.uint8)
     image = image[:, :, None] if image.ndim == 2 else image
     return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image[:, :, :3]
 

@@ -122,10 +122,14 @@ def test_of_rectified_images_of_another_size(tmp_path):
     (tmp_path / "left.yaml").write_text(ros(P))
     (tmp_path / "right.yaml").write_text(ros(RIGHT_P))
     (tmp_path / "orb_slam.yaml").write_text(RECTIFIED["orb_slam3.yaml"] + f"Camera.width: {WIDTH}\nCamera.height: {HEIGHT}\n")
-    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml"):
-        expect_rectified(read(name, (WIDTH, HEIGHT)))
+    (tmp_path / "flat.json").write_text(RECTIFIED["flat.json"])
+    (tmp_path / "q.json").write_text(json.dumps(dict(Q=Q, image_size=[WIDTH, HEIGHT])))
+    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json"):
+        expect_rectified(read(name, np.array([WIDTH, HEIGHT])))
         with pytest.raises(egosgm.InvalidArgument, match=f"{name}.*is of images of 640x480, and these have 320x240"):
             read(name, (WIDTH // 2, HEIGHT // 2))
+    with pytest.raises(egosgm.InvalidArgument, match="size 640: give .width, height."):
+        read("kalibr.yaml", WIDTH)
     (tmp_path / "kalibr_lens.yaml").write_text(RAW["kalibr_lens.yaml"])
     expect_raw(read("kalibr_lens.yaml", (WIDTH, HEIGHT)))
 
@@ -201,9 +205,9 @@ def test_a_zed_is_read_for_the_size_of_the_images(tmp_path):
     file = tmp_path / "SN1.conf"
     camera = "".join(f"{name}={value}\n" for name, value in dict(fx=F, fy=F, cx=CX, cy=CY, k1=LENS[0], k2=LENS[1], p1=LENS[2], p2=LENS[3]).items())
     file.write_text("".join(f"[{side}_CAM_{size}]\n{camera if size == 'VGA' else camera.replace(str(F), '1')}" for side in ("LEFT", "RIGHT") for size in ("HD", "VGA"))
-                    + f"[STEREO]\nBaseline={1000 * B}\nTY=0\nTZ=0\nRX_VGA=0.01\nCV_VGA=0.02\nRZ_VGA=-0.03\n")
+                    + f"[STEREO]\nBaseline={1000 * B}\nTY=0.3\nTZ=-0.6\nRX_VGA=0.01\nCV_VGA=0.02\nRZ_VGA=-0.03\n")
     rig = egosgm.read_calibration(file, size=(672, 376))
-    assert rig.size == (672, 376) and rig.T.tolist() == pytest.approx([-B, 0, 0])
+    assert rig.size == (672, 376) and rig.T.tolist() == pytest.approx([-B, -0.0003, 0.0006])  # as Stereolabs' own samples rectify
     np.testing.assert_allclose(rig.left_matrix, K)
     np.testing.assert_allclose(rig.left_distortion[:4], LENS)
     np.testing.assert_allclose([rig.R[2, 1], rig.R[0, 2], rig.R[1, 0]], [0.01, 0.02, -0.03], atol=5e-4)
@@ -265,6 +269,15 @@ def test_a_fisheye(tmp_path):
         (tmp_path / name).write_text(text)
         with pytest.raises(egosgm.InvalidArgument, match=f"{name}: is of rectified images, or says itself what its lenses are"):
             egosgm.read_calibration(tmp_path / name, is_fisheye=True)
+    oak = json.loads(RAW["oak.json"])
+    for kind in (1, 2):  # as DepthAI numbers its models of lenses
+        for _, camera in oak["cameraData"][:2]:
+            camera["cameraType"] = kind
+        (tmp_path / f"oak{kind}.json").write_text(json.dumps(oak))
+    rig = egosgm.read_calibration(tmp_path / "oak1.json")
+    assert rig.is_fisheye and rig.left_distortion.tolist() == LENS
+    with pytest.raises(egosgm.InvalidArgument, match="lenses cameraType 2 and 2"):
+        egosgm.read_calibration(tmp_path / "oak2.json")
 
 
 @pytest.mark.parametrize("text, named", [
@@ -276,6 +289,9 @@ def test_a_fisheye(tmp_path):
     (opencv_yaml(M1=K, D1=LENS, R=EYE, T=[[-B], [0], [0]]), "right_matrix"),
     (RAW["opencv.yml"].replace("D2:", "lens2:"), "lacks D2, the distortion: give zeros"), (kalibr("x"), "without coefficients of its distortion (radtan)"),
     (kalibr(LENS).replace("distortion_coeffs", "distortion"), "without coefficients of its distortion (radtan)"),
+    (kalibr().replace("resolution", "resolutoin"), "resolutoin stands in place of resolution"),
+    (kalibr([-0, 28, 0.07, 0.001, 0.002], "equidistant"), "distortion_coeffs of cam0 are 5 numbers, not 4: does a decimal comma"),
+    (RECTIFIED["flat.json"].replace("width", "widht"), "the images' height alone"),
     (RAW["orb_slam3_raw.yaml"].replace("Camera2.k1", "Camera2.k"), "lacks Camera2.k1"),
     (RECTIFIED["orb_slam2.yaml"].replace(f"fx: {F}", "fx: -1"), "calib.yaml: calibration: fx is -1"),
 ])

@@ -74,6 +74,15 @@ def test_what_lies_in_one_cube_is_its_mean():
     assert len(grid.means(1)[0]) == 4
 
 
+def test_a_long_drive_costs_little_more_than_its_frames(monkeypatch):
+    sorted_rows, of = [], cloud.VoxelGrid._of
+    monkeypatch.setattr(cloud.VoxelGrid, "_of", staticmethod(lambda keys, rows: sorted_rows.append(len(keys)) or of(keys, rows)))
+    grid = cloud.VoxelGrid(1)
+    for i in range(100):
+        grid.add(np.array([[i + 0.5, 0, 0]]), np.zeros((1, 3)), np.zeros((1, 3)))
+    assert len(grid.means(1)[0]) == 100 and sum(sorted_rows) < 1000  # all of them for each frame were 5000
+
+
 def test_a_row_of_pixels_has_no_slope_across():
     camera = egosgm.Calibration(fx=100, fy=100, cx=2, cy=0, baseline_m=0.5)
     for shape in ((1, 5), (5, 1)):

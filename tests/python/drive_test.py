@@ -458,7 +458,9 @@ def test_a_cloud_has_the_points_that_are_sure(tmp_path):
     assert cloud.left_out == {"far": 0, "uncertain": 1, "reason": 0, "alone": 0}
     assert len(egosgm.point_cloud(frame_of(disparity, variance), max_sigma=0.011).points) == 21
     assert egosgm.point_cloud(frame_of(disparity, variance), max_depth_m=4.9).left_out["far"] == 23
-    wide = egosgm.point_cloud(frame_of(disparity, variance), colors=np.full((4, 6), 4095, np.uint16))
+    colors = np.full((40, 60), 4095, np.uint16)
+    colors[5, 5] = 65535  # a hot pixel makes nothing dark
+    wide = egosgm.point_cloud(frame_of(np.full((40, 60), 5), np.full((40, 60), 0.01)), colors=colors)
     assert (wide.colors == 255).all()
     egosgm.write_ply(tmp_path / "cloud.ply", cloud.points, cloud.colors)
     header, body = (tmp_path / "cloud.ply").read_bytes().split(b"end_header\n", 1)

@@ -501,6 +501,9 @@ class Parameters(unittest.TestCase):
             node._process(image, image)
             self.assertIsNot(node._pipeline, before)
             self.assertEqual(node._cameras.calibration.fx, focal)
+            self.assertEqual(node._doubt, "")
+        node._process(image, image)
+        self.assertIn("pairs of one stamp, 2.000 s", node._doubt)
 
     def test_infos_that_change_and_the_range_that_messages_tell(self):
         from sensor_msgs.msg import CameraInfo, Image

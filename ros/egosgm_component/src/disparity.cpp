@@ -2,6 +2,7 @@
 // The node as a component, which shares its process with the camera's driver: images come without a copy. It has less
 // than egosgm_ros: mono8 images of equal stamps in, disparity and depth out, motion by stereo odometry.
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <iterator>
@@ -131,9 +132,27 @@ class Disparity : public rclcpp::Node {
     return {image.data.data(), static_cast<int>(image.width), static_cast<int>(image.height), image.step};
   }
 
+  /// By the topic's name and the camera info, as egosgm_ros has it.
+  void warn_of_raw(const CameraInfo& info, const std::string& topic) const {
+    const auto is_there = [](double value) { return value != 0; };
+    const bool is_turned = info.r != std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1} &&
+                           std::any_of(info.r.begin(), info.r.end(), is_there);  // all 0: nobody set it
+    const std::size_t parent = topic.rfind('/', topic.rfind('/') - 1);
+    const bool is_named_rect =
+        topic.find("/rect", parent) != std::string::npos || topic.find("_rect", parent) != std::string::npos;
+    if (is_named_rect || !(is_turned || std::any_of(info.d.begin(), info.d.end(), is_there))) return;
+    RCLCPP_WARN(get_logger(),
+                "%s: its camera info has a distortion or a rotation: it is not rectified: remap both cameras' "
+                "image_rect to rectified images",
+                topic.c_str());
+  }
+
   void process(const Image& left, const Image& right) {
     if (!infos_[0] || !infos_[1]) throw std::runtime_error("no camera info yet of both cameras");
-    if (!matching_) matching_ = std::make_unique<Matching>(*infos_[0], *infos_[1], options_, device_);
+    if (!matching_) {
+      matching_ = std::make_unique<Matching>(*infos_[0], *infos_[1], options_, device_);
+      for (const int side : {0, 1}) warn_of_raw(*infos_[side], images_in_[side]->get_topic_name());
+    }
     Matching& m = *matching_;
     const std::int64_t stamp = rclcpp::Time(left.header.stamp).nanoseconds();
     if (m.last_stamp && stamp <= *m.last_stamp) m.reset();  // a bag that starts over

@@ -273,6 +273,10 @@ class EgosgmNode(LifecycleNode):
                 raise ValueError(f"{side}/image_rect: an image of {image.shape[1]}x{image.shape[0]} px, while the camera info is of "
                                  f"{self._cameras.size[0]}x{self._cameras.size[1]}")
         stamp, previous = stamp_ns(left), self._last_stamp
+        self._doubt = ""
+        if stamp == previous:
+            self._doubt = f"pairs of one stamp, {stamp / 1e9:.3f} s, which tells nothing of what belongs together or moved: let the driver stamp each image"
+            self._warn("stamp", self._doubt)
         if previous is not None and stamp <= previous:  # a bag that starts over
             self._pipeline.reset()
             self._odometry.reset()
@@ -309,7 +313,6 @@ class EgosgmNode(LifecycleNode):
     def _motion(self, frame_id: str, images: Any, previous: Optional[int], stamp: int) -> Optional[egosgm.Motion]:
         if self._tf is None:
             return self._odometry.process(*images).motion
-        self._doubt = ""
         try:
             return self._tf.between(frame_id, previous, stamp) if previous is not None else None
         except LookupError as error:
