@@ -22,8 +22,10 @@ constexpr int kSteadyFrom = 3;
 
 /// Percent of the pixels in `masks`, of the steady frames, that are off by more than 3 px or have no disparity.
 double bad_or_missing(const RenderedVideo& video, const std::vector<cv::Mat>& masks, bool temporal) {
+  MethodOptions options;
+  options.temporal = temporal;
   const cv::Size size = video.frames.front().left.size();
-  Pipeline pipeline(video.sequence.calibration(), size.width, size.height, MethodOptions{.temporal = temporal});
+  Pipeline pipeline(video.sequence.calibration(), size.width, size.height, options);
   cv::Mat disparity(size, CV_32FC1);
   FrameOutputs outputs;
   outputs.disparity = map_view(disparity);
