@@ -45,7 +45,7 @@ void expect_same(const reference::SearchBands& actual, const reference::SearchBa
   EXPECT_TRUE(same_bits(actual.row_sums, expected.row_sums, {1, size.height}));
 }
 
-class SearchBandTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(SearchBandTest);
 
 TEST_P(SearchBandTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -126,9 +126,6 @@ TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
     }
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, SearchBandTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, SearchBandTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 /// Two views of `size` without a prediction.
 HostMaps nothing(shared::ImageSize size) {
