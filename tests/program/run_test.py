@@ -542,7 +542,3 @@ class RealData(ProgramTest):
         self.assert_works("odometry", folder, "--out", poses)
         drift = json.loads(self.assert_works("eval-poses", "--estimate", poses, "--truth", folder / "poses.txt", "--json"))
         self.assertLessEqual(drift["end_drift_percent"], 1.5)
-
-
-if __name__ == "__main__":
-    unittest.main()

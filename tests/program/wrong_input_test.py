@@ -2,7 +2,6 @@
 """Wrong arguments and broken files: one line each that names the value and the remedy."""
 import os
 import struct
-import unittest
 import zlib
 
 from program_case import FRAMES, HEIGHT, WIDTH, ProgramTest, egosgm, grey_png
@@ -337,7 +336,3 @@ class BrokenInput(ProgramTest):
         self.assert_sequence_refused(self.street, poses, options=["--poses", poses])
         self.assert_sequence_refused(self.street, "nowhere", options=["--poses", "nowhere"])
         self.assert_refused(["eval-poses", "--estimate", poses, "--truth", self.street / "poses.txt"])
-
-
-if __name__ == "__main__":
-    unittest.main()
