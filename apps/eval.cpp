@@ -10,6 +10,7 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/metrics_json.h"
+#include "apps/option_group.h"
 #include "apps/progress.h"
 #include "apps/truth_pairs.h"
 #include "egosgm/error.h"
@@ -269,25 +270,20 @@ Command add_eval(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("eval", "Compare disparity maps with their truth, as KITTI's development kits do");
   auto arguments = std::make_shared<EvalArguments>();
+  OptionGroup options(*command);
   arguments->compared.add_to(
       *command, "disparity map (KITTI PNG, 16-bit PNG with --scale, PFM, .npy), a folder of them, or a folder of `run`",
       "true disparity, or a folder of files with equal names");
-  command
-      ->add_option("--mask", arguments->mask,
-                   "compare only where this grey PNG, or the one of the truth's name in this folder, is not 0")
-      ->type_name("FILE|DIR");
-  command->add_option("--scale", arguments->scale, "steps a pixel of 16-bit PNG in --estimate; KITTI's have 256")
-      ->type_name("STEPS")
+  options.add("--mask", arguments->mask, "FILE|DIR",
+              "compare only where this grey PNG, or the one of the truth's name in this folder, is not 0");
+  options.add("--scale", arguments->scale, "STEPS", "steps a pixel of 16-bit PNG in --estimate; KITTI's have 256")
       ->capture_default_str();
-  command->add_option("--truth-scale", arguments->truth_scale, "the same of the truth")
-      ->type_name("STEPS")
-      ->capture_default_str();
-  command
-      ->add_option("--merge", arguments->reports,
-                   "pool what `egosgm eval --json` printed for several sequences, over all their pixels")
-      ->type_name("REPORT...")
+  options.add("--truth-scale", arguments->truth_scale, "STEPS", "the same of the truth")->capture_default_str();
+  options
+      .add("--merge", arguments->reports, "REPORT...",
+           "pool what `egosgm eval --json` printed for several sequences, over all their pixels")
       ->excludes("--estimate", "--truth", "ESTIMATE", "--frames", "--mask", "--scale", "--truth-scale");
-  command->add_flag("--json", arguments->json, "print JSON");
+  options.add_flag("--json", arguments->json, "print JSON");
   command->footer(
       "In percent of the pixels with truth (bad_of_valid: of those with an estimate too); bad: off by more than 3 px.\n"
       "  wrong_of_all     bad; what is missing does not count\n"
