@@ -16,6 +16,7 @@
 #include "apps/device_arguments.h"
 #include "apps/interrupt.h"
 #include "apps/option_arguments.h"
+#include "apps/option_group.h"
 #include "apps/output_folder.h"
 #include "apps/standard_output.h"
 #include "egosgm/error.h"
@@ -131,19 +132,14 @@ Command add_compile(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("compile", "Compile the kernels ahead, for machines without an OpenCL compiler");
   auto arguments = std::make_shared<CompileArguments>();
-  command->add_option("--out", arguments->out, "new folder: program binaries, and manifest.json, which says of what")
-      ->type_name("DIR")
-      ->group("Output")
+  OptionGroup output(*command, "Output");
+  output.add("--out", arguments->out, "DIR", "new folder: program binaries, and manifest.json, which says of what")
       ->required();
-  command
-      ->add_flag("--il", arguments->spirv,
-                 "SPIR-V in place of binaries: for every device of the type that takes it, whatever its driver. Needs "
-                 "clang and llvm-spirv")
-      ->group("Output");
-  command->add_option("--clang", arguments->clang, "the compiler for --il [clang]")->type_name("NAME")->group("Output");
-  command->add_option("--llvm-spirv", arguments->translator, "the translator for --il, of clang's version [llvm-spirv]")
-      ->type_name("NAME")
-      ->group("Output");
+  output.add_flag("--il", arguments->spirv,
+                  "SPIR-V in place of binaries: for every device of the type that takes it, whatever its driver. Needs "
+                  "clang and llvm-spirv");
+  output.add("--clang", arguments->clang, "NAME", "the compiler for --il [clang]");
+  output.add("--llvm-spirv", arguments->translator, "NAME", "the translator for --il, of clang's version [llvm-spirv]");
   arguments->method.add_to(*command);
   add_device(*command, arguments->device);
   return {command, [arguments] { return compile(*arguments); }};

@@ -10,6 +10,7 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/metrics_json.h"
+#include "apps/option_group.h"
 #include "apps/progress.h"
 #include "apps/truth_pairs.h"
 #include "egosgm/error.h"
@@ -47,8 +48,15 @@ struct Row {
 struct Result {
   std::vector<Row> rows;
   std::vector<DisparityMetrics> each;  // of the rows
-  DisparityMetrics pooled, mean;
+  DisparityCounts all;
   std::vector<std::string> doubts;  // what speaks against the estimates that were read
+
+  void add(const DisparityCounts& counts) {
+    each.push_back(vision::metrics_of(counts));
+    all += counts;
+  }
+  DisparityMetrics pooled() const { return vision::metrics_of(all); }
+  DisparityMetrics mean() const { return vision::mean_of(each); }
 };
 
 /// Throws InvalidArgument, naming both files, where `map` has another size than the estimate.
@@ -77,7 +85,6 @@ DisparityCounts compare(const vision::EvaluationPair& pair, const EvalArguments&
 
 Result measure(const vision::EvaluationPairs& found, const EvalArguments& arguments) {
   Result result;
-  DisparityCounts pooled;
   vision::EstimateReader estimates;
   for (const vision::EvaluationPair& pair : found.pairs) {
     vision::expect_scaled("--scale", arguments.scale, pair.estimate);
@@ -87,12 +94,9 @@ Result measure(const vision::EvaluationPairs& found, const EvalArguments& argume
   Progress progress(static_cast<int>(found.pairs.size()), !show);
   for (const vision::EvaluationPair& pair : found.pairs) {
     result.rows.push_back({pair, compare(pair, arguments, estimates)});
-    result.each.push_back(vision::metrics_of(result.rows.back().counts));
-    pooled += result.rows.back().counts;
+    result.add(result.rows.back().counts);
     progress.done(pair.name);
   }
-  result.pooled = vision::metrics_of(pooled);
-  result.mean = vision::mean_of(result.each);
   result.doubts = estimates.doubts(arguments.scale);
   return result;
 }
@@ -118,8 +122,8 @@ Json json_of(const DisparityCounts& counts) {
 
 Json json_of(const vision::EvaluationPairs& found, const Result& result) {
   Json json{{"pairs", Json::array()},
-            {"pooled", app::json_of(result.pooled)},
-            {"mean", app::json_of(result.mean)},
+            {"pooled", app::json_of(result.pooled())},
+            {"mean", app::json_of(result.mean())},
             {"without_estimate", Json::array()}};
   for (std::size_t i = 0; i < result.rows.size(); ++i) {
     const Row& row = result.rows[i];
@@ -147,17 +151,13 @@ void print_row(const std::string& name, const DisparityMetrics& m) {
              cell(m.mae_px, 11, "px"));
 }
 
-void print_header() {
+void print_errors(const Result& result) {
   fmt::print("{:<14}{:>13}{:>14}{:>11}{:>11}{:>16}{:>14}{:>11}{:>17}{:>11}\n", "", "wrong_of_all", "bad_of_valid",
              "filled", "density", "bad_or_missing", "interpolated", "d1", "d1_interpolated", "mae");
-}
-
-void print_errors(const Result& result) {
-  print_header();
   for (std::size_t i = 0; i < result.rows.size(); ++i) print_row(result.rows[i].files.name, result.each[i]);
-  if (result.rows.size() > 1) {
-    print_row("pooled", result.pooled);
-    print_row("mean", result.mean);
+  if (result.each.size() > 1 || result.rows.empty()) {
+    print_row("pooled", result.pooled());
+    print_row("mean", result.mean());
   }
 }
 
@@ -211,7 +211,6 @@ std::vector<DisparityCounts> counts_of(const Json& report, const std::string& fi
 /// The figures of all pairs of the reports, over all their pixels. Throws InvalidArgument and IoError.
 int merge(const EvalArguments& arguments) {
   Result result;
-  DisparityCounts pooled;
   std::map<std::string, std::string> read;  // pairs, and the first file that holds them
   for (const std::string& file : arguments.reports) {
     const Json report = parse_json(vision::read_file(file, kMaxReportBytes), file);
@@ -222,27 +221,22 @@ int merge(const EvalArguments& arguments) {
         throw InvalidArgument("--merge " + file + ": holds pairs of " + first->second +
                               ", whose pixels would count twice: give each pair once");
       }
-      result.each.push_back(vision::metrics_of(counts));
-      pooled += counts;
+      result.add(counts);
     }
     for (const Json& doubt : report.value("doubts", Json::array())) {
       if (doubt.is_string()) result.doubts.push_back(file + ": " + doubt.get<std::string>());
     }
   }
-  result.pooled = vision::metrics_of(pooled);
-  result.mean = vision::mean_of(result.each);
   if (arguments.json) {
     Json json{{"reports", arguments.reports.size()},
               {"pairs", result.each.size()},
-              {"pooled", app::json_of(result.pooled)},
-              {"mean", app::json_of(result.mean)}};
+              {"pooled", app::json_of(result.pooled())},
+              {"mean", app::json_of(result.mean())}};
     if (!result.doubts.empty()) json["doubts"] = result.doubts;
     fmt::print("{}\n", dumped(json, 2));
     return kOk;
   }
-  print_header();
-  print_row("pooled", result.pooled);
-  print_row("mean", result.mean);
+  print_errors(result);
   for (const std::string& doubt : result.doubts) fmt::print("{}\n", doubt);
   return kOk;
 }
@@ -269,25 +263,20 @@ Command add_eval(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("eval", "Compare disparity maps with their truth, as KITTI's development kits do");
   auto arguments = std::make_shared<EvalArguments>();
+  OptionGroup options(*command);
   arguments->compared.add_to(
       *command, "disparity map (KITTI PNG, 16-bit PNG with --scale, PFM, .npy), a folder of them, or a folder of `run`",
       "true disparity, or a folder of files with equal names");
-  command
-      ->add_option("--mask", arguments->mask,
-                   "compare only where this grey PNG, or the one of the truth's name in this folder, is not 0")
-      ->type_name("FILE|DIR");
-  command->add_option("--scale", arguments->scale, "steps a pixel of 16-bit PNG in --estimate; KITTI's have 256")
-      ->type_name("STEPS")
+  options.add("--mask", arguments->mask, "FILE|DIR",
+              "compare only where this grey PNG, or the one of the truth's name in this folder, is not 0");
+  options.add("--scale", arguments->scale, "STEPS", "steps a pixel of 16-bit PNG in --estimate; KITTI's have 256")
       ->capture_default_str();
-  command->add_option("--truth-scale", arguments->truth_scale, "the same of the truth")
-      ->type_name("STEPS")
-      ->capture_default_str();
-  command
-      ->add_option("--merge", arguments->reports,
-                   "pool what `egosgm eval --json` printed for several sequences, over all their pixels")
-      ->type_name("REPORT...")
+  options.add("--truth-scale", arguments->truth_scale, "STEPS", "the same of the truth")->capture_default_str();
+  options
+      .add("--merge", arguments->reports, "REPORT...",
+           "pool what `egosgm eval --json` printed for several sequences, over all their pixels")
       ->excludes("--estimate", "--truth", "ESTIMATE", "--frames", "--mask", "--scale", "--truth-scale");
-  command->add_flag("--json", arguments->json, "print JSON");
+  options.add_flag("--json", arguments->json, "print JSON");
   command->footer(
       "In percent of the pixels with truth (bad_of_valid: of those with an estimate too); bad: off by more than 3 px.\n"
       "  wrong_of_all     bad; what is missing does not count\n"

@@ -3,6 +3,7 @@
 
 #include <chrono>
 
+#include "apps/option_group.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
@@ -15,26 +16,21 @@ constexpr std::size_t kLookedAt = 6;  // motions that are given, beside those of
 }  // namespace
 
 void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOptions& options) {
-  command
-      .add_option("--poses", poses_file,
-                  "take the motion from KITTI poses (camera-to-world) in place of stereo odometry")
-      ->type_name("FILE")
-      ->group("Method");
+  OptionGroup(command, "Method")
+      .add("--poses", poses_file, "FILE",
+           "take the motion from KITTI poses (camera-to-world) in place of stereo odometry");
   add_motion_bounds(command, options, "Method");
 }
 
 void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const std::string& group) {
-  command
-      .add_option("--max-translation", options.max_translation_m,
-                  "odometry: a longer motion between two frames is no motion [m]")
-      ->type_name("M")
-      ->group(group)
+  OptionGroup bounds(command, group);
+  bounds
+      .add("--max-translation", options.max_translation_m, "M",
+           "odometry: a longer motion between two frames is no motion [m]")
       ->capture_default_str();
-  command
-      .add_option("--max-rotation", options.max_rotation_deg,
-                  "odometry: a larger turn between two frames is no motion [deg]")
-      ->type_name("DEG")
-      ->group(group)
+  bounds
+      .add("--max-rotation", options.max_rotation_deg, "DEG",
+           "odometry: a larger turn between two frames is no motion [deg]")
       ->capture_default_str();
 }
 

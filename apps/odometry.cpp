@@ -8,6 +8,7 @@
 #include "apps/command.h"
 #include "apps/interrupt.h"
 #include "apps/motion_source.h"
+#include "apps/option_group.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
@@ -72,12 +73,12 @@ int estimate(const OdometryArguments& arguments, const CalibrationReader& read) 
 Command add_odometry(CLI::App& program, const Package& package) {
   CLI::App* command = program.add_subcommand("odometry", "Estimate the camera's poses alone, without matching");
   auto arguments = std::make_shared<OdometryArguments>();
+  OptionGroup options(*command);
   arguments->input.add_to(*command);
-  command->add_option("--out", arguments->out, "new file: KITTI poses, camera-to-world, relative to the first frame")
-      ->type_name("FILE")
+  options.add("--out", arguments->out, "FILE", "new file: KITTI poses, camera-to-world, relative to the first frame")
       ->required();
   add_motion_bounds(*command, arguments->options, "Options");
-  command->add_flag("--quiet", arguments->quiet, "no progress, only errors");
+  options.add_flag("--quiet", arguments->quiet, "no progress, only errors");
   return {command, [arguments, read = package.read_calibration] { return estimate(*arguments, read); }};
 }
 

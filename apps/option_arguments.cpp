@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "apps/option_group.h"
 #include "apps/output_folder.h"
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
@@ -129,37 +130,19 @@ std::string options_help() {
 }  // namespace
 
 void OptionArguments::add_to(CLI::App& command) {
-  const char* group = "Method";
+  OptionGroup method(command, "Method");
   const PipelineOptions defaults;
-  command.add_option("--preset", preset, "default: the best known; paper: the choices of Fucek et al. 2017 [default]")
-      ->type_name("default|paper")
-      ->group(group);
-  command.add_option("--temporal", temporal, "off: the plain single-frame matcher, full range [on]")
-      ->type_name("on|off")
-      ->group(group);
-  command.add_option("--paths", paths, fmt::format("paths of the semi-global aggregation [{}]", defaults.paths))
-      ->type_name("4|8")
-      ->group(group);
-  command
-      .add_option("--disparities", disparities,
-                  fmt::format("number D of disparities; the range is [min, min + D) px [{}]", defaults.disparities))
-      ->type_name("N")
-      ->group(group);
-  command
-      .add_option("--min-disparity", min_disparity,
-                  fmt::format("least disparity, of either sign, px [{}]", defaults.min_disparity))
-      ->type_name("N")
-      ->group(group);
-  command.add_option("--set", settings, "set an option (list below); may be repeated")
-      ->type_name("NAME=VALUE")
-      ->allow_extra_args(false)
-      ->group(group);
-  command.add_option("--config", config, "read options from a file, `name = value` a line (TOML)")
-      ->type_name("FILE")
-      ->group(group);
-  command.add_option("--save-config", save_config, "write the options in use to such a new file")
-      ->type_name("FILE")
-      ->group(group);
+  method.add("--preset", preset, "default|paper",
+             "default: the best known; paper: the choices of Fucek et al. 2017 [default]");
+  method.add("--temporal", temporal, "on|off", "off: the plain single-frame matcher, full range [on]");
+  method.add("--paths", paths, "4|8", fmt::format("paths of the semi-global aggregation [{}]", defaults.paths));
+  method.add("--disparities", disparities, "N",
+             fmt::format("number D of disparities; the range is [min, min + D) px [{}]", defaults.disparities));
+  method.add("--min-disparity", min_disparity, "N",
+             fmt::format("least disparity, of either sign, px [{}]", defaults.min_disparity));
+  method.add("--set", settings, "NAME=VALUE", "set an option (list below); may be repeated")->allow_extra_args(false);
+  method.add("--config", config, "FILE", "read options from a file, `name = value` a line (TOML)");
+  method.add("--save-config", save_config, "FILE", "write the options in use to such a new file");
   command.footer([] { return options_help(); });
 }
 

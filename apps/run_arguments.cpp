@@ -9,6 +9,7 @@
 #include "apps/device_arguments.h"
 #include "apps/feed.h"
 #include "apps/motion_source.h"
+#include "apps/option_group.h"
 #include "apps/output_folder.h"
 #include "apps/run_outputs.h"
 #include "apps/tuning_file.h"
@@ -65,39 +66,25 @@ OutputFolder folder_of(const RunArguments& arguments, const SequenceJob& job) {
 
 void RunArguments::add_to(CLI::App& command) {
   input.add_to(command);
-  const char* group = "Output";
-  command
-      .add_option("--out", out,
-                  "new or empty folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room "
-                  "for the range), "
-                  "poses.txt, "
-                  "report.json. With the Python package also FILE.rrd, for the viewer Rerun, and of a bag FILE.mcap, "
-                  "for ROS 2")
-      ->type_name("DIR|FILE")
-      ->group(group);
-  command.add_option("--write", write, kWriteListHelp)->type_name("LIST")->group(group);
-  command
-      .add_option(
-          "--cloud-sigma", cloud_sigma_percent,
-          fmt::format(
-              "--write cloud leaves out depths whose standard deviation is larger than this [% of the depth, {:g}]",
-              cloud_sigma_percent))
-      ->type_name("PERCENT")
-      ->group(group);
-  command.add_flag("--interpolate", interpolate, "fill holes from the background, into OUT/interpolated")->group(group);
-  command
-      .add_option("--trace", trace,
-                  "write when every kernel, transfer and step of the host ran, as a Chrome trace (JSON) that "
-                  "https://ui.perfetto.dev opens")
-      ->type_name("FILE")
-      ->group(group);
-  command
-      .add_flag("--resume", resume,
-                "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
-                "before are computed again, for the filter's state")
-      ->group(group);
-  command.add_flag("--rerun", rerun, "show each frame in the viewer Rerun, by the Python package")->group(group);
-  command.add_flag("--quiet", quiet, "no progress, only errors")->group(group);
+  OptionGroup output(command, "Output");
+  output.add("--out", out, "DIR|FILE",
+             "new or empty folder to write: disparity/NNNNNN.png (KITTI's format; .pfm where that has no room for "
+             "the range), poses.txt, report.json. With the Python package also FILE.rrd, for the viewer Rerun, and of "
+             "a bag FILE.mcap, for ROS 2");
+  output.add("--write", write, "LIST", kWriteListHelp);
+  output.add(
+      "--cloud-sigma", cloud_sigma_percent, "PERCENT",
+      fmt::format("--write cloud leaves out depths whose standard deviation is larger than this [% of the depth, {:g}]",
+                  cloud_sigma_percent));
+  output.add_flag("--interpolate", interpolate, "fill holes from the background, into OUT/interpolated");
+  output.add("--trace", trace, "FILE",
+             "write when every kernel, transfer and step of the host ran, as a Chrome trace (JSON) that "
+             "https://ui.perfetto.dev opens");
+  output.add_flag("--resume", resume,
+                  "go on with a run that was stopped: its maps stay, the result is that of an undisturbed run. Frames "
+                  "before are computed again, for the filter's state");
+  output.add_flag("--rerun", rerun, "show each frame in the viewer Rerun, by the Python package");
+  output.add_flag("--quiet", quiet, "no progress, only errors");
   bag.add_to(command);
   method.add_to(command);
   add_motion(command, poses, odometry);

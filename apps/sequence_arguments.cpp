@@ -6,13 +6,12 @@
 #include <string_view>
 #include <utility>
 
+#include "apps/option_group.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
 
 namespace egosgm::app {
 namespace {
-
-constexpr const char* kGroup = "Input (one of)";
 
 bool is_image(const std::filesystem::path& file) {
   std::error_code error;
@@ -31,12 +30,10 @@ std::string words_of(const std::vector<std::pair<const char*, std::string>>& opt
 }  // namespace
 
 void add_pair_by(CLI::App& command, std::string& pair_by, const std::string& group) {
-  command
-      .add_option("--pair-by", pair_by,
-                  "what tells which --left and --right images belong together: equal texts in their names (what * or "
-                  "%d stands for), or their order")
-      ->type_name("name|order")
-      ->group(group);
+  OptionGroup options(command, group);
+  options.add("--pair-by", pair_by, "name|order",
+              "what tells which --left and --right images belong together: equal texts in their names (what * or "
+              "%d stands for), or their order");
 }
 
 vision::PairBy parse_pair_by(const std::string& pair_by) {
@@ -46,42 +43,25 @@ vision::PairBy parse_pair_by(const std::string& pair_by) {
 }
 
 void SequenceArguments::add_to(CLI::App& command) {
-  command
-      .add_option(
-          "DATASET,--dataset", folder,
-          "folder in the layout of KITTI odometry, KITTI raw or Middlebury, whichever it is, or with left, right and "
-          "calib.txt")
-      ->type_name("DIR")
-      ->group(kGroup);
-  command.add_option("RIGHT", other_picture, "where DATASET is the left picture of a pair, the right one")
-      ->type_name("")
-      ->group(kGroup);
-  command
-      .add_option("--odometry", odometry, "KITTI odometry sequence: image_0, image_1 (or image_2, image_3), calib.txt")
-      ->type_name("DIR")
-      ->group(kGroup);
-  command
-      .add_option("--kitti", kitti,
-                  "KITTI 2012 or 2015 multi-view: `training`, `testing` or their parent; with --scene")
-      ->type_name("DIR")
-      ->group(kGroup);
-  command.add_option("--scene", scene, "scene of --kitti, for example 000151")->type_name("NUMBER")->group(kGroup);
-  command
-      .add_option("--left", left,
-                  "left images: one PNG or JPEG, or a pattern (in quotes) such as 'left/%06d.png' or 'left/*.jpg'")
-      ->type_name("PATTERN")
-      ->group(kGroup);
-  command.add_option("--right", right, "right images, likewise; rectified")->type_name("PATTERN")->group(kGroup);
-  command
-      .add_option("--calib", calib,
-                  "calibration of --left and --right: KITTI's, Middlebury's, or fx, fy, cx, cy, baseline_m; with the "
-                  "Python package, of whichever program")
-      ->type_name("FILE")
-      ->group(kGroup);
-  add_pair_by(command, pair_by, kGroup);
-  command.add_option("--frames", frames, "frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all")
-      ->type_name("FIRST:LAST")
-      ->group(kGroup);
+  const std::string heading = "Input (one of)";
+  OptionGroup input(command, heading);
+  input.add("DATASET,--dataset", folder, "DIR",
+            "folder in the layout of KITTI odometry, KITTI raw or Middlebury, whichever it is, or with left, right and "
+            "calib.txt");
+  input.add("RIGHT", other_picture, "", "where DATASET is the left picture of a pair, the right one");
+  input.add("--odometry", odometry, "DIR",
+            "KITTI odometry sequence: image_0, image_1 (or image_2, image_3), calib.txt");
+  input.add("--kitti", kitti, "DIR",
+            "KITTI 2012 or 2015 multi-view: `training`, `testing` or their parent; with --scene");
+  input.add("--scene", scene, "NUMBER", "scene of --kitti, for example 000151");
+  input.add("--left", left, "PATTERN",
+            "left images: one PNG or JPEG, or a pattern (in quotes) such as 'left/%06d.png' or 'left/*.jpg'");
+  input.add("--right", right, "PATTERN", "right images, likewise; rectified");
+  input.add("--calib", calib, "FILE",
+            "calibration of --left and --right: KITTI's, Middlebury's, or fx, fy, cx, cy, baseline_m; with the "
+            "Python package, of whichever program");
+  add_pair_by(command, pair_by, heading);
+  input.add("--frames", frames, "FIRST:LAST", "frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all");
 }
 
 vision::StereoSequence SequenceArguments::open(bool needs_calibration, const CalibrationReader& read) const {
@@ -169,13 +149,11 @@ std::string SequenceArguments::text() const {
 }
 
 void BagArguments::add_to(CLI::App& command) {
-  const char* group = "Bags, by the Python package with its extra \"bag\"";
+  OptionGroup options(command, "Bags, by the Python package with its extra \"bag\"");
   CLI::Option* const of_bag =
-      command.add_option("--bag", bag, "ROS 2 (MCAP, SQLite) or ROS 1: a .mcap, a .bag, or a bag's folder")
-          ->type_name("BAG")
-          ->group(group);
+      options.add("--bag", bag, "BAG", "ROS 2 (MCAP, SQLite) or ROS 1: a .mcap, a .bag, or a bag's folder");
   const auto add = [&](const char* name, auto& value, const char* text, const char* type) {
-    return command.add_option(name, value, text)->type_name(type)->group(group)->needs(of_bag);
+    return options.add(name, value, type, text)->needs(of_bag);
   };
   add("--left-topic", left_topic, "raw or compressed images [where names tell, and there is one choice, that one]",
       "TOPIC");

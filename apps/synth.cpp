@@ -4,6 +4,7 @@
 #include "apps/command.h"
 #include "apps/counted.h"
 #include "apps/interrupt.h"
+#include "apps/option_group.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
 #include "apps/sequence_arguments.h"
@@ -55,38 +56,26 @@ Command add_synth(CLI::App& program) {
       program.add_subcommand("synth", "Render a synthetic stereo sequence with exact disparity, masks and poses");
   auto arguments = std::make_shared<SynthArguments>();
   vision::SyntheticOptions& options = arguments->options;
-  command->add_option("--out", arguments->out, "new folder, in the layout of KITTI odometry, with truth/ beside")
-      ->type_name("DIR")
+  command->option_defaults()->always_capture_default();
+  OptionGroup group(*command);
+  group.add("--out", arguments->out, "DIR", "new folder, in the layout of KITTI odometry, with truth/ beside")
       ->required();
-  command->add_option("--frames", options.frames, "number of frames")->type_name("N")->capture_default_str();
-  command->add_option("--width", options.width, "image width [px]")->type_name("W")->capture_default_str();
-  command->add_option("--height", options.height, "image height [px]")->type_name("H")->capture_default_str();
-  command->add_option("--seed", options.seed, "seed of street, texture and noise")
-      ->type_name("S")
-      ->capture_default_str();
-  command->add_flag("--plain", options.plain,
-                    "what has no texture: a sky, which is nothing in the truth, walls and ground; people and poles");
-  command->add_flag("--moving-object", options.moving_object,
-                    "vehicles that move on their own; with --plain people who walk");
-  command->add_option("--speed", options.speed_m, "travel per frame [m]")->type_name("M")->capture_default_str();
-  command->add_option("--turn", options.turn_deg, "largest turn per frame [deg]")
-      ->type_name("DEG")
-      ->capture_default_str();
-  command->add_option("--exposure", options.exposure, "scale of the grey values before noise; night: 0.08")
-      ->type_name("F")
-      ->capture_default_str();
-  command->add_option("--noise", options.noise_grey, "sensor noise, standard deviation [grey values]")
-      ->type_name("G")
-      ->capture_default_str();
-  command
-      ->add_option("--pole-width", options.pole_width_px,
-                   "mean width of a pole 10 m ahead [px]; single ones from 2/3 to 4/3 of it")
-      ->type_name("PX")
-      ->capture_default_str();
-  command->add_option("--pole-spacing", options.pole_spacing_m, "mean distance of poles along either side [m]")
-      ->type_name("M")
-      ->capture_default_str();
-  command->add_flag("--quiet", arguments->quiet, "no progress");
+  group.add("--frames", options.frames, "N", "number of frames");
+  group.add("--width", options.width, "W", "image width [px]");
+  group.add("--height", options.height, "H", "image height [px]");
+  group.add("--seed", options.seed, "S", "seed of street, texture and noise");
+  group.add_flag("--plain", options.plain,
+                 "what has no texture: a sky, which is nothing in the truth, walls and ground; people and poles");
+  group.add_flag("--moving-object", options.moving_object,
+                 "vehicles that move on their own; with --plain people who walk");
+  group.add("--speed", options.speed_m, "M", "travel per frame [m]");
+  group.add("--turn", options.turn_deg, "DEG", "largest turn per frame [deg]");
+  group.add("--exposure", options.exposure, "F", "scale of the grey values before noise; night: 0.08");
+  group.add("--noise", options.noise_grey, "G", "sensor noise, standard deviation [grey values]");
+  group.add("--pole-width", options.pole_width_px, "PX",
+            "mean width of a pole 10 m ahead [px]; single ones from 2/3 to 4/3 of it");
+  group.add("--pole-spacing", options.pole_spacing_m, "M", "mean distance of poles along either side [m]");
+  group.add_flag("--quiet", arguments->quiet, "no progress");
   return {command, [arguments] { return render(*arguments); }};
 }
 

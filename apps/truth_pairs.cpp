@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include "apps/counted.h"
+#include "apps/option_group.h"
 #include "apps/run_folder.h"
 #include "egosgm/error.h"
 #include "host/vision/pair_with_truth.h"
@@ -49,12 +50,12 @@ std::string text_of(const vision::EvaluationPairs& pairs) {
 }
 
 void ComparisonArguments::add_to(CLI::App& command, const std::string& estimate_help, const std::string& truth_help) {
-  command.add_option("ESTIMATE", positional_[0], "what --estimate takes")->type_name("");
-  command.add_option("TRUTH", positional_[1], "what --truth takes")->type_name("");
-  command.add_option("--estimate", estimate, estimate_help)->type_name("FILE|DIR");
-  command.add_option("--truth", truth, truth_help)->type_name("FILE|DIR");
-  command.add_option("--frames", frames, "only these frame numbers, both ends included: 7:10, 7:, :10 or 7")
-      ->type_name("FIRST:LAST");
+  OptionGroup options(command);
+  options.add("ESTIMATE", positional_[0], "", "what --estimate takes");
+  options.add("TRUTH", positional_[1], "", "what --truth takes");
+  options.add("--estimate", estimate, "FILE|DIR", estimate_help);
+  options.add("--truth", truth, "FILE|DIR", truth_help);
+  options.add("--frames", frames, "FIRST:LAST", "only these frame numbers, both ends included: 7:10, 7:, :10 or 7");
 }
 
 void ComparisonArguments::resolve(bool truth_is_needed) {

@@ -10,6 +10,7 @@
 #include "apps/command.h"
 #include "apps/device_arguments.h"
 #include "apps/interrupt.h"
+#include "apps/option_group.h"
 #include "apps/output_folder.h"
 #include "apps/standard_output.h"
 #include "apps/tuning_file.h"
@@ -225,29 +226,16 @@ Command add_tune(CLI::App& program) {
   CLI::App* command =
       program.add_subcommand("tune", "Measure what tile and work-group sizes suit a device, and keep them");
   auto arguments = std::make_shared<TuneArguments>();
-  command
-      ->add_option(
-          "--file", arguments->file,
-          "where to keep them; other devices' stay [$XDG_CONFIG_HOME/egosgm/tuning.json, which egosgm run reads]")
-      ->type_name("FILE")
-      ->group("Output");
-  const char* group = "Method";
-  command->add_option("--width", arguments->width, "of the images to measure with, px [1242]")
-      ->type_name("N")
-      ->group(group)
-      ->check(CLI::Range(1, 8192));
-  command->add_option("--height", arguments->height, "[375]")->type_name("N")->group(group)->check(CLI::Range(1, 8192));
-  command->add_option("--disparities", arguments->disparities, "[128]")
-      ->type_name("N")
-      ->group(group)
-      ->check(CLI::Range(1, 4096));
-  command->add_option("--rounds", arguments->rounds, "runs with each size, the first of which does not count [9]")
-      ->type_name("N")
-      ->group(group)
+  OptionGroup output(*command, "Output");
+  output.add("--file", arguments->file, "FILE",
+             "where to keep them; other devices' stay [$XDG_CONFIG_HOME/egosgm/tuning.json, which egosgm run reads]");
+  OptionGroup method(*command, "Method");
+  method.add("--width", arguments->width, "N", "of the images to measure with, px [1242]")->check(CLI::Range(1, 8192));
+  method.add("--height", arguments->height, "N", "[375]")->check(CLI::Range(1, 8192));
+  method.add("--disparities", arguments->disparities, "N", "[128]")->check(CLI::Range(1, 4096));
+  method.add("--rounds", arguments->rounds, "N", "runs with each size, the first of which does not count [9]")
       ->check(CLI::Range(2, 1000));
-  command->add_option("--stage", arguments->stage, "only the sizes of this one; the others stay")
-      ->type_name("NAME")
-      ->group(group)
+  method.add("--stage", arguments->stage, "NAME", "only the sizes of this one; the others stay")
       ->check(CLI::IsMember({"BandedSgm", "ForwardWarp", "SpeckleRemoval", "SearchBand", "VerticalAlignment"}));
   add_device(*command, arguments->device);
   add_cache(*command, arguments->cache);

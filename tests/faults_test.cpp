@@ -6,9 +6,10 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <map>
 #include <memory>
-#include <random>
 #include <regex>
+#include <tuple>
 
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
@@ -20,72 +21,44 @@
 namespace egosgm {
 namespace {
 
-constexpr int kWidth = 24, kHeight = 12;
-constexpr float kUntouched = 12345.0f;
+using testing::ImageMemory;
+using testing::OutputMemory;
+using testing::Scene;
 
-MethodOptions small_options() {
+constexpr shared::ImageSize kSmall{24, 12};
+
+std::unique_ptr<Pipeline> make_pipeline() {
+  static const Device device = Device::select();
   MethodOptions options;
   options.disparities = 16;
   options.sad_check.max_difference = 60;
   options.speckle_removal.max_size_px = 4;
-  return options;
+  return std::make_unique<Pipeline>(Scene(kSmall).calibration(), kSmall.width, kSmall.height, options, device);
 }
 
-/// A textured pair whose scene moves a little from frame to frame.
-struct Images {
-  std::vector<std::uint8_t> left, right;
+/// A scene's first frames, rendered once.
+struct Drive {
+  Scene scene;
+  std::vector<std::vector<int>> greys;
 
-  explicit Images(int frame) : left(kWidth * kHeight), right(kWidth * kHeight) {
-    std::mt19937 random(71);
-    std::vector<std::uint8_t> texture(2 * kWidth * kHeight);
-    for (auto& grey : texture) grey = static_cast<std::uint8_t>(random());
-    for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) {
-        left[y * kWidth + x] = texture[(y * 2 * kWidth) + x + frame];
-        right[y * kWidth + x] = texture[(y * 2 * kWidth) + x + frame + 4];
-      }
-    }
+  explicit Drive(const Scene& of) : scene(of) {
+    for (int frame = 0; frame < 6; ++frame) greys.push_back(scene.frame(frame).greys);
+  }
+  void submit_to(Pipeline& pipeline, int frame, const FrameOutputs& outputs) const {
+    const ImageMemory left(scene.size(), greys[frame], EGOSGM_LEFT, PixelType::kU8);
+    const ImageMemory right(scene.size(), greys[frame], EGOSGM_RIGHT, PixelType::kU8);
+    pipeline.submit(left.view(), right.view(), scene.motion(frame), outputs);
   }
 };
 
 /// All that a frame gives.
-struct Maps {
-  std::vector<std::vector<float>> maps{8, std::vector<float>(kWidth* kHeight, kUntouched)};
-  std::vector<std::uint16_t> search_width = std::vector<std::uint16_t>(kWidth * kHeight, 7);
-  std::vector<std::uint8_t> reason = std::vector<std::uint8_t>(kWidth * kHeight, 7);
-  std::vector<std::uint8_t> dynamic = std::vector<std::uint8_t>(kWidth * kHeight, 7);
-
-  bool operator==(const Maps&) const = default;
-
-  FrameOutputs views() {
-    const auto view = [&](int i) { return MapView<float>{maps[i].data(), kWidth, kHeight, kWidth * sizeof(float)}; };
-    return {view(0),
-            view(1),
-            {reason.data(), kWidth, kHeight, kWidth},
-            view(2),
-            view(3),
-            {view(4),
-             view(5),
-             view(6),
-             view(7),
-             {search_width.data(), kWidth, kHeight, kWidth * sizeof(std::uint16_t)},
-             {dynamic.data(), kWidth, kHeight, kWidth}}};
-  }
+struct Maps : OutputMemory {
+  Maps() : OutputMemory(kSmall) {}
 };
 
-std::unique_ptr<Pipeline> make_pipeline() {
-  static const Device device = Device::select();
-  return std::make_unique<Pipeline>(Calibration{.fx = 20, .fy = 20, .cx = 12, .cy = 6, .baseline_m = 0.5}, kWidth,
-                                    kHeight, small_options(), device);
-}
-
 void submit(Pipeline& pipeline, int frame, Maps& maps) {
-  const Images images(frame);
-  const ImageView left{images.left.data(), kWidth, kHeight, kWidth, PixelType::kU8};
-  const ImageView right{images.right.data(), kWidth, kHeight, kWidth, PixelType::kU8};
-  Motion motion;
-  motion.current_from_previous.translation().z() = -0.01;
-  pipeline.submit(left, right, motion, maps.views());
+  static const Drive drive{Scene(kSmall)};
+  drive.submit_to(pipeline, frame, maps.views());
 }
 
 void process(Pipeline& pipeline, int frame, Maps& maps) {
@@ -99,21 +72,16 @@ Maps process(Pipeline& pipeline, int frame) {
   return maps;
 }
 
-struct Fault {
-  int code;
-  bool is_late;
-  bool separate_memory = false;
-
-  testing::FaultLayer::How how() const { return is_late ? testing::FaultLayer::kLate : testing::FaultLayer::kAtOnce; }
-};
+/// The code, whether it comes late, and whether the device has memory of its own.
+using Fault = std::tuple<int, bool, bool>;
 
 std::string fault_name(const ::testing::TestParamInfo<Fault>& info) {
-  const int code = info.param.code;
-  return std::string(code == CL_OUT_OF_RESOURCES                ? "OutOfResources"
-                     : code == CL_OUT_OF_HOST_MEMORY            ? "OutOfHostMemory"
-                     : code == CL_MEM_OBJECT_ALLOCATION_FAILURE ? "MemObjectAllocationFailure"
-                                                                : "DeviceNotAvailable") +
-         (info.param.is_late ? "Late" : "AtOnce") + (info.param.separate_memory ? "SeparateMemory" : "");
+  static const std::map<int, std::string> kCodes{{CL_OUT_OF_RESOURCES, "OutOfResources"},
+                                                 {CL_OUT_OF_HOST_MEMORY, "OutOfHostMemory"},
+                                                 {CL_MEM_OBJECT_ALLOCATION_FAILURE, "MemObjectAllocationFailure"},
+                                                 {CL_DEVICE_NOT_AVAILABLE, "DeviceNotAvailable"}};
+  const auto& [code, is_late, separate_memory] = info.param;
+  return kCodes.at(code) + (is_late ? "Late" : "AtOnce") + (separate_memory ? "SeparateMemory" : "");
 }
 
 /// Of the calls that build a pipeline every 23rd fails, others for every code; with EGOSGM_ALL_FAULTS all of them (the
@@ -123,6 +91,8 @@ int stride() { return std::getenv("EGOSGM_ALL_FAULTS") ? 1 : 23; }
 class FaultTest : public ::testing::TestWithParam<Fault> {
  protected:
   const testing::FaultLayer faults_{FAULT_LAYER};
+  const int code_ = std::get<0>(GetParam());
+  const bool is_late_ = std::get<1>(GetParam());
 
   FaultTest() { faults_.reuse_builds(1); }
   ~FaultTest() override { faults_.reuse_builds(0); }
@@ -132,19 +102,22 @@ class FaultTest : public ::testing::TestWithParam<Fault> {
   int count(F&& f) {
     faults_.disarm();
     f();
-    return GetParam().is_late ? faults_.enqueues() : faults_.calls();
+    return is_late_ ? faults_.enqueues() : faults_.calls();
+  }
+
+  void arm(int at) const {
+    faults_.arm(at, code_, is_late_ ? testing::FaultLayer::kLate : testing::FaultLayer::kAtOnce);
   }
 
   /// A command that fails late may have lost its status to the event that it waited for, and to nothing else.
-  static bool tells(const DeviceError& error) {
-    return error.code() == GetParam().code ||
-           (GetParam().is_late && error.code() == CL_EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST);
+  bool tells(const DeviceError& error) const {
+    return error.code() == code_ || (is_late_ && error.code() == CL_EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST);
   }
 
   /// `f` must report that the call `at` failed.
   template <typename F>
   void expect_reported(int at, F&& f) {
-    faults_.arm(at, GetParam().code, GetParam().how());
+    arm(at);
     try {
       f();
       ADD_FAILURE() << "call " << at << " failed and nobody noticed";
@@ -220,9 +193,9 @@ TEST_P(FaultTest, EveryCallOfConstruction) {
   const Maps expected = process(*make_pipeline(), 0);  // and what the driver builds once and keeps
   const long before = faults_.references();
   const int calls = count([] { make_pipeline(); });
-  ASSERT_GT(calls, GetParam().is_late ? 2 : 500);
-  const int offset = -GetParam().code;
-  const int step = GetParam().is_late ? 1 : stride();  // there are few commands
+  ASSERT_GT(calls, is_late_ ? 2 : 500);
+  const int offset = -code_;
+  const int step = is_late_ ? 1 : stride();  // there are few commands
   for (int at = offset % step; at < calls && !HasFailure(); at += step) {
     expect_reported(at, [] { make_pipeline(); });
     EXPECT_EQ(faults_.references(), before) << "after call " << at << " of " << calls << " failed";
@@ -231,13 +204,13 @@ TEST_P(FaultTest, EveryCallOfConstruction) {
   EXPECT_EQ(faults_.references(), before);
 }
 
+using ::testing::Bool;
+using ::testing::Combine;
+using ::testing::Values;
 INSTANTIATE_TEST_SUITE_P(Codes, FaultTest,
-                         ::testing::Values(Fault{CL_OUT_OF_RESOURCES, false}, Fault{CL_OUT_OF_HOST_MEMORY, false},
-                                           Fault{CL_MEM_OBJECT_ALLOCATION_FAILURE, false},
-                                           Fault{CL_DEVICE_NOT_AVAILABLE, false}, Fault{CL_OUT_OF_RESOURCES, true},
-                                           Fault{CL_OUT_OF_HOST_MEMORY, true},
-                                           Fault{CL_MEM_OBJECT_ALLOCATION_FAILURE, true},
-                                           Fault{CL_DEVICE_NOT_AVAILABLE, true}),
+                         Combine(Values(CL_OUT_OF_RESOURCES, CL_OUT_OF_HOST_MEMORY, CL_MEM_OBJECT_ALLOCATION_FAILURE,
+                                        CL_DEVICE_NOT_AVAILABLE),
+                                 Bool(), Values(false)),
                          fault_name);
 
 /// Plays frames with two under way, and goes on after errors as the contract of submit and collect says.
@@ -280,7 +253,7 @@ class OverlappedRun {
 
 class OverlappedFaultTest : public FaultTest {
  protected:
-  OverlappedFaultTest() { faults_.separate_memory(GetParam().separate_memory); }
+  OverlappedFaultTest() { faults_.separate_memory(std::get<2>(GetParam())); }
   ~OverlappedFaultTest() override { faults_.separate_memory(false); }
 };
 
@@ -307,7 +280,7 @@ TEST_P(OverlappedFaultTest, EveryCallOfTwoFramesUnderWay) {
   for (int at = 0; at < calls && !HasFailure(); ++at) {
     prepare();
     std::vector<Maps> maps(expected.size());
-    faults_.arm(at, GetParam().code, GetParam().how());
+    arm(at);
     EXPECT_EQ(play(maps), 1) << "call " << at << " of " << calls;
     faults_.disarm();
     EXPECT_EQ(maps, expected) << "after call " << at << " of " << calls << " failed";
@@ -317,16 +290,11 @@ TEST_P(OverlappedFaultTest, EveryCallOfTwoFramesUnderWay) {
 // What is known of the rows' offset goes back with the rest; the other tests' images are too small for an estimate.
 TEST_P(OverlappedFaultTest, TheVerticalOffsetOfFramesThatFailedIsForgotten) {
   constexpr shared::ImageSize kSize{127, 61};
-  const testing::Scene scene(kSize, 0, 0.4);
+  const Drive drive(Scene(kSize, 0, 0.4));
   MethodOptions options;
   options.disparities = 32;
-  Pipeline pipeline(scene.calibration(), kSize.width, kSize.height, options);
-  const auto submit_frame = [&](int index) {
-    const std::vector<int> greys = scene.frame(index).greys;
-    const testing::ImageMemory left(kSize, greys, EGOSGM_LEFT, PixelType::kU8),
-        right(kSize, greys, EGOSGM_RIGHT, PixelType::kU8);
-    pipeline.submit(left.view(), right.view(), scene.motion(index), {});
-  };
+  Pipeline pipeline(drive.scene.calibration(), kSize.width, kSize.height, options);
+  const auto submit_frame = [&](int index) { drive.submit_to(pipeline, index, {}); };
   std::vector<double> expected;
   for (int index = 0; index < 4; ++index) {
     submit_frame(index);
@@ -337,15 +305,14 @@ TEST_P(OverlappedFaultTest, TheVerticalOffsetOfFramesThatFailedIsForgotten) {
   pipeline.reset();
   const int calls = count([&] { submit_frame(0), pipeline.collect(); });
   submit_frame(1);
-  faults_.arm(calls / 2, GetParam().code, GetParam().how());
-  try {
+  arm(calls / 2);
+  const auto frame_that_fails = [&] {
     submit_frame(2);
     faults_.disarm();
     pipeline.collect();
-    ADD_FAILURE() << "the fault was not noticed";
-  } catch (const DeviceError&) {
-    faults_.disarm();
-  }
+  };
+  EXPECT_THROW(frame_that_fails(), DeviceError);
+  faults_.disarm();
   for (int index = pipeline.under_way() == 0 ? 1 : 2; index < 4; ++index) {
     submit_frame(index);
     if (pipeline.under_way() == 2) pipeline.collect();
@@ -366,11 +333,7 @@ TEST_P(OverlappedFaultTest, APipelineMayEndWithFramesUnderWay) {
   EXPECT_EQ(faults_.references(), before);
 }
 
-INSTANTIATE_TEST_SUITE_P(Codes, OverlappedFaultTest,
-                         ::testing::Values(Fault{CL_OUT_OF_RESOURCES, false}, Fault{CL_OUT_OF_RESOURCES, true},
-                                           Fault{CL_OUT_OF_RESOURCES, false, true},
-                                           Fault{CL_OUT_OF_RESOURCES, true, true}),
-                         fault_name);
+INSTANTIATE_TEST_SUITE_P(Codes, OverlappedFaultTest, Combine(Values(CL_OUT_OF_RESOURCES), Bool(), Bool()), fault_name);
 
 TEST(Destruction, IsQuietWhicheverReleaseFails) {
   const testing::FaultLayer layer(FAULT_LAYER);

@@ -219,7 +219,3 @@ class Kernels(unittest.TestCase):
                 with self.subTest(kernel=kernel.name, defines=defines):
                     self.assertEqual(list(violations(syntax_tree(kernel, defines), DATA_DEPENDENT.get(kernel.name, ()))), [])
         self.assertGreater(checked, 20)
-
-
-if __name__ == "__main__":
-    unittest.main()

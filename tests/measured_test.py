@@ -177,7 +177,3 @@ class Page(unittest.TestCase):
         (self.docs / "measured" / "accuracy2.json").write_text("{}")
         self.assertEqual(self.write(), 1)
         self.assertFalse((self.docs / "understand/measured.md").exists())
-
-
-if __name__ == "__main__":
-    unittest.main()

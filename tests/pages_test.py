@@ -4,7 +4,6 @@ import os
 import pathlib
 import re
 import sys
-import unittest
 
 SOURCE = pathlib.Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(SOURCE / "tests/program"))
@@ -73,7 +72,3 @@ class Pages(ProgramTest):
         for page, text in PAGES.items():
             for name in re.findall(r"\]\(([\w./-]+)(?:#[\w-]*)?\)", text):
                 self.assertTrue((page.parent / name).exists(), f"{page.name}: {name}")
-
-
-if __name__ == "__main__":
-    unittest.main()

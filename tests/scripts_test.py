@@ -98,7 +98,3 @@ class Scripts(unittest.TestCase):
             self.assertRegex(tests, rf"(TEST|TEST_[FP]|INSTANTIATE_TEST_SUITE_P)\({name.rstrip('/')}")
         for name in programs.split("|"):
             self.assertRegex(tests, rf"class {name}\(")
-
-
-if __name__ == "__main__":
-    unittest.main()

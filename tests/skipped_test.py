@@ -20,7 +20,3 @@ class Skipped(unittest.TestCase):
             done = subprocess.run([os.environ["EGOSGM_CTEST"], "--test-dir", build, "-R", f"^({names})$"], capture_output=True, text=True)
         for name in EXPECTED:
             self.assertRegex(done.stdout, rf"{name} \.+\*\*\*Skipped")
-
-
-if __name__ == "__main__":
-    unittest.main()

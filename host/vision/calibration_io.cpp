@@ -107,21 +107,6 @@ void check_focal_length(const Entries& entries, const Entry& entry, double fx, d
                  " px; it must be positive");
 }
 
-/// Of left and right, each fx, fy and cy: the pixels of a row of one image are on that row of the other one.
-void check_rectified(const Entries& entries, const Entry& right, const std::array<double, 3>& left,
-                     const std::array<double, 3>& other) {
-  for (const int i : {0, 1}) {
-    if (std::abs(left[i] - other[i]) <= kMaxRelativeFocalDifference * left[i]) continue;
-    refuse_row(entries.file(), right.row,
-               std::string(right.key) + ": the focal lengths of left and right, " + std::to_string(left[i]) + " and " +
-                   std::to_string(other[i]) + " px, differ; give the calibration of a rectified pair");
-  }
-  if (std::abs(left[2] - other[2]) <= EGOSGM_MAX_OFFSET_PX) return;
-  refuse_row(entries.file(), right.row,
-             std::string(right.key) + ": the rows of left and right, cy " + std::to_string(left[2]) + " and " +
-                 std::to_string(other[2]) + " px, differ; give the calibration of a rectified pair");
-}
-
 void check_baseline(const Entries& entries, const Entry& entry, double baseline_m) {
   if (baseline_m > 0 && std::isfinite(baseline_m)) return;
   const std::string text = entries.file().string() + ":" + std::to_string(entry.row) + ": " + std::string(entry.key) +
@@ -130,23 +115,45 @@ void check_baseline(const Entries& entries, const Entry& entry, double baseline_
   throw NegativeBaseline(text + " (are left and right swapped?)");
 }
 
+/// One camera of a pair, as its row has it.
+struct Camera {
+  const Entry& row;
+  double fx, fy, cx, cy;
+};
+
+/// The pixels of a row of one image are on that row of the other one.
+void check_rectified(const Entries& entries, const Camera& right, const Camera& left) {
+  for (const auto& [of_left, of_right] : {std::pair{left.fx, right.fx}, {left.fy, right.fy}}) {
+    if (std::abs(of_left - of_right) <= kMaxRelativeFocalDifference * of_left) continue;
+    refuse_row(entries.file(), right.row.row,
+               std::string(right.row.key) + ": the focal lengths of left and right, " + std::to_string(of_left) +
+                   " and " + std::to_string(of_right) + " px, differ; give the calibration of a rectified pair");
+  }
+  if (std::abs(left.cy - right.cy) <= EGOSGM_MAX_OFFSET_PX) return;
+  refuse_row(entries.file(), right.row.row,
+             std::string(right.row.key) + ": the rows of left and right, cy " + std::to_string(left.cy) + " and " +
+                 std::to_string(right.cy) + " px, differ; give the calibration of a rectified pair");
+}
+
+/// `of_baseline`: the row that tells it.
+Calibration from_pair(const Entries& entries, const Camera& left, const Camera& right, const Entry& of_baseline,
+                      double baseline_m, double doffs_px) {
+  check_focal_length(entries, left.row, left.fx, left.fy);
+  check_focal_length(entries, right.row, right.fx, right.fy);
+  check_rectified(entries, right, left);
+  check_baseline(entries, of_baseline, baseline_m);
+  return {left.fx, left.fy, left.cx, left.cy, baseline_m, doffs_px};
+}
+
 Calibration from_projections(const Entries& entries, const std::string& left_key, const std::string& right_key) {
   const std::string remedy = "give the calibration of cameras " + left_key + " and " + right_key;
   const Entry& left = entries.at(left_key, remedy);
   const Entry& right = entries.at(right_key, remedy);
   const std::vector<double> p_left = parse_numbers(entries, left, left.value, 12);
   const std::vector<double> p_right = parse_numbers(entries, right, right.value, 12);
-  check_focal_length(entries, left, p_left[0], p_left[5]);
-  check_focal_length(entries, right, p_right[0], p_right[5]);
-  check_rectified(entries, right, {p_left[0], p_left[5], p_left[6]}, {p_right[0], p_right[5], p_right[6]});
-  const double baseline_m = (p_left[3] - p_right[3]) / p_left[0];
-  check_baseline(entries, right, baseline_m);
-  return {.fx = p_left[0],
-          .fy = p_left[5],
-          .cx = p_left[2],
-          .cy = p_left[6],
-          .baseline_m = baseline_m,
-          .doffs_px = p_right[2] - p_left[2]};
+  return from_pair(entries, {left, p_left[0], p_left[5], p_left[2], p_left[6]},
+                   {right, p_right[0], p_right[5], p_right[2], p_right[6]}, right, (p_left[3] - p_right[3]) / p_left[0],
+                   p_right[2] - p_left[2]);
 }
 
 Calibration from_kitti(const Entries& entries, KittiCameras cameras, const std::string& prefix) {
@@ -169,20 +176,12 @@ Calibration from_middlebury(const Entries& entries) {
   const Entry& baseline = entries.at("baseline", remedy);
   const std::vector<double> k_left = parse_middlebury_matrix(entries, left);
   const std::vector<double> k_right = parse_middlebury_matrix(entries, right);
-  check_focal_length(entries, left, k_left[0], k_left[4]);
-  check_focal_length(entries, right, k_right[0], k_right[4]);
-  check_rectified(entries, right, {k_left[0], k_left[4], k_left[5]}, {k_right[0], k_right[4], k_right[5]});
-  const double baseline_m = parse_finite(entries, baseline, baseline.value) / 1000.0;
-  check_baseline(entries, baseline, baseline_m);
   const double doffs_px = entries.has("doffs")
                               ? parse_finite(entries, entries.at("doffs", remedy), entries.at("doffs", remedy).value)
                               : k_right[2] - k_left[2];
-  return {.fx = k_left[0],
-          .fy = k_left[4],
-          .cx = k_left[2],
-          .cy = k_left[5],
-          .baseline_m = baseline_m,
-          .doffs_px = doffs_px};
+  return from_pair(entries, {left, k_left[0], k_left[4], k_left[2], k_left[5]},
+                   {right, k_right[0], k_right[4], k_right[2], k_right[5]}, baseline,
+                   parse_finite(entries, baseline, baseline.value) / 1000.0, doffs_px);
 }
 
 Calibration from_own(const Entries& entries) {
@@ -206,8 +205,6 @@ Calibration from_own(const Entries& entries) {
   check_baseline(entries, entries.at("baseline_m", ""), calibration.baseline_m);
   return calibration;
 }
-
-bool is_zip(std::string_view text) { return text.starts_with("PK\x03\x04"); }
 
 bool has_all(std::string_view text, std::initializer_list<std::string_view> words) {
   return std::all_of(words.begin(), words.end(),
@@ -244,7 +241,7 @@ std::string_view foreign_format(std::string_view text) {
   }};
   if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff")) return "UTF-16, which is to be saved as UTF-8";
   if (text.starts_with("\x1f\x8b")) return "packed by gzip";
-  if (is_zip(text)) return "an archive of NumPy arrays (.npz)";
+  if (text.starts_with("PK\x03\x04")) return "an archive of NumPy arrays (.npz)";
   if (text.starts_with("\x93NUMPY")) return "one NumPy array";
   for (const Format& format : kFormats) {
     if (has_all(text, format.words)) return format.name;

@@ -15,6 +15,7 @@
 #include "egosgm/vision/image_io.h"
 #include "host/cpu_clones.h"
 #include "host/vision/file_io.h"
+#include "host/vision/frame_names.h"
 #include "host/vision/image_bounds.h"
 #include "host/vision/npy.h"
 #include "host/vision/png.h"
@@ -142,12 +143,6 @@ cv::Mat parse_pfm(std::string_view bytes, const std::filesystem::path& file) {
   return map;
 }
 
-std::string lower_extension(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return extension;
-}
-
 }  // namespace
 
 cv::Mat read_disparity(const std::filesystem::path& file, double png_steps_per_px) {
@@ -181,7 +176,7 @@ cv::Mat read_values(const std::filesystem::path& file) {
 }
 
 std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& disparity) {
-  const std::string extension = lower_extension(file);
+  const std::string extension = lower(file.extension().string());
   if (extension == ".png") return write_disparity_png(file, disparity);
   if (extension != ".pfm") throw InvalidArgument(file.string() + ": a disparity map's name must end in .png or .pfm");
   write_pfm(file, disparity);

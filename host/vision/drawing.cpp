@@ -6,8 +6,12 @@
 #include <cmath>
 #include <cstdint>
 
+#include "egosgm/error.h"
+
 namespace egosgm::vision {
 namespace {
+
+constexpr int kMaxPictureSide = 32768;
 
 /// RGB, in equal steps; between them colours are mixed.
 constexpr std::array<std::uint32_t, 33> kTurbo{
@@ -60,6 +64,10 @@ void for_each_part(double begin, double end, int count, const Visit& visit) {
 }
 
 }  // namespace
+
+void require_width(int width) {
+  if (width < 1 || width > kMaxPictureSide) throw InvalidArgument("picture width: must be in 1..32768 px");
+}
 
 cv::Vec3b turbo(double position) {
   const double at = position * (kTurbo.size() - 1);

@@ -7,6 +7,9 @@
 
 namespace egosgm::vision {
 
+/// Throws InvalidArgument unless a picture may be so wide.
+void require_width(int width);
+
 /// The colour of a place in 0..1 on the scale Turbo (Mikhailov 2019), BGR.
 cv::Vec3b turbo(double position);
 

@@ -64,6 +64,7 @@ std::vector<std::string> list_folder(const std::filesystem::path& folder);
 EGOSGM_EXPORT bool is_before(const std::string& a, const std::string& b);
 
 bool is_digits(std::string_view text);
+std::string lower(std::string text);  // of ASCII
 bool is_folder(const std::filesystem::path& path);
 bool is_file(const std::filesystem::path& path);
 

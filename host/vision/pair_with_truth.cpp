@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "egosgm/error.h"
+#include "host/vision/frame_names.h"
 #include "host/vision/name_numbers.h"
 
 namespace egosgm::vision {
@@ -15,15 +16,9 @@ namespace {
 namespace fs = std::filesystem;
 using Maps = std::map<std::string, fs::path>;  // name without extension -> file
 
-bool is_folder(const fs::path& path) {
-  std::error_code error;
-  return fs::is_directory(path, error);
-}
-
 bool is_map(const fs::path& file) {
   const fs::path extension = file.extension();
-  return (extension == ".png" || extension == ".pfm" || extension == ".npy" || extension == ".flo") &&
-         !file.filename().string().starts_with('.');
+  return extension == ".png" || extension == ".pfm" || extension == ".npy" || extension == ".flo";
 }
 
 /// Where data sets keep their truth.
@@ -45,18 +40,15 @@ Maps maps_of(const fs::path& path) {
   if (!is_folder(path)) return {{path.stem().string(), path}};
   Maps maps;
   std::set<std::string> folders;
-  std::error_code error;
-  fs::directory_iterator entry(path, error);
-  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
-    if (is_folder(entry->path())) folders.insert(entry->path().filename().string());
-    if (!is_map(entry->path())) continue;
-    const auto [other, is_new] = maps.emplace(entry->path().stem().string(), entry->path());
+  for (const std::string& name : list_folder(path)) {
+    const fs::path file = path / name;
+    if (is_folder(file)) folders.insert(name);
+    if (!is_map(file)) continue;
+    const auto [other, is_new] = maps.emplace(file.stem().string(), file);
     if (is_new) continue;
-    throw InvalidArgument(entry->path().string() + ": has the name of " + other->second.string() +
+    throw InvalidArgument(file.string() + ": has the name of " + other->second.string() +
                           "; give a folder with one map of each name, or one file");
   }
-  if (error)
-    throw InvalidArgument(path.string() + ": cannot be listed: " + error.message() + "; give a readable folder");
   if (!maps.empty()) return maps;
   std::string inside;
   for (const std::string& folder : folders) inside += (inside.empty() ? "; inside are the folders " : ", ") + folder;

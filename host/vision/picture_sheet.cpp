@@ -11,11 +11,6 @@ namespace egosgm::vision {
 namespace {
 
 constexpr int kCaptionHeight = 24;
-constexpr int kMaxPictureSide = 32768;
-
-void require_width(int width) {
-  if (width < 1 || width > kMaxPictureSide) throw InvalidArgument("picture width: must be in 1..32768 px");
-}
 
 cv::Mat scaled_to(const cv::Mat& picture, int cell_width) {
   if (picture.cols <= cell_width) return picture;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <vector>
 
 #include "egosgm/error.h"
@@ -16,8 +17,7 @@ namespace egosgm::vision {
 namespace {
 
 constexpr int kBarHeight = 40, kBarColors = 22;  // [px]; below the colours stands the text
-constexpr int kMaxPictureSide = 32768;
-constexpr int kSmallWidth = 640;  // of a bar; below, its letters are small [px]
+constexpr int kSmallWidth = 640;                 // of a bar; below, its letters are small [px]
 const cv::Scalar kBlack(0, 0, 0);
 const cv::Vec3b kMissing(128, 128, 128);
 
@@ -66,10 +66,6 @@ void require_range(const ColorRange& range) {
     throw InvalidArgument(
         "color range: low must be less than high, both finite, and low positive on a logarithmic scale");
   }
-}
-
-void require_width(int width) {
-  if (width < 1 || width > kMaxPictureSide) throw InvalidArgument("picture width: must be in 1..32768 px");
 }
 
 /// Where values stand in a range, 0..1.
@@ -160,11 +156,8 @@ cv::Mat color_variance(const cv::Mat& variance, const cv::Mat& disparity, ColorR
   require_map(disparity, "color_variance");
   require_same_size(variance, disparity, "color_variance");
   cv::Mat picture = color_map(variance, range);
-  for (int y = 0; y < picture.rows; ++y) {
-    for (int x = 0; x < picture.cols; ++x) {
-      if (!is_valid_disparity(disparity.at<float>(y, x))) picture.at<cv::Vec3b>(y, x) = cv::Vec3b(0, 0, 0);
-    }
-  }
+  const cv::Mat has_value = (disparity > kInvalidDisparity) & (disparity <= std::numeric_limits<float>::max());
+  picture.setTo(kBlack, ~has_value);
   return picture;
 }
 
@@ -263,19 +256,13 @@ cv::Mat color_grey(const cv::Mat& grey) {
   if (grey.empty() || (grey.type() != CV_8UC1 && grey.type() != CV_16UC1)) {
     throw InvalidArgument("color_grey: the image must be CV_8UC1 or CV_16UC1 and not empty");
   }
-  cv::Mat bytes = grey, picture(grey.size(), CV_8UC3);
+  cv::Mat bytes = grey, picture;
   if (grey.depth() == CV_16U) {
-    int highest = 0;
-    for (int y = 0; y < grey.rows; ++y) {
-      const auto* row = grey.ptr<std::uint16_t>(y);
-      highest = std::max<int>(highest, *std::max_element(row, row + grey.cols));
-    }
+    double highest = 0;
+    cv::minMaxLoc(grey, nullptr, &highest);
     grey.convertTo(bytes, CV_8U, highest > 0 ? 255.0 / highest : 1.0);
   }
-  for (int y = 0; y < bytes.rows; ++y) {
-    const std::uint8_t* row = bytes.ptr(y);
-    std::transform(row, row + bytes.cols, picture.ptr<cv::Vec3b>(y), [](auto v) { return cv::Vec3b(v, v, v); });
-  }
+  cv::merge(std::vector<cv::Mat>(3, bytes), picture);
   return picture;
 }
 

@@ -13,6 +13,7 @@
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/poses_io.h"
 #include "host/vision/file_io.h"
+#include "host/vision/frame_names.h"
 #include "host/vision/synthetic_render.h"
 #include "host/vision/synthetic_scene.h"
 
@@ -32,11 +33,6 @@ std::string text(const Parts&... parts) {
 void require_range(const char* name, double value, double low, double high) {
   if (value >= low && value <= high) return;
   throw InvalidArgument(text("synthetic ", name, " = ", value, " is out of range: choose ", low, " to ", high));
-}
-
-std::string six_digits(int number) {
-  const std::string digits = std::to_string(number);
-  return std::string(6 - std::min<size_t>(6, digits.size()), '0') + digits;
 }
 
 cv::Mat only_noc(const cv::Mat& disparity, const cv::Mat& noc) {
@@ -135,14 +131,11 @@ SyntheticFrame SyntheticSequence::render(int frame) const {
 void write_sequence(const SyntheticOptions& options, const std::filesystem::path& folder,
                     const std::function<void(int done, int frames)>& progress) {
   const SyntheticSequence sequence(options);
-  std::vector<std::string> folders = {"image_0",
-                                      "image_1",
-                                      "truth/left_disp_occ",
-                                      "truth/left_disp_noc",
-                                      "truth/right_disp_occ",
-                                      "truth/right_disp_noc"};
-  if (options.moving_object) folders.insert(folders.end(), {"truth/left_moving", "truth/right_moving"});
-  for (const std::string& name : folders) make_folder(folder / name);
+  for (const char* images : {"image_0", "image_1"}) make_folder(folder / images);
+  for (const std::string view : {"truth/left_", "truth/right_"}) {
+    for (const char* map : {"disp_occ", "disp_noc"}) make_folder(folder / (view + map));
+    if (options.moving_object) make_folder(folder / (view + "moving"));
+  }
 
   std::vector<Eigen::Isometry3d> poses;
   std::string times;
@@ -154,7 +147,7 @@ void write_sequence(const SyntheticOptions& options, const std::filesystem::path
   write_file(folder / "times.txt", times);
   write_poses(folder / "poses.txt", poses);
   for (int k = 0; k < options.frames; ++k) {
-    write_frame(sequence.render(k), six_digits(k) + ".png", options.moving_object, folder);
+    write_frame(sequence.render(k), padded(std::to_string(k), 6) + ".png", options.moving_object, folder);
     if (progress) progress(k + 1, options.frames);
   }
 }

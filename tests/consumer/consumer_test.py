@@ -90,7 +90,3 @@ class Installed(unittest.TestCase):
         environment = {name: value for name, value in os.environ.items() if name != "LD_LIBRARY_PATH"}
         self.assert_runs(self.prefix / "bin/egosgm", "--version", env=environment)
         self.assertNotIn("not found", self.assert_runs("ldd", self.prefix / "bin/egosgm", env=environment))
-
-
-if __name__ == "__main__":
-    unittest.main()

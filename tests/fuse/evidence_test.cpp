@@ -129,7 +129,7 @@ double mean(const std::vector<int>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-class EvidenceTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(EvidenceTest);
 
 TEST_P(EvidenceTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -165,9 +165,6 @@ TEST_P(EvidenceTest, LooksAtTheLeftViewAlone) {
     EXPECT_TRUE(std::all_of(left.evidence.begin() + middle, left.evidence.end(), [](int e) { return e == 12345; }));
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, EvidenceTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, EvidenceTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 constexpr shared::ImageSize kSize{320, 97};
 

@@ -51,15 +51,14 @@ testing::HostMaps right_row(const Row& left, const Row& measured, int min_dispar
   return found[0];
 }
 
-class RightMapTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(RightMapTest);
 
 TEST_P(RightMapTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
   const float max_disparity = size.width > 300 ? 150 : 12;
   testing::HostMaps maps = testing::random_maps(size, -4.5f, max_disparity, 0.2, 5);
   const testing::HostMaps full = testing::random_maps(size, -4.5f, max_disparity, 0, 7);
-  maps.disparity = testing::left_and_right(maps.disparity, full.disparity);
-  maps.variance = testing::left_and_right(maps.variance, full.variance);
+  maps = testing::left_and_right(maps, full);
   const testing::HostMaps measured = testing::random_maps(size, -4, max_disparity, 0.5, 6);
   for (const float max_difference_px : {0.0f, 1.0f, 1e6f}) {
     const testing::HostMaps expected = reference::right_map(size, -4, max_difference_px, measured, maps);
@@ -68,16 +67,10 @@ TEST_P(RightMapTest, EqualsReference) {
       const testing::HostMaps bare = right_map(size, {-4, 160}, max_difference_px, measured, maps, pixels, false);
       EXPECT_EQ(bare.disparity, expected.disparity);
       EXPECT_EQ(bare.variance, testing::masked({bare.disparity, maps.variance}).variance);
-      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
-          << max_difference_px << " px, by " << pixels;
-      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
-          << max_difference_px << " px, by " << pixels;
+      EXPECT_TRUE(testing::same_maps(actual, expected, size)) << max_difference_px << " px, by " << pixels;
     }
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, RightMapTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, RightMapTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(RightMap, LandsOnTheNearestPixelWithTheVarianceOfItsSource) {
   const testing::HostMaps right = right_row({kNone, kNone, 2, 1.25f, 0.75f, kNone}, Row(6, kNone));

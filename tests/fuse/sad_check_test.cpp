@@ -39,7 +39,7 @@ std::vector<float> run(shared::ImageSize size, PixelType type, const SadCheckOpt
   return checked.read(context);
 }
 
-class SadCheckTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(SadCheckTest);
 
 TEST_P(SadCheckTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -61,9 +61,6 @@ TEST_P(SadCheckTest, EqualsReference) {
     }
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, SadCheckTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, SadCheckTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 /// A ramp of `step` a column, the same scene in both views with disparity 3.
 struct Scene {

@@ -7,16 +7,18 @@
 #include <optional>
 #include <random>
 
-#include "egosgm/error.h"
 #include "tests/reference/match/banded_sgm.h"
 #include "tests/reference/match/census.h"
 #include "tests/reference/match/step_penalties.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
 #include "tests/support/device_maps.h"
+#include "tests/support/expect_refused.h"
 
 namespace egosgm {
 namespace {
+
+using testing::expect_refused;
 
 struct Case {
   shared::ImageSize size;
@@ -130,12 +132,6 @@ Match match(const Case& c, int max_memory_mib = 0) {
   return m;
 }
 
-void expect_same(const testing::HostMaps& actual, const testing::HostMaps& expected, shared::ImageSize size) {
-  EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size));
-  EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size));
-  EXPECT_TRUE(testing::same_bits(actual.doubtful, expected.doubtful, size));
-}
-
 class BandedSgmTest : public ::testing::TestWithParam<Case> {};
 
 /// Whether the device's compiler refuses blocks of so many lanes by name (kernels/match/block.h).
@@ -154,7 +150,7 @@ TEST_P(BandedSgmTest, EqualsReference) {
   const Match m = match(c);
   ASSERT_EQ(m.stripes.size(), 1u);
   const auto expected = reference::banded_sgm(c.size, m.range, m.options, m.codes, m.grey, m.bands, m.reads_off);
-  expect_same(m.measured, expected, c.size);
+  EXPECT_TRUE(testing::same_maps(m.measured, expected, c.size));
 }
 
 /// `rows` rows of every one of `planes` planes, from `first` on.
@@ -211,37 +207,25 @@ TEST(BandedSgmStripes, EqualTheTwinOfEach) {
       const Match m = match(c, scheduling == Scheduling::kPaths ? 4 : 2);
       ASSERT_GE(m.stripes.size(), 3u);
       expect_few_rows(m.stripes, c.size.height);
-      const auto expected = stripe_by_stripe(m, c.size);
-      expect_same(m.measured, expected, c.size);
+      EXPECT_TRUE(testing::same_maps(m.measured, stripe_by_stripe(m, c.size), c.size));
     }
   }
 }
 
 TEST(BandedSgmStripes, TooLittleMemoryForOneNamesTheLimit) {
-  try {
-    match({.size = {640, 120}, .range = {0, 1024}}, 7);
-    ADD_FAILURE() << "matched within 7 MiB";
-  } catch (const DeviceError& error) {
-    const std::string text = error.what();
-    for (const char* part : {"BandedSgm", "96 rows", "max_memory_mib allows 7 MiB", "fewer disparities"}) {
-      EXPECT_NE(text.find(part), std::string::npos) << text;
-    }
-  }
+  expect_refused<DeviceError>(
+      [] {
+        match({.size = {640, 120}, .range = {0, 1024}}, 7);
+      },
+      {"BandedSgm", "96 rows", "max_memory_mib allows 7 MiB", "fewer disparities"});
 }
 
 TEST(BandedSgmPathsGroup, LargerThanTheDeviceAllowsNamesTheLimit) {
   const std::size_t limit = ocl::Context(testing::any_device()).max_work_group_size();
   const int lines = static_cast<int>(limit / 16) + 1;
-  try {
-    match({.size = {9, 5}, .range = {0, 16}, .scheduling = Scheduling::kPaths, .group = {{16, lines}}});
-    ADD_FAILURE() << "launched work-groups of " << 16 * lines;
-  } catch (const DeviceError& error) {
-    const std::string text = error.what();
-    for (const std::string& part : {std::string("BandedSgm: kernel follow_paths"), std::to_string(16 * lines),
-                                    "the device allows " + std::to_string(limit), std::string("--tuning none")}) {
-      EXPECT_NE(text.find(part), std::string::npos) << text;
-    }
-  }
+  const Case c{.size = {9, 5}, .range = {0, 16}, .scheduling = Scheduling::kPaths, .group = {{16, lines}}};
+  expect_refused<DeviceError>([&] { match(c); }, {"BandedSgm: kernel follow_paths", std::to_string(16 * lines),
+                                                  "the device allows " + std::to_string(limit), "--tuning none"});
 }
 
 TEST(BandedSgmStripes, MatchFewRowsTwice) {

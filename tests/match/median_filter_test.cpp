@@ -24,7 +24,7 @@ testing::HostMaps raw_filter(shared::ImageSize size, const testing::HostMaps& in
   ocl::Context context(testing::any_device());
   MedianFilter stage(context, size, pixels);
   StereoMaps maps = testing::upload(context, size, in);
-  Map filtered = testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99)).disparity;
+  Map filtered = testing::upload(context, size, testing::earlier_maps(size)).disparity;
   if (holes == Holes::kFill) {
     stage.fill(maps.disparity, filtered, maps.variance, views);
   } else {
@@ -49,7 +49,7 @@ std::vector<float> filter_left(shared::ImageSize size, const std::vector<float>&
   return filtered;
 }
 
-class MedianFilterTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(MedianFilterTest);
 
 TEST_P(MedianFilterTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -59,8 +59,7 @@ TEST_P(MedianFilterTest, EqualsReference) {
       const testing::HostMaps expected = reference::median_filter(size, policy == Holes::kFill, maps);
       for (const int pixels : {1, 16}) {
         const testing::HostMaps actual = filter(size, maps, policy, pixels);
-        EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size)) << holes << " holes, by " << pixels;
-        EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size)) << holes << " holes, by " << pixels;
+        EXPECT_TRUE(testing::same_maps(actual, expected, size)) << holes << " holes, by " << pixels;
       }
     }
   }
@@ -75,15 +74,11 @@ TEST_P(MedianFilterTest, FiltersTheLeftViewAlone) {
     const testing::HostMaps both = filter(size, maps, holes);
     for (const int pixels : {1, 16}) {
       const testing::HostMaps raw = raw_filter(size, maps, holes, pixels, Views::kLeft), one = testing::masked(raw);
-      EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, one.disparity), size));
-      EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, one.variance), size));
+      EXPECT_TRUE(testing::same_maps(one, testing::left_and_right(both, one), size));
       EXPECT_TRUE(testing::same_bits(raw.variance, testing::left_and_right(raw.variance, uploaded), size));
     }
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, MedianFilterTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, MedianFilterTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(MedianFilter, TakesTheMiddleOfEveryOrder) {
   std::vector<float> window{1, 2, 3, 4, 5, 6, 7, 8, 9};

@@ -36,7 +36,7 @@ HostMaps regions(shared::ImageSize size, float step, unsigned seed) {
   return maps;
 }
 
-class SpeckleRemovalTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(SpeckleRemovalTest);
 
 TEST_P(SpeckleRemovalTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -69,9 +69,6 @@ TEST_P(SpeckleRemovalTest, LooksAtTheLeftViewAlone) {
     EXPECT_TRUE(same_bits(one, testing::left_and_right(both, maps.disparity), size));
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, SpeckleRemovalTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, SpeckleRemovalTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 /// Both views as drawn: a digit is a disparity of ten times its value, a dot none.
 HostMaps drawn(const std::vector<std::string>& rows) {

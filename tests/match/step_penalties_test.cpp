@@ -40,7 +40,7 @@ std::vector<std::uint16_t> random_grey(shared::ImageSize size, int bits) {
   return grey;
 }
 
-class StepPenaltiesTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(StepPenaltiesTest);
 
 TEST_P(StepPenaltiesTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -66,9 +66,6 @@ TEST_P(StepPenaltiesTest, AreWrittenOfTheLeftViewAlone) {
                                    {4 * size.width, size.height}));
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, StepPenaltiesTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, StepPenaltiesTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(StepPenalties, FallWithTheStepInGrey) {
   const std::vector<std::uint8_t> steps = penalties({3, 2}, {10, 40, 240, 10, 30, 35, 0, 0, 0, 0, 0, 0}, PixelType::kU8,

@@ -98,9 +98,7 @@ TEST(OdometryMotion, DenseMovingObjectDoesNotWin) {
     const PointMatch match = random_match(generator, calibration, truth, 0.15);
     if (match.u1 < 380 || match.u1 > 870) matches.push_back(match);
   }
-  StereoOdometryOptions options;
-  options.min_inlier_ratio = 0.2;
-  const auto result = estimate(calibration, matches, options);
+  const auto result = estimate(calibration, matches, {.min_inlier_ratio = 0.2});
   ASSERT_EQ(result.reason, "");
   EXPECT_LT(motion_error(result.motion.current_from_previous, truth).translation_m, 0.02);
 }
@@ -111,8 +109,7 @@ TEST(OdometryMotion, SaysWhyThereIsNone) {
   const auto few = random_matches(generator, calibration, make_motion(0, 0, -1, 0), 8, 0);
   EXPECT_NE(estimate(calibration, few).reason.find("too few matches"), std::string::npos);
 
-  StereoOdometryOptions slow;
-  slow.max_translation_m = 0.5;
+  const StereoOdometryOptions slow{.max_translation_m = 0.5};
   const auto fast = random_matches(generator, calibration, make_motion(0, 0, -1, 0), 200, 0);
   EXPECT_NE(estimate(calibration, fast, slow).reason, "");
   const auto refined = odometry::refine_motion(calibration, slow, {}, fast, make_motion(0, 0, -1, 0));
@@ -123,12 +120,9 @@ TEST(OdometryMotion, SaysWhyThereIsNone) {
 
   std::vector<PointMatch> unrelated;
   for (int i = 0; i < 200; ++i) {
-    PointMatch match = random_match(generator, calibration, make_motion(0, 0, -1, 0), 0);
+    const PointMatch first = random_match(generator, calibration, make_motion(0, 0, -1, 0), 0);
     const PointMatch second = random_match(generator, calibration, make_motion(0, 0, -1, 0), 0);
-    match.u2 = second.u2;
-    match.v2 = second.v2;
-    match.d2 = second.d2;
-    unrelated.push_back(match);
+    unrelated.push_back({first.u1, first.v1, first.d1, second.u2, second.v2, second.d2});
   }
   EXPECT_NE(estimate(calibration, unrelated).reason, "");
 }

@@ -16,8 +16,7 @@ constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 std::vector<float> reject(shared::ImageSize size, float max_jump_px, const testing::HostMaps& maps, int pixels = 0) {
   ocl::Context context(testing::any_device());
   EdgeRejection stage(context, size, {.max_jump_px = max_jump_px}, pixels);
-  Map kept =
-      testing::upload(context, size, testing::random_maps(size, 0, 9, 0.5, 99)).disparity;  // must not shine through
+  Map kept = testing::upload(context, size, testing::earlier_maps(size)).disparity;
   stage.reject(testing::upload(context, size, maps).disparity, kept, Views::kBoth);
   return kept.read(context);
 }
@@ -31,7 +30,7 @@ std::vector<float> reject_row(const std::vector<float>& row, float max_jump_px) 
   return {kept.begin(), kept.begin() + size.width};
 }
 
-class EdgeRejectionTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(EdgeRejectionTest);
 
 TEST_P(EdgeRejectionTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -44,9 +43,6 @@ TEST_P(EdgeRejectionTest, EqualsReference) {
     }
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, EdgeRejectionTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, EdgeRejectionTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(EdgeRejection, DropsBothSidesOfAJump) {
   EXPECT_EQ(reject_row({10, 10, 10, 10, 30, 30, 30}, 5), (std::vector<float>{10, 10, 10, kNone, kNone, 30, 30}));

@@ -21,16 +21,13 @@ constexpr shared::ImageSize kSize{101, 61};
 constexpr shared::DisparityRange kRange{0, 64};
 const Calibration kCalibration{.fx = 100, .fy = 100, .cx = 50, .cy = 30, .baseline_m = 0.5};  // Z = 50 / d
 
-// What lies in the output must not shine through.
-testing::HostMaps before(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
-
 testing::HostMaps warp(shared::ImageSize size, const Calibration& calibration, shared::DisparityRange range,
                        float process_noise_px2, const testing::HostMaps& belief, const Motion& motion, int pixels = 0,
                        Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   ForwardWarp stage(context, size, calibration, {.process_noise_px2 = process_noise_px2}, range, pixels);
   const StereoMaps in = testing::upload(context, size, belief);
-  StereoMaps out = testing::upload(context, size, before(size));
+  StereoMaps out = testing::upload(context, size, testing::earlier_maps(size));
   FlagMap evidence(context, 2 * pixel_count(size)), moved(context, 2 * pixel_count(size));
   evidence.write(context, belief.evidence.empty() ? std::vector<cl_uchar>(evidence.size()) : belief.evidence);
   moved.write(context, std::vector<cl_uchar>(moved.size(), 77));
@@ -79,7 +76,7 @@ std::size_t count_valid(const std::vector<float>& disparity, int view) {
   return static_cast<std::size_t>(std::count_if(first, last, [](float d) { return d > kNone; }));
 }
 
-class ForwardWarpTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(ForwardWarpTest);
 
 TEST_P(ForwardWarpTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -102,12 +99,7 @@ TEST_P(ForwardWarpTest, EqualsReference) {
                                   disparity_motion(calibration, motion, EGOSGM_RIGHT), 0.25f, belief);
       for (const int pixels : {1, 16}) {
         const testing::HostMaps actual = warp(size, calibration, range, 0.25f, belief, motion, pixels);
-        EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
-            << "min " << range.min << ", by " << pixels;
-        EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
-            << "min " << range.min << ", by " << pixels;
-        EXPECT_EQ(actual.evidence, expected.evidence) << "min " << range.min << ", by " << pixels;
-        EXPECT_EQ(actual.hidden, expected.hidden) << "min " << range.min << ", by " << pixels;
+        EXPECT_TRUE(testing::same_maps(actual, expected, size)) << "min " << range.min << ", by " << pixels;
       }
     }
   }
@@ -115,23 +107,19 @@ TEST_P(ForwardWarpTest, EqualsReference) {
 
 TEST_P(ForwardWarpTest, PredictsTheLeftViewAlone) {
   const shared::ImageSize size = GetParam();
-  const testing::HostMaps belief = testing::random_maps(size, 0, 70, 0.2, 18), was = before(size);
+  const testing::HostMaps belief = testing::random_maps(size, 0, 70, 0.2, 18);
   std::mt19937 random(19);
   const Motion motion = random_motion(random, 0.3, 0.02);
   const testing::HostMaps both = warp(size, kCalibration, kRange, 0.25f, belief, motion);
   for (const int pixels : {1, 16}) {
     const testing::HostMaps one = warp(size, kCalibration, kRange, 0.25f, belief, motion, pixels, Views::kLeft);
-    EXPECT_TRUE(testing::same_bits(one.disparity, testing::left_and_right(both.disparity, was.disparity), size));
-    EXPECT_TRUE(testing::same_bits(one.variance, testing::left_and_right(both.variance, was.variance), size));
+    EXPECT_TRUE(testing::same_maps(one, testing::left_and_right(both, testing::earlier_maps(size)), size));
     const std::size_t left = one.hidden.size() / 2;
     EXPECT_TRUE(
         std::equal(one.hidden.begin(), one.hidden.begin() + static_cast<std::ptrdiff_t>(left), both.hidden.begin()));
     EXPECT_EQ(std::count(one.hidden.begin() + static_cast<std::ptrdiff_t>(left), one.hidden.end(), 1), 0);
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, ForwardWarpTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, ForwardWarpTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(ForwardWarp, WithoutMotionOnlyTheVarianceGrows) {
   const testing::HostMaps belief = testing::random_maps(kSize, 0, 63, 0.2, 13);
@@ -271,8 +259,7 @@ TEST(ForwardWarp, SurvivesWildMotions) {
       const testing::HostMaps expected =
           reference::forward_warp(kSize, kRange, disparity_motion(kCalibration, motion, EGOSGM_LEFT),
                                   disparity_motion(kCalibration, motion, EGOSGM_RIGHT), 0.25f, belief);
-      EXPECT_TRUE(testing::same_bits(predicted.disparity, expected.disparity, kSize)) << metres << " m";
-      EXPECT_TRUE(testing::same_bits(predicted.variance, expected.variance, kSize)) << metres << " m";
+      EXPECT_TRUE(testing::same_maps(predicted, {expected.disparity, expected.variance}, kSize)) << metres << " m";
       for (std::size_t i = 0; i < predicted.disparity.size(); ++i) {
         const float d = predicted.disparity[i], p = predicted.variance[i];
         ASSERT_TRUE(d == kNone ? p == 0 : d >= 0 && d <= 63 && p >= 0.25f && p <= 1e6f)

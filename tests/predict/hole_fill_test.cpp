@@ -15,15 +15,12 @@ namespace {
 
 constexpr float kNone = EGOSGM_INVALID_DISPARITY;
 
-/// What lies in the output must not shine through.
-testing::HostMaps before_fill(shared::ImageSize size) { return testing::random_maps(size, 0, 9, 0.5, 99); }
-
 testing::HostMaps fill(shared::ImageSize size, float max_difference_px, const testing::HostMaps& maps, int pixels = 0,
                        Views views = Views::kBoth) {
   ocl::Context context(testing::any_device());
   HoleFill stage(context, size, {.max_difference_px = max_difference_px}, pixels);
   const StereoMaps in = testing::upload(context, size, testing::with_marks(maps));
-  StereoMaps out = testing::upload(context, size, before_fill(size));
+  StereoMaps out = testing::upload(context, size, testing::earlier_maps(size));
   FlagMap hidden(context, in.disparity.size());
   hidden.write(context, std::vector<cl_uchar>(hidden.size(), 9));
   stage.fill(in, out, hidden, views);
@@ -51,7 +48,7 @@ std::vector<float> fill_left(shared::ImageSize size, const std::vector<float>& d
   return filled;
 }
 
-class HoleFillTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(HoleFillTest);
 
 TEST_P(HoleFillTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -64,11 +61,7 @@ TEST_P(HoleFillTest, EqualsReference) {
     const testing::HostMaps expected = reference::hole_fill(size, max_difference_px, maps);
     for (const int pixels : {1, 16}) {
       const testing::HostMaps actual = fill(size, max_difference_px, maps, pixels);
-      EXPECT_TRUE(testing::same_bits(actual.disparity, expected.disparity, size))
-          << max_difference_px << " px, by " << pixels;
-      EXPECT_TRUE(testing::same_bits(actual.variance, expected.variance, size))
-          << max_difference_px << " px, by " << pixels;
-      EXPECT_EQ(actual.hidden, expected.hidden) << max_difference_px << " px, by " << pixels;
+      EXPECT_TRUE(testing::same_maps(actual, expected, size)) << max_difference_px << " px, by " << pixels;
     }
   }
 }
@@ -83,15 +76,10 @@ TEST_P(HoleFillTest, FillsTheLeftViewAlone) {
   for (const int pixels : {1, 16}) {
     SCOPED_TRACE(pixels);
     const testing::HostMaps actual = fill(size, 1, maps, pixels, Views::kLeft);
-    const auto before = before_fill(size);
-    EXPECT_EQ(actual.disparity, testing::left_and_right(both.disparity, before.disparity));
-    EXPECT_EQ(actual.variance, testing::left_and_right(both.variance, before.variance));
+    EXPECT_TRUE(testing::same_maps(actual, testing::left_and_right(both, testing::earlier_maps(size)), size));
     EXPECT_TRUE(std::equal(actual.hidden.begin(), actual.hidden.begin() + right, both.hidden.begin()));
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, HoleFillTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, HoleFillTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(HoleFill, FillsAGapWithTheMeanAndTheLargerVariance) {
   for (const shared::ImageSize size : {shared::ImageSize{3, 1}, shared::ImageSize{1, 3}}) {

@@ -4,7 +4,6 @@ import json
 import os
 import resource
 import subprocess
-import unittest
 
 from program_case import PROGRAM, ProgramTest, png
 
@@ -101,7 +100,3 @@ class Bounds(ProgramTest):
         file = self.new_folder() / "config.toml"
         file.write_text("[" + "a." * 5000 + "a]\n")
         self.assert_bounded(file, "run", "--odometry", self.street, "--config", file, "--out", self.folder / "never", says="nested too deep")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-import unittest
 
 import numpy
 
@@ -309,7 +308,3 @@ class Maps(Brought):
             self.assert_refused(["eval", self.maps / name, self.maps / "truth.npy", "--scale", 16], "--scale 16", name)
         self.png16(self.maps / "map.png", numpy.rint(self.truth * 256))
         self.assert_refused(["eval", self.maps / "map.png", self.maps / "truth.npy", "--truth-scale", 16], "--truth-scale 16", "truth.npy")
-
-
-if __name__ == "__main__":
-    unittest.main()

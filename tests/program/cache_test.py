@@ -92,7 +92,3 @@ class ProgramCaches(ProgramTest):
         self.assertTrue(last.startswith("egosgm: error: "), done.stderr)
         self.assertIn("delete the cache", last)
         self.assertIn("POCL_CACHE_DIR", last)
-
-
-if __name__ == "__main__":
-    unittest.main()

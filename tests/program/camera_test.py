@@ -2,7 +2,6 @@
 """The example of a live camera, on videos. Environment as for program_case.py."""
 import os
 import subprocess
-import unittest
 
 import numpy
 
@@ -55,7 +54,3 @@ class Camera(InputTest):
             done = self.run_camera(*arguments)
             self.assertNotEqual(done.returncode, 0, arguments)
             self.assertTrue(done.stderr)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -240,7 +240,3 @@ class DoctorOnRealData(InputTest):
             findings = self.examine(*arguments)
             self.assertEqual(findings["rows"]["verdict"], "ok")
             self.assertEqual(findings["sides"]["verdict"], "ok")
-
-
-if __name__ == "__main__":
-    unittest.main()

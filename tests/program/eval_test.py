@@ -6,7 +6,6 @@ import shlex
 import shutil
 import signal
 import subprocess
-import unittest
 
 from program_case import FRAMES, PROGRAM, ProgramTest, egosgm, grey_png
 
@@ -183,7 +182,3 @@ class EvalPoses(ProgramTest):
         (out / "report.json").write_text(json.dumps(report))
         self.assert_refused(["eval-poses", out, self.street / "poses.txt"], "holds 4 poses", "lists 2 frames")
         self.assert_works("eval-poses", shutil.copy(out / "poses.txt", out / "others.txt"), self.street / "poses.txt")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -3,7 +3,6 @@
 import json
 import shutil
 import struct
-import unittest
 
 from program_case import FRAMES, HEIGHT, WIDTH, ProgramTest, grey_png, png
 
@@ -185,7 +184,3 @@ class EvalOverTime(ProgramTest):
         (broken / "000003.png").write_bytes(constant_png(1)[:100])
         refused([broken, truth], "000003.png")
         refused([truth, truth, "--flow", truth], "000000.png", "optical flow")
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -98,7 +98,3 @@ class Evidence(ProgramTest):
         self.assertEqual([row[0] for row in rows], ["3 px", "4 px", "6 px", "8 px", "14 px"])
         for _, video, single in rows:
             self.assertTrue(0 <= video <= 100 and 0 <= single <= 100)
-
-
-if __name__ == "__main__":
-    unittest.main()

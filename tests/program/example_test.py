@@ -3,7 +3,6 @@
 import json
 import re
 import subprocess
-import unittest
 
 from program_case import EXAMPLES, SOURCE, ProgramTest
 
@@ -55,7 +54,3 @@ class Example(ProgramTest):
                 self.assertIn(f"def {test}(", sources)
             else:
                 self.assertRegex(sources, rf"TEST(_F|_P)?\({suite}, {test}\)")
-
-
-if __name__ == "__main__":
-    unittest.main()

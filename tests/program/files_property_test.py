@@ -259,7 +259,3 @@ class RandomCommandsOne(RandomCommands):
 class RandomCommandsTwo(RandomCommands):
     def test_what_is_the_users_stays(self):
         print(self.drive(2))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -381,7 +381,3 @@ class TuneFiles(FilesTest):
         for name, text in (("shape.json", '{"a, driver b": {"hello": 3}}'), ("number.json", '{"a": 7}'), ("list.json", "[]"), ("text.json", "mine")):
             (folder / name).write_text(text)
             self.assert_refused_and_untouched(folder, [*tune, folder / name], name)
-
-
-if __name__ == "__main__":
-    unittest.main()

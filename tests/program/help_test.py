@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-import unittest
 
 from program_case import HAS_PACKAGE, PROGRAM, SOURCE, ProgramTest, egosgm
 
@@ -129,7 +128,3 @@ class Help(ProgramTest):
             last = done.stderr.splitlines()[-1]
             self.assertTrue(last.startswith("egosgm: error: "), done.stderr)
             self.assertIn("POCL_CACHE_DIR", last)
-
-
-if __name__ == "__main__":
-    unittest.main()

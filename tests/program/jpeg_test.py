@@ -4,7 +4,6 @@ import base64
 import json
 import re
 import shutil
-import unittest
 
 from program_case import FRAMES, ProgramTest
 
@@ -73,7 +72,3 @@ class Jpeg(ProgramTest):
         file.write_bytes(file.read_bytes()[:-200])
         self.assertIn(str(file), self.assert_works("run", broken, "--out", broken.parent / "out"))
         self.assert_refused(["odometry", broken, "--out", broken.parent / "poses.txt"], file)
-
-
-if __name__ == "__main__":
-    unittest.main()

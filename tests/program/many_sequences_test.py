@@ -11,7 +11,6 @@ import signal
 import struct
 import subprocess
 import time
-import unittest
 
 from program_case import EXAMPLES, PROGRAM, SOURCE, ProgramTest, egosgm
 
@@ -233,7 +232,3 @@ class ManySequences(ProgramTest):
             errors = process.stderr.read()
         self.assertEqual(process.returncode, 130, errors)
         self.assertNotIn("egosgm: error", errors)
-
-
-if __name__ == "__main__":
-    unittest.main()

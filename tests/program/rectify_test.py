@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import struct
-import unittest
 
 import numpy
 
@@ -368,7 +367,3 @@ class RectifyFisheye(RectifyTest):
                             "fisheye model has 4")
         self.assert_refused(["rectify", *self.PAIRS, "--fisheye", "--calib", self.street / "calib.txt", "--out", self.folder / "never"],
                             "--fisheye", "calib.txt")
-
-
-if __name__ == "__main__":
-    unittest.main()

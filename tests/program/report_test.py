@@ -399,7 +399,3 @@ class ReportInBrowser(ReportTest):
             texts = json.dumps(self.browser.errors())
         self.assertIn("setUpPicture is not defined", texts)
         self.assertIn("Content Security Policy", texts)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -506,13 +506,6 @@ class RealData(ProgramTest):
     def evaluate(self, estimate, truth):
         return json.loads(self.assert_works("eval", "--estimate", estimate, "--truth", truth, "--json"))["pooled"]
 
-    def test_evaluation_agrees_with_kittis_kit(self):
-        kit = self.data / "devkit2012"
-        figures = self.evaluate(kit / "disp_est.png", kit / "disp_gt.png")
-        for key, value in {"density": 96.337, "interpolated": 5.186, "bad_of_valid": 4.393, "bad_or_missing": 7.894,
-                           "d1_interpolated": 5.185}.items():
-            self.assertAlmostEqual(figures[key], value, delta=0.0006, msg=key)
-
     def test_kitti_2012_beats_the_single_frame(self):
         training = self.data / "kitti2012/training"
         figures = {}
@@ -536,13 +529,3 @@ class RealData(ProgramTest):
         out = self.new_folder()
         self.assert_works("run", "--dataset", self.data / "middlebury/Motorcycle", "--out", out)
         self.assertGreater(self.report(out)["calibration"]["doffs_px"], 1)
-
-    def test_odometry_excerpt(self):
-        folder, poses = self.data / "odometry/sequences/A", self.new_folder() / "poses.txt"
-        self.assert_works("odometry", folder, "--out", poses)
-        drift = json.loads(self.assert_works("eval-poses", "--estimate", poses, "--truth", folder / "poses.txt", "--json"))
-        self.assertLessEqual(drift["end_drift_percent"], 1.5)
-
-
-if __name__ == "__main__":
-    unittest.main()

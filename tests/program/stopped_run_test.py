@@ -439,7 +439,3 @@ class Resume(LongRuns):
         self.assert_refused([*run, "--resume"], out / "report.json")
         (out / "report.json").unlink()
         self.assert_refused([*run, "--resume"], out, "report.json")
-
-
-if __name__ == "__main__":
-    unittest.main()

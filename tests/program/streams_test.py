@@ -4,7 +4,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import unittest
 
 from program_case import FEW_KERNELS, HAS_PACKAGE, PROGRAM, ProgramTest
 
@@ -58,7 +57,3 @@ class StandardError(ProgramTest):
         out = self.new_folder() / "poses.txt"
         self.assertEqual(self.code_of(["odometry", self.street, "--out", out], "2>&-"), 0)
         self.assertEqual(len(out.read_text().splitlines()), 4)
-
-
-if __name__ == "__main__":
-    unittest.main()

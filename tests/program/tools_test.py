@@ -159,7 +159,3 @@ class ReadCalibration(ProgramTest):
         self.assertEqual((process.returncode, errors.count("\n")), (130, 1), errors)
         self.assertTrue(self.report(stopped)["frames"])
         self.assertEqual(list(temporary.iterdir()), [])
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -2,7 +2,6 @@
 """Wrong arguments and broken files: one line each that names the value and the remedy."""
 import os
 import struct
-import unittest
 import zlib
 
 from program_case import FRAMES, HEIGHT, WIDTH, ProgramTest, egosgm, grey_png
@@ -293,51 +292,21 @@ class BrokenInput(ProgramTest):
         self.assert_sequence_refused(street, "000000.png")
 
     def test_calibrations(self):
-        good = (self.street / "calib.txt").read_text().splitlines()
-        left = good[0].split()
-
-        def with_left(index, value):
-            return " ".join(left[:index] + [value] + left[index + 1:])
-
-        def with_right_shift(value):
-            row = good[1].split()
-            row[4] = value
-            return " ".join(row)
-
-        for name, rows in {
-                "zero focal length": [with_left(1, "0"), good[1]],
-                "NaN": [with_left(1, "nan"), good[1]],
-                "too few numbers": [" ".join(left[:-1]), good[1]],
-                "no number": [with_left(3, "wide"), good[1]],
-                "zero baseline": [good[0], with_right_shift("0")],
-                "negative baseline": [good[0], with_right_shift("100")],
-                "one camera": [good[0]],
-                "empty": [],
-        }.items():
-            with self.subTest(name):
-                street = self.broken_street()
-                (street / "calib.txt").write_text("\n".join(rows) + "\n")
-                self.assert_sequence_refused(street, "calib.txt")
-        street = self.broken_street()
+        """What rows must hold, the tests of the library's reader say."""
+        for text in ((self.street / "calib.txt").read_text().replace("P0: ", "P0: nan "), ""):
+            street = self.broken_street()
+            (street / "calib.txt").write_text(text)
+            self.assert_sequence_refused(street, "calib.txt")
         (street / "calib.txt").unlink()
         self.assert_sequence_refused(street, "calib.txt")
 
     def test_poses(self):
+        """What rows must hold, the tests of the library's reader say."""
         rows = (self.street / "poses.txt").read_text().splitlines()
-        stretched = "2 0 0 0 0 1 0 0 0 0 1 0"
-        mirrored = "-1 0 0 0 0 1 0 0 0 0 1 0"
-        for name, bad in {"too few numbers": "1 0 0", "not a rotation": stretched, "a reflection": mirrored, "words": "a " * 12,
-                          "NaN": "nan " * 12}.items():
-            with self.subTest(name):
-                poses = self.new_folder() / "poses.txt"
-                poses.write_text("\n".join([rows[0], bad, *rows[2:]]) + "\n")
-                self.assert_sequence_refused(self.street, f"{poses}:2", options=["--poses", poses])
         poses = self.new_folder() / "poses.txt"
+        poses.write_text("\n".join([rows[0], "-1 0 0 0 0 1 0 0 0 0 1 0", *rows[2:]]) + "\n")
+        self.assert_sequence_refused(self.street, f"{poses}:2", options=["--poses", poses])
         poses.write_text(rows[0] + "\n")
         self.assert_sequence_refused(self.street, poses, options=["--poses", poses])
         self.assert_sequence_refused(self.street, "nowhere", options=["--poses", "nowhere"])
         self.assert_refused(["eval-poses", "--estimate", poses, "--truth", self.street / "poses.txt"])
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -24,7 +24,7 @@ std::vector<cl_uchar> marks_of(shared::ImageSize size, const testing::HostMaps& 
   return marks.read(context);
 }
 
-class DynamicMapTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(DynamicMapTest);
 
 TEST_P(DynamicMapTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -38,9 +38,6 @@ TEST_P(DynamicMapTest, EqualsReference) {
     }
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, DynamicMapTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, DynamicMapTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 TEST(DynamicMap, MarksAnObjectAndNotSingleMismatches) {
   const shared::ImageSize size{60, 40};

@@ -41,7 +41,7 @@ std::vector<float> output_variance(shared::ImageSize size, const testing::HostMa
   return output_variance(size, measured.disparity, measured, measured, options, pixels, views);
 }
 
-class OutputVarianceTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(OutputVarianceTest);
 
 TEST_P(OutputVarianceTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -60,9 +60,6 @@ TEST_P(OutputVarianceTest, EqualsReference) {
     }
   }
 }
-
-INSTANTIATE_TEST_SUITE_P(Sizes, OutputVarianceTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, OutputVarianceTest, ::testing::Values(testing::kLargest), testing::size_name);
 
 /// What is given out for a sum of squares.
 float given_for(float sum) {

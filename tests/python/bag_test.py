@@ -29,6 +29,7 @@ WIDTH, HEIGHT, FRAMES = 320, 96, 3
 SEED = 7
 OPTIONS = dict(disparities=48, paths=4)
 RATE_NS = 100_000_000
+SIDES = "left", "right"
 START = 1_700_000_000_000_000_000
 SET = ["--set", "disparities=48", "--set", "paths=4", "--quiet"]
 TOPICS = ["--left-topic", "/left/image_rect", "--right-topic", "/right/image_rect"]
@@ -72,6 +73,10 @@ class Recording:
         self.add(topic, "sensor_msgs/msg/CameraInfo", START, height=HEIGHT, width=WIDTH, distortion_model="plumb_bob", **values,
                  binning_x=0, binning_y=0, roi=region)
 
+    def pose(self, time, received=None, at=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0, 1.0)):
+        position, orientation = self.types["geometry_msgs/msg/Point"](*at), self.types["geometry_msgs/msg/Quaternion"](*turn)
+        self.add("/odom", "geometry_msgs/msg/PoseStamped", time, received, pose=self.types["geometry_msgs/msg/Pose"](position, orientation))
+
     def write(self, path):
         self.messages.sort(key=lambda item: item[0])
         plugin = {} if self.kind == "ros1" else dict(version=9, storage_plugin=StoragePlugin.MCAP if self.kind == "mcap" else StoragePlugin.SQLITE3)
@@ -85,17 +90,24 @@ class Recording:
         return next(path.glob("*.mcap")) if self.kind == "mcap" else path
 
 
-def record(kind, path, street, frames, skew_ns=0, left_out=(), times=None, **infos):
+def drive_of(street, frames, change=lambda message: message, image=lambda pixels: pixels, encoding=None, kind="mcap", times=None,
+             of_right=lambda i, time: time, left_out=(), in_order=False):
+    """A recording whose camera infos and images are changed; it received them when they are stamped, or in order."""
     recording = Recording(kind)
-    for side, name in enumerate(("left", "right")):
-        recording.info(f"/{name}/camera_info", street.calibration, side, **infos)
+    for side, name in enumerate(SIDES):
+        recording.info(f"/{name}/camera_info", street.calibration, side)
+        change(recording.messages[-1][3])
     for i, frame in enumerate(frames):
         time = times[i] if times else START + i * RATE_NS
-        if (i, "left") not in left_out:
-            recording.image("/left/image_rect", time, frame.left)
-        if (i, "right") not in left_out:
-            recording.image("/right/image_rect", time + skew_ns, frame.right)
-    return recording.write(path)
+        for side, name in enumerate(SIDES):
+            stamp = of_right(i, time) if side else time
+            if (i, name) not in left_out:
+                recording.image(f"/{name}/image_rect", stamp, image(getattr(frame, name)), encoding, None if in_order else stamp + side)
+    return recording
+
+
+def record(kind, path, street, frames, **how):
+    return drive_of(street, frames, kind=kind, in_order=True, **how).write(path)
 
 
 def program(*arguments):
@@ -246,7 +258,7 @@ def test_a_calibration_that_changes_is_seen(tmp_path, street, frames):
     c = street.calibration
     half = egosgm.Calibration(c.fx / 2, c.fy, c.cx, c.cy, c.baseline_m)
     for i, frame in enumerate(frames):
-        for side, name in enumerate(("left", "right")):
+        for side, name in enumerate(SIDES):
             recording.info(f"/{name}/camera_info", c if i < 2 else half, side)
             recording.image(f"/{name}/image_rect", START + i * RATE_NS, (frame.left, frame.right)[side])
     bag = bags.Bag(recording.write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect")
@@ -413,7 +425,7 @@ def test_python_runs_a_bag(tmp_path, street, frames):
 
 def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, frames):
     times = [START, START + RATE_NS, START + 2 * RATE_NS, START + 17 * RATE_NS, START + 3 * RATE_NS]
-    path = record("mcap", tmp_path / "drive", street, [frames[i % FRAMES] for i in range(5)], skew_ns=2_000_000, times=times,
+    path = record("mcap", tmp_path / "drive", street, [frames[i % FRAMES] for i in range(5)], of_right=lambda i, time: time + 2_000_000, times=times,
                   left_out=[(1, "right")])
     bag = bags.Bag(path, "/left/image_rect", "/right/image_rect", max_skew_ms=3)
     found = list(bag.frames())
@@ -429,7 +441,7 @@ def test_stamps_pair_within_their_bound_and_gaps_are_told(tmp_path, street, fram
 def test_messages_that_were_received_out_of_order(tmp_path, street, frames):
     """Within a second they are sorted: no pair is made up, and none is lost."""
     recording = Recording("mcap")
-    for side, name in enumerate(("left", "right")):
+    for side, name in enumerate(SIDES):
         recording.info(f"/{name}/camera_info", street.calibration, side)
     for i, name in ((2, "left"), (0, "left"), (0, "right"), (2, "right"), (1, "right"), (1, "left"), (3, "left"), (3, "right")):
         recording.image(f"/{name}/image_rect", START + i * RATE_NS, getattr(frames[i % FRAMES], name))
@@ -501,7 +513,7 @@ def test_a_pair_that_comes_twice_is_left_out(tmp_path, street, frames):
 
 def test_without_stamps_the_times_of_the_recording_are_taken(tmp_path, street, frames):
     recording = Recording("mcap")
-    for side, name in enumerate(("left", "right")):
+    for side, name in enumerate(SIDES):
         recording.info(f"/{name}/camera_info", street.calibration, side)
         for i in range(FRAMES):
             recording.image(f"/{name}/image_rect", 0, (frames[i].left, frames[i].right)[side], received=START + i * RATE_NS + 1_000_000 * side)
@@ -519,7 +531,7 @@ def test_the_parts_of_a_bag_in_a_folder_that_nothing_describes(kind, suffix, tmp
     (tmp_path / "parts").mkdir()
     for part in (1, 0):
         recording = Recording(kind)
-        for side, name in enumerate(("left", "right")):
+        for side, name in enumerate(SIDES):
             if part == 0:
                 recording.info(f"/{name}/camera_info", street.calibration, side)
             time = START + part * RATE_NS
@@ -708,9 +720,9 @@ def test_raw_images_are_rectified_by_their_infos(street):
 
 def test_either_camera_may_be_the_raw_one(tmp_path, street, frames):
     raw = []
-    for side, name in enumerate(("left", "right")):
+    for side, name in enumerate(SIDES):
         recording = Recording("mcap")
-        for other, topic in enumerate(("left", "right")):
+        for other, topic in enumerate(SIDES):
             recording.info(f"/{topic}/camera_info", street.calibration, other, distortion=(0.1 * (side == other), 0, 0, 0, 0))
             recording.image(f"/{topic}/image", START, (frames[0].left, frames[0].right)[other])
         bag = bags.Bag(recording.write(tmp_path / name), "/left/image", "/right/image")
@@ -727,11 +739,8 @@ def test_next_to_no_disparity_is_infinitely_uncertain(street):
 def test_poses_of_the_bag_are_the_motion(tmp_path, street, frames):
     def recorded(name, times, received=None):
         recording = drive_of(street, frames, times=times)
-        types = recording.types
         for i in (-1, 0, 1, 2, 3):  # between the frames, of a constant speed of 8 m/s, forward
-            recording.add("/odom", "geometry_msgs/msg/PoseStamped", 0 if received else START + i * RATE_NS + RATE_NS // 2, received, pose=types["geometry_msgs/msg/Pose"](
-                position=types["geometry_msgs/msg/Point"](x=0.8 * i, y=0.0, z=0.0),
-                orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)))
+            recording.pose(0 if received else START + i * RATE_NS + RATE_NS // 2, received, at=(0.8 * i, 0.0, 0.0))
         return recording.write(tmp_path / name)
 
     path = recorded("drive", None)
@@ -802,9 +811,7 @@ def of_pose(**fields):
     ("/odom", of_pose(x=0.0, y=0.0, z=0.0, w=0.0), "no rotation"), ("/odom", of_pose(at_x=np.nan), "pose 0 is not finite"), ("/odom", of_pose(w=np.inf), "pose 0 is not finite")])
 def test_a_message_that_is_wrong_is_one_line(topic, change, named, tmp_path, street, frames, capfd):
     recording = drive_of(street, frames[:1])
-    types = recording.types
-    recording.add("/odom", "geometry_msgs/msg/PoseStamped", START, pose=types["geometry_msgs/msg/Pose"](
-        position=types["geometry_msgs/msg/Point"](x=0.0, y=0.0, z=0.0), orientation=types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)))
+    recording.pose(START)
     message, = (item[3] for item in recording.messages if item[1] == topic)
     change(message)
     bag = recording.write(tmp_path / "drive")
@@ -814,11 +821,8 @@ def test_a_message_that_is_wrong_is_one_line(topic, change, named, tmp_path, str
 
 
 def test_stamps_before_1970(tmp_path, street, frames, capfd):
-    recording = Recording("mcap")
-    for side, name in enumerate(("left", "right")):
-        recording.info(f"/{name}/camera_info", street.calibration, side)
-        recording.image(f"/{name}/image_rect", -5 * 10**9, (frames[0].left, frames[0].right)[side])
-    refused(capfd, ["--bag", recording.write(tmp_path / "drive"), *TOPICS, "--out", tmp_path / "out.mcap", *SET], "a stamp of -5 s")
+    bag = record("mcap", tmp_path / "drive", street, frames[:1], times=[-5 * 10**9])
+    refused(capfd, ["--bag", bag, *TOPICS, "--out", tmp_path / "out.mcap", *SET], "a stamp of -5 s")
     assert os.listdir(tmp_path) == ["drive"]
 
 
@@ -922,20 +926,6 @@ def test_a_silent_camera_costs_no_memory():
 
 # What drives of other people are like.
 
-def drive_of(street, frames, change=lambda message: message, image=lambda pixels: pixels, encoding=None, kind="mcap", times=None, of_right=None):
-    """A recording whose camera infos and images are changed."""
-    recording = Recording(kind)
-    for side, name in enumerate(("left", "right")):
-        recording.info(f"/{name}/camera_info", street.calibration, side)
-        change(recording.messages[-1][3])
-        for i, frame in enumerate(frames):
-            time = (times or [START + k * RATE_NS for k in range(len(frames))])[i]
-            if side and of_right:
-                time = of_right(i, time)
-            recording.image(f"/{name}/image_rect", time, image((frame.left, frame.right)[side]), encoding, received=time + side)
-    return recording
-
-
 def told_of(capfd, path, *arguments):
     with tempfile.TemporaryDirectory() as folder:
         code = bag_program.main(["--bag", str(path), *TOPICS, *SET[:-1], "--out", folder, *map(str, arguments)])
@@ -1014,7 +1004,7 @@ def test_an_empty_distortion_and_an_unset_rotation(tmp_path, street, frames):
 
 def test_the_first_infos_may_be_unset(tmp_path, street, frames):
     recording = drive_of(street, frames)
-    for side, name in enumerate(("left", "right")):
+    for side, name in enumerate(SIDES):
         recording.info(f"/{name}/camera_info", street.calibration, side)
         received, topic, kind, message = recording.messages.pop()
         message.k, message.p, message.r = np.zeros(9), np.zeros(12), np.zeros(9)
@@ -1023,21 +1013,24 @@ def test_the_first_infos_may_be_unset(tmp_path, street, frames):
     assert len(list(bag.frames())) == FRAMES and bag.cameras.calibration.fx == pytest.approx(street.calibration.fx)
 
 
-def test_a_broken_message_costs_its_pair(tmp_path, street, frames, capfd):
+def with_a_broken_message(street, frames):
+    """The third one of four of the right camera."""
     recording = drive_of(street, [frames[i % FRAMES] for i in range(4)])
     for received, topic, _, message in recording.messages:
         if topic == "/right/image_rect" and received == START + 2 * RATE_NS + 1:
             message.height, message.width, message.step, message.data = 1, 1, 1, np.zeros(1, np.uint8)
+    return recording
+
+
+def test_a_broken_message_costs_its_pair(tmp_path, street, frames, capfd):
+    recording = with_a_broken_message(street, frames)
     path = recording.write(tmp_path / "drive")
     said = told_of(capfd, path)
     assert "3 frames" in said and "1 broken message, whose pairs are left out: /right/image_rect at 1700000000.200000000 s: an image of 1x1 px" in said
 
 
 def test_a_drive_warns_of_broken_messages_and_iterations_keep_theirs(tmp_path, street, frames):
-    recording = drive_of(street, [frames[i % FRAMES] for i in range(4)])
-    for received, topic, _, message in recording.messages:
-        if topic == "/right/image_rect" and received == START + 2 * RATE_NS + 1:
-            message.height, message.width, message.step, message.data = 1, 1, 1, np.zeros(1, np.uint8)
+    recording = with_a_broken_message(street, frames)
     bag = bags.Bag(recording.write(tmp_path / "drive"), "/left/image_rect", "/right/image_rect")
     with pytest.warns(UserWarning, match="1 broken message"):
         assert len(list(egosgm.run(bag, disparities=16))) == 3
@@ -1182,15 +1175,12 @@ def test_poses_come_from_one_source(tmp_path, capfd):
 
 def test_poses_of_another_unit_are_told(tmp_path, street, frames, capfd):
     recording = drive_of(street, frames)
-    types = recording.types
     world_from_camera = np.eye(4)
     for i in range(FRAMES):
         if i:
             world_from_camera = world_from_camera @ np.linalg.inv(street.motion(i).current_from_previous)
-        x, y, z, w = ros_images.quaternion_of(world_from_camera[:3, :3])
-        at = 1000 * world_from_camera[:3, 3]
-        recording.add("/odom", "geometry_msgs/msg/PoseStamped", START + i * RATE_NS, START + i * RATE_NS, pose=types["geometry_msgs/msg/Pose"](
-            position=types["geometry_msgs/msg/Point"](x=at[0], y=at[1], z=at[2]), orientation=types["geometry_msgs/msg/Quaternion"](x=x, y=y, z=z, w=w)))
+        turn = ros_images.quaternion_of(world_from_camera[:3, :3])
+        recording.pose(START + i * RATE_NS, START + i * RATE_NS, 1000 * world_from_camera[:3, 3], turn)
     said = told_of(capfd, recording.write(tmp_path / "drive"), "--pose-topic", "/odom", "--pose-axes", "optical")
     assert "the given poses contradict the images" in said and "millimetres" in said
 

@@ -45,7 +45,7 @@ void expect_same(const reference::SearchBands& actual, const reference::SearchBa
   EXPECT_TRUE(same_bits(actual.row_sums, expected.row_sums, {1, size.height}));
 }
 
-class SearchBandTest : public ::testing::TestWithParam<shared::ImageSize> {};
+EGOSGM_TEST_AT_ALL_SIZES(SearchBandTest);
 
 TEST_P(SearchBandTest, EqualsReference) {
   const shared::ImageSize size = GetParam();
@@ -127,20 +127,11 @@ TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Sizes, SearchBandTest, ::testing::ValuesIn(testing::kSizes), testing::size_name);
-INSTANTIATE_TEST_SUITE_P(Large, SearchBandTest, ::testing::Values(testing::kLargest), testing::size_name);
-
-/// Two views of `size` without a prediction.
-HostMaps nothing(shared::ImageSize size) {
-  const std::size_t pixels = 2 * static_cast<std::size_t>(size.width) * size.height;
-  return {std::vector(pixels, EGOSGM_INVALID_DISPARITY), std::vector(pixels, 0.0f)};
-}
-
 TEST(SearchBand, CoversWhatItSearchesWithTheFewestChunks) {
   std::mt19937 random(34);
   for (const shared::DisparityRange range : kRanges) {
     const shared::ImageSize size{200, 1};
-    auto maps = nothing(size);
+    auto maps = testing::empty_maps(size);
     for (std::size_t i = 0; i < maps.disparity.size(); ++i) {
       maps.disparity[i] = std::uniform_real_distribution<float>(range.min, range.min + range.count - 1)(random);
       maps.variance[i] = std::pow(std::uniform_real_distribution<float>(0, std::sqrt(range.count) / 3)(random), 4.0f);
@@ -166,7 +157,7 @@ TEST(SearchBand, CoversWhatItSearchesWithTheFewestChunks) {
 
 TEST(SearchBand, PredictedPixelSearchesItsDeviations) {
   const shared::ImageSize size{2, 1};
-  auto maps = nothing(size);
+  auto maps = testing::empty_maps(size);
   maps.disparity[0] = 40.25f, maps.variance[0] = 4.0f;  // +- 3 * 2
   maps.disparity[1] = 60.5f, maps.variance[1] = 0.01f;  // +- the minimum
   const auto bands = run(size, {0, 128}, {.sigmas = 3, .min_half_width_px = 2, .from_neighbours = false}, maps).bands;
@@ -180,7 +171,7 @@ TEST(SearchBand, PredictedPixelSearchesItsDeviations) {
 
 TEST(SearchBand, AbsurdVarianceSearchesEverything) {
   const shared::ImageSize size{4, 1};
-  auto maps = nothing(size);
+  auto maps = testing::empty_maps(size);
   for (int x = 0; x < 3; ++x) maps.disparity[x] = 10;
   maps.variance = {1e30f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN(), 0, 0, 0, 0,
                    0};
@@ -193,7 +184,7 @@ TEST(SearchBand, AbsurdVarianceSearchesEverything) {
 
 TEST(SearchBand, UnpredictedPixelSearchesWhatItsNeighboursSpan) {
   const shared::ImageSize size{64, 64};
-  auto maps = nothing(size);
+  auto maps = testing::empty_maps(size);
   for (int x = 16; x < 32; ++x) maps.disparity[20 * 64 + x] = x == 20 ? 50.5f : 40.25f;
   const SearchBandOptions options{.neighbour_min_count = 8, .neighbour_margin_px = 4};
   const auto bands = run(size, {0, 128}, options, maps).bands;
@@ -211,7 +202,7 @@ TEST(SearchBand, UnpredictedPixelSearchesWhatItsNeighboursSpan) {
 
 TEST(SearchBand, ReachesWhatTheCoarseMatchFoundElsewhere) {
   const shared::ImageSize size{64, 64};
-  auto maps = nothing(size);
+  auto maps = testing::empty_maps(size);
   maps.disparity[20 * 64 + 20] = 40, maps.disparity[20 * 64 + 60] = 40;
   std::vector<float> coarse(2 * 16 * 16, EGOSGM_INVALID_DISPARITY);
   for (int v = 3; v <= 6; ++v) {
@@ -246,7 +237,7 @@ TEST(SearchBand, ReachesWhatTheCoarseMatchFoundElsewhere) {
 // Beside a jump a prediction may lie on the wrong side of it.
 TEST(SearchBand, PredictedPixelReachesWhatItsBlockSpans) {
   const shared::ImageSize size{24, 8};
-  auto maps = nothing(size);
+  auto maps = testing::empty_maps(size);
   for (int x = 8; x < 24; ++x) maps.disparity[3 * 24 + x] = x < 12 ? 40 : 60;
   const SearchBandOptions options{.min_half_width_px = 2, .coarse_tolerance_px = 3, .coarse_margin_px = 1};
   const auto bands = run(size, {0, 128}, options, maps).bands;
@@ -266,7 +257,7 @@ TEST(SearchBand, PredictedPixelReachesAThinThingFarBelow) {
   const shared::ImageSize size{72, 160};
   const SearchBandOptions options{.min_half_width_px = 2, .coarse_tolerance_px = 3, .coarse_margin_px = 1};
   const auto last_at = [&](int first_x, int last_x, float disparity, int x, int block_y, float behind = 40) {
-    auto maps = nothing(size);
+    auto maps = testing::empty_maps(size);
     std::fill_n(maps.disparity.begin(), pixel_count(size), 40.0f);
     for (int y = 96; y < size.height; ++y) {
       std::fill_n(maps.disparity.begin() + y * size.width, size.width, behind);
@@ -286,7 +277,7 @@ TEST(SearchBand, PredictedPixelReachesAThinThingFarBelow) {
 
 TEST(SearchBand, CountsCellsAndLanesOfARow) {
   const shared::ImageSize size{3, 2};
-  auto maps = nothing(size);
+  auto maps = testing::empty_maps(size);
   maps.disparity[0] = 50, maps.disparity[2] = 60;
   const auto result = run(size, {0, 100}, {.sigmas = 0, .min_half_width_px = 2, .from_neighbours = false}, maps);
   EXPECT_EQ(result.row_sums[0].cells, 8u + 112 + 8);
@@ -298,7 +289,7 @@ TEST(SearchBand, CountsCellsAndLanesOfARow) {
 // The left view has a prediction everywhere and searches 5 of 100 disparities, the right one has none and searches all.
 TEST(SearchBand, ReportsAllThatWasMatched) {
   const shared::ImageSize size{32, 8};
-  auto maps = nothing(size);
+  auto maps = testing::empty_maps(size);
   std::fill_n(maps.disparity.begin(), pixel_count(size), 50.0f);
   ocl::Context context(testing::any_device());
   SearchBand stage(context, size, {0, 100}, {.sigmas = 0, .min_half_width_px = 2});

@@ -49,4 +49,10 @@ inline std::string size_name(const ::testing::TestParamInfo<shared::ImageSize>& 
   return std::to_string(info.param.width) + "x" + std::to_string(info.param.height);
 }
 
+/// Makes the fixture of a kernel's TEST_Ps, which run at all of these sizes.
+#define EGOSGM_TEST_AT_ALL_SIZES(Fixture)                                                             \
+  class Fixture : public ::testing::TestWithParam<shared::ImageSize> {};                              \
+  INSTANTIATE_TEST_SUITE_P(Sizes, Fixture, ::testing::ValuesIn(testing::kSizes), testing::size_name); \
+  INSTANTIATE_TEST_SUITE_P(Large, Fixture, ::testing::Values(testing::kLargest), testing::size_name)
+
 }  // namespace egosgm::testing

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // An OpenCL layer that fails the n-th call, at once, or later, as a kernel fault would; and that counts references to
-// OpenCL objects. OPENCL_LAYERS loads it, tests arm it through the functions of fault_layer.h. A call that it does not
+// OpenCL objects. OPENCL_LAYERS loads it, tests arm it by the controls of fault_layer.h. A call that it does not
 // know ends the program: so none can be forgotten.
 #define CL_TARGET_OPENCL_VERSION 300
+#include "tests/support/fault_layer.h"
+
 #include <CL/cl.h>
 #include <CL/cl_icd.h>
 #include <CL/cl_layer.h>
@@ -13,18 +15,21 @@
 #include <map>
 #include <mutex>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 namespace {
+
+using egosgm::testing::FaultControls;
 
 const cl_icd_dispatch* next = nullptr;
 cl_icd_dispatch layer{};
 
 std::atomic<int> calls = 0, enqueues = 0, releases = 0;
 int failing = -1;
-enum { kAtOnce = 0, kLater = 1, kRelease = 2, kHeld = 3 } kind = kAtOnce;
-// A command that says until the next `fault_arm` that it has not ended, and then that it failed. PoCL 3.1 ends the
+int kind = FaultControls::kAtOnce;
+// A command that says until the next `arm` that it has not ended, and then that it failed. PoCL 3.1 ends the
 // program where one fails that others wait for.
 cl_event held = nullptr, failed = nullptr;
 bool separate_memory = false, svm_is_hidden = false;
@@ -45,7 +50,7 @@ std::map<cl_command_queue, int> queues;  // that live, with their owners
 
 // Calls that take part: all of them where the fault is to come at once, enqueues only where it is to come later.
 bool fails() {
-  const bool chosen = kind == kAtOnce && calls == failing;
+  const bool chosen = kind == FaultControls::kAtOnce && calls == failing;
   ++calls;
   return chosen;
 }
@@ -80,7 +85,8 @@ void finish_all_queues() {
 // (tests/support/pocl_late_failure.c).
 template <typename Enqueue>
 cl_int enqueue(cl_command_queue queue, cl_uint count, const cl_event* given, cl_event* done, Enqueue&& enqueue_with) {
-  const bool fails_later = kind == kLater && enqueues == failing, is_held = kind == kHeld && enqueues == failing;
+  const bool is_it = enqueues == failing;
+  const bool fails_later = is_it && kind == FaultControls::kLate, is_held = is_it && kind == FaultControls::kHeld;
   ++enqueues;
   if (failing_context && context_of(queue) == failing_context && commands_of_it++ >= last_good_command)
     return CL_DEVICE_NOT_AVAILABLE;
@@ -180,6 +186,10 @@ cl_int CL_API_CALL build(cl_program p, cl_uint n, const cl_device_id* d, const c
   if (result == CL_SUCCESS) binary = binary_of(p);
   return result;
 }
+template <auto Call, typename... Arguments>
+cl_int CL_API_CALL ask(Arguments... arguments) {
+  return fails() ? status : (next->*Call)(arguments...);
+}
 cl_int CL_API_CALL program_info(cl_program p, cl_program_info i, size_t n, void* v, size_t* s) {
   return fails() ? status : next->clGetProgramInfo(stand_in(p), i, n, v, s);
 }
@@ -193,59 +203,33 @@ cl_int CL_API_CALL device_info(cl_device_id d, cl_device_info i, size_t n, void*
   if (separate_memory && i == CL_DEVICE_HOST_UNIFIED_MEMORY && v) *static_cast<cl_bool*>(v) = CL_FALSE;
   return result;
 }
-cl_int CL_API_CALL kernel_info(cl_kernel k, cl_kernel_info i, size_t n, void* v, size_t* s) {
-  return fails() ? status : next->clGetKernelInfo(k, i, n, v, s);
-}
-cl_int CL_API_CALL arg_info(cl_kernel k, cl_uint a, cl_kernel_arg_info i, size_t n, void* v, size_t* s) {
-  return fails() ? status : next->clGetKernelArgInfo(k, a, i, n, v, s);
-}
-cl_int CL_API_CALL work_group_info(cl_kernel k, cl_device_id d, cl_kernel_work_group_info i, size_t n, void* v,
-                                   size_t* s) {
-  return fails() ? status : next->clGetKernelWorkGroupInfo(k, d, i, n, v, s);
-}
-cl_int CL_API_CALL set_arg(cl_kernel k, cl_uint i, size_t n, const void* v) {
-  return fails() ? status : next->clSetKernelArg(k, i, n, v);
-}
-cl_int CL_API_CALL fill(cl_command_queue q, cl_mem b, const void* p, size_t pn, size_t o, size_t n, cl_uint c,
-                        const cl_event* g, cl_event* e) {
-  return enqueue(q, c, g, e,
-                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueFillBuffer(q, b, p, pn, o, n, w, l, e); });
-}
-cl_int CL_API_CALL copy(cl_command_queue q, cl_mem from, cl_mem to, size_t fo, size_t o, size_t n, cl_uint c,
-                        const cl_event* g, cl_event* e) {
-  ++transfers;
-  return enqueue(q, c, g, e, [&](cl_uint w, const cl_event* l) {
-    return next->clEnqueueCopyBuffer(q, from, to, fo, o, n, w, l, e);
+// Commands whose last arguments are the number of events to wait for, those events, and their own.
+template <auto Call, bool kTransfers = false, typename... Arguments>
+cl_int CL_API_CALL command(cl_command_queue queue, Arguments... arguments) {
+  if (kTransfers) ++transfers;
+  std::tuple all(arguments...);
+  auto& count = std::get<sizeof...(Arguments) - 3>(all);
+  auto& given = std::get<sizeof...(Arguments) - 2>(all);
+  return enqueue(queue, count, given, std::get<sizeof...(Arguments) - 1>(all), [&](cl_uint n, const cl_event* events) {
+    count = n, given = events;
+    return std::apply([&](auto... of_call) { return (next->*Call)(queue, of_call...); }, all);
   });
 }
-// A transfer by `transfer(blocking, number of events to wait for, those events, its event)`. A blocking one that fails
-// later would wait for ever for the event that fails only after the enqueue: it is waited for here.
-template <typename Transfer>
-cl_int enqueue_transfer(cl_command_queue queue, cl_bool blocking, cl_uint count, const cl_event* given, cl_event* done,
-                        Transfer&& transfer) {
+// A blocking transfer that fails later would wait for ever for the event that fails only after the enqueue: it is
+// waited for here.
+template <auto Call, typename Pixels>
+cl_int CL_API_CALL transfer(cl_command_queue q, cl_mem b, cl_bool blocking, size_t o, size_t n, Pixels p, cl_uint count,
+                            const cl_event* given, cl_event* done) {
+  ++transfers;
   cl_event own = nullptr;
-  const bool waits = blocking && kind == kLater;
-  const cl_int result = enqueue(queue, count, given, done, [&](cl_uint w, const cl_event* l) {
-    return transfer(waits ? CL_FALSE : blocking, w, l, waits && !done ? &own : done);
+  const bool waits = blocking && kind == FaultControls::kLate;
+  const cl_int result = enqueue(q, count, given, done, [&](cl_uint w, const cl_event* l) {
+    return (next->*Call)(q, b, waits ? CL_FALSE : blocking, o, n, p, w, l, waits && !done ? &own : done);
   });
   if (!waits || result != CL_SUCCESS) return result;
   const cl_int waited = next->clWaitForEvents(1, done ? done : &own);
   if (own) next->clReleaseEvent(own);
   return waited;
-}
-cl_int CL_API_CALL read(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, void* p, cl_uint c,
-                        const cl_event* g, cl_event* e) {
-  ++transfers;
-  return enqueue_transfer(q, bl, c, g, e, [&](cl_bool waits, cl_uint w, const cl_event* l, cl_event* done) {
-    return next->clEnqueueReadBuffer(q, b, waits, o, n, p, w, l, done);
-  });
-}
-cl_int CL_API_CALL write(cl_command_queue q, cl_mem b, cl_bool bl, size_t o, size_t n, const void* p, cl_uint c,
-                         const cl_event* g, cl_event* e) {
-  ++transfers;
-  return enqueue_transfer(q, bl, c, g, e, [&](cl_bool waits, cl_uint w, const cl_event* l, cl_event* done) {
-    return next->clEnqueueWriteBuffer(q, b, waits, o, n, p, w, l, done);
-  });
 }
 // A map that blocks can only fail at once: PoCL 3.1 would hang.
 void* CL_API_CALL map(cl_command_queue q, cl_mem b, cl_bool bl, cl_map_flags f, size_t o, size_t n, cl_uint c,
@@ -261,41 +245,12 @@ void* CL_API_CALL map(cl_command_queue q, cl_mem b, cl_bool bl, cl_map_flags f, 
   if (error) *error = result;
   return mapped;
 }
-cl_int CL_API_CALL barrier(cl_command_queue q, cl_uint c, const cl_event* g, cl_event* e) {
-  return enqueue(q, c, g, e,
-                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueBarrierWithWaitList(q, w, l, e); });
-}
-cl_int CL_API_CALL marker(cl_command_queue q, cl_uint c, const cl_event* g, cl_event* e) {
-  return enqueue(q, c, g, e,
-                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueMarkerWithWaitList(q, w, l, e); });
-}
-cl_int CL_API_CALL mem_info(cl_mem b, cl_mem_info i, size_t n, void* v, size_t* s) {
-  return fails() ? status : next->clGetMemObjectInfo(b, i, n, v, s);
-}
-cl_int CL_API_CALL queue_info(cl_command_queue q, cl_command_queue_info i, size_t n, void* v, size_t* s) {
-  return fails() ? status : next->clGetCommandQueueInfo(q, i, n, v, s);
-}
 cl_int CL_API_CALL event_info(cl_event e, cl_event_info i, size_t n, void* v, size_t* s) {
   if (fails()) return status;
   const cl_int result = next->clGetEventInfo(e, i, n, v, s);
   const bool is_told = (e == held || e == failed) && i == CL_EVENT_COMMAND_EXECUTION_STATUS && v;
   if (is_told) *static_cast<cl_int*>(v) = e == held ? CL_QUEUED : CL_OUT_OF_RESOURCES;
   return result;
-}
-cl_int CL_API_CALL unmap(cl_command_queue q, cl_mem b, void* p, cl_uint c, const cl_event* g, cl_event* e) {
-  ++transfers;
-  return enqueue(q, c, g, e,
-                 [&](cl_uint w, const cl_event* l) { return next->clEnqueueUnmapMemObject(q, b, p, w, l, e); });
-}
-cl_int CL_API_CALL launch(cl_command_queue q, cl_kernel k, cl_uint d, const size_t* o, const size_t* g, const size_t* l,
-                          cl_uint c, const cl_event* given, cl_event* e) {
-  return enqueue(q, c, given, e, [&](cl_uint w, const cl_event* wl) {
-    return next->clEnqueueNDRangeKernel(q, k, d, o, g, l, w, wl, e);
-  });
-}
-cl_int CL_API_CALL wait(cl_uint n, const cl_event* e) { return fails() ? status : next->clWaitForEvents(n, e); }
-cl_int CL_API_CALL profiling(cl_event e, cl_profiling_info i, size_t n, void* v, size_t* s) {
-  return fails() ? status : next->clGetEventProfilingInfo(e, i, n, v, s);
 }
 
 template <auto Call, typename Object>
@@ -306,7 +261,7 @@ cl_int CL_API_CALL retain(Object object) {
 template <auto Call, typename Object>
 cl_int CL_API_CALL release(Object object) {
   --references;
-  const bool chosen = kind == kRelease && releases == failing;
+  const bool chosen = kind == FaultControls::kRelease && releases == failing;
   ++releases;
   const cl_int result = (next->*Call)(object);
   return chosen ? status : result;
@@ -340,24 +295,25 @@ void unknown_call() {
 
 }  // namespace
 
-extern "C" void fault_arm(int at, int code, int how) {
-  if (failed) next->clReleaseEvent(failed);
-  failed = std::exchange(held, nullptr);
-  calls = enqueues = releases = 0;
-  failing = at;
-  status = code;
-  kind = how == 3 ? kHeld : how == 2 ? kRelease : how == 1 ? kLater : kAtOnce;
-}
-extern "C" void fault_forbid_sources(int forbidden) { sources_forbidden = forbidden != 0; }
-extern "C" void fault_reuse_builds(int reused) { builds_are_reused = reused != 0; }
-extern "C" void fault_separate_memory(int separate) { separate_memory = separate; }
-extern "C" void fault_hide_svm(int hidden) { svm_is_hidden = hidden; }
-extern "C" int fault_releases() { return releases; }
-extern "C" int fault_calls() { return calls; }
-extern "C" int fault_enqueues() { return enqueues; }
-extern "C" long fault_references() { return references; }
-extern "C" int fault_transfers() { return transfers; }
-extern "C" long fault_buffers_created() { return buffers_created; }
+extern "C" const FaultControls fault_controls{.arm =
+                                                  [](int at, int code, int how) {
+                                                    if (failed) next->clReleaseEvent(failed);
+                                                    failed = std::exchange(held, nullptr);
+                                                    calls = enqueues = releases = 0;
+                                                    failing = at;
+                                                    status = code;
+                                                    kind = how;
+                                                  },
+                                              .forbid_sources = [](int forbidden) { sources_forbidden = forbidden; },
+                                              .reuse_builds = [](int reused) { builds_are_reused = reused; },
+                                              .separate_memory = [](int separate) { separate_memory = separate; },
+                                              .hide_svm = [](int hidden) { svm_is_hidden = hidden; },
+                                              .calls = []() -> int { return calls; },
+                                              .enqueues = []() -> int { return enqueues; },
+                                              .releases = []() -> int { return releases; },
+                                              .references = []() -> long { return references; },
+                                              .buffers_created = []() -> long { return buffers_created; },
+                                              .transfers = []() -> int { return transfers; }};
 
 extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target, cl_uint* count,
                                           const cl_icd_dispatch** out) {
@@ -393,33 +349,33 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   layer.clGetProgramInfo = program_info;
   layer.clCreateKernel = create_kernel;
   layer.clGetDeviceInfo = device_info;
-  layer.clGetKernelInfo = kernel_info;
-  layer.clGetKernelArgInfo = arg_info;
-  layer.clGetKernelWorkGroupInfo = work_group_info;
-  layer.clSetKernelArg = set_arg;
-  layer.clEnqueueFillBuffer = fill;
-  layer.clEnqueueCopyBuffer = copy;
-  layer.clEnqueueReadBuffer = read;
-  layer.clEnqueueWriteBuffer = write;
+  layer.clGetKernelInfo = ask<&cl_icd_dispatch::clGetKernelInfo>;
+  layer.clGetKernelArgInfo = ask<&cl_icd_dispatch::clGetKernelArgInfo>;
+  layer.clGetKernelWorkGroupInfo = ask<&cl_icd_dispatch::clGetKernelWorkGroupInfo>;
+  layer.clSetKernelArg = ask<&cl_icd_dispatch::clSetKernelArg>;
+  layer.clEnqueueFillBuffer = command<&cl_icd_dispatch::clEnqueueFillBuffer>;
+  layer.clEnqueueCopyBuffer = command<&cl_icd_dispatch::clEnqueueCopyBuffer, true>;
+  layer.clEnqueueReadBuffer = transfer<&cl_icd_dispatch::clEnqueueReadBuffer>;
+  layer.clEnqueueWriteBuffer = transfer<&cl_icd_dispatch::clEnqueueWriteBuffer>;
   layer.clEnqueueMapBuffer = map;
-  layer.clEnqueueUnmapMemObject = unmap;
-  layer.clEnqueueBarrierWithWaitList = barrier;
-  layer.clEnqueueMarkerWithWaitList = marker;
-  layer.clGetMemObjectInfo = mem_info;
-  layer.clGetCommandQueueInfo = queue_info;
+  layer.clEnqueueUnmapMemObject = command<&cl_icd_dispatch::clEnqueueUnmapMemObject, true>;
+  layer.clEnqueueBarrierWithWaitList = command<&cl_icd_dispatch::clEnqueueBarrierWithWaitList>;
+  layer.clEnqueueMarkerWithWaitList = command<&cl_icd_dispatch::clEnqueueMarkerWithWaitList>;
+  layer.clGetMemObjectInfo = ask<&cl_icd_dispatch::clGetMemObjectInfo>;
+  layer.clGetCommandQueueInfo = ask<&cl_icd_dispatch::clGetCommandQueueInfo>;
   layer.clGetEventInfo = event_info;
-  layer.clEnqueueNDRangeKernel = launch;
-  layer.clWaitForEvents = wait;
-  layer.clGetEventProfilingInfo = profiling;
-#define COUNT(Name, Object)                                                \
-  layer.clRetain##Name = retain<&cl_icd_dispatch::clRetain##Name, Object>; \
-  layer.clRelease##Name = release<&cl_icd_dispatch::clRelease##Name, Object>
-  COUNT(Context, cl_context);
-  COUNT(MemObject, cl_mem);
-  COUNT(Program, cl_program);
-  COUNT(Kernel, cl_kernel);
-  COUNT(Event, cl_event);
+  layer.clEnqueueNDRangeKernel = command<&cl_icd_dispatch::clEnqueueNDRangeKernel>;
+  layer.clWaitForEvents = ask<&cl_icd_dispatch::clWaitForEvents>;
+  layer.clGetEventProfilingInfo = ask<&cl_icd_dispatch::clGetEventProfilingInfo>;
+#define COUNT(Name)                                                \
+  layer.clRetain##Name = retain<&cl_icd_dispatch::clRetain##Name>; \
+  layer.clRelease##Name = release<&cl_icd_dispatch::clRelease##Name>
+  COUNT(Context);
+  COUNT(MemObject);
+  COUNT(Kernel);
+  COUNT(Event);
 #undef COUNT
+  layer.clRetainProgram = retain<&cl_icd_dispatch::clRetainProgram>;
   layer.clReleaseProgram = release_program;
   layer.clRetainCommandQueue = retain_queue;
   layer.clReleaseCommandQueue = release_queue;

@@ -12,13 +12,12 @@
 
 namespace egosgm::testing {
 
-/// The layer between this program and its OpenCL driver. Exists only where OPENCL_LAYERS named it before the first
-/// OpenCL call.
-struct FaultLayer {
+/// What the layer can be told and asked. Counts are from zero.
+struct FaultControls {
   enum How { kAtOnce, kLate, kRelease, kHeld };
 
-  /// Counts from zero; lets call `at` return `code`, or command `at` fail after it was enqueued, or release `at` return
-  /// `code` after it was done. -1: none. Held: the command says from the next `arm` to the one behind that it failed.
+  /// Lets call `at` return `code`, or command `at` fail after it was enqueued, or release `at` return `code` after it
+  /// was done. -1: none. Held: the command says from the next `arm` to the one behind that it failed.
   void (*arm)(int at, int code, int how);
   void (*forbid_sources)(int forbidden);  // 1: no program can be made of its source from now on
   void (*reuse_builds)(int reused);       // 1: a program built before is taken from its binary from now on, at once
@@ -30,33 +29,21 @@ struct FaultLayer {
   long (*references)();  // to contexts, queues, buffers, programs, kernels and events: created + retained - released
   long (*buffers_created)();  // ever
   int (*transfers)();         // ever: copies, reads, writes, maps and unmaps of buffers
+};
 
+/// The layer between this program and its OpenCL driver. Exists only where OPENCL_LAYERS named it before the first
+/// OpenCL call.
+struct FaultLayer : FaultControls {
   explicit FaultLayer(const char* file) {
     cl_uint platforms = 0;
     clGetPlatformIDs(0, nullptr, &platforms);  // the loader loads layers with the first call
     void* layer = dlopen(file, RTLD_NOW | RTLD_NOLOAD);
     if (!layer) throw std::runtime_error(std::string("run this test with OPENCL_LAYERS=") + file);
-    find(layer, "fault_arm", arm);
-    find(layer, "fault_forbid_sources", forbid_sources);
-    find(layer, "fault_reuse_builds", reuse_builds);
-    find(layer, "fault_separate_memory", separate_memory);
-    find(layer, "fault_hide_svm", hide_svm);
-    find(layer, "fault_calls", calls);
-    find(layer, "fault_enqueues", enqueues);
-    find(layer, "fault_releases", releases);
-    find(layer, "fault_references", references);
-    find(layer, "fault_buffers_created", buffers_created);
-    find(layer, "fault_transfers", transfers);
+    static_cast<FaultControls&>(*this) = *static_cast<const FaultControls*>(dlsym(layer, "fault_controls"));
     disarm();
   }
 
   void disarm() const { arm(-1, 0, kAtOnce); }
-
- private:
-  template <typename Function>
-  static void find(void* layer, const char* name, Function& function) {
-    function = reinterpret_cast<Function>(dlsym(layer, name));
-  }
 };
 
 }  // namespace egosgm::testing

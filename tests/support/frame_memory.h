@@ -77,6 +77,7 @@ class MapMemory {
     }
     return values;
   }
+  bool operator==(const MapMemory& other) const { return memory_ == other.memory_; }
   bool padding_is_untouched() const {
     for (int y = 0; y < size_.height; ++y) {
       for (int x = size_.width; x < row_; ++x) {
@@ -116,6 +117,8 @@ struct OutputMemory {
         search_width(size, layout),
         dynamic(size, layout),
         reason(size, layout) {}
+
+  bool operator==(const OutputMemory&) const = default;
 
   FrameOutputs views() {
     return {disparity.view(),

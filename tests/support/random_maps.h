@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstdint>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "kernels/shared.h"
+#include "tests/support/compare.h"
 
 namespace egosgm::testing {
 
@@ -41,6 +45,30 @@ inline HostMaps random_maps(shared::ImageSize size, float min, float max, double
     maps.variance[i] = hole ? 0.0f : 0.05f + 3.0f * unit(random);
   }
   return maps;
+}
+
+/// What lies in a stage's output before; it must not shine through.
+inline HostMaps earlier_maps(shared::ImageSize size) { return random_maps(size, 0, 9, 0.5, 99); }
+
+/// Bit by bit, of all that `expected` has.
+inline ::testing::AssertionResult same_maps(const HostMaps& actual, const HostMaps& expected, shared::ImageSize size) {
+  const auto compare = [&](const auto& of_actual, const auto& of_expected, const char* name) {
+    const auto same = of_expected.empty() ? ::testing::AssertionSuccess() : same_bits(of_actual, of_expected, size);
+    return same ? same : ::testing::AssertionFailure() << name << ": " << same.message();
+  };
+  for (const auto& same :
+       {compare(actual.disparity, expected.disparity, "disparity"),
+        compare(actual.variance, expected.variance, "variance"), compare(actual.hidden, expected.hidden, "hidden"),
+        compare(actual.doubtful, expected.doubtful, "doubtful"),
+        compare(actual.evidence, expected.evidence, "evidence")}) {
+    if (!same) return same;
+  }
+  return ::testing::AssertionSuccess();
+}
+
+/// Disparities and variances of the left view of `left` and the right one of `right`.
+inline HostMaps left_and_right(const HostMaps& left, const HostMaps& right) {
+  return {left_and_right(left.disparity, right.disparity), left_and_right(left.variance, right.variance)};
 }
 
 }  // namespace egosgm::testing

@@ -54,6 +54,12 @@ class DatasetTest : public ::testing::Test {
     for (const std::string& name : names) add_image(name + ".png");
   }
   std::string path(const std::string& name) const { return (root_ / name).string(); }
+  /// By patterns below the root, with the calibration c.toml.
+  StereoSequence open(const std::string& left, const std::string& right, FrameRange range = {},
+                      PairBy pair_by = PairBy::kName) {
+    add_text("c.toml", kOwnCalibration);
+    return open_patterns(path(left), path(right), root_ / "c.toml", range, pair_by);
+  }
 
   TemporaryFolder folder_;
   const std::filesystem::path& root_ = folder_.path();
@@ -180,21 +186,17 @@ TEST_F(DatasetTest, PrintfPatterns) {
   for (const char* name : {"l/left_7.png", "l/left_8.png", "r/right_0007.png", "r/right_0008.png", "r/right_9.png"}) {
     add_image(name);
   }
-  add_text("c.toml", kOwnCalibration);
-  const StereoSequence sequence = open_patterns(path("l/left_%d.png"), path("r/right_%04d.png"), root_ / "c.toml");
+  const StereoSequence sequence = open("l/left_%d.png", "r/right_%04d.png");
   EXPECT_EQ(numbers_of(sequence), (std::vector<int>{7, 8}));
   EXPECT_EQ(sequence.frames[1].left, root_ / "l/left_8.png");
   EXPECT_EQ(sequence.frames[1].right, root_ / "r/right_0008.png");
   for (const char* bad :
        {"l/%s.png", "l/%d_%d.png", "l/%", "l/%6d.png", "l/%0999d.png", "%d/a.png", "l/", "l/%n%d.png", "l/*%d.png"}) {
-    expect_refused([&] { open_patterns(path(bad), path("r/right_%04d.png"), root_ / "c.toml"); }, {"pattern '", bad});
+    expect_refused([&] { open(bad, "r/right_%04d.png"); }, {"pattern '", bad});
   }
-  expect_refused([&] { open_patterns(path("l/left_%d.png"), path("r/right_0007.png"), root_ / "c.toml"); },
-                 {"both must hold"});
-  EXPECT_EQ(open_patterns(path("l/left_%d.png"), path("r/right_0*.png"), root_ / "c.toml").frames[1].right,
-            root_ / "r/right_0008.png");
-  expect_refused([&] { open_patterns(path("x/left_%d.png"), path("r/right_%04d.png"), root_ / "c.toml"); },
-                 {"/x", "cannot be listed"});
+  expect_refused([&] { open("l/left_%d.png", "r/right_0007.png"); }, {"both must hold"});
+  EXPECT_EQ(open("l/left_%d.png", "r/right_0*.png").frames[1].right, root_ / "r/right_0008.png");
+  expect_refused([&] { open("x/left_%d.png", "r/right_%04d.png"); }, {"/x", "cannot be listed"});
   expect_refused([&] { open_patterns(path("l/left_%d.png"), path("r/right_%04d.png"), root_ / "d.toml"); }, {"d.toml"});
 }
 
@@ -203,64 +205,56 @@ TEST_F(DatasetTest, GlobPatterns) {
        {"l/a_12.png", "l/a_13.png", "r/12_b.png", "r/13_b.png", "n/x.png", "n/y.png", "m/x.png", "m/y.png"}) {
     add_image(name);
   }
-  add_text("c.toml", kOwnCalibration);
-  const StereoSequence numbered = open_patterns(path("l/a_*.png"), path("r/*_b.png"), root_ / "c.toml");
+  const StereoSequence numbered = open("l/a_*.png", "r/*_b.png");
   EXPECT_EQ(numbers_of(numbered), (std::vector<int>{12, 13}));
   EXPECT_EQ(numbered.frames[1].right, root_ / "r/13_b.png");
-  const StereoSequence named = open_patterns(path("n/*.png"), path("m/*.png"), root_ / "c.toml");
+  const StereoSequence named = open("n/*.png", "m/*.png");
   EXPECT_EQ(numbers_of(named), (std::vector<int>{0, 1}));
   EXPECT_EQ(named.frames[1].left, root_ / "n/y.png");
   std::filesystem::remove(root_ / "m/y.png");
-  EXPECT_EQ(numbers_of(open_patterns(path("n/*.png"), path("m/*.png"), root_ / "c.toml")), (std::vector<int>{0}));
+  EXPECT_EQ(numbers_of(open("n/*.png", "m/*.png")), (std::vector<int>{0}));
 }
 
 TEST_F(DatasetTest, StepsAndGapsAreFramesInOrderWithANote) {
-  add_text("c.toml", kOwnCalibration);
   for (const char* number : {"0", "10", "20", "30"})
     add_images({"l/" + std::string(number), "r/" + std::string(number)});
   for (const char* wild : {"*", "%d", "*.png"}) {
-    const StereoSequence steps = open_patterns(path("l/") + wild, path("r/") + wild, root_ / "c.toml");
+    const StereoSequence steps = open(std::string("l/") + wild, std::string("r/") + wild);
     EXPECT_EQ(numbers_of(steps), (std::vector<int>{0, 10, 20, 30})) << wild;
     EXPECT_EQ(steps.frames[1].name, "000010");
     EXPECT_EQ(steps.frames[1].right, root_ / "r/10.png");
     EXPECT_NE(steps.note.find("0..30 go in steps of 10"), std::string::npos) << steps.note;
   }
-  const StereoSequence part = open_patterns(path("l/*"), path("r/*"), root_ / "c.toml", parse_frame_range("5:20"));
+  const StereoSequence part = open("l/*", "r/*", parse_frame_range("5:20"));
   EXPECT_EQ(numbers_of(part), (std::vector<int>{10, 20}));
   EXPECT_EQ(part.numbers, (std::vector<int>{0, 10, 20, 30}));
-  expect_refused([&] { open_patterns(path("l/*"), path("r/*"), root_ / "c.toml", parse_frame_range("5:40")); },
-                 {"l/40.png", "frame 40 is missing", "0..30"});
-  expect_refused([&] { open_patterns(path("l/*"), path("r/*"), root_ / "c.toml", parse_frame_range("11:19")); },
-                 {"frame 11 is missing"});
+  expect_refused([&] { open("l/*", "r/*", parse_frame_range("5:40")); }, {"l/40.png", "frame 40 is missing", "0..30"});
+  expect_refused([&] { open("l/*", "r/*", parse_frame_range("11:19")); }, {"frame 11 is missing"});
   add_images({"l/31", "r/31"});
-  EXPECT_NE(open_patterns(path("l/*"), path("r/*"), root_ / "c.toml").note.find("3 gaps, the first after 0"),
-            std::string::npos);
+  EXPECT_NE(open("l/*", "r/*").note.find("3 gaps, the first after 0"), std::string::npos);
   add_odometry(2, 4);
   EXPECT_EQ(open_folder(root_).note, "");
 }
 
 TEST_F(DatasetTest, NamesThatDifferArePairedByOrderWhereTold) {
-  add_text("c.toml", kOwnCalibration);
   add_images({"s/left_9", "s/left_10", "s/right_1", "s/right_2"});
-  expect_refused([&] { open_patterns(path("s/l*"), path("s/r*"), root_ / "c.toml"); },
+  expect_refused([&] { open("s/l*", "s/r*"); },
                  {"no right image has the name of a left one", "s/left_", "s/right_", "--pair-by order"});
-  const StereoSequence sequence = open_patterns(path("s/l*"), path("s/r*"), root_ / "c.toml", {}, PairBy::kOrder);
+  const StereoSequence sequence = open("s/l*", "s/r*", {}, PairBy::kOrder);
   EXPECT_EQ(numbers_of(sequence), (std::vector<int>{0, 1}));
   EXPECT_EQ(sequence.frames[0].left, root_ / "s/left_9.png");
   EXPECT_EQ(sequence.frames[1].right, root_ / "s/right_2.png");
-  const StereoSequence own = open_patterns(path("s/left_*"), path("s/right_*"), root_ / "c.toml", {}, PairBy::kOrder);
+  const StereoSequence own = open("s/left_*", "s/right_*", {}, PairBy::kOrder);
   EXPECT_EQ(numbers_of(own), (std::vector<int>{9, 10})) << "the left ones' numbers";
   add_images({"s/right_3"});
-  expect_refused([&] { open_patterns(path("s/l*"), path("s/r*"), root_ / "c.toml", {}, PairBy::kOrder); },
-                 {"2 left and 3 right images"});
+  expect_refused([&] { open("s/l*", "s/r*", {}, PairBy::kOrder); }, {"2 left and 3 right images"});
 }
 
 TEST_F(DatasetTest, TimeStampsAreFramesInTheirOrder) {
-  add_text("c.toml", kOwnCalibration);
   for (const char* stamp : {"1403636579763555584", "1403636579813555456"})
     add_images({"n/" + std::string(stamp), "m/" + std::string(stamp)});
   for (const char* wild : {"*", "%d"}) {
-    const StereoSequence nanoseconds = open_patterns(path("n/") + wild, path("m/") + wild, root_ / "c.toml");
+    const StereoSequence nanoseconds = open(std::string("n/") + wild, std::string("m/") + wild);
     EXPECT_EQ(numbers_of(nanoseconds), (std::vector<int>{0, 1}));
     EXPECT_EQ(nanoseconds.frames[1].left, root_ / "n/1403636579813555456.png");
   }
@@ -278,9 +272,8 @@ TEST_F(DatasetTest, NumbersInNamesCountByTheirValue) {
 }
 
 TEST_F(DatasetTest, TwoFramesNeverShareAName) {
-  add_text("c.toml", kOwnCalibration);
   add_images({"l/a1", "l/a01", "l/2", "r/a1", "r/a01", "r/2"});
-  const StereoSequence sequence = open_patterns(path("l/*"), path("r/*"), root_ / "c.toml");
+  const StereoSequence sequence = open("l/*", "r/*");
   EXPECT_EQ(numbers_of(sequence), (std::vector<int>{0, 1, 2}));
   std::set<std::string> names;
   for (const StereoFrame& frame : sequence.frames) {
@@ -291,12 +284,11 @@ TEST_F(DatasetTest, TwoFramesNeverShareAName) {
   add_odometry(0, 1);
   add_image("image_0/1.png");
   expect_refused([&] { open_folder(root_); }, {"image_0/000001.png", "means the same frame as 1.png"});
-  expect_refused([&] { open_patterns(path("l/*"), path("l/*"), root_ / "c.toml"); }, {"is the left and the right"});
+  expect_refused([&] { open("l/*", "l/*"); }, {"is the left and the right"});
   add_image("l/02.png");
-  expect_refused([&] { open_patterns(path("l/*"), path("r/*"), root_ / "c.toml"); },
-                 {"l/02.png", "means the same frame as 2.png"});
+  expect_refused([&] { open("l/*", "r/*"); }, {"l/02.png", "means the same frame as 2.png"});
   add_images({"n/7", "m/007"});
-  EXPECT_EQ(open_patterns(path("n/*"), path("m/*"), root_ / "c.toml").frames[0].right, root_ / "m/007.png");
+  EXPECT_EQ(open("n/*", "m/*").frames[0].right, root_ / "m/007.png");
 }
 
 TEST_F(DatasetTest, APictureBesideOneCamerasFramesMovesNoNumber) {
@@ -325,7 +317,7 @@ TEST_F(DatasetTest, NamesThatAreThereAreNoPatterns) {
 }
 
 TEST_F(DatasetTest, JpegIsAnImageLikeAnother) {
-  add_text("c.toml", kOwnCalibration), add_text("calib.txt", kProjections);
+  add_text("calib.txt", kProjections);
   for (const char* name : {"image_0/000000.jpg", "image_1/000000.JPEG", "image_0/000001.png", "image_1/000001.Jpg",
                            "image_0/notes.txt", "m/im0.jpg", "m/im1.JPG"}) {
     add_text(name, "x");
@@ -336,9 +328,9 @@ TEST_F(DatasetTest, JpegIsAnImageLikeAnother) {
   EXPECT_EQ(sequence.frames[0].right, root_ / "image_1/000000.JPEG");
   EXPECT_EQ(open_folder(root_ / "m").frames[0].right, root_ / "m/im1.JPG");
   for (const char* right : {"image_1/*", "image_1/%06d"}) {
-    EXPECT_EQ(open_patterns(path("image_0/%06d"), path(right), root_ / "c.toml").frames.size(), 2u);
+    EXPECT_EQ(open("image_0/%06d", right).frames.size(), 2u);
   }
-  EXPECT_EQ(open_patterns(path("image_0/*.JPG"), path("image_1/*.jpeg"), root_ / "c.toml").frames.size(), 1u);
+  EXPECT_EQ(open("image_0/*.JPG", "image_1/*.jpeg").frames.size(), 1u);
   add_text("multi/calib/000003.txt", kProjections);
   add_text("multi/image_0/000003_10.jpg", "x"), add_text("multi/image_1/000003_10.jpg", "x");
   EXPECT_EQ(numbers_of(open_kitti_multiview(root_ / "multi", "3")), (std::vector<int>{10}));

@@ -34,75 +34,74 @@ void expect_equal(const cv::Mat& a, const cv::Mat& b) {
   }
 }
 
-TEST(DisparityIo, PngStoresAsTheDevelopmentKit) {
-  const TemporaryFolder folder;
+class DisparityIo : public ::testing::Test {
+ protected:
+  const TemporaryFolder folder_;
+  const std::filesystem::path file_ = folder_ / "d.map";
+};
+
+TEST_F(DisparityIo, PngStoresAsTheDevelopmentKit) {
   const std::vector<float> values = {kInvalidDisparity, 0.0f,   0.001f, 1.0f / 256, 1.999f / 256, 1.0f,  100.5f,
                                      255.99f,           256.0f, -1.0f,  NAN,        kInf,         -kInf, 1e30f};
   const std::vector<int> stored = {0, 1, 1, 1, 1, 256, 25728, 65533, 0, 0, 0, 0, 0, 0};
-  EXPECT_EQ(write_disparity_png(folder / "d.png", row_map(values)), 3);  // 256, -1, 1e30
-  const cv::Mat png = cv::imread((folder / "d.png").string(), cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(write_disparity_png(folder_ / "d.png", row_map(values)), 3);  // 256, -1, 1e30
+  const cv::Mat png = cv::imread((folder_ / "d.png").string(), cv::IMREAD_UNCHANGED);
   ASSERT_EQ(png.type(), CV_16UC1);
   for (int x = 0; x < png.cols; ++x) EXPECT_EQ(png.at<std::uint16_t>(0, x), stored[static_cast<std::size_t>(x)]) << x;
   EXPECT_THROW(count_outside_png(png), InvalidArgument);
 }
 
-TEST(DisparityIo, PngReadsValueBy256) {
-  const TemporaryFolder folder;
+TEST_F(DisparityIo, PngReadsValueBy256) {
   cv::Mat stored(1, 4, CV_16UC1);
   const std::uint16_t values[] = {0, 1, 25728, 65535};
   std::copy(values, values + 4, stored.ptr<std::uint16_t>());
-  write_png(folder / "d.png", stored);
-  expect_equal(read_disparity(folder / "d.png"), row_map({kInvalidDisparity, 1.0f / 256, 100.5f, 65535.0f / 256}));
+  write_png(folder_ / "d.png", stored);
+  expect_equal(read_disparity(folder_ / "d.png"), row_map({kInvalidDisparity, 1.0f / 256, 100.5f, 65535.0f / 256}));
 }
 
-TEST(DisparityIo, PngRoundTripIsExactOnItsGrid) {
+TEST_F(DisparityIo, PngRoundTripIsExactOnItsGrid) {
   std::mt19937 random(1);
   std::uniform_int_distribution<int> value(0, 65535);
-  const TemporaryFolder folder;
   cv::Mat map(33, 127, CV_32FC1);
   for (float& d : cv::Mat_<float>(map)) {
     const int v = value(random);
     d = v < 1000 ? kInvalidDisparity : static_cast<float>(v) / 256.0f;
   }
-  EXPECT_EQ(write_disparity(folder / "d.png", map), 0);
-  expect_equal(read_disparity(folder / "d.png"), map);
+  EXPECT_EQ(write_disparity(folder_ / "d.png", map), 0);
+  expect_equal(read_disparity(folder_ / "d.png"), map);
 }
 
-TEST(DisparityIo, OtherPngsAreNoDisparity) {
-  const TemporaryFolder folder;
-  write_png(folder / "grey.png", cv::Mat(3, 3, CV_8UC1, cv::Scalar(7)));
-  expect_refused([&] { read_disparity(folder / "grey.png"); }, {"grey.png", "16-bit grey", "8 bit"});
-  ASSERT_TRUE(cv::imwrite((folder / "flow.png").string(), cv::Mat(3, 3, CV_16UC3, cv::Scalar(1, 2, 3))));
-  expect_refused([&] { read_disparity(folder / "flow.png"); }, {"flow.png", "3 channel"});
+TEST_F(DisparityIo, OtherPngsAreNoDisparity) {
+  write_png(folder_ / "grey.png", cv::Mat(3, 3, CV_8UC1, cv::Scalar(7)));
+  expect_refused([&] { read_disparity(folder_ / "grey.png"); }, {"grey.png", "16-bit grey", "8 bit"});
+  ASSERT_TRUE(cv::imwrite((folder_ / "flow.png").string(), cv::Mat(3, 3, CV_16UC3, cv::Scalar(1, 2, 3))));
+  expect_refused([&] { read_disparity(folder_ / "flow.png"); }, {"flow.png", "3 channel"});
 }
 
-TEST(DisparityIo, PfmRoundTripKeepsEveryBit) {
+TEST_F(DisparityIo, PfmRoundTripKeepsEveryBit) {
   std::mt19937 random(2);
   std::uniform_real_distribution<float> value(-500.0f, 2000.0f);
-  const TemporaryFolder folder;
   for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {65, 3}}) {
     cv::Mat map(height, width, CV_32FC1);
     for (float& d : cv::Mat_<float>(map)) d = random() % 4 == 0 ? kInvalidDisparity : value(random);
-    EXPECT_EQ(write_disparity(folder / "d.PFM", map), 0);
-    expect_equal(read_disparity(folder / "d.PFM"), map);
+    EXPECT_EQ(write_disparity(folder_ / "d.PFM", map), 0);
+    expect_equal(read_disparity(folder_ / "d.PFM"), map);
   }
 }
 
-TEST(DisparityIo, PfmIsBottomUpInBothByteOrders) {
-  const TemporaryFolder folder;
+TEST_F(DisparityIo, PfmIsBottomUpInBothByteOrders) {
   const std::string little("Pf\n1 3\n-0.5\n\x00\x00\x80\x3f\x00\x00\x00\x40\x00\x00\x80\x7f", 24);
   const std::string big("Pf 1 3 1\n\x3f\x80\x00\x00\x40\x00\x00\x00\x7f\xc0\x00\x00", 21);
-  write_file(folder / "little.pfm", little);
-  write_file(folder / "big.pfm", big);
+  write_file(folder_ / "little.pfm", little);
+  write_file(folder_ / "big.pfm", big);
   const cv::Mat expected = (cv::Mat_<float>(3, 1) << kInvalidDisparity, 2.0f, 1.0f);
-  expect_equal(read_pfm(folder / "little.pfm"), expected);
-  expect_equal(read_pfm(folder / "big.pfm"), expected);
+  expect_equal(read_pfm(folder_ / "little.pfm"), expected);
+  expect_equal(read_pfm(folder_ / "big.pfm"), expected);
 }
 
-TEST(DisparityIo, WrittenPfmHoldsInfinityAndStartsAtTheBottom) {
-  const TemporaryFolder folder;
-  write_pfm(folder / "d.pfm", (cv::Mat_<float>(2, 1) << kInvalidDisparity, 1.0f));
-  EXPECT_EQ(read_file(folder / "d.pfm", 100), std::string("Pf\n1 2\n-1.0\n\x00\x00\x80\x3f\x00\x00\x80\x7f", 20));
+TEST_F(DisparityIo, WrittenPfmHoldsInfinityAndStartsAtTheBottom) {
+  write_pfm(folder_ / "d.pfm", (cv::Mat_<float>(2, 1) << kInvalidDisparity, 1.0f));
+  EXPECT_EQ(read_file(folder_ / "d.pfm", 100), std::string("Pf\n1 2\n-1.0\n\x00\x00\x80\x3f\x00\x00\x80\x7f", 20));
 }
 
 /// NumPy's header, padded as NumPy does, and the values.
@@ -115,9 +114,7 @@ std::string npy(const std::string& type, const std::string& order, const std::st
          static_cast<char>(header.size() >> 8) + header + values;
 }
 
-TEST(DisparityIo, NpyOfAnyOrderAndType) {
-  const TemporaryFolder folder;
-  const auto file = folder / "d.npy";
+TEST_F(DisparityIo, NpyOfAnyOrderAndType) {
   const cv::Mat expected = (cv::Mat_<float>(2, 3) << 1, kInvalidDisparity, 3, 4, 5, 6);
   const std::string rows("\x01\x00\x00\x00\x03\x00\x04\x00\x05\x00\x06\x00", 12);
   const std::string columns("\x01\x04\x00\x05\x03\x06", 6);
@@ -128,20 +125,18 @@ TEST(DisparityIo, NpyOfAnyOrderAndType) {
   for (const std::string& bytes : {npy("<i8", "False", "(2, 3)", longs), npy("<u2", "False", "(2, 3)", rows),
                                    npy("|u1", "True", "(2, 3)", columns), npy(">i2", "False", "(2, 3)", big),
                                    npy("<f2", "False", "(1, 2, 3, 1)", halves)}) {
-    write_file(file, bytes);
-    expect_equal(read_disparity(file), expected);
+    write_file(file_, bytes);
+    expect_equal(read_disparity(file_), expected);
   }
   std::string doubles(16, '\0');
   const double values[] = {-2, 7.25};
   std::memcpy(doubles.data(), values, 16);
-  write_file(file, npy("<f8", "False", "(1, 2)", doubles));
-  expect_equal(read_disparity(file), (cv::Mat_<float>(1, 2) << kInvalidDisparity, 7.25f));
-  expect_equal(read_values(file), (cv::Mat_<float>(1, 2) << -2, 7.25f));
+  write_file(file_, npy("<f8", "False", "(1, 2)", doubles));
+  expect_equal(read_disparity(file_), (cv::Mat_<float>(1, 2) << kInvalidDisparity, 7.25f));
+  expect_equal(read_values(file_), (cv::Mat_<float>(1, 2) << -2, 7.25f));
 }
 
-TEST(DisparityIo, BrokenNpyIsRefused) {
-  const TemporaryFolder folder;
-  const auto file = folder / "d.npy";
+TEST_F(DisparityIo, BrokenNpyIsRefused) {
   const std::string four(4, '\1');
   std::string ones;
   for (int i = 0; i < 65; ++i) ones += "1,";
@@ -164,23 +159,19 @@ TEST(DisparityIo, BrokenNpyIsRefused) {
       {npy("<f4", "False", '(' + ones + ')', four), "more than 64 sides"},
   };
   for (const auto& [bytes, part] : cases) {
-    write_file(file, bytes);
-    expect_refused([&] { read_disparity(file); }, {"d.npy", part});
+    write_file(file_, bytes);
+    expect_refused([&] { read_disparity(file_); }, {file_.string(), part});
   }
 }
 
-TEST(DisparityIo, PngOfAnotherScale) {
-  const TemporaryFolder folder;
-  const auto file = folder / "d.png";
-  write_png(file, (cv::Mat_<std::uint16_t>(1, 3) << 0, 100, 250));
-  expect_equal(read_disparity(file, 100), (cv::Mat_<float>(1, 3) << kInvalidDisparity, 1, 2.5f));
-  expect_equal(read_values(file), (cv::Mat_<float>(1, 3) << 0, 100, 250));
-  expect_refused([&] { read_disparity(file, 0); }, {"0.000000", "positive"});
+TEST_F(DisparityIo, PngOfAnotherScale) {
+  write_png(file_, (cv::Mat_<std::uint16_t>(1, 3) << 0, 100, 250));
+  expect_equal(read_disparity(file_, 100), (cv::Mat_<float>(1, 3) << kInvalidDisparity, 1, 2.5f));
+  expect_equal(read_values(file_), (cv::Mat_<float>(1, 3) << 0, 100, 250));
+  expect_refused([&] { read_disparity(file_, 0); }, {"0.000000", "positive"});
 }
 
-TEST(DisparityIo, BrokenPfmIsRefused) {
-  const TemporaryFolder folder;
-  const auto file = folder / "d.pfm";
+TEST_F(DisparityIo, BrokenPfmIsRefused) {
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"", "neither PNG nor PFM"},
       {"Pf", "header"},
@@ -200,18 +191,17 @@ TEST(DisparityIo, BrokenPfmIsRefused) {
       {"Pf\n16384 16384\n-1\n0123", "instead of 1073741824"},
   };
   for (const auto& [bytes, why] : cases) {
-    write_file(file, bytes);
-    expect_refused([&] { read_disparity(file); }, {file.string(), why});
+    write_file(file_, bytes);
+    expect_refused([&] { read_disparity(file_); }, {file_.string(), why});
   }
 }
 
-TEST(DisparityIo, WrongTypesAndNamesAreRefused) {
-  const TemporaryFolder folder;
+TEST_F(DisparityIo, WrongTypesAndNamesAreRefused) {
   const cv::Mat map(2, 2, CV_32FC1, cv::Scalar(1));
-  expect_refused([&] { write_disparity(folder / "d.tiff", map); }, {"d.tiff", ".png or .pfm"});
-  expect_refused([&] { write_disparity(folder / "d.png", cv::Mat(2, 2, CV_64FC1)); }, {"d.png", "CV_32FC1"});
-  expect_refused([&] { write_disparity(folder / "d.pfm", cv::Mat()); }, {"d.pfm", "CV_32FC1"});
-  expect_refused<IoError>([&] { write_disparity(folder / "none/d.png", map); }, {"none/d.png", "No such file"});
+  expect_refused([&] { write_disparity(folder_ / "d.tiff", map); }, {"d.tiff", ".png or .pfm"});
+  expect_refused([&] { write_disparity(folder_ / "d.png", cv::Mat(2, 2, CV_64FC1)); }, {"d.png", "CV_32FC1"});
+  expect_refused([&] { write_disparity(folder_ / "d.pfm", cv::Mat()); }, {"d.pfm", "CV_32FC1"});
+  expect_refused<IoError>([&] { write_disparity(folder_ / "none/d.png", map); }, {"none/d.png", "No such file"});
 }
 
 TEST(RealData, MiddleburyTruthIsRead) {

@@ -45,58 +45,59 @@ class FileSizeLimit {
   void (*handler_)(int) = SIG_DFL;
 };
 
-TEST(FileIo, WrittenBytesAreReadBack) {
-  const TemporaryFolder folder;
+class FileIo : public ::testing::Test {
+ protected:
+  const TemporaryFolder folder_;
+};
+
+TEST_F(FileIo, WrittenBytesAreReadBack) {
   const std::string bytes("a\0b\nc", 5);
-  write_file(folder / "file", bytes);
-  EXPECT_EQ(read_file(folder / "file", 5), bytes);
-  EXPECT_EQ(read_file_start(folder / "file", 2), bytes.substr(0, 2));
-  write_file(folder / "file", "");
-  EXPECT_EQ(read_file(folder / "file", 5), "");
-  EXPECT_EQ(count_entries(folder.path()), 1u);
+  write_file(folder_ / "file", bytes);
+  EXPECT_EQ(read_file(folder_ / "file", 5), bytes);
+  EXPECT_EQ(read_file_start(folder_ / "file", 2), bytes.substr(0, 2));
+  write_file(folder_ / "file", "");
+  EXPECT_EQ(read_file(folder_ / "file", 5), "");
+  EXPECT_EQ(count_entries(folder_.path()), 1u);
 }
 
-TEST(FileIo, WhatHasComeMeanwhileStays) {
-  const TemporaryFolder folder;
+TEST_F(FileIo, WhatHasComeMeanwhileStays) {
   const auto stays = [&](const auto& write) {
     try {
       write();
     } catch (const IoError& error) {
       return std::string(error.what()).find("has come there meanwhile, and stays") != std::string::npos &&
-             read_file(folder / "file", 9) == "mine";
+             read_file(folder_ / "file", 9) == "mine";
     }
     return false;
   };
   const KeepFiles others;
-  write_file(folder / "file", "mine");
-  EXPECT_TRUE(stays([&] { write_file(folder / "file", "another"); }));
-  std::filesystem::create_symlink(folder / "nowhere", folder / "link");
-  write_file(folder / "link", "led there");
-  EXPECT_EQ(read_file(folder / "nowhere", 9), "led there");
-  EXPECT_TRUE(stays([&] { write_file(folder / "file", "another"); }));
-  EXPECT_EQ(count_entries(folder.path()), 3u);
+  write_file(folder_ / "file", "mine");
+  EXPECT_TRUE(stays([&] { write_file(folder_ / "file", "another"); }));
+  std::filesystem::create_symlink(folder_ / "nowhere", folder_ / "link");
+  write_file(folder_ / "link", "led there");
+  EXPECT_EQ(read_file(folder_ / "nowhere", 9), "led there");
+  EXPECT_TRUE(stays([&] { write_file(folder_ / "file", "another"); }));
+  EXPECT_EQ(count_entries(folder_.path()), 3u);
 }
 
-TEST(FileIo, NewFilesObeyTheUmask) {
-  const TemporaryFolder folder;
+TEST_F(FileIo, NewFilesObeyTheUmask) {
   const mode_t before = ::umask(027);
-  write_file(folder / "file", "x");
+  write_file(folder_ / "file", "x");
   ::umask(before);
   struct stat status {};
-  ASSERT_EQ(::stat((folder / "file").c_str(), &status), 0);
+  ASSERT_EQ(::stat((folder_ / "file").c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777, 0640u);
 }
 
-TEST(FileIo, FullDiskLeavesTheOldFileAndNothingElse) {
-  const TemporaryFolder folder;
-  write_file(folder / "file", "old");
+TEST_F(FileIo, FullDiskLeavesTheOldFileAndNothingElse) {
+  write_file(folder_ / "file", "old");
   {
     const FileSizeLimit limit(1000);
-    expect_refused<IoError>([&] { write_file(folder / "file", std::string(5000, 'x')); },
-                            {(folder / "file").string(), "cannot be written", "File too large"});
+    expect_refused<IoError>([&] { write_file(folder_ / "file", std::string(5000, 'x')); },
+                            {(folder_ / "file").string(), "cannot be written", "File too large"});
   }
-  EXPECT_EQ(read_file(folder / "file", 100), "old");
-  EXPECT_EQ(count_entries(folder.path()), 1u);
+  EXPECT_EQ(read_file(folder_ / "file", 100), "old");
+  EXPECT_EQ(count_entries(folder_.path()), 1u);
 }
 
 bool has_unnamed_files(const std::filesystem::path& folder) {
@@ -109,7 +110,7 @@ bool has_unnamed_files(const std::filesystem::path& folder) {
 #endif
 }
 
-TEST(FileIo, KillWhileWritingLeavesOnlyWholeFiles) {
+TEST_F(FileIo, KillWhileWritingLeavesOnlyWholeFiles) {
   const std::string bytes(std::size_t{4} << 20, 'x');
   for (int round = 0; round < 12; ++round) {
     const TemporaryFolder folder;
@@ -131,57 +132,53 @@ TEST(FileIo, KillWhileWritingLeavesOnlyWholeFiles) {
   }
 }
 
-TEST(FileIo, UnwritablePlacesAreNamedWithTheReason) {
-  const TemporaryFolder folder;
-  write_file(folder / "file", "old");
-  expect_refused<IoError>([&] { write_file(folder / "none/file", "x"); }, {"none/file", "No such file or directory"});
-  expect_refused<IoError>([&] { write_file(folder / "file/x", "x"); }, {"file/x", "Not a directory"});
-  expect_refused<IoError>([&] { write_file(folder.path(), "x"); }, {folder.path().string(), "directory"});
+TEST_F(FileIo, UnwritablePlacesAreNamedWithTheReason) {
+  write_file(folder_ / "file", "old");
+  expect_refused<IoError>([&] { write_file(folder_ / "none/file", "x"); }, {"none/file", "No such file or directory"});
+  expect_refused<IoError>([&] { write_file(folder_ / "file/x", "x"); }, {"file/x", "Not a directory"});
+  expect_refused<IoError>([&] { write_file(folder_.path(), "x"); }, {folder_.path().string(), "directory"});
   expect_refused<IoError>([&] { write_file("", "x"); }, {"cannot be written"});
-  expect_refused<IoError>([&] { make_folder(folder / "file/sub"); }, {"file/sub", "Not a directory"});
-  expect_refused<IoError>([&] { make_folder(folder / "file"); }, {"file", "Not a directory"});
-  make_folder(folder / "a/b/c");
-  make_folder(folder / "a/b/c");
-  EXPECT_TRUE(std::filesystem::is_directory(folder / "a/b/c"));
+  expect_refused<IoError>([&] { make_folder(folder_ / "file/sub"); }, {"file/sub", "Not a directory"});
+  expect_refused<IoError>([&] { make_folder(folder_ / "file"); }, {"file", "Not a directory"});
+  make_folder(folder_ / "a/b/c");
+  make_folder(folder_ / "a/b/c");
+  EXPECT_TRUE(std::filesystem::is_directory(folder_ / "a/b/c"));
 }
 
-TEST(FileIo, TheModeOfAnOldFileStaysAndWhatIsProtectedIsNotReplaced) {
-  const TemporaryFolder folder;
-  write_file(folder / "file", "old");
-  ASSERT_EQ(::chmod((folder / "file").c_str(), 0600), 0);
-  write_file(folder / "file", "new");
+TEST_F(FileIo, TheModeOfAnOldFileStaysAndWhatIsProtectedIsNotReplaced) {
+  write_file(folder_ / "file", "old");
+  ASSERT_EQ(::chmod((folder_ / "file").c_str(), 0600), 0);
+  write_file(folder_ / "file", "new");
   struct stat status {};
-  ASSERT_EQ(::stat((folder / "file").c_str(), &status), 0);
+  ASSERT_EQ(::stat((folder_ / "file").c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 07777, 0600u);
-  EXPECT_EQ(read_file(folder / "file", 10), "new");
+  EXPECT_EQ(read_file(folder_ / "file", 10), "new");
   if (::geteuid() == 0) return;  // who may write to all files
-  ASSERT_EQ(::chmod((folder / "file").c_str(), 0400), 0);
-  expect_refused<IoError>([&] { write_file(folder / "file", "newer"); }, {"file", "Permission denied"});
-  EXPECT_EQ(read_file(folder / "file", 10), "new");
+  ASSERT_EQ(::chmod((folder_ / "file").c_str(), 0400), 0);
+  expect_refused<IoError>([&] { write_file(folder_ / "file", "newer"); }, {"file", "Permission denied"});
+  EXPECT_EQ(read_file(folder_ / "file", 10), "new");
 }
 
-TEST(FileIo, LinksAreFollowedAndHardLinksAreCut) {
-  const TemporaryFolder folder;
-  make_folder(folder / "elsewhere");
-  write_file(folder / "elsewhere/file", "old");
-  std::filesystem::create_hard_link(folder / "elsewhere/file", folder / "second_name");
-  std::filesystem::create_symlink("elsewhere/file", folder / "link");
-  std::filesystem::create_symlink("link", folder / "link_to_link");
-  write_file(folder / "link_to_link", "new");
-  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link_to_link"));
-  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
-  EXPECT_EQ(read_file(folder / "elsewhere/file", 10), "new");
-  EXPECT_EQ(read_file(folder / "second_name", 10), "old");
-  std::filesystem::create_symlink("elsewhere/none", folder / "to_nothing");
-  write_file(folder / "to_nothing", "made");
-  EXPECT_EQ(read_file(folder / "elsewhere/none", 10), "made");
-  std::filesystem::create_symlink("loop", folder / "loop");
-  expect_refused<IoError>([&] { write_file(folder / "loop", "x"); }, {"loop", "symbolic links"});
+TEST_F(FileIo, LinksAreFollowedAndHardLinksAreCut) {
+  make_folder(folder_ / "elsewhere");
+  write_file(folder_ / "elsewhere/file", "old");
+  std::filesystem::create_hard_link(folder_ / "elsewhere/file", folder_ / "second_name");
+  std::filesystem::create_symlink("elsewhere/file", folder_ / "link");
+  std::filesystem::create_symlink("link", folder_ / "link_to_link");
+  write_file(folder_ / "link_to_link", "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "link_to_link"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "link"));
+  EXPECT_EQ(read_file(folder_ / "elsewhere/file", 10), "new");
+  EXPECT_EQ(read_file(folder_ / "second_name", 10), "old");
+  std::filesystem::create_symlink("elsewhere/none", folder_ / "to_nothing");
+  write_file(folder_ / "to_nothing", "made");
+  EXPECT_EQ(read_file(folder_ / "elsewhere/none", 10), "made");
+  std::filesystem::create_symlink("loop", folder_ / "loop");
+  expect_refused<IoError>([&] { write_file(folder_ / "loop", "x"); }, {"loop", "symbolic links"});
 }
 
-TEST(FileIo, PipesAndDescriptorsAreWrittenThrough) {
-  const TemporaryFolder folder;
-  const std::filesystem::path pipe = folder / "pipe";
+TEST_F(FileIo, PipesAndDescriptorsAreWrittenThrough) {
+  const std::filesystem::path pipe = folder_ / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   const int reading = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK);
   ASSERT_GE(reading, 0);
@@ -192,29 +189,27 @@ TEST(FileIo, PipesAndDescriptorsAreWrittenThrough) {
   ::close(reading);
   EXPECT_TRUE(std::filesystem::is_fifo(pipe));
 
-  const int open_file = ::open((folder / "open").c_str(), O_WRONLY | O_CREAT, 0600);
+  const int open_file = ::open((folder_ / "open").c_str(), O_WRONLY | O_CREAT, 0600);
   ASSERT_GE(open_file, 0);
   ASSERT_EQ(::write(open_file, "before ", 7), 7);
   const std::string name = "/dev/fd/" + std::to_string(open_file);
   EXPECT_TRUE(is_stream(name));
   write_file(name, "after");
   ::close(open_file);
-  EXPECT_EQ(read_file(folder / "open", 20), "before after");
-  EXPECT_FALSE(is_stream(folder / "open"));
-  EXPECT_FALSE(is_stream(folder / "none"));
+  EXPECT_EQ(read_file(folder_ / "open", 20), "before after");
+  EXPECT_FALSE(is_stream(folder_ / "open"));
+  EXPECT_FALSE(is_stream(folder_ / "none"));
 }
 
-TEST(FileIo, APipeWithoutItsOtherEndIsNotWaitedForWithoutEnd) {
-  const TemporaryFolder folder;
-  const std::filesystem::path pipe = folder / "pipe";
+TEST_F(FileIo, APipeWithoutItsOtherEndIsNotWaitedForWithoutEnd) {
+  const std::filesystem::path pipe = folder_ / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   expect_refused([&] { read_file(pipe, 100); }, {"pipe", "nobody writes to"});
   expect_refused<IoError>([&] { write_file(pipe, "x"); }, {"pipe", "nobody reads"});
 }
 
-TEST(FileIo, APipeThatIsWrittenLateAndInPiecesIsReadWhole) {
-  const TemporaryFolder folder;
-  const std::filesystem::path pipe = folder / "pipe";
+TEST_F(FileIo, APipeThatIsWrittenLateAndInPiecesIsReadWhole) {
+  const std::filesystem::path pipe = folder_ / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   const std::string piece(100000, 'x');  // more than a pipe holds
   const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(100)); };
@@ -235,8 +230,7 @@ TEST(FileIo, APipeThatIsWrittenLateAndInPiecesIsReadWhole) {
   writer.join();
 }
 
-TEST(FileIo, TellsOfAFileBeforeItIsThere) {
-  const TemporaryFolder folder;
+TEST_F(FileIo, TellsOfAFileBeforeItIsThere) {
   std::string told;
   {
     const BeforeWrite outer([&](const auto&, std::string_view bytes) {
@@ -248,33 +242,31 @@ TEST(FileIo, TellsOfAFileBeforeItIsThere) {
         told += file.filename().string() + "=" + std::string(bytes) + (std::filesystem::exists(file) ? " late " : " ");
         return true;
       });
-      write_file(folder / "a", "1");
+      write_file(folder_ / "a", "1");
     }
-    write_file(folder / "b", "2");
-    write_file(folder / "e", "no");
+    write_file(folder_ / "b", "2");
+    write_file(folder_ / "e", "no");
     const BeforeWrite none([](const auto&, std::string_view) -> bool { throw IoError("no record"); });
-    expect_refused<IoError>([&] { write_file(folder / "c", "3"); }, {"no record"});
+    expect_refused<IoError>([&] { write_file(folder_ / "c", "3"); }, {"no record"});
   }
-  write_file(folder / "d", "4");
+  write_file(folder_ / "d", "4");
   EXPECT_EQ(told, "a=1 outer outer ");
-  EXPECT_TRUE(std::filesystem::exists(folder / "b"));
-  for (const char* name : {"c", "e"}) EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "b"));
+  for (const char* name : {"c", "e"}) EXPECT_FALSE(std::filesystem::exists(folder_ / name)) << name;
 }
 
-TEST(FileIo, LooksWithoutATrace) {
-  const TemporaryFolder folder;
-  expect_writable(folder / "none");
-  expect_refused<IoError>([&] { expect_writable(folder / "no/folder"); }, {"no/folder", "No such file"});
-  EXPECT_EQ(count_entries(folder.path()), 0u);
+TEST_F(FileIo, LooksWithoutATrace) {
+  expect_writable(folder_ / "none");
+  expect_refused<IoError>([&] { expect_writable(folder_ / "no/folder"); }, {"no/folder", "No such file"});
+  EXPECT_EQ(count_entries(folder_.path()), 0u);
 }
 
-TEST(FileIo, UnreadablePlacesAreNamedWithTheReason) {
-  const TemporaryFolder folder;
-  expect_refused([&] { read_file(folder / "none", 10); }, {"none", "No such file or directory"});
-  expect_refused([&] { read_file(folder.path(), 10); }, {folder.path().string(), "Is a directory"});
+TEST_F(FileIo, UnreadablePlacesAreNamedWithTheReason) {
+  expect_refused([&] { read_file(folder_ / "none", 10); }, {"none", "No such file or directory"});
+  expect_refused([&] { read_file(folder_.path(), 10); }, {folder_.path().string(), "Is a directory"});
   expect_refused([&] { read_file("/dev/zero", 10); }, {"/dev/zero", "device"});
-  write_file(folder / "file", "12345");
-  expect_refused([&] { read_file(folder / "file", 4); }, {"file", "larger than 4 bytes"});
+  write_file(folder_ / "file", "12345");
+  expect_refused([&] { read_file(folder_ / "file", 4); }, {"file", "larger than 4 bytes"});
 }
 
 }  // namespace

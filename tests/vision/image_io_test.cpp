@@ -67,108 +67,109 @@ void write_with_libpng(const std::filesystem::path& file, const cv::Mat& image, 
   std::fclose(stream);
 }
 
-TEST(ImageIo, GreyImagesKeepEveryBit) {
+class ImageIo : public ::testing::Test {
+ protected:
+  void expect_unreadable(std::vector<std::string> named) const {
+    named.push_back(file_.string());
+    expect_refused([&] { read_grey_image(file_); }, named);
+  }
+
+  const TemporaryFolder folder_;
+  const std::filesystem::path file_ = folder_ / "image.png";  // JPEGs are known by what they hold
+};
+
+TEST_F(ImageIo, GreyImagesKeepEveryBit) {
   std::mt19937 random(1);
-  const TemporaryFolder folder;
   for (int type : {CV_8UC1, CV_16UC1}) {
     for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {65, 3}, {127, 33}}) {
       const cv::Mat image = random_image(random, width, height, type);
-      write_png(folder / "image.png", image);
-      expect_equal(read_grey_image(folder / "image.png"), image);
-      expect_equal(cv::imread((folder / "image.png").string(), cv::IMREAD_UNCHANGED), image);
-      EXPECT_EQ(read_image_size(folder / "image.png"), image.size());
+      write_png(file_, image);
+      expect_equal(read_grey_image(file_), image);
+      expect_equal(cv::imread(file_.string(), cv::IMREAD_UNCHANGED), image);
+      EXPECT_EQ(read_image_size(file_), image.size());
     }
   }
 }
 
-TEST(ImageIo, ColorIsReadAsItIs) {
+TEST_F(ImageIo, ColorIsReadAsItIs) {
   std::mt19937 random(3);
-  const TemporaryFolder folder;
   const cv::Mat image = random_image(random, 33, 7, CV_8UC3);
-  write_png(folder / "image.png", image);
-  expect_equal(read_color_image(folder / "image.png"), image);
+  write_png(file_, image);
+  expect_equal(read_color_image(file_), image);
   cv::Mat deep;
   for (const int lower_byte : {0, 255}) {
     image.convertTo(deep, CV_16U, 256, lower_byte);
-    ASSERT_TRUE(cv::imwrite((folder / "deep.png").string(), deep));
-    expect_equal(read_color_image(folder / "deep.png"), image);
+    ASSERT_TRUE(cv::imwrite((folder_ / "deep.png").string(), deep));
+    expect_equal(read_color_image(folder_ / "deep.png"), image);
   }
-  write_png(folder / "grey.png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(7)));
-  expect_equal(read_color_image(folder / "grey.png"), cv::Mat(3, 4, CV_8UC3, cv::Scalar::all(7)));
+  write_png(folder_ / "grey.png", cv::Mat(3, 4, CV_8UC1, cv::Scalar(7)));
+  expect_equal(read_color_image(folder_ / "grey.png"), cv::Mat(3, 4, CV_8UC3, cv::Scalar::all(7)));
 }
 
-TEST(ImageIo, ColorBecomesGreyAsInOpenCv) {
+TEST_F(ImageIo, ColorBecomesGreyAsInOpenCv) {
   std::mt19937 random(2);
-  const TemporaryFolder folder;
   for (int depth : {CV_8U, CV_16U}) {
     for (int channels : {3, 4}) {
       const cv::Mat image = random_image(random, 31, 17, CV_MAKETYPE(depth, channels));
-      ASSERT_TRUE(cv::imwrite((folder / "image.png").string(), image));
+      ASSERT_TRUE(cv::imwrite(file_.string(), image));
       cv::Mat expected;
       cv::cvtColor(image, expected, channels == 3 ? cv::COLOR_BGR2GRAY : cv::COLOR_BGRA2GRAY);
-      expect_equal(read_grey_image(folder / "image.png"), expected);
+      expect_equal(read_grey_image(file_), expected);
     }
   }
 }
 
-TEST(ImageIo, InterlacedAndPaletteAndBilevelFilesAreRead) {
+TEST_F(ImageIo, InterlacedAndPaletteAndBilevelFilesAreRead) {
   std::mt19937 random(3);
-  const TemporaryFolder folder;
   const cv::Mat image = random_image(random, 29, 19, CV_8UC1);
-  write_with_libpng(folder / "interlaced.png", image, {.interlace = PNG_INTERLACE_ADAM7});
-  expect_equal(read_grey_image(folder / "interlaced.png"), image);
+  write_with_libpng(folder_ / "interlaced.png", image, {.interlace = PNG_INTERLACE_ADAM7});
+  expect_equal(read_grey_image(folder_ / "interlaced.png"), image);
 
-  write_with_libpng(folder / "palette.png", image, {.color_type = PNG_COLOR_TYPE_PALETTE});
+  write_with_libpng(folder_ / "palette.png", image, {.color_type = PNG_COLOR_TYPE_PALETTE});
   cv::Mat expected;
-  cv::cvtColor(cv::imread((folder / "palette.png").string(), cv::IMREAD_COLOR), expected, cv::COLOR_BGR2GRAY);
-  expect_equal(read_grey_image(folder / "palette.png"), expected);
+  cv::cvtColor(cv::imread((folder_ / "palette.png").string(), cv::IMREAD_COLOR), expected, cv::COLOR_BGR2GRAY);
+  expect_equal(read_grey_image(folder_ / "palette.png"), expected);
 
   const cv::Mat bilevel = image > 128;
-  ASSERT_TRUE(cv::imwrite((folder / "bilevel.png").string(), bilevel, {cv::IMWRITE_PNG_BILEVEL, 1}));
-  expect_equal(read_grey_image(folder / "bilevel.png"), bilevel);
+  ASSERT_TRUE(cv::imwrite((folder_ / "bilevel.png").string(), bilevel, {cv::IMWRITE_PNG_BILEVEL, 1}));
+  expect_equal(read_grey_image(folder_ / "bilevel.png"), bilevel);
 }
 
-TEST(ImageIo, PlainFilesOfEveryFilterAreReadAsTheyAre) {
+TEST_F(ImageIo, PlainFilesOfEveryFilterAreReadAsTheyAre) {
   std::mt19937 random(6);
-  const TemporaryFolder folder;
-  const auto file = folder / "image.png";
   for (int type : {CV_8UC1, CV_16UC1, CV_8UC3}) {
     const int color_type = type == CV_8UC3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY;
     for (int filters : {PNG_FILTER_NONE, PNG_FILTER_SUB, PNG_FILTER_UP, PNG_FILTER_AVG, PNG_FILTER_PAETH}) {
       for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {65, 3}, {127, 33}}) {
         const cv::Mat image = random_image(random, width, height, type);
-        write_with_libpng(file, image, {.color_type = color_type, .filters = filters, .chunk_bytes = 100});
-        expect_equal(read_stored_image(file), image);
+        write_with_libpng(file_, image, {.color_type = color_type, .filters = filters, .chunk_bytes = 100});
+        expect_equal(read_stored_image(file_), image);
       }
     }
   }
 }
 
-TEST(ImageIo, EveryTruncationIsRefusedInSilence) {
+TEST_F(ImageIo, EveryTruncationIsRefusedInSilence) {
   std::mt19937 random(4);
-  const TemporaryFolder folder;
-  const auto file = folder / "image.png";
-  write_png(file, random_image(random, 23, 11, CV_8UC1));
-  const std::string whole = read_file(file, 1 << 20);
+  write_png(file_, random_image(random, 23, 11, CV_8UC1));
+  const std::string whole = read_file(file_, 1 << 20);
   ::testing::internal::CaptureStderr();
   for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
-    write_file(file, whole.substr(0, bytes));
-    expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
+    write_file(file_, whole.substr(0, bytes));
+    expect_unreadable({"not a readable image (truncated?)"});
   }
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
 
-TEST(ImageIo, EveryDamagedByteIsRefused) {
+TEST_F(ImageIo, EveryDamagedByteIsRefused) {
   std::mt19937 random(5);
-  const TemporaryFolder folder;
-  const auto file = folder / "image.png";
-  write_png(file, random_image(random, 23, 11, CV_16UC1));
-  const std::string whole = read_file(file, 1 << 20);
+  write_png(file_, random_image(random, 23, 11, CV_16UC1));
+  const std::string whole = read_file(file_, 1 << 20);
   for (std::size_t at = 0; at < whole.size(); ++at) {
     std::string bytes = whole;
     bytes[at] = static_cast<char>(bytes[at] ^ 4);
-    write_file(file, bytes);
-    expect_refused([&] { read_grey_image(file); }, {file.string()});
+    write_file(file_, bytes);
+    expect_unreadable({});
   }
 }
 
@@ -188,55 +189,47 @@ std::string with_header_size(std::string png, std::uint32_t width, std::uint32_t
   return png;
 }
 
-TEST(ImageIo, HugeSizesAreRefusedFromTheHeader) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.png";
-  write_png(file, cv::Mat(2, 2, CV_8UC1, cv::Scalar(0)));
-  const std::string small = read_file(file, 1000);
+TEST_F(ImageIo, HugeSizesAreRefusedFromTheHeader) {
+  write_png(file_, cv::Mat(2, 2, CV_8UC1, cv::Scalar(0)));
+  const std::string small = read_file(file_, 1000);
   ASSERT_LT(small.size(), 100u);
   for (const auto& [width, height] : {std::pair{16385u, 1u}, {1u, 16385u}, {0x7fffffffu, 0x7fffffffu}}) {
-    write_file(file, with_header_size(small, width, height));
-    expect_refused([&] { read_grey_image(file); }, {file.string(), "larger than the limit"});
-    expect_refused([&] { read_image_size(file); }, {file.string(), "larger than the limit"});
+    write_file(file_, with_header_size(small, width, height));
+    expect_unreadable({"larger than the limit"});
+    expect_refused([&] { read_image_size(file_); }, {file_.string(), "larger than the limit"});
   }
   // Within the limits, but no 100 bytes hold so many pixels.
-  write_file(file, with_header_size(small, 16384, 16384));
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
-  write_with_libpng(file, cv::Mat(2, 2, CV_8UC1, cv::Scalar(0)), {.interlace = PNG_INTERLACE_ADAM7});
-  write_file(file, with_header_size(read_file(file, 1000), 16384, 16384));
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
-  write_file(file, with_header_size(small, 0, 5));
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "zero"});
+  write_file(file_, with_header_size(small, 16384, 16384));
+  expect_unreadable({"too short for 16384x16384"});
+  write_with_libpng(file_, cv::Mat(2, 2, CV_8UC1, cv::Scalar(0)), {.interlace = PNG_INTERLACE_ADAM7});
+  write_file(file_, with_header_size(read_file(file_, 1000), 16384, 16384));
+  expect_unreadable({"too short for 16384x16384"});
+  write_file(file_, with_header_size(small, 0, 5));
+  expect_unreadable({"zero"});
 }
 
 // What is compressed may hold fewer pixels than the header says, or more, which libpng overlooks.
-TEST(ImageIo, PixelsAreAsManyAsTheHeaderSays) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.png";
+TEST_F(ImageIo, PixelsAreAsManyAsTheHeaderSays) {
   const cv::Mat image = (cv::Mat_<std::uint8_t>(3, 2) << 1, 2, 3, 4, 5, 6);
-  write_png(file, image);
-  const std::string whole = read_file(file, 1000);
-  write_file(file, with_header_size(whole, 2, 4));
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
-  write_file(file, with_header_size(whole, 2, 2));
-  expect_equal(read_grey_image(file), image.rowRange(0, 2));
+  write_png(file_, image);
+  const std::string whole = read_file(file_, 1000);
+  write_file(file_, with_header_size(whole, 2, 4));
+  expect_unreadable({"not a readable image (truncated?)"});
+  write_file(file_, with_header_size(whole, 2, 2));
+  expect_equal(read_grey_image(file_), image.rowRange(0, 2));
 }
 
-TEST(ImageIo, NonImagesAreRefused) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.png";
+TEST_F(ImageIo, NonImagesAreRefused) {
   for (const std::string text : {"", "hello", "\xff\xd8\xff\xe0 JFIF", "\xff\xd8\xff"}) {
-    write_file(file, text);
-    expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image"});
+    write_file(file_, text);
+    expect_unreadable({"not a readable image"});
   }
-  expect_refused([&] { read_grey_image(folder / "none.png"); }, {"none.png", "No such file"});
-  expect_refused([&] { write_png(file, cv::Mat()); }, {file.string()});
-  expect_refused([&] { write_png(file, cv::Mat(1, 1, CV_32FC1)); }, {file.string()});
+  expect_refused([&] { read_grey_image(folder_ / "none.png"); }, {"none.png", "No such file"});
+  expect_refused([&] { write_png(file_, cv::Mat()); }, {file_.string()});
+  expect_refused([&] { write_png(file_, cv::Mat(1, 1, CV_32FC1)); }, {file_.string()});
 }
 
-TEST(ImageIo, WhatIsGivenInPlaceOfAnImageIsNamed) {
-  const TemporaryFolder folder;
-  const std::filesystem::path file = folder / "0.png";
+TEST_F(ImageIo, WhatIsGivenInPlaceOfAnImageIsNamed) {
   const std::pair<std::string, std::string> kinds[] = {
       {"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "git lfs pull"},
       {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video, which `egosgm rectify` reads"},
@@ -245,13 +238,13 @@ TEST(ImageIo, WhatIsGivenInPlaceOfAnImageIsNamed) {
       {"P5\n2 2\n255\n1234", "is a PGM"},
       {"<!DOCTYPE html>", "is a web page"}};
   for (const auto& [content, named] : kinds) {
-    write_file(file, content);
-    expect_refused([&] { read_grey_image(file); }, {file.string(), named});
-    expect_refused([&] { read_image_size(file); }, {file.string(), named});
+    write_file(file_, content);
+    expect_unreadable({named});
+    expect_refused([&] { read_image_size(file_); }, {file_.string(), named});
   }
 }
 
-TEST(ImageIo, SixteenBitsMayHoldEight) {
+TEST_F(ImageIo, SixteenBitsMayHoldEight) {
   const cv::Mat grey = (cv::Mat_<std::uint16_t>(1, 2) << 7, 255);
   EXPECT_TRUE(holds_8_bits_in_16(grey));
   EXPECT_FALSE(holds_8_bits_in_16(grey + 1));
@@ -272,75 +265,65 @@ cv::Mat smooth_image(int width, int height, int type) {
   return image;
 }
 
-TEST(ImageIo, JpegIsReadAsPngIsWhateverItsName) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.png";
+TEST_F(ImageIo, JpegIsReadAsPngIsWhateverItsName) {
   for (const auto& [width, height] : {std::pair{1, 1}, {8, 8}, {65, 33}, {127, 40}}) {
     for (const int type : {CV_8UC1, CV_8UC3}) {
       for (const int progressive : {0, 1}) {
-        write_file(file, jpeg_of(smooth_image(width, height, type), {cv::IMWRITE_JPEG_PROGRESSIVE, progressive}));
-        cv::Mat expected = cv::imread(file.string(), type == CV_8UC1 ? cv::IMREAD_GRAYSCALE : cv::IMREAD_COLOR), grey;
+        write_file(file_, jpeg_of(smooth_image(width, height, type), {cv::IMWRITE_JPEG_PROGRESSIVE, progressive}));
+        cv::Mat expected = cv::imread(file_.string(), type == CV_8UC1 ? cv::IMREAD_GRAYSCALE : cv::IMREAD_COLOR), grey;
         if (type == CV_8UC3) {
-          expect_equal(read_color_image(file), expected);
+          expect_equal(read_color_image(file_), expected);
           cv::cvtColor(expected, expected, cv::COLOR_BGR2GRAY);
         }
-        expect_equal(read_grey_image(file), expected);
-        EXPECT_EQ(read_image_size(file), cv::Size(width, height));
+        expect_equal(read_grey_image(file_), expected);
+        EXPECT_EQ(read_image_size(file_), cv::Size(width, height));
       }
     }
   }
 }
 
-TEST(ImageIo, AJpegsSizeMayStandBehindALongComment) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.jpg";
+TEST_F(ImageIo, AJpegsSizeMayStandBehindALongComment) {
   std::string bytes = jpeg_of(smooth_image(30, 20, CV_8UC1));
   const std::string comment = "\xff\xfe\xff\xff" + std::string(65533, 'x');
   for (int i = 0; i < 3; ++i) bytes.insert(2, comment);
-  write_file(file, bytes);
-  EXPECT_EQ(read_image_size(file), cv::Size(30, 20));
-  EXPECT_EQ(read_grey_image(file).size(), cv::Size(30, 20));
+  write_file(file_, bytes);
+  EXPECT_EQ(read_image_size(file_), cv::Size(30, 20));
+  EXPECT_EQ(read_grey_image(file_).size(), cv::Size(30, 20));
 }
 
-TEST(ImageIo, EveryTruncationOfAJpegIsRefusedInSilence) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.jpg";
+TEST_F(ImageIo, EveryTruncationOfAJpegIsRefusedInSilence) {
   for (const int progressive : {0, 1}) {
     const std::string whole = jpeg_of(smooth_image(17, 9, CV_8UC3), {cv::IMWRITE_JPEG_PROGRESSIVE, progressive});
     ::testing::internal::CaptureStderr();
     for (std::size_t bytes = 0; bytes < whole.size(); ++bytes) {
-      write_file(file, whole.substr(0, bytes));
-      expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
+      write_file(file_, whole.substr(0, bytes));
+      expect_unreadable({"not a readable image (truncated?)"});
     }
     EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
   }
 }
 
-TEST(ImageIo, ADamagedJpegIsRefusedInSilence) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.jpg";
+TEST_F(ImageIo, ADamagedJpegIsRefusedInSilence) {
   std::string bytes = jpeg_of(smooth_image(64, 64, CV_8UC1));
   bytes.replace(bytes.size() - 200, 100, std::string(50, '\xff') + std::string(50, '\x01'));  // markers that are none
-  write_file(file, bytes);
+  write_file(file_, bytes);
   ::testing::internal::CaptureStderr();
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "not a readable image (truncated?)"});
+  expect_unreadable({"not a readable image (truncated?)"});
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
 }
 
-TEST(ImageIo, AJpegWithTheSizeOfALargerOneIsRefused) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.jpg";
+TEST_F(ImageIo, AJpegWithTheSizeOfALargerOneIsRefused) {
   const std::string bytes = jpeg_of(cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(0)));
   const std::size_t frame = bytes.find("\xff\xc0");
   ASSERT_NE(frame, std::string::npos);
   const auto with_size = [&](const std::string& height, const std::string& width) {
     return std::string(bytes).replace(frame + 5, 4, height + width);
   };
-  write_file(file, with_size("\xf0\xf0", "\xf0\xf0"));
-  expect_refused([&] { read_image_size(file); }, {file.string(), "61680x61680", "larger than the limit"});
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "61680x61680", "larger than the limit"});
-  write_file(file, with_size("\x40" + std::string(1, '\0'), "\x40" + std::string(1, '\0')));
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
+  write_file(file_, with_size("\xf0\xf0", "\xf0\xf0"));
+  expect_refused([&] { read_image_size(file_); }, {file_.string(), "61680x61680", "larger than the limit"});
+  expect_unreadable({"61680x61680", "larger than the limit"});
+  write_file(file_, with_size("\x40" + std::string(1, '\0'), "\x40" + std::string(1, '\0')));
+  expect_unreadable({"too short for 16384x16384"});
 }
 
 /// Written by libjpeg itself, as `colors` says, by these scans if there are any.
@@ -382,21 +365,17 @@ void write_scans(const std::filesystem::path& file, int coefficients) {
   write_jpeg(file, smooth_image(16, 16, CV_8UC1), JCS_GRAYSCALE, scans);
 }
 
-TEST(ImageIo, AJpegOfFourColoursIsRefusedForThat) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.jpg";
-  write_jpeg(file, cv::Mat(8, 8, CV_8UC4, cv::Scalar::all(9)), JCS_CMYK);
-  EXPECT_EQ(read_image_size(file), cv::Size(8, 8));
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "4 components, like CMYK", "save it as grey or RGB"});
+TEST_F(ImageIo, AJpegOfFourColoursIsRefusedForThat) {
+  write_jpeg(file_, cv::Mat(8, 8, CV_8UC4, cv::Scalar::all(9)), JCS_CMYK);
+  EXPECT_EQ(read_image_size(file_), cv::Size(8, 8));
+  expect_unreadable({"4 components, like CMYK", "save it as grey or RGB"});
 }
 
-TEST(ImageIo, AJpegOfManyScansIsRefused) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.jpg";
-  write_scans(file, 40);
-  EXPECT_EQ(read_grey_image(file).size(), cv::Size(16, 16));
-  write_scans(file, 63);
-  expect_refused([&] { read_grey_image(file); }, {file.string(), "scans"});
+TEST_F(ImageIo, AJpegOfManyScansIsRefused) {
+  write_scans(file_, 40);
+  EXPECT_EQ(read_grey_image(file_).size(), cv::Size(16, 16));
+  write_scans(file_, 63);
+  expect_unreadable({"scans"});
 }
 
 /// A file of few bytes and many pixels: one colour, of `bits` bits.
@@ -420,18 +399,16 @@ void write_bomb(const std::filesystem::path& file, int side, int color_type, int
   std::fclose(stream);
 }
 
-TEST(ImageIo, TheBoundHoldsForPixelsAsTheyAreWidened) {
-  const TemporaryFolder folder;
-  const auto file = folder / "image.png";
+TEST_F(ImageIo, TheBoundHoldsForPixelsAsTheyAreWidened) {
   for (const int color_type : {PNG_COLOR_TYPE_PALETTE, PNG_COLOR_TYPE_GRAY}) {
-    write_bomb(file, 16384, color_type, 1);
-    ASSERT_LT(std::filesystem::file_size(file), 50'000u);
-    expect_refused([&] { read_grey_image(file); }, {file.string(), "too short for 16384x16384"});
-    write_bomb(file, 2000, color_type, 1);  // a mask may be as empty as it likes
-    EXPECT_EQ(read_grey_image(file).size(), cv::Size(2000, 2000));
+    write_bomb(file_, 16384, color_type, 1);
+    ASSERT_LT(std::filesystem::file_size(file_), 50'000u);
+    expect_unreadable({"too short for 16384x16384"});
+    write_bomb(file_, 2000, color_type, 1);  // a mask may be as empty as it likes
+    EXPECT_EQ(read_grey_image(file_).size(), cv::Size(2000, 2000));
   }
-  write_bomb(file, 6000, PNG_COLOR_TYPE_GRAY, 8);  // one grey, as deflate packs it best
-  EXPECT_EQ(read_grey_image(file).size(), cv::Size(6000, 6000));
+  write_bomb(file_, 6000, PNG_COLOR_TYPE_GRAY, 8);  // one grey, as deflate packs it best
+  EXPECT_EQ(read_grey_image(file_).size(), cv::Size(6000, 6000));
 }
 
 }  // namespace

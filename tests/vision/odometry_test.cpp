@@ -23,35 +23,23 @@
 #include "tests/odometry/motions.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
+#include "tests/vision/rendered_video.h"
 
 namespace egosgm::vision {
 namespace {
 
 using testing::expect_refused;
 
-struct Drive {
-  SyntheticSequence sequence;
-  std::vector<SyntheticFrame> frames;
-
-  explicit Drive(const SyntheticOptions& options) : sequence(options) {
-    for (int k = 0; k < options.frames; ++k) frames.push_back(sequence.render(k));
-  }
-};
-
-const Drive& turning_drive() {
-  static const Drive drive([] {
-    SyntheticOptions options;
-    options.frames = 8;
-    options.turn_deg = 2.7;
-    options.seed = 21;
-    options.supersampling = 2;
-    return options;
-  }());
+const RenderedVideo& turning_drive() {
+  static const RenderedVideo drive({.frames = 8, .seed = 21, .turn_deg = 2.7, .supersampling = 2});
   return drive;
 }
 
 OdometryResult process(StereoOdometry& odometry, const cv::Mat& left, const cv::Mat& right) {
   return odometry.process(image_view(left), image_view(right));
+}
+OdometryResult process(StereoOdometry& odometry, const SyntheticFrame& frame) {
+  return process(odometry, frame.left, frame.right);
 }
 
 void expect_motion(const OdometryResult& result, const Eigen::Isometry3d& truth, const MotionError& most,
@@ -66,20 +54,19 @@ void expect_motion(const OdometryResult& result, const Eigen::Isometry3d& truth,
 void expect_all_motions(const SyntheticSequence& sequence, const std::vector<SyntheticFrame>& frames,
                         const MotionError& most, const std::string& what = "") {
   StereoOdometry odometry(sequence.calibration());
-  process(odometry, frames[0].left, frames[0].right);
+  process(odometry, frames[0]);
   for (std::size_t k = 1; k < frames.size(); ++k) {
-    expect_motion(process(odometry, frames[k].left, frames[k].right),
-                  sequence.motion(static_cast<int>(k)).current_from_previous, most,
+    expect_motion(process(odometry, frames[k]), sequence.motion(static_cast<int>(k)).current_from_previous, most,
                   what + "frame " + std::to_string(k));
   }
 }
 
 TEST(StereoOdometry, FollowsATurningDrive) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   StereoOdometry odometry(drive.sequence.calibration());
   Eigen::Isometry3d estimated = Eigen::Isometry3d::Identity();
   for (std::size_t k = 0; k < drive.frames.size(); ++k) {
-    const OdometryResult result = process(odometry, drive.frames[k].left, drive.frames[k].right);
+    const OdometryResult result = process(odometry, drive.frames[k]);
     EXPECT_GT(result.features, 500);
     if (k == 0) {
       EXPECT_FALSE(result.motion);
@@ -99,13 +86,13 @@ TEST(StereoOdometry, FollowsATurningDrive) {
 }
 
 TEST(StereoOdometry, GivesTheSameBitsTwiceAndAfterReset) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   StereoOdometry first(drive.sequence.calibration()), second(drive.sequence.calibration());
-  process(second, drive.frames[5].left, drive.frames[5].right);
-  process(second, drive.frames[6].left, drive.frames[6].right);
+  process(second, drive.frames[5]);
+  process(second, drive.frames[6]);
   second.reset();
   for (const SyntheticFrame& frame : drive.frames) {
-    const OdometryResult a = process(first, frame.left, frame.right), b = process(second, frame.left, frame.right);
+    const OdometryResult a = process(first, frame), b = process(second, frame);
     ASSERT_EQ(a.motion.has_value(), b.motion.has_value());
     EXPECT_EQ(a.inliers, b.inliers);
     EXPECT_EQ(a.reason, b.reason);
@@ -117,19 +104,16 @@ TEST(StereoOdometry, GivesTheSameBitsTwiceAndAfterReset) {
 
 /// The covariance is a claim: over many motions, squared errors over it average to the six degrees of freedom.
 TEST(StereoOdometry, CovarianceIsConsistentWithTheError) {
-  SyntheticOptions options;
-  options.frames = 8;
-  options.seed = 24;
-  options.supersampling = 2;
-  const Drive straight(options);
+  SyntheticOptions options{.frames = 8, .seed = 24, .supersampling = 2};
+  const RenderedVideo straight(options);
   options.height = 360;  // features are sought at half the size
-  const Drive large(options);
-  for (const Drive* drive : {&turning_drive(), &straight, &large}) {
+  const RenderedVideo large(options);
+  for (const RenderedVideo* drive : {&turning_drive(), &straight, &large}) {
     double sum = 0;
     int motions = 0;
     StereoOdometry odometry(drive->sequence.calibration());
     for (int k = 0; k < drive->sequence.frames(); ++k) {
-      const OdometryResult result = process(odometry, drive->frames[k].left, drive->frames[k].right);
+      const OdometryResult result = process(odometry, drive->frames[k]);
       if (k == 0) continue;
       ASSERT_TRUE(result.motion) << result.reason;
       const Eigen::Isometry3d error =
@@ -146,12 +130,12 @@ TEST(StereoOdometry, CovarianceIsConsistentWithTheError) {
 }
 
 TEST(StereoOdometry, ThreadsChangeNoBit) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   const auto motions = [&drive] {
     StereoOdometry odometry(drive.sequence.calibration());
     std::vector<Motion> found;
     for (int k = 0; k < 4; ++k) {
-      const OdometryResult result = process(odometry, drive.frames[k].left, drive.frames[k].right);
+      const OdometryResult result = process(odometry, drive.frames[k]);
       if (result.motion) found.push_back(*result.motion);
     }
     return found;
@@ -176,13 +160,7 @@ TEST(StereoOdometry, ThreadsChangeNoBit) {
 }
 
 TEST(StereoOdometry, FollowsFastMotion) {
-  SyntheticOptions options;
-  options.frames = 4;
-  options.speed_m = 2.5;
-  options.turn_deg = 2;
-  options.seed = 23;
-  options.supersampling = 2;
-  const Drive drive(options);
+  const RenderedVideo drive({.frames = 4, .seed = 23, .speed_m = 2.5, .turn_deg = 2, .supersampling = 2});
   expect_all_motions(drive.sequence, drive.frames, {0.02, 0.05});
 }
 
@@ -195,7 +173,7 @@ cv::Mat lowered(const cv::Mat& image, double rows) {
 }
 
 TEST(StereoOdometry, BearsAVerticalOffsetBetweenTheImages) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   for (const double rows : {0.5, -0.5, 1.5}) {
     std::vector<SyntheticFrame> frames(drive.frames.begin(), drive.frames.begin() + 5);
     for (SyntheticFrame& frame : frames) frame.right = lowered(frame.right, rows);
@@ -204,11 +182,11 @@ TEST(StereoOdometry, BearsAVerticalOffsetBetweenTheImages) {
 }
 
 TEST(StereoOdometry, BlurGivesAGoodMotionOrNone) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   int without = 0;
   for (const int length_px : {3, 9, 61}) {
     StereoOdometry odometry(drive.sequence.calibration());
-    process(odometry, drive.frames[0].left, drive.frames[0].right);
+    process(odometry, drive.frames[0]);
     cv::Mat left, right;
     cv::blur(drive.frames[1].left, left, {length_px, 1});
     cv::blur(drive.frames[1].right, right, {length_px, 1});
@@ -226,14 +204,12 @@ TEST(StereoOdometry, BlurGivesAGoodMotionOrNone) {
 }
 
 TEST(StereoOdometry, BoundsAreOptionsAndTheReasonNamesThem) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   const auto reason_with = [&drive](double max_translation_m, double max_rotation_deg) {
-    StereoOdometryOptions options;
-    options.max_translation_m = max_translation_m;
-    options.max_rotation_deg = max_rotation_deg;
-    StereoOdometry odometry(drive.sequence.calibration(), options);
-    process(odometry, drive.frames[4].left, drive.frames[4].right);
-    const OdometryResult result = process(odometry, drive.frames[5].left, drive.frames[5].right);
+    StereoOdometry odometry(drive.sequence.calibration(),
+                            {.max_translation_m = max_translation_m, .max_rotation_deg = max_rotation_deg});
+    process(odometry, drive.frames[4]);
+    const OdometryResult result = process(odometry, drive.frames[5]);
     EXPECT_EQ(result.motion.has_value(), result.reason.empty());
     return result.reason;
   };
@@ -244,10 +220,8 @@ TEST(StereoOdometry, BoundsAreOptionsAndTheReasonNamesThem) {
 
 /// What an IMU tells: the rotation; of the translation it knows nothing, so the last one is taken.
 TEST(StereoOdometry, RotationOfAnImuGuidesWhereTheSearchIsNarrow) {
-  const Drive& drive = turning_drive();
-  StereoOdometryOptions options;
-  options.max_flow_x_px = 8;
-  options.max_flow_y_px = 8;
+  const RenderedVideo& drive = turning_drive();
+  const StereoOdometryOptions options{.max_flow_x_px = 8, .max_flow_y_px = 8};
   const int from = 4, to = 7;
   const Eigen::Isometry3d truth =
       current_from_previous(drive.sequence.world_from_camera(from), drive.sequence.world_from_camera(to));
@@ -256,7 +230,7 @@ TEST(StereoOdometry, RotationOfAnImuGuidesWhereTheSearchIsNarrow) {
   imu.translation() = 3 * drive.sequence.motion(from).current_from_previous.translation();
   for (const bool with_imu : {false, true}) {
     StereoOdometry odometry(drive.sequence.calibration(), options);
-    process(odometry, drive.frames[from].left, drive.frames[from].right);
+    process(odometry, drive.frames[from]);
     const OdometryResult result =
         odometry.process(image_view(drive.frames[to].left), image_view(drive.frames[to].right),
                          with_imu ? std::optional(imu) : std::nullopt);
@@ -267,29 +241,22 @@ TEST(StereoOdometry, RotationOfAnImuGuidesWhereTheSearchIsNarrow) {
 
 /// A fifth of a millimetre a frame: below what one frame can tell, and yet not lost.
 TEST(StereoOdometry, CreepingIsNotTakenForStandstill) {
-  SyntheticOptions options;
-  options.frames = 14;
-  options.speed_m = 0.0002;
-  options.turn_deg = 0;
-  options.wobble = 0;
-  options.seed = 25;
-  options.supersampling = 2;
-  const SyntheticSequence sequence(options);
+  const SyntheticSequence sequence(
+      {.frames = 14, .seed = 25, .speed_m = 0.0002, .turn_deg = 0, .wobble = 0, .supersampling = 2});
   StereoOdometry odometry(sequence.calibration());
   double travel_m = 0;
-  for (int k = 0; k < options.frames; ++k) {
-    const SyntheticFrame frame = sequence.render(k);
-    const OdometryResult result = process(odometry, frame.left, frame.right);
+  for (int k = 0; k < sequence.frames(); ++k) {
+    const OdometryResult result = process(odometry, sequence.render(k));
     if (k == 0) continue;
     ASSERT_TRUE(result.motion) << result.reason;
     EXPECT_EQ(result.standstill, result.motion->current_from_previous.matrix() == Eigen::Matrix4d::Identity());
     travel_m -= result.motion->current_from_previous.translation().z();
   }
-  EXPECT_NEAR(travel_m, sequence.world_from_camera(options.frames - 1).translation().z(), 0.0015);
+  EXPECT_NEAR(travel_m, sequence.world_from_camera(sequence.frames() - 1).translation().z(), 0.0015);
 }
 
 TEST(StereoOdometry, StandstillIsIdentity) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   StereoOdometry odometry(drive.sequence.calibration());
   std::mt19937 generator(31);
   std::normal_distribution<double> noise(0, 2);
@@ -307,50 +274,50 @@ TEST(StereoOdometry, StandstillIsIdentity) {
     EXPECT_EQ(result.motion->current_from_previous.matrix(), Eigen::Matrix4d::Identity());
     EXPECT_GT(result.motion->covariance.trace(), 0);
   }
-  const OdometryResult start = process(odometry, drive.frames[1].left, drive.frames[1].right);
+  const OdometryResult start = process(odometry, drive.frames[1]);
   EXPECT_FALSE(start.standstill);
   expect_motion(start, drive.sequence.motion(1).current_from_previous, {0.01, 0.05}, "starting");
 }
 
 TEST(StereoOdometry, BlankImageGivesNoMotionAndTheNextFramesRecover) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   StereoOdometry odometry(drive.sequence.calibration());
   const cv::Mat blank(drive.frames[0].left.size(), CV_8UC1, cv::Scalar(90));
-  process(odometry, drive.frames[0].left, drive.frames[0].right);
+  process(odometry, drive.frames[0]);
   const OdometryResult lost = process(odometry, blank, blank);
   EXPECT_FALSE(lost.motion);
   EXPECT_EQ(lost.reason, "too few features: 0 of at least 20");
   EXPECT_EQ(lost.features, 0);
-  EXPECT_FALSE(process(odometry, drive.frames[1].left, drive.frames[1].right).motion);
-  EXPECT_TRUE(process(odometry, drive.frames[2].left, drive.frames[2].right).motion);
+  EXPECT_FALSE(process(odometry, drive.frames[1]).motion);
+  EXPECT_TRUE(process(odometry, drive.frames[2]).motion);
 }
 
 TEST(StereoOdometry, BearsDroppedFramesAndExposureJumps) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   StereoOdometry odometry(drive.sequence.calibration());
   const auto expect_from_to = [&](const OdometryResult& result, int from, int to) {
     const Eigen::Isometry3d truth =
         current_from_previous(drive.sequence.world_from_camera(from), drive.sequence.world_from_camera(to));
     expect_motion(result, truth, {0.03, 0.1}, std::to_string(from) + " to " + std::to_string(to));
   };
-  process(odometry, drive.frames[0].left, drive.frames[0].right);
-  process(odometry, drive.frames[1].left, drive.frames[1].right);
-  expect_from_to(process(odometry, drive.frames[3].left, drive.frames[3].right), 1, 3);
+  process(odometry, drive.frames[0]);
+  process(odometry, drive.frames[1]);
+  expect_from_to(process(odometry, drive.frames[3]), 1, 3);
   cv::Mat left, right;
   drive.frames[4].left.convertTo(left, CV_8U, 0.6, 15);
   drive.frames[4].right.convertTo(right, CV_8U, 0.6, 15);
   expect_from_to(process(odometry, left, right), 3, 4);
-  expect_from_to(process(odometry, drive.frames[5].left, drive.frames[5].right), 4, 5);
+  expect_from_to(process(odometry, drive.frames[5]), 4, 5);
 }
 
 TEST(StereoOdometry, SixteenBitImagesGiveTheSameMotion) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   StereoOdometry narrow(drive.sequence.calibration()), wide(drive.sequence.calibration());
   for (int k = 0; k < 2; ++k) {
     cv::Mat left, right;
     drive.frames[k].left.convertTo(left, CV_16U, 256);
     drive.frames[k].right.convertTo(right, CV_16U, 256);
-    const auto a = process(narrow, drive.frames[k].left, drive.frames[k].right), b = process(wide, left, right);
+    const auto a = process(narrow, drive.frames[k]), b = process(wide, left, right);
     ASSERT_EQ(a.motion.has_value(), b.motion.has_value());
     if (k == 0) continue;
     EXPECT_LT(motion_error(a.motion->current_from_previous, b.motion->current_from_previous).translation_m, 0.005);
@@ -358,38 +325,30 @@ TEST(StereoOdometry, SixteenBitImagesGiveTheSameMotion) {
 }
 
 TEST(StereoOdometry, FindsTheMotionAtNight) {
-  SyntheticOptions options;
-  options.frames = 4;
-  options.exposure = 0.08;  // most of the picture holds less than twenty grey levels
-  options.noise_grey = 0.5;
-  options.supersampling = 2;
-  const Drive night(options);
+  // Most of the picture holds less than twenty grey levels.
+  SyntheticOptions options{.frames = 4, .noise_grey = 0.5, .exposure = 0.08, .supersampling = 2};
+  const RenderedVideo night(options);
   expect_all_motions(night.sequence, night.frames, {0.03, 0.1});
   options.height = 480;
   options.noise_grey = 2;
-  const Drive noisy(options);
+  const RenderedVideo noisy(options);
   expect_all_motions(noisy.sequence, noisy.frames, {0.05, 0.1});
 }
 
 TEST(StereoOdometry, PriorGuidesAndAWrongOneDoesNotMislead) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   const Eigen::Isometry3d truth = drive.sequence.motion(1).current_from_previous;
   for (const Eigen::Isometry3d& prior : {truth, make_motion(0.5, 0.2, 2, -12), make_motion(0, 0, -90, 0)}) {
     StereoOdometry odometry(drive.sequence.calibration());
-    process(odometry, drive.frames[0].left, drive.frames[0].right);
+    process(odometry, drive.frames[0]);
     const auto result = odometry.process(image_view(drive.frames[1].left), image_view(drive.frames[1].right), prior);
     expect_motion(result, truth, {0.01, 0.05}, "");
   }
 }
 
 TEST(StereoOdometry, LargeMovingVehicleDoesNotWin) {
-  SyntheticOptions options;
-  options.frames = 6;
-  options.moving_object = true;
-  options.moving_object_scale = 7;
-  options.seed = 22;
-  options.supersampling = 2;
-  const Drive drive(options);
+  const RenderedVideo drive(
+      {.frames = 6, .seed = 22, .moving_object = true, .moving_object_scale = 7, .supersampling = 2});
   EXPECT_GT(cv::countNonZero(drive.frames[3].left_moving), 0.4 * drive.frames[3].left.total());
   expect_all_motions(drive.sequence, drive.frames, {0.02, 0.1});
 }
@@ -418,18 +377,16 @@ TEST(StereoOdometry, BearsACalibrationThatNoCameraHas) {
 }
 
 TEST(StereoOdometry, RefusesWhatItCannotUse) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   const Calibration calibration = drive.sequence.calibration();
-  StereoOdometryOptions options;
-  options.max_translation_m = std::nan("");
-  expect_refused([&] { StereoOdometry odometry(calibration, options); }, {"max_translation_m"});
+  expect_refused([&] { StereoOdometry(calibration, {.max_translation_m = std::nan("")}); }, {"max_translation_m"});
   expect_refused([&] { StereoOdometry odometry(Calibration{}); }, {"fx"});
 
   StereoOdometry odometry(calibration);
   const cv::Mat small(40, 50, CV_8UC1, cv::Scalar(0));
   expect_refused([&] { odometry.process(ImageView{}, ImageView{}); }, {"empty"});
   expect_refused([&] { odometry.process(image_view(drive.frames[0].left), image_view(small)); }, {"50x40"});
-  process(odometry, drive.frames[0].left, drive.frames[0].right);
+  process(odometry, drive.frames[0]);
   expect_refused([&] { process(odometry, small, small); }, {"size changed", "50x40", "reset"});
   Eigen::Isometry3d prior = Eigen::Isometry3d::Identity();
   prior.translation().z() = std::nan("");
@@ -438,8 +395,7 @@ TEST(StereoOdometry, RefusesWhatItCannotUse) {
   flat.stride_bytes = 0;
   expect_refused([&] { odometry.process(image, flat); }, {"right image: a stride of 0 bytes is shorter than a row"});
   expect_refused([&] { odometry.process(image, image, prior); }, {"motion: not all values are finite"});
-  EXPECT_TRUE(process(odometry, drive.frames[1].left, drive.frames[1].right).motion)
-      << "a refused call changes nothing";
+  EXPECT_TRUE(process(odometry, drive.frames[1]).motion) << "a refused call changes nothing";
 }
 
 TEST(RealData, KittiOdometryExcerpt) {

@@ -11,11 +11,7 @@
 namespace egosgm::vision {
 namespace {
 
-SyntheticOptions small_options() {
-  SyntheticOptions options;
-  options.frames = 12, options.width = 320, options.height = 120, options.plain = true;
-  return options;
-}
+SyntheticOptions small_options() { return {.frames = 12, .width = 320, .height = 120, .plain = true}; }
 
 TEST(PlainStreet, HasNothingInItsSkyAndNoTexture) {
   SyntheticOptions options = small_options();

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <set>
 #include <string>
 
 #include "egosgm/error.h"
@@ -14,15 +15,13 @@
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/poses_io.h"
+#include "tests/support/expect_refused.h"
+#include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {
 namespace {
 
-SyntheticOptions small_options() {
-  SyntheticOptions options;
-  options.frames = 12, options.width = 320, options.height = 120;
-  return options;
-}
+SyntheticOptions small_options() { return {.frames = 12, .width = 320, .height = 120}; }
 
 bool same_bits(const cv::Mat& a, const cv::Mat& b) {
   if (a.size() != b.size() || a.type() != b.type()) return false;
@@ -217,9 +216,7 @@ TEST(Synthetic, ThinPolesStandBeforeTheBackground) {
 }
 
 TEST(Synthetic, DisparityIsPositiveAndFitsTheDefaultRange) {
-  SyntheticOptions options;
-  options.width = 1242, options.height = 375, options.supersampling = 1;
-  const SyntheticSequence sequence(options);
+  const SyntheticSequence sequence({.width = 1242, .height = 375, .supersampling = 1});
   for (const int frame : {0, 7, 19}) {
     const SyntheticFrame rendered = sequence.render(frame);
     for (const cv::Mat& map : {rendered.left_disparity, rendered.right_disparity}) {
@@ -232,8 +229,7 @@ TEST(Synthetic, DisparityIsPositiveAndFitsTheDefaultRange) {
 }
 
 TEST(Synthetic, PolesBeforeAPlainSkyAreAsThinAsTheyAreToBe) {
-  SyntheticOptions options;
-  options.plain = true, options.pole_width_px = 5, options.pole_spacing_m = 4, options.supersampling = 1;
+  SyntheticOptions options{.plain = true, .pole_width_px = 5, .pole_spacing_m = 4, .supersampling = 1};
   const int with_poles = thin_runs(SyntheticSequence(options).render(0).left_disparity, 3, 8);
   EXPECT_GT(with_poles, 200);
   options.pole_spacing_m = 1000;
@@ -317,9 +313,8 @@ TEST(Synthetic, StandstillWithoutWobbleIsIdentity) {
 
 TEST(Synthetic, AnySizeRenders) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 5}, {7, 1}, {7, 5}, {65, 3}, {33, 127}}) {
-    SyntheticOptions options;
-    options.width = width, options.height = height, options.frames = 2, options.moving_object = true;
-    const SyntheticFrame frame = SyntheticSequence(options).render(1);
+    const SyntheticFrame frame =
+        SyntheticSequence({.frames = 2, .width = width, .height = height, .moving_object = true}).render(1);
     const cv::Size size(width, height);
     EXPECT_EQ(frame.left.size(), size);
     EXPECT_EQ(frame.right_noc.size(), size);
@@ -330,51 +325,37 @@ TEST(Synthetic, AnySizeRenders) {
   }
 }
 
-void expect_refused(const char* name, void (*spoil)(SyntheticOptions&)) {
-  SyntheticOptions options;
-  spoil(options);
-  try {
-    SyntheticSequence sequence(options);
-    ADD_FAILURE() << name << " was accepted";
-  } catch (const InvalidArgument& error) {
-    EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
-  }
-}
-
 TEST(Synthetic, BadOptionsAreRefusedByName) {
-  expect_refused("frames", [](SyntheticOptions& o) { o.frames = 0; });
-  expect_refused("width", [](SyntheticOptions& o) { o.width = 0; });
-  expect_refused("width", [](SyntheticOptions& o) { o.width = 8193; });
-  expect_refused("height", [](SyntheticOptions& o) { o.height = -3; });
-  expect_refused("speed_m", [](SyntheticOptions& o) { o.speed_m = std::nan(""); });
-  expect_refused("turn_deg", [](SyntheticOptions& o) { o.turn_deg = 90; });
-  expect_refused("turn_deg", [](SyntheticOptions& o) { o.turn_deg = 3, o.speed_m = 0.2; });
-  expect_refused("noise_grey", [](SyntheticOptions& o) { o.noise_grey = -1; });
-  expect_refused("exposure", [](SyntheticOptions& o) { o.exposure = 0; });
-  expect_refused("wobble", [](SyntheticOptions& o) { o.wobble = 1e9; });
-  expect_refused("pole_width_px", [](SyntheticOptions& o) { o.pole_width_px = 0; });
-  expect_refused("pole_spacing_m", [](SyntheticOptions& o) { o.pole_spacing_m = 0; });
-  expect_refused("supersampling", [](SyntheticOptions& o) { o.supersampling = 0; });
-  expect_refused("moving_object_scale", [](SyntheticOptions& o) { o.moving_object_scale = 0; });
+  const std::pair<const char*, SyntheticOptions> cases[] = {{"frames", {.frames = 0}},
+                                                            {"width", {.width = 0}},
+                                                            {"width", {.width = 8193}},
+                                                            {"height", {.height = -3}},
+                                                            {"speed_m", {.speed_m = std::nan("")}},
+                                                            {"turn_deg", {.turn_deg = 90}},
+                                                            {"turn_deg", {.speed_m = 0.2, .turn_deg = 3}},
+                                                            {"noise_grey", {.noise_grey = -1}},
+                                                            {"exposure", {.exposure = 0}},
+                                                            {"wobble", {.wobble = 1e9}},
+                                                            {"pole_width_px", {.pole_width_px = 0}},
+                                                            {"pole_spacing_m", {.pole_spacing_m = 0}},
+                                                            {"supersampling", {.supersampling = 0}},
+                                                            {"moving_object_scale", {.moving_object_scale = 0}}};
+  for (const auto& [name, options] : cases) {
+    testing::expect_refused([&, options = options] { SyntheticSequence{options}; }, {name});
+  }
   const SyntheticSequence sequence(small_options());
   EXPECT_THROW(sequence.render(-1), InvalidArgument);
   EXPECT_THROW(sequence.motion(12), InvalidArgument);
 }
 
-class SyntheticFiles : public testing::Test {
+class SyntheticFiles : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const testing::TestInfo& info = *testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::path(testing::TempDir()) / ("egosgm_" + std::string(info.name()));
-    std::filesystem::remove_all(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-  std::filesystem::path folder_;
+  const TemporaryFolder temporary_;
+  const std::filesystem::path folder_ = temporary_ / "street";
 };
 
 TEST_F(SyntheticFiles, SequenceReadsBackAsItWasRendered) {
-  SyntheticOptions options;
-  options.frames = 2, options.width = 97, options.height = 41, options.moving_object = true;
+  const SyntheticOptions options{.frames = 2, .width = 97, .height = 41, .moving_object = true};
   int done = 0;
   write_sequence(options, folder_, [&](int count, int) { done = count; });
   EXPECT_EQ(done, 2);
@@ -407,34 +388,21 @@ TEST_F(SyntheticFiles, SequenceReadsBackAsItWasRendered) {
 }
 
 TEST_F(SyntheticFiles, FolderHoldsWhatIsPromisedAndNothingElse) {
-  SyntheticOptions options;
-  options.frames = 1, options.width = 16, options.height = 9;
-  write_sequence(options, folder_);
-  std::vector<std::string> names;
+  write_sequence({.frames = 1, .width = 16, .height = 9}, folder_);
+  std::set<std::string> names, expected = {"calib.txt", "poses.txt", "times.txt"};
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder_)) {
-    if (entry.is_regular_file()) names.push_back(std::filesystem::relative(entry.path(), folder_).string());
+    if (entry.is_regular_file()) names.insert(std::filesystem::relative(entry.path(), folder_).string());
   }
-  std::sort(names.begin(), names.end());
-  const std::vector<std::string> expected = {"calib.txt",
-                                             "image_0/000000.png",
-                                             "image_1/000000.png",
-                                             "poses.txt",
-                                             "times.txt",
-                                             "truth/left_disp_noc/000000.png",
-                                             "truth/left_disp_occ/000000.png",
-                                             "truth/right_disp_noc/000000.png",
-                                             "truth/right_disp_occ/000000.png"};
+  for (const std::string folder : {"image_0", "image_1", "truth/left_disp_noc", "truth/left_disp_occ",
+                                   "truth/right_disp_noc", "truth/right_disp_occ"}) {
+    expected.insert(folder + "/000000.png");
+  }
   EXPECT_EQ(names, expected);
 }
 
 TEST_F(SyntheticFiles, FolderThatCannotBeMadeIsNamed) {
   std::ofstream(folder_) << "a file, not a folder";
-  try {
-    write_sequence(small_options(), folder_);
-    ADD_FAILURE() << "was accepted";
-  } catch (const IoError& error) {
-    EXPECT_NE(std::string(error.what()).find(folder_.filename().string()), std::string::npos) << error.what();
-  }
+  testing::expect_refused<IoError>([&] { write_sequence(small_options(), folder_); }, {folder_.string()});
 }
 
 }  // namespace

@@ -11,8 +11,8 @@
 
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/opencv.h"
-#include "egosgm/vision/synthetic.h"
 #include "host/method_options.h"
+#include "tests/vision/rendered_video.h"
 
 namespace egosgm::vision {
 namespace {
@@ -20,17 +20,8 @@ namespace {
 /// From this frame on, a video has settled.
 constexpr int kSteadyFrom = 3;
 
-struct Video {
-  SyntheticSequence sequence;
-  std::vector<SyntheticFrame> frames;
-
-  explicit Video(const SyntheticOptions& options) : sequence(options) {
-    for (int k = 0; k < options.frames; ++k) frames.push_back(sequence.render(k));
-  }
-};
-
 /// Percent of the pixels in `masks`, of the steady frames, that are off by more than 3 px or have no disparity.
-double bad_or_missing(const Video& video, const std::vector<cv::Mat>& masks, bool temporal) {
+double bad_or_missing(const RenderedVideo& video, const std::vector<cv::Mat>& masks, bool temporal) {
   MethodOptions options;
   options.temporal = temporal;
   const cv::Size size = video.frames.front().left.size();
@@ -52,7 +43,8 @@ double bad_or_missing(const Video& video, const std::vector<cv::Mat>& masks, boo
   return 100 * bad / all;
 }
 
-std::vector<cv::Mat> masks_of(const Video& video, const std::function<cv::Mat(const SyntheticFrame&)>& mask_of) {
+std::vector<cv::Mat> masks_of(const RenderedVideo& video,
+                              const std::function<cv::Mat(const SyntheticFrame&)>& mask_of) {
   std::vector<cv::Mat> masks;
   for (const SyntheticFrame& frame : video.frames) masks.push_back(mask_of(frame));
   return masks;
@@ -67,14 +59,9 @@ cv::Mat thin_things(const SyntheticFrame& frame) {
 
 // A single frame of the same matcher, which searches everything in both views, loses fewer of them.
 TEST(Video, ThinThingsSurvive) {
-  const std::pair<int, double> most_lost[] = {{2, 62}, {3, 40}, {4, 20}};  // [px], percent
+  const std::pair<double, double> most_lost[] = {{2, 62}, {3, 40}, {4, 20}};  // [px], percent
   for (const auto& [width, most] : most_lost) {
-    SyntheticOptions options;
-    options.frames = 8;
-    options.supersampling = 2;
-    options.pole_width_px = width;
-    options.pole_spacing_m = 3;
-    const Video video(options);
+    const RenderedVideo video({.frames = 8, .pole_width_px = width, .pole_spacing_m = 3, .supersampling = 2});
     const std::vector<cv::Mat> poles = masks_of(video, thin_things);
     EXPECT_LE(bad_or_missing(video, poles, true), most) << "poles of " << width;
   }
@@ -82,12 +69,7 @@ TEST(Video, ThinThingsSurvive) {
 
 TEST(Video, VehiclesThatMoveAreFollowed) {
   for (const unsigned seed : {1u, 2u}) {
-    SyntheticOptions options;
-    options.frames = 10;
-    options.supersampling = 2;
-    options.seed = seed;
-    options.moving_object = true;
-    const Video video(options);
+    const RenderedVideo video({.frames = 10, .seed = seed, .moving_object = true, .supersampling = 2});
     const std::vector<cv::Mat> vehicles =
         masks_of(video, [](const SyntheticFrame& frame) { return frame.left_moving; });
     EXPECT_LE(bad_or_missing(video, vehicles, true), bad_or_missing(video, vehicles, false) + 1) << "seed " << seed;
