@@ -20,7 +20,7 @@ class Egosgm(ConanFile):
     settings = "os", "arch", "compiler", "build_type"
     options = {"vision": [True, False]}
     default_options = {"vision": True}
-    exports_sources = "CMakeLists.txt", "LICENSE", "apps/*", "cmake/*", "host/*", "include/*", "kernels/*"
+    exports_sources = "CMakeLists.txt", "LICENSE", "apps/*", "cmake/*", "host/*", "include/*", "kernels/*", "vision/*"
 
     def set_version(self):
         self.version = re.search(r"project\(egosgm VERSION ([\d.]+)", load(self, f"{self.recipe_folder}/CMakeLists.txt"))[1]

@@ -21,7 +21,7 @@
 #include "apps/standard_output.h"
 #include "egosgm/error.h"
 #include "egosgm/programs.h"
-#include "host/vision/file_io.h"
+#include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

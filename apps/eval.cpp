@@ -17,8 +17,8 @@
 #include "egosgm/vision/evaluation.h"
 #include "egosgm/vision/image_io.h"
 #include "host/json_text.h"
-#include "host/vision/estimate_reader.h"
-#include "host/vision/file_io.h"
+#include "vision/estimate_reader.h"
+#include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "apps/interrupt.h"
 #include "egosgm/error.h"
-#include "host/vision/image_pairs.h"
+#include "vision/image_pairs.h"
 
 namespace egosgm::app {
 

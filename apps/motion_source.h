@@ -9,7 +9,7 @@
 #include "apps/feed.h"
 #include "egosgm/motion.h"
 #include "egosgm/odometry.h"
-#include "host/vision/pose_doubt.h"
+#include "vision/pose_doubt.h"
 
 namespace egosgm::app {
 

@@ -12,8 +12,8 @@
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
 #include "egosgm/named_options.h"
-#include "host/vision/file_io.h"
-#include "host/vision/text_rows.h"
+#include "vision/file_io.h"
+#include "vision/text_rows.h"
 
 namespace egosgm::app {
 namespace {

@@ -21,7 +21,7 @@
 #include "apps/standard_output.h"
 #include "apps/suggestion.h"
 #include "egosgm/error.h"
-#include "host/vision/text_rows.h"
+#include "vision/text_rows.h"
 
 namespace egosgm::app {
 namespace {

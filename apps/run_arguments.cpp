@@ -14,7 +14,7 @@
 #include "apps/run_outputs.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
-#include "host/vision/frame_panels.h"
+#include "vision/frame_panels.h"
 
 namespace egosgm::app {
 namespace {

@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "host/json_text.h"
-#include "host/vision/file_io.h"
+#include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

@@ -18,7 +18,7 @@
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/point_cloud.h"
 #include "egosgm/vision/render.h"
-#include "host/vision/file_io.h"
+#include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

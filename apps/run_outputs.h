@@ -12,7 +12,7 @@
 #include "apps/feed.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/point_cloud.h"
-#include "host/vision/frame_panels.h"
+#include "vision/frame_panels.h"
 
 namespace egosgm::app {
 

@@ -5,7 +5,7 @@
 
 #include "egosgm/named_options.h"
 #include "host/json_text.h"
-#include "host/vision/file_io.h"
+#include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

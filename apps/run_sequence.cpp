@@ -20,8 +20,8 @@
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
-#include "host/vision/doubt.h"
-#include "host/vision/file_io.h"
+#include "vision/doubt.h"
+#include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

@@ -10,7 +10,7 @@
 #include "apps/sequence_arguments.h"
 #include "apps/standard_output.h"
 #include "egosgm/vision/synthetic.h"
-#include "host/vision/file_io.h"
+#include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "apps/output_folder.h"
-#include "host/vision/file_io.h"
+#include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

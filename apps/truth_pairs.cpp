@@ -7,7 +7,7 @@
 #include "apps/option_group.h"
 #include "apps/run_folder.h"
 #include "egosgm/error.h"
-#include "host/vision/pair_with_truth.h"
+#include "vision/pair_with_truth.h"
 
 namespace egosgm::app {
 namespace {

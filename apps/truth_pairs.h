@@ -6,7 +6,7 @@
 #include <string>
 
 #include "egosgm/vision/evaluation.h"
-#include "host/vision/pair_with_truth.h"
+#include "vision/pair_with_truth.h"
 
 namespace egosgm::app {
 

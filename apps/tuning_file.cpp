@@ -9,7 +9,7 @@
 #include "egosgm/error.h"
 #include "host/json_text.h"
 #include "host/tuning_defaults.h"
-#include "host/vision/file_io.h"
+#include "vision/file_io.h"
 
 namespace egosgm::app {
 namespace {

@@ -10,8 +10,8 @@
 #include "egosgm/vision/render.h"
 #include "egosgm/vision/synthetic.h"
 #include "host/frame/frame_queue.h"
-#include "host/vision/file_io.h"
-#include "host/vision/picture_sheet.h"
+#include "vision/file_io.h"
+#include "vision/picture_sheet.h"
 
 namespace egosgm::bench {
 namespace {

@@ -13,7 +13,7 @@
 #include <stdexcept>
 
 #include "commit.h"  // written by the build
-#include "host/vision/file_io.h"
+#include "vision/file_io.h"
 
 namespace egosgm::bench {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "egosgm/error.h"
-#include "host/vision/grey_bytes.h"
+#include "vision/grey_bytes.h"
 
 namespace egosgm::python {
 namespace {

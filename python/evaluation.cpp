@@ -9,11 +9,11 @@
 
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/render.h"
-#include "host/vision/estimate_reader.h"
-#include "host/vision/pair_with_truth.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/pickling.h"
+#include "vision/estimate_reader.h"
+#include "vision/pair_with_truth.h"
 
 namespace egosgm::python {
 namespace {

@@ -2,11 +2,11 @@
 #include <pybind11/stl.h>
 
 #include "egosgm/options.h"
-#include "host/vision/coarse_map.h"
-#include "host/vision/doubt.h"
-#include "host/vision/grey_bytes.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "vision/coarse_map.h"
+#include "vision/doubt.h"
+#include "vision/grey_bytes.h"
 
 namespace egosgm::python {
 namespace {

@@ -8,12 +8,12 @@
 #include "egosgm/vision/image_io.h"
 #include "egosgm/vision/point_cloud.h"
 #include "egosgm/vision/poses_io.h"
-#include "host/vision/file_io.h"
-#include "host/vision/frame_panels.h"
-#include "host/vision/image_pairs.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/pickling.h"
+#include "vision/file_io.h"
+#include "vision/frame_panels.h"
+#include "vision/image_pairs.h"
 
 namespace egosgm::python {
 namespace {

@@ -5,10 +5,10 @@
 
 #include <ctime>
 
-#include "host/vision/file_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
 #include "tests/vision/temporary_folder.h"
+#include "vision/file_io.h"
 
 namespace egosgm::vision {
 namespace {

@@ -6,11 +6,11 @@
 #include <set>
 
 #include "egosgm/vision/image_io.h"
-#include "host/vision/file_io.h"
-#include "host/vision/image_pairs.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
 #include "tests/vision/temporary_folder.h"
+#include "vision/file_io.h"
+#include "vision/image_pairs.h"
 
 namespace egosgm::vision {
 namespace {

@@ -6,11 +6,11 @@
 #include <cmath>
 
 #include "egosgm/vision/disparity_io.h"
-#include "host/vision/file_io.h"
-#include "host/vision/pair_with_truth.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
 #include "tests/vision/temporary_folder.h"
+#include "vision/file_io.h"
+#include "vision/pair_with_truth.h"
 
 namespace egosgm::vision {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/vision/file_io.h"
+#include "vision/file_io.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

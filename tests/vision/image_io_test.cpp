@@ -12,9 +12,9 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "host/vision/file_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
+#include "vision/file_io.h"
 
 namespace egosgm::vision {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "egosgm/error.h"
 #include "egosgm/image.h"
-#include "host/vision/file_io.h"
 #include "tests/vision/temporary_folder.h"
+#include "vision/file_io.h"
 
 namespace egosgm::vision {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "egosgm/image.h"
 #include "egosgm/reason.h"
-#include "host/vision/picture_sheet.h"
 #include "tests/support/expect_refused.h"
+#include "vision/picture_sheet.h"
 
 namespace egosgm::vision {
 namespace {

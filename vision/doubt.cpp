@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/doubt.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <iterator>
+#include <string_view>
+#include <utility>
+
+#include "egosgm/vision/image_io.h"
+#include "kernels/method.h"
+
+namespace egosgm::vision {
+namespace {
+
+constexpr double kMinBaseline_m = 0.004, kMaxBaseline_m = 3.0;
+constexpr double kUsualBaseline_m[] = {0.02, 1.0};
+constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
+constexpr double kMinDensity = 0.5;
+constexpr double kFarRows_px = 0.9 * EGOSGM_MAX_OFFSET_PX;
+constexpr std::size_t kFramesPerLook = 50;  // for what is nearer than the range
+
+template <typename... Values>
+std::string formatted(const char* format, Values... values) {
+  char text[200];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+void append(std::string& text, const std::string& part) { text += (text.empty() ? "" : ", ") + part; }
+
+/// Of all bytes; images that differ have different ones, as good as surely.
+std::uint64_t digest_of(const cv::Mat& image) {
+  std::uint64_t digest = 0;
+  for (int y = 0; y < image.rows; ++y) {
+    const std::string_view row(image.ptr<char>(y), image.cols * image.elemSize());
+    digest = 31 * digest + std::hash<std::string_view>()(row);
+  }
+  return digest;
+}
+
+bool is_usual(double baseline_m) { return baseline_m >= kUsualBaseline_m[0] && baseline_m <= kUsualBaseline_m[1]; }
+
+/// Units in which a baseline that is too long for metres would be a usual one.
+std::string units_of(double baseline) {
+  std::string units;
+  for (const auto& [unit, unit_m] :
+       {std::pair{"centimetres", 0.01}, {"millimetres", 0.001}, {"decimetres", 0.1}, {"inches", 0.0254}}) {
+    if (!is_usual(baseline * unit_m)) continue;
+    units += formatted("%s%s (%.4g m)", units.empty() ? "" : " or ", unit, baseline * unit_m);
+  }
+  return units.empty() ? "a chessboard's squares or other units" : units;
+}
+
+}  // namespace
+
+std::optional<Suspicion> suspect_baseline(double baseline_m, double fx) {
+  const std::string what = formatted("a baseline of %.4g m", baseline_m);
+  if (baseline_m > kUsualBaseline_m[1]) {
+    const bool is_certain = baseline_m > kMaxBaseline_m;
+    return Suspicion{what,
+                     (is_certain ? "a baseline is in metres: is this one in "
+                                 : "few rigs are wider than a metre, and depths grow with the baseline: is it in ") +
+                         units_of(baseline_m) + "?",
+                     is_certain};
+  }
+  if (baseline_m < kMinBaseline_m) {
+    const std::string missing = is_usual(baseline_m * fx)
+                                    ? formatted(
+                                          " A camera info's Tx is -fx times the baseline: is fx missing, so that "
+                                          "it is %.4g m?",
+                                          baseline_m * fx)
+                                    : "";
+    return Suspicion{what, "no two cameras stand so close: give the distance of these in metres." + missing};
+  }
+  return std::nullopt;
+}
+
+std::optional<Suspicion> suspect_calibration(const Calibration& c, cv::Size size) {
+  if (auto baseline = suspect_baseline(c.baseline_m, c.fx)) return baseline;
+  if (size.empty()) return std::nullopt;
+  const std::string remedy =
+      "give the calibration of images of this size: scale fx, fy, cx, cy as the images were scaled, and subtract what "
+      "was cropped from cx, cy";
+  const std::string of_size = formatted("%dx%d", size.width, size.height);
+  const auto is_centred = [&](double cx) { return cx > 0.25 * size.width && cx < 0.75 * size.width; };
+  if (!(is_centred(c.cx) && c.cy > 0.2 * size.height && c.cy < 0.8 * size.height)) {
+    return Suspicion{
+        "the principal point is far from the middle of " + of_size + formatted(" (cx %.1f, cy %.1f)", c.cx, c.cy),
+        remedy};
+  }
+  if (!is_centred(c.cx + c.doffs_px)) {
+    return Suspicion{formatted("with doffs_px %.4g the right principal point is at x %.1f in images of ", c.doffs_px,
+                               c.cx + c.doffs_px) +
+                         of_size,
+                     "give the right image's cx less the left one's as doffs_px"};
+  }
+  const double least = std::min(c.fx, c.fy), largest = std::max(c.fx, c.fy);
+  if (least < kMinFocal * size.width || largest > kMaxFocal * size.width || largest > 2 * least) {
+    return Suspicion{formatted("focal lengths of %.4g and %.4g px in images of ", c.fx, c.fy) + of_size, remedy};
+  }
+  return std::nullopt;
+}
+
+void Doubt::add(const cv::Mat& left, const cv::Mat& right, const FrameReport& report, bool has_motion) {
+  if (frames_ % kFramesPerLook == 0) {
+    const std::optional<Clipped> clipped = clipped_by_range(left, right, least_, end_);
+    if (clipped && (!clipped_ || clipped->share > clipped_->share)) clipped_ = clipped;
+  }
+  const std::uint64_t digests[2] = {digest_of(left), digest_of(right)};
+  for (const int side : {0, 1}) {
+    const bool stands_still = digests[side] == seen_[side] && digests[1 - side] != seen_[1 - side];
+    if (frames_ > 0 && stands_still) ++frozen_[side];
+  }
+  if (digests[0] == digests[1]) ++same_;
+  std::copy(std::begin(digests), std::end(digests), seen_);
+  size_ = left.size();
+  density_ += report.density;
+  if (holds_8_bits_in_16(left)) ++narrow_;
+  if (std::abs(report.vertical_offset_px) >= kFarRows_px) ++far_rows_;
+  if (frames_++ > 0 && calibration_ && !has_motion) ++without_motion_;
+}
+
+std::string Doubt::text() const {
+  std::string text;
+  if (frames_ == 0) return text;
+  const double density = density_ / static_cast<double>(frames_);
+  if (density < kMinDensity) append(text, formatted("density %.0f %% in the mean", 100 * density));
+  if (2 * without_motion_ > frames_ - 1)
+    append(text, formatted("no motion in %zu of %zu frames", without_motion_, frames_ - 1));
+  if (narrow_ == frames_) append(text, "values of 8 bits in images of 16");
+  if (2 * far_rows_ > frames_) {
+    append(text, formatted("rows of the two views lie %g px apart, the most that is mended, or farther",
+                           static_cast<double>(EGOSGM_MAX_OFFSET_PX)));
+  }
+  if (same_ == frames_) append(text, "the left and the right images are the same (give those of both cameras)");
+  for (const auto& [side, name] : {std::pair{0, "left"}, {1, "right"}}) {
+    if (frozen_[side] == 0) continue;
+    append(text,
+           formatted("the %s image is that of the frame before in %zu frames, and the other one is not (these are "
+                     "of other moments: leave them out)",
+                     name, frozen_[side]));
+  }
+  if (clipped_) {
+    append(text, formatted("%.0f %% of the image is nearer than the range (--disparities %d)", 100 * clipped_->share,
+                           clipped_->disparities));
+  }
+  if (!calibration_) return text;
+  if (const auto suspicion = suspect_calibration(*calibration_, size_)) {
+    append(text, suspicion->what + " (" + suspicion->remedy + ")");
+  }
+  return text;
+}
+
+}  // namespace egosgm::vision

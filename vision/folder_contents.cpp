@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/folder_contents.h"
+
+#include <algorithm>
+#include <cstring>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "egosgm/error.h"
+#include "vision/frame_names.h"
+
+namespace egosgm::vision {
+namespace {
+
+namespace fs = std::filesystem;
+using Contents = std::optional<std::string>;
+
+constexpr std::size_t kMostNamed = 5;
+constexpr std::size_t kMostFolders = 1000;  // a data set has no more beside each other; looking stays short
+
+/// Names in a folder, sorted; none where it cannot be listed.
+std::vector<std::string> names_in(const fs::path& folder) {
+  try {
+    return list_folder(folder);
+  } catch (const InvalidArgument&) {
+    return {};
+  }
+}
+
+std::vector<fs::path> folders_in(const fs::path& folder) {
+  std::vector<fs::path> folders;
+  for (const std::string& name : names_in(folder)) {
+    if (folders.size() == kMostFolders) break;
+    if (!name.starts_with('.') && is_folder(folder / name)) folders.push_back(folder / name);
+  }
+  return folders;
+}
+
+bool holds_both(const fs::path& folder, const std::string& left, const std::string& right) {
+  return is_folder(folder / left) && is_folder(folder / right);
+}
+
+bool holds_images(const fs::path& folder) {
+  const std::vector<std::string> names = names_in(folder);
+  return std::any_of(names.begin(), names.end(), [](const std::string& name) { return is_image_name(name); });
+}
+
+std::set<std::string> scenes_in(const fs::path& folder) {
+  std::set<std::string> scenes;
+  for (const char* camera : {"image_0", "image_2"}) {
+    if (is_folder(folder / camera)) scenes.merge(list_scenes(folder / camera));
+  }
+  return scenes;
+}
+
+/// The pattern of a camera's images: `*`, or what they have beside their number, which begins or ends with the camera's
+/// name.
+std::string pattern_in(const fs::path& folder, const std::string& side) {
+  for (const std::string& name : names_in(folder)) {
+    const std::string stem = fs::path(name).stem().string();
+    if (!is_image_name(name)) continue;
+    if (stem.starts_with(side + "_")) return (folder / (side + "_*")).string();
+    if (stem.ends_with("_" + side)) return (folder / ("*_" + side)).string();
+    break;
+  }
+  return (folder / "*").string();
+}
+
+bool is_sequence(const fs::path& folder) {
+  if (holds_both(folder, "image_00/data", "image_01/data") || holds_both(folder, "image_02/data", "image_03/data"))
+    return true;
+  if (holds_both(folder, "image_0", "image_1") || holds_both(folder, "image_2", "image_3"))
+    return scenes_in(folder).empty();
+  for (const char* image : {"im0.png", "im0.jpg", "im0.jpeg"}) {
+    if (is_file(folder / image)) return true;
+  }
+  const std::optional<TwoCameras> cameras = find_two_cameras(folder);
+  return cameras && !cameras->calibration.empty();
+}
+
+Contents multiview(const fs::path& folder) {
+  for (const fs::path& candidate : {folder, folder / "training", folder / "testing"}) {
+    const std::set<std::string> scenes = scenes_in(candidate);
+    if (scenes.empty()) continue;
+    return "it holds KITTI's multi-view scenes " + *scenes.begin() +
+           (scenes.size() > 1 ? ".." + *scenes.rbegin() : "") + ": use --kitti " + candidate.string() + " --scene " +
+           *scenes.begin();
+  }
+  return std::nullopt;
+}
+
+Contents sequences_below(const fs::path& folder) {
+  std::vector<fs::path> found;
+  for (const fs::path& child : folders_in(folder)) {
+    if (is_sequence(child)) found.push_back(child);
+  }
+  if (found.empty()) {
+    for (const fs::path& child : folders_in(folder)) {
+      for (const fs::path& grandchild : folders_in(child)) {
+        if (is_sequence(grandchild)) found.push_back(grandchild);
+      }
+    }
+  }
+  if (found.empty()) return std::nullopt;
+  std::string names;
+  for (std::size_t i = 0; i < std::min(found.size(), kMostNamed); ++i) {
+    names += (i > 0 ? ", " : "") + found[i].lexically_relative(folder).string();
+  }
+  if (found.size() > kMostNamed) names += " and " + std::to_string(found.size() - kMostNamed) + " more";
+  return "it holds " + names + ": give " + (found.size() > 1 ? "one of them, for example " : "") +
+         found.front().string();
+}
+
+/// The folder of one camera's images.
+Contents one_camera(const fs::path& folder) {
+  std::error_code error;
+  const fs::path absolute = fs::canonical(folder, error);
+  for (const fs::path& above : {absolute.parent_path(), absolute.parent_path().parent_path()}) {
+    if (!error && is_sequence(above)) return "it belongs to the sequence " + above.string() + ": give that one";
+  }
+  if (!holds_images(folder)) return std::nullopt;
+  return "it holds images of its own: give --left '" + (folder / "LEFT_*").string() + "' --right '" +
+         (folder / "RIGHT_*").string() + "' --calib FILE, with the names that they have";
+}
+
+Contents two_cameras(const fs::path& folder) {
+  const std::optional<TwoCameras> cameras = find_two_cameras(folder);
+  if (!cameras) return std::nullopt;
+  std::vector<std::string> files;
+  for (const std::string& name : names_in(folder)) {
+    const std::string type = fs::path(name).extension().string();
+    if (type == ".json" || type == ".yaml" || type == ".yml" || type == ".xml" || type == ".npz") files.push_back(name);
+  }
+  const std::string calibration = files.size() == 1 ? "'" + (folder / files.front()).string() + "'" : "FILE";
+  return "it holds two cameras and no calib.txt: put their calibration there, or give --left '" + cameras->left +
+         "' --right '" + cameras->right + "' --calib " + calibration;
+}
+
+Contents euroc(const fs::path& folder) {
+  for (const fs::path& candidate : {folder, folder / "mav0"}) {
+    if (is_file(candidate / "cam0/data.csv"))
+      return "it is an EuRoC recording: egosgm rectify --euroc " + folder.string() + " makes a sequence of it";
+  }
+  return std::nullopt;
+}
+
+Contents videos(const fs::path& folder) {
+  for (const char* type : {".mp4", ".avi", ".mkv", ".mov"}) {
+    const fs::path left = folder / ("left" + std::string(type)), right = folder / ("right" + std::string(type));
+    if (is_file(left) && is_file(right))
+      return "it holds two videos: egosgm rectify --left '" + left.string() + "' --right '" + right.string() +
+             "' --calib FILE makes a sequence of them";
+  }
+  return std::nullopt;
+}
+
+/// What the folders of both cameras may be called: the usual names, then any with left or right in it that holds
+/// images.
+std::vector<std::pair<std::string, std::string>> names_of_cameras(const fs::path& folder) {
+  std::vector<std::pair<std::string, std::string>> names{
+      {"left", "right"}, {"cam0", "cam1"}, {"image_left", "image_right"}, {"L", "R"}, {"l", "r"}};
+  for (const fs::path& child : folders_in(folder)) {
+    const std::string name = child.filename().string();
+    for (const auto& [left, right] : {std::pair{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}}) {
+      const std::size_t at = name.find(left);
+      if (at == std::string::npos) continue;
+      const std::string partner = std::string(name).replace(at, std::strlen(left), right);
+      if (is_folder(folder / partner) && holds_images(child)) names.emplace_back(name, partner);
+    }
+  }
+  return names;
+}
+
+Contents result_of_a_run(const fs::path& folder) {
+  if (!is_file(folder / "report.json")) return std::nullopt;
+  return "it is what `egosgm run` wrote: give the run's input";
+}
+
+}  // namespace
+
+Contents found_instead(const fs::path& folder) {
+  for (const auto& look : {multiview, sequences_below, euroc, videos, result_of_a_run, two_cameras, one_camera}) {
+    if (Contents found = look(folder)) return found;
+  }
+  return std::nullopt;
+}
+
+std::optional<TwoCameras> find_two_cameras(const fs::path& folder) {
+  for (const auto& [left, right] : names_of_cameras(folder)) {
+    if (!holds_both(folder, left, right)) continue;
+    TwoCameras cameras{pattern_in(folder / left, "left"), pattern_in(folder / right, "right"), {}};
+    for (const char* name : {"calib.txt", "calibration.txt"}) {
+      if (cameras.calibration.empty() && is_file(folder / name)) cameras.calibration = folder / name;
+    }
+    return cameras;
+  }
+  return std::nullopt;
+}
+
+std::set<std::string> list_scenes(const fs::path& images) {
+  std::set<std::string> scenes;
+  for (const std::string& name : list_folder(images)) {
+    const std::size_t end = name.find('_');
+    if (end != std::string::npos && is_image_name(name) && is_digits(name.substr(0, end))) {
+      scenes.insert(name.substr(0, end));
+    }
+  }
+  return scenes;
+}
+
+}  // namespace egosgm::vision
