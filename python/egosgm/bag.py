@@ -22,6 +22,7 @@ _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 # What tells cameras apart in names of topics.
 _SIDES = (("left", "right"), ("Left", "Right"), ("cam0", "cam1"), ("camera0", "camera1"), ("infra1", "infra2"), ("cam_0", "cam_1"),
           ("camera_0", "camera_1"), ("cam1", "cam2"), ("camera1", "camera2"), ("infra_1", "infra_2"), ("/0/", "/1/"), ("Infrared_1", "Infrared_2"))
+_MOST_INTERVALS = 1000  # the last ones, of both cameras
 _MOST_BROKEN = 10  # from the start on; then the bag is none that can be read
 _POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
 
@@ -40,9 +41,14 @@ class Gaps:
     has_no_stamps: bool = False
     gaps: List[Tuple[int, float]] = dataclasses.field(default_factory=list)
     largest_skew_ms: float = 0.0
-    interval_ms: float = math.inf
+    intervals_ms: Deque[float] = dataclasses.field(default_factory=lambda: collections.deque(maxlen=_MOST_INTERVALS))
     broken: List[str] = dataclasses.field(default_factory=list)
     parts: List[str] = dataclasses.field(default_factory=list)
+
+    @property
+    def interval_ms(self) -> float:
+        """The usual one, as two images may come at once after a stall."""
+        return float(np.median(self.intervals_ms)) if self.intervals_ms else math.inf
 
     def are_other_moments(self, apart_ms: float) -> bool:
         """From about half the time between two frames on, stamps are of other moments, whatever is allowed."""
@@ -93,7 +99,7 @@ class Pairing:
         waiting = self._waiting[side]
         last = self._last[side]
         if last is not None and stamp > last:
-            self.gaps.interval_ms = min(self.gaps.interval_ms, (stamp - last) / 1e6)
+            self.gaps.intervals_ms.append((stamp - last) / 1e6)
         self._last[side] = stamp
         if waiting and stamp < waiting[-1][0]:  # a recording that starts over
             yield from self.end()
