@@ -306,7 +306,7 @@ class Bag:
             if self._pose_topic:
                 times, poses = self._read_poses(reader)
             connections = [c for c in reader.connections if c.topic in (*self.images, *self.infos)]
-            number, last, interval, changed = 0, None, None, ""
+            number, last, changed = 0, None, ""
 
             def image_of(message: Any, stamp: int, topic: str) -> Optional[NDArray[Any]]:
                 """None of one that is broken, unless all are."""
@@ -326,7 +326,7 @@ class Bag:
                     raise _egosgm.InvalidArgument(f"{self.path}: {pairing.gaps.broken[0]}")
 
             def frame_of(pair: Any) -> Iterator[BagFrame]:
-                nonlocal number, last, interval
+                nonlocal number, last
                 (stamp, left), (_, right) = pair
                 if not 0 <= stamp < 2**31 * 10**9:
                     raise _egosgm.InvalidArgument(f"{self.images[0]}: a stamp of {stamp / 1e9:.0f} s, which is not from 1970 to 2038")
@@ -336,11 +336,8 @@ class Bag:
                 steps_back = last is not None and stamp < last
                 if steps_back:
                     pairing.gaps.steps_back += 1
-                elif last is not None:
-                    if interval is not None and stamp - last > 1.5 * interval:
-                        pairing.gaps.gaps.append((number, (stamp - last) / 1e9))
-                    else:
-                        interval = stamp - last
+                elif last is not None and stamp - last > 1.5e6 * pairing.gaps.interval_ms:
+                    pairing.gaps.gaps.append((number, (stamp - last) / 1e9))
                 images = [image_of(message, stamp, topic) for message, topic in zip((left, right), self.images)]
                 if images[0] is None or images[1] is None:
                     return
