@@ -22,6 +22,7 @@ _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 # What tells cameras apart in names of topics.
 _SIDES = (("left", "right"), ("Left", "Right"), ("cam0", "cam1"), ("camera0", "camera1"), ("infra1", "infra2"), ("cam_0", "cam_1"),
           ("camera_0", "camera_1"), ("cam1", "cam2"), ("camera1", "camera2"), ("infra_1", "infra_2"), ("/0/", "/1/"), ("Infrared_1", "Infrared_2"))
+_MOST_INTERVALS = 1000  # the last ones, of both cameras
 _MOST_BROKEN = 10  # from the start on; then the bag is none that can be read
 _POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PoseWithCovarianceStamped")
 
@@ -40,9 +41,14 @@ class Gaps:
     has_no_stamps: bool = False
     gaps: List[Tuple[int, float]] = dataclasses.field(default_factory=list)
     largest_skew_ms: float = 0.0
-    interval_ms: float = math.inf
+    intervals_ms: Deque[float] = dataclasses.field(default_factory=lambda: collections.deque(maxlen=_MOST_INTERVALS))
     broken: List[str] = dataclasses.field(default_factory=list)
     parts: List[str] = dataclasses.field(default_factory=list)
+
+    @property
+    def interval_ms(self) -> float:
+        """The usual one, as two images may come at once after a stall."""
+        return float(np.median(self.intervals_ms)) if self.intervals_ms else math.inf
 
     def are_other_moments(self, apart_ms: float) -> bool:
         """From about half the time between two frames on, stamps are of other moments, whatever is allowed."""
@@ -93,7 +99,7 @@ class Pairing:
         waiting = self._waiting[side]
         last = self._last[side]
         if last is not None and stamp > last:
-            self.gaps.interval_ms = min(self.gaps.interval_ms, (stamp - last) / 1e6)
+            self.gaps.intervals_ms.append((stamp - last) / 1e6)
         self._last[side] = stamp
         if waiting and stamp < waiting[-1][0]:  # a recording that starts over
             yield from self.end()
@@ -300,7 +306,7 @@ class Bag:
             if self._pose_topic:
                 times, poses = self._read_poses(reader)
             connections = [c for c in reader.connections if c.topic in (*self.images, *self.infos)]
-            number, last, interval, changed = 0, None, None, ""
+            number, last, changed = 0, None, ""
 
             def image_of(message: Any, stamp: int, topic: str) -> Optional[NDArray[Any]]:
                 """None of one that is broken, unless all are."""
@@ -320,7 +326,7 @@ class Bag:
                     raise _egosgm.InvalidArgument(f"{self.path}: {pairing.gaps.broken[0]}")
 
             def frame_of(pair: Any) -> Iterator[BagFrame]:
-                nonlocal number, last, interval
+                nonlocal number, last
                 (stamp, left), (_, right) = pair
                 if not 0 <= stamp < 2**31 * 10**9:
                     raise _egosgm.InvalidArgument(f"{self.images[0]}: a stamp of {stamp / 1e9:.0f} s, which is not from 1970 to 2038")
@@ -330,11 +336,8 @@ class Bag:
                 steps_back = last is not None and stamp < last
                 if steps_back:
                     pairing.gaps.steps_back += 1
-                elif last is not None:
-                    if interval is not None and stamp - last > 1.5 * interval:
-                        pairing.gaps.gaps.append((number, (stamp - last) / 1e9))
-                    else:
-                        interval = stamp - last
+                elif last is not None and stamp - last > 1.5e6 * pairing.gaps.interval_ms:
+                    pairing.gaps.gaps.append((number, (stamp - last) / 1e9))
                 images = [image_of(message, stamp, topic) for message, topic in zip((left, right), self.images)]
                 if images[0] is None or images[1] is None:
                     return

@@ -15,7 +15,7 @@ from .arguments import counted, decimal, expect_new_file, expect_new_folder, Par
 from .boards import Board, Corners, charuco, chessboard, drawn, other_size
 from .raw_pairs import RawPair, open_pairs
 
-_FEWEST_VIEWS, _MANY_VIEWS = 5, 15
+_FEWEST_VIEWS, _MANY_VIEWS, _MOST_VIEWS = 5, 15, 40  # the time grows with their cube
 _BAD_VIEW = 3.0  # times the median error of all views
 _LEAST_BAD_PX = 0.3  # no view with a smaller error is bad
 _MOST_LEFT_OUT = 0.3  # of the views; where more are bad, something else is wrong
@@ -187,6 +187,12 @@ def _without_bad(board: Board, views: List[_View], size: Tuple[int, int]) -> Tup
         views = views[:at] + views[at + 1:]
 
 
+def _thinned(views: List[_View]) -> List[_View]:
+    """As many as tell the cameras in good time, evenly chosen: a video has hundreds that are alike."""
+    last = len(views) - 1
+    return views if last < _MOST_VIEWS else [views[i * last // (_MOST_VIEWS - 1)] for i in range(_MOST_VIEWS)]
+
+
 def _rows_px(board: Board, views: Sequence[_View], stereo: _Stereo, size: Tuple[int, int]) -> NDArray[np.float64]:
     """How far the rows of corners are apart once both images are rectified."""
     left, right = stereo.cameras
@@ -245,7 +251,8 @@ def _text(stereo: _Stereo, size: Tuple[int, int]) -> str:
 
 def _tell(found: _Views, stereo: _Stereo, views: Sequence[_View], out: Sequence[Tuple[_View, float]], coverage: Sequence[float],
           rows: NDArray[np.float64]) -> None:
-    tell(f"the board is in both images of {len(found.views)} of {counted(found.pairs, 'pair')} ({found.found[0]} left, {found.found[1]} right)")
+    thinned = f"; {_MOST_VIEWS} of them are taken, evenly chosen" if len(found.views) > _MOST_VIEWS else ""
+    tell(f"the board is in both images of {len(found.views)} of {counted(found.pairs, 'pair')} ({found.found[0]} left, {found.found[1]} right){thinned}")
     for view, errors in zip(views, stereo.errors_px):
         tell(f"  pair {view.number:3}: error {errors[0]:.3f} px left, {errors[1]:.3f} px right")
     for view, error in out:
@@ -279,7 +286,7 @@ def main(arguments: Sequence[str]) -> int:
     found = _Views(given, board, columns, rows)
     assert found.size is not None
     try:
-        stereo, views, left_out = _without_bad(board, found.views, found.size)
+        stereo, views, left_out = _without_bad(board, _thinned(found.views), found.size)
     except cv2.error as error:
         reason = str(error).strip().splitlines()[-1]
         raise _egosgm.InvalidArgument(f"the views do not tell the cameras ({reason}): give pictures of the board tilted to all sides") from None

@@ -990,9 +990,12 @@ def test_other_moments_get_no_advice(tmp_path, street, frames, capfd):
     path = drive_of(street, frames, of_right=lambda i, time: time + RATE_NS // 2).write(tmp_path / "between")
     refused(capfd, ["--bag", path, *TOPICS, *SET], "at 100.000 ms a frame: left and right are of other moments")
     assert "those are of other moments" in told_of(capfd, path, "--max-skew-ms", 50)
-    path = drive_of(street, frames, of_right=lambda i, time: time + 5_000_000).write(tmp_path / "near")
-    refused(capfd, ["--bag", path, *TOPICS, *SET], "allow that by --max-skew-ms")
-    assert "other moments" not in told_of(capfd, path, "--max-skew-ms", 5)
+    after_a_stall = [START, START + RATE_NS, START + RATE_NS + 12_000_000, START + 2 * RATE_NS]  # two images at once, which are no measure of the usual time
+    for name, times in (("near", None), ("stall", after_a_stall)):
+        path = drive_of(street, [*frames, frames[0]], times=times, of_right=lambda i, time: time + 5_000_000).write(tmp_path / name)
+        refused(capfd, ["--bag", path, *TOPICS, *SET], "allow that by --max-skew-ms")
+        told = told_of(capfd, path, "--max-skew-ms", 5)
+        assert "other moments" not in told and " gap" not in told
 
 
 def test_an_empty_distortion_and_an_unset_rotation(tmp_path, street, frames):

@@ -141,6 +141,13 @@ def test_a_standard_output_that_is_full_costs_no_calibration(pictures, tmp_path,
     expect_the_cameras(tmp_path / "calib.yml")
 
 
+def test_of_the_many_views_of_a_video_some_are_taken(pictures, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("egosgm.calibrate._MOST_VIEWS", 6)
+    code, said = calibrate(pictures, tmp_path / "calib.yml", capsys)
+    assert code == 0 and "; 6 of them are taken, evenly chosen" in said and said.count("  pair ") == 6
+    assert "  pair   0:" in said and "  pair  11:" in said
+
+
 def test_a_charuco_board(tmp_path, capsys):
     pytest.importorskip("cv2.aruco")
     folder = write_pictures(tmp_path / "views", charuco(8, 6, 0.02), 7, 5, count=14)
