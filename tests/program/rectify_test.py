@@ -7,6 +7,7 @@ import re
 import shutil
 import struct
 
+import cv2
 import numpy
 
 from input_case import InputTest, read_grey, rotation, sampled, write_grey
@@ -36,6 +37,7 @@ class RectifyTest(InputTest):
 
     MODEL = "radial-tangential"
     DISTORTION = ([-0.12, 0.03, 0.001, -0.0005, 0.0], [-0.1, 0.02, -0.0008, 0.0006, 0.0])
+    undistorted = staticmethod(cv2.undistortPoints)
 
     def rig(self):
         """K, distortion, rotation from the raw to the rectified camera; for left and right."""
@@ -44,23 +46,12 @@ class RectifyTest(InputTest):
         R = [rotation([0, 0, 1], 0.8), rotation([1, 0, 0], -1.5) @ rotation([0, 0, 1], -0.7)]
         return K, R, numpy.array([[f, 0, cx], [0, f, cy], [0, 0, 1]]), baseline
 
-    def undistorted(self, xd, yd, side):
-        k1, k2, p1, p2, k3 = self.DISTORTION[side]
-        x, y = xd, yd
-        for _ in range(20):
-            r = x * x + y * y
-            radial = 1 + r * (k1 + r * (k2 + r * k3))
-            x, y = (xd - 2 * p1 * x * y - p2 * (r + 2 * x * x)) / radial, (yd - p1 * (r + 2 * y * y) - 2 * p2 * x * y) / radial
-        return x, y
-
     def raw(self, image, side):
         """Where each raw pixel lies in the rectified image."""
         K, R, P, _ = self.rig()
-        v, u = numpy.mgrid[0:HEIGHT, 0:WIDTH]
-        x, y = self.undistorted((u - K[side][0, 2]) / K[side][0, 0], (v - K[side][1, 2]) / K[side][1, 1], side)
-        ray = R[side] @ numpy.stack([x.ravel(), y.ravel(), numpy.ones(x.size)])
-        at = P @ (ray / ray[2])
-        return sampled(image, at[0].reshape(x.shape), at[1].reshape(x.shape))
+        raw = numpy.moveaxis(numpy.mgrid[0:HEIGHT, 0:WIDTH][::-1], 0, -1).reshape(-1, 1, 2).astype(float)
+        at = self.undistorted(raw, K[side], numpy.array(self.DISTORTION[side]), R=R[side], P=P).reshape(HEIGHT, WIDTH, 2)
+        return sampled(image, at[..., 0], at[..., 1])
 
     @staticmethod
     def matrix(name, values):
@@ -228,7 +219,6 @@ class Rectify(RectifyTest):
         self.assertIn("rectified already", text)
 
     def test_colour_of_16_bits_stays_so(self):
-        import cv2
         both = self.new_folder() / "both.png"
         image = numpy.random.default_rng(1).integers(0, 65536, (HEIGHT, 2 * WIDTH, 3)).astype(numpy.uint16)
         cv2.imwrite(str(both), image)
@@ -331,16 +321,7 @@ class RectifyFisheye(RectifyTest):
 
     MODEL = "equidistant"
     DISTORTION = ([0.06, -0.02, 0.004, -0.001], [0.05, -0.015, 0.003, -0.0008])
-
-    def undistorted(self, xd, yd, side):
-        k1, k2, k3, k4 = self.DISTORTION[side]
-        distorted = numpy.hypot(xd, yd)
-        angle = distorted
-        for _ in range(30):
-            s = angle * angle
-            angle = distorted / (1 + s * (k1 + s * (k2 + s * (k3 + s * k4))))
-        scale = numpy.tan(angle) / numpy.maximum(distorted, 1e-12)
-        return scale * xd, scale * yd
+    undistorted = staticmethod(cv2.fisheye.undistortPoints)
 
     def test_raw_pairs_of_a_known_rig_become_the_street_again(self):
         out, text = self.rectify(*self.PAIRS, "--fisheye")
