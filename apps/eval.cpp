@@ -289,7 +289,7 @@ Command add_eval(CLI::App& program) {
       "pooled: over all pixels (KITTI 2015); mean: of the images' figures (KITTI 2012).\n"
       "A truth of 1/256 px (1 in KITTI's PNG) or less says that nothing is there, the sky for instance: a hole is "
       "right.\n"
-      "Over time and beside another method: `egosgm eval-video`, of the Python package. docs/evaluation.md has the "
+      "Over time and beside another method: `egosgm eval-video`, of the Python package. docs/use/evaluation.md has the "
       "formula, the source and the pixels of every figure.");
   return {command, [arguments] { return evaluate(*arguments); }};
 }

@@ -116,7 +116,7 @@ void set_preset(Choices& choices, const std::string& name) {
 std::string options_help() {
   const auto defaults = list_options(PipelineOptions{});
   const auto paper = list_options(PipelineOptions::paper());
-  std::string help = "Options, for --set and --config (docs/options.md):\n";
+  std::string help = "Options, for --set and --config (docs/use/options.md):\n";
   for (std::size_t i = 0; i < defaults.size(); ++i) {
     const OptionText& text = option_texts()[i];
     const bool differs = paper[i].value != defaults[i].value;

@@ -72,7 +72,7 @@ int refuse_arguments(const CLI::App& program, const CLI::ParseError& error) {
   if (typed == "view") {
     return fail(kBadInput,
                 "view: the Python package shows frames: pip install the wheel, with \"[rerun]\", and see egosgm.viewer "
-                "(docs/python.md); `egosgm run --write overview` draws them into files");
+                "(docs/use/python.md); `egosgm run --write overview` draws them into files");
   }
   const std::string nearest = suggestion(typed, names_known_to(command));
   return fail(kBadInput,

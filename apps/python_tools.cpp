@@ -28,7 +28,7 @@ try:
     from egosgm.program import run_tool
 except ImportError as error:
     sys.exit(f"egosgm: error: {sys.argv[1]}: needs the Python package egosgm, which {sys.executable} does not load: {error}; "
-             "pip install the wheel, or build the package with the program (docs/python.md)")
+             "pip install the wheel, or build the package with the program (docs/use/python.md)")
 sys.exit(run_tool(sys.argv[1:]))
 )python";
 
@@ -75,7 +75,7 @@ void become_python(int argc, const char* const* argv) {
   execvp(words[0], const_cast<char* const*>(words.data()));
   throw IoError(std::string(argv[1]) + ": needs Python and its package egosgm, and " + package.interpreter +
                 " cannot be started: " + std::generic_category().message(errno) +
-                "; install Python, then pip install the wheel (docs/python.md)");
+                "; install Python, then pip install the wheel (docs/use/python.md)");
 }
 
 }  // namespace egosgm::app

@@ -61,7 +61,7 @@ const char* const kWriteListHelp =
     "  search         disparities searched at each pixel, 16-bit PNG\n"
     "  dynamic        255 where prediction and measurement contradict each other, as on what moves by itself, 8-bit "
     "PNG\n"
-    "  reason         why a pixel has no value, or a doubtful one: a number each, 8-bit PNG (docs/formats.md)\n"
+    "  reason         why a pixel has no value, or a doubtful one: a number each, 8-bit PNG (docs/use/formats.md)\n"
     "  color          disparity in colours, PNG\n"
     "  overview       image, disparity, search width and error (or variance) in one PNG\n"
     "  cloud          points with colours [m], PLY, without those whose depth is uncertain (--cloud-sigma)\n"

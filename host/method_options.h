@@ -61,7 +61,7 @@ struct BandedSgmOptions {
   bool doubts_band_ends = true;  // where the sums fall on beyond the end of a band, r is that of what is doubtful
   Scheduling scheduling = Scheduling::kAutomatic;
   // Memory for the path sums. An image that needs more is matched in horizontal stripes that overlap by 32 rows, almost
-  // as well (docs/reliability.md). 0: what the device has.
+  // as well (docs/understand/reliability.md). 0: what the device has.
   int max_memory_mib = 0;
 };
 

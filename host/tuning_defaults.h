@@ -9,7 +9,7 @@
 
 namespace egosgm {
 
-/// Up to so many compute units are busy with fewer tiles, too, and wait less often (docs/decisions.md).
+/// Up to so many compute units are busy with fewer tiles, too, and wait less often (docs/understand/decisions.md).
 inline constexpr int kFewComputeUnits = 4;
 
 /// Sizes by what they are for: a device and its driver, as `tuning_key` names them, a device's name alone for all

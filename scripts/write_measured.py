@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes docs/measured.md, and the table of README.md, from what the benches left in docs/measured/: the only places with figures that a run
+"""Writes docs/understand/measured.md, and the table of README.md, from what the benches left in docs/measured/: the only places with figures that a run
 could change.
 
   scripts/write_measured.py           writes the page
@@ -124,7 +124,7 @@ def video(content):
         "## Over time\n\nFrom frame 3 on, pixels that both views see; percent unless px. \"Harm\" and \"help\": of the pixels that differ from the single "
         "frame's by more than 1 px. \"Bad at the single frame's density\": of the surest pixels by the variance, of as many as the single frame has. "
         "\"Error² / variance\": the mean, of errors up to 3 px. The filters are those of cameras: 0.4 of the new and 0.6 of the old disparity where they differ by less than the step. "
-        "[What each figure is](evaluation.md).\n", video_table(found["methods"]),
+        "[What each figure is](../use/evaluation.md).\n", video_table(found["methods"]),
         *([] if "ratios" not in found else ["### Bad of valid, to the single frame\n\nOne video can decide a mean, but no median.\n",
                                            video_table(found["ratios"])]),
         "### A wrong motion\n\nThe true motions, each off by so much in a random direction, and believed.\n", video_table(found["pose_noise"]),
@@ -136,7 +136,7 @@ def evidence(content):
     return "\n".join([
         "## Places without evidence\n\nThe last frame beside the same frame alone; percent, all pixels that have truth. Sky, corridor, fence, poles and plain streets "
         "have no texture, or one that repeats, in large parts. \"Gained\": what the video's map has and the single frame's has not. What is right is off by at most 3 px. "
-        "[What each figure is](evaluation.md#figures-of-single-frames).\n", video_table(found["places"]),
+        "[What each figure is](../use/evaluation.md#figures-of-single-frames).\n", video_table(found["places"]),
         "### One pair again and again\n\nIt brings no evidence that the first time did not bring.\n", video_table(found["repeated"]),
         "### Thin poles\n\nPercent of the pixels of a pole, before a wall, that are off by at most 2 px.\n", video_table(found["poles"]),
         "### The paper's preset in such places\n\nPercent of all pixels of the last frame ([why](paper.md#where-nothing-is-seen)).\n", video_table(found["paper"])])
@@ -170,7 +170,7 @@ def machines(found):
         ms = {row["name"]: row["median_ms"] for row in machine["rows"] if (row["width"], row["disparities"]) == (1242, 128)}
         rows.append([machine["device"], machine["driver"], str(machine["compute_units"]), number(machine.get("copy_gb_s")),
                      *(number(ms.get(name), "ms") for name in ("BandedSgm_full", "full_frame", "steady_frame")), machine["commit"], machine["date"][:10]])
-    return ("## Devices\n\nBy `scripts/bench-device` at 1242×375, D = 128: this machine's, and those that came ([send yours](send-your-device.md)).\n\n" +
+    return ("## Devices\n\nBy `scripts/bench-device` at 1242×375, D = 128: this machine's, and those that came ([send yours](../use/send-your-device.md)).\n\n" +
             table(["device", "driver", "compute units", "copy, GB/s", "full search", "full frame", "steady frame", "commit", "date"], rows))
 
 
@@ -219,9 +219,9 @@ def with_results(readme, text):
 def main():
     parser = Parser(__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing")
-    parser.add_argument("--docs", metavar="DIR", type=pathlib.Path, default=DOCS, help="where measured/ and measured.md are, beside README.md (docs)")
+    parser.add_argument("--docs", metavar="DIR", type=pathlib.Path, default=DOCS, help="where measured/ and understand/measured.md are, beside README.md (docs)")
     arguments = parser.parse_args()
-    written, readme = arguments.docs / "measured.md", arguments.docs.resolve().parent / "README.md"
+    written, readme = arguments.docs / "understand/measured.md", arguments.docs.resolve().parent / "README.md"
     try:
         found = read(arguments.docs / "measured")
         texts = {written: page(found)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kernels of the way that CPUs and FPGAs take hold to what FPGA compilers accept (docs/fpga.md), read off clang's syntax tree.
+"""Kernels of the way that CPUs and FPGAs take hold to what FPGA compilers accept (docs/understand/fpga.md), read off clang's syntax tree.
 
 EGOSGM_CLANG names clang.
 """
@@ -17,7 +17,7 @@ GPU_WAY = {"banded_sgm_paths.cl"}
 GPU_DEFINES = {"ROW_GROUP=64", "ROW_GROUP=128", "PIXELS=1"}
 
 # Loops that end by what they read and not by a counter. Union-find: parents[run] <= run, so a walk to the root goes down, and a join
-# that another work-item forestalled goes on with smaller runs. Stages that have them can be switched off (docs/fpga.md).
+# that another work-item forestalled goes on with smaller runs. Stages that have them can be switched off (docs/understand/fpga.md).
 # Those of banded_sgm.cl go along a row by a counter that is a member of a struct: its bound is known when they begin.
 DATA_DEPENDENT = {"speckle_removal.cl": {"root_of", "root_now", "join_seams", "measure_row"}, "banded_sgm.cl": {"sweep_row", "match_straight"}}
 

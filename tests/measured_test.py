@@ -65,7 +65,7 @@ class Page(unittest.TestCase):
         holder = tempfile.TemporaryDirectory()
         self.addCleanup(holder.cleanup)
         self.docs = pathlib.Path(holder.name) / "docs"
-        self.docs.mkdir()
+        (self.docs / "understand").mkdir(parents=True)
         self.readme = self.docs.parent / "README.md"
         self.readme.write_text("# Before\n<!-- results: scripts/write_measured.py writes this -->\nold\n<!-- end of results -->\nbehind\n")
 
@@ -86,7 +86,7 @@ class Page(unittest.TestCase):
     def test_holds_the_figures(self):
         self.put()
         self.assertEqual(self.write(), 0)
-        page = (self.docs / "measured.md").read_text()
+        page = (self.docs / "understand/measured.md").read_text()
         for text in ("| street | bad_or_missing | 1.25 % | 2.50 | ≤ 1 **missed** |", "- 2012: skipped: not there", "a CPU", "driver 1.0", "0123456789", "2026-01-02",
                      "| EgoSGM, steady frame, both views, motion given | 320×96, 32 | 1 | 0.990 | 11.00 ms | 0.500 | 13.6 % |",
                      "| OpenCV MODE_HH, 8 paths, left view | 320×96, 32 | 2 | 1.00 | 20.00 ms | 1.00 |  |", "| Census | 320×96, 32 | 1.50 ms | 1.25 ms | 3.50 |", "| room_match | 320×96, 32 | 9.50 ms |  |  |",
@@ -113,7 +113,7 @@ class Page(unittest.TestCase):
         file = self.docs / "measured/drivers.json"
         file.write_text(json.dumps(found))
         self.assertEqual(self.write(), 0)
-        page = (self.docs / "measured.md").read_text()
+        page = (self.docs / "understand/measured.md").read_text()
         for text in ("commit 0123456789", "| driver | tests | commit |\n| --- | --- | --- |\n| PoCL 9 | 11 pass | 9876543210 |"):
             self.assertIn(text, page)
         file.write_text(json.dumps({**found, "rows": [["PoCL 9", "11 pass", "9876543210-dirty"]]}))
@@ -128,7 +128,7 @@ class Page(unittest.TestCase):
         file = folder / "a-gpu.json"
         file.write_text(json.dumps(sent))
         self.assertEqual(self.write(), 0)
-        page = (self.docs / "measured.md").read_text()
+        page = (self.docs / "understand/measured.md").read_text()
         self.assertIn("| a GPU | 1.0 | 2 | 250.50 |  |  | 1.75 ms | 9876543210 | 2026-01-02 |", page)
         self.assertIn("| a CPU | 1.0 | 2 |  |", page)
         for broken in ({**sent, "commit": "9876543210-dirty"}, {"rows": []}):
@@ -138,7 +138,7 @@ class Page(unittest.TestCase):
     def test_places_without_evidence_where_they_were_measured(self):
         self.put()
         self.assertEqual(self.write(), 0)
-        self.assertNotIn("without evidence", (self.docs / "measured.md").read_text())
+        self.assertNotIn("without evidence", (self.docs / "understand/measured.md").read_text())
         tables = {"places": {"headings": ["place", "filled", "ratio"], "rows": [["sky", 98.5, 7.5], ["fence", "skipped: not there"], ["median of the ratios", None, 7.5]]},
                   "repeated": {"headings": ["pair", "time 10"], "rows": [["sky, first pair", 94.5]]}, "poles": {"headings": ["width", "found"], "rows": [["3 px", 23.5]]},
                   "paper": {"headings": ["place", "wrong"], "rows": [["fence", 67.5]]}}
@@ -146,7 +146,7 @@ class Page(unittest.TestCase):
         file.write_text(json.dumps({**MACHINE, "evidence": tables}))
         self.put(video={"video": {**VIDEO, "ratios": {"headings": ["video", "ratio"], "rows": [["street", 1.5], ["median of the ratios", 1.25]]}}})
         self.assertEqual(self.write(), 0)
-        page = (self.docs / "measured.md").read_text()
+        page = (self.docs / "understand/measured.md").read_text()
         for text in ("| sky | 98.50 | 7.50 |", "| median of the ratios |  | 7.50 |", "| sky, first pair | 94.50 |", "| 3 px | 23.50 |", "| fence | 67.50 |", "- fence: skipped: not there",
                      "| street | 1.50 |", "| median of the ratios | 1.25 |"):
             self.assertIn(text, page)
@@ -159,7 +159,7 @@ class Page(unittest.TestCase):
         self.assertEqual(self.write("--check"), 1)
         self.write()
         self.assertEqual(self.write("--check"), 0)
-        page = self.docs / "measured.md"
+        page = self.docs / "understand/measured.md"
         page.write_text(page.read_text().replace("1.25 %", "1.24 %"))
         self.assertEqual(self.write("--check"), 1)
 
@@ -170,10 +170,10 @@ class Page(unittest.TestCase):
         dirty = {"commit": "0123456789-dirty"}
         self.put(accuracy=dirty, video=dirty, compare=dirty, stages=dirty)
         self.assertEqual(self.write(), 1)
-        self.assertFalse((self.docs / "measured.md").exists())
+        self.assertFalse((self.docs / "understand/measured.md").exists())
 
     def test_nothing_lies_there_that_the_page_is_not_made_from(self):
         self.put()
         (self.docs / "measured" / "accuracy2.json").write_text("{}")
         self.assertEqual(self.write(), 1)
-        self.assertFalse((self.docs / "measured.md").exists())
+        self.assertFalse((self.docs / "understand/measured.md").exists())

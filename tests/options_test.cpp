@@ -276,9 +276,9 @@ TEST(Options, NumbersAreFiniteAndNotNegative) {
   }
 }
 
-// docs/options.md has a row for every option, in the order of the list, as the library tells it.
+// docs/use/options.md has a row for every option, in the order of the list, as the library tells it.
 TEST(Options, ThePageSaysWhatTheTableSays) {
-  std::ifstream file(EGOSGM_SOURCE_DIR "/docs/options.md");
+  std::ifstream file(EGOSGM_SOURCE_DIR "/docs/use/options.md");
   const std::string page{std::istreambuf_iterator<char>(file), {}};
   const Texts defaults = texts(PipelineOptions());
   std::string table;
@@ -287,7 +287,7 @@ TEST(Options, ThePageSaysWhatTheTableSays) {
     table += std::string("| `") + text.name + "` | " + text.meaning + " | " + unit + text.range + " | " +
              defaults.at(text.name) + " | " + text.when_to_change + " |\n";
   }
-  EXPECT_NE(page.find(table), std::string::npos) << "docs/options.md must hold:\n" << table;
+  EXPECT_NE(page.find(table), std::string::npos) << "docs/use/options.md must hold:\n" << table;
 }
 
 TEST(Parameters, EachIsSetByItsNameAlone) {

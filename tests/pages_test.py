@@ -10,7 +10,7 @@ sys.path.insert(0, str(SOURCE / "tests/program"))
 
 from program_case import ProgramTest  # noqa: E402
 
-PAGES = {page: page.read_text() for page in (*SOURCE.glob("*.md"), *(SOURCE / "docs").glob("*.md")) if page.name != "CHANGELOG.md"}
+PAGES = {page: page.read_text() for page in (*SOURCE.glob("*.md"), *(SOURCE / "docs").rglob("*.md")) if page.name != "CHANGELOG.md"}
 FOLDERS = "apps|bench|cmake|docs|examples|host|include|kernels|python|ros|scripts|tests"
 
 

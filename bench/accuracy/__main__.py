@@ -50,7 +50,7 @@ def parse_arguments():
     parser.add_argument("--no-speed", action="store_true", help="do not run egosgm_compare or egosgm_odometry")
     parser.add_argument("--compare-json", metavar="FILE", help="take the speed from what egosgm_compare --json wrote")
     parser.add_argument("--no-maps", action="store_true", help="leave out what needs the maps pixel by pixel: flicker, poles, variances, 500 frames")
-    parser.add_argument("--video", action="store_true", help="the figures over time (docs/evaluation.md), and nothing else")
+    parser.add_argument("--video", action="store_true", help="the figures over time (docs/use/evaluation.md), and nothing else")
     parser.add_argument("--evidence", action="store_true", help="places without evidence, and nothing else")
     parser.add_argument("--ego-motion", action="store_true", help="stereo odometry alone, and nothing else")
     parser.add_argument("--ablation", action="store_true", help="every correction on and off, on four kinds of input apart, and nothing else")

@@ -9,7 +9,7 @@ from inputs import PAPER, SINGLE_FRAME, STEADY_FROM, Missing, expect, program_at
 from tables import Table, shown
 
 HOST_TIMES = {"total", "odometry", "read", "write", "wall"}  # in a report; all others are stages'
-# The paper has a window of 3x3 and does not name its cost; census is the other one that was tried (docs/paper.md).
+# The paper has a window of 3x3 and does not name its cost; census is the other one that was tried (docs/understand/paper.md).
 CONFIGURATIONS = {"paper": PAPER, "paper, census 5x5": (*PAPER, *settings("cost=census5x5")), "default": ()}
 COLUMNS = ("single_frame", "method", "method_interpolated", "search")
 FIGURE = "paper_stages.png"

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Five forms of one kernel, from a plain loop to that of the library: the same bits, and the least time of nineteen. Needs pyopencl.
 
-  python3 run.py [DEVICE NUMBER]    docs/a-kernel.md tells what each step is for
+  python3 run.py [DEVICE NUMBER]    docs/develop/a-kernel.md tells what each step is for
 """
 import pathlib
 import sys

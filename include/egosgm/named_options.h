@@ -26,7 +26,7 @@ struct OptionText {
   const char* when_to_change;  // for whom the default does not fit, and what then
 };
 
-/// All options of `options`: the preset first, then in the order of docs/options.md; then its constants, if any, as
+/// All options of `options`: the preset first, then in the order of docs/use/options.md; then its constants, if any, as
 /// `constants.NAME`.
 EGOSGM_EXPORT std::vector<NamedOption> list_options(const PipelineOptions& options);
 

@@ -15,11 +15,11 @@ namespace egosgm {
 enum class MatchingCost { kCensus9x7, kLearned7x7, kCensus5x5, kSad3x3 };
 
 /// Where the options start from, and what chooses the constants of the method.
-/// kPaper: the method of Fućek et al. (IFAC 2017), docs/paper.md.
+/// kPaper: the method of Fućek et al. (IFAC 2017), docs/understand/paper.md.
 enum class Preset { kDefault, kPaper };
 
 /// What a user can choose. Meaning, unit, range and when to change each: list_options, `egosgm run --help` and
-/// docs/options.md, from one table. Value semantics; not thread-safe.
+/// docs/use/options.md, from one table. Value semantics; not thread-safe.
 struct EGOSGM_EXPORT PipelineOptions {
   int disparities;          ///< D: number of disparities; the range is [min_disparity, min_disparity + D) px
   int min_disparity;        ///< least disparity [px], of either sign
@@ -45,8 +45,8 @@ struct EGOSGM_EXPORT PipelineOptions {
 
   /// The default preset.
   PipelineOptions();
-  /// Fućek et al. (IFAC 2017), and nothing that goes beyond them. docs/paper.md goes through it step by step, and says
-  /// what they leave open.
+  /// Fućek et al. (IFAC 2017), and nothing that goes beyond them. docs/understand/paper.md goes through it step by
+  /// step, and says what they leave open.
   static PipelineOptions paper();
 
   /// Throws InvalidArgument, naming the option, its value and what is allowed.

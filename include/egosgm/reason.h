@@ -7,8 +7,8 @@
 
 namespace egosgm {
 
-/// Why a pixel has no value, or one that is doubtful: `FrameOutputs::reason`. Where several hold, docs/formats.md says
-/// which of them a pixel has.
+/// Why a pixel has no value, or one that is doubtful: `FrameOutputs::reason`. Where several hold, docs/use/formats.md
+/// says which of them a pixel has.
 enum class Reason : std::uint8_t {
   kTrusted,       // has a value, and nothing speaks against it
   kUnconfirmed,   // no value: no match that the other view confirms

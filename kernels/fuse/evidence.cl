@@ -70,9 +70,10 @@ static inline int beyond_four(const Code own, volatile global const Code* match)
          bits_apart(own, match[EGOSGM_NEAR_CONTROL]) + bits_apart(own, match[EGOSGM_FAR_CONTROL]) -
          4 * bits_apart(own, match[0]);
 }
-static inline int beyond_eight(const Code own, global const Code* match, const Code alike) {
-  int beyond = -8 * (int)popcount((own ^ match[0]) & alike);
-  for (int i = 0; i < 8; ++i) beyond += (int)popcount((own ^ match[kCoarseControls[i]]) & alike);
+static inline int beyond_eight(const Code own, volatile global const Code* match, const Code alike) {
+  int beyond = -8 * bits_apart(own & alike, match[0] & alike);
+#pragma unroll
+  for (int i = 0; i < 8; ++i) beyond += bits_apart(own & alike, match[kCoarseControls[i]] & alike);
   return beyond;
 }
 

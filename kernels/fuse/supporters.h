@@ -13,8 +13,9 @@ static inline Ints have_supporters(const ImageSize size, const int x, const int 
                                    global const uchar* evidence) {
   Ints supporters = 0;
   Ints lacks = asked;
-  for (int v = y - EGOSGM_SUPPORTERS_RADIUS; v <= y + EGOSGM_SUPPORTERS_RADIUS && any_of(lacks);
-       v += EGOSGM_SUPPORTERS_STEP) {
+  // The pixel's own row comes first: most find what they need there.
+  for (int i = 0; i <= 2 * EGOSGM_SUPPORTERS_RADIUS / EGOSGM_SUPPORTERS_STEP && any_of(lacks); ++i) {
+    const int away = (i + 1) / 2 * EGOSGM_SUPPORTERS_STEP, v = i % 2 == 0 ? y + away : y - away;
     if (v < 0 || v >= size.height) continue;
     const size_t row = (size_t)v * size.width;
     for (int u = x - EGOSGM_SUPPORTERS_RADIUS; u <= x + EGOSGM_SUPPORTERS_RADIUS; u += EGOSGM_SUPPORTERS_STEP) {

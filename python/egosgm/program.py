@@ -18,7 +18,7 @@ _PACKAGES = {  # what brings a module
     "cv2": "pip install opencv-python-headless, or apt install python3-opencv",
     "PIL": "pip install pillow, or apt install python3-pil",
     "matplotlib": "pip install matplotlib, or apt install python3-matplotlib",
-    "rosbags": 'pip install the wheel with "[bag]" (docs/robots.md)',
+    "rosbags": 'pip install the wheel with "[bag]" (docs/use/robots.md)',
 }
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of a video's disparity maps over time; docs/evaluation.md has their formulas."""
+"""Figures of a video's disparity maps over time; docs/use/evaluation.md has their formulas."""
 import collections
 import concurrent.futures
 import dataclasses

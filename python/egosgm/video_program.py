@@ -236,7 +236,7 @@ class VideoInput:
 def _parser() -> Parser:
     parser = comparison_parser("eval-video", __doc__, "disparity map (KITTI PNG, 16-bit PNG with --scale, PFM, .npy), a folder of them, or a folder of `run`",
                                 "true disparity, or a folder of files with equal names; not needed with --sequence")
-    parser.epilog = "docs/evaluation.md has the formula, the source and the pixels of every figure. `egosgm eval` compares maps with their truth frame by frame."
+    parser.epilog = "docs/use/evaluation.md has the formula, the source and the pixels of every figure. `egosgm eval` compares maps with their truth frame by frame."
     add = parser.add_argument
     add("--mask", default="", metavar="FILE|DIR", help="compare only where this grey PNG, or the one of the truth's name in this folder, is not 0")
     add("--scale", type=decimal, default=256.0, metavar="STEPS", help="steps a pixel of 16-bit PNG in --estimate and --against [256, KITTI's]")

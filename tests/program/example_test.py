@@ -44,7 +44,7 @@ class Example(ProgramTest):
         self.assertEqual(shown, re.sub("^//.*\n", "", (SOURCE / "examples/minimal.cpp").read_text(), flags=re.MULTILINE))
 
     def test_the_comparison_names_tests_that_exist(self):
-        claims = (SOURCE / "docs/comparison.md").read_text().split("## Each claim")[1]
+        claims = (SOURCE / "docs/understand/comparison.md").read_text().split("## Each claim")[1]
         sources = "".join(file.read_text() for folder in ("tests", "bench") for kind in ("*.cpp", "*.py") for file in (SOURCE / folder).rglob(kind))
         named = [name for name in re.findall("`([A-Za-z_0-9.]+)`", claims) if "test_" in name or "." in name]
         self.assertGreater(len(named), 20)

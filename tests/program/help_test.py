@@ -28,7 +28,7 @@ class Help(ProgramTest):
             self.assertIn(f"egosgm {command} [OPTIONS] [ESTIMATE] [TRUTH]\n", self.assert_works(command, "--help"))
 
     def test_the_page_names_every_subcommand_and_exit_code(self):
-        text = (SOURCE / "docs/program.md").read_text()
+        text = (SOURCE / "docs/use/program.md").read_text()
         for name in COMMANDS:
             self.assertIn(f"`{name}`", text)
         self.assertIn("130", text)

@@ -274,7 +274,7 @@ def test_the_stub_has_the_parameters_of_the_module():
 
 def test_what_the_page_shows_is_what_comes_out():
     import doctest
-    page = pathlib.Path(__file__).resolve().parents[2] / "docs/python.md"
+    page = pathlib.Path(__file__).resolve().parents[2] / "docs/use/python.md"
     failed, tried = doctest.testfile(str(page), module_relative=False, optionflags=doctest.ELLIPSIS)
     assert failed == 0 and tried > 10
 
@@ -303,7 +303,7 @@ def test_the_matcher_has_opencvs_values(street, frames):
 
 
 def test_the_page_for_those_who_come_from_elsewhere_names_options_that_exist():
-    page = (pathlib.Path(__file__).resolve().parents[2] / "docs/coming-from.md").read_text()
+    page = (pathlib.Path(__file__).resolve().parents[2] / "docs/use/coming-from.md").read_text()
     names = {"disparities", "min_disparity", "cost", "p1", "p2", "left_right_px", "max_speckle_px", "paths"}
     assert names <= set(egosgm.pipeline_options())
     assert all(f"`{name}`" in page or f"`{name} = " in page for name in names)

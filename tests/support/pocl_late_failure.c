@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shows a fault of PoCL 3.1 that tests/support/fault_layer.cpp steers around; docs/reliability.md tells of it. A
+// Shows a fault of PoCL 3.1 that tests/support/fault_layer.cpp steers around; docs/understand/reliability.md tells of it. A
 // command that fails while another one of its queue still runs is notified by that one when it ends, though it is gone
 // by then. cc -o late tests/support/pocl_late_failure.c -lOpenCL && ./late: ends by a failed assertion of PoCL
 // within seconds. ./late wait, which lets the earlier command end first, says how many rounds went well.
