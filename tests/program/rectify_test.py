@@ -53,25 +53,19 @@ class RectifyTest(InputTest):
         at = self.undistorted(raw, K[side], numpy.array(self.DISTORTION[side]), R=R[side], P=P).reshape(HEIGHT, WIDTH, 2)
         return sampled(image, at[..., 0], at[..., 1])
 
-    @staticmethod
-    def matrix(name, values):
-        values = numpy.atleast_2d(values)
-        numbers = ", ".join(f"{float(value):.12g}" for value in values.ravel())
-        return f"{name}: !!opencv-matrix\n   rows: {values.shape[0]}\n   cols: {values.shape[1]}\n   dt: d\n   data: [ {numbers} ]\n"
-
     def opencv_yaml(self, unit_m=1.0, given=True):
         K, R, P, baseline = self.rig()
-        right_from_left = R[1].T @ R[0]
         T = R[1].T @ numpy.array([-baseline, 0, 0]) / unit_m
-        text = "%YAML:1.0\n---\n"
+        storage = cv2.FileStorage(".yml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
         for i in (0, 1):
-            text += self.matrix(f"M{i + 1}", K[i]) + self.matrix(f"D{i + 1}", self.DISTORTION[i])
-        text += self.matrix("R", right_from_left) + self.matrix("T", T.reshape(3, 1))
-        if given:
-            projections = numpy.hstack([P, numpy.zeros((3, 1))]), numpy.hstack([P, [[-P[0, 0] * baseline / unit_m], [0], [0]]])
-            for i in (0, 1):
-                text += self.matrix(f"R{i + 1}", R[i]) + self.matrix(f"P{i + 1}", projections[i])
-        return text
+            storage.write(f"M{i + 1}", K[i])
+            storage.write(f"D{i + 1}", numpy.array([self.DISTORTION[i]]))
+            if given:
+                storage.write(f"R{i + 1}", R[i])
+                storage.write(f"P{i + 1}", numpy.hstack([P, [[-P[0, 0] * baseline / unit_m * i], [0], [0]]]))
+        storage.write("R", R[1].T @ R[0])
+        storage.write("T", T.reshape(3, 1))
+        return storage.releaseAndGetString()
 
     @classmethod
     def setUpClass(cls):
@@ -343,7 +337,8 @@ class RectifyFisheye(RectifyTest):
 
     def test_refuses_other_numbers_of_coefficients(self):
         file = self.new_folder() / "stereo.yml"
-        file.write_text(self.opencv_yaml().replace("rows: 1\n   cols: 4", "rows: 1\n   cols: 5").replace("0.06, -0.02", "0.06, 0, -0.02"))
+        self.DISTORTION = ([0.06, 0, -0.02, 0.004, -0.001], self.DISTORTION[1])
+        file.write_text(self.opencv_yaml())
         self.assert_refused(["rectify", *self.PAIRS, "--fisheye", "--calib", file, "--out", self.folder / "never"], file, "D1 has 5 numbers",
                             "fisheye model has 4")
         self.assert_refused(["rectify", *self.PAIRS, "--fisheye", "--calib", self.street / "calib.txt", "--out", self.folder / "never"],
