@@ -2,6 +2,7 @@
 """What the tests of sequences and raw images share. Environment as for program_case.py."""
 import json
 
+import cv2
 import numpy
 import PIL.Image
 
@@ -21,19 +22,11 @@ def write_grey(file, image):
 
 def sampled(image, x, y):
     """Bilinear, the border repeated."""
-    x, y = numpy.clip(x, 0, image.shape[1] - 1.001), numpy.clip(y, 0, image.shape[0] - 1.001)
-    u, v = x.astype(int), y.astype(int)
-    a, b, image = x - u, y - v, image.astype(float)
-    top = (1 - a) * image[v, u] + a * image[v, u + 1]
-    bottom = (1 - a) * image[v + 1, u] + a * image[v + 1, u + 1]
-    return numpy.rint((1 - b) * top + b * bottom).astype(numpy.uint8)
+    return cv2.remap(image, x.astype(numpy.float32), y.astype(numpy.float32), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def rotation(axis, degrees):
-    a = numpy.radians(degrees)
-    x, y, z = numpy.asarray(axis, float)
-    K = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return numpy.eye(3) + numpy.sin(a) * K + (1 - numpy.cos(a)) * K @ K
+    return cv2.Rodrigues(numpy.radians(degrees) * numpy.asarray(axis, float))[0]
 
 
 class InputTest(ProgramTest):

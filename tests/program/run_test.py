@@ -195,13 +195,6 @@ class Run(ProgramTest):
         self.assert_works("run", "--odometry", self.street, "--out", out, "--interpolate", "--frames", "0")
         self.assertTrue((out / "interpolated/000000.png").exists())
 
-    def test_frames_keep_their_own_numbers(self):
-        out = self.new_folder()
-        self.assert_works("run", "--odometry", self.street, "--out", out, "--frames", "2:3")
-        self.assertEqual([f.name for f in sorted((out / "disparity").iterdir())], ["000002.png", "000003.png"])
-        self.assertEqual([frame["frame"] for frame in self.report(out)["frames"]], [2, 3])
-        self.assertTrue((out / "poses.txt").read_text().startswith("1.0000"))
-
     def test_same_bits_twice_and_quiet_says_nothing(self):
         first, second = self.new_folder(), self.new_folder()
         for out in (first, second):
@@ -312,13 +305,6 @@ class Run(ProgramTest):
         self.assertEqual(shares, [100] * (FRAMES + 1), told)
         self.assertEqual(told.count("(no prediction: not temporal; matched 2 times)"), FRAMES, told)
         self.assertEqual(told.count("times)"), FRAMES, told)
-
-    def test_search_full_still_predicts(self):
-        out = self.new_folder()
-        self.assert_works("run", "--odometry", self.street, "--out", out, "--set", "constants.search=full")
-        last = self.report(out)["frames"][-1]
-        self.assertEqual(last["search_fraction"], 1)
-        self.assertGreater(last["predicted_fraction"], 0.5)
 
     def test_poses_take_the_place_of_odometry(self):
         out = self.new_folder()
