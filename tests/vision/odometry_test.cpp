@@ -366,7 +366,7 @@ TEST(StereoOdometry, ImagesTooSmallForFeaturesGiveNoMotion) {
 }
 
 TEST(StereoOdometry, BearsACalibrationThatNoCameraHas) {
-  const Drive& drive = turning_drive();
+  const RenderedVideo& drive = turning_drive();
   Calibration calibration = drive.sequence.calibration();
   calibration.fx = 1e6;
   calibration.fy = 1e-300;  // what is seen through it lies at infinity
