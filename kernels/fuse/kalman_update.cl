@@ -104,14 +104,17 @@ static inline Verdict judged(const int repeats, const Ints before, const Ints no
   return verdict;
 }
 
-// The measurements without those that neither a prediction nor a measurement around shares.
-static inline Floats without_lone(const ImageSize size, const int x, const int y, const Floats d, const Floats z,
-                                  const float gate, global const float* measured) {
-  const Ints is_shared = (d > INVALID) & (fabs(z - d) <= gate);
-  const Ints is_new = (z > INVALID) & !is_shared;
-  const Ints is_lone =
-      is_new & !have_supporters(size, x, y, is_new, EGOSGM_SUPPORTERS_LEAST, z, EGOSGM_LONE_PX, measured, 0);
-  return is_lone ? INVALID : z;
+// Drops of a chunk's measurements those that neither a prediction nor a measurement around shares.
+static inline void drop_lone(const ImageSize size, const int start, const int y, const float gate,
+                             global const float* predicted_row, global const float* measured, Floats* chunk) {
+  FOR_BLOCKS(x, i, start, size.width) {
+    const Floats d = load_pixels(predicted_row, x, size.width), z = chunk[i];
+    const Ints is_shared = (d > INVALID) & (fabs(z - d) <= gate);
+    const Ints is_new = (z > INVALID) & !is_shared;
+    const Ints is_lone =
+        is_new & !have_supporters(size, x, y, is_new, EGOSGM_SUPPORTERS_LEAST, z, EGOSGM_LONE_PX, measured, 0);
+    chunk[i] = is_lone ? INVALID : z;
+  }
 }
 
 // `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
@@ -134,54 +137,58 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
   const int blocks_high = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
   const size_t row_of_blocks = ((size_t)at.view * blocks_high + y / EGOSGM_COARSE) * EGOSGM_EVIDENCE_STRIDE(size.width);
 
-  FOR_PIXELS(x, width) {
-    const Floats d = load_pixels(predicted + row, x, width);
-    Floats z = load_pixels(measured + row, x, width);
-    const Floats p = load_pixels(predicted_variance + row, x, width);
-    const Floats r = load_pixels(measured_variance + row, x, width);
-    Verdict verdict = {(Ints)(EGOSGM_EVIDENCE_MOST), (Ints)(-1), (Ints)(-1)};
-    if (has_evidence) {
-      z = without_lone(size, x, y, d, z, gate, measured + view);
-      verdict = judged(repeats, moved_evidence(size, x, y, evidence_before + row),
-                       OF_ITS_BLOCK(Ints, block_evidence + row_of_blocks, x),
-                       OF_ITS_BLOCK(Floats, found + row_of_blocks, x), d, z, gate, x, width, at.view);
+  FOR_CHUNKS(start, width) {
+    Floats taken[CHUNK];
+    FOR_BLOCKS(x, i, start, width) taken[i] = load_pixels(measured + row, x, width);
+    if (has_evidence) drop_lone(size, start, y, gate, predicted + row, measured + view, taken);
+    FOR_BLOCKS(x, i, start, width) {
+      const Floats d = load_pixels(predicted + row, x, width);
+      const Floats z = taken[i];
+      const Floats p = load_pixels(predicted_variance + row, x, width);
+      const Floats r = load_pixels(measured_variance + row, x, width);
+      Verdict verdict = {(Ints)(EGOSGM_EVIDENCE_MOST), (Ints)(-1), (Ints)(-1)};
+      if (has_evidence) {
+        verdict = judged(repeats, moved_evidence(size, x, y, evidence_before + row),
+                         OF_ITS_BLOCK(Ints, block_evidence + row_of_blocks, x),
+                         OF_ITS_BLOCK(Floats, found + row_of_blocks, x), d, z, gate, x, width, at.view);
+      }
+      const Ints has_prediction = d > INVALID;
+      const Ints has_measurement =
+          (z > INVALID) & (is_plain | (load_bytes(hidden + row, x, width) == 0)) & (verdict.counts != 0);
+      const Ints is_doubtful = load_bytes(measured_doubtful + row, x, width) != 0;
+      const Ints has_both = has_prediction & has_measurement;
+      const Ints fuses = has_both & (is_plain | ((fabs(z - d) <= gate) & !is_doubtful));
+      const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
+
+      const Floats zero = 0.0f;
+      const Floats innovation = z - d;
+      const Floats sum = p + r;
+      const Floats gain = sum > zero ? p / sum : zero;
+      const Floats fused = d + gain * innovation;
+      const Floats fused_variance = (1.0f - gain) * p;
+
+      const Floats wide = EGOSGM_DOUBTFUL_VARIANCE_PX2;
+      const Floats contradicting = r < wide ? wide : r;
+      Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
+      value = verdict.lives ? value : INVALID;
+      Floats variance = fuses ? fused_variance : has_both ? contradicting : has_measurement ? r : p;
+
+      const Floats most = EGOSGM_DIFFERENCE_PX;
+      const Floats side = innovation > zero ? (Floats)(1.0f) : (Floats)(-1.0f);
+      Ints moves = fuses & (fabs(innovation) > most) & (Ints)(ask_neighbours ? -1 : 0) &
+                   are_beside_off_to(side, x, width, predicted + row, measured + row);
+      if (any_of(moves)) {
+        moves = move_together(size, x, y, side, moves, predicted + view, measured + view);
+        value = (moves & (value > INVALID)) ? z : value;
+        variance = moves ? wide : variance;
+      }
+      const Floats least = min_variance;
+      store_pixels(value, updated + row, x, width);
+      store_pixels(variance < least ? least : variance, updated_variance + row, x, width);
+      const Ints contradicted = (has_both & !fuses) | (moves != 0) | (has_measurement & !has_prediction & is_doubtful);
+      store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
+      store_bytes(value > INVALID ? verdict.sums : (Ints)(0), evidence + row, x, width);
     }
-    const Ints has_prediction = d > INVALID;
-    const Ints has_measurement =
-        (z > INVALID) & (is_plain | (load_bytes(hidden + row, x, width) == 0)) & (verdict.counts != 0);
-    const Ints is_doubtful = load_bytes(measured_doubtful + row, x, width) != 0;
-    const Ints has_both = has_prediction & has_measurement;
-    const Ints fuses = has_both & (is_plain | ((fabs(z - d) <= gate) & !is_doubtful));
-    const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
-
-    const Floats zero = 0.0f;
-    const Floats innovation = z - d;
-    const Floats sum = p + r;
-    const Floats gain = sum > zero ? p / sum : zero;
-    const Floats fused = d + gain * innovation;
-    const Floats fused_variance = (1.0f - gain) * p;
-
-    const Floats wide = EGOSGM_DOUBTFUL_VARIANCE_PX2;
-    const Floats contradicting = r < wide ? wide : r;
-    Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
-    value = verdict.lives ? value : INVALID;
-    Floats variance = fuses ? fused_variance : has_both ? contradicting : has_measurement ? r : p;
-
-    const Floats most = EGOSGM_DIFFERENCE_PX;
-    const Floats side = innovation > zero ? (Floats)(1.0f) : (Floats)(-1.0f);
-    Ints moves = fuses & (fabs(innovation) > most) & (Ints)(ask_neighbours ? -1 : 0) &
-                 are_beside_off_to(side, x, width, predicted + row, measured + row);
-    if (any_of(moves)) {
-      moves = move_together(size, x, y, side, moves, predicted + view, measured + view);
-      value = (moves & (value > INVALID)) ? z : value;
-      variance = moves ? wide : variance;
-    }
-    const Floats least = min_variance;
-    store_pixels(value, updated + row, x, width);
-    store_pixels(variance < least ? least : variance, updated_variance + row, x, width);
-    const Ints contradicted = (has_both & !fuses) | (moves != 0) | (has_measurement & !has_prediction & is_doubtful);
-    store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
-    store_bytes(value > INVALID ? verdict.sums : (Ints)(0), evidence + row, x, width);
   }
 }
 
