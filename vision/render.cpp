@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <vector>
 
 #include "egosgm/error.h"
@@ -156,8 +155,11 @@ cv::Mat color_variance(const cv::Mat& variance, const cv::Mat& disparity, ColorR
   require_map(disparity, "color_variance");
   require_same_size(variance, disparity, "color_variance");
   cv::Mat picture = color_map(variance, range);
-  const cv::Mat has_value = (disparity > kInvalidDisparity) & (disparity <= std::numeric_limits<float>::max());
-  picture.setTo(kBlack, ~has_value);
+  for (int y = 0; y < picture.rows; ++y) {
+    for (int x = 0; x < picture.cols; ++x) {
+      if (!is_valid_disparity(disparity.at<float>(y, x))) picture.at<cv::Vec3b>(y, x) = cv::Vec3b(0, 0, 0);
+    }
+  }
   return picture;
 }
 
@@ -256,13 +258,19 @@ cv::Mat color_grey(const cv::Mat& grey) {
   if (grey.empty() || (grey.type() != CV_8UC1 && grey.type() != CV_16UC1)) {
     throw InvalidArgument("color_grey: the image must be CV_8UC1 or CV_16UC1 and not empty");
   }
-  cv::Mat bytes = grey, picture;
+  cv::Mat bytes = grey, picture(grey.size(), CV_8UC3);
   if (grey.depth() == CV_16U) {
-    double highest = 0;
-    cv::minMaxLoc(grey, nullptr, &highest);
+    int highest = 0;
+    for (int y = 0; y < grey.rows; ++y) {
+      const auto* row = grey.ptr<std::uint16_t>(y);
+      highest = std::max<int>(highest, *std::max_element(row, row + grey.cols));
+    }
     grey.convertTo(bytes, CV_8U, highest > 0 ? 255.0 / highest : 1.0);
   }
-  cv::merge(std::vector<cv::Mat>(3, bytes), picture);
+  for (int y = 0; y < bytes.rows; ++y) {
+    const std::uint8_t* row = bytes.ptr(y);
+    std::transform(row, row + bytes.cols, picture.ptr<cv::Vec3b>(y), [](auto v) { return cv::Vec3b(v, v, v); });
+  }
   return picture;
 }
 
