@@ -337,7 +337,8 @@ class TuneFiles(FilesTest):
             process = self.started("tune", "--file", file, "--width", 64, "--height", 24, "--disparities", 16, "--rounds", 2, "--stage", "ForwardWarp", lines=lines)
             process.send_signal(signal.SIGINT)
             _, errors = process.communicate(timeout=900)
-            self.assertEqual((process.returncode, errors), (130, f"egosgm: interrupted: nothing is kept, {file} is as it was\n"))
+            # An interrupt while the driver compiles may leave lines of its compiler's before this one.
+            self.assertEqual((process.returncode, errors.splitlines()[-1:]), (130, [f"egosgm: interrupted: nothing is kept, {file} is as it was"]))
             self.assertEqual(file.read_bytes(), before)
 
     def test_one_stage_leaves_the_sizes_of_the_others(self):
