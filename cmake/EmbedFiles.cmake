@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Turns files into one C++ table from names to texts, so that the binaries need no files at run time: NAMESPACE::FUNCTION(), declared in HEADER.
-# cmake -DOUTPUT=kernels.cpp -DHEADER=host/ocl/sources.h -DNAMESPACE=egosgm::ocl -DFUNCTION=sources -DINPUTS=a.cl,b.cl -P EmbedFiles.cmake
-string(REPLACE "," ";" INPUTS "${INPUTS}")
+# cmake -DOUTPUT=kernels.cpp -DHEADER=host/ocl/sources.h -DNAMESPACE=egosgm::ocl -DFUNCTION=sources "-DINPUTS=a.cl;b.cl" -P EmbedFiles.cmake
 set(rows "")
 foreach(input IN LISTS INPUTS)
   cmake_path(GET input FILENAME name)

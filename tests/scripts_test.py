@@ -4,6 +4,7 @@ import os
 import pathlib
 import re
 import runpy
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -98,3 +99,42 @@ class Scripts(unittest.TestCase):
             self.assertRegex(tests, rf"(TEST|TEST_[FP]|INSTANTIATE_TEST_SUITE_P)\({name.rstrip('/')}")
         for name in programs.split("|"):
             self.assertRegex(tests, rf"class {name}\(")
+
+
+class InAnyOrder(unittest.TestCase):
+    """The README's commands share build/: each configures it as if it came first. Nothing is compiled here."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="egosgm_orders_")
+        self.addCleanup(folder.cleanup)
+        self.checkout = pathlib.Path(folder.name, "a b, c")
+        made = shutil.ignore_patterns(".git", "build", "build-*", "out")
+
+        def ignored(folder, names):
+            return made(folder, names) if pathlib.Path(folder) == SCRIPTS.parent else [name for name in names if name == "__pycache__"]
+
+        shutil.copytree(SCRIPTS.parent, self.checkout, ignore=ignored)
+        # CMake configures, and builds nothing: so a script ends here.
+        stub = pathlib.Path(folder.name, "bin", "cmake")
+        stub.parent.mkdir()
+        stub.write_text(f"#!/bin/sh\n[ \"$1\" != --build ] || {{ shift 2; echo \"would build: $*\"; exit 99; }}\nexec {shutil.which('cmake')} \"$@\"\n")
+        stub.chmod(0o755)
+        self.environment = dict(os.environ, PATH=f"{stub.parent}:{os.environ['PATH']}", PYTHONDONTWRITEBYTECODE="1")
+
+    def configured(self, script, *arguments):
+        """What the cache says after a call of a script that came as far as building."""
+        done = subprocess.run([self.checkout / "scripts" / script, *arguments], env=self.environment, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+        self.assertIn("would build:", done.stdout + done.stderr, f"{script} {arguments}: {done.stderr}")
+        return dict(re.findall(r"^(EGOSGM_\w+):BOOL=(\w+)$", (self.checkout / "build/CMakeCache.txt").read_text(), re.MULTILINE))
+
+    def test_no_call_leaves_its_options_to_the_next(self):
+        for script in ("check", "demo", "build", "demo", "check", "test", "build"):
+            with self.subTest(script=script):
+                options = self.configured(script, *(["kalman_update"] if script == "check" else []))
+                self.assertEqual((options["EGOSGM_TESTS"], options["EGOSGM_BENCH"]), ("OFF", "OFF") if script == "demo" else ("ON", "ON"))
+                self.assertEqual(options["EGOSGM_WERROR"], "ON" if script == "test" else "OFF")
+        self.assertEqual(self.configured("build", "-DEGOSGM_WERROR=ON")["EGOSGM_WERROR"], "ON")
+        self.assertEqual(self.configured("build")["EGOSGM_WERROR"], "OFF")
+        # A path with a comma is one file among those that are embedded.
+        subprocess.run(["cmake", "--build", self.checkout / "build", "--target", "kernels.cpp"], check=True, capture_output=True)
+        self.assertIn("kalman_update.cl", (self.checkout / "build/kernels.cpp").read_text())
