@@ -9,13 +9,13 @@
 
 namespace egosgm {
 
-/// How values become 8 bits: what nearly all pixels hold fills the 8 bits. A pedestal below and a few hot pixels
+/// Maps grey values to 8 bits: the values of nearly all pixels fill the 8 bits. A pedestal below and a few hot pixels
 /// above do not count; where neither is there, values of 16 bits are shifted alone, and those of 8 bits stay.
 struct GreyLevels {
   int pedestal = 0, gain = 1, shift = 0;
 
   bool operator==(const GreyLevels&) const = default;
-  /// How far apart values are that differ by one of the 8-bit levels.
+  /// The difference of values that are one 8-bit level apart.
   float step() const { return static_cast<float>(1 << shift) / static_cast<float>(gain); }
 
   std::uint8_t operator()(int value) const {
@@ -23,7 +23,7 @@ struct GreyLevels {
   }
 };
 
-/// Of both images of a pair, so that they stay comparable. REQUIRES: both are of one type.
+/// Levels for both images of a pair, so that they stay comparable. REQUIRES: both are of one type.
 EGOSGM_EXPORT GreyLevels levels_of(const ImageView& left, const ImageView& right);
 
 }  // namespace egosgm

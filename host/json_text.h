@@ -44,7 +44,7 @@ inline std::string dumped(const nlohmann::ordered_json& json, int indent = -1) {
   return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
-/// What is read back of a file of this JSON.
+/// Returns what a reader of this JSON's file gets.
 inline nlohmann::ordered_json as_in_file(const nlohmann::ordered_json& json) {
   return nlohmann::ordered_json::parse(dumped(json));
 }

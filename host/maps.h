@@ -18,7 +18,7 @@ inline shared::DisparityRange range_of(const MethodOptions& options) {
   return {options.min_disparity, options.disparities};
 }
 
-/// What kernels that read images of `type` are built with.
+/// The define of kernels that read images of `type`.
 inline ocl::Defines pixel_define(PixelType type) {
   return ocl::Defines().set("PIXEL_BYTES", type == PixelType::kU8 ? 1 : 2);
 }
@@ -62,7 +62,7 @@ struct StereoMaps {
       : disparity(context, 2 * pixel_count(size)), variance(context, 2 * pixel_count(size)) {}
 };
 
-/// Where a frame writes what is given out of its belief.
+/// The maps that a frame publishes of its belief.
 struct GivenOut {
   Map& disparity;  // what is confirmed; not written where that is all of the belief
   Map& variance;   // of what is given out
@@ -71,7 +71,7 @@ struct GivenOut {
 /// A map of both views of bytes: 1 where something holds, else 0.
 using FlagMap = ocl::Buffer<cl_uchar>;
 
-/// What was matched within bands.
+/// The result of matching within bands.
 struct Measurement : StereoMaps {
   FlagMap doubtful;  // 1 where the path sums fall on beyond the end of the band
 
@@ -80,7 +80,7 @@ struct Measurement : StereoMaps {
       : StereoMaps(context, size), doubtful(context, 2 * pixel_count(size)) {}
 };
 
-/// Of which views something is made. The values are their number.
+/// The views that a stage works on. The values are their number.
 enum class Views { kLeft = 1, kBoth = 2 };
 inline int count(Views views) { return static_cast<int>(views); }
 

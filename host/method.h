@@ -15,7 +15,7 @@ namespace egosgm {
 /// The rooms of a frame, in its order.
 enum class Room { kPredict, kAlign, kSearch, kMatch, kRefineAlignment, kFuse, kPublish };
 
-/// What a frame makes on its way. The next one overwrites it.
+/// Intermediate maps of a frame. The next frame overwrites them.
 struct Workspace {
   Prediction prediction;
   FrameImages aligned;
@@ -30,7 +30,7 @@ struct Workspace {
   Workspace(ocl::Context& context, shared::ImageSize size, const MethodOptions& options);
 };
 
-/// What a frame left on the device. Handles: it is there until a later frame overwrites it.
+/// Results of a frame on the device. These are handles: a later frame overwrites their memory.
 struct FrameResults {
   StereoMaps given_out;
   StereoMaps measured;

@@ -90,7 +90,7 @@ void for_each_chosen(Options& o, Method& m, Visit&& visit) {
   visit(o.gate_px, m.kalman_update.gate_px);
 }
 
-/// What the paper's preset chooses that users do not (docs/understand/paper.md).
+/// Constants that the paper's preset sets and that are no options (docs/understand/paper.md).
 void choose_as_the_paper(MethodOptions& method) {
   method.forward_warp.motion_noise = 0.0f;
   method.edge_rejection.max_jump_px = 3.0f;

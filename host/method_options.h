@@ -90,7 +90,8 @@ struct EvidenceOptions {
 };
 struct OutputVarianceOptions {
   bool enabled = true;  // false: the filter's variance as it is, which knows of no wrong surface
-  // Of the averaged variance to the power 1.5; of the squares of the distance from a plane and of jumps beside [px^2].
+  // Weights: of the averaged variance to the power 1.5; of the squares of the distance from a plane and of jumps beside
+  // [px^2].
   float scale = 1.3f, roughness_weight = 1.2f, jump_weight = 0.02f;
 };
 
@@ -116,7 +117,7 @@ struct MethodOptions {
   OutputVarianceOptions output_variance;
 
   MethodOptions() = default;
-  /// What a preset and the user's options choose. Throws InvalidArgument for a constant that does not exist.
+  /// Resolves a preset and the user's options. Throws InvalidArgument for a constant that does not exist.
   MethodOptions(const PipelineOptions& options);  // NOLINT(google-explicit-constructor)
   /// Options with which a pipeline runs exactly this, for tests and benches: the public ones, and every other
   /// parameter that differs from the preset's as a constant.

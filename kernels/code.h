@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What matching compares of a pixel (match/census.cl). OpenCL C only.
+// The code of a pixel, which matching compares (census.cl). OpenCL C only.
 #ifndef EGOSGM_KERNELS_CODE_H
 #define EGOSGM_KERNELS_CODE_H
 

@@ -11,7 +11,7 @@
 
 // SearchBand looks at a block's coarse pixels and the ones around them, and believes this many that have a disparity.
 #define EGOSGM_COARSE_MIN_COUNT 8
-// Of these, so many of the least and of the largest are taken for mismatches. REQUIRES: less than half of the count.
+// So many of the least and of the largest of these are taken for mismatches. REQUIRES: less than half of the count.
 #define EGOSGM_COARSE_OUTLIERS 2
 // A block is of a thin thing where it holds predictions by so much nearer than the blocks EGOSGM_THIN_BLOCKS to the
 // left and to the right do [px]. So many blocks above and below it, that thing may go on; every second one is asked.
@@ -19,27 +19,27 @@
 #define EGOSGM_THIN_BLOCKS 2
 #define EGOSGM_THIN_REACH 8
 
-// What is doubtful is known to 4 px, so that the next frame searches wide: the matching variance where the path sums
-// fall on beyond the end of a band, and the least variance where measurement and prediction contradict each other.
+// A doubtful disparity is known to 4 px, so that the next frame searches wide: the matching variance where the path
+// sums fall on beyond the end of a band, and the least variance where measurement and prediction contradict each other.
 #define EGOSGM_DOUBTFUL_VARIANCE_PX2 16.0f
 
 // Evidence (fuse/evidence.cl) is counted in whole numbers, so many a bit of Hamming distance.
 #define EGOSGM_EVIDENCE_UNITS 16
-// How far from the match the controls lie [px]: two on each side; at a quarter of the resolution, four.
+// Distances of the controls from the match [px]: two on each side; at a quarter of the resolution, four.
 #define EGOSGM_NEAR_CONTROL 8
 #define EGOSGM_FAR_CONTROL 14
 #define EGOSGM_COARSE_CONTROLS \
   { -19, -14, -10, -7, 7, 10, 14, 19 }
 // Codes may be read so far beside a match.
 #define EGOSGM_CONTROLS_REACH 19
-// Of a block, every second row is asked, as the codes of neighbouring rows are alike.
+// Every second row of a block is asked, as the codes of neighbouring rows are alike.
 #define EGOSGM_EVIDENCE_ROW_STEP 2
 // The window, in blocks to all sides; half of a window counts with more than so many pixels in it, a quarter.
 #define EGOSGM_EVIDENCE_RADIUS 2
 #define EGOSGM_EVIDENCE_LEAST_COUNT 30
 // Rows of what is known of blocks begin at multiples of what a work-item reads of them.
 #define EGOSGM_EVIDENCE_STRIDE(width) (((width) + 15) / 16 * (16 / EGOSGM_COARSE))
-// What lies on the surface of a block: blocks whose grey values at a quarter of the resolution differ from its own by
+// The surface of a block: blocks whose grey values at a quarter of the resolution differ from its own by
 // no more than so many times the fourth least difference to those around it, and half a grey level of 8 bits. A code
 // counts by those of its 62 bits that are of such blocks, where at least so many are.
 #define EGOSGM_ALIKE_TIMES 16
@@ -49,14 +49,14 @@
 // its images say, less what noise must not reach. What was chosen in this frame alone, and not by the coarse match too,
 // has that much less, as the best of many is better than chance. Below 0, the pixel dies; it is confirmed from
 // CONFIRMED on, and given out by itself from TRUSTED on, with which a full-range match that both views confirm begins.
-// Where a match lies outside of the other image, nothing can be asked, and so many 64ths are kept.
+// A match outside of the other image cannot be asked: so many 64ths of its evidence are kept.
 #define EGOSGM_EVIDENCE_MOST 160
 #define EGOSGM_EVIDENCE_KEPT 45
 #define EGOSGM_EVIDENCE_KEPT_UNSEEN 58
 #define EGOSGM_EVIDENCE_OF_NOISE 24
 #define EGOSGM_EVIDENCE_OF_CHOICE 48
 #define EGOSGM_EVIDENCE_CONFIRMED 32
-// What has less than TRUSTED is given out where COUNT of the pixels on a grid around are confirmed and differ by no
+// A pixel with less than TRUSTED is published where COUNT of the pixels on a grid around are confirmed and differ by no
 // more than SAME_SURFACE, and is named flat: the images hardly say that it is there. A measurement that no prediction
 // shares counts where LEAST of them are measured as much, but for LONE.
 #define EGOSGM_EVIDENCE_TRUSTED 96
@@ -125,7 +125,7 @@
 // byte.
 #define EGOSGM_MAX_COST 63
 
-// Where the right view is read off the left one's sums, a right pixel takes of the left pixels that it may be the one
+// If the right view comes from the left view's sums, a right pixel takes of the left pixels that it may be the one
 // with the least rank (match/sgm_cells.h). Sums are relative to a pixel's own paths and alone do not tell which of two
 // pixels fits better: so many quarters of a pixel's least sum, 510 at most, do not count, and the matching cost counts
 // so many times. What is added keeps ranks above 0.
@@ -150,11 +150,11 @@
 // they tell nothing of the others.
 #define EGOSGM_OFFSET_PRIOR 0.01f
 
-// What MatchingCost::kLearned7x7 compares beside a census of 5x5: dx, dy, dx, dy, threshold. A bit is set where the sum
-// of the 3x3 grey values around the first place is less than that around the second plus the threshold, in ninths of a
-// grey level of 8 bits. bench/learn_census.py learned the table.
-// It did so on videos that are all under CC0: path-traced ones, planes with noise, and the project's own streets, each
-// as it is and with other contrast, exposure, sharpness and noise.
+// The comparisons of MatchingCost::kLearned7x7 beside a census of 5x5: dx, dy, dx, dy, threshold. A bit is set where
+// the sum of the 3x3 grey values around the first place is less than that around the second plus the threshold, in
+// ninths of a grey level of 8 bits. bench/learn_census.py learned the table. It did so on videos that are all under
+// CC0: path-traced ones, planes with noise, and the project's own streets, each as it is and with other contrast,
+// exposure, sharpness and noise.
 // clang-format off
 #define EGOSGM_LEARNED7X7_BITS 40
 #define EGOSGM_LEARNED7X7 \

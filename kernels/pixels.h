@@ -32,7 +32,7 @@ typedef uint16 Uints;
 // The blocks of PIXELS pixels of a row that the work-item `at` takes: all of them where it has the row alone, else one.
 #define FOR_PIXELS(x, width) for (int x = at.x * PIXELS; x < (width); x += at.items * PIXELS)
 
-// What is long is done in several loops over a chunk of blocks each: a CPU has many turns of a short loop under way,
+// Long work is done in several loops over a chunk of blocks each: a CPU has many turns of a short loop under way,
 // but hardly two of a long one, whose instructions wait for each other.
 #if PIXELS == 1
 #define CHUNK 1
@@ -46,8 +46,8 @@ typedef uint16 Uints;
 
 #define INVALID ((Floats)(EGOSGM_INVALID_DISPARITY))
 
-// What conditions count as; and whether one holds in any pixel, for what most blocks need not do. any() asks lane by
-// lane on some compilers (PoCL 3.1).
+// A condition as a number; and whether one holds in any pixel, for work that most blocks need not do. any() asks lane
+// by lane on some compilers (PoCL 3.1).
 static inline Floats one_where(const Ints condition) { return condition ? (Floats)(1.0f) : (Floats)(0.0f); }
 static inline int any_of(const Ints condition) {
 #if PIXELS == 1
@@ -80,7 +80,7 @@ static inline Floats gather(volatile global const float* row, const Ints* places
 }
 
 #if PIXELS > 1
-// What a block does where its row begins or ends. Not inlined: inlined at every load and store, it would be most of
+// A block where its row begins or ends. Not inlined: inlined at every load and store, it would be most of
 // what is compiled. Without a branch a lane: a row has few blocks.
 #define AT_EDGE static __attribute__((noinline, cold))
 AT_EDGE Floats load_pixels_at_edge(global const float* row, const int x, const int width) {
@@ -181,7 +181,7 @@ typedef struct __attribute__((packed)) {
   int16 lanes;
 } PackedInts;
 
-// The same of words of four bytes each, the lowest first.
+// Stores words of four bytes each, the lowest first.
 static inline void store_words(const Ints words, global uchar* row, const int x, const int width) {
 #if PIXELS == 1
   ((global int*)row)[x] = words;

@@ -72,7 +72,7 @@ typedef struct {
 // VerticalAlignment's quadratic: 1, u, v, u v, u^2, v^2.
 #define EGOSGM_OFFSET_TERMS 6
 
-// What Reasons says of a pixel: include/egosgm/reason.h.
+// The reasons of a pixel: include/egosgm/reason.h.
 #define EGOSGM_REASON_TRUSTED 0
 #define EGOSGM_REASON_UNCONFIRMED 1
 #define EGOSGM_REASON_UNCOVERED 2
@@ -93,7 +93,7 @@ typedef struct {
   i32 min, count;
 } DisparityRange;
 
-// What a pixel searches. Lanes origin .. origin + chunks * EGOSGM_LANES - 1 are computed; first .. last (inclusive) can
+// The band of a pixel. Lanes origin .. origin + chunks * EGOSGM_LANES - 1 are computed; first .. last (inclusive) can
 // win.
 typedef struct {
   i16 origin;
@@ -110,7 +110,7 @@ static inline Band band_at(global const Band* bands, const size_t at) {
 }
 #endif
 
-// What a row of a view searches: cells, which are lanes of its bands, also those that cannot win; predicted pixels.
+// The search of a row of a view: cells, which are lanes of its bands, also those that cannot win; predicted pixels.
 typedef struct {
   u32 cells, predicted;
 } RowSum;
@@ -126,7 +126,7 @@ typedef struct {
   i32 sum, count;
 } EvidenceSum;
 
-// What a sweep of BandedSgm needs to know.
+// Parameters of a sweep of BandedSgm.
 typedef struct {
   i32 width, height;
   i32 min_disparity, disparities;
@@ -138,7 +138,7 @@ typedef struct {
   i32 first_view;        // of those that are matched, which lie one behind the other in what only a match needs
 } SgmParameters;
 
-// How a view's disparity space moves (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
+// The motion of a view's disparity space (eqs. 1-4): rows 1, 2 and 4 of H = Gamma T Gamma^-1; row 3 is (0, 0, 1, 0).
 // noise_*: variance of d' by the motion's covariance, over d'^2, as a form in (d', x' - cx, y' - cy).
 typedef struct {
   f32 x[4], y[4], w[4];

@@ -7,13 +7,13 @@
 
 namespace egosgm {
 
-/// Where the rows of the right image lie: a quadratic's terms [px], the first one that of the image's middle, and the
-/// number of estimates that they rest on (see kernels/align/vertical_alignment.cl).
+/// The vertical offset of the right image's rows: a quadratic's terms [px], the first one that of the image's middle,
+/// and the number of estimates that they rest on (see kernels/align/vertical_alignment.cl).
 struct VerticalOffset {
   ocl::Buffer<float> terms;
   bool is_known = false;
 
-  /// Of nothing: 0, which rests on no estimate.
+  /// Starts at 0, which rests on no estimate.
   explicit VerticalOffset(ocl::Context& context);
 };
 
@@ -22,7 +22,7 @@ struct VerticalOffset {
 /// 1981 a frame) and the right image resampled, so that rows correspond.
 class VerticalAlignment {
  public:
-  /// Of each row that is looked at: see the kernel.
+  /// Sums of each sampled row: see the kernel.
   struct Sums {
     ocl::Buffer<cl_long> of_rows;
 

@@ -19,7 +19,7 @@ struct Belief {
   std::shared_ptr<std::vector<cl_uchar>> images;  // that it is of, both views; empty where the host does not know them
   std::optional<Unpredicted> why_not = Unpredicted::kFirstFrame;  // there are no maps
 
-  /// Of nothing.
+  /// Starts empty.
   Belief(ocl::Context& context, shared::ImageSize size)
       : maps(context, size),
         evidence(context, 2 * pixel_count(size)),

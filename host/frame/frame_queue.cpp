@@ -10,7 +10,7 @@
 namespace egosgm {
 namespace {
 
-/// Of the images that show the driver all kernels: those are as high as others, for every launch.
+/// The images that show the driver all kernels are this wide, and as high as others, for every launch.
 constexpr int kRehearsedWidth = 16;
 
 /// Writes the pixels of both views without gaps. Allocates only for the first images of a type.
@@ -217,7 +217,7 @@ void FrameQueue::expect_none_failed() {
   });
 }
 
-/// Where `f` throws, a frame failed: it and those submitted after it, which rest on it, never were.
+/// If `f` throws, a frame failed: the queue forgets it and those submitted after it, which rest on it.
 template <typename F>
 void FrameQueue::or_go_back(F&& f) {
   try {

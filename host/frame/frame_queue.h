@@ -16,7 +16,7 @@ ocl::Context context_on(const Device::Handle& device);
 /// `options` as a pipeline on a device with this tuning runs them.
 MethodOptions method_of(const PipelineOptions& options, const Tuning& tuning);
 
-/// What is wanted of a frame with these outputs.
+/// The results that these outputs need.
 Wanted wanted_of(const FrameOutputs& outputs);
 
 /// Frames on their way: up to two at once, each on the belief that the one before leaves. One that fails takes those
@@ -33,7 +33,7 @@ class FrameQueue {
   /// their kernels: some drivers do that when a kernel first runs. REQUIRES: no frame is under way.
   void prepare(PixelType type, const Wanted& wanted);
 
-  /// As Pipeline. REQUIRES: arguments that were validated, and a frame under way or room for one.
+  /// See Pipeline. REQUIRES: arguments that were validated, and a frame under way or room for one.
   void submit(const ImageView& left, const ImageView& right, const std::optional<Motion>& motion,
               const FrameOutputs& outputs);
   FrameReport collect();
@@ -41,7 +41,7 @@ class FrameQueue {
   void reset();
   void record_commands(bool wanted) { records_commands_ = wanted; }
 
-  /// As DevicePipeline. REQUIRES: no frame is under way.
+  /// See DevicePipeline. REQUIRES: no frame is under way.
   DeviceMaps enqueue(const FrameImages& images, const std::optional<Motion>& motion, cl_event* done,
                      bool wants_dynamic);
 

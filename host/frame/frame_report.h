@@ -11,14 +11,14 @@
 
 namespace egosgm {
 
-/// What was matched of a frame, apart from which bands.
+/// The matched parts of a frame, without its bands.
 struct MatchedParts {
   int passes;                          // each over all bands
   const std::vector<Stripe>* stripes;  // in which
   std::uint64_t coarse_cells;          // and in each pass, these of CoarseMatch
 };
 
-/// What a frame's bands say of it.
+/// The search of a frame, counted from its bands.
 struct MatchedFrame {
   shared::ImageSize size;
   shared::DisparityRange range;
@@ -27,12 +27,12 @@ struct MatchedFrame {
   bool has_prediction;
 };
 
-/// What the report tells of what was predicted and matched.
+/// Reports a frame's prediction and search.
 void report_matching(const MatchedFrame& frame, FrameReport& report);
 
-/// What the report tells of a frame's commands: launches and stages.
+/// Reports a frame's launches, and the times of its stages.
 void report_stages(const std::vector<ocl::Context::Finished>& finished, FrameReport& report);
-/// The same: each of them. REQUIRES: they have ended.
+/// Reports each command. REQUIRES: they have ended.
 void report_commands(ocl::Context& context, const std::vector<ocl::Command>& commands, FrameReport& report);
 
 }  // namespace egosgm

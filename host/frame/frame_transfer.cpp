@@ -25,7 +25,7 @@ void copy_rows(const T* fetched, const MapView<T>& map) {
   copy_rows(fetched, map, [](T value) { return value; });
 }
 
-/// Where there is no disparity, a variance means nothing.
+/// A variance without a disparity means nothing.
 void copy_variances(const float* variances, const float* disparities, const MapView<float>& map) {
   for (int y = 0; map.data && y < map.height; ++y) {
     float* row = reinterpret_cast<float*>(reinterpret_cast<char*>(map.data) + y * map.stride_bytes);

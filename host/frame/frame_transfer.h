@@ -14,7 +14,7 @@
 
 namespace egosgm {
 
-/// What a frame leaves on the device.
+/// The results of a frame on the device.
 struct FrameOnDevice {
   const StereoMaps& result;     // that is given out; no later frame writes it before this one is collected
   const StereoMaps* predicted;  // null where there is no prediction. From here on, the next frame writes them:

@@ -9,10 +9,10 @@
 
 namespace egosgm {
 
-/// Where a frame is searched.
+/// The disparities that a frame searches.
 enum class Search { kBands, kEverything };
 
-/// What is wanted of a frame that no later one rests on.
+/// Results that a caller asks for and no later frame needs.
 struct Wanted {
   std::optional<Views> variance = {};  // the one that is given out
   bool dynamic = false;

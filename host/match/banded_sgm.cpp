@@ -59,19 +59,20 @@ bool has_few_units(const ocl::Context& context, int views) {
 /// Sums of a view that are worth to be kept once in place of twice, for two launches more.
 constexpr std::size_t kSparedBytes = std::size_t{16} << 20;
 
-/// How many views wavefronts match at once. `bytes`: the sums of one.
+/// The number of views that wavefronts match at once. `bytes`: the sums of one view.
 int views_at_once(const ocl::Context& context, BandedSgm::Launches launches, std::size_t bytes) {
   const bool spares = launches == BandedSgm::Launches::kAutomatic ? has_few_units(context, 1) && bytes >= kSparedBytes
                                                                   : launches == BandedSgm::Launches::kSweepsOfAView;
   return spares ? 1 : kViews;
 }
 
-/// What a match takes on the device.
+/// The device memory of a match.
 struct Demand {
   std::uint64_t largest_buffer, total;
 };
 
-/// Of both views at once, whatever the device has of compute units: stripes, and with them bits, do not depend on that.
+/// The demand of both views at once, for any number of compute units: stripes, and with them bits, do not depend on
+/// that.
 Demand demand(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
               const BandedSgmOptions& options, int chunks) {
   const bool follows = BandedSgm::follows_paths(context, options.scheduling);
@@ -87,8 +88,8 @@ std::size_t code_words_a_row(int width, shared::DisparityRange range, MatchingCo
   return Census::words(cost, {width, 1}, BandedSgm::code_padding(range), tile.code_words) / 2;
 }
 
-/// How many rows can be matched at once. A quarter of the memory is left to all else; what stages share can be had
-/// again.
+/// The number of rows that can be matched at once. A quarter of the memory is left to all else; what stages share can
+/// be had again.
 int rows_at_once(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                  const BandedSgmOptions& options, BandedSgm::Tile tile) {
   const int chunks = chunks_of(range, tile);

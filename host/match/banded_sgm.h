@@ -23,19 +23,19 @@ namespace egosgm {
 /// kStripeOverlap rows above and below a stripe instead of at the image's edge.
 class BandedSgm {
  public:
-  /// Of a wavefront; at most as high as wide. `block_lanes`: disparities that are matched at once, 16 or 32 (see
-  /// kernels/match/block.h); 0: what suits the compiler.
+  /// The size of a wavefront's tile; at most as high as wide. `block_lanes`: disparities that are matched at once, 16
+  /// or 32 (see kernels/match/block.h); 0: what suits the compiler.
   struct Tile {
     int width = cpu_tuning().tile_width, height = cpu_tuning().tile_height;
     int block_lanes = 0;
-    /// Where another match has the same program: what that one needs, so that it need not be built twice. A code of one
+    /// Needs of another match with the same program, so that it need not be built twice. A code of one
     /// word stands twice in two.
     int max_chunks = 0, code_words = 0;
   };
 
-  /// Of the wavefronts, two sweeps a view, to the middle of the image and from there: one for every wave of tiles, or
-  /// one for each half of the way, whose work-items take a sweep each and wait for nobody; or the latter of one view
-  /// after the other, in the memory of one. Automatic: the last that leaves no compute unit without a sweep.
+  /// Launches of the wavefronts, two sweeps a view, to the middle of the image and from there: one for every wave of
+  /// tiles, or one for each half of the way, whose work-items take a sweep each and wait for nobody; or the latter of
+  /// one view after the other, in the memory of one. Automatic: the last that leaves no compute unit without a sweep.
   enum class Launches { kAutomatic, kWaves, kSweeps, kSweepsOfAView };
 
   /// `group`: how paths share work-groups, where they do; by default what suits the device. `tile`, `launches`: where
@@ -50,7 +50,7 @@ class BandedSgm {
   static constexpr int kStripeOverlap = 32;
   /// In which the image is matched; one: as a whole.
   const std::vector<Stripe>& stripes() const { return stripes_; }
-  /// Of all stripes: those where they overlap are matched more than once.
+  /// The rows of all stripes: rows where stripes overlap are matched more than once.
   int matched_rows() const;
 
   /// Matches `views`. Of the inputs' codes, which Census makes with a padding of `code_padding(range)`, both views' are

@@ -9,10 +9,10 @@
 
 namespace egosgm {
 
-/// What the programs of both ways of BandedSgm are told.
+/// Defines of the programs of both forms of BandedSgm.
 ocl::Defines sgm_defines(int max_chunks, int code_words, const BandedSgmOptions& options);
 
-/// How BandedSgm runs on GPUs: a few work-items follow each path across the image (see
+/// The form of BandedSgm for GPUs: a few work-items follow each path across the image (see
 /// kernels/match/banded_sgm_paths.cl).
 class BandedSgmPaths {
  public:
@@ -24,15 +24,15 @@ class BandedSgmPaths {
   BandedSgmPaths(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
                  const BandedSgmOptions& options, Group group);
 
-  /// As BandedSgm.
+  /// See BandedSgm.
   void match(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
              ocl::Buffer<cl_uint>& ranks, Views views);
 
   /// On GPUs two quads of disparities a lane (one, where codes of 64 bits take the registers), and a group that fills
   /// the smallest unit, as far as the device allows it; elsewhere work-items of their own, which wait for nobody.
   static Group default_group(const ocl::Context& context, shared::DisparityRange range, MatchingCost cost);
-  /// Of one of the four buffers of partial sums: a byte a cell, and what the last vector of a pixel holds beyond its
-  /// band.
+  /// The size of one of the four buffers of partial sums: a byte a cell, and the lanes of a pixel's last vector beyond
+  /// its band.
   static std::size_t sum_bytes(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
 
  private:

@@ -10,8 +10,8 @@
 
 namespace egosgm {
 
-/// What matching compares: a code a pixel of both views, in padded rows, the right view's from right to left (see
-/// kernels/match/census.cl).
+/// Computes a code a pixel of both views, which matching compares, in padded rows, the right view's from right to left
+/// (see kernels/match/census.cl).
 class Census {
  public:
   /// Codes may be read up to `padding` pixels outside the image. `pixels`: of a work-item, 1 or 16; 0: what suits the

@@ -6,7 +6,7 @@
 
 namespace egosgm {
 
-/// What becomes of a disparity that points to a place outside of the other image, where nothing can contradict it.
+/// Decides on a disparity that points outside of the other image, where nothing can contradict it.
 enum class OutsideView { kDrop, kKeep };
 inline OutsideView outside_view(const ConsistencyCheckOptions& options) {
   return options.keep_unseen ? OutsideView::kKeep : OutsideView::kDrop;

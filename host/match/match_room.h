@@ -9,7 +9,7 @@
 
 namespace egosgm {
 
-/// What matching leaves, beside what it measured.
+/// Results of matching beside the measurement.
 struct Matching {
   // Disparities before any was dropped, until the room ends; the latter where the median filter is on.
   Map matched, smoothed;

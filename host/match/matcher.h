@@ -22,10 +22,10 @@ class Matcher {
   /// Builds what images of `type` need.
   void prepare(PixelType type);
 
-  /// As BandedSgm.
+  /// See BandedSgm.
   void prepare_reading_off() { banded_sgm_.prepare_reading_off(); }
 
-  /// As BandedSgm. REQUIRES: the images' type was prepared.
+  /// See BandedSgm. REQUIRES: the images' type was prepared.
   void match(const FrameImages& images, const SearchBands& bands, Measurement& matched, Views views);
   void reading_off(const FrameImages& images, const SearchBands& bands, Measurement& matched);
 

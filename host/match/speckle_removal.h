@@ -25,7 +25,7 @@ class SpeckleRemoval {
   /// In place. With `max_size_px` 0 nothing is launched. `views`: 1 looks at the left view only.
   void remove(Map& disparity, Views views);
 
-  /// Of the last maps, before anything was dropped: where each pixel's run of connected ones begins, 65535 without one.
+  /// Runs of the last maps, before anything was dropped: the column where each pixel's run begins, 65535 without one.
   const Runs& runs() const { return runs_; }
 
  private:

@@ -23,7 +23,7 @@ std::vector<Stripe> cut_into_stripes(int height, int rows, int overlap) {
   const int inner = rows - 2 * overlap, count = (height + inner - 1) / inner;
   std::vector<Stripe> stripes;
   for (int i = 0; i < count; ++i) {
-    // Of about equal height, rather than a thin one at the end.
+    // The stripes have about equal height, rather than a thin one at the end.
     const int begin = static_cast<int>(static_cast<std::int64_t>(height) * i / count);
     const int end = static_cast<int>(static_cast<std::int64_t>(height) * (i + 1) / count);
     stripes.push_back({std::clamp(begin - overlap, 0, height - rows), rows, begin, end});

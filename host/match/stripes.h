@@ -8,7 +8,7 @@
 
 namespace egosgm {
 
-/// What a match reads: codes and penalties (see BandedSgm), and what SearchBand gives.
+/// Inputs of a match: codes and penalties (see BandedSgm), and the bands of SearchBand.
 struct MatchInputs {
   const ocl::Buffer<cl_uint>& codes;
   const ocl::Buffer<cl_uchar>& penalties;
@@ -20,7 +20,8 @@ struct Stripe {
   int first_row, rows, kept_begin, kept_end;
 };
 
-/// How few rows stripes may match, at most `most_rows`, without being more: what is more is matched twice.
+/// The least number of rows a stripe, at most `most_rows`, that needs no further stripe: more rows would be matched
+/// twice.
 int fewest_rows(int height, int most_rows, int overlap);
 
 /// Stripes of `rows` matched rows each. Of every stripe, `overlap` rows at either end are not kept, except at the
@@ -42,7 +43,7 @@ class StripeMemory {
   MatchInputs inputs() const { return {codes_, penalties_, bands_}; }
   Measurement& measured() { return measured_; }
 
-  /// What this takes on the device.
+  /// The device memory that this takes.
   static std::uint64_t bytes(int width, int rows, std::size_t words_a_row);
 
  private:

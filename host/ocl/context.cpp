@@ -74,7 +74,7 @@ cl::CommandQueue make_queue(const cl::Context& context, const cl::Device& device
   return {context, device, CL_QUEUE_PROFILING_ENABLE};
 }
 
-/// Where the compiler named no error of the source.
+/// The reason of a failed build whose compiler named no error of the source.
 std::string reason_beside(const std::string& log, const cl::Device& device) {
   if (log.find("error:") != std::string::npos) return {};
   const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
@@ -228,7 +228,7 @@ cl::Buffer Context::allocate(std::uint64_t bytes) {
                           " MiB, the device allows " + std::to_string(max_allocation_bytes_ >> 20) +
                           " MiB: choose fewer disparities, a smaller image or another device");
   }
-  // Where host and device share memory, most drivers map only what they allocated as host memory without a copy.
+  // If host and device share memory, most drivers map without a copy only memory that they allocated as host memory.
   const cl_mem_flags place = shares_host_memory_ ? CL_MEM_ALLOC_HOST_PTR : 0;
   cl::Buffer buffer(context_, CL_MEM_READ_WRITE | place, bytes);
   allocated_bytes_ += bytes;
@@ -250,7 +250,7 @@ std::uint64_t Context::bytes_of_stages() const {
   return bytes;
 }
 
-/// What is built together.
+/// Programs that are built together.
 struct Context::Group {
   Defines defines;
   std::vector<Program*> members;

@@ -51,14 +51,14 @@ class Context {
   /// Builds what was asked for since the last call: what joins, and whose defines agree, together. Programs that come
   /// from a folder are those of a file each. Throws BuildError, or InvalidArgument as ProgramFolder does.
   void build();
-  /// How often a compiler was called, or given the binary of a folder of programs.
+  /// The number of builds by the compiler, or from binaries of a folder of programs.
   int builds() const { return builds_; }
   /// All files that were asked for, as a compiler gets each of them alone.
   std::vector<ProgramSource> sources() const;
   /// Builds one of them.
   cl::Program built(const ProgramSource& source);
 
-  /// What is built, allocated and enqueued from now on belongs to `stage`: errors and timings name it. A string
+  /// Programs, memory and commands belong to `stage` from now on: errors and timings name it. `stage` is a string
   /// literal.
   void enter(const char* stage) { stage_ = whole_ ? whole_ : stage; }
   /// While it lives, the stages entered are parts of `stage`, and go by its name.
@@ -96,7 +96,7 @@ class Context {
   /// failed: PoCL 3.1 never ends a command whose dependency failed before it was enqueued.
   void let_wait(Queue which, const cl::Event& event);
 
-  /// Of those recorded, the last one for `kKernels`. REQUIRES: there is one.
+  /// The last recorded command of `kKernels`. REQUIRES: there is one.
   const cl::Event& last_kernel() const;
 
   /// Remembers a command, for `wait` to ask whether it succeeded.
@@ -120,16 +120,16 @@ class Context {
   struct Times {
     std::int64_t queued, submitted, started, ended;
   };
-  /// What a driver answered, with what it left out: Intel's says that a barrier was queued at 0.
+  /// Completes the times of a driver: Intel's says that a barrier was queued at 0.
   static Times completed(Times answered);
   /// Waits for `commands` and throws if one failed. Nothing less tells: clFinish returns success after a failed kernel,
   /// and a later command of the same queue runs as if nothing were. Returns the device time of each.
   std::vector<Finished> wait(const std::vector<Command>& commands);
-  /// The same for the recorded ones.
+  /// Waits for the recorded commands.
   std::vector<Finished> wait() { return wait(take_commands()); }
 
-  /// Of commands that have ended, on the host's steady clock. A command is recorded right after it was queued, so that
-  /// the least distance between the two is how far the device's clock is off.
+  /// Times of commands that have ended, on the host's steady clock. A command is recorded right after it was queued, so
+  /// that the least distance between the two is how far the device's clock is off.
   std::vector<Times> times_of(const std::vector<Command>& commands);
 
   /// Throws if one of `commands` has failed by now. Does not wait.
@@ -143,12 +143,12 @@ class Context {
 
   /// Throws DeviceError, naming the stage and the limit, for a buffer that this device cannot hold.
   cl::Buffer allocate(std::uint64_t bytes);
-  /// What the place has of at least so many bytes, or what is allocated for it now.
+  /// The shared buffer of a place, allocated anew where it has fewer bytes.
   cl::Buffer scratch(Scratch place, std::uint64_t bytes);
   /// For tests: all of it.
   const std::multimap<Scratch, cl::Buffer>& scratch() const { return scratch_; }
   std::uint64_t allocated_bytes() const { return allocated_bytes_; }
-  /// What stages share; also what was allocated before a context was Apart.
+  /// Bytes that stages share, also those that were allocated before a context was Apart.
   std::uint64_t bytes_of_stages() const;
   /// The largest buffer that the device allows.
   std::uint64_t max_allocation_bytes() const { return max_allocation_bytes_; }
@@ -169,7 +169,7 @@ class Context {
   struct Group;
   void build_together(const Group& group);
   void build_alone(Program& program);
-  /// What the cache of programs has, or what the compiler makes; and the compiler's status.
+  /// The program of the cache, or of the compiler, with the compiler's status.
   std::pair<cl::Program, cl_int> compiled(const ProgramSource& source);
   std::pair<cl::Program, cl_int> build(const cl::Program& program, const std::string& options);
   ProgramSource source_of(const Program& program) const;

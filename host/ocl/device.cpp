@@ -181,7 +181,7 @@ Found find_devices() {
   return found;
 }
 
-/// What is known of platforms that have no device; empty where there are none of that kind.
+/// Describes platforms that have no device; empty without such.
 std::string of_platforms_without(const std::vector<std::string>& platforms) {
   std::string text;
   for (const std::string& platform : platforms) {
@@ -223,7 +223,7 @@ const Device* find(const std::vector<Device>& devices, const std::string& name, 
                         another->info().name + ": give its number or more of its name: " + numbered(devices));
 }
 
-/// The same, or compute units of what is found so.
+/// Finds a whole device, or compute units of one.
 std::optional<Device> find_whole_or_units(const std::vector<Device>& devices, const std::string& name,
                                           const std::string& origin) {
   if (name.empty()) return std::nullopt;

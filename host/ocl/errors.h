@@ -12,7 +12,7 @@ namespace egosgm::ocl {
 /// "CL_OUT_OF_RESOURCES", or the number of a status that has no name here.
 std::string status_name(int status);
 
-/// What to do where `platform` may have failed for its cache on the disk; empty where it has none.
+/// The remedy where `platform` may have failed for its cache on the disk; empty where it has none.
 std::string cache_remedy(const std::string& platform);
 
 /// Throws the DeviceError for an OpenCL call that failed in `stage`.
@@ -28,7 +28,7 @@ auto translated(const Context& context, F&& f) {
   }
 }
 
-/// The same before there is a context, in a process that may use OpenCL.
+/// Translates errors before there is a context, in a process that may use OpenCL.
 template <typename F>
 auto translated(const std::string& stage, F&& f) {
   expect_own_process(stage);

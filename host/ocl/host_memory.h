@@ -14,7 +14,7 @@ namespace egosgm::ocl {
 class Mapping {
  public:
   Mapping() = default;
-  /// Where nothing is to be waited for, pass `done`.
+  /// Pass `done` if there is nothing to wait for.
   Mapping(const cl::CommandQueue& queue, const cl::Buffer& buffer, cl_map_flags access, std::size_t first_byte,
           std::size_t bytes, cl::Event* done = nullptr)
       : queue_(queue),
@@ -62,7 +62,7 @@ class PinnedMemory {
   Mapping mapping_;
 };
 
-/// What the host writes into the first bytes of a device buffer, on the upload queue: the buffer itself where device
+/// Writes into the first bytes of a device buffer, on the upload queue: the buffer itself where device
 /// and host share memory, else page-locked memory that is copied.
 class Upload {
  public:
@@ -97,7 +97,7 @@ class Upload {
   cl::Event done_;
 };
 
-/// What the host reads of a device buffer, on the download queue: the buffer itself, mapped, where device and host
+/// Reads a device buffer, on the download queue: the buffer itself, mapped, where device and host
 /// share memory, else a copy in page-locked memory.
 template <typename T>
 class Readback {
@@ -120,7 +120,7 @@ class Readback {
     context_.record(done, pinned_ ? "read" : "map", Queue::kDownload);
   }
 
-  /// What was fetched, once its command has ended.
+  /// The fetched values, once their command has ended.
   const T* data() const { return static_cast<const T*>(pinned_ ? pinned_->data() : mapping_.data()); }
 
   /// Enqueues what lets later kernels write the buffer again, where that takes anything.

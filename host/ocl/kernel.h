@@ -43,7 +43,8 @@ inline Range group_a_row(shared::ImageSize size, int work_items, int views = 2) 
   return {cl::NDRange(work_items, size.height, views), cl::NDRange(work_items, 1, 1)};
 }
 
-/// How many work-items share a row whose values build on one another: many where a work-item is slow, else one.
+/// The number of work-items that share a row whose values build on one another: many where a work-item is slow, else
+/// one.
 inline int row_group(const Context& context) {
   const bool is_gpu = context.device().getInfo<CL_DEVICE_TYPE>() == CL_DEVICE_TYPE_GPU;
   return is_gpu ? static_cast<int>(std::min<std::size_t>(128, context.max_work_group_size())) : 1;
@@ -69,7 +70,7 @@ void expect_work_group(const Context& context, const char* kernel, const cl::NDR
 /// bounds can do with. The global size, a multiple of the former, is one of it too.
 cl::NDRange halved_to(const cl::NDRange& local, std::size_t limit);
 
-/// What a program has under a name.
+/// A kernel of a program, by its name.
 struct MadeKernel {
   cl::Kernel kernel;
   std::size_t max_work_group_size = 0;

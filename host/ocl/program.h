@@ -34,7 +34,7 @@ class Program {
   void when_built(std::function<void(const cl::Program&)> f) {
     is_built() ? f(built_) : waiting_.push_back(std::move(f));
   }
-  /// Where one of those that wait throws, it is not built.
+  /// The program counts as not built if one of those that wait throws.
   void set_built(const cl::Program& built) {
     for (const auto& f : waiting_) f(built);
     waiting_.clear();

@@ -113,7 +113,7 @@ bool is_ours(const std::string& name) {
          std::string_view(name).substr(kDigits).starts_with(kEnd);
 }
 
-/// What stands before a binary: who it is and how to tell that it is whole.
+/// The header of a binary: its key, and how to tell that it is whole.
 std::string header(std::string_view key, std::string_view binary) {
   return std::string(kMagic) + std::string(key) + hex(sha256(binary));
 }

@@ -21,14 +21,14 @@ class ProgramCache {
   /// either, a driver that keeps no programs itself gets $XDG_CACHE_HOME/egosgm or ~/.cache/egosgm.
   static std::optional<ProgramCache> of(const cl::Device& device, const std::string& wanted = {});
 
-  /// Of its files, those that were used least lately go where all have more than `max_bytes`.
+  /// The cache drops the files that were used least lately where all have more than `max_bytes`.
   ProgramCache(std::filesystem::path folder, const cl::Device& device, std::uintmax_t max_bytes = kMaxBytes);
 
   /// The program of `source`, built. Null: the folder has none that this driver takes.
   cl::Program built(const cl::Context& context, const cl::Device& device, const ProgramSource& source) const;
   /// Keeps what `source` was built to.
   void keep(const ProgramSource& source, const cl::Program& program) const;
-  /// Where it does.
+  /// The file that keeps the program of `source`.
   std::filesystem::path file_of(const ProgramSource& source) const;
 
  private:

@@ -33,7 +33,7 @@ std::string hash_of(std::string_view bytes) {
   return text;
 }
 
-/// What binaries depend on.
+/// The properties of a device that binaries depend on.
 std::vector<std::pair<std::string, std::string>> identity(const cl::Device& device) {
   const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
   return {{"device", trimmed(device.getInfo<CL_DEVICE_NAME>())},

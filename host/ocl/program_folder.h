@@ -12,13 +12,13 @@
 
 namespace egosgm::ocl {
 
-/// What a program is made of: its kernel file, the text that the compiler saw, and the options that it was given.
+/// The source of a program: its kernel file, the text that the compiler saw, and its options.
 struct ProgramSource {
   std::string kernel_file, text, options;
   std::string device_options;  // those of `options` that are no defines
 };
 
-/// The same without what only some devices of a type get.
+/// The source without the parts that only some devices of a type get.
 ProgramText portable(const ProgramSource& source);
 
 /// Programs compiled ahead for one device, or to SPIR-V for all that take it. Constant, so thread-safe.
@@ -33,7 +33,7 @@ class ProgramFolder {
   std::vector<unsigned char> binary(const ProgramSource& source) const;
   /// The program of `source`, to be built. Throws as `binary`.
   cl::Program program(const cl::Context& context, const cl::Device& device, const ProgramSource& source) const;
-  /// What to build it with.
+  /// The options to build it with.
   std::string options(const ProgramSource& source) const { return is_spirv_ ? source.device_options : source.options; }
 
  private:

@@ -64,8 +64,8 @@ void expect_signature(const cl::Kernel& kernel, const std::vector<std::string>& 
     throw std::logic_error("kernel " + name + " has " + std::to_string(compiled.size()) + " parameters, declared are " +
                            std::to_string(declared.size()));
   }
-  // Of SPIR-V drivers tell types without `const` and sign, and by what is read through a pointer. That it belongs to
-  // its source says the manifest.
+  // Drivers tell a SPIR-V kernel's types without `const` and sign, and by what is read through a pointer. That it
+  // belongs to its source says the manifest.
   if (!has_source(kernel)) return;
   for (std::size_t i = 0; i < compiled.size(); ++i) {
     if (compiled[i] == declared[i] || !is_known(compiled[i])) continue;

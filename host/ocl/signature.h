@@ -18,7 +18,7 @@ std::string struct_name(const std::type_info& type);
 /// OpenCL's name of an integer.
 std::string integer_name(std::size_t bytes, bool is_unsigned);
 
-/// How a kernel's source writes the parameter that `T` stands for: "uint", "const float*", "ImageSize".
+/// A kernel source's type of the parameter that `T` stands for: "uint", "const float*", "ImageSize".
 template <typename T>
 struct KernelParameter {
   static std::string text() {
@@ -38,7 +38,7 @@ struct KernelParameter<const Buffer<T>> {
   static std::string text() { return "const " + KernelParameter<T>::text() + "*"; }
 };
 
-/// What the kernel's compiler saw, written the same way; empty where the driver does not tell.
+/// The types that the kernel's compiler saw, written the same way; empty where the driver does not tell.
 std::vector<std::string> compiled_signature(const cl::Kernel& kernel);
 
 /// Throws std::logic_error, naming the kernel and the parameter, if its source was not written for the C++ types. An

@@ -7,7 +7,7 @@
 
 namespace egosgm::ocl {
 
-/// What every stage has: a name, which errors and timings tell, the program of a kernel file, and launches for images
+/// A stage has a name, which errors and timings tell, the program of a kernel file, and launches for images
 /// of a size.
 class Stage {
  public:
@@ -17,7 +17,8 @@ class Stage {
       : context_(context), name_(name), size_(size), pixels_(pixels > 0 ? pixels : pixels_a_work_item(context)) {
     program_ = &enter().program(file, defines.set("PIXELS", pixels_), joins);
   }
-  /// The same where `row_group` work-items share a row whose values build on one another (ROW_GROUP); 0: by the device.
+  /// A stage of which `row_group` work-items share a row whose values build on one another (ROW_GROUP); 0: by the
+  /// device.
   static Stage of_row_groups(Context& context, const char* name, const char* file, shared::ImageSize size,
                              int row_group, Defines defines = {}) {
     if (row_group == 0) row_group = ocl::row_group(context);
@@ -32,7 +33,7 @@ class Stage {
   int pixels() const { return pixels_; }
   int row_group() const { return row_group_; }
 
-  /// What is allocated and enqueued from now on is its.
+  /// Memory and commands belong to this stage from now on.
   Context& enter() {
     context_.enter(name_);
     return context_;

@@ -6,7 +6,7 @@
 
 namespace egosgm::ocl {
 
-/// What a driver says of itself, without the terminating zero that CLHPP leaves in some drivers' strings, and without
+/// Trims a driver's text: without the terminating zero that CLHPP leaves in some drivers' strings, and without
 /// blanks at its end.
 inline std::string trimmed(std::string text) {
   text = text.substr(0, text.find('\0'));

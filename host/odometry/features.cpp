@@ -69,7 +69,8 @@ constexpr int kTwoRows = 2 * kSuppressionRadius + 2;  // around two rows below e
 static_assert(kTwoRows <= kRingRows && kCell % 2 == 0);
 using RingRows = std::array<const std::int16_t*, kTwoRows>;
 
-// Of the two rows in the middle of `high` and `low`. Bit 0: a maximum of at least `above`, bit 1: a minimum of at most
+// Extrema of the two rows in the middle of `high` and `low`. Bit 0: a maximum of at least `above`, bit 1: a minimum of
+// at most
 // -`below`.
 EGOSGM_CPU_CLONES
 void flag_extrema(const std::int16_t* upper, const std::int16_t* lower, const RingRows& high, const RingRows& low,
@@ -195,7 +196,7 @@ void FeatureDetector::suppress_rows(int y, int width, int height) {
   }
 }
 
-// Where a cell has enough, only a stronger one is let in, in place of the weakest; ties go to the upper and left.
+// A full cell lets in only a stronger one, in place of the weakest; ties go to the upper and left.
 void FeatureDetector::keep_strongest(int filter, const std::int16_t* response, int y, int width,
                                      std::vector<std::uint8_t>& flags) {
   std::fill(flags.begin() + width - kMargin, flags.end(), std::uint8_t{0});

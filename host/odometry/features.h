@@ -74,7 +74,7 @@ class FeatureDetector {
   std::vector<std::int16_t> response_[2], row_max_[2], row_min_[2];  // rings of rows: blob, corner
   std::vector<std::uint8_t> flags_[2];                               // of two rows
   std::vector<Feature> found_[kFeatureClasses];  // those of strength 0 were replaced by stronger ones
-  // Of the present row of cells: strengths and complements of indices, in full cells the weakest first.
+  // The present row of cells: strengths and complements of indices, in full cells the weakest first.
   std::vector<std::vector<std::uint64_t>> cells_[kFeatureClasses];
   std::vector<std::int16_t> least_[kFeatureClasses];  // strength that a column still asks for
   std::size_t per_cell_ = 0;

@@ -43,7 +43,7 @@ inline Eigen::Vector3d project(const Calibration& c, const Eigen::Vector3d& p) {
   return {c.fx * p.x() * inverse + c.cx, c.fy * p.y() * inverse + c.cy, c.fx * c.baseline_m * inverse - c.doffs_px};
 }
 
-/// Of (u, v, d) by the point.
+/// The derivative of (u, v, d) by the point.
 inline Eigen::Matrix3d projection_jacobian(const Calibration& c, const Eigen::Vector3d& p) {
   const double i = 1 / p.z(), i2 = i * i;
   Eigen::Matrix3d j;
@@ -51,7 +51,7 @@ inline Eigen::Matrix3d projection_jacobian(const Calibration& c, const Eigen::Ve
   return j;
 }
 
-/// Of (u, v, d) by a left perturbation (translation, rotation) of the motion that took the point to `p`.
+/// The derivative of (u, v, d) by a left perturbation (translation, rotation) of the motion that took the point to `p`.
 inline MotionJacobian motion_jacobian(const Eigen::Matrix3d& projection, const Eigen::Vector3d& p) {
   Eigen::Matrix3d rotation;  // -[p]x
   rotation << 0, p.z(), -p.y(), -p.z(), 0, p.x(), p.y(), -p.x(), 0;

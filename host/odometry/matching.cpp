@@ -64,7 +64,7 @@ int match_to_left(TrackedFrame& frame, int right, int max_disparity_px) {
   return known;
 }
 
-// Where a static point goes, as a shift of its two images.
+// The shift of a static point's two images.
 struct Flow {
   double left_x, right_x, y;
 };
@@ -78,7 +78,7 @@ Flow predict_flow(const Calibration& c, const Eigen::Isometry3d& motion, double 
   return {u - x, u - x - (c.fx * c.baseline_m / p.z() - d), v - y};
 }
 
-// Of left feature `i` at its refined place.
+// The disparity of left feature `i` at its refined place.
 float refined_disparity(TrackedFrame& frame, int i) {
   float& disparity = frame.disparity[i];
   if (!std::isnan(disparity)) return disparity;

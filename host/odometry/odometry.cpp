@@ -190,7 +190,7 @@ void StereoOdometry::State::estimate(const std::optional<Eigen::Isometry3d>& pri
   result.times_ms.learning = stopwatch.lap();
 }
 
-// What agrees with the motion goes on as a track; all else starts anew at its pixel.
+// Matches that agree with the motion go on as tracks; all others start anew at their pixels.
 void StereoOdometry::State::keep_tracks(const std::vector<CircularMatch>& matches, const std::vector<int>& inliers) {
   std::vector<bool> tracked(current.left_features.size(), false);
   for (const int k : inliers) {

@@ -20,7 +20,7 @@ constexpr double kMemory = 0.998;  // of what was learnt, from frame to frame: c
 
 constexpr int kRowOffset = 1, kRoll = 3;  // among the terms
 
-// Of the right image's error against the left one's.
+// The basis of the right image's error against the left one's.
 Terms column_basis(const Calibration& c, double u, double v) {
   const double x = (u - c.cx) / c.fx, y = (v - c.cy) / c.fy;
   Terms basis;
@@ -35,7 +35,7 @@ Terms row_basis(const Calibration& c, double u, double v) {
   return basis;
 }
 
-// Of the left image's error.
+// The basis of the left image's error.
 Eigen::Matrix<double, 2, RectificationError::kTerms> left_basis(const Calibration& c, double u, double v) {
   const double x = (u - c.cx) / c.fx, y = (v - c.cy) / c.fy;
   Eigen::Matrix<double, 2, RectificationError::kTerms> basis;
@@ -69,7 +69,7 @@ void RectificationError::correct(const Calibration& calibration, std::vector<Poi
   }
 }
 
-// How far the rows of the two images are from each other tells how good the calibration is, and so what to expect of
+// The distance between the rows of the two images tells how good the calibration is, and so what to expect of
 // the terms that only the motion shows. A constant offset and roll tell nothing of lenses, and the rows alone show them
 // well: they stay out of it.
 Square RectificationError::prior_information(const Calibration& calibration) const {

@@ -8,7 +8,7 @@
 
 namespace egosgm::odometry {
 
-/// What is left of rotation, distortion and principal point between two rectified images, learnt on the way.
+/// The residual rotation, distortion and principal point between two rectified images, learnt on the way.
 ///
 /// A constant error of the disparity, or one that grows towards the sides of the image, gives far and near points
 /// different speeds; so the odometry's own residuals, and the rows of stereo matches, tell it. On KITTI, the error

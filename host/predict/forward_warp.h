@@ -12,7 +12,7 @@
 
 namespace egosgm {
 
-/// How the disparity space of `view` (EGOSGM_LEFT or EGOSGM_RIGHT) moves with the left camera: H = Gamma T Gamma^-1
+/// The motion of the disparity space of `view` (EGOSGM_LEFT or EGOSGM_RIGHT) with the left camera: H = Gamma T Gamma^-1
 /// (eqs. 1-4), and the variance that its covariance adds.
 shared::DisparityMotion disparity_motion(const Calibration& calibration, const Motion& current_from_previous, int view);
 

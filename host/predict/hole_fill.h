@@ -15,7 +15,7 @@ class HoleFill {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   HoleFill(ocl::Context& context, shared::ImageSize size, const HoleFillOptions& options, int pixels = 0);
 
-  /// Of `views`; what is hidden, in a map of its own. REQUIRES: the outputs are not the inputs.
+  /// Fills `views`, with a map of its own for occluded pixels. REQUIRES: the outputs are not the inputs.
   void fill(const StereoMaps& in, StereoMaps& out, FlagMap& hidden, Views views);
 
  private:

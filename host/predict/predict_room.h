@@ -10,7 +10,7 @@
 
 namespace egosgm {
 
-/// What the last frame's maps say of this one, of the views that are tracked.
+/// The prediction of this frame from the last frame's maps, of the tracked views.
 struct Prediction {
   StereoMaps warped;    // before anything was dropped
   StereoMaps rejected;  // of these, what EdgeRejection keeps; until the room ends

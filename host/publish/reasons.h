@@ -14,7 +14,7 @@ class Reasons {
  public:
   using Bytes = ocl::Buffer<cl_uchar>;
 
-  /// What the other stages left.
+  /// Results of other stages.
   struct Inputs {
     const FrameImages& images;          // that were matched
     const ocl::Buffer<cl_uint>& codes;  // of both views (Census)
@@ -29,7 +29,7 @@ class Reasons {
     const float grey_step;                      // Plan's
   };
 
-  /// Of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels, a byte each: whether its texture repeats.
+  /// A byte for each block of EGOSGM_COARSE x EGOSGM_COARSE pixels: whether its texture repeats.
   static Bytes repeats(ocl::Context& context, shared::ImageSize size);
 
   /// `repeats`: memory that this type of pixels may share with others. `pixels` of a work-item, 1 or 16; 0: by the

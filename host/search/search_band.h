@@ -34,7 +34,7 @@ class SearchBand {
   void narrow(const StereoMaps& predicted, const Map* coarse, SearchBands& bands, Views views);
   /// Every pixel searches everything.
   void full_range(SearchBands& bands, Views views);
-  /// The same where there are predicted disparities that are not searched by: `row_sums` counts them.
+  /// Searches the full range although there are predicted disparities: `row_sums` counts them.
   void full_range(const Map& predicted, SearchBands& bands, Views views);
 
   /// No pixel has more chunks than this.

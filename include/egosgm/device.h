@@ -18,7 +18,7 @@ enum class DeviceQueue { kUpload, kKernels, kDownload };
 enum class DeviceType { kGpu, kAccelerator, kCpu };
 EGOSGM_EXPORT const char* to_string(DeviceType type);
 
-/// What an OpenCL device says of itself.
+/// Properties of an OpenCL device, as its driver tells them.
 struct DeviceInfo {
   std::string name;  // "pthread-skylake-avx512-AMD EPYC"
   DeviceType type = DeviceType::kCpu;
@@ -29,7 +29,7 @@ struct DeviceInfo {
   int compute_units = 0;
   std::uint64_t memory_bytes = 0;
   std::uint64_t max_allocation_bytes = 0;
-  /// What it does not promise of what equal bits and all of this library rest on: "denormals". Empty: nothing.
+  /// Properties that equal bits need and the device does not promise: "denormals". Empty: it has all.
   std::vector<std::string> lacks;
 };
 
@@ -43,9 +43,9 @@ class EGOSGM_EXPORT Device {
   /// The device that `wanted` names: an index into `list()`, a type ("gpu", "cpu", "accelerator": the first of it), or
   /// a part of its name, vendor or platform (upper and lower case alike; "PLATFORM:NAME" for both) of at least three
   /// characters, with a letter among them. Empty: the environment variable EGOSGM_DEVICE, else the first of `list()`.
-  /// What nothing fits as a whole may end in compute units: "cpu/0" is the first one of "cpu", "cpu/0-3" the first
-  /// four, as a device of their own (see `compute_units`). Throws InvalidArgument with the list where nothing fits,
-  /// where devices of different names do, and how to install one where there is none.
+  /// A name that nothing fits as a whole may end in compute units: "cpu/0" is the first one of "cpu", "cpu/0-3" the
+  /// first four, as a device of their own (see `compute_units`). Throws InvalidArgument with the list where nothing
+  /// fits, where devices of different names do, and how to install one where there is none.
   static Device select(const std::string& wanted = {});
 
   /// The compute units `first` to `last` (from 0, both included) as a device of their own: one core, some cores. Its
@@ -56,16 +56,16 @@ class EGOSGM_EXPORT Device {
   /// Whether the two have a compute unit in common.
   bool shares_units(const Device& other) const;
 
-  /// The same device, on which pipelines take their programs from `folder`, as `compile_programs` made them
+  /// This device, on which pipelines take their programs from `folder`, as `compile_programs` made them
   /// (egosgm/programs.h), and compile nothing. Throws InvalidArgument where they were made for another device, platform
   /// or driver version; a Pipeline's constructor does where the folder lacks one of its programs, or has it from
   /// another version of the source.
   Device with_programs(const std::string& folder) const;
 
-  /// The same device, on which pipelines use these sizes. Throws InvalidArgument as Tuning::validate.
+  /// This device, on which pipelines use these sizes. Throws InvalidArgument as Tuning::validate.
   Device with_tuning(const Tuning& tuning) const;
 
-  /// The same device, on which pipelines keep what the compiler makes in `folder`, and take it from there; "off":
+  /// This device, on which pipelines keep what the compiler makes in `folder`, and take it from there; "off":
   /// nowhere. It goes before the environment variable EGOSGM_CACHE; without both, drivers that keep no programs
   /// themselves get $XDG_CACHE_HOME/egosgm or ~/.cache/egosgm. A folder that cannot be used is no error.
   Device with_cache(const std::string& folder) const;

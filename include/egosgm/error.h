@@ -9,7 +9,7 @@
 
 namespace egosgm {
 
-/// What all errors of this library have in common: `catch (const egosgm::Error& error)` catches each of them. Each is a
+/// The base of all errors of this library: `catch (const egosgm::Error& error)` catches each of them. Each is a
 /// std::exception, too.
 class EGOSGM_EXPORT Error {
  public:
@@ -17,7 +17,7 @@ class EGOSGM_EXPORT Error {
   virtual const char* what() const noexcept = 0;
 };
 
-/// What the caller gave cannot be used: an image, a calibration, an option, a file. `what()` names the
+/// The caller gave something that cannot be used: an image, a calibration, an option, a file. `what()` names the
 /// value and the remedy in one line. Nothing was enqueued and nothing was written.
 class EGOSGM_EXPORT InvalidArgument : public std::invalid_argument, public Error {
  public:

@@ -24,9 +24,9 @@ struct DebugMaps {
   MapView<std::uint8_t> dynamic;
 };
 
-/// Where a frame's maps go: views of the caller's memory, width x height of the pipeline each. Empty views are not
-/// filled and cost nothing. Disparities in pixels, variances in px^2; kInvalidDisparity (and variance 0) where there is
-/// no value.
+/// The destinations of a frame's maps: views of the caller's memory, width x height of the pipeline each. Empty views
+/// are not filled and cost nothing. Disparities in pixels, variances in px^2; kInvalidDisparity (and variance 0) where
+/// there is no value.
 struct FrameOutputs {
   MapView<float> disparity, variance;              // the left view's result
   MapView<std::uint8_t> reason;                    // of each of its pixels, a Reason
@@ -53,7 +53,7 @@ struct DeviceCommand {
   std::int64_t queued_ns = 0, submitted_ns = 0, started_ns = 0, ended_ns = 0;
 };
 
-/// What happened in a frame.
+/// Figures of a frame.
 ///
 /// `search_fraction`: all cells (a pixel and a disparity) that were matched / (width * height * D) of each view that
 /// was searched at full size: the left one alone, or both in a frame of full range or with track_right. All: lanes

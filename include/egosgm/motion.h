@@ -7,7 +7,7 @@
 
 namespace egosgm {
 
-/// How the left camera moved: `current_from_previous` takes a point from the previous left camera's frame
+/// The motion of the left camera: `current_from_previous` takes a point from the previous left camera's frame
 /// (x right, y down, z forward, metres) to the current one's.
 struct EGOSGM_EXPORT Motion {
   Eigen::Isometry3d current_from_previous = Eigen::Isometry3d::Identity();

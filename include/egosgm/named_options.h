@@ -17,7 +17,7 @@ struct NamedOption {
   std::string value;
 };
 
-/// What an option is, in a sentence each. The strings live as long as the program.
+/// The description of an option, in a sentence each. The strings live as long as the program.
 struct OptionText {
   const char* name;
   const char* meaning;
@@ -30,7 +30,7 @@ struct OptionText {
 /// `constants.NAME`.
 EGOSGM_EXPORT std::vector<NamedOption> list_options(const PipelineOptions& options);
 
-/// What each of them is, in the same order, without constants.
+/// The descriptions, in the same order, without constants.
 EGOSGM_EXPORT const std::vector<OptionText>& option_texts();
 
 /// Sets one. `preset` sets all others, too. `constants.NAME` sets a constant of the method, for experiments. Throws

@@ -25,7 +25,7 @@ struct DeviceImages {
   const void* svm_pixels = nullptr;
 };
 
-/// What a frame gives, in the pipeline's own buffers: floats, the left view's height x width, then the right view's.
+/// The maps of a frame, in the pipeline's own buffers: floats, the left view's height x width, then the right view's.
 /// Disparity [px], kInvalidDisparity where there is none; variance [px^2]. Retain none: they are read by commands of
 /// the same queue (or that wait for `done` of `enqueue`), which are enqueued before the next frame is.
 struct DeviceMaps {

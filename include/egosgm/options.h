@@ -14,11 +14,11 @@ namespace egosgm {
 /// kLearned7x7: a census of 5x5 and 40 learned comparisons of 3x3 means within 7x7 pixels.
 enum class MatchingCost { kCensus9x7, kLearned7x7, kCensus5x5, kSad3x3 };
 
-/// Where the options start from, and what chooses the constants of the method.
+/// The options' starting point, and the constants of the method.
 /// kPaper: the method of Fućek et al. (IFAC 2017), docs/understand/paper.md.
 enum class Preset { kDefault, kPaper };
 
-/// What a user can choose. Meaning, unit, range and when to change each: list_options, `egosgm run --help` and
+/// The options of a pipeline. Meaning, unit, range and when to change each: list_options, `egosgm run --help` and
 /// docs/use/options.md, from one table. Value semantics; not thread-safe.
 struct EGOSGM_EXPORT PipelineOptions {
   int disparities;          ///< D: number of disparities; the range is [min_disparity, min_disparity + D) px

@@ -29,7 +29,7 @@ struct ProgramText {
   std::string kernel_file, text, options;
 };
 
-/// What `compile_programs` would build, for a compiler to SPIR-V. The same for all devices of a type.
+/// Lists what `compile_programs` would build, for a compiler to SPIR-V. It is equal for all devices of a type.
 EGOSGM_EXPORT std::vector<ProgramText> list_programs(const Device& device, const PipelineOptions& options = {});
 
 /// The files of a folder of programs that any device of that type loads if it takes SPIR-V. `modules`: of each of

@@ -9,7 +9,7 @@
 
 namespace egosgm {
 
-/// How the paths of BandedSgm run: diagonal wavefronts of tiles (CPUs, FPGAs) or a work-group a path (GPUs).
+/// The scheduling of BandedSgm's paths: diagonal wavefronts of tiles (CPUs, FPGAs) or a work-group a path (GPUs).
 enum class Scheduling { kAutomatic, kWavefront, kPaths };
 
 /// Sizes that decide how fast a device is, and change no bit of a result. 0, kAutomatic: what suits the device's class.

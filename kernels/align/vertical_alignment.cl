@@ -59,7 +59,7 @@ static inline float bounded(const float offset_px) {
   return clamp(offset_px, -EGOSGM_MAX_OFFSET_PX, EGOSGM_MAX_OFFSET_PX);
 }
 
-// Where among `count` rows or columns, in `steps` from the middle to either end.
+// Positions among `count` rows or columns, in `steps` from the middle to either end.
 static inline Ints places(const Ints at, const int count, const int steps) {
   return INTS_OF_FLOATS(nearest(FLOATS_OF_INTS(2 * at + 1 - count) * ((float)steps / (float)count)));
 }
@@ -128,7 +128,7 @@ KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void resample(cons
 #define MAX_RESIDUAL (EGOSGM_ALIGNED_MAX_RESIDUAL * GREY)
 #define MIN_GRADIENT (EGOSGM_ALIGNED_MIN_GRADIENT * GREY)
 
-// Of a row: sums of g clamp(r) u^n for n = 0 to 2, of g_I g_J u^n for n = 0 to 4, and of 1; u: the column in the right
+// Sums of a row: g clamp(r) u^n for n = 0 to 2, of g_I g_J u^n for n = 0 to 4, and of 1; u: the column in the right
 // image, -COARSE_PLACES to COARSE_PLACES, so that no sum is too large for 63 bits. A work-group of ROW_GROUP a sampled
 // row.
 #define COARSE_BITS 5
@@ -180,7 +180,7 @@ static inline long sum_of_lanes(const Longs lanes) {
 #endif
 }
 
-// What every ROW_GROUP-th sample of row y from that of `lane` on gives, or blocks of PIXELS samples.
+// Sums every ROW_GROUP-th sample of row y from that of `lane` on, or blocks of PIXELS samples.
 COMPILED_ONCE void sum_row_residuals(const ImageSize size, const int y, const int lane, global const uchar* images,
                                      global const float* disparity, long row_sums[SUMS]) {
   Longs sums[SUMS];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What matching compares, a code a pixel: a bit for each comparison of two grey values in a window around it.
+// Computes a code a pixel for matching: a bit for each comparison of two grey values in a window around it.
 // - Census transform (Zabih and Woodfill 1994): every pixel of the window, row by row, against the centre.
 // - Learned: a census of 5x5, and sums of 3x3 grey values at two places of a 7x7 window against each other, with a
 //   threshold (EGOSGM_LEARNED7X7).
@@ -60,7 +60,7 @@
 
 #if COMPARISONS == 2
 constant char kLearned[LEARNED][5] = EGOSGM_LEARNED7X7;
-// Where sums lie whose rows and columns begin at the window's.
+// The place of sums whose rows and columns begin at the window's.
 #define SUMS 7
 #define FIRST_PLACE(i, stride) ((kLearned[i][1] + SUMS / 2) * (stride) + kLearned[i][0] + SUMS / 2)
 #define SECOND_PLACE(i, stride) ((kLearned[i][3] + SUMS / 2) * (stride) + kLearned[i][2] + SUMS / 2)
@@ -213,7 +213,7 @@ static inline uchar16 learned_byte(const Sum* sums, const int byte) {
 
 #endif
 
-// Where no column needs clamping. Bits are put into bytes: compilers keep these in narrow vectors.
+// No column needs clamping here. Bits are put into bytes: compilers keep these in narrow vectors.
 static inline void write_codes_at(const Rows* rows, const int x, const int width, const int view, global Code* row) {
 #if COMPARISONS == 2
   Sum sums[SUMS * SUMS_WIDTH];

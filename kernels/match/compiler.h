@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What compilers must be told. OpenCL C only.
+// Hints for compilers. OpenCL C only.
 #ifndef EGOSGM_KERNELS_MATCH_COMPILER_H
 #define EGOSGM_KERNELS_MATCH_COMPILER_H
 

@@ -26,7 +26,7 @@ static inline Sorted sort(const Floats a, const Floats b, const Floats c) {
   return sorted;
 }
 
-// Where it does not fill, `variance` is not looked at.
+// Without filling, `variance` is not read.
 COMPILED_ONCE void filter_row(const WorkItem at, const bool fills, const ImageSize size, global const float* disparity,
                               global float* filtered, global float* variance) {
   const int y = at.y;

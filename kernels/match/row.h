@@ -8,7 +8,7 @@
 #include "slots.h"
 #include "winner.h"
 
-// What the pixels of a row share. Pixels count from its first one in the tile, backward ones down.
+// Values that the pixels of a row share. Pixels count from its first one in the tile, backward ones down.
 typedef struct {
   global const Band* bands;
   global const uint* penalties;

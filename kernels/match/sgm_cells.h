@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What both ways of BandedSgm (banded_sgm.cl, banded_sgm_paths.cl) make of a winner. OpenCL C only.
+// The disparity and variance of a winner, for both forms of BandedSgm (banded_sgm.cl, banded_sgm_paths.cl). OpenCL C
+// only.
 #ifndef EGOSGM_KERNELS_SGM_CELLS_H
 #define EGOSGM_KERNELS_SGM_CELLS_H
 
@@ -24,7 +25,7 @@ static inline Floats refined(const Ints winner, const Ints rise_before, const In
   return FLOATS_OF_INTS(winner) + (is_risen ? clamp(offset, -0.5f, 0.5f) : (Floats)(0.0f));
 }
 
-// Where the sums fall on beyond the end of a band, the true disparity rather lies outside.
+// If the sums fall on beyond the end of a band, the true disparity rather lies outside.
 static inline Ints falls_on(const SgmParameters q, const Ints rise_before, const Ints rise_after) {
   return ((rise_before < 0) | (rise_after < 0)) & ((Ints)(q.doubts_band_ends) != 0);
 }

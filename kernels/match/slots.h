@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a pixel's costs lie in the slot of a path, and the penalties of the steps to it. OpenCL C only.
+// The place of a pixel's costs in the slot of a path, and the penalties of the steps to it. OpenCL C only.
 #ifndef EGOSGM_KERNELS_MATCH_SLOTS_H
 #define EGOSGM_KERNELS_MATCH_SLOTS_H
 
 #include "lanes.h"
 
-// Of a band what says where a pixel's costs lie in a slot, in one word: its origin and its chunks.
+// The part of a band that tells the place of its costs in a slot, in one word: its origin and its chunks.
 static inline uint extent_at(global const Band* band) { return *(global const uint*)band; }
 static inline int origin_of(const uint extent) { return (short)extent; }
 static inline int chunks_of(const uint extent) { return extent >> 16; }
@@ -27,7 +27,7 @@ static inline bool covers(const uint own, const uint extent) {
          origin_of(extent) + EGOSGM_LANES * chunks_of(extent) <= origin_of(own) + EGOSGM_LANES * chunks_of(own);
 }
 
-// What StepPenalties left at pixels around the next one of a backward sweep, a byte a path: before it, above that,
+// Results of StepPenalties at pixels around the next one of a backward sweep, a byte a path: before it, above that,
 // above.
 typedef struct {
   uint before, above_before, above;

@@ -41,8 +41,8 @@ uint bits_of(int16 lanes) {
 int lowest_bit(uint bits) { return 31 - clz(bits & -bits); }
 
 #if ROW_GROUP == 1
-// Where runs begin, as far as a row has seventeen pixels from x on, sixteen at a time: an inclusive maximum of the
-// columns that do not continue their left neighbour's run. Returns the column behind; `begin` is where its left
+// Finds where runs begin, as far as a row has seventeen pixels from x on, sixteen at a time: an inclusive maximum of
+// the columns that do not continue their left neighbour's run. Returns the column behind; `begin` is where its left
 // neighbour's run begins.
 COMPILED_ONCE int find_runs_by_lanes(const int width, const float max_difference, global const float* disparity,
                                      const uint row, global ushort* runs, global uint* parents, global uint* sizes,
@@ -78,7 +78,7 @@ COMPILED_ONCE int find_runs_by_lanes(const int width, const float max_difference
 }
 #endif
 
-// Where the run of each pixel begins, and the length of each run. A work-group of ROW_GROUP a row and view.
+// Finds where the run of each pixel begins, and the length of each run. A work-group of ROW_GROUP a row and view.
 KERNEL __attribute__((reqd_work_group_size(ROW_GROUP, 1, 1))) void find_runs(const ImageSize size,
                                                                              const float max_difference,
                                                                              global const float* disparity,

@@ -23,8 +23,8 @@ static inline bool goes_straight(const SgmParameters q, const uint extent, const
   return fit;
 }
 
-// Where a pixel's costs go in the slots, and where those before it are wiped. As many as a row has: made of two, SPIR-V
-// is not valid (LLVM 19's translator).
+// The places in the slots for a pixel's costs, and of those before it to wipe. As many as a row has: made of two,
+// SPIR-V is not valid (LLVM 19's translator).
 typedef struct {
   global uchar *at[4], *wiped_at[4];
 } Places;
@@ -66,7 +66,7 @@ static inline Before before_at(const uchar16 t, const int lanes) {
   return before;
 }
 
-// The same of an origin as before.
+// The costs before, of an origin that stayed.
 static inline Before straight_before(const uchar16 t) {
   const ulong2 chunk = as_ulong2(t);
   const Before before = {chunk, chunk << (ulong2)(8) | (ulong2)(ABSENT),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a work-item of banded_sgm_paths.cl computes at once: VECTOR neighbouring disparities of a pixel, 4 where
+// A work-item of banded_sgm_paths.cl computes a vector at once: VECTOR neighbouring disparities of a pixel, 4 where
 // work-items are lanes themselves, 16 for CPUs. OpenCL C only.
 #ifndef EGOSGM_KERNELS_MATCH_VECTOR_H
 #define EGOSGM_KERNELS_MATCH_VECTOR_H

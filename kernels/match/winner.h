@@ -43,7 +43,7 @@ static inline void put_window(const ushort* totals, const int winner_total, Cand
   candidate->rank = winner_total << 4;
 }
 
-// What `leave_winners` needs of a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one
+// Inputs of `leave_winners` for a pixel: disparity, path sums of the two neighbours above the winner's (0 both if one
 // is missing), steps; 16 bits each.
 static inline ulong winner_of(const SgmParameters q, const Candidate* candidate) {
   const int here = candidate->rank >> 4;
@@ -84,7 +84,7 @@ static inline void offer(const ushort16 totals, const int least, const uchar16 c
   at->ranks = min(at->ranks, ranks.sfedcba9876543210);
 }
 
-// The same of 8 lanes, what is offered alone: the last lane's first.
+// The offers of 8 lanes, the last lane's first.
 static inline uint8 offered_by_chunk(const ushort8 totals, const int least, const uchar8 cost, const int behind) {
   const ushort8 each = (ushort8)((ushort)behind) - convert_ushort8(kLane.lo);
   const uint8 ranks = convert_uint8(RANK(totals, least, convert_ushort8(cost))) << (uint8)(16) | convert_uint8(each);

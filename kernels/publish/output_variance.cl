@@ -11,11 +11,11 @@
 
 static inline Floats cut(const Floats value, const float most) { return value < most ? value : (Floats)(most); }
 
-// What lies outside of the image is negative.
+// Values outside of the image are negative.
 static inline Floats counted(const Floats value) { return value >= 0.0f ? (Floats)(1.0f) : (Floats)(0.0f); }
 static inline Floats if_inside(const Floats value) { return value >= 0.0f ? value : (Floats)(0.0f); }
 
-// Where there is no disparity, a variance means nothing.
+// A variance without a disparity means nothing.
 static inline Floats if_valid(const Floats d, const Floats variance) { return d > INVALID ? variance : (Floats)(0.0f); }
 
 // |before - 2 at + after|; beside a hole as much as can be.
@@ -33,8 +33,8 @@ static inline Floats blend(const Floats p, const Floats measured, const Floats r
   return sqrt(cut_r * sqrt(cut_r * cut(p, EGOSGM_MAX_MEAN_VARIANCE_PX2)));
 }
 
-// Of each pixel: the variances' blend, and the sum of the horizontal and the vertical second difference. A pixel at the
-// image's edge is its own neighbour.
+// For each pixel: the variances' blend, and the sum of the horizontal and the vertical second difference. A pixel at
+// the image's edge is its own neighbour.
 COMPILED_ONCE void of_each_pixel_row(const WorkItem at, const ImageSize size, global const float* disparity,
                                      global const float* belief, global const float* variance,
                                      global const float* measured, global const float* measured_variance,

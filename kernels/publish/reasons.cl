@@ -37,8 +37,8 @@ static inline Floats load_grey_values(global const Pixel* row, const int x, cons
 #endif
 }
 
-// Of the window around a pixel, as far as the image has its rows: how much the grey values two columns apart differ,
-// how many are black or white, and of how many that is.
+// The texture of the window around a pixel, as far as the image has its rows: how much the grey values two columns
+// apart differ, how many are black or white, and of how many that is.
 typedef struct {
   Floats changes, extremes;
   float pixels;
@@ -63,7 +63,7 @@ static inline Texture texture_around(const ImageSize size, global const Pixel* i
   return texture;
 }
 
-// How far apart those disparities lie that were warped near a pixel of the row.
+// The span of the disparities that were warped near a pixel of the row.
 static inline Floats jump_in_row(global const float* warped, const int x, const int width) {
   Floats least = INFINITY;
   Floats most = -INFINITY;
@@ -75,7 +75,7 @@ static inline Floats jump_in_row(global const float* warped, const int x, const 
   return most - least;
 }
 
-// How many bits a code differs from each of PIXELS codes side by side.
+// The Hamming distances of a code to each of PIXELS codes side by side.
 static inline Ints codes_apart(const Code own, global const Code* others) {
 #if PIXELS == 1
   return (int)popcount(own ^ others[0]);
@@ -86,7 +86,7 @@ static inline Ints codes_apart(const Code own, global const Code* others) {
 #endif
 }
 
-// How many bits the codes of a grid around a pixel differ from those around PIXELS places side by side, the first of
+// The Hamming distances of the codes of a grid around a pixel to those around PIXELS places side by side, the first of
 // which is `other`, where columns of the grid lead in `direction`, in all; sums beyond `most` need not be whole.
 // `stride`: of rows of codes.
 static inline Ints bits_apart_around(global const Code* own, global const Code* other, const int direction,

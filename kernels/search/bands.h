@@ -61,8 +61,8 @@ static inline Bands bands_of(const DisparityRange range, Floats from, Floats to)
   return bands;
 }
 
-// What the blocks of PIXELS pixels say, each pixel what its own does. `blocks`: the first one's; `next`: to that of the
-// next one, if there is any.
+// The values of the blocks of PIXELS pixels: each pixel gets that of its own block. `blocks`: the first one's; `next`:
+// to that of the next one, if there is any.
 #if PIXELS == 1
 #define OF_BLOCKS(Values, Half, blocks, next, member) ((Values)((blocks)->member))
 #else
@@ -120,7 +120,7 @@ static inline Ints chunks_at(global const Band* row, const int x, const int widt
   return as_int16((uint16)(low.even, high.even) >> 16);
 }
 
-// Of a row up to a pixel.
+// Sums of a row up to a pixel.
 typedef struct {
   int chunks;
   Ints predicted;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every pixel searches: d +- a multiple of its standard deviation, or what the predictions around it span; and
+// The band of every pixel: d +- a multiple of its standard deviation, or what the predictions around it span; and
 // what its block's predictions span and CoarseMatch found there, where that lies elsewhere.
 
 // lint: ROW_GROUP=1 PIXELS=16
@@ -51,9 +51,9 @@ KERNEL void gather_blocks(const ImageSize size, global const float* disparity, g
   }
 }
 
-// What CoarseMatch found in a block and one coarse pixel around it, in full pixels, without EGOSGM_COARSE_OUTLIERS at
-// either end: a single mismatch, as where there is no texture, would widen the bands of a whole block. A work-item a
-// block and view.
+// Spans what CoarseMatch found in a block and one coarse pixel around it, in full pixels, without
+// EGOSGM_COARSE_OUTLIERS at either end: a single mismatch, as where there is no texture, would widen the bands of a
+// whole block. A work-item a block and view.
 COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, global const float* coarse,
                                        global BlockRange* ranges) {
   const ImageSize blocks = blocks_of(size);
@@ -67,7 +67,7 @@ COMPILED_ONCE void gather_coarse_block(const WorkItem at, const ImageSize size, 
 #if EGOSGM_BLOCK != 2 * EGOSGM_COARSE
 #error "a block and what lies around it are four coarse pixels wide"
 #endif
-  // Of each column the outermost ones, then of all four.
+  // The outermost ones of each column, then of all four.
   float4 least[EGOSGM_COARSE_OUTLIERS + 1];  // in rising order
   float4 most[EGOSGM_COARSE_OUTLIERS + 1];   // in falling order
 #pragma unroll
@@ -112,7 +112,7 @@ typedef struct {
   float from, to;
 } Span;
 
-// What the predictions in the 3x3 blocks around it and the coarse match span, and the whole range where few are
+// Spans the predictions in the 3x3 blocks around it and the coarse match, or the whole range where few are
 // predicted: a few beside each other may be wrong together, and what searches near them alone would confirm them, as
 // where texture repeats. `found`: what the predictions in the block and in those above and below it, and the coarse
 // match span. Thin things stand upright: where a frame lost a part of one, the parts farther above and below it say
@@ -191,7 +191,7 @@ typedef struct {
   Floats from, to;
 } SearchedRange;
 
-// What PIXELS predictions and what was found in their blocks search.
+// The range that PIXELS predictions and the matches of their blocks search.
 static inline SearchedRange range_of_predictions(const DisparityRange range, const float sigmas,
                                                  const float min_half_width, const float coarse_tolerance,
                                                  const float coarse_margin, const Floats d, const Floats variance,
@@ -277,7 +277,7 @@ KERNEL void bands_of_pixels(const ImageSize size, const DisparityRange range, co
 
 #if ROW_GROUP == 1
 
-// What was not banded pixel by pixel. A work-item a row and view.
+// Counts rows that were not banded pixel by pixel. A work-item a row and view.
 KERNEL void sum_rows(const ImageSize size, global const float* disparity, global const Band* bands,
                      global uint* cell_offsets, global RowSum* row_sums) {
   sum_row(THIS_WORK_ITEM, size, disparity, bands, cell_offsets, row_sums);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the pixels of blocks span. OpenCL C only.
+// The spans of the pixels of blocks. OpenCL C only.
 #ifndef EGOSGM_KERNELS_SEARCH_SPANS_H
 #define EGOSGM_KERNELS_SEARCH_SPANS_H
 
