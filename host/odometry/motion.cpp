@@ -19,6 +19,8 @@ constexpr double kCauchy2 = 2;
 constexpr double kCorrelated = 2.3;
 constexpr std::size_t kFullPart = 3;  // matches from which on a part of the image counts in full
 constexpr double kPart_px = 80;       // side of a part of the image in RANSAC
+// Disparities of static points change as the motion says: errors of the calibration move their median by 0.1 px.
+constexpr double kDisparityBias_px = 0.3;
 
 // SplitMix64 (Steele et al., OOPSLA 2014): the same numbers on every platform.
 class Generator {
@@ -148,7 +150,7 @@ Score score_motion(const Calibration& calibration, const Scene& scene, const Par
 }
 
 std::string format(const char* text, double a, double b) {
-  char buffer[160];
+  char buffer[192];
   std::snprintf(buffer, sizeof(buffer), text, a, b);
   return buffer;
 }
@@ -180,6 +182,18 @@ std::string too_few(const StereoOdometryOptions& options, std::size_t inliers, s
     return format("inlier ratio %.2f is below %.2f", static_cast<double>(inliers) / matches, options.min_inlier_ratio);
   }
   return {};
+}
+
+// By how much the inliers' disparities grew beyond what the motion explains, in the median [px].
+double disparity_bias_px(const Calibration& calibration, const Scene& scene, const MotionEstimate& estimate) {
+  std::vector<double> errors;
+  for (const int i : estimate.inliers) {
+    const Eigen::Vector3d p = estimate.motion.current_from_previous * scene.points[i];
+    errors.push_back(scene.measured[i].z() - project(calibration, p).z());
+  }
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  return *middle;
 }
 
 struct NormalEquations {
@@ -281,6 +295,14 @@ MotionEstimate refine_motion(const Calibration& calibration, const StereoOdometr
   collect_inliers(calibration, scene, options.inlier_threshold_px, estimate);
   estimate.reason = too_few(options, estimate.inliers.size(), matches.size());
   if (!estimate.reason.empty()) return estimate;
+  const double bias_px = disparity_bias_px(calibration, scene, estimate);
+  if (std::abs(bias_px) > kDisparityBias_px) {
+    estimate.reason = format(
+        "disparities changed by %+.2f px more than the motion explains (at most %.2f px): the features "
+        "move with the camera, as a projector's dots do",
+        bias_px, kDisparityBias_px);
+    return estimate;
+  }
   sums = accumulate(calibration, noise, matches, estimate.inliers, estimate.motion.current_from_previous);
   const double variance = sums.cost / std::max(1.0, 3 * sums.weight - 6);
   const Matrix6 covariance = kCorrelated * variance * sums.normal.inverse();

@@ -127,6 +127,20 @@ TEST(OdometryMotion, SaysWhyThereIsNone) {
   EXPECT_NE(estimate(calibration, unrelated).reason, "");
 }
 
+// A projector's dots stay where they are in the images, and only their disparities tell that the camera came nearer.
+TEST(OdometryMotion, RefusesFeaturesThatMoveWithTheCamera) {
+  std::mt19937 generator(7);
+  std::normal_distribution<double> noise(0, 0.1);
+  const Calibration calibration = kitti_calibration();
+  for (const double growth : {1.03, 0.97}) {
+    std::vector<PointMatch> dots = random_matches(generator, calibration, make_motion(0, 0, 0, 0), 300, 0.1);
+    for (PointMatch& dot : dots) dot.d2 = growth * dot.d1 + noise(generator);
+    const auto result = odometry::refine_motion(calibration, {}, {}, dots, Eigen::Isometry3d::Identity());
+    EXPECT_NE(result.reason.find("a projector's dots"), std::string::npos) << result.reason;
+    EXPECT_NE(result.reason.find(growth > 1 ? "+" : "-"), std::string::npos) << result.reason;
+  }
+}
+
 // The pair's error grows with x^2 and x y; each frame sees new points.
 TEST(OdometryRectification, LearnsYawAndDistortionButNothingFromAnExactPair) {
   const Calibration c = kitti_calibration();
