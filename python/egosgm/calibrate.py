@@ -14,6 +14,7 @@ from . import _egosgm
 from .arguments import counted, decimal, expect_new_file, expect_new_folder, Parser, tell
 from .boards import Board, Corners, charuco, chessboard, drawn, other_size
 from .raw_pairs import RawPair, open_pairs
+from .rectification import StereoRig, projections
 
 _FEWEST_VIEWS, _MANY_VIEWS, _MOST_VIEWS = 5, 15, 40  # the time grows with their cube
 _BAD_VIEW = 3.0  # times the median error of all views
@@ -58,6 +59,7 @@ def _parser() -> Parser:
     add("--right", metavar="PATTERN", help="right images, likewise")
     add("--pair-by", default="name", metavar="name|order", help="what tells which images belong together: equal texts in their names, or their order")
     add("--side-by-side", metavar="PATTERN", help="images or a video with the left view in the left half and the right one in the right half")
+    add("--top-bottom", metavar="PATTERN", help="images or a video with the left view in the upper half and the right one in the lower half")
     add = parser.add_argument
     add("--board", required=True, metavar="CxR", help="9x6: a chessboard's inner corners, where four squares meet; with --marker a ChArUco board's squares")
     add("--square", required=True, type=decimal, metavar="M", help="side of a square, as measured on the board [m]")
@@ -107,7 +109,7 @@ class _Views:
         self.size: Optional[Tuple[int, int]] = None
         self.pairs, self.found = 0, [0, 0]
         without: List[NDArray[np.uint8]] = []
-        pairs = open_pairs(given.left, given.right, given.side_by_side, None, None, given.pair_by == "order")
+        pairs = open_pairs(given.left, given.right, given.side_by_side, given.top_bottom, None, None, given.pair_by == "order")
         for pair in pairs:
             greys = _grey(pair)
             size = greys[0].shape[1::-1]
@@ -196,8 +198,7 @@ def _thinned(views: List[_View]) -> List[_View]:
 def _rows_px(board: Board, views: Sequence[_View], stereo: _Stereo, size: Tuple[int, int]) -> NDArray[np.float64]:
     """How far the rows of corners are apart once both images are rectified."""
     left, right = stereo.cameras
-    r1, r2, p1, p2 = cv2.stereoRectify(left.matrix, left.distortion, right.matrix, right.distortion, size, stereo.rotation, stereo.translation_m,
-                                       flags=cv2.CALIB_ZERO_DISPARITY, alpha=0)[:4]
+    r1, r2, p1, p2 = projections(StereoRig(left.matrix, left.distortion, right.matrix, right.distortion, stereo.rotation, stereo.translation_m), size, 0.0)
     apart = []
     for view in views:
         numbers = view.common()
@@ -269,7 +270,8 @@ def _tell(found: _Views, stereo: _Stereo, views: Sequence[_View], out: Sequence[
 
 
 def _next_step(given: argparse.Namespace) -> str:
-    source = f"--side-by-side {shlex.quote(given.side_by_side)}" if given.side_by_side else "--left LEFT --right RIGHT"
+    halves = {"--side-by-side": given.side_by_side, "--top-bottom": given.top_bottom}
+    source = next((f"{option} {shlex.quote(pattern)}" for option, pattern in halves.items() if pattern), "--left LEFT --right RIGHT")
     return f"egosgm rectify {source} --calib {shlex.quote(given.out)} --out SEQUENCE"
 
 

@@ -56,6 +56,16 @@ class StereoRig:
             self.given = tuple(_matrix_of(matrix) for matrix in self.given)  # type: ignore[assignment]
 
 
+def is_transposed(matrix: Any) -> bool:
+    """Of a camera matrix, of OpenCV's P and Q, or of a rotation and a translation: what stands in the last column stands in the last row."""
+    if matrix.size == 12:
+        flat = matrix.ravel()
+        return bool(flat[4] and not flat[5])  # fy
+    side = {9: 3, 16: 4}.get(matrix.size, 0)
+    square = matrix.reshape(side, side) if side else matrix
+    return bool(side and square[-1, :2].any() and not square[:2, -1].any())
+
+
 def _check_shape(name: str, matrix: Any, rows: int, columns: int) -> None:
     if matrix.shape not in ((rows, columns), (rows,) if columns == 1 else ()) or not np.isfinite(matrix).all():
         raise _egosgm.InvalidArgument(f"{name}: needs {rows}x{columns} finite numbers")
@@ -106,11 +116,12 @@ def _check(rig: Any) -> None:
     else:
         for name, matrix in (("M1", rig.left_matrix), ("M2", rig.right_matrix)):
             if not (matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[2].tolist() == [0, 0, 1]):
-                raise _egosgm.InvalidArgument(f"{name} is no camera matrix: fx and fy are above 0, its last row is 0 0 1")
+                raise _egosgm.InvalidArgument(f"{name} is no camera matrix: fx and fy are above 0, its last row is 0 0 1"
+                                              + ("; it is transposed, as MATLAB writes it" if is_transposed(matrix) else ""))
 
 
-def _projections(rig: Any, size: Tuple[int, int], alpha: float) -> Any:
-    """R1, R2, P1, P2."""
+def projections(rig: Any, size: Tuple[int, int], alpha: float) -> Any:
+    """R1, R2, P1, P2. Since OpenCV 5 an array of three numbers is no column."""
     import cv2
     if rig.given is not None:
         return rig.given
@@ -158,7 +169,7 @@ class Rectification:
             raise _egosgm.InvalidArgument(f"the images are {width}x{height}, but {rig.size[0]}x{rig.size[1]} were calibrated: give the calibration of this size")
         _check(rig)
         size = (width, height)
-        left_r, right_r, left_p, right_p = _projections(rig, size, alpha)
+        left_r, right_r, left_p, right_p = projections(rig, size, alpha)
         self.calibration = _egosgm.Calibration(left_p[0, 0], left_p[1, 1], left_p[0, 2], left_p[1, 2], -right_p[0, 3] / right_p[0, 0],
                                                right_p[0, 2] - left_p[0, 2])
         make_maps = cv2.fisheye.initUndistortRectifyMap if rig.is_fisheye else cv2.initUndistortRectifyMap

@@ -16,8 +16,10 @@ class RerunOutput:
     def __init__(self, file: Optional[pathlib.Path] = None) -> None:
         try:
             import rerun
-        except ImportError:
+        except ModuleNotFoundError:
             raise _egosgm.InvalidArgument('the viewer Rerun is a package of its own: pip install rerun-sdk') from None
+        except ImportError as error:  # of what it needs in its turn
+            raise _egosgm.InvalidArgument(f"the viewer Rerun is there and does not load: {error}") from None
         if file is not None:
             if os.path.lexists(file):
                 raise _egosgm.InvalidArgument(f"{file}: is there already, and stays: give another name")

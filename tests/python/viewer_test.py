@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import egosgm
+pytest.importorskip("rerun", exc_type=ImportError)
 from egosgm.viewer import RerunOutput
 
 WIDTH, HEIGHT, FRAMES, SEED = 320, 96, 3, 7
