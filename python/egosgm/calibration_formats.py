@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibrations as other programs write them, a function a format."""
 import configparser
+import math
 import pathlib
 import re
 import types
@@ -9,7 +10,7 @@ from typing import Any, Dict, List, Optional, Tuple, Union
 import numpy as np
 
 from . import _egosgm
-from .calibration_parts import Camera, Matrix, Values, data_of, expect_size, matrix, of_four, refuse, rotation, size_of, text_of, transform
+from .calibration_parts import Camera, Matrix, Values, data_of, expect_size, expect_upright, matrix, of_four, refuse, rotation, size_of, text_of, transform
 from .rectification import StereoRig
 
 Found = Union[StereoRig, _egosgm.Calibration]
@@ -146,7 +147,19 @@ def basalt(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
     return calibration.pair_on_body(cameras, body_from, (data.get("resolution") or [None])[0])
 
 
-def oak(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
+def _stream_from(calibrated: Optional[Tuple[int, int]], size: Optional[Tuple[int, int]]) -> Optional[Matrix]:
+    """What an OAK's matrices are multiplied by for images of another size, which it makes by whole numbers of pixels and by cutting alike on both sides; None of other
+    sizes."""
+    if not calibrated or not size or 0 in calibrated + size:
+        return None
+    step = min(whole // part for whole, part in zip(calibrated, size))
+    if step < 1 or not any(whole == step * part for whole, part in zip(calibrated, size)):
+        return None
+    left, top = ((whole / step - part) / 2 for whole, part in zip(calibrated, size))
+    return np.array([[1 / step, 0, -left], [0, 1 / step, -top], [0, 0, 1]])
+
+
+def oak(data: Dict[str, Any], file: pathlib.Path, images_size: Optional[Tuple[int, int]]) -> StereoRig:
     """Of the left and the right camera of an OAK, sockets 1 and 2; where one stands is told from the other, or both from a third one [cm]."""
     calibration = Values(data, file, "the calibration of an OAK camera")
     sockets = {int(socket): camera for socket, camera in data["cameraData"]}
@@ -168,11 +181,14 @@ def oak(data: Dict[str, Any], file: pathlib.Path) -> StereoRig:
     kinds = [camera.data.get("cameraType", 0) for camera in both]
     if not set(kinds) <= {0, 1}:  # perspective and fisheye
         raise calibration.refuse(f" of the lenses cameraType {kinds[0]} and {kinds[1]}: 0 and 1 are read")
-    cameras = [(camera.matrix((3, 3), "intrinsicMatrix"), camera.matrix((), "distortionCoeff")[:4 if kind else 14], bool(kind)) for camera, kind in zip(both, kinds)]
+    calibrated = size_of([both[0].data.get("width"), both[0].data.get("height")])
+    stream = _stream_from(calibrated, images_size)
+    cameras = [((np.eye(3) if stream is None else stream) @ camera.matrix((3, 3), "intrinsicMatrix"), camera.matrix((), "distortionCoeff")[:4 if kind else 14], bool(kind))
+               for camera, kind in zip(both, kinds)]
     (root, left), (other_root, right) = to_root(1), to_root(2)
     if root != other_root:
         raise calibration.refuse(", which does not say how the cameras of sockets 1 and 2 stand")
-    return calibration.pair_on_body(cameras, [left, right], [sockets[1].get("width"), sockets[1].get("height")])
+    return calibration.pair_on_body(cameras, [left, right], calibrated if stream is None else images_size)
 
 
 _ZED_SIZES = {"2K": (2208, 1242), "FHD": (1920, 1080), "HD": (1280, 720), "VGA": (672, 376), "FHD1200": (1920, 1200), "SVGA": (960, 600)}
@@ -223,10 +239,53 @@ def virtual_kitti(file: pathlib.Path) -> _egosgm.Calibration:
     return _egosgm.Calibration(*four, -right_from_left[0, 3])
 
 
+def is_cahv(text: str) -> bool:
+    return all(re.search(rf"(?m)^\s*{name}\s*=", text) for name in "CAHV")
+
+
+def _cahv(text: str, file: pathlib.Path) -> Tuple[Camera, Matrix, Optional[Tuple[int, int]]]:
+    """A camera, where it stands in the rover's frame [m], and the size of its images. CAHV is Yakimovsky and Cunningham's, O and R of CAHVOR a radial lens of
+    Gennery's, whose axis O is A's here."""
+    rover = Values({}, file, "a rover's camera (CAHV)")
+    rows = dict(re.findall(r"(?m)^\s*(\w+)\s*=\s*(.*?)\s*$", text))
+    values = rover.part({name: row.strip("()[]").replace(",", " ").split() for name, row in rows.items()})
+    c, a, h, v = (values.matrix((3,), name) for name in "CAHV")
+    if "E" in rows:
+        raise rover.refuse(" with E, of the model CAHVORE for fisheyes: give images and cameras that were linearized to CAHV")
+    axis, lens = values.first((3,), "O"), values.first((3,), "R")
+    if lens is None or not lens.any():
+        axis, lens = a, np.zeros(3)
+    elif axis is None or np.linalg.norm(np.cross(a, axis)) > _MOST_AXIS_ERROR:
+        raise rover.refuse(" of the model CAHVOR, whose lens has an axis O that is not A: give images and cameras that were linearized to CAHV")
+    cx, cy, fx, fy = a @ h, a @ v, np.linalg.norm(np.cross(a, h)), np.linalg.norm(np.cross(a, v))
+    if not (abs(np.linalg.norm(a) - 1) < 1e-3 and fx > 0 and fy > 0):
+        raise rover.refuse(", and A is no vector of length 1, or H or V lies along it")
+    scale = 1 + lens[0]
+    k = np.array([[scale * fx, 0, cx], [0, scale * fy, cy], [0, 0, 1]])
+    turn = np.array([(h - cx * a) / fx, (v - cy * a) / fy, a])
+    return (k, np.array([lens[1] / scale, lens[2] / scale, 0, 0, 0]), False), np.linalg.inv(transform(turn, -turn @ c)), size_of(rows.get("Dimensions"))
+
+
+def cahv(files: List[pathlib.Path], texts: List[str]) -> StereoRig:
+    """Two cameras of a rover."""
+    (left, rover_from_left, size), (right, rover_from_right, _) = (_cahv(text, file) for text, file in zip(texts, files))
+    return Values({}, files[0], "a rover's camera (CAHV)").pair_on_body([left, right], [rover_from_left, rover_from_right], size)
+
+
+def is_camera(data: Dict[str, Any]) -> bool:
+    """Whether it holds the numbers of one lens, whoever wrote them."""
+    names = {re.sub(r"[^a-z0-9]", "", str(name).lower()) for name in data}
+    return bool(names & {"projectionparameters", "cameramatrix", "intrinsicmatrix", "intrinsics", "intrinsic", "k", "mtx", "m", "fx", "f", "focallength"})
+
+
 def of_q(q: Matrix, file: pathlib.Path) -> _egosgm.Calibration:
+    expect_upright(q, "Q", file)
     if not q[3, 2] > 0:
         raise refuse(file, f"its Q has a baseline of {1 / q[3, 2]:.4g} m: are left and right swapped?" if q[3, 2] else "its Q has no baseline")
     return _egosgm.Calibration(q[2, 3], q[2, 3], -q[0, 3], -q[1, 3], 1 / q[3, 2], q[3, 3] / q[3, 2])
+
+
+_MOST_AXIS_ERROR = 1e-3  # of a lens's axis, which moves its centre by as many focal lengths
 
 
 # How NumPy's users and others call the matrices of stereoCalibrate, and the numbers of a rectified pair (Cityscapes' in two groups), in small letters
@@ -237,10 +296,11 @@ _NAMES = {
     "left_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(l|left|1)|(l|left|1)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
     "right_distortion": r"(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)(r|right|2)|(r|right|2)(d|dist|distortion|dist(ortion)?coef(f)?(s|icients)?)",
     "R": r"r|om|rot|rotmat|rotation(matrix)?|rmat|rstereo|stereor", "T": r"t|trans|transvec|translation(vector)?|tvec|tstereo|stereot",
-    "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims", "width": r"(image|img)?width", "height": r"(image|img)?height",
+    "Q": r"q|disptodepthmat|disparitytodepth", "size": r"(image|img)?(size|shape|resolution)|dims", "width": r"(image|img|camera)?(width|sizex)", "height": r"(image|img|camera)?(height|sizey)",
     "R1": r"r1", "R2": r"r2", "P1": r"p1", "P2": r"p2",
     "fx": r"(intrinsics?)?(f|fx|focal(length)?(px)?)", "fy": r"(intrinsics?)?fy", "cx": r"(intrinsics?)?(cx[0l]?|u0|ppx)", "cy": r"(intrinsics?)?(cy[0l]?|v0|ppy)",
-    "right_cx": r"cx[1r]", "baseline": r"(extrinsics?)?baseline(m|met(er|re)s?)?", "baseline_mm": r"baseline(mm|millimet(er|re)s?)",
+    "right_cx": r"cx[1r]", "baseline": r"b|(extrinsics?|stereo)?baseline(m|met(er|re)s?)?", "baseline_mm": r"baseline(mm|millimet(er|re)s?)",
+    "fov": r"(camera|image)?(h|x|horizontal)?(fov|fieldofview)(h|x|horizontal)?(deg|degrees?)?", "vertical_fov": r"(camera|image)?(v|y|vertical)(fov|fieldofview)(deg|degrees?)?",
 }
 
 
@@ -263,6 +323,30 @@ def _coefficients(value: Any, name: str, is_fisheye: bool, file: pathlib.Path) -
     return numbers
 
 
+_NUMBERS = ("fx", "fy", "cx", "cy", "right_cx", "baseline", "baseline_mm", "fov", "vertical_fov")
+
+
+def _of_numbers(numbers: Dict[str, float], size: Optional[Tuple[int, int]], file: pathlib.Path, what: str) -> _egosgm.Calibration:
+    """Of a rectified pair. A field of view is of a rendered camera, whose principal point is the middle; of another one nothing is guessed."""
+    middle = dict(zip(("cx", "cy"), ((side - 1) / 2 for side in size or ())))
+    if "fx" not in numbers:
+        name, degrees = ("fov", numbers["fov"]) if "fov" in numbers else ("vertical_fov", numbers["vertical_fov"])
+        if not math.pi < degrees < 180:
+            raise refuse(file, f"is {what} with a field of view of {degrees:g}: it is in degrees"
+                         + (f": is this one in radians ({math.degrees(degrees):.4g} degrees)?" if 0 < degrees <= math.pi else ", below 180"))
+        if not size:
+            raise refuse(file, f"is {what} of a field of view, and nothing tells the images' size: give width and height")
+        numbers = {**middle, "fx": size[name != "fov"] / (2 * math.tan(math.radians(degrees) / 2)), **numbers}
+    lacking = [name for name in ("cx", "cy") if name not in numbers]
+    if lacking:
+        near = f"; the middle would be cx {middle['cx']:g}, cy {middle['cy']:g}" if middle else ""
+        raise refuse(file, f"is {what} and lacks {' and '.join(lacking)}, the principal point [px], which lies near the middle of the images{near}")
+    fx, cx, baseline_m = numbers["fx"], numbers["cx"], numbers.get("baseline", 0.001 * numbers.get("baseline_mm", 0))
+    if not baseline_m:
+        raise refuse(file, f"is {what} of fx, cx and cy, and lacks the baseline: give the distance of the two cameras in metres")
+    return _egosgm.Calibration(fx, numbers.get("fy", fx), cx, numbers["cy"], baseline_m, numbers.get("right_cx", cx) - cx)
+
+
 def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bool = False, images_size: Optional[Tuple[int, int]] = None) -> Found:
     found = named(data)
     size = size_of(found.get("size"))
@@ -271,6 +355,8 @@ def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bo
     if size is None and "width" in found:
         size = size_of([found["width"], found["height"]])
     matrices = {name: matrix(found.get(name), (3, 3)) for name in ("left_matrix", "right_matrix")}
+    for side, one in enumerate(matrices.values(), 1):
+        expect_upright(one, f"M{side}", file)
     matrices["R"], matrices["T"] = rotation(found.get("R")), matrix(found.get("T"), (3,))
     missing = [name for name, one in matrices.items() if one is None]
     if not missing:
@@ -286,17 +372,13 @@ def by_names(data: Dict[str, Any], file: pathlib.Path, what: str, is_fisheye: bo
     if q is not None and len(missing) >= 2:
         expect_size(size, images_size, file)
         return of_q(q, file)
-    numbers = {name: float(value[0]) for name in ("fx", "fy", "cx", "cy", "right_cx", "baseline", "baseline_mm")
-               if (value := matrix(found.get(name), (1,))) is not None}
-    if {"fx", "cx", "cy"} <= set(numbers):
-        fx, cx, baseline_m = numbers["fx"], numbers["cx"], numbers.get("baseline", 0.001 * numbers.get("baseline_mm", 0))
-        if not baseline_m:
-            raise refuse(file, f"is {what} of fx, cx and cy, and lacks the baseline: give the distance of the two cameras in metres")
+    numbers = {name: float(value[0]) for name in _NUMBERS if (value := matrix(found.get(name), (1,))) is not None}
+    if not {"fx", "fov", "vertical_fov"}.isdisjoint(numbers):
         expect_size(size, images_size, file)
-        return _egosgm.Calibration(fx, numbers.get("fy", fx), cx, numbers["cy"], baseline_m, numbers.get("right_cx", cx) - cx)
+        return _of_numbers(numbers, size or images_size, file, what)
     there = ", ".join(str(key) for key in list(data)[:12])
     raise refuse(file, f"is {what} ({there}) and lacks {', '.join(missing)}: a stereo calibration has the matrix and the distortion of both cameras, "
-                        "R and T, of finite numbers (M1, D1, M2, D2, R, T)")
+                        "R and T, of finite numbers (M1, D1, M2, D2, R, T); that of rectified images fx, cx, cy and baseline")
 
 
 def foundation_stereo(text: str, file: pathlib.Path) -> Optional[_egosgm.Calibration]:
@@ -307,6 +389,9 @@ def foundation_stereo(text: str, file: pathlib.Path) -> Optional[_egosgm.Calibra
         return None
     if len(numbers) == 9:
         raise refuse(file, "is a camera matrix alone, as of FoundationStereo's K.txt without its second row, the baseline in metres")
-    if len(numbers) != 10 or numbers[6:9] != [0, 0, 1]:
+    if len(numbers) != 10:
+        return None
+    expect_upright(np.array(numbers[:9]), "K", file)
+    if numbers[6:9] != [0, 0, 1]:
         return None
     return _egosgm.Calibration(numbers[0], numbers[4], numbers[2], numbers[5], numbers[9])

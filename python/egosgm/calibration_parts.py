@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _egosgm
-from .rectification import StereoRig
+from .rectification import StereoRig, is_transposed
 
 Matrix = NDArray[np.float64]
 Camera = Tuple[Matrix, Matrix, bool]  # matrix, distortion, whether that is a fisheye's
@@ -64,6 +64,11 @@ def matrix(value: Any, shape: Tuple[int, ...]) -> Optional[Matrix]:
     return numbers.reshape(shape or -1)
 
 
+def expect_upright(numbers: Optional[Matrix], name: str, file: pathlib.Path) -> None:
+    if numbers is not None and is_transposed(numbers):
+        raise refuse(file, f"{name} is transposed, as MATLAB writes it, with the numbers of its last column in its last row: transpose it, and the file's other matrices, R too")
+
+
 def size_of(value: Any) -> Optional[Tuple[int, int]]:
     numbers = matrix(value, (2,)) if value is not None else None
     return (int(numbers[0]), int(numbers[1])) if numbers is not None else None
@@ -96,6 +101,7 @@ class Values:
         found = matrix(value, shape)
         if found is None:
             raise self.refuse(f", and {name} is not {int(np.prod(shape)) if shape else 'of'} finite numbers")
+        expect_upright(found, name or "", self.file)
         return found
 
     def matrix(self, shape: Tuple[int, ...], *names: str) -> Matrix:

@@ -6,7 +6,8 @@ import math
 import os
 import pathlib
 import re
-from typing import Any, Callable, List, Optional, Sequence, Tuple, TypeVar, Union
+import zipfile
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, TypeVar, Union
 
 import numpy as np
 
@@ -80,7 +81,7 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool, size: Optional[Tup
     if isinstance(flat.get("value0"), dict) and "T_imu_cam" in flat["value0"]:
         return formats.basalt(flat["value0"], file)
     if isinstance(flat.get("cameraData"), list):
-        return formats.oak(flat, file)
+        return formats.oak(flat, file, size)
     if isinstance(flat.get("disparity_to_depth"), dict):
         name = next((name for name in ("cams_12", "cams_03") if name in flat["disparity_to_depth"]), "cams_12")
         return formats.of_q(parts.Values(flat["disparity_to_depth"], file, "DSEC's cam_to_cam.yaml").matrix((4, 4), name), file)
@@ -91,14 +92,28 @@ def _of_data(data: Any, file: pathlib.Path, is_fisheye: bool, size: Optional[Tup
     return formats.by_names({**nested, **flat}, file, "YAML, XML or JSON", is_fisheye, size)
 
 
+def _contents(file: pathlib.Path) -> Any:
+    """Of a file of one camera: what YAML, JSON, XML or an archive of arrays holds, or the text itself of a rover's camera."""
+    start = _egosgm._read_file(file, parts.MOST_BYTES)[:2] if file.is_file() else b""
+    if start == b"PK":
+        return _arrays(file)
+    text = parts.text_of(file)
+    return text if formats.is_cahv(text) else parts.data_of(text, file)
+
+
 def _of_two_files(files: List[pathlib.Path], size: Optional[Tuple[int, int]] = None) -> Found:
-    contents = [parts.data_of(parts.text_of(path), path) for path in files]
-    for file, data in zip(files, contents):
-        if not isinstance(data, dict) or not ("T_BS" in data or formats.is_info(data)):
-            raise parts.refuse(file, "is not the calibration of one camera, as of ROS (camera_matrix, projection_matrix) or EuRoC (T_BS, intrinsics)")
-    if ("T_BS" in contents[0]) != ("T_BS" in contents[1]):
+    contents = [_contents(path) for path in files]
+    kinds = ["CAHV" if isinstance(data, str) else "" if not isinstance(data, dict) else "EuRoC" if "T_BS" in data else "ROS" if formats.is_info(data) else
+             "lens" if formats.is_camera(data) else "" for data in contents]
+    for file, kind in zip(files, kinds):
+        if not kind:
+            raise parts.refuse(file, "is not the calibration of one camera, as of ROS (camera_matrix, projection_matrix), EuRoC (T_BS, intrinsics) or a rover (C, A, H, V)")
+    if kinds[0] != kinds[1]:
         raise parts.refuse(files[1], f"is of another kind than {files[0]}: give both cameras' files of one program")
-    return formats.euroc(files, contents) if "T_BS" in contents[0] else formats.ros(files, contents, size)
+    if kinds[0] == "lens":
+        raise _egosgm.InvalidArgument(f"{files[0]} and {files[1]}: each is the calibration of one camera alone, and neither says how the cameras stand: R and T are missing. "
+                                      "`egosgm calibrate` finds all of it by pictures of a board that both cameras took at once")
+    return formats.cahv(files, contents) if kinds[0] == "CAHV" else formats.euroc(files, contents) if kinds[0] == "EuRoC" else formats.ros(files, contents, size)
 
 
 def _of_folder(folder: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]) -> Found:
@@ -121,6 +136,16 @@ def _of_folder(folder: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int,
     raise parts.refuse(folder, "is a folder without one calibration: give the file" + (", of " + ", ".join(c.name for c in candidates[:8]) if candidates else ""))
 
 
+def _arrays(file: pathlib.Path) -> Dict[str, Any]:
+    try:
+        with np.load(file, allow_pickle=False) as archive:
+            if sum(part.file_size for part in archive.zip.infolist()) > parts.MOST_BYTES:
+                raise parts.refuse(file, f"holds more than {parts.MOST_BYTES >> 20} MiB of arrays: give a calibration alone")
+            return {name: archive[name] for name in archive.files}
+    except (ValueError, OSError, zipfile.BadZipFile) as error:
+        raise parts.refuse(file, f"is no archive of NumPy arrays: {error}") from None
+
+
 def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]] = None) -> Found:
     if file.is_dir():
         return _of_folder(file, is_fisheye, size)
@@ -133,13 +158,7 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
             ("a pickle of Python, which may run programs", "save its matrices by numpy.savez, or as JSON")
         raise parts.refuse(file, f"is {kind}: it is not read; {remedy}")
     if start.startswith(b"PK"):
-        try:
-            with np.load(file, allow_pickle=False) as archive:
-                if sum(part.file_size for part in archive.zip.infolist()) > parts.MOST_BYTES:
-                    raise parts.refuse(file, f"holds more than {parts.MOST_BYTES >> 20} MiB of arrays: give a calibration alone")
-                return formats.by_names({name: archive[name] for name in archive.files}, file, "an archive of NumPy arrays", is_fisheye, size)
-        except (ValueError, OSError) as error:
-            raise parts.refuse(file, f"is no archive of NumPy arrays: {error}") from None
+        return formats.by_names(_arrays(file), file, "an archive of NumPy arrays", is_fisheye, size)
     if start.startswith(b"\x93NUMPY"):
         array = np.load(file, allow_pickle=False)
         if array.shape == (4, 4):
@@ -152,6 +171,8 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
     text = parts.text_of(file)
     if re.search(r"(?m)^\[(LEFT|RIGHT)_CAM_\w+\]", text):
         return formats.zed(text, file, size)
+    if formats.is_cahv(text):
+        return _of_two_files(list(_other_side(file)), size)
     if text.startswith("frame cameraID "):
         return formats.virtual_kitti(file)
     plain = formats.foundation_stereo(text, file)

@@ -14,10 +14,13 @@ from .arguments import counted
 os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")  # what OpenCV would say of a broken file stands in our message
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 import cv2
+import numpy as np
 
 _FOREIGN = (".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")  # that only OpenCV reads
 _MOST_SKEW_NS = 2_000_000  # of cameras that are triggered together
 _MOST_LIST_BYTES = 1 << 28
+_MOST_PICTURE_BYTES = 1 << 28
+_MOST_HEIGHT = 2  # of a view, in its widths
 _LEAST_OF_VIDEO = 0.9  # of the images that it says it has, which many videos only estimate
 
 
@@ -50,10 +53,32 @@ def _read_image(file: pathlib.Path) -> Any:
     return image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
 
 
+def _read_mpo(file: pathlib.Path) -> Any:
+    """Both pictures of a 3D camera's file, which are two JPEG one behind the other, side by side."""
+    content = _egosgm._read_file(file, _MOST_PICTURE_BYTES)
+    end = _end_of_jpeg(content)
+    parts = content[:end], content[max(end, content.find(b"\xff\xd8\xff", end)):]
+    images = [cv2.imdecode(np.frombuffer(part, np.uint8), cv2.IMREAD_ANYCOLOR | cv2.IMREAD_IGNORE_ORIENTATION) if part else None for part in parts]
+    if any(image is None for image in images):
+        raise _refuse(f"{file}: does not hold two pictures, left and right, as an MPO does")
+    left, right = (image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB) for image in images)
+    pair = _same_size(RawPair(left, right), f"{file}")
+    return np.hstack([pair.left, pair.right])
+
+
+def _end_of_jpeg(content: bytes) -> int:
+    """Behind the end of the first picture: a small one may lie within its header, whose parts have lengths."""
+    at = 2
+    while content[at:at + 1] == b"\xff" and content[at + 1:at + 2] != b"\xda":
+        at += 2 + int.from_bytes(content[at + 2:at + 4], "big")
+    end = content.find(b"\xff\xd9", at)  # what is compressed holds no such marker
+    return end + 2 if end >= 0 else len(content)
+
+
 def _names_files(pattern: str) -> bool:
     """Whether it names images, by a pattern or an image's extension; else it is a video."""
     path = pathlib.Path(pattern)
-    return any(mark in path.name for mark in "*%") or path.suffix.lower() in (".png", ".jpg", ".jpeg", *_FOREIGN)
+    return any(mark in path.name for mark in "*%") or path.suffix.lower() in (".png", ".jpg", ".jpeg", ".mpo", *_FOREIGN)
 
 
 class _Files:
@@ -66,7 +91,7 @@ class _Files:
             raise _refuse(f"{pattern}: no file matches")
 
     def __iter__(self) -> Iterator[Tuple[Any, Optional[float]]]:
-        return ((_read_image(file), None) for file in self._files)
+        return (((_read_mpo if file.suffix.lower() == ".mpo" else _read_image)(file), None) for file in self._files)
 
 
 class _Video:
@@ -121,7 +146,7 @@ class RawPairs:
 class _TwoSources(RawPairs):
     def __init__(self, left: str, right: str) -> None:
         if os.path.exists(left) and os.path.exists(right) and os.path.samefile(left, right):
-            raise _refuse(f"--left {left} --right {right}: are one file: give one of each camera, or --side-by-side where it holds both views")
+            raise _refuse(f"--left {left} --right {right}: are one file: give one of each camera, or --side-by-side or --top-bottom where it holds both views")
         self._names = f"--left {left}", f"--right {right}"
         self._sources = _open(left), _open(right)
         counts = [source.count for source in self._sources]
@@ -144,18 +169,23 @@ class _TwoSources(RawPairs):
         self.note = "; ".join(notes)
 
 
-class _SideBySide(RawPairs):
-    def __init__(self, pattern: str) -> None:
-        self._name, self._images = pattern, _open(pattern)
+class _Halves(RawPairs):
+    """Images with the left view in the left half, or in the upper one."""
+
+    def __init__(self, option: str, pattern: str) -> None:
+        self._what, self._is_wide, self._images = f"{option} {pattern}", option == "--side-by-side", _open(pattern)
         self.count = self._images.count
 
     def __iter__(self) -> Iterator[RawPair]:
         for both, time_s in self._images:
-            width = both.shape[1]
-            if width % 2:
-                raise _refuse(f"--side-by-side {self._name}: the images are {width} px wide, which has no half")
-            yield RawPair(both[:, :width // 2], both[:, width // 2:], time_s)
-        self.note = self._images.note
+            size = both.shape[self._is_wide]
+            if size % 2:
+                raise _refuse(f"{self._what}: the images are {size} px {'wide' if self._is_wide else 'high'}, which has no half")
+            if both.shape[0] > _MOST_HEIGHT * size // 2 and self._is_wide:
+                self.note = f"a half is {size // 2} px wide and {both.shape[0]} high: does one view lie above the other? --top-bottom takes such images"
+            halves = np.split(both, 2, axis=int(self._is_wide))
+            yield RawPair(halves[0], halves[1], time_s)
+        self.note = self._images.note or self.note
 
 
 class _Listed(RawPairs):
@@ -247,16 +277,17 @@ def _of_euroc(mav0: pathlib.Path) -> RawPairs:
     return _Listed(pairs, "; ".join(notes))
 
 
-def open_pairs(left: Optional[str], right: Optional[str], side_by_side: Optional[str], list_: Optional[str], euroc: Optional[str],
+def open_pairs(left: Optional[str], right: Optional[str], side_by_side: Optional[str], top_bottom: Optional[str], list_: Optional[str], euroc: Optional[str],
                by_order: bool) -> RawPairs:
     """Throws InvalidArgument unless exactly one input was named."""
     two = bool(left or right)
-    sources = two + bool(side_by_side) + bool(list_) + bool(euroc)
+    sources = two + bool(side_by_side) + bool(top_bottom) + bool(list_) + bool(euroc)
     if sources != 1 or (two and not (left and right)):
         what = "no input" if sources == 0 else "more than one input" if sources > 1 else "half a pair"
-        raise _refuse(f"{what}: give --left and --right, or --side-by-side, or --list, or --euroc")
+        raise _refuse(f"{what}: give --left and --right, or --side-by-side, or --top-bottom, or --list, or --euroc")
     if left and right:
         return _of_patterns(left, right, by_order) if _names_files(left) and _names_files(right) else _TwoSources(left, right)
-    if side_by_side:
-        return _SideBySide(side_by_side)
+    for option, pattern in (("--side-by-side", side_by_side), ("--top-bottom", top_bottom)):
+        if pattern:
+            return _Halves(option, pattern)
     return _of_list(pathlib.Path(list_)) if list_ else _of_euroc(pathlib.Path(euroc or ""))

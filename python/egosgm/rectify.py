@@ -41,6 +41,7 @@ def _parser() -> Parser:
     add("--pair-by", default="name", metavar="name|order", help="what tells which --left and --right images belong together: equal texts in their names "
         "(what * or %%d stands for), or their order")
     add("--side-by-side", metavar="PATTERN", help="images or a video with the left view in the left half and the right one in the right half")
+    add("--top-bottom", metavar="PATTERN", help="images or a video with the left view in the upper half and the right one in the lower half")
     add("--list", metavar="FILE", help="a text file with rows LEFT RIGHT or LEFT RIGHT SECONDS")
     add("--euroc", metavar="DIR", help="an EuRoC sequence (mav0 or its parent), with its own calibration")
     add = parser.add_argument
@@ -158,7 +159,7 @@ def main(arguments: Sequence[str]) -> int:
     given.unit = _unit_m(given.unit)
     if given.euroc and os.path.isdir(os.path.join(given.euroc, "mav0")):
         given.euroc = os.path.join(given.euroc, "mav0")
-    pairs = open_pairs(given.left, given.right, given.side_by_side, given.list, given.euroc, given.pair_by == "order")
+    pairs = open_pairs(given.left, given.right, given.side_by_side, given.top_bottom, given.list, given.euroc, given.pair_by == "order")
     stream = iter(pairs)
     first = next(stream, None)
     rectifier = _Rectifier(given, first.left.shape[1::-1] if first else None)

@@ -171,20 +171,44 @@ class Rectify(RectifyTest):
         self.assert_refused(["rectify", "--left", whole, "--right", folder / "../" / folder.name / "whole.avi", "--calib", self.street / "calib.txt", "--out",
                              folder / "never"], "are one file", "--side-by-side")
 
-    def test_side_by_side_images_and_lists(self):
-        both = self.new_folder()
+    def test_images_of_both_views_and_lists(self):
+        both, above = self.new_folder(), self.new_folder()
         for i in range(2):
             left, right = (read_grey(self.raw_folder / f"cam{side}/{9 + i}.png") for side in (0, 1))
             write_grey(both / f"{i}.png", numpy.hstack([left, right]))
+            write_grey(above / f"{i}.png", numpy.vstack([left, right]))
         expected, _ = self.rectify(*self.PAIRS)
         out, _ = self.rectify("--side-by-side", both / "*.png")
+        stacked, _ = self.rectify("--top-bottom", above / "*.png")
         rows = "# left right seconds\n" + "".join(f"cam0/{i}.png cam1/{i}.png {i / 8}\n" for i in (9, 10))
         (self.raw_folder / "list.txt").write_text(rows)
         listed, _ = self.rectify("--list", self.raw_folder / "list.txt")
         for file in expected.rglob("*.png"):
-            for folder in (out, listed):
+            for folder in (out, stacked, listed):
                 self.assertEqual((folder / file.relative_to(expected)).read_bytes(), file.read_bytes())
         self.assertEqual((listed / "times.txt").read_text(), "1.125000000\n1.250000000\n")
+
+    def test_one_view_above_the_other_is_told_where_it_is_taken_for_side_by_side(self):
+        folder = self.new_folder()
+        write_grey(folder / "above.png", numpy.zeros((4 * 40, 2 * 30), numpy.uint8))
+        calib = (self.street / "calib.txt").read_text()
+        self.assertIn("does one view lie above the other? --top-bottom", self.rectify("--side-by-side", folder / "above.png", calib=calib)[1])
+        self.assertNotIn("--top-bottom", self.rectify("--top-bottom", folder / "above.png", calib=calib)[1])
+        write_grey(folder / "odd.png", numpy.zeros((41, 60), numpy.uint8))
+        self.assert_refused(["rectify", "--top-bottom", folder / "odd.png", "--calib", self.street / "calib.txt", "--out", folder / "never"], "41 px high, which has no half")
+
+    def test_both_pictures_of_a_3d_camera_in_one_file(self):
+        folder = self.new_folder()
+        images = [read_grey(self.street / f"image_{side}/000000.png") for side in (0, 1)]
+        jpegs = [cv2.imencode(".jpg", image)[1].tobytes() for image in images]
+        thumbnail = b"\xff\xe1" + (2 + len(jpegs[1])).to_bytes(2, "big") + jpegs[1]  # in a header, as cameras write it
+        (folder / "both.MPO").write_bytes(jpegs[0][:2] + thumbnail + jpegs[0][2:] + b"\0\0" + jpegs[1])
+        out, _ = self.rectify("--side-by-side", folder / "*.MPO", calib=(self.street / "calib.txt").read_text())
+        for side, jpeg in enumerate(jpegs):
+            expected = cv2.imdecode(numpy.frombuffer(jpeg, numpy.uint8), cv2.IMREAD_GRAYSCALE)
+            numpy.testing.assert_array_equal(read_grey(out / f"image_{side}/000000.png"), expected)
+        (folder / "one.mpo").write_bytes(jpegs[0])
+        self.assert_refused(["rectify", "--side-by-side", folder / "one.mpo", "--calib", self.street / "calib.txt", "--out", folder / "never"], "does not hold two pictures")
 
     def test_pairs_are_those_of_equal_names(self):
         raw = self.new_folder()

@@ -3,6 +3,7 @@
 import contextlib
 import gzip
 import json
+import math
 import os
 import random
 import re
@@ -58,6 +59,9 @@ RECTIFIED = {
     "flat.yaml": yaml.safe_dump(dict(focal_length=F, ppx=CX, ppy=CY, baseline_mm=1000 * B)),
     "own.json": json.dumps(dict(fx=F, fy=F, cx=CX, cy=CY, baseline_m=B)),
     "cam_to_cam.yaml": yaml.safe_dump(dict(intrinsics=dict(cam0=dict(camera_matrix=[1, 2, 3, 4])), disparity_to_depth=dict(cams_12=Q))),
+    "few.yaml": f"f: {F}\nB: {B}\ncx: {CX}\ncy: {CY}\n",
+    "rendered.json": json.dumps(dict(image_size_x=WIDTH, image_size_y=HEIGHT, fov=math.degrees(2 * math.atan(WIDTH / 2 / F)), baseline=B)),
+    "rendered.yaml": yaml.safe_dump(dict(camera=dict(width=WIDTH, height=HEIGHT, vfov_deg=math.degrees(2 * math.atan(HEIGHT / 2 / F))), baseline=B)),
     "K.txt": " ".join(map(str, flat(K))) + f"\n{B}\n",
     "q.yml": opencv_yaml(Q=Q),
     "q_of_python.json": json.dumps(dict(Q=Q)),
@@ -189,6 +193,81 @@ def test_a_file_for_each_camera_of_any_name(tmp_path):
         egosgm.read_calibration((tmp_path / "a.yaml", tmp_path / "c.yaml"))
 
 
+OAK = dict(RAW_OAK := json.loads(RAW["oak.json"]), cameraData=[
+    [socket, dict(camera, width=1280, height=800, intrinsicMatrix=[[800, 0, 645], [0, 800, 394], [0, 0, 1]])] for socket, camera in RAW_OAK["cameraData"]])
+
+
+@pytest.mark.parametrize("size, expected", [((1280, 800), (800, 645, 394)), ((640, 400), (400, 322.5, 197)), ((1280, 720), (800, 645, 354)), ((640, 360), (400, 322.5, 177)),
+                                            ((640, 480), None), ((2560, 1600), None), ((1280, 801), None)])
+def test_an_oak_is_read_for_the_sizes_of_its_streams(size, expected, tmp_path):
+    (tmp_path / "oak.json").write_text(json.dumps(OAK))
+    rig = egosgm.read_calibration(tmp_path / "oak.json", size=size)
+    if expected:
+        assert rig.size == size
+        for k in (rig.left_matrix, rig.right_matrix):
+            assert [k[0, 0], k[1, 1], k[0, 2], k[1, 2]] == pytest.approx([expected[0], *expected])
+    else:
+        assert rig.size == (1280, 800)  # which Rectification refuses
+
+
+def cahv(place, turn, **others):
+    """A camera whose axes are the rows of `turn`, as rovers describe it."""
+    x, y, a = np.asarray(turn)
+    vectors = dict(C=place, A=a, H=F * x + CX * a, V=F * y + CY * a, **others)
+    return f"Model = CAHV = perspective, linear\nDimensions = {WIDTH} {HEIGHT}\n" + "".join(f"{name} = {' '.join(map(repr, flat(vector)))}\n" for name, vector in vectors.items())
+
+
+def test_cameras_of_rovers(tmp_path):
+    turn = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])  # the rover's x is ahead, its z down
+    place = np.array([0.3, -0.2, -1.5])
+
+    def read(left, right):
+        (tmp_path / "left.cahv").write_text(left)
+        (tmp_path / "right.cahv").write_text(right)
+        return egosgm.read_calibration(tmp_path / "left.cahv")
+
+    expect_rectified(read(cahv(place, turn), cahv(place + B * turn[0], turn)))
+    expect_rectified(egosgm.read_calibration((tmp_path / "left.cahv", tmp_path / "right.cahv")))
+    toed_in = np.array([[0.0, np.cos(0.01), np.sin(0.01)], [0, -np.sin(0.01), np.cos(0.01)], [1, 0, 0]])
+    rig = read(cahv(place, turn), cahv(place + B * turn[0], toed_in))
+    np.testing.assert_allclose(rig.R, toed_in @ turn.T, atol=1e-12)
+    np.testing.assert_allclose(rig.T, toed_in @ (-B * turn[0]), atol=1e-12)
+    lens = dict(O=turn[2], R=[0, -0.1, 0.05])
+    assert read(cahv(place, turn, **lens), cahv(place + B * turn[0], turn, **lens)).left_distortion.tolist() == [-0.1, 0.05, 0, 0, 0]
+    for others, named in ((dict(O=[1, 0, 0.01], R=[0, -0.1, 0]), "CAHVOR, whose lens has an axis O"), (dict(E=[0, 0, 0]), "CAHVORE"), (dict(R=[0, 1, 0]), "CAHVOR")):
+        with pytest.raises(egosgm.InvalidArgument, match=f"right.cahv: is a rover's camera .CAHV.*{named}"):
+            read(cahv(place, turn), cahv(place + B * turn[0], turn, **others))
+
+
+@pytest.mark.parametrize("name, text", [
+    ("camera.yaml", f"%YAML:1.0\n---\nmodel_type: PINHOLE\nprojection_parameters:\n   fx: {F}\n   fy: {F}\n   cx: {CX}\n   cy: {CY}\n"),
+    ("camera.json", json.dumps(dict(camera_matrix=K, dist_coeff=LENS))), ("camera.yml", opencv_yaml(K=K, D=LENS)), ("camera.npz", dict(K=np.array(K), T=np.eye(4))),
+])
+def test_two_cameras_that_do_not_say_how_they_stand(name, text, tmp_path):
+    files = [tmp_path / f"{side}_{name}" for side in "ab"]
+    for file in files:
+        if isinstance(text, dict):
+            np.savez(file, **text)
+        else:
+            file.write_text(text)
+    with pytest.raises(egosgm.InvalidArgument, match="each is the calibration of one camera alone, and neither says how the cameras stand"):
+        egosgm.read_calibration(files)
+
+
+TRANSPOSED = np.transpose(K).tolist()
+
+
+@pytest.mark.parametrize("text, named", [
+    (RAW["nested.json"].replace(json.dumps(K), json.dumps(TRANSPOSED)), "M1"), (json.dumps(dict(Q=np.transpose(Q).tolist())), "Q"),
+    (kalibr(T_cn_cnm1=np.transpose(SHIFT).tolist()), "T_cn_cnm1"), (RAW["oak.json"].replace(json.dumps(K), json.dumps(TRANSPOSED)), "intrinsicMatrix"),
+    (" ".join(map(str, flat(TRANSPOSED))) + f"\n{B}\n", "K"),
+])
+def test_transposed_matrices_are_named(text, named, tmp_path):
+    (tmp_path / "calib.txt").write_text(text)
+    with pytest.raises(egosgm.InvalidArgument, match=f"{named}:? is transposed, as MATLAB writes it"):
+        egosgm.read_calibration(tmp_path / "calib.txt")
+
+
 def test_vins_and_its_cameras(tmp_path):
     for i in (0, 1):
         (tmp_path / f"cam{i}.yaml").write_text("%YAML:1.0\n---\n" + yaml.safe_dump(dict(
@@ -293,6 +372,9 @@ def test_a_fisheye(tmp_path):
     (kalibr([-0, 28, 0.07, 0.001, 0.002], "equidistant"), "distortion_coeffs of cam0 are 5 numbers, not 4: does a decimal comma"),
     (RECTIFIED["flat.json"].replace("width", "widht"), "the images' height alone"),
     (RAW["orb_slam3_raw.yaml"].replace("Camera2.k1", "Camera2.k"), "lacks Camera2.k1"),
+    (f"f: {F}\nB: {B}\n", "lacks cx and cy, the principal point"), (f"f: {F}\nB: {B}\nwidth: 640\nheight: 480\n", "the middle would be cx 319.5, cy 239.5"),
+    ("fov: 90\nbaseline: 0.3\n", "nothing tells the images' size"), ("fov: 1.5708\nbaseline: 0.3\nwidth: 640\nheight: 480\n", "in radians (90 degrees)"),
+    ("hfov: 69.7\nwidth: 640\nheight: 480\n", "lacks the baseline"),
     (RECTIFIED["orb_slam2.yaml"].replace(f"fx: {F}", "fx: -1"), "calib.yaml: calibration: fx is -1"),
 ])
 def test_what_is_known_and_not_enough_is_named(text, named, tmp_path):
