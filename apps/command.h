@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "apps/feed.h"
+#include "apps/frame_sink.h"
 #include "apps/sequence_arguments.h"
 
 namespace egosgm::app {
@@ -23,12 +23,12 @@ struct Command {
 /// What the Python package does for a run. Without it, the program becomes the package's where that is asked for.
 struct Package {
   /// The frames of a bag that lie in `range`, of a run that writes to `out`.
-  std::function<std::shared_ptr<Feed>(const BagArguments& bag, const std::string& calib, vision::FrameRange range,
-                                      const std::string& out)>
+  std::function<std::shared_ptr<vision::FrameSource>(const BagArguments& bag, const std::string& calib,
+                                                     vision::FrameRange range, const std::string& out)>
       open_bag;
   CalibrationReader read_calibration;
   /// A recording, unless `file` is empty, and a viewer.
-  std::function<std::shared_ptr<Taker>(const std::string& file, bool viewer)> take;
+  std::function<std::shared_ptr<FrameSink>(const std::string& file, bool viewer)> take;
 };
 
 Command add_run(CLI::App& program, const Package& package);

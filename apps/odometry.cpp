@@ -7,7 +7,6 @@
 
 #include "apps/command.h"
 #include "apps/interrupt.h"
-#include "apps/motion_source.h"
 #include "apps/option_group.h"
 #include "apps/output_folder.h"
 #include "apps/progress.h"
@@ -16,6 +15,7 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/poses_io.h"
 #include "vision/file_io.h"
+#include "vision/motion_source.h"
 
 namespace egosgm::app {
 namespace {
@@ -27,7 +27,7 @@ struct OdometryArguments {
   bool quiet = false;
 };
 
-void tell(const vision::StereoFrame& frame, const FrameMotion& motion, bool first, Progress& progress) {
+void tell(const vision::StereoFrame& frame, const vision::FrameMotion& motion, bool first, Progress& progress) {
   const OdometryResult& odometry = motion.odometry;
   if (!first && !odometry.motion)
     progress.note(fmt::format("frame {}: no motion ({}): the last one is repeated", frame.name, odometry.reason));
@@ -37,9 +37,9 @@ void tell(const vision::StereoFrame& frame, const FrameMotion& motion, bool firs
 }
 
 int estimate(const OdometryArguments& arguments, const CalibrationReader& read) {
-  FileFeed feed(arguments.input.open(/*needs_calibration=*/true, read));
-  const vision::StereoSequence& sequence = feed.sequence();
-  MotionSource motions(sequence, {}, arguments.options);
+  vision::FileSource source(arguments.input.open(/*needs_calibration=*/true, read));
+  const vision::StereoSequence& sequence = source.sequence();
+  vision::MotionSource motions(sequence, {}, arguments.options);
   expect_no_folder("--out", arguments.out);
   vision::make_folder(std::filesystem::absolute(arguments.out).parent_path());
   expect_new_file("--out", arguments.out);
@@ -50,11 +50,11 @@ int estimate(const OdometryArguments& arguments, const CalibrationReader& read) 
     Progress progress(static_cast<int>(sequence.frames.size()), arguments.quiet);
     if (!sequence.note.empty()) progress.note(sequence.note);
     while (!interrupted()) {
-      const std::optional<FedFrame> fed = feed.next();
-      if (!fed) break;
-      if (!fed->unreadable.empty()) throw InvalidArgument(fed->unreadable);
-      const FrameMotion motion = motions.next(*fed, poses.size());
-      tell(fed->frame, motion, poses.empty(), progress);
+      const std::optional<vision::VideoPair> pair = source.next();
+      if (!pair) break;
+      if (!pair->unreadable.empty()) throw InvalidArgument(pair->unreadable);
+      const vision::FrameMotion motion = motions.next(*pair, poses.size());
+      tell(pair->frame, motion, poses.empty(), progress);
       poses.push_back(motion.first_from_camera);
     }
   } catch (const std::exception&) {  // the poses before are whole

@@ -7,21 +7,22 @@
 #include <vector>
 
 #include "apps/device_arguments.h"
-#include "apps/feed.h"
-#include "apps/motion_source.h"
+#include "apps/frame_sink.h"
 #include "apps/option_group.h"
 #include "apps/output_folder.h"
 #include "apps/run_outputs.h"
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
 #include "vision/frame_panels.h"
+#include "vision/motion_source.h"
 
 namespace egosgm::app {
 namespace {
 
-std::shared_ptr<Feed> feed_of(const RunArguments& arguments, const Package& package) {
+std::shared_ptr<vision::FrameSource> source_of(const RunArguments& arguments, const Package& package) {
   if (arguments.bag.bag.empty()) {
-    return std::make_shared<FileFeed>(arguments.input.open(/*needs_calibration=*/false, package.read_calibration));
+    return std::make_shared<vision::FileSource>(
+        arguments.input.open(/*needs_calibration=*/false, package.read_calibration));
   }
   SequenceArguments others = arguments.input;
   others.calib = others.frames = "";
@@ -36,14 +37,14 @@ std::shared_ptr<Feed> feed_of(const RunArguments& arguments, const Package& pack
 
 /// Throws InvalidArgument for what only a folder takes, or for what the frames have not.
 void expect_takeable(const RunArguments& arguments, const SequenceJob& job) {
-  const vision::StereoSequence& sequence = job.feed->sequence();
+  const vision::StereoSequence& sequence = job.source->sequence();
   for (const char* kind : {"cloud", "depth", "depth_m"}) {
     if (sequence.has_calibration || !job.kinds.contains(kind)) continue;
     throw InvalidArgument(
         fmt::format("--write {}: a disparity is no depth without a calibration: give --calib FILE", kind));
   }
   if (job.kinds.contains("overview")) {
-    for (const vision::StereoFrame& frame : sequence.frames) vision::expect_truth_of_size(frame, job.feed->size());
+    for (const vision::StereoFrame& frame : sequence.frames) vision::expect_truth_of_size(frame, job.source->size());
   }
   if (!arguments.has_recording() && !arguments.rerun) return;
   const std::string what = arguments.has_recording() ? "--out " + arguments.out : "--rerun";
@@ -57,8 +58,8 @@ void expect_takeable(const RunArguments& arguments, const SequenceJob& job) {
 }
 
 OutputFolder folder_of(const RunArguments& arguments, const SequenceJob& job) {
-  std::vector<std::string> files = output_files(job.kinds, job.feed->sequence(), job.options);
-  if (job.feed->has_no_files()) files.emplace_back(kRunCalibration);
+  std::vector<std::string> files = output_files(job.kinds, job.source->sequence(), job.options);
+  if (job.source->has_no_files()) files.emplace_back(kRunCalibration);
   return {arguments.out, arguments.resume, files};
 }
 
@@ -110,15 +111,15 @@ SequenceJob RunArguments::job(const Package& package) const {
     throw InvalidArgument(
         fmt::format("--cloud-sigma {:g}: is of clouds: give --write cloud, too", cloud_sigma_percent));
   }
-  job.feed = feed_of(*this, package);
+  job.source = source_of(*this, package);
   job.input = bag.bag.empty() ? input.text() : bag.text();
   job.poses_file = poses;
   job.odometry = odometry;
   expect_takeable(*this, job);
-  if (job.feed->has_no_files() && has_folder()) job.kinds.insert("left");
+  if (job.source->has_no_files() && has_folder()) job.kinds.insert("left");
   if (has_folder()) job.out = folder_of(*this, job);
   if (has_recording() || rerun) {
-    job.taker = package.take(has_recording() ? out : "", rerun);
+    job.sink = package.take(has_recording() ? out : "", rerun);
   }
   job.trace = job.out.named_file("--trace", trace);
   job.save_config = job.out.named_file("--save-config", method.save_config);

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "apps/feed.h"
+#include "apps/frame_sink.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/point_cloud.h"
 #include "vision/frame_panels.h"
@@ -48,7 +48,7 @@ class RunOutputs {
   /// Where the pipeline is to write; valid as long as this object lives.
   FrameOutputs views();
 
-  /// Those of a Taker, whatever is written.
+  /// Those of a FrameSink, whatever is written.
   void make_shown_maps();
   ShownMaps shown() const { return {disparity_, variance_, reason_}; }
 

@@ -28,7 +28,7 @@ Json json_of(const Calibration& c) {
       {"fx", c.fx}, {"fy", c.fy}, {"cx", c.cx}, {"cy", c.cy}, {"baseline_m", c.baseline_m}, {"doffs_px", c.doffs_px}};
 }
 
-Json odometry_json(const FrameMotion& motion) {
+Json odometry_json(const vision::FrameMotion& motion) {
   Json json{{"source", motion.is_given ? "poses file" : "estimated"}};
   if (!motion.is_given) {
     json["features"] = motion.odometry.features;
@@ -42,7 +42,7 @@ Json odometry_json(const FrameMotion& motion) {
 }
 
 /// A stage that runs more than once in a frame (the consistency checks) has its times added up.
-Json times_json(const FrameReport& report, const FrameMotion& motion, const HostTimes& times) {
+Json times_json(const FrameReport& report, const vision::FrameMotion& motion, const HostTimes& times) {
   Json json = Json::object();
   for (const StageTime& stage : report.stages) json[stage.stage] = json.value(stage.stage, 0.0) + stage.ms;
   json["total"] = report.total_ms;
@@ -115,9 +115,9 @@ void RunReport::take_over(const LostDevice& from) {
   json_["fallback"] = {{"from", json_of(from.device)}, {"why", from.why}};
 }
 
-void RunReport::add(const FedFrame& fed, const FrameReport& report, const FrameMotion& motion, const HostTimes& times,
-                    const WrittenFrame& written) {
-  const vision::StereoFrame& frame = fed.frame;
+void RunReport::add(const vision::VideoPair& pair, const FrameReport& report, const vision::FrameMotion& motion,
+                    const HostTimes& times, const WrittenFrame& written) {
+  const vision::StereoFrame& frame = pair.frame;
   json_["frames"].push_back({{"frame", frame.number},
                              {"left", std::filesystem::absolute(frame.left).string()},
                              {"search_fraction", report.search_fraction},
@@ -137,7 +137,7 @@ void RunReport::add(const FedFrame& fed, const FrameReport& report, const FrameM
         {"points", cloud->points},
         {"left_out", {{"far", out.far}, {"uncertain", out.uncertain}, {"alone", out.alone}}}};
   }
-  if (fed.stamp_ns) json_["frames"].back()["stamp_ns"] = *fed.stamp_ns;
+  if (pair.stamp_ns) json_["frames"].back()["stamp_ns"] = *pair.stamp_ns;
   if (frame.name != fmt::format("{:06}", frame.number)) json_["frames"].back()["name"] = frame.name;
 }
 

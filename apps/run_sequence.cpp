@@ -10,7 +10,6 @@
 
 #include "apps/counted.h"
 #include "apps/interrupt.h"
-#include "apps/motion_source.h"
 #include "apps/option_arguments.h"
 #include "apps/progress.h"
 #include "apps/run_outputs.h"
@@ -22,6 +21,7 @@
 #include "egosgm/vision/poses_io.h"
 #include "vision/doubt.h"
 #include "vision/file_io.h"
+#include "vision/motion_source.h"
 
 namespace egosgm::app {
 namespace {
@@ -61,8 +61,8 @@ double ms_since(Clock::time_point start) {
 
 /// What a frame needs before the device can start.
 struct PreparedFrame {
-  FedFrame fed;
-  FrameMotion motion;
+  vision::VideoPair pair;
+  vision::FrameMotion motion;
   Clock::time_point read_start, odometry_start;
   double read_ms = 0;
 };
@@ -73,24 +73,24 @@ class Run {
       : quiet_(job.quiet),
         folder_(job.out),
         save_config_(job.save_config),
-        feed_(*job.feed),
-        taker_(job.taker.get()),
-        sequence_(feed_.sequence()),
+        source_(*job.source),
+        sink_(job.sink.get()),
+        sequence_(source_.sequence()),
         cloud_options_(job.cloud),
         input_(job.input),
-        size_(feed_.size()),
+        size_(source_.size()),
         motions_(sequence_, job.poses_file, job.odometry),
         waiting_(std::in_place,
                  fmt::format("compiling the kernels for {}, which its driver keeps if it can", device.info().name),
                  quiet_),
-        pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, feed_.type()),
+        pipeline_(sequence_.calibration, size_.width, size_.height, job.options, device, source_.type()),
         report_(sequence_, pipeline_, motion_of(job), size_.width, size_.height),
         doubt_(sequence_.has_calibration ? std::optional(sequence_.calibration) : std::nullopt, job.options) {
     if (job.lost) report_.take_over(*job.lost);
     if (has_folder()) folder_.begin(report_.identity());
     if (job.kinds.contains("reason")) report_.add_reasons();
     outputs_.emplace(folder_.path(), job.kinds, size_, job.options, sequence_.calibration, cloud_options_);
-    if (taker_) outputs_->make_shown_maps();
+    if (sink_) outputs_->make_shown_maps();
     if (job.trace.empty()) return;
     trace_.emplace(job.trace);
     pipeline_.record_commands(true);
@@ -102,12 +102,12 @@ class Run {
     write_report(false, kKilled);
     try {
       save_config();
-      pipeline_.prepare(feed_.type(), outputs_->views());
+      pipeline_.prepare(source_.type(), outputs_->views());
       waiting_.reset();
-      if (has_folder() && feed_.has_no_files()) {
+      if (has_folder() && source_.has_no_files()) {
         vision::write_calibration(folder_.path() / kRunCalibration, sequence_.calibration);
       }
-      if (taker_) taker_->begin(pipeline_.options(), sequence_.calibration);
+      if (sink_) sink_->begin(pipeline_.options(), sequence_.calibration);
       const bool finished = process_all();
       finish(finished, finished ? "" : kInterrupt);
       if (!finished) {
@@ -131,9 +131,9 @@ class Run {
   bool has_folder() const { return !folder_.path().empty(); }
 
   static std::string motion_of(const SequenceJob& job) {
-    if (!job.feed->sequence().has_calibration) return "none: the images have no calibration";
+    if (!job.source->sequence().has_calibration) return "none: the images have no calibration";
     if (!job.poses_file.empty()) return "poses of " + job.poses_file;
-    if (const std::string poses = job.feed->poses(); !poses.empty()) return "poses of " + poses;
+    if (const std::string poses = job.source->poses(); !poses.empty()) return "poses of " + poses;
     return fmt::format("stereo odometry, at most {} m and {} degrees a frame", job.odometry.max_translation_m,
                        job.odometry.max_rotation_deg);
   }
@@ -158,10 +158,10 @@ class Run {
         std::optional<PreparedFrame> frame = next.get();
         is_over = !frame;
         if (is_over) break;
-        if (frame->fed.unreadable.empty()) {
+        if (frame->pair.unreadable.empty()) {
           submit(std::move(*frame), progress);
         } else {
-          leave_out(frame->fed, progress);
+          leave_out(frame->pair, progress);
         }
       } catch (const DeviceError&) {
         throw;
@@ -177,7 +177,7 @@ class Run {
     if (!is_over && poses_.size() + left_out_ < sequence_.frames.size())
       return false;  // what was only read is not done
     if (2 * left_out_ > sequence_.frames.size()) throw InvalidArgument(text_of_left_out());
-    if (motions_.has_file() && feed_.has_lost_images()) {
+    if (motions_.has_file() && source_.has_lost_images()) {
       throw InvalidArgument("--poses: the rows of a file belong to images one after the other, and " + sequence_.title +
                             " has images that are in no pair: give --pose-topic, or leave the poses out");
     }
@@ -187,44 +187,47 @@ class Run {
   std::optional<PreparedFrame> prepare() {
     PreparedFrame frame;
     frame.read_start = Clock::now();
-    std::optional<FedFrame> fed = feed_.next();
-    if (!fed) return std::nullopt;
-    frame.fed = std::move(*fed);
+    std::optional<vision::VideoPair> pair = source_.next();
+    if (!pair) return std::nullopt;
+    frame.pair = std::move(*pair);
     frame.read_ms = ms_since(frame.read_start);
     const std::size_t place = fed_++;
-    if (!frame.fed.unreadable.empty()) return frame;
-    const cv::Mat& left = frame.fed.images.left;
+    if (!frame.pair.unreadable.empty()) {
+      if (interrupted()) throw InvalidArgument(frame.pair.unreadable);  // a pipe that was waited for
+      return frame;
+    }
+    const cv::Mat& left = frame.pair.images.left;
     if (left.size() != size_) {
       throw InvalidArgument(fmt::format("{} is {}x{} and the sequence {}x{}: all frames need one size",
-                                        frame.fed.frame.left.string(), left.cols, left.rows, size_.width,
+                                        frame.pair.frame.left.string(), left.cols, left.rows, size_.width,
                                         size_.height));
     }
     frame.odometry_start = Clock::now();
-    frame.motion = motions_.next(frame.fed, place);
+    frame.motion = motions_.next(frame.pair, place);
     return frame;
   }
 
   /// A pair that cannot be read costs itself alone: the next motion is over two intervals.
-  void leave_out(const FedFrame& fed, Progress& progress) {
-    const fs::path map = folder_.path() / output_file("disparity", fed.frame.name, pipeline_.options());
+  void leave_out(const vision::VideoPair& pair, Progress& progress) {
+    const fs::path map = folder_.path() / output_file("disparity", pair.frame.name, pipeline_.options());
     if (has_folder() && fs::exists(map)) {
       throw InvalidArgument(
           fmt::format("--resume: {} is there, but its pair cannot be read any more: {}; give another "
                       "--out",
-                      map.string(), fed.unreadable));
+                      map.string(), pair.unreadable));
     }
-    if (left_out_++ == 0) first_left_out_ = fed.unreadable;
-    report_.leave_out(fed.frame, fed.unreadable);
-    progress.note(fmt::format("frame {}: left out: {}", fed.frame.name, fed.unreadable));
-    progress.done(fmt::format("frame {}  left out", fed.frame.name));
+    if (left_out_++ == 0) first_left_out_ = pair.unreadable;
+    report_.leave_out(pair.frame, pair.unreadable);
+    progress.note(fmt::format("frame {}: left out: {}", pair.frame.name, pair.unreadable));
+    progress.done(fmt::format("frame {}  left out", pair.frame.name));
   }
 
   void submit(PreparedFrame frame, Progress& progress) {
-    if (frame.fed.starts_anew && (!poses_.empty() || !under_way_.empty())) {
+    if (frame.pair.starts_anew && (!poses_.empty() || !under_way_.empty())) {
       while (!under_way_.empty()) collect(progress);
       pipeline_.reset();
     }
-    pipeline_.submit(vision::image_view(frame.fed.images.left), vision::image_view(frame.fed.images.right),
+    pipeline_.submit(vision::image_view(frame.pair.images.left), vision::image_view(frame.pair.images.right),
                      frame.motion.motion, outputs_->views());
     under_way_.push_back(std::move(frame));
   }
@@ -234,20 +237,20 @@ class Run {
     const FrameReport result = pipeline_.collect();
     const PreparedFrame prepared = std::move(under_way_.front());
     under_way_.pop_front();
-    const vision::StereoFrame& frame = prepared.fed.frame;
+    const vision::StereoFrame& frame = prepared.pair.frame;
     const std::optional<Motion>& motion = prepared.motion.motion;
     const auto before_write = Clock::now();
-    const WrittenFrame written = has_folder() ? outputs_->write(frame, prepared.fed.images.left) : WrittenFrame();
-    if (taker_) {
-      taker_->take(prepared.fed, outputs_->shown(), result,
-                   motion ? std::optional(motion->current_from_previous) : std::nullopt);
+    const WrittenFrame written = has_folder() ? outputs_->write(frame, prepared.pair.images.left) : WrittenFrame();
+    if (sink_) {
+      sink_->take(prepared.pair, outputs_->shown(), result,
+                  motion ? std::optional(motion->current_from_previous) : std::nullopt);
     }
     if (written.cloud) add(*written.cloud);
     const HostTimes times{prepared.read_ms, ms_since(before_write), ms_since(last_written_)};
     last_written_ = Clock::now();
     if (trace_) trace(frame.name, prepared, result, before_write, times.write_ms);
-    report_.add(prepared.fed, result, prepared.motion, times, written);
-    doubt_.add(prepared.fed.images.left, prepared.fed.images.right, result, motion.has_value());
+    report_.add(prepared.pair, result, prepared.motion, times, written);
+    doubt_.add(prepared.pair.images.left, prepared.pair.images.right, result, motion.has_value());
     poses_.push_back(prepared.motion.first_from_camera);
     tell(frame, result, prepared.motion, times, written, progress);
   }
@@ -270,7 +273,7 @@ class Run {
     trace_->add_host("write", frame, Trace::Row::kWrite, before_write, write_ms);
   }
 
-  void tell(const vision::StereoFrame& frame, const FrameReport& result, const FrameMotion& motion,
+  void tell(const vision::StereoFrame& frame, const FrameReport& result, const vision::FrameMotion& motion,
             const HostTimes& times, const WrittenFrame& written, Progress& progress) {
     if (sequence_.has_calibration && poses_.size() > 1 && !motion.motion) {
       progress.note(
@@ -302,10 +305,10 @@ class Run {
   }
 
   void finish(bool finished, const std::string& why_not) {
-    if (taker_) taker_->end(finished);
+    if (sink_) sink_->end(finished);
     const std::string doubt = doubt_.text(), of_poses = motions_.doubt();
     const std::size_t told = notes_.size();
-    for (std::string& of_feed : feed_.notes()) notes_.push_back(std::move(of_feed));
+    for (std::string& of_feed : source_.notes()) notes_.push_back(std::move(of_feed));
     report_.set_doubt(doubt.empty() || of_poses.empty() ? doubt + of_poses : doubt + "; " + of_poses, notes_);
     if (has_folder() && sequence_.has_calibration && !poses_.empty())
       vision::write_poses(folder_.path() / "poses.txt", poses_);
@@ -361,14 +364,14 @@ class Run {
   const bool quiet_;
   OutputFolder folder_;
   const fs::path save_config_;
-  Feed& feed_;
-  Taker* const taker_;
+  vision::FrameSource& source_;
+  FrameSink* const sink_;
   const vision::StereoSequence& sequence_;
   const vision::PointCloudOptions cloud_options_;
   std::optional<CloudCounts> clouds_;  // of all frames
   const std::string& input_;
   const cv::Size size_;
-  MotionSource motions_;
+  vision::MotionSource motions_;
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
   std::optional<Waiting> waiting_;     // until all is built
   Pipeline pipeline_;

@@ -7,7 +7,7 @@
 #include <set>
 #include <string>
 
-#include "apps/feed.h"
+#include "apps/frame_sink.h"
 #include "apps/output_folder.h"
 #include "apps/run_report.h"
 #include "egosgm/device.h"
@@ -22,9 +22,9 @@ inline constexpr const char* kRunCalibration = "calibration.txt";
 
 /// A sequence, how to match it, and where its results go.
 struct SequenceJob {
-  std::shared_ptr<Feed> feed;
-  std::shared_ptr<Taker> taker;  // null: the folder alone takes what the run makes
-  std::string input;             // the arguments that named the sequence, for messages
+  std::shared_ptr<vision::FrameSource> source;
+  std::shared_ptr<FrameSink> sink;  // null: the folder alone takes what the run makes
+  std::string input;                // the arguments that named the sequence, for messages
   PipelineOptions options;
   std::string poses_file;          // empty: stereo odometry,
   StereoOdometryOptions odometry;  // with these options
@@ -37,7 +37,7 @@ struct SequenceJob {
   std::optional<LostDevice> lost;  // which this one takes over from
 };
 
-/// Every frame that is fed into `job.out`, then poses.txt and report.json, and to the taker. Returns false where an
+/// Every frame that is pair into `job.out`, then poses.txt and report.json, and to the sink. Returns false where an
 /// interrupt ended it early. Throws InvalidArgument (input), IoError, DeviceError; report.json then says why it
 /// stopped, where it could be written. Thread-safe for different folders.
 bool run_sequence(const SequenceJob& job, const Device& device);

@@ -125,6 +125,25 @@ vision::StereoSequence SequenceArguments::open_pictures(const vision::FrameRange
   return sequence;
 }
 
+void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOptions& options) {
+  OptionGroup(command, "Method")
+      .add("--poses", poses_file, "FILE",
+           "take the motion from KITTI poses (camera-to-world) in place of stereo odometry");
+  add_motion_bounds(command, options, "Method");
+}
+
+void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const std::string& group) {
+  OptionGroup bounds(command, group);
+  bounds
+      .add("--max-translation", options.max_translation_m, "M",
+           "odometry: a longer motion between two frames is no motion [m]")
+      ->capture_default_str();
+  bounds
+      .add("--max-rotation", options.max_rotation_deg, "DEG",
+           "odometry: a larger turn between two frames is no motion [deg]")
+      ->capture_default_str();
+}
+
 std::string shell_word(const std::string& text) {
   const bool is_plain = std::all_of(text.begin(), text.end(), [](unsigned char c) {
     return std::isalnum(c) || std::string_view("/._-+=:,@%").find(static_cast<char>(c)) != std::string_view::npos;

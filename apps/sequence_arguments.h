@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "egosgm/odometry.h"
 #include "egosgm/vision/dataset.h"
 
 namespace egosgm::app {
@@ -39,6 +40,12 @@ struct BagArguments {
   /// As SequenceArguments::text.
   std::string text() const;
 };
+
+/// Adds --poses, --max-translation and --max-rotation to the group "Method".
+void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOptions& options);
+
+/// Adds --max-translation and --max-rotation.
+void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const std::string& group);
 
 /// Adds --pair-by.
 void add_pair_by(CLI::App& command, std::string& pair_by, const std::string& group);

@@ -14,12 +14,12 @@
 #include <utility>
 #include <vector>
 
-#include "apps/motion_source.h"
 #include "egosgm/error.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
 #include "python/frame.h"
 #include "python/option_values.h"
+#include "vision/motion_source.h"
 
 namespace egosgm::python {
 namespace {
@@ -56,10 +56,10 @@ class Held {
   py::object object_;
 };
 
-/// egosgm.bag_program.BagFeed.
-class BagFeed : public app::Feed {
+/// egosgm.bag_program.BagSource.
+class BagSource : public vision::FrameSource {
  public:
-  BagFeed(py::object bag, vision::FrameRange range, const std::string& out) : bag_(std::move(bag)), range_(range) {
+  BagSource(py::object bag, vision::FrameRange range, const std::string& out) : bag_(std::move(bag)), range_(range) {
     sequence_.title = text_from(bag_["title"]);
     sequence_.note = text_from(bag_["note"]);
     sequence_.calibration = bag_["calibration"].cast<Calibration>();
@@ -80,8 +80,8 @@ class BagFeed : public app::Feed {
   bool has_no_files() const override { return true; }
   std::string poses() const override { return poses_; }
 
-  std::optional<app::FedFrame> next() override {
-    return in_python([&]() -> std::optional<app::FedFrame> {
+  std::optional<vision::VideoPair> next() override {
+    return in_python([&]() -> std::optional<vision::VideoPair> {
       for (;;) {
         const py::object found = bag_.call("next");
         if (found.is_none()) {
@@ -93,15 +93,15 @@ class BagFeed : public app::Feed {
         if (number < range_.first.value_or(0)) continue;
         if (number > range_.last.value_or(number)) return std::nullopt;
         has_given_ = true;
-        app::FedFrame fed;
-        fed.frame = frame_of(number);
-        fed.images = {mat_of(found.attr("left"), "left"), mat_of(found.attr("right"), "right")};
-        fed.starts_anew = found.attr("starts_anew").cast<bool>();
-        fed.stamp_ns = found.attr("stamp_ns").cast<std::int64_t>();
-        fed.camera = found.attr("frame_id").cast<std::string>();
+        vision::VideoPair pair;
+        pair.frame = frame_of(number);
+        pair.images = {mat_of(found.attr("left"), "left"), mat_of(found.attr("right"), "right")};
+        pair.starts_anew = found.attr("starts_anew").cast<bool>();
+        pair.stamp_ns = found.attr("stamp_ns").cast<std::int64_t>();
+        pair.camera = found.attr("frame_id").cast<std::string>();
         const py::object pose = found.attr("world_from_camera");
-        if (!pose.is_none()) fed.world_from_camera = transform_of(pose, "pose");
-        return fed;
+        if (!pose.is_none()) pair.world_from_camera = transform_of(pose, "pose");
+        return pair;
       }
     });
   }
@@ -136,7 +136,7 @@ class BagFeed : public app::Feed {
 };
 
 /// egosgm.bag_program.Outputs.
-class Outputs : public app::Taker {
+class Outputs : public app::FrameSink {
  public:
   explicit Outputs(py::object outputs) : outputs_(std::move(outputs)) {}
 
@@ -144,17 +144,17 @@ class Outputs : public app::Taker {
     in_python([&] { outputs_.call("begin", dict_of(options), calibration); });
   }
 
-  void take(const app::FedFrame& fed, const app::ShownMaps& maps, const FrameReport& report,
+  void take(const vision::VideoPair& pair, const app::ShownMaps& maps, const FrameReport& report,
             const std::optional<Eigen::Isometry3d>& current_from_previous) override {
     in_python([&] {
       py::dict frame;
-      frame["number"] = fed.frame.number;
-      frame["name"] = fed.frame.name;
-      frame["left"] = array_of(fed.images.left);
-      frame["right"] = array_of(fed.images.right);
-      frame["starts_anew"] = fed.starts_anew;
-      frame["frame_id"] = fed.camera;
-      if (fed.stamp_ns) frame["stamp_ns"] = *fed.stamp_ns;
+      frame["number"] = pair.frame.number;
+      frame["name"] = pair.frame.name;
+      frame["left"] = array_of(pair.images.left);
+      frame["right"] = array_of(pair.images.right);
+      frame["starts_anew"] = pair.starts_anew;
+      frame["frame_id"] = pair.camera;
+      if (pair.stamp_ns) frame["stamp_ns"] = *pair.stamp_ns;
       Frame made{.maps = {}, .report = report};
       made.maps["disparity"] = array_of(maps.disparity.clone());
       made.maps["variance"] = array_of(maps.variance.clone());
@@ -215,7 +215,7 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
   app::Package hooks;
   hooks.open_bag = [&](const app::BagArguments& given, const std::string& calib, vision::FrameRange range,
                        const std::string& out) {
-    return in_python([&]() -> std::shared_ptr<app::Feed> {
+    return in_python([&]() -> std::shared_ptr<vision::FrameSource> {
       py::dict values;
       for (const auto& [name, value] : {std::pair{"bag", given.bag},
                                         {"left_topic", given.left_topic},
@@ -231,11 +231,11 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
       py::list info_topics;
       for (const std::string& topic : given.info_topics) info_topics.append(text_of(topic));
       values["info_topics"] = info_topics;
-      return std::make_shared<BagFeed>(package.attr("BagFeed")(**values), range, out);
+      return std::make_shared<BagSource>(package.attr("BagSource")(**values), range, out);
     });
   };
   hooks.take = [&](const std::string& file, bool viewer) {
-    return in_python([&]() -> std::shared_ptr<app::Taker> {
+    return in_python([&]() -> std::shared_ptr<app::FrameSink> {
       return std::make_shared<Outputs>(package.attr("Outputs")(text_of(file), viewer));
     });
   };
@@ -249,8 +249,8 @@ int main_of(const std::vector<std::string>& arguments, const py::object& package
 }
 
 void bind_motions(py::module_& module) {
-  using app::FrameMotion;
-  using app::MotionSource;
+  using vision::FrameMotion;
+  using vision::MotionSource;
   py::class_<FrameMotion>(module, "_FrameMotion")
       .def_readonly("motion", &FrameMotion::motion)
       .def_readonly("odometry", &FrameMotion::odometry);
@@ -263,12 +263,12 @@ void bind_motions(py::module_& module) {
           "next",
           [](MotionSource& self, const py::object& left, const py::object& right, const py::object& pose,
              bool starts_anew) {
-            app::FedFrame fed;
-            fed.images = {mat_of(left, "left"), mat_of(right, "right")};
-            if (!pose.is_none()) fed.world_from_camera = transform_of(pose, "pose");
-            fed.starts_anew = starts_anew;
+            vision::VideoPair pair;
+            pair.images = {mat_of(left, "left"), mat_of(right, "right")};
+            if (!pose.is_none()) pair.world_from_camera = transform_of(pose, "pose");
+            pair.starts_anew = starts_anew;
             const py::gil_scoped_release other_threads_run;
-            return self.next(fed, 0);
+            return self.next(pair, 0);
           },
           py::arg("left"), py::arg("right"), py::arg("pose") = py::none(), py::arg("starts_anew") = false)
       .def("doubt", &MotionSource::doubt);

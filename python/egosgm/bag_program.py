@@ -20,8 +20,8 @@ def read_calibration(file: pathlib.Path, size: Tuple[int, int]) -> _egosgm.Calib
     raise _egosgm.InvalidArgument(f"{file}: is of raw images, and rectified ones are matched: `egosgm rectify` makes them, by it")
 
 
-class BagFeed:
-    """A bag as the run reads it (apps/feed.h)."""
+class BagSource:
+    """A bag as the run reads it (vision/frame_source.h)."""
 
     def __init__(self, bag: str, max_skew_ms: str, rectify: str, out: str, **given: Any) -> None:
         if rectify not in ("auto", "on", "off"):
@@ -57,7 +57,7 @@ class BagFeed:
 
 
 class Outputs:
-    """Who takes the maps of a run (apps/feed.h): a recording, a viewer, or both."""
+    """Who takes the maps of a run (apps/frame_sink.h): a recording, a viewer, or both."""
 
     def __init__(self, file: str, viewer: bool) -> None:
         self._file, self._viewer, self._outputs = pathlib.Path(file) if file else None, viewer, []

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "apps/feed.h"
+#include "egosgm/export.h"
 #include "egosgm/motion.h"
 #include "egosgm/odometry.h"
+#include "vision/frame_source.h"
 #include "vision/pose_doubt.h"
 
-namespace egosgm::app {
+namespace egosgm::vision {
 
 /// How the camera came to a frame.
 struct FrameMotion {
@@ -23,36 +23,29 @@ struct FrameMotion {
       Eigen::Isometry3d::Identity();  // the pose, in the system of the first frame that came
 };
 
-/// Adds --poses, --max-translation and --max-rotation to the group "Method".
-void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOptions& options);
-
-/// Adds --max-translation and --max-rotation.
-void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const std::string& group);
-
 /// The motion of one frame after the other: from a file of poses, from poses that come with the frames, or by stereo
 /// odometry, also where one of two frames came without its pose. A frame where odometry found none repeats the last
 /// motion in its pose, and only there. Not thread-safe.
-class MotionSource {
+class EGOSGM_EXPORT MotionSource {
  public:
   /// `calibration`: none where nothing can be predicted. Throws InvalidArgument.
   MotionSource(const std::optional<Calibration>& calibration, const StereoOdometryOptions& options);
   /// Reads `poses_file`; empty: there is none. Throws InvalidArgument.
-  MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
-               const StereoOdometryOptions& options);
+  MotionSource(const StereoSequence& sequence, const std::string& poses_file, const StereoOdometryOptions& options);
 
   /// The motion from the frame of the last call, unless this one starts anew. REQUIRES: `frame`, a place in the
   /// sequence, grows from call to call.
-  FrameMotion next(const FedFrame& fed, std::size_t frame);
+  FrameMotion next(const VideoPair& pair, std::size_t frame);
 
   /// Whether a file tells the poses.
   bool has_file() const { return !poses_.empty(); }
 
   /// What the odometry of the first frames says against the given poses; empty where nothing, and without such. To be
   /// asked from the thread of `next`.
-  std::string doubt() const { return vision::suspect_motions(given_, found_); }
+  std::string doubt() const { return suspect_motions(given_, found_); }
 
  private:
-  void estimate(const FedFrame& fed, FrameMotion& result);
+  void estimate(const VideoPair& pair, FrameMotion& result);
   void take(const Eigen::Isometry3d& pose, FrameMotion& result);
   void follow(FrameMotion& result);
 
@@ -67,4 +60,4 @@ class MotionSource {
   std::vector<std::optional<Eigen::Isometry3d>> found_;
 };
 
-}  // namespace egosgm::app
+}  // namespace egosgm::vision

@@ -1,64 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/motion_source.h"
+#include "vision/motion_source.h"
 
 #include <chrono>
 
-#include "apps/option_group.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/opencv.h"
 #include "egosgm/vision/poses_io.h"
 
-namespace egosgm::app {
+namespace egosgm::vision {
 namespace {
 
 constexpr std::size_t kLookedAt = 6;  // motions that are given, beside those of the odometry
 
 }  // namespace
 
-void add_motion(CLI::App& command, std::string& poses_file, StereoOdometryOptions& options) {
-  OptionGroup(command, "Method")
-      .add("--poses", poses_file, "FILE",
-           "take the motion from KITTI poses (camera-to-world) in place of stereo odometry");
-  add_motion_bounds(command, options, "Method");
-}
-
-void add_motion_bounds(CLI::App& command, StereoOdometryOptions& options, const std::string& group) {
-  OptionGroup bounds(command, group);
-  bounds
-      .add("--max-translation", options.max_translation_m, "M",
-           "odometry: a longer motion between two frames is no motion [m]")
-      ->capture_default_str();
-  bounds
-      .add("--max-rotation", options.max_rotation_deg, "DEG",
-           "odometry: a larger turn between two frames is no motion [deg]")
-      ->capture_default_str();
-}
-
 MotionSource::MotionSource(const std::optional<Calibration>& calibration, const StereoOdometryOptions& options) {
   options.validate();
   if (calibration) odometry_.emplace(*calibration, options);
 }
 
-MotionSource::MotionSource(const vision::StereoSequence& sequence, const std::string& poses_file,
+MotionSource::MotionSource(const StereoSequence& sequence, const std::string& poses_file,
                            const StereoOdometryOptions& options)
     : MotionSource(sequence.has_calibration ? std::optional(sequence.calibration) : std::nullopt, options) {
   if (poses_file.empty()) return;
   if (!sequence.has_calibration) {
     throw InvalidArgument("--poses " + poses_file + ": a motion predicts nothing without a calibration: give --calib");
   }
-  poses_ = vision::poses_of_frames(sequence, poses_file);
+  poses_ = poses_of_frames(sequence, poses_file);
 }
 
-FrameMotion MotionSource::next(const FedFrame& fed, std::size_t frame) {
+FrameMotion MotionSource::next(const VideoPair& pair, std::size_t frame) {
   FrameMotion result;
-  if (fed.starts_anew) {
+  if (pair.starts_anew) {
     if (odometry_) odometry_->reset();
     last_pose_.reset();
     last_motion_ = Eigen::Isometry3d::Identity();
   }
-  const std::optional<Eigen::Isometry3d> pose = poses_.empty() ? fed.world_from_camera : std::optional(poses_[frame]);
+  const std::optional<Eigen::Isometry3d> pose = poses_.empty() ? pair.world_from_camera : std::optional(poses_[frame]);
   // A file has poses of all frames: odometry only looks at the first ones.
-  if (odometry_ && (poses_.empty() || frames_ <= kLookedAt)) estimate(fed, result);
+  if (odometry_ && (poses_.empty() || frames_ <= kLookedAt)) estimate(pair, result);
   if (pose) {
     take(*pose, result);
   } else {
@@ -69,16 +49,16 @@ FrameMotion MotionSource::next(const FedFrame& fed, std::size_t frame) {
   return result;
 }
 
-void MotionSource::estimate(const FedFrame& fed, FrameMotion& result) {
+void MotionSource::estimate(const VideoPair& pair, FrameMotion& result) {
   const auto start = std::chrono::steady_clock::now();
-  result.odometry = odometry_->process(vision::image_view(fed.images.left), vision::image_view(fed.images.right));
+  result.odometry = odometry_->process(image_view(pair.images.left), image_view(pair.images.right));
   result.odometry_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   result.motion = result.odometry.motion;
 }
 
 void MotionSource::take(const Eigen::Isometry3d& pose, FrameMotion& result) {
   if (last_pose_) {
-    const Eigen::Isometry3d given = vision::current_from_previous(*last_pose_, pose);
+    const Eigen::Isometry3d given = current_from_previous(*last_pose_, pose);
     if (given_.size() < kLookedAt) {
       given_.push_back(given);
       found_.push_back(result.motion ? std::optional(result.motion->current_from_previous) : std::nullopt);
@@ -101,4 +81,4 @@ void MotionSource::follow(FrameMotion& result) {
   result.first_from_camera = first_from_camera_;
 }
 
-}  // namespace egosgm::app
+}  // namespace egosgm::vision

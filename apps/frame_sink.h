@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Geometry>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "egosgm/calibration.h"
+#include "egosgm/options.h"
+#include "vision/frame_source.h"
+
+namespace egosgm::app {
+
+/// The maps of a frame as they come from the device: CV_32FC1, and CV_8UC1 of reasons.
+struct ShownMaps {
+  cv::Mat disparity, variance, reason;
+};
+
+/// Who takes a run's maps beside its folder, or in place of it.
+class FrameSink {
+ public:
+  virtual ~FrameSink() = default;
+  /// Before the first frame. Throws InvalidArgument and IoError.
+  virtual void begin(const PipelineOptions& options, const Calibration& calibration) = 0;
+  virtual void take(const vision::VideoPair& pair, const ShownMaps& maps, const FrameReport& report,
+                    const std::optional<Eigen::Isometry3d>& current_from_previous) = 0;
+  /// All came; or, after a begin that may have thrown, the run stopped.
+  virtual void end(bool finished) = 0;
+};
+
+}  // namespace egosgm::app
