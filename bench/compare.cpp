@@ -16,8 +16,8 @@
 #include "egosgm/odometry.h"
 #include "egosgm/pipeline.h"
 #include "egosgm/vision/opencv.h"
-#include "host/match/matcher.h"
 #include "host/ocl/device_handle.h"
+#include "host/stages/matcher.h"
 
 namespace egosgm::bench {
 namespace {

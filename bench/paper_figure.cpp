@@ -34,8 +34,8 @@ void draw(const std::string& file) {
   options.disparities = 64;
   FrameQueue frames(street.calibration(), size, options, Device::select(), PixelType::kU8);
   cv::Mat filled;
-  frames.method().observer = [&](Room room) {
-    if (room == Room::kPredict) filled = left_of(frames, frames.method().workspace().prediction.filled.disparity);
+  frames.method().observer = [&](Step step) {
+    if (step == Step::kPredict) filled = left_of(frames, frames.method().workspace().prediction.filled.disparity);
   };
   cv::Mat previous, measured(size.height, size.width, CV_32FC1), updated = measured.clone();
   for (int k = 0; k < kFrames; ++k) {

@@ -69,7 +69,7 @@ def compare_table(content):
 
 
 def stage_rows(content):
-    """Without the rooms; of the typical size, or of all."""
+    """Without the steps; of the typical size, or of all."""
     rows = [row for row in content["rows"] if "of_copy" in row]
     return [row for row in rows if shape(row) == TYPICAL] or rows
 

@@ -24,10 +24,10 @@ constexpr const char* kHelp =
     "  --json FILE       write the rows\n"
     "  --bits FILE       hold the maps against checksums that were recorded on another device: exit code 1 where they "
     "differ\n"
-    "Rows: a stage each, room_NAME for a room (with what the host does there), BandedSgm_full of a frame of full "
+    "Rows: a stage each, step_NAME for a step (with what the host does there), BandedSgm_full of a frame of full "
     "range,\n"
     "steady_frame and full_frame for all stages of one.\n"
-    "Columns: ms and device_ms: of a frame, the former by the wall clock for rooms; GB_s: every map, image and band "
+    "Columns: ms and device_ms: of a frame, the former by the wall clock for steps; GB_s: every map, image and band "
     "that a\n"
     "stage takes or gives counted once (no re-reads, no memory of its own but the path sums of BandedSgm: a byte a\n"
     "computed cell written and read), by device time; of_copy: the same as part of a copy's GB/s; Gcells_s: cells "
@@ -103,7 +103,7 @@ bool run_frames(const Device& device, shared::ImageSize size, int disparities, c
     for (int i = 0; i < arguments.rounds * kFramesARound; ++i) {
       const FrameTimes& times = frame.steady();
       for (const auto& [stage, ms] : times.device) device_ms[stage].push_back(ms);
-      for (const auto& [room, ms] : times.wall) wall_ms[room].push_back(ms);
+      for (const auto& [step, ms] : times.wall) wall_ms[step].push_back(ms);
       frame_ms.push_back(times.device_ms());
     }
     const std::map<std::string, double> bytes = bytes_of(size, frame.steady_cells());
@@ -123,7 +123,7 @@ bool run_frames(const Device& device, shared::ImageSize size, int disparities, c
                  {"of_copy", full_gb_s / copy_gb_s},
                  {"Gcells_s", 1e-6 * frame.full_range_cells() / full_ms}};
     add_row(std::move(full), rows);
-    for (const auto& [room, all] : wall_ms) add_row(row_of("room_" + room, size, disparities, median(all)), rows);
+    for (const auto& [step, all] : wall_ms) add_row(row_of("step_" + step, size, disparities, median(all)), rows);
     add_row(row_of("full_frame", size, disparities, full_range.device_ms()), rows);
     add_row(row_of("steady_frame", size, disparities, median(frame_ms)), rows);
     return check_bits(

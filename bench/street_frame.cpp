@@ -16,7 +16,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr const char* kRooms[] = {"predict", "align", "search", "match", "refine_alignment", "fuse", "publish"};
+constexpr const char* kSteps[] = {"predict", "align", "search", "match", "refine_alignment", "fuse", "publish"};
 
 MethodOptions options_of(int disparities, Scheduling scheduling) {
   MethodOptions options;
@@ -46,7 +46,7 @@ StreetFrame::StreetFrame(ocl::Context& context, const Street& street, int dispar
       after_(context, size_) {
   images_.pixels.write(context, street.images);
   method_.prepare(images_.type);
-  method_.observer = [this](Room room) { look(room); };
+  method_.observer = [this](Step step) { look(step); };
   if (begins) begins("full");
   full_range();
   belief_ = std::exchange(after_, belief_);
@@ -92,7 +92,7 @@ const FrameTimes& StreetFrame::run(Belief& after, const Belief& before) {
   return times_;
 }
 
-void StreetFrame::look(Room room) {
+void StreetFrame::look(Step step) {
   const std::vector<ocl::Command> commands = context_.take_commands();
   const std::vector<ocl::Context::Finished> finished = context_.wait(commands);
   for (std::size_t i = 0; i < commands.size(); ++i) {
@@ -100,7 +100,7 @@ void StreetFrame::look(Room room) {
     times_.commands.push_back({finished[i].stage, commands[i].name, finished[i].is_launch, finished[i].ms});
   }
   const Clock::time_point now = Clock::now();
-  times_.wall[kRooms[static_cast<int>(room)]] += std::chrono::duration<double, std::milli>(now - last_).count();
+  times_.wall[kSteps[static_cast<int>(step)]] += std::chrono::duration<double, std::milli>(now - last_).count();
   last_ = now;
 }
 

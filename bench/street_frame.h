@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "bench/street.h"
-#include "host/method.h"
+#include "host/method/method.h"
 
 namespace egosgm::bench {
 
@@ -22,7 +22,7 @@ struct CommandTime {
 
 /// What a frame took [ms].
 struct FrameTimes {
-  std::map<std::string, double> device, wall;  // by stage, by room
+  std::map<std::string, double> device, wall;  // by stage, by step
   std::vector<CommandTime> commands;
 
   double device_ms() const;
@@ -46,7 +46,7 @@ class StreetFrame {
 
  private:
   const FrameTimes& run(Belief& after, const Belief& before);
-  void look(Room room);
+  void look(Step step);
   double cells() const;
 
   ocl::Context& context_;

@@ -14,7 +14,7 @@ file(WRITE ${preamble} "#pragma OPENCL FP_CONTRACT OFF\n")
 # A block that SPIR-V has no vector for is refused by name, before a translator ends the process for it.
 add_test(NAME kernels.block.refuses_32_lanes_in_spirv
          COMMAND ${EGOSGM_CLANG} -x cl -cl-std=CL1.2 -target spir64-unknown-unknown -Xclang -finclude-default-header -DBLOCK=32
-                 -I ${PROJECT_SOURCE_DIR}/kernels -fsyntax-only ${PROJECT_SOURCE_DIR}/kernels/match/block.h)
+                 -I ${PROJECT_SOURCE_DIR}/kernels -fsyntax-only ${PROJECT_SOURCE_DIR}/kernels/sgm/block.h)
 set_tests_properties(kernels.block.refuses_32_lanes_in_spirv PROPERTIES PASS_REGULAR_EXPRESSION "BLOCK: 16")
 
 file(GLOB kernels CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/kernels/*/*.cl)

@@ -23,7 +23,7 @@
 // sums fall on beyond the end of a band, and the least variance where measurement and prediction contradict each other.
 #define EGOSGM_DOUBTFUL_VARIANCE_PX2 16.0f
 
-// Evidence (fuse/evidence.cl) is counted in whole numbers, so many a bit of Hamming distance.
+// Evidence (stages/evidence.cl) is counted in whole numbers, so many a bit of Hamming distance.
 #define EGOSGM_EVIDENCE_UNITS 16
 // Distances of the controls from the match [px]: two on each side; at a quarter of the resolution, four.
 #define EGOSGM_NEAR_CONTROL 8
@@ -126,7 +126,7 @@
 #define EGOSGM_MAX_COST 63
 
 // If the right view comes from the left view's sums, a right pixel takes of the left pixels that it may be the one
-// with the least rank (match/sgm_cells.h). Sums are relative to a pixel's own paths and alone do not tell which of two
+// with the least rank (sgm/sgm_cells.h). Sums are relative to a pixel's own paths and alone do not tell which of two
 // pixels fits better: so many quarters of a pixel's least sum, 510 at most, do not count, and the matching cost counts
 // so many times. What is added keeps ranks above 0.
 #define EGOSGM_RANK_LEAST_QUARTERS 3

@@ -160,7 +160,7 @@ def speed(content):
 def stages(content):
     rows = [[row["name"], f"{row['width']}×{row['height']}, {row['disparities']}", number(row["median_ms"], "ms"), number(row.get("device_ms"), "ms"),
              number(row.get("GB_s"))] for row in content["rows"]]
-    return "## Stages\n\nOf a steady frame, stage by stage, and by rooms.\n\n" + table(["stage", "size, D", "time", "on the device", "GB/s"], rows)
+    return "## Stages\n\nOf a steady frame, stage by stage, and by steps.\n\n" + table(["stage", "size, D", "time", "on the device", "GB/s"], rows)
 
 
 def machines(found):

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <regex>
 #include <set>
 #include <sstream>
@@ -96,15 +97,34 @@ TEST(House, KernelsAndTheirHostKnowNothingOfOpenCv) {
   }
 }
 
-constexpr const char* kRooms[] = {"align", "predict", "search", "match", "fuse", "publish"};
-
-TEST(House, EveryRoomSaysWhatComesInAndWhatGoesOut) {
-  for (const std::string room : kRooms) {
-    const std::string text = text_of(kSource / "host" / room / "README.md");
-    for (const char* part : {"**In:**", "**Out:**"}) EXPECT_NE(text.find(part), std::string::npos) << room;
-    for (const char* folder : {"kernels", "tests", "tests/reference"}) {
-      EXPECT_TRUE(fs::is_directory(kSource / folder / room)) << folder << ": " << room;
+/// Folders below host/ whose files a folder's own files include, directly or by others.
+std::map<fs::path, std::set<fs::path>> folders_included() {
+  static const std::regex include("#include \"(host/[^\"]+)\"");
+  std::map<fs::path, std::set<fs::path>> found;
+  for (const fs::path& file : files({".h", ".cpp"}, {"host"})) {
+    const fs::path folder = file.lexically_relative(kSource).parent_path();
+    const std::string text = text_of(file);
+    for (std::sregex_iterator at(text.begin(), text.end(), include), end; at != end; ++at) {
+      const fs::path other = fs::path((*at)[1].str()).parent_path();
+      if (other != folder) found[folder].insert(other);
     }
+  }
+  for (bool grew = true; grew;) {
+    grew = false;
+    for (auto& [folder, others] : found) {
+      const std::size_t before = others.size();
+      for (const fs::path& other : std::set<fs::path>(others)) others.insert(found[other].begin(), found[other].end());
+      grew |= others.size() > before;
+    }
+  }
+  return found;
+}
+
+TEST(House, NoFoldersOfHostIncludeEachOther) {
+  const auto included = folders_included();
+  ASSERT_GE(included.size(), 5u);
+  for (const auto& [folder, others] : included) {
+    EXPECT_FALSE(others.contains(folder)) << folder << " includes itself by way of others";
   }
 }
 
@@ -122,18 +142,17 @@ TEST(House, EveryKernelHasItsHostItsTwinAndItsTest) {
   ASSERT_GE(kernels().size(), 10u);
   std::set<std::string> names;
   for (const fs::path& kernel : kernels()) {
-    const std::string name = kernel.stem(), room = kernel.parent_path().filename();
-    EXPECT_TRUE(std::count(std::begin(kRooms), std::end(kRooms), room)) << kernel << " is in no room";
+    const std::string name = kernel.stem();
     EXPECT_TRUE(names.insert(name).second) << kernel << ": programs go by the names of their files";
     // A second way to a stage's bits, or its last part, shares its twin and its test, which runs all of them.
     const std::string stage = name == "banded_sgm_paths" || name == "read_off" ? "banded_sgm" : name;
-    const std::string host = "host/" + room + "/" + name, twin = "tests/reference/" + room + "/" + stage;
+    const std::string host = "host/stages/" + name, twin = "tests/reference/" + stage;
     for (const std::string& file :
-         {host + ".h", host + ".cpp", twin + ".h", twin + ".cpp", "tests/" + room + "/" + stage + "_test.cpp"}) {
+         {host + ".h", host + ".cpp", twin + ".h", twin + ".cpp", "tests/stages/" + stage + "_test.cpp"}) {
       EXPECT_TRUE(fs::exists(kSource / file)) << file;
     }
     // scripts/check asks for tests by this name.
-    const std::string tests = text_of(kSource / "tests" / room / (stage + "_test.cpp"));
+    const std::string tests = text_of(kSource / "tests/stages" / (stage + "_test.cpp"));
     EXPECT_TRUE(std::regex_search(tests, std::regex("TEST(_P)?\\(" + in_pascal_case(stage)))) << kernel;
   }
 }

@@ -17,7 +17,7 @@ MACHINE = {"device": "a CPU", "driver": "1.0", "version": "OpenCL 3.0", "compute
 SHAPE = {"width": 320, "height": 96, "disparities": 32}
 COMPARED = [{"name": "opencv_hh", **SHAPE, "median_ms": 20, "cpus": 1.0}, {"name": "opencv_hh_1t", **SHAPE, "median_ms": 22, "cpus": 1.0},
             {"name": "egosgm_banded_frame_1t", **SHAPE, "median_ms": 11, "cpus": 0.99, "search_fraction": 0.136}]
-STAGES = [{"name": "Census", **SHAPE, "median_ms": 1.5, "device_ms": 1.25, "GB_s": 3.5}, {"name": "room_match", **SHAPE, "median_ms": 9.5}]
+STAGES = [{"name": "Census", **SHAPE, "median_ms": 1.5, "device_ms": 1.25, "GB_s": 3.5}, {"name": "step_match", **SHAPE, "median_ms": 9.5}]
 
 VIDEO = {"methods": {"headings": ["video", "method", "flicker [px]", "harm"],
                      "rows": [["street", "EgoSGM", 0.25, 12.5], ["street", "EgoSGM, single frame", 1.25, None], ["KITTI", "skipped: not there"]]},
@@ -89,7 +89,7 @@ class Page(unittest.TestCase):
         page = (self.docs / "understand/measured.md").read_text()
         for text in ("| street | bad_or_missing | 1.25 % | 2.50 | ≤ 1 **missed** |", "- 2012: skipped: not there", "a CPU", "driver 1.0", "0123456789", "2026-01-02",
                      "| EgoSGM, steady frame, both views, motion given | 320×96, 32 | 1 | 0.990 | 11.00 ms | 0.500 | 13.6 % |",
-                     "| OpenCV MODE_HH, 8 paths, left view | 320×96, 32 | 2 | 1.00 | 20.00 ms | 1.00 |  |", "| Census | 320×96, 32 | 1.50 ms | 1.25 ms | 3.50 |", "| room_match | 320×96, 32 | 9.50 ms |  |  |",
+                     "| OpenCV MODE_HH, 8 paths, left view | 320×96, 32 | 2 | 1.00 | 20.00 ms | 1.00 |  |", "| Census | 320×96, 32 | 1.50 ms | 1.25 ms | 3.50 |", "| step_match | 320×96, 32 | 9.50 ms |  |  |",
                      "| street | EgoSGM | 0.250 | 12.50 |", "| street | EgoSGM, single frame | 1.25 |  |", "- KITTI: skipped: not there",
                      "| street | 1 degree, 0 cm | 3.50 |", "| street | 2 | 4.50 |"):
             self.assertIn(text, page)

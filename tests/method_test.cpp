@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/method.h"
+#include "host/method/method.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/frame/plan.h"
+#include "host/method/plan.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 
 #include "egosgm/opencl.h"
 #include "host/frame/frame_transfer.h"
-#include "host/method.h"
+#include "host/method/method.h"
 #include "host/ocl/device_handle.h"
 
 namespace egosgm {

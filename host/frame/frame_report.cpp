@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "host/search/search_band.h"
+#include "host/stages/search_band.h"
 
 namespace egosgm {
 namespace {

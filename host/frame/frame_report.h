@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "egosgm/pipeline.h"
-#include "host/match/stripes.h"
 #include "host/ocl/context.h"
+#include "host/stages/stripes.h"
 #include "kernels/shared.h"
 
 namespace egosgm {

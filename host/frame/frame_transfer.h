@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "egosgm/pipeline.h"
-#include "host/align/vertical_alignment.h"
 #include "host/frame/frame_report.h"
-#include "host/maps.h"
 #include "host/ocl/host_memory.h"
-#include "host/search/search_band.h"
+#include "host/stages/maps.h"
+#include "host/stages/search_band.h"
+#include "host/stages/vertical_alignment.h"
 
 namespace egosgm {
 

@@ -23,8 +23,8 @@ namespace egosgm::ocl {
 using Queue = DeviceQueue;
 
 /// Memory that is needed for a while and shared by all who need it at other times: kernels run one after another. Of a
-/// stage: within a call of it. Of a room: from one of its stages to another of them.
-enum class Scratch { kOfStage0, kOfStage1, kOfStage2, kOfStage3, kOfStage4, kOfRoom0, kOfRoom1 };
+/// stage: within a call of it. Of a step: from one of its stages to another of them.
+enum class Scratch { kOfStage0, kOfStage1, kOfStage2, kOfStage3, kOfStage4, kOfStep0, kOfStep1 };
 
 /// A command that was enqueued. The names are string literals.
 struct Command {

@@ -60,7 +60,7 @@ inline int pixels_a_work_item(const Context& context) {
 bool is_this_cpu_by_pocl(const std::string& version);
 
 /// Whether the device is this machine's CPU, which counts the bits of each lane of a vector in one instruction, and its
-/// compiler is one that may be told so (kernels/match/banded_sgm.cl).
+/// compiler is one that may be told so (kernels/sgm/banded_sgm.cl).
 bool counts_bits(const Context& context);
 
 /// Throws DeviceError, naming the stage, the kernel and the limit, where `local` has more work-items than `limit`.

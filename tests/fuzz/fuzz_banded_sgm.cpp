@@ -2,12 +2,12 @@
 // Random codes, grey values and bands for BandedSgm, in both ways and in stripes, against the twin.
 #include <memory>
 
-#include "host/match/banded_sgm.h"
+#include "host/stages/banded_sgm.h"
 #include "tests/fuzz/bytes.h"
 #include "tests/fuzz/target.h"
-#include "tests/reference/match/banded_sgm.h"
-#include "tests/reference/match/census.h"
-#include "tests/reference/match/step_penalties.h"
+#include "tests/reference/banded_sgm.h"
+#include "tests/reference/census.h"
+#include "tests/reference/step_penalties.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
 #include "tests/support/device_maps.h"

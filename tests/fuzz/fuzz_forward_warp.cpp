@@ -2,10 +2,10 @@
 // Random maps, calibrations and motions, also degenerate ones, for ForwardWarp in both ways, against the twin.
 #include <stdexcept>
 
-#include "host/predict/forward_warp.h"
+#include "host/stages/forward_warp.h"
 #include "tests/fuzz/random_motion.h"
 #include "tests/fuzz/target.h"
-#include "tests/reference/predict/forward_warp.h"
+#include "tests/reference/forward_warp.h"
 #include "tests/support/compare.h"
 #include "tests/support/device.h"
 #include "tests/support/device_maps.h"

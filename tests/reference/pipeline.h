@@ -8,9 +8,9 @@
 
 #include "host/method_options.h"
 #include "kernels/shared.h"
-#include "tests/reference/align/vertical_alignment.h"
-#include "tests/reference/fuse/evidence.h"
-#include "tests/reference/search/search_band.h"
+#include "tests/reference/evidence.h"
+#include "tests/reference/search_band.h"
+#include "tests/reference/vertical_alignment.h"
 #include "tests/support/random_maps.h"
 
 namespace egosgm::reference {
@@ -32,8 +32,8 @@ struct Pass {
   std::vector<float> coarse;  // disparities of both views at a quarter of the resolution
   ViewCodes view_codes, coarse_codes, coarse_alike;
   SearchBands band;
-  std::vector<std::uint32_t> codes;     // as kernels/match/census.cl lays them out
-  std::vector<std::uint8_t> penalties;  // as kernels/match/step_penalties.cl does
+  std::vector<std::uint32_t> codes;     // as kernels/stages/census.cl lays them out
+  std::vector<std::uint8_t> penalties;  // as kernels/stages/step_penalties.cl does
   testing::HostMaps matched, smoothed, consistent, measured;
   VerticalOffset offset;  // after this pass; by it the next one is resampled
 };
@@ -53,7 +53,7 @@ struct Frame {
   float vertical_offset_px = 0;        // that the last pass was resampled by in the middle
 };
 
-/// The twins of the stages, in the order of host/pipeline.cpp.
+/// The twins of the stages, in the order of host/frame/pipeline.cpp.
 class Pipeline {
  public:
   /// `code_padding`: of the rows of `Pass::codes`.

@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "host/maps.h"
+#include "host/stages/maps.h"
 #include "tests/support/random_maps.h"
 
 namespace egosgm::testing {

@@ -13,7 +13,7 @@
 
 #include "egosgm/pipeline.h"
 #include "host/method_options.h"
-#include "host/predict/forward_warp.h"
+#include "host/stages/forward_warp.h"
 #include "tests/reference/pipeline.h"
 #include "tests/support/frame_memory.h"
 #include "tests/support/scene.h"

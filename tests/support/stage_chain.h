@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "host/frame/frame_transfer.h"
-#include "host/method.h"
+#include "host/method/method.h"
 #include "host/tuning_defaults.h"
 #include "tests/reference/pipeline.h"
 #include "tests/support/device.h"
@@ -12,7 +12,7 @@
 
 namespace egosgm::testing {
 
-/// Frames of the method, each looked at after every room. Maps that a later stage of the room overwrote are empty.
+/// Frames of the method, each looked at after every step. Maps that a later stage of the step overwrote are empty.
 class StageChain {
  public:
   StageChain(const Calibration& calibration, shared::ImageSize size, const MethodOptions& options, PixelType type)
@@ -30,8 +30,8 @@ class StageChain {
     const Plan plan =
         plan_of(options_, before_.why_not, before_.offset.is_known, motion, {Views::kBoth, true, true, true});
     const FrameImages& uploaded = transfer_.upload(left, right);
-    method_.observer = [&](Room room) {
-      look(room, plan, uploaded, frame);
+    method_.observer = [&](Step step) {
+      look(step, plan, uploaded, frame);
       spoil_scratch();
     };
     const FrameResults results = method_.frame(plan, uploaded, before_, after_, transfer_.given_out());
@@ -44,35 +44,35 @@ class StageChain {
   }
 
  private:
-  void look(Room room, const Plan& plan, const FrameImages& uploaded, reference::Frame& frame) {
+  void look(Step step, const Plan& plan, const FrameImages& uploaded, reference::Frame& frame) {
     const Workspace& work = method_.workspace();
-    if (room == Room::kAlign) frame.passes.emplace_back();
-    switch (room) {
-      case Room::kPredict:
+    if (step == Step::kAlign) frame.passes.emplace_back();
+    switch (step) {
+      case Step::kPredict:
         if (plan.predicts()) look(work.prediction, frame);
         return;
-      case Room::kAlign:
+      case Step::kAlign:
         return look_at_images(before_.offset.is_known || frame.passes.size() > 1 ? work.aligned : uploaded, frame);
-      case Room::kSearch:
+      case Step::kSearch:
         if (plan.has_coarse_match) frame.passes.back().coarse = work.coarse.read(context_);
         frame.passes.back().band = {work.bands.bands.read(context_), work.bands.cell_offsets.read(context_),
                                     work.bands.row_sums.read(context_)};
         return;
-      case Room::kMatch:
+      case Step::kMatch:
         return look(work.matching, plan.predicts() ? work.measured : after_.maps, frame.passes.back());
-      case Room::kFuse:
+      case Step::kFuse:
         if (plan.predicts()) look(work.fusion, frame);
         return;
-      case Room::kPublish:
+      case Step::kPublish:
         frame.dynamic = work.dynamic.read(context_);
         frame.reasons = work.reasons.read(context_);
         return;
-      case Room::kRefineAlignment:
+      case Step::kRefineAlignment:
         return;
     }
   }
 
-  /// Nobody may read what a room before left there.
+  /// Nobody may read what a step before left there.
   void spoil_scratch() {
     for (const auto& [place, buffer] : context_.scratch()) {
       ocl::Buffer<cl_uchar>(buffer, buffer.getInfo<CL_MEM_SIZE>()).fill(context_, 0x55);

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "egosgm/pipeline.h"
+#include "host/stages/maps.h"
+#include "host/stages/vertical_alignment.h"
+
+namespace egosgm {
+
+/// All that survives a frame. A value: copies share the device's memory, so that going back to one is an assignment.
+struct Belief {
+  StereoMaps maps;
+  FlagMap evidence;  // of each pixel (kernels/method.h); what has enough of it is given out
+  VerticalOffset offset;
+  std::shared_ptr<std::vector<cl_uchar>> images;  // that it is of, both views; empty where the host does not know them
+  std::optional<Unpredicted> why_not = Unpredicted::kFirstFrame;  // there are no maps
+
+  /// Starts empty.
+  Belief(ocl::Context& context, shared::ImageSize size)
+      : maps(context, size),
+        evidence(context, 2 * pixel_count(size)),
+        offset(context),
+        images(std::make_shared<std::vector<cl_uchar>>()) {}
+
+  /// Forgets all.
+  void forget(Unpredicted why) {
+    why_not = why;
+    offset.is_known = false;
+  }
+
+  bool shares_memory_with(const Belief& other) const { return maps.disparity.get()() == other.maps.disparity.get()(); }
+};
+
+}  // namespace egosgm

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/method/fuse_step.h"
+
+namespace egosgm {
+
+FuseStep::FuseStep(ocl::Context& context, shared::ImageSize size, const MethodOptions& options)
+    : left_right_px_(options.consistency.update_px),
+      outside_(outside_view(options.consistency)),
+      kalman_update_(context, size, options.kalman_update),
+      consistency_(context, size) {
+  if (Evidence::is_of(options)) evidence_.emplace(context, size, options);
+  if (!options.track_right) right_map_.emplace(context, size, range_of(options));
+  if (options.median_filter.enabled) median_filter_.emplace(context, size);
+  if (options.sad_check.max_difference > 0) {
+    sad_check_.emplace(
+        [&context, size, check = options.sad_check](PixelType type) { return SadCheck(context, size, type, check); });
+  }
+}
+
+void FuseStep::prepare(PixelType type) {
+  if (sad_check_) sad_check_->prepare(type);
+}
+
+void FuseStep::update(const Plan& plan, const Matched& matched, const Prediction& prediction,
+                      const Measurement& measured, Fusion& fusion, Belief& after) {
+  StereoMaps& belief = after.maps;
+  StereoMaps fused{fusion.fused, belief.variance};
+  if (evidence_) {
+    (*evidence_)(matched.codes, matched.coarse, prediction.maps.disparity, measured.disparity, fusion.evidence,
+                 plan.tracked);
+  }
+  const KalmanUpdate::FrameEvidence of_frame{prediction.evidence, fusion.evidence, plan.repeats};
+  kalman_update_.update(prediction.hidden, prediction.maps, measured, evidence_ ? &of_frame : nullptr, fused,
+                        fusion.doubtful, after.evidence, plan.tracked);
+  if (median_filter_) median_filter_->fill(fusion.fused, fusion.smoothed, belief.variance, plan.tracked);
+  StereoMaps smoothed{median_filter_ ? fusion.smoothed : fusion.fused, belief.variance};
+  if (plan.tracked == Views::kLeft) right_map_->complete(measured, left_right_px_, smoothed, plan.wanted.right);
+  const Views checked = plan.wanted.right ? Views::kBoth : plan.tracked;
+  consistency_.check(smoothed.disparity, left_right_px_, outside_, belief.disparity, checked);
+  if (sad_check_) (*sad_check_)[matched.images.type].check(matched.images.pixels, belief.disparity, checked);
+}
+
+void FuseStep::publish(const Plan& plan, const Belief& belief, Map& confirmed) {
+  evidence_->publish(belief.maps.disparity, belief.evidence, confirmed, plan.wanted.right ? Views::kBoth : Views::kLeft,
+                     plan.tracked);
+}
+
+}  // namespace egosgm

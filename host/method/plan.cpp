@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/method/plan.h"
+
+namespace egosgm {
+namespace {
+
+std::optional<Unpredicted> why_not(const MethodOptions& options, std::optional<Unpredicted> why_no_belief,
+                                   const std::optional<Motion>& motion) {
+  if (!options.temporal) return Unpredicted::kNotTemporal;
+  if (why_no_belief) return why_no_belief;
+  if (!motion) return Unpredicted::kNoMotion;
+  return {};
+}
+
+}  // namespace
+
+Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_belief, bool knows_offset,
+             const std::optional<Motion>& motion, const Wanted& wanted, bool repeats) {
+  Plan plan{};
+  plan.why_not = why_not(options, why_no_belief, motion);
+  const bool searches_bands = plan.predicts() && options.search == SearchMode::kBand;
+  plan.motion = plan.predicts() ? motion : std::nullopt;
+  plan.search = searches_bands ? Search::kBands : Search::kEverything;
+  plan.tracked = options.track_right ? Views::kBoth : Views::kLeft;
+  plan.matched = plan.predicts() ? plan.tracked : Views::kBoth;
+  plan.matches = options.vertical_alignment.enabled && !knows_offset ? 2 : 1;
+  plan.has_coarse_match = searches_bands && options.coarse_match.enabled;
+  plan.repeats = repeats;
+  plan.wanted = wanted;
+  return plan;
+}
+
+}  // namespace egosgm

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "egosgm/motion.h"
+#include "egosgm/pipeline.h"
+#include "host/stages/maps.h"
+
+namespace egosgm {
+
+/// The disparities that a frame searches.
+enum class Search { kBands, kEverything };
+
+/// Results that a caller asks for and no later frame needs.
+struct Wanted {
+  std::optional<Views> variance = {};  // the one that is given out
+  bool dynamic = false;
+  bool right = true;  // the right view's maps, too; where that is not tracked, no later frame needs them
+  bool reasons = false;
+};
+
+/// All that is decided before a frame.
+struct Plan {
+  std::optional<Unpredicted> why_not;  // there is no prediction
+  std::optional<Motion> motion;        // by which it is made
+  Search search;
+  Views tracked;  // predicted and fused
+  Views matched;  // where it is the left one, the right one is read off its match
+  int matches;    // 2 where the first one gives the vertical offset
+  bool has_coarse_match;
+  bool repeats;         // the images are those of the frame before
+  float grey_step = 1;  // GreyLevels::step of the images
+  Wanted wanted;
+
+  bool predicts() const { return !why_not; }
+};
+
+/// `why_no_belief`: why the belief has no maps, if it has none. `knows_offset`: whether it has a vertical offset.
+/// `repeats`: whether the images are those of the frame before.
+Plan plan_of(const MethodOptions& options, std::optional<Unpredicted> why_no_belief, bool knows_offset,
+             const std::optional<Motion>& motion, const Wanted& wanted, bool repeats = false);
+
+}  // namespace egosgm

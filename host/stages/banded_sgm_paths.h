@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/method_options.h"
+#include "host/ocl/defines.h"
+#include "host/ocl/stage.h"
+#include "host/stages/maps.h"
+#include "host/stages/stripes.h"
+
+namespace egosgm {
+
+/// Defines of the programs of both forms of BandedSgm.
+ocl::Defines sgm_defines(int max_chunks, int code_words, const BandedSgmOptions& options);
+
+/// The form of BandedSgm for GPUs: a few work-items follow each path across the image (see
+/// kernels/sgm/banded_sgm_paths.cl).
+class BandedSgmPaths {
+ public:
+  /// Work-items that share a path, a power of two, and paths that share a work-group.
+  struct Group {
+    int lanes, lines;
+  };
+
+  BandedSgmPaths(ocl::Context& context, shared::ImageSize size, shared::DisparityRange range,
+                 const BandedSgmOptions& options, Group group);
+
+  /// See BandedSgm.
+  void match(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
+             ocl::Buffer<cl_uint>& ranks, Views views);
+
+  /// On GPUs two quads of disparities a lane (one, where codes of 64 bits take the registers), and a group that fills
+  /// the smallest unit, as far as the device allows it; elsewhere work-items of their own, which wait for nobody.
+  static Group default_group(const ocl::Context& context, shared::DisparityRange range, MatchingCost cost);
+  /// The size of one of the four buffers of partial sums: a byte a cell, and the lanes of a pixel's last vector beyond
+  /// its band.
+  static std::size_t sum_bytes(const ocl::Context& context, shared::ImageSize size, shared::DisparityRange range);
+
+ private:
+  using Parameters = const shared::SgmParameters;
+  using Codes = const ocl::Buffer<cl_uint>;
+  using Penalties = const ocl::Buffer<cl_uchar>;
+  using Bands = const ocl::Buffer<shared::Band>;
+  using Offsets = const ocl::Buffer<cl_uint>;
+  using Sums = ocl::Buffer<cl_uchar>;
+  using Maps = ocl::Buffer<float>;
+
+  void follow(int stage, const shared::SgmParameters& parameters, const MatchInputs& inputs, Views views);
+
+  ocl::Stage stage_;
+  const int paths_;
+  const Group group_;
+  Sums forward_first_, forward_second_, backward_first_, backward_second_;  // partial sums of paths
+  ocl::Kernel<Parameters, const cl_int, const cl_int, Codes, Penalties, Bands, Offsets, Sums, Sums, Sums, Sums>
+      follow_paths_;
+  ocl::Kernel<Parameters, Codes, Bands, Offsets, const Sums, const Sums, const Sums, const Sums, Maps, Maps, FlagMap,
+              ocl::Buffer<cl_uint>>
+      find_winners_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/stages/census.h"
+
+#include <algorithm>
+
+namespace egosgm {
+namespace {
+
+struct Comparisons {
+  int kind, radius_x, radius_y;
+};
+
+Comparisons comparisons(MatchingCost cost) {
+  switch (cost) {
+    case MatchingCost::kSad3x3:
+      return {0, 0, 0};
+    case MatchingCost::kCensus5x5:
+      return {1, 2, 2};
+    case MatchingCost::kCensus9x7:
+      return {1, 4, 3};
+    case MatchingCost::kLearned7x7:
+      return {2, 4, 4};  // the window, and a pixel around it for sums of 3x3
+  }
+  return {};
+}
+
+ocl::Defines defines(PixelType type, MatchingCost cost, int words) {
+  const Comparisons chosen = comparisons(cost);
+  return pixel_define(type)
+      .set("CODE_BYTES", 4 * std::max(words, Census::words(cost)))
+      .set("COMPARISONS", chosen.kind)
+      .set("RADIUS_X", chosen.radius_x)
+      .set("RADIUS_Y", chosen.radius_y);
+}
+
+}  // namespace
+
+Census::Census(ocl::Context& context, shared::ImageSize size, PixelType type, MatchingCost cost, int padding,
+               int pixels, int words)
+    : stage_(context, "Census", "census.cl", size, pixels, defines(type, cost, words)),
+      padding_(padding),
+      census_(stage_, "census") {}
+
+void Census::encode(const ocl::Buffer<cl_uchar>& images, ocl::Buffer<cl_uint>& codes, bool alike) {
+  const shared::ImageSize size = stage_.size();
+  ocl::Context& context = stage_.enter();
+  const ocl::Range range = stage_.pixels() == 1 ? ocl::every_pixel(context, {size.width + 2 * padding_, size.height})
+                                                : ocl::every_row(context, size);
+  census_(context, range, size, padding_, alike, images, codes);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "host/method_options.h"
+#include "host/ocl/stage.h"
+#include "host/stages/evidence.h"
+#include "host/stages/maps.h"
+
+namespace egosgm {
+
+/// Fuses prediction and measurement, pixel by pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the
+/// two differ by more than the gate, or to the same side as most around (something moves by itself), or only the
+/// measurement is there, the measurement is taken. Without a gate, as in the paper, all that is predicted and measured
+/// is averaged, and nothing hides it.
+class KalmanUpdate {
+ public:
+  /// What is known of a frame before it is fused.
+  struct FrameEvidence {
+    const FlagMap& before;        // that moved with the prediction
+    const BlockEvidence& blocks;  // of this frame's images
+    bool repeats;                 // they are those of the frame before, and make nobody surer
+  };
+
+  /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
+  KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
+
+  /// Nothing is believed of what is `hidden`. `doubtful`: 1 where the measurement was taken although the prediction, or
+  /// its own path sums, speak against it. `evidence` is null where the method has none: then all that is updated has
+  /// the most of it. REQUIRES: `updated` is neither `predicted` nor `measured`.
+  void update(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
+              const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful, FlagMap& updated_evidence,
+              Views views);
+
+ private:
+  ocl::Stage stage_;
+  const cl_int has_gate_;
+  const float gate_px_;
+  const cl_int keep_predicted_, ask_neighbours_;
+  const float min_variance_px2_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const cl_int, const float,
+              const FlagMap, const Map, const Map, const Map, const Map, const FlagMap, const cl_int, const cl_int,
+              const FlagMap, const ocl::Buffer<cl_int>, const Map, Map, Map, FlagMap, FlagMap>
+      update_;
+  const BlockEvidence none_;
+};
+
+}  // namespace egosgm

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/stages/median_filter.h"
+
+namespace egosgm {
+
+MedianFilter::MedianFilter(ocl::Context& context, shared::ImageSize size, int pixels)
+    : stage_(context, "MedianFilter", "median_filter.cl", size, pixels),
+      filter_(stage_, "filter"),
+      filter_and_fill_(stage_, "filter_and_fill") {}
+
+void MedianFilter::filter(const Map& disparity, Map& filtered, Views views) {
+  stage_.launch_pixels(filter_, count(views), disparity, filtered);
+}
+
+void MedianFilter::fill(const Map& disparity, Map& filtered, Map& variance, Views views) {
+  stage_.launch_pixels(filter_and_fill_, count(views), disparity, filtered, variance);
+}
+
+}  // namespace egosgm

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "tests/reference/output_variance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "tests/reference/method.h"
+
+namespace egosgm::reference {
+namespace {
+
+/// A map of one view.
+struct Plane {
+  shared::ImageSize size;
+  const float* values;
+
+  float operator()(int x, int y) const { return values[static_cast<std::size_t>(y) * size.width + x]; }
+  float nearest_inside(int x, int y) const {
+    return (*this)(std::clamp(x, 0, size.width - 1), std::clamp(y, 0, size.height - 1));
+  }
+};
+
+float second_difference(float before, float at, float after) {
+  for (const float d : {before, at, after}) {
+    if (d == EGOSGM_INVALID_DISPARITY) return kMaxRoughnessPx;
+  }
+  return std::min(std::abs(before + after - 2 * at), kMaxRoughnessPx);
+}
+
+std::vector<float> roughness(const Plane& disparity) {
+  std::vector<float> out;
+  for (int y = 0; y < disparity.size.height; ++y) {
+    for (int x = 0; x < disparity.size.width; ++x) {
+      const float d = disparity(x, y);
+      const float across = second_difference(disparity.nearest_inside(x - 1, y), d, disparity.nearest_inside(x + 1, y));
+      const float down = second_difference(disparity.nearest_inside(x, y - 1), d, disparity.nearest_inside(x, y + 1));
+      out.push_back(across + down);
+    }
+  }
+  return out;
+}
+
+/// Mean of `at(i - radius), at(i - radius + step), ...`, as far as they lie in [0, end).
+template <typename At>
+float mean(int i, int radius, int step, int end, At&& at) {
+  float sum = 0, count = 0;
+  for (int k = i - radius; k <= i + radius; k += step) {
+    if (k < 0 || k >= end) continue;
+    sum += at(k);
+    count += 1;
+  }
+  return sum / count;
+}
+
+/// Of the means of the rows.
+float window_mean(const Plane& plane, int x, int y, int radius, int step) {
+  return mean(y, radius, step, plane.size.height,
+              [&](int v) { return mean(x, radius, step, plane.size.width, [&](int u) { return plane(u, v); }); });
+}
+
+/// The largest of the differences to the valid disparities kJumpDistance pixels off, to eight sides.
+float jump_beside(const Plane& disparity, int x, int y) {
+  float most = 0;
+  for (const int dy : {-kJumpDistance, 0, kJumpDistance}) {
+    for (const int dx : {-kJumpDistance, 0, kJumpDistance}) {
+      const int u = x + dx, v = y + dy;
+      if (u < 0 || u >= disparity.size.width || v < 0 || v >= disparity.size.height) continue;
+      if (disparity(u, v) == EGOSGM_INVALID_DISPARITY) continue;
+      most = std::max(most, std::abs(disparity(u, v) - disparity(x, y)));
+    }
+  }
+  return std::min(most, kMaxJumpPx);
+}
+
+/// (p r^3)^(1/4) of every pixel of both views, each cut.
+std::vector<float> blends(const testing::HostMaps& belief, const testing::HostMaps& measured) {
+  std::vector<float> out;
+  for (std::size_t i = 0; i < belief.variance.size(); ++i) {
+    const float most = kMaxMeanVariancePx2;
+    const bool is_measured = measured.disparity[i] != EGOSGM_INVALID_DISPARITY;
+    const float r = is_measured ? std::min(measured.variance[i], most) : most;
+    const bool is_there = belief.disparity[i] != EGOSGM_INVALID_DISPARITY;
+    const float p = is_there ? std::min(belief.variance[i], most) : 0;
+    out.push_back(std::sqrt(r * std::sqrt(r * p)));
+  }
+  return out;
+}
+
+float calibrated(float sum) {
+  const float square = sum * sum;
+  return 0.36f / (1 + 0.07f / square) + 2.52f * std::sqrt(sum) / (1 + 0.8f / (square * square * sum));
+}
+
+}  // namespace
+
+std::vector<float> output_variance(shared::ImageSize size, const OutputVarianceOptions& options,
+                                   const std::vector<float>& given_out, const testing::HostMaps& belief,
+                                   const testing::HostMaps& measured) {
+  if (!options.enabled) return testing::masked({given_out, belief.variance}).variance;
+  std::vector<float> out;
+  const std::vector<float> variances = blends(belief, measured);
+  const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
+  for (std::size_t view = 0; view < 2; ++view) {
+    const Plane disparity{size, given_out.data() + view * pixels};
+    const Plane variance{size, variances.data() + view * pixels};
+    const std::vector<float> rough = roughness(disparity);
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const float p = window_mean(variance, x, y, kVarianceRadius, kVarianceStep);
+        const float r = window_mean({size, rough.data()}, x, y, kRoughnessRadius, 1);
+        const bool is_valid = disparity(x, y) != EGOSGM_INVALID_DISPARITY;
+        const float j = jump_beside(disparity, x, y);
+        const float sum =
+            options.scale * (p * std::sqrt(p)) + options.roughness_weight * (r * r) + options.jump_weight * (j * j);
+        out.push_back(is_valid ? calibrated(sum) : 0);
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace egosgm::reference

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/stages/census.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <random>
+
+#include "tests/reference/census.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+
+namespace egosgm {
+namespace {
+
+using Case = std::tuple<shared::ImageSize, PixelType, MatchingCost, int>;
+
+std::string name(const ::testing::TestParamInfo<Case>& info) {
+  const auto [size, type, cost, pixels] = info.param;
+  return std::to_string(size.width) + "x" + std::to_string(size.height) +
+         (type == PixelType::kU8 ? "_8bit" : "_16bit") +
+         (cost == MatchingCost::kLearned7x7  ? "_learned7x7"
+          : cost == MatchingCost::kCensus9x7 ? "_census9x7"
+          : cost == MatchingCost::kCensus5x5 ? "_census5x5"
+                                             : "_grey") +
+         "_by_" + std::to_string(pixels);
+}
+
+class CensusTest : public ::testing::TestWithParam<Case> {};
+
+TEST_P(CensusTest, EqualsReference) {
+  const auto [size, type, cost, pixels] = GetParam();
+  const int padding = 19, bytes = type == PixelType::kU8 ? 1 : 2;
+  std::mt19937 random(1);
+  std::uniform_int_distribution<int> grey(0, type == PixelType::kU8 ? 255 : 65535);
+  std::vector<std::uint16_t> views[2];
+  std::vector<cl_uchar> raw;
+  for (auto& view : views) {
+    for (std::size_t i = 0; i < pixel_count(size); ++i) {
+      view.push_back(static_cast<std::uint16_t>(grey(random)));
+      for (int b = 0; b < bytes; ++b) raw.push_back(static_cast<cl_uchar>(view.back() >> (8 * b)));
+    }
+  }
+
+  ocl::Context context(testing::any_device());
+  Census census(context, size, type, cost, padding, pixels);
+  ocl::Buffer<cl_uchar> images(context, raw.size());
+  ocl::Buffer<cl_uint> codes(context, Census::words(cost, size, padding));
+  images.write(context, raw);
+  census.encode(images, codes);
+
+  const auto expected = reference::padded_codes(size, reference::codes(size, views[0], 8 * bytes, cost),
+                                                reference::codes(size, views[1], 8 * bytes, cost), padding, cost);
+  const auto actual = codes.read(context);
+  EXPECT_TRUE(testing::same_bits(std::vector<std::uint32_t>(actual.begin(), actual.end()), expected,
+                                 {(size.width + 2 * padding) * Census::words(cost), size.height}));
+}
+
+/// The codes of a pair of 16 bits.
+std::vector<cl_uint> codes_of(shared::ImageSize size, const std::vector<std::uint16_t>& greys) {
+  ocl::Context context(testing::any_device());
+  Census census(context, size, PixelType::kU16, MatchingCost::kLearned7x7, 0);
+  ocl::Buffer<cl_uchar> images(context, 2 * greys.size());
+  ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kLearned7x7, size, 0));
+  std::vector<cl_uchar> raw;
+  for (const std::uint16_t grey : greys) {
+    raw.push_back(static_cast<cl_uchar>(grey));
+    raw.push_back(static_cast<cl_uchar>(grey >> 8));
+  }
+  images.write(context, raw);
+  census.encode(images, codes);
+  return codes.read(context);
+}
+
+// Cameras differ in exposure: an offset changes no bit, a gain those alone that a threshold decides.
+TEST(Census, LearnedSeesThroughAnOffsetAndMostOfAGain) {
+  const shared::ImageSize size{67, 41};
+  std::mt19937 random(2);
+  std::uniform_int_distribution<int> grey(0, 20000);
+  std::vector<std::uint16_t> greys(2 * pixel_count(size)), brighter, doubled;
+  for (std::uint16_t& value : greys) value = static_cast<std::uint16_t>(grey(random));
+  for (const std::uint16_t value : greys) {
+    brighter.push_back(static_cast<std::uint16_t>(value + 3000));
+    doubled.push_back(static_cast<std::uint16_t>(2 * value));
+  }
+  const auto codes = codes_of(size, greys), of_doubled = codes_of(size, doubled);
+  EXPECT_EQ(codes_of(size, brighter), codes);
+  std::size_t bits = 0;
+  for (std::size_t word = 0; word < codes.size(); ++word) {
+    const cl_uint differing = codes[word] ^ of_doubled[word];
+    if (word % 2 == 1) {
+      EXPECT_EQ(differing >> 8, 0u) << "the census of 5x5";
+    }
+    bits += static_cast<std::size_t>(std::popcount(differing));
+  }
+  EXPECT_GT(bits, 0u) << "thresholds are grey levels";
+  EXPECT_LT(bits, 64 * codes.size() / 2 / 20);
+}
+
+using AlikeCase = std::tuple<shared::ImageSize, int>;
+
+std::string alike_name(const ::testing::TestParamInfo<AlikeCase>& info) {
+  const auto [size, pixels] = info.param;
+  return std::to_string(size.width) + "x" + std::to_string(size.height) + "_by_" + std::to_string(pixels);
+}
+
+class AlikeTest : public ::testing::TestWithParam<AlikeCase> {};
+
+TEST_P(AlikeTest, EqualsReference) {
+  const auto [size, pixels] = GetParam();
+  std::mt19937 random(3);
+  std::vector<std::uint16_t> views[2];
+  std::vector<cl_uchar> raw;
+  for (auto& view : views) {
+    for (std::size_t i = 0; i < pixel_count(size); ++i) {  // a wall, noise, and all that 16 bits can be
+      const unsigned x = i % size.width, kind = x * 3 / size.width;
+      view.push_back(static_cast<std::uint16_t>(kind == 0   ? 30000 + random() % 300
+                                                : kind == 1 ? random() % 2 * 65535
+                                                            : random() % 65536));
+      raw.insert(raw.end(), {static_cast<cl_uchar>(view.back()), static_cast<cl_uchar>(view.back() >> 8)});
+    }
+  }
+  ocl::Context context(testing::any_device());
+  const int padding = 19;
+  Census census(context, size, PixelType::kU16, MatchingCost::kCensus9x7, padding, pixels);
+  ocl::Buffer<cl_uchar> images(context, raw.size());
+  ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kCensus9x7, size, padding));
+  images.write(context, raw);
+  census.encode_alike(images, codes);
+  const auto expected =
+      reference::padded_codes(size, reference::alike_codes(size, views[0]), reference::alike_codes(size, views[1]),
+                              padding, MatchingCost::kCensus9x7);
+  const auto actual = codes.read(context);
+  EXPECT_TRUE(testing::same_bits(std::vector<std::uint32_t>(actual.begin(), actual.end()), expected,
+                                 {2 * (size.width + 2 * padding), size.height}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, AlikeTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::kSizes), ::testing::Values(1, 16)),
+                         alike_name);
+INSTANTIATE_TEST_SUITE_P(Sizes, CensusTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::kSizes),
+                                            ::testing::Values(PixelType::kU8, PixelType::kU16),
+                                            ::testing::Values(MatchingCost::kLearned7x7, MatchingCost::kCensus9x7,
+                                                              MatchingCost::kCensus5x5, MatchingCost::kSad3x3),
+                                            ::testing::Values(1, 16)),
+                         name);
+INSTANTIATE_TEST_SUITE_P(Large, CensusTest,
+                         ::testing::Values(std::tuple{testing::kLargest, PixelType::kU8, MatchingCost::kLearned7x7,
+                                                      16}),
+                         name);
+
+}  // namespace
+}  // namespace egosgm

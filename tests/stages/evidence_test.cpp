@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/stages/evidence.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "host/stages/banded_sgm.h"
+#include "host/stages/coarse_match.h"
+#include "tests/reference/census.h"
+#include "tests/reference/evidence.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+constexpr int kDisparities = 24;
+
+MethodOptions options() {
+  MethodOptions options;
+  options.disparities = kDisparities;
+  return options;
+}
+
+/// Both views of an image with 16 bits, and of it at a quarter of the resolution.
+struct Images {
+  shared::ImageSize size;
+  std::vector<std::uint16_t> full[2], coarse[2];
+
+  explicit Images(shared::ImageSize size) : size(size) {
+    const shared::ImageSize quarter = CoarseMatch::coarse_size(size);
+    for (int view = 0; view < 2; ++view)
+      full[view].resize(pixel_count(size)), coarse[view].resize(pixel_count(quarter));
+  }
+  shared::ImageSize coarse_size() const { return CoarseMatch::coarse_size(size); }
+
+  reference::ViewCodes codes() const {
+    return {size,
+            {reference::codes(size, full[0], 16, MatchingCost::kCensus9x7),
+             reference::codes(size, full[1], 16, MatchingCost::kCensus9x7)}};
+  }
+  reference::ViewCodes coarse_codes() const {
+    return {coarse_size(),
+            {reference::codes(coarse_size(), coarse[0], 16, MatchingCost::kCensus9x7),
+             reference::codes(coarse_size(), coarse[1], 16, MatchingCost::kCensus9x7)}};
+  }
+  reference::ViewCodes coarse_alike() const {
+    return {coarse_size(),
+            {reference::alike_codes(coarse_size(), coarse[0]), reference::alike_codes(coarse_size(), coarse[1])}};
+  }
+};
+
+Images noise(shared::ImageSize size, unsigned seed) {
+  std::mt19937 random(seed);
+  Images images(size);
+  for (int view = 0; view < 2; ++view) {
+    for (std::uint16_t& grey : images.full[view]) grey = static_cast<std::uint16_t>(random() % 65536);
+    for (std::uint16_t& grey : images.coarse[view]) grey = static_cast<std::uint16_t>(random() % 65536);
+  }
+  return images;
+}
+
+/// The right view of it shows each column `disparity` to the left, at a quarter of the resolution as well.
+Images shifted(Images images, int disparity) {
+  const auto shift = [](std::vector<std::uint16_t>(&views)[2], shared::ImageSize size, int by) {
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x + by < size.width; ++x) views[1][y * size.width + x] = views[0][y * size.width + x + by];
+    }
+  };
+  shift(images.full, images.size, disparity);
+  shift(images.coarse, images.coarse_size(), disparity / 4);
+  return images;
+}
+
+/// What the device says, without the gaps of its rows.
+reference::BlockEvidence evidence_of(const Images& images, bool has_coarse, const std::vector<float>& found,
+                                     const testing::HostMaps& predicted, const testing::HostMaps& measured, int pixels,
+                                     Views views = Views::kBoth) {
+  ocl::Context context(testing::any_device());
+  const shared::ImageSize size = images.size, quarter = images.coarse_size();
+  const int padding = BandedSgm::code_padding(range_of(options()));
+  const reference::ViewCodes of_views = images.codes();
+  ocl::Buffer<cl_uint> codes(context, Census::words(MatchingCost::kCensus9x7, size, padding));
+  codes.write(context, reference::padded_codes(size, of_views.of_view[0], of_views.of_view[1], padding,
+                                               MatchingCost::kCensus9x7));
+  ocl::Buffer<cl_uchar> coarse_images(context, 2 * 2 * pixel_count(quarter));
+  std::vector<cl_uchar> bytes;
+  for (const auto& view : images.coarse) {
+    for (const std::uint16_t grey : view)
+      bytes.insert(bytes.end(), {static_cast<cl_uchar>(grey), static_cast<cl_uchar>(grey >> 8)});
+  }
+  coarse_images.write(context, bytes);
+  Map coarse_disparity(context, 2 * pixel_count(quarter));
+  coarse_disparity.write(context, found);
+  const CoarseView coarse{coarse_images, coarse_disparity};
+  const StereoMaps prediction = testing::upload(context, size, predicted);
+  const StereoMaps measurement = testing::upload(context, size, measured);
+  BlockEvidence blocks(context, size);
+  blocks.evidence.write(context, std::vector<cl_int>(blocks.evidence.size(), 12345));
+  blocks.found.write(context, std::vector<float>(blocks.found.size(), 777));
+  Evidence evidence(context, size, options(), pixels);
+  evidence(codes, has_coarse ? &coarse : nullptr, prediction.disparity, measurement.disparity, blocks, views);
+  const std::vector<cl_int> padded = blocks.evidence.read(context);
+  const std::vector<float> padded_found = blocks.found.read(context);
+  const int stride = static_cast<int>(padded.size()) / (2 * quarter.height);
+  reference::BlockEvidence result;
+  for (int row = 0; row < 2 * quarter.height; ++row) {
+    for (int x = 0; x < quarter.width; ++x) {
+      result.evidence.push_back(padded[row * stride + x]);
+      result.found.push_back(padded_found[row * stride + x]);
+    }
+  }
+  return result;
+}
+
+testing::HostMaps everywhere(shared::ImageSize size, float disparity) {
+  return {std::vector<float>(2 * pixel_count(size), disparity), std::vector<float>(2 * pixel_count(size), 1.0f)};
+}
+
+std::vector<float> nothing_found(const Images& images) {
+  return std::vector<float>(2 * pixel_count(images.coarse_size()), kNone);
+}
+
+double mean(const std::vector<int>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+EGOSGM_TEST_AT_ALL_SIZES(EvidenceTest);
+
+TEST_P(EvidenceTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  const Images images = shifted(noise(size, 3), 8);
+  testing::HostMaps predicted = testing::random_maps(size, 0, kDisparities - 1, 0.3, 4);
+  const testing::HostMaps measured = testing::random_maps(size, 0, kDisparities - 1, 0.3, 5);
+  for (std::size_t i = 0; i < predicted.disparity.size(); ++i) {
+    if (i % 3 == 0) predicted.disparity[i] = 8;
+    if (i % 7 == 0) predicted.disparity[i] = 8.5f;  // a tie of rounding
+  }
+  std::vector<float> found = testing::random_maps(images.coarse_size(), 0, 5, 0.3, 6).disparity;
+  for (const bool has_coarse : {true, false}) {
+    std::optional<reference::CoarseView> coarse;
+    if (has_coarse) coarse = reference::CoarseView{images.coarse_codes(), images.coarse_alike(), found};
+    const reference::BlockEvidence expected = reference::block_evidence(3, images.codes(), coarse, predicted, measured);
+    for (const int pixels : {1, 16}) {
+      const reference::BlockEvidence actual = evidence_of(images, has_coarse, found, predicted, measured, pixels);
+      EXPECT_EQ(actual.evidence, expected.evidence) << "by " << pixels << ", coarse " << has_coarse;
+      EXPECT_EQ(actual.found, expected.found) << "by " << pixels << ", coarse " << has_coarse;
+    }
+  }
+}
+
+TEST_P(EvidenceTest, LooksAtTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const Images images = noise(size, 3);
+  const testing::HostMaps maps = testing::random_maps(size, 0, kDisparities - 1, 0.3, 4);
+  for (const int pixels : {1, 16}) {
+    const auto both = evidence_of(images, true, nothing_found(images), maps, maps, pixels);
+    const auto left = evidence_of(images, true, nothing_found(images), maps, maps, pixels, Views::kLeft);
+    const auto middle = static_cast<std::ptrdiff_t>(both.evidence.size() / 2);
+    EXPECT_TRUE(std::equal(both.evidence.begin(), both.evidence.begin() + middle, left.evidence.begin()));
+    EXPECT_TRUE(std::all_of(left.evidence.begin() + middle, left.evidence.end(), [](int e) { return e == 12345; }));
+  }
+}
+
+constexpr shared::ImageSize kSize{320, 97};
+
+TEST(Evidence, IsNothingInNoise) {
+  const Images images = noise(kSize, 1);
+  const testing::HostMaps predicted = everywhere(kSize, 9);
+  const auto blocks = evidence_of(images, true, nothing_found(images), predicted, predicted, 0);
+  // The least of five means lies a little below the mean, by how much noise scatters.
+  EXPECT_LT(mean(blocks.evidence), 0);
+  EXPECT_GT(mean(blocks.evidence), 16 * -3);
+  EXPECT_LT(*std::max_element(blocks.evidence.begin(), blocks.evidence.end()), 16 * 8) << "8 bits";
+}
+
+TEST(Evidence, IsAThirdOfTheBitsOfAMatchWithoutNoise) {
+  const Images images = shifted(noise(kSize, 1), 8);
+  const testing::HostMaps right = everywhere(kSize, 8), wrong = everywhere(kSize, 12);
+  const auto confirmed = evidence_of(images, true, nothing_found(images), right, right, 0);
+  const auto fine = evidence_of(images, false, nothing_found(images), right, right, 0);
+  const auto chance = evidence_of(images, true, nothing_found(images), wrong, wrong, 0);
+  EXPECT_GT(mean(confirmed.evidence), 16 * 30) << "both resolutions";
+  EXPECT_GT(mean(fine.evidence), 16 * 20) << "one";
+  EXPECT_LT(mean(fine.evidence), 16 * 31);
+  EXPECT_LT(mean(chance.evidence), 0);
+}
+
+// Beside a textured wall, a plain place has none: the half of its window that has no texture says so.
+TEST(Evidence, DoesNotReachOverAnEdge) {
+  Images images = shifted(noise(kSize, 1), 8);
+  const Images other = noise(kSize, 2);
+  for (int y = 0; y < 48; ++y) {
+    for (int x = 0; x < kSize.width; ++x) images.full[1][y * kSize.width + x] = other.full[1][y * kSize.width + x];
+  }
+  const testing::HostMaps predicted = everywhere(kSize, 8);
+  const auto blocks = evidence_of(images, false, nothing_found(images), predicted, predicted, 0);
+  const int columns = images.coarse_size().width;
+  const auto row = [&](int y) {
+    return mean({blocks.evidence.begin() + y * columns + 4, blocks.evidence.begin() + (y + 1) * columns - 4});
+  };
+  EXPECT_GT(row(16), 16 * 15) << "well within the texture";
+  EXPECT_LT(row(11), 16 * 5) << "the last plain row but its census window";
+  EXPECT_LT(row(9), 24);
+}
+
+// A plain place beside a bright thing, whose outline the codes at a quarter of the resolution show from afar.
+TEST(Evidence, DoesNotSeeAnOutlineFromAfar) {
+  Images images = noise(kSize, 1);
+  const int columns = images.coarse_size().width, rows = images.coarse_size().height, edge = columns / 2;
+  for (int view = 0; view < 2; ++view) {
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < columns; ++x) {
+        std::uint16_t& grey = images.coarse[view][y * columns + x];
+        grey = static_cast<std::uint16_t>(grey % 512 + (x + 2 * view < edge ? 20000 : 60000));
+      }
+    }
+  }
+  const testing::HostMaps predicted = everywhere(kSize, 8);
+  const auto blocks = evidence_of(images, true, nothing_found(images), predicted, predicted, 0);
+  std::vector<int> beside;
+  for (int y = 4; y + 4 < rows; ++y) {
+    for (int x = edge - 4; x < edge; ++x) beside.push_back(blocks.evidence[y * columns + x]);
+  }
+  EXPECT_LT(mean(beside), 24) << "the noise of the plain place is all that is asked";
+}
+
+TEST(Evidence, AsksThePredictionUnlessTheMeasurementContradictsIt) {
+  const Images images = shifted(noise(kSize, 1), 8);
+  const testing::HostMaps right = everywhere(kSize, 8), wrong = everywhere(kSize, 15), none = everywhere(kSize, kNone);
+  const auto of = [&](const testing::HostMaps& predicted, const testing::HostMaps& measured) {
+    return mean(evidence_of(images, false, nothing_found(images), predicted, measured, 0).evidence) / 16;
+  };
+  EXPECT_GT(of(right, none), 20);
+  EXPECT_GT(of(none, right), 20);
+  EXPECT_GT(of(wrong, right), 20) << "contradicted: the measurement is asked";
+  EXPECT_LT(of(everywhere(kSize, 10), right), 2) << "within the gate: the prediction is";
+  EXPECT_EQ(of(none, none), 0);
+}
+
+TEST(Evidence, GivesOutWhatHasMuchOrIsSupported) {
+  constexpr shared::ImageSize kSmall{65, 37};
+  testing::HostMaps maps = testing::random_maps(kSmall, 0, 9, 0.2, 8);
+  maps.disparity[10] = 5.5f;
+  for (std::size_t i = 0; i < maps.disparity.size(); ++i) {
+    maps.evidence.push_back(static_cast<std::uint8_t>(i % 7 < 5 ? 28 + i * 5 % 8 : 94 + i % 4));
+  }
+  for (const int pixels : {1, 16}) {
+    for (const Views tracked : {Views::kBoth, Views::kLeft}) {
+      ocl::Context context(testing::any_device());
+      const StereoMaps on_device = testing::upload(context, kSmall, maps);
+      FlagMap evidence(context, maps.evidence.size());
+      evidence.write(context, maps.evidence);
+      Map published = testing::upload(context, kSmall, testing::random_maps(kSmall, 0, 9, 0.2, 9)).disparity;
+      Evidence stage(context, kSmall, options(), pixels);
+      const std::vector<float> expected = reference::confirmed(kSmall, maps, tracked == Views::kLeft);
+      stage.publish(on_device.disparity, evidence, published, Views::kBoth, tracked);
+      EXPECT_TRUE(testing::same_bits(published.read(context), expected, kSmall)) << "by " << pixels;
+    }
+  }
+}
+
+// A pixel without evidence of its own, on the surface of those 8 and 16 px around.
+TEST(Evidence, GivesOutWhatHasLittleWithinASurface) {
+  constexpr shared::ImageSize kSurface{33, 33};
+  constexpr std::size_t kMiddle = 16 * 33 + 16;
+  const auto gives = [&](float d, int supporters, int of_them, int of_pixel) {
+    testing::HostMaps maps = testing::empty_maps(kSurface);
+    maps.evidence.assign(maps.disparity.size(), 0);
+    maps.disparity[kMiddle] = d;
+    maps.evidence[kMiddle] = static_cast<std::uint8_t>(of_pixel);
+    for (int i = 0; i < 25 && supporters > 0; ++i) {
+      const std::size_t pixel = i / 5 * 8 * 33 + i % 5 * 8;
+      if (pixel == kMiddle) continue;
+      maps.disparity[pixel] = 20;
+      maps.evidence[pixel] = static_cast<std::uint8_t>(of_them);
+      --supporters;
+    }
+    ocl::Context context(testing::any_device());
+    FlagMap evidence(context, maps.evidence.size());
+    evidence.write(context, maps.evidence);
+    Map published(context, maps.disparity.size());
+    Evidence(context, kSurface, options())
+        .publish(testing::upload(context, kSurface, maps).disparity, evidence, published, Views::kBoth, Views::kBoth);
+    return published.read(context)[kMiddle] == d;
+  };
+  EXPECT_TRUE(gives(20, 8, 32, 0));
+  EXPECT_FALSE(gives(20, 7, 32, 95)) << "too few";
+  EXPECT_FALSE(gives(20, 24, 31, 95)) << "not confirmed";
+  EXPECT_TRUE(gives(24, 24, 32, 0)) << "a slope";
+  EXPECT_FALSE(gives(24.5f, 24, 32, 0)) << "another surface";
+  EXPECT_TRUE(gives(20, 0, 0, 96)) << "it has much itself";
+}
+
+TEST(Evidence, NeedsCodesOfTwoWords) {
+  MethodOptions method;
+  EXPECT_TRUE(Evidence::is_of(method));
+  method.banded_sgm.cost = MatchingCost::kSad3x3;
+  EXPECT_FALSE(Evidence::is_of(method));
+  method = {};
+  method.temporal = false;
+  EXPECT_FALSE(Evidence::is_of(method));
+  EXPECT_FALSE(Evidence::is_of(PipelineOptions::paper()));
+}
+
+}  // namespace
+}  // namespace egosgm

@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/stages/kalman_update.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/reference/kalman_update.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+
+/// Values of blocks as the device has them.
+template <typename T>
+std::vector<T> in_padded_rows(shared::ImageSize size, const std::vector<T>& values) {
+  const int columns = (size.width + 3) / 4, stride = (size.width + 15) / 16 * 4;
+  std::vector<T> padded(values.size() / columns * stride);
+  for (std::size_t i = 0; i < values.size(); ++i) padded[i / columns * stride + i % columns] = values[i];
+  return padded;
+}
+
+testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& options, const testing::HostMaps& predicted,
+                         const testing::HostMaps& measured, int pixels = 0, Views views = Views::kBoth,
+                         const reference::FrameEvidence* evidence = nullptr) {
+  ocl::Context context(testing::any_device());
+  KalmanUpdate stage(context, size, options, pixels);
+  const StereoMaps prediction = testing::upload(context, size, predicted);
+  const Measurement measurement = testing::upload_measurement(context, size, measured);
+  StereoMaps out = testing::upload(context, size, testing::earlier_maps(size));
+  FlagMap hidden(context, predicted.disparity.size());
+  hidden.write(context, predicted.hidden.empty() ? std::vector<cl_uchar>(hidden.size()) : predicted.hidden);
+  FlagMap doubtful(context, predicted.disparity.size());
+  doubtful.write(context, std::vector<cl_uchar>(doubtful.size(), 9));
+  BlockEvidence blocks(context, size);
+  FlagMap before(context, predicted.disparity.size()), after(context, predicted.disparity.size());
+  after.write(context, std::vector<cl_uchar>(after.size(), 7));
+  if (evidence) {
+    before.write(context, evidence->before);
+    blocks.evidence.write(context, in_padded_rows(size, evidence->blocks.evidence));
+    blocks.found.write(context, in_padded_rows(size, evidence->blocks.found));
+  }
+  const KalmanUpdate::FrameEvidence of_frame{before, blocks, evidence && evidence->repeats};
+  stage.update(hidden, prediction, measurement, evidence ? &of_frame : nullptr, out, doubtful, after, views);
+  testing::HostMaps maps = testing::download(context, Measurement{out, doubtful});
+  maps.evidence = after.read(context);
+  return maps;
+}
+
+struct Estimate {
+  float disparity, variance;
+  bool doubtful = false;
+  bool operator==(const Estimate&) const = default;
+};
+
+constexpr Estimate kNothing{kNone, 0};
+constexpr float kWide = 16;  // the variance of what is doubtful
+
+Estimate update_pixel(const KalmanUpdateOptions& options, Estimate predicted, Estimate measured, int is_hidden = 0) {
+  const testing::HostMaps updated = update(
+      {1, 1}, options,
+      {{predicted.disparity, kNone}, {predicted.variance, 0}, {static_cast<std::uint8_t>(is_hidden), 0}},
+      {{measured.disparity, kNone}, {measured.variance, 0}, {}, {static_cast<std::uint8_t>(measured.doubtful), 0}});
+  EXPECT_EQ(updated.disparity[1], kNone);
+  EXPECT_EQ(updated.variance[1], 0);
+  EXPECT_EQ(updated.doubtful[1], 0);
+  return {updated.disparity[0], updated.variance[0], updated.doubtful[0] != 0};
+}
+
+EGOSGM_TEST_AT_ALL_SIZES(KalmanUpdateTest);
+
+TEST_P(KalmanUpdateTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  // On the left most are off to the same side.
+  testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 6);
+  testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 7);
+  for (std::size_t i = 0; i < measured.disparity.size(); ++i) {
+    predicted.hidden.push_back(predicted.disparity[i] == kNone && i % 13 < 4);
+    if (i % 7 == 0 && predicted.disparity[i] != kNone) predicted.variance[i] += 16;
+    measured.doubtful.push_back(i % 11 == 0);
+    if (i % 5 == 0 && measured.disparity[i] != kNone) measured.disparity[i] -= 6;
+    if (static_cast<int>(i) % size.width < size.width / 2 && i % 23 != 0) {
+      predicted.hidden[i] = 0;
+      predicted.disparity[i] = 0;
+      measured.disparity[i] = 0.25f * static_cast<float>(i % 9) + 0.5f;
+    }
+  }
+  for (const KalmanUpdateOptions& options :
+       {KalmanUpdateOptions{}, KalmanUpdateOptions{.ask_neighbours = false},
+        KalmanUpdateOptions{.gate_px = 0, .keep_predicted = false, .min_variance_px2 = 0.5f}}) {
+    const testing::HostMaps twin = reference::kalman_update(size, options, predicted, measured);
+    const testing::HostMaps expected{twin.disparity, twin.variance, {}, twin.doubtful};
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps actual = update(size, options, predicted, measured, pixels);
+      EXPECT_TRUE(testing::same_maps(actual, expected, size)) << "gate " << options.gate_px << ", by " << pixels;
+    }
+  }
+}
+
+/// Of which nothing is hidden, and all that is asked has an answer.
+reference::FrameEvidence random_evidence(shared::ImageSize size, unsigned seed, bool repeats) {
+  std::mt19937 random(seed);
+  reference::FrameEvidence evidence;
+  for (std::size_t i = 0; i < 2 * pixel_count(size); ++i) {
+    evidence.before.push_back(random() % 3 == 0 ? 0 : static_cast<std::uint8_t>(random() % 161));
+  }
+  const std::size_t blocks = 2 * static_cast<std::size_t>((size.width + 3) / 4) * ((size.height + 3) / 4);
+  for (std::size_t i = 0; i < blocks; ++i) {
+    evidence.blocks.evidence.push_back(static_cast<int>(random() % 240) - 80);
+    evidence.blocks.found.push_back(random() % 3 == 0 ? kNone : static_cast<float>(random() % 13) - 6);
+  }
+  evidence.repeats = repeats;
+  return evidence;
+}
+
+TEST_P(KalmanUpdateTest, EqualsReferenceWithEvidence) {
+  const shared::ImageSize size = GetParam();
+  const testing::HostMaps predicted = testing::random_maps(size, -4, 4, 0.3, 16);
+  testing::HostMaps measured = testing::random_maps(size, -5, 5, 0.2, 17);
+  for (std::size_t i = 0; i < measured.disparity.size(); ++i) measured.doubtful.push_back(i % 11 == 0);
+  for (const bool repeats : {false, true}) {
+    const reference::FrameEvidence evidence = random_evidence(size, 18, repeats);
+    const testing::HostMaps expected = reference::kalman_update(size, {}, predicted, measured, &evidence);
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps actual = update(size, {}, predicted, measured, pixels, Views::kBoth, &evidence);
+      EXPECT_TRUE(testing::same_maps(actual, expected, size)) << repeats << ", by " << pixels;
+    }
+  }
+}
+
+TEST_P(KalmanUpdateTest, UpdatesTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const testing::HostMaps predicted = testing::random_maps(size, -2, 2, 0.3, 9);
+  const testing::HostMaps measured = testing::random_maps(size, -3, 3, 0.2, 10);
+  const testing::HostMaps both = update(size, {}, predicted, measured);
+  for (const int pixels : {1, 16}) {
+    const testing::HostMaps one = update(size, {}, predicted, measured, pixels, Views::kLeft);
+    EXPECT_TRUE(testing::same_maps(one, testing::left_and_right(both, testing::earlier_maps(size)), size));
+  }
+}
+
+TEST(KalmanUpdate, WeighsByTheVariances) {
+  EXPECT_EQ(update_pixel({}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));
+  EXPECT_EQ(update_pixel({}, {10, 3}, {12, 1}), (Estimate{11.5f, 0.75f}));
+  EXPECT_EQ(update_pixel({}, {10, 1}, {12, 3}), (Estimate{10.5f, 0.75f}));
+}
+
+TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12, 1}), (Estimate{11, 0.5f}));
+  // With a variance for which the next frame searches wide.
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {12.25f, 1}), (Estimate{12.25f, kWide, true}));
+  const KalmanUpdateOptions alone{.gate_px = 2, .ask_neighbours = false};
+  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 1}), (Estimate{7.75f, kWide, true}));
+  EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 2 * kWide}), (Estimate{7.75f, 2 * kWide, true}));
+}
+
+TEST(KalmanUpdate, TakesAMeasurementThatEscapedItsBand) {
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, 1, true}), (Estimate{11, kWide, true}));
+  EXPECT_EQ(update_pixel({.gate_px = 2}, kNothing, {11, kWide, true}), (Estimate{11, kWide, true}));
+  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, kWide}).doubtful, false) << "uncertain, but where it belongs";
+}
+
+// The paper's update knows of no escape and of nothing that hides.
+TEST(KalmanUpdate, AveragesAllWithoutAGate) {
+  const KalmanUpdateOptions plain{.gate_px = 0, .ask_neighbours = false};
+  EXPECT_EQ(update_pixel(plain, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
+  EXPECT_EQ(update_pixel(plain, {10, 16}, {14, 48, true}), (Estimate{11, 12}));
+  EXPECT_EQ(update_pixel(plain, kNothing, {12, 3}, /*is_hidden=*/1), (Estimate{12, 3}));
+  EXPECT_EQ(update_pixel(plain, kNothing, kNothing, /*is_hidden=*/1), kNothing);
+}
+
+TEST(KalmanUpdate, TakesWhatIsThere) {
+  EXPECT_EQ(update_pixel({}, kNothing, {12, 3}), (Estimate{12, 3}));
+  EXPECT_EQ(update_pixel({.keep_predicted = true}, {10, 5}, kNothing), (Estimate{10, 5}));
+  EXPECT_EQ(update_pixel({.keep_predicted = false}, {10, 5}, kNothing), kNothing);
+  EXPECT_EQ(update_pixel({}, kNothing, kNothing), kNothing);
+}
+
+TEST(KalmanUpdate, DropsWhatIsMeasuredWhereANearerSurfaceHidesIt) {
+  for (const bool ask_neighbours : {false, true}) {
+    const KalmanUpdateOptions options{.keep_predicted = true, .ask_neighbours = ask_neighbours};
+    EXPECT_EQ(update_pixel(options, kNothing, {12, 3}, /*is_hidden=*/1), kNothing);
+    EXPECT_EQ(update_pixel(options, kNothing, kNothing, /*is_hidden=*/1), kNothing);
+  }
+}
+
+/// 21x21 pixels: all have `around` as prediction and measurement, but for the pixel in the middle.
+struct Surroundings {
+  static constexpr shared::ImageSize kSize{21, 21};
+  static constexpr int kMiddle = 10 * 21 + 10;
+  testing::HostMaps predicted, measured;
+
+  explicit Surroundings(float around) : predicted(all(around)), measured(all(around)) {}
+
+  static testing::HostMaps all(float disparity) {
+    const std::size_t pixels = 2 * kSize.width * kSize.height;
+    return {std::vector<float>(pixels, disparity), std::vector<float>(pixels, 1)};
+  }
+  Estimate updated_in_the_middle(const KalmanUpdateOptions& options = {}) const {
+    const testing::HostMaps updated = update(kSize, options, predicted, measured);
+    return {updated.disparity[kMiddle], updated.variance[kMiddle], updated.doubtful[kMiddle] != 0};
+  }
+};
+
+/// All are measured `off` nearer than predicted, the pixel in the middle `innovation`.
+Surroundings shifted(float off, float innovation) {
+  Surroundings maps(20);
+  for (float& disparity : maps.measured.disparity) disparity += off;
+  maps.measured.disparity[Surroundings::kMiddle] = 20 + innovation;
+  return maps;
+}
+
+TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
+  for (const float sign : {1.0f, -1.0f}) {
+    EXPECT_EQ(shifted(sign * 1.125f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kWide, true}));
+    const Estimate fused{20 + sign * 0.625f, 0.5f};
+    EXPECT_EQ(shifted(sign * 1, sign * 1.25f).updated_in_the_middle(), fused) << "the others not far enough";
+    EXPECT_EQ(shifted(sign * -1.125f, sign * 1.25f).updated_in_the_middle(), fused) << "to the other side";
+    EXPECT_EQ(shifted(sign * 1.125f, sign * 1).updated_in_the_middle(), (Estimate{20 + sign * 0.5f, 0.5f}));
+    EXPECT_EQ(shifted(sign * 1.125f, sign * 1.25f).updated_in_the_middle({.ask_neighbours = false}), fused);
+  }
+  Surroundings maps = shifted(1.125f, 1.25f);
+  for (const int still : {2, 6, 10, 14, 18}) {
+    maps.measured.disparity[2 * 21 + still] = maps.measured.disparity[18 * 21 + still] = 20;
+  }
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kWide, true})) << "15 of 25";
+  maps.measured.disparity[6 * 21 + 2] = maps.measured.disparity[14 * 21 + 18] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kWide, true})) << "13 of 25";
+  maps.measured.disparity[14 * 21 + 2] = 20;
+  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "12 of 25";
+  for (const int beside : {6, 14}) {
+    Surroundings between = shifted(1.125f, 1.25f);
+    between.measured.disparity[10 * 21 + beside] = 20;
+    EXPECT_EQ(between.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "but not beside";
+  }
+}
+
+TEST(KalmanUpdate, CountsNoPixelOutsideOfTheImageAmongThoseThatMove) {
+  Surroundings maps(20);
+  maps.measured = Surroundings::all(21.25f);
+  const testing::HostMaps updated = update(Surroundings::kSize, {}, maps.predicted, maps.measured);
+  const auto moved = [&](int view, int x, int y) { return updated.disparity[(view * 21 + y) * 21 + x] == 21.25f; };
+  for (const int view : {0, 1}) {
+    EXPECT_TRUE(moved(view, 10, 3) && moved(view, 10, 17)) << "15 of 25 lie in the image";
+    EXPECT_FALSE(moved(view, 7, 3) || moved(view, 13, 3)) << "12";
+    EXPECT_FALSE(moved(view, 7, 17) || moved(view, 13, 17));
+    EXPECT_FALSE(moved(view, 3, 10) || moved(view, 17, 10)) << "none beside";
+  }
+}
+
+/// The left pixel in the middle of 25x1, whose match lies in the image, and its evidence. `supporters`: how many of the
+/// pixels 8 and 16 px beside were measured the same.
+struct Pixel {
+  float predicted = kNone, measured = kNone;
+  std::uint8_t before = 0;
+  int now = 0;
+  float found = kNone;
+  bool repeats = false;
+  int supporters = 1;
+};
+struct Judged {
+  Estimate estimate;
+  int evidence;
+  bool operator==(const Judged&) const = default;
+};
+
+Judged judged(const Pixel& pixel, int x = 12) {
+  constexpr shared::ImageSize kRow{25, 1};
+  testing::HostMaps predicted = testing::empty_maps(kRow), measured = predicted;
+  predicted.disparity[x] = pixel.predicted, measured.disparity[x] = pixel.measured;
+  int supporters = pixel.supporters;
+  for (const int away : {8, 16, -8, -16}) {
+    if (x + away >= 0 && x + away < 25 && supporters-- > 0) measured.disparity[x + away] = pixel.measured;
+  }
+  predicted.variance[x] = measured.variance[x] = 1;
+  reference::FrameEvidence evidence{std::vector<std::uint8_t>(50, 0),
+                                    {std::vector<int>(14, pixel.now), std::vector<float>(14, pixel.found)},
+                                    pixel.repeats};
+  evidence.before[x] = pixel.before;
+  const testing::HostMaps out = update(kRow, {}, predicted, measured, 0, Views::kBoth, &evidence);
+  return {{out.disparity[x], out.variance[x], out.doubtful[x] != 0}, out.evidence[x]};
+}
+
+// In sixteenths of a bit: 1.5 bits a frame must be had, 3 more by what was chosen in this frame alone.
+TEST(KalmanUpdate, EvidenceAddsUpAndDecays) {
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40}), (Judged{{5.5f, 0.5f}, 45 + 40 - 24}));
+  EXPECT_EQ(judged({.predicted = 5, .measured = 5, .before = 128, .now = 400}).evidence, 160) << "at most";
+  EXPECT_EQ(judged({.measured = 5, .now = 72}), (Judged{{5, 1}, 0})) << "chosen: just alive";
+  EXPECT_EQ(judged({.measured = 5, .now = 71}), (Judged{kNothing, 0}));
+  EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9}), (Judged{{5, 1}, 0})) << "the coarse match found it, too";
+  EXPECT_EQ(judged({.measured = 5, .now = 24, .found = 9.5f}), (Judged{kNothing, 0})) << "but not that";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 90}).evidence, 90 - 72)
+      << "contradicted: what was believed does not count";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 128, .now = 71}), (Judged{{5, 1}, 90 - 24}))
+      << "a measurement without evidence contradicts nothing";
+}
+
+TEST(KalmanUpdate, AMeasurementAloneDoesNotCountUnlessThePredictionSharesIt) {
+  EXPECT_EQ(judged({.measured = 5, .now = 96}), (Judged{{5, 1}, 96 - 72}));
+  EXPECT_EQ(judged({.measured = 5, .now = 96, .supporters = 0}), (Judged{kNothing, 0}));
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 64, .now = 96, .supporters = 0}),
+            (Judged{{5, 1}, 45 + 96 - 24}))
+      << "it contradicts nothing";
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 40, .supporters = 0}),
+            (Judged{{5.5f, 0.5f}, 45 + 40 - 24}));
+}
+
+TEST(KalmanUpdate, WithoutEvidenceAPredictionLivesAFewFrames) {
+  int evidence = 160, frames = 0;
+  for (; frames < 20; ++frames) {
+    const Judged now = judged({.predicted = 5, .measured = 6, .before = static_cast<std::uint8_t>(evidence)});
+    if (now.estimate.disparity == kNone) break;
+    EXPECT_EQ(now.estimate, (Estimate{5, 1})) << "the measurement moves nothing, and no variance falls";
+    evidence = now.evidence;
+  }
+  EXPECT_EQ(frames, 3);
+}
+
+TEST(KalmanUpdate, WhereNothingCanBeAskedEvidenceDecaysAlone) {
+  EXPECT_EQ(judged({.predicted = 5, .before = 64, .now = -100}, 3).evidence, 58)
+      << "the match lies outside of the image";
+  EXPECT_EQ(judged({.predicted = 5, .before = 64, .now = -100}, 5), (Judged{kNothing, 0})) << "and inside";
+}
+
+TEST(KalmanUpdate, ARepeatedPairMakesNobodySurer) {
+  EXPECT_EQ(judged({.predicted = 5, .measured = 6, .before = 64, .now = 90, .repeats = true}), (Judged{{5, 1}, 64}));
+  EXPECT_EQ(judged({.measured = 6, .now = 200, .repeats = true}), (Judged{kNothing, 0}));
+  EXPECT_EQ(judged({.predicted = 5, .measured = 9, .before = 64, .now = 90, .repeats = true}), (Judged{{5, 1}, 64}));
+}
+
+TEST(KalmanUpdate, NeverClaimsMoreThanTheFloor) {
+  const KalmanUpdateOptions options{.min_variance_px2 = 0.25f};
+  EXPECT_EQ(update_pixel(options, {10, 0.25f}, {10, 0.25f}), (Estimate{10, 0.25f}));
+  EXPECT_EQ(update_pixel(options, kNothing, {12, 0.125f}), (Estimate{12, 0.25f}));
+  EXPECT_EQ(update_pixel(options, {10, 0.125f}, kNothing), (Estimate{10, 0.25f}));
+  EXPECT_EQ(update_pixel(options, {10, 0}, {11, 0}), (Estimate{10, 0.25f}));
+}
+
+}  // namespace
+}  // namespace egosgm

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/stages/median_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/reference/median_filter.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+constexpr float kNone = EGOSGM_INVALID_DISPARITY;
+
+/// What becomes of a pixel without a disparity.
+enum class Holes { kLeave, kFill };
+
+/// The maps as they lie on the device: a variance means nothing where there is no disparity.
+testing::HostMaps raw_filter(shared::ImageSize size, const testing::HostMaps& in, Holes holes, int pixels,
+                             Views views) {
+  ocl::Context context(testing::any_device());
+  MedianFilter stage(context, size, pixels);
+  StereoMaps maps = testing::upload(context, size, in);
+  Map filtered = testing::upload(context, size, testing::earlier_maps(size)).disparity;
+  if (holes == Holes::kFill) {
+    stage.fill(maps.disparity, filtered, maps.variance, views);
+  } else {
+    stage.filter(maps.disparity, filtered, views);
+  }
+  return {filtered.read(context), maps.variance.read(context)};
+}
+testing::HostMaps filter(shared::ImageSize size, const testing::HostMaps& in, Holes holes = Holes::kLeave,
+                         int pixels = 0, Views views = Views::kBoth) {
+  return testing::masked(raw_filter(size, in, holes, pixels, views));
+}
+
+// The left view's disparities; the right view is the left one, plus 100.
+std::vector<float> filter_left(shared::ImageSize size, const std::vector<float>& left) {
+  testing::HostMaps maps{left, std::vector<float>(2 * left.size(), 1.0f)};
+  for (const float d : left) maps.disparity.push_back(d == kNone ? kNone : d + 100);
+  const std::vector<float> both = filter(size, maps).disparity;
+  const std::vector<float> filtered(both.begin(), both.begin() + static_cast<std::ptrdiff_t>(left.size()));
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    EXPECT_EQ(both[left.size() + i], left[i] == kNone ? kNone : filtered[i] + 100) << "right view, pixel " << i;
+  }
+  return filtered;
+}
+
+EGOSGM_TEST_AT_ALL_SIZES(MedianFilterTest);
+
+TEST_P(MedianFilterTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const double holes : {0.0, 0.3, 1.0}) {
+    const testing::HostMaps maps = testing::random_maps(size, -40, 90, holes, 7);
+    for (const Holes policy : {Holes::kLeave, Holes::kFill}) {
+      const testing::HostMaps expected = reference::median_filter(size, policy == Holes::kFill, maps);
+      for (const int pixels : {1, 16}) {
+        const testing::HostMaps actual = filter(size, maps, policy, pixels);
+        EXPECT_TRUE(testing::same_maps(actual, expected, size)) << holes << " holes, by " << pixels;
+      }
+    }
+  }
+}
+
+TEST_P(MedianFilterTest, FiltersTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam();
+  const testing::HostMaps maps = testing::random_maps(size, -40, 90, 0.2, 8);
+  ocl::Context context(testing::any_device());
+  const std::vector<float> uploaded = testing::upload(context, size, maps).variance.read(context);
+  for (const Holes holes : {Holes::kLeave, Holes::kFill}) {
+    const testing::HostMaps both = filter(size, maps, holes);
+    for (const int pixels : {1, 16}) {
+      const testing::HostMaps raw = raw_filter(size, maps, holes, pixels, Views::kLeft), one = testing::masked(raw);
+      EXPECT_TRUE(testing::same_maps(one, testing::left_and_right(both, one), size));
+      EXPECT_TRUE(testing::same_bits(raw.variance, testing::left_and_right(raw.variance, uploaded), size));
+    }
+  }
+}
+
+TEST(MedianFilter, TakesTheMiddleOfEveryOrder) {
+  std::vector<float> window{1, 2, 3, 4, 5, 6, 7, 8, 9};
+  std::mt19937 random(3);
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_EQ(filter_left({3, 3}, window)[4], 5) << "order " << i;
+    std::shuffle(window.begin(), window.end(), random);
+  }
+}
+
+TEST(MedianFilter, RemovesASpikeAndKeepsAStep) {
+  EXPECT_EQ(filter_left({5, 3}, {2, 2, 2, 9, 9,  //
+                                 2, 7, 2, 9, 9,  //
+                                 2, 2, 2, 9, 9}),
+            (std::vector<float>{2, 2, 2, 9, 9,  //
+                                2, 2, 2, 9, 9,  //
+                                2, 2, 2, 9, 9}));
+}
+
+TEST(MedianFilter, LeavesHolesAndLetsThemVoteForTheCentre) {
+  // The centre has four neighbours that say 1 and four holes: with its own vote, 5 wins. One more 1 outvotes it.
+  EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, 5, kNone, kNone, kNone, kNone})[4], 5);
+  EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, 5, 1, kNone, kNone, kNone})[4], 1);
+  EXPECT_EQ(filter_left({3, 3}, {1, 1, 1, 1, kNone, 1, 1, 1, 1})[4], kNone);
+}
+
+TEST(MedianFilter, FillsAHoleThatSixNeighboursSurround) {
+  const auto centre = [](const std::vector<float>& left) {
+    testing::HostMaps maps{left, std::vector<float>(18, 0.25f)};
+    maps.disparity.insert(maps.disparity.end(), left.begin(), left.end());
+    const testing::HostMaps filled = filter({3, 3}, maps, Holes::kFill);
+    EXPECT_EQ(filled.variance[4], filled.disparity[4] == kNone ? 0.0f : 1.0f);
+    return filled.disparity[4];
+  };
+  EXPECT_EQ(centre({1, 2, 3, 4, kNone, 5, 6, 7, 8}), 5);
+  EXPECT_EQ(centre({1, kNone, 3, 4, kNone, 5, 6, 7, 8}), 5);
+  EXPECT_EQ(centre({1, kNone, 3, 4, kNone, 5, 6, kNone, 8}), 5);
+  EXPECT_EQ(centre({1, kNone, kNone, 4, kNone, 5, 6, kNone, 8}), kNone);
+}
+
+TEST(MedianFilter, TheBorderVotesForTheCentre) {
+  // A corner has three neighbours, an edge five.
+  EXPECT_EQ(filter_left({3, 2}, {5, 1, 1, 1, 1, 1}), (std::vector<float>{5, 1, 1, 1, 1, 1}));
+  EXPECT_EQ(filter_left({3, 2}, {1, 5, 1, 1, 1, 1}), (std::vector<float>{1, 1, 1, 1, 1, 1}));
+}
+
+TEST(MedianFilter, DoesNotMixTheViews) {
+  // The last row of the left view lies beside the first of the right one.
+  const testing::HostMaps maps{{1, 2, 3, 7, 7, 7}, std::vector<float>(6, 1.0f)};
+  EXPECT_EQ(filter({3, 1}, maps).disparity, maps.disparity);
+}
+
+}  // namespace
+}  // namespace egosgm

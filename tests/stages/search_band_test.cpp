@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/stages/search_band.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "host/frame/frame_transfer.h"
+#include "tests/reference/search_band.h"
+#include "tests/support/compare.h"
+#include "tests/support/device.h"
+#include "tests/support/device_maps.h"
+
+namespace egosgm {
+namespace {
+
+using testing::HostMaps;
+using testing::same_bits;
+
+constexpr shared::DisparityRange kRanges[] = {{0, 1}, {0, 16}, {-20, 37}, {0, 128}, {3, 1027}};
+
+reference::SearchBands read(ocl::Context& context, const SearchBands& bands) {
+  return {bands.bands.read(context), bands.cell_offsets.read(context), bands.row_sums.read(context)};
+}
+
+reference::SearchBands run(shared::ImageSize size, shared::DisparityRange range, const SearchBandOptions& options,
+                           const HostMaps& maps, int row_group = 0, const std::vector<float>& coarse = {}) {
+  ocl::Context context(testing::any_device());
+  SearchBand stage(context, size, range, options, row_group);
+  StereoMaps predicted(context, size);
+  predicted.disparity.write(context, maps.disparity);
+  predicted.variance.write(context, maps.variance);
+  StereoMaps found(context, {(size.width + 3) / 4, (size.height + 3) / 4});
+  if (!coarse.empty()) found.disparity.write(context, coarse);
+  SearchBands bands(context, size, range);
+  stage.narrow(predicted, coarse.empty() ? nullptr : &found.disparity, bands, Views::kBoth);
+  return read(context, bands);
+}
+
+void expect_same(const reference::SearchBands& actual, const reference::SearchBands& expected, shared::ImageSize size) {
+  EXPECT_TRUE(same_bits(actual.bands, expected.bands, size));
+  EXPECT_TRUE(same_bits(actual.cell_offsets, expected.cell_offsets, size));
+  EXPECT_TRUE(same_bits(actual.row_sums, expected.row_sums, {1, size.height}));
+}
+
+EGOSGM_TEST_AT_ALL_SIZES(SearchBandTest);
+
+TEST_P(SearchBandTest, EqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const shared::DisparityRange range : kRanges) {
+    SCOPED_TRACE("min " + std::to_string(range.min) + ", count " + std::to_string(range.count));
+    // Some predictions lie outside of the range, as a warp can leave them.
+    const auto maps = testing::random_maps(size, static_cast<float>(range.min - 3),
+                                           static_cast<float>(range.min + range.count + 3), 0.6, 31);
+    expect_same(run(size, range, {}, maps), reference::search_band(size, range, {}, maps), size);
+  }
+}
+
+TEST_P(SearchBandTest, EqualsReferenceWithACoarseMatch) {
+  const shared::ImageSize size = GetParam(), quarter{(size.width + 3) / 4, (size.height + 3) / 4};
+  for (const shared::DisparityRange range : kRanges) {
+    SCOPED_TRACE("min " + std::to_string(range.min) + ", count " + std::to_string(range.count));
+    const float end = static_cast<float>(range.min + range.count);
+    const auto maps = testing::random_maps(size, static_cast<float>(range.min), end, 0.5, 35);
+    const auto coarse = testing::random_maps(quarter, static_cast<float>(range.min) / 4, end / 4, 0.3, 36).disparity;
+    const SearchBandOptions options{.coarse_tolerance_px = 1.25f, .coarse_margin_px = 0.5f};
+    expect_same(run(size, range, options, maps, 0, coarse), reference::search_band(size, range, options, maps, coarse),
+                size);
+  }
+}
+
+TEST_P(SearchBandTest, EqualsReferenceWithoutNeighbours) {
+  const shared::ImageSize size = GetParam();
+  const SearchBandOptions options{.sigmas = 1.5f, .min_half_width_px = 0.0f, .from_neighbours = false};
+  const auto maps = testing::random_maps(size, 0, 127, 0.4, 32);
+  expect_same(run(size, {0, 128}, options, maps), reference::search_band(size, {0, 128}, options, maps), size);
+}
+
+TEST_P(SearchBandTest, RowsAreSummedAlikeByAnyGroup) {
+  const shared::ImageSize size = GetParam();
+  const auto maps = testing::random_maps(size, 0, 127, 0.6, 33);
+  const auto expected = reference::search_band(size, {0, 128}, {}, maps);
+  for (const int row_group : {1, 7, 64}) expect_same(run(size, {0, 128}, {}, maps, row_group), expected, size);
+}
+
+TEST_P(SearchBandTest, FullRangeEqualsReference) {
+  const shared::ImageSize size = GetParam();
+  for (const shared::DisparityRange range : kRanges) {
+    ocl::Context context(testing::any_device());
+    SearchBands bands(context, size, range);
+    EXPECT_TRUE(same_bits(bands.bands.read(context), reference::full_range(size, range).bands, size));
+    EXPECT_TRUE(same_bits(bands.cell_offsets.read(context), reference::full_range(size, range).cell_offsets, size));
+    bands.bands.fill(context, {0, 1, 0, 0});
+    SearchBand(context, size, range, {}).full_range(bands, Views::kBoth);
+    expect_same(read(context, bands), reference::full_range(size, range), size);
+  }
+}
+
+TEST_P(SearchBandTest, SearchesTheLeftViewAlone) {
+  const shared::ImageSize size = GetParam(), quarter{(size.width + 3) / 4, (size.height + 3) / 4};
+  ocl::Context context(testing::any_device());
+  const StereoMaps predicted = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.6, 40));
+  const StereoMaps coarse = testing::upload(context, quarter, testing::random_maps(quarter, -1, 30, 0.3, 42));
+  const StereoMaps earlier = testing::upload(context, size, testing::random_maps(size, -5, 122, 0.6, 43));
+  for (const int row_group : {1, 64}) {
+    SearchBand stage(context, size, {-5, 128}, {}, row_group);
+    SearchBands bands(context, size, {-5, 128});
+    const std::function<void(Views)> ways[] = {
+        [&](Views views) { stage.narrow(predicted, &coarse.disparity, bands, views); },
+        [&](Views views) { stage.full_range(bands, views); },
+        [&](Views views) { stage.full_range(predicted.disparity, bands, views); },
+    };
+    for (const auto& search : ways) {
+      search(Views::kBoth);
+      const reference::SearchBands both = read(context, bands);
+      stage.narrow(earlier, nullptr, bands, Views::kBoth);
+      const reference::SearchBands before = read(context, bands);
+      search(Views::kLeft);
+      expect_same(read(context, bands),
+                  {testing::left_and_right(both.bands, before.bands),
+                   testing::left_and_right(both.cell_offsets, before.cell_offsets),
+                   testing::left_and_right(both.row_sums, before.row_sums)},
+                  size);
+    }
+  }
+}
+
+TEST(SearchBand, CoversWhatItSearchesWithTheFewestChunks) {
+  std::mt19937 random(34);
+  for (const shared::DisparityRange range : kRanges) {
+    const shared::ImageSize size{200, 1};
+    auto maps = testing::empty_maps(size);
+    for (std::size_t i = 0; i < maps.disparity.size(); ++i) {
+      maps.disparity[i] = std::uniform_real_distribution<float>(range.min, range.min + range.count - 1)(random);
+      maps.variance[i] = std::pow(std::uniform_real_distribution<float>(0, std::sqrt(range.count) / 3)(random), 4.0f);
+    }
+    for (const shared::Band& band : run(size, range, {}, maps).bands) {
+      const int end = band.origin + EGOSGM_LANES * band.chunks;
+      ASSERT_GE(band.first, range.min);
+      ASSERT_LE(band.first, band.last);
+      ASSERT_LT(band.last, range.min + range.count);
+      ASSERT_GE(band.origin, range.min);
+      const int step = band.chunks > 1 ? EGOSGM_BAND_STEP : 1;
+      ASSERT_EQ((band.origin - range.min) % step, 0);
+      ASSERT_LE(band.origin, band.first);
+      ASSERT_GT(end, band.last);
+      ASSERT_LE(band.chunks, SearchBand::max_chunks(range));
+      ASSERT_TRUE(band.chunks == 1 || band.chunks % 2 == 0);
+      ASSERT_LE(band.chunks, (band.last - band.first + 2 * EGOSGM_LANES) / (2 * EGOSGM_LANES) * 2 + 2);
+      ASSERT_EQ(band.chunks == 1, band.last - band.first < EGOSGM_LANES);
+      ASSERT_TRUE(band.origin == range.min || end < range.min + range.count + step);
+    }
+  }
+}
+
+TEST(SearchBand, PredictedPixelSearchesItsDeviations) {
+  const shared::ImageSize size{2, 1};
+  auto maps = testing::empty_maps(size);
+  maps.disparity[0] = 40.25f, maps.variance[0] = 4.0f;  // +- 3 * 2
+  maps.disparity[1] = 60.5f, maps.variance[1] = 0.01f;  // +- the minimum
+  const auto bands = run(size, {0, 128}, {.sigmas = 3, .min_half_width_px = 2, .from_neighbours = false}, maps).bands;
+  EXPECT_EQ(bands[0].first, 34);  // 34.25
+  EXPECT_EQ(bands[0].last, 47);   // 46.25
+  EXPECT_EQ(bands[1].first, 58);  // 58.5
+  EXPECT_EQ(bands[1].last, 63);   // 62.5
+  EXPECT_EQ(bands[1].chunks, 1);
+  EXPECT_EQ(bands[1].origin, 57);  // one of two spare lanes below
+}
+
+TEST(SearchBand, AbsurdVarianceSearchesEverything) {
+  const shared::ImageSize size{4, 1};
+  auto maps = testing::empty_maps(size);
+  for (int x = 0; x < 3; ++x) maps.disparity[x] = 10;
+  maps.variance = {1e30f, std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN(), 0, 0, 0, 0,
+                   0};
+  const auto bands = run(size, {-8, 100}, {}, maps).bands;
+  for (int x = 0; x < 3; ++x) {
+    EXPECT_EQ(bands[x].first, -8) << x;
+    EXPECT_EQ(bands[x].last, 91) << x;
+  }
+}
+
+TEST(SearchBand, UnpredictedPixelSearchesWhatItsNeighboursSpan) {
+  const shared::ImageSize size{64, 64};
+  auto maps = testing::empty_maps(size);
+  for (int x = 16; x < 32; ++x) maps.disparity[20 * 64 + x] = x == 20 ? 50.5f : 40.25f;
+  const SearchBandOptions options{.neighbour_min_count = 8, .neighbour_margin_px = 4};
+  const auto bands = run(size, {0, 128}, options, maps).bands;
+  EXPECT_EQ(bands[25 * 64 + 24].first, 36);
+  EXPECT_EQ(bands[25 * 64 + 24].last, 55);
+  EXPECT_EQ(bands[25 * 64 + 24].chunks, 4);
+  EXPECT_EQ(bands[40 * 64 + 24].last - bands[40 * 64 + 24].first, 127) << "two blocks below: none near";
+  EXPECT_EQ(bands[25 * 64 + 32].first, 36) << "beside the block of x 24..31";
+  EXPECT_EQ(bands[25 * 64 + 32].last, 45);
+  EXPECT_EQ(bands[4096 + 25 * 64 + 24].last, 127) << "the right view has no predictions";
+
+  maps.disparity[20 * 64 + 31] = EGOSGM_INVALID_DISPARITY;  // seven left around (32, 25)
+  EXPECT_EQ(run(size, {0, 128}, options, maps).bands[25 * 64 + 32].last, 127);
+}
+
+TEST(SearchBand, ReachesWhatTheCoarseMatchFoundElsewhere) {
+  const shared::ImageSize size{64, 64};
+  auto maps = testing::empty_maps(size);
+  maps.disparity[20 * 64 + 20] = 40, maps.disparity[20 * 64 + 60] = 40;
+  std::vector<float> coarse(2 * 16 * 16, EGOSGM_INVALID_DISPARITY);
+  for (int v = 3; v <= 6; ++v) {
+    for (int u = 3; u <= 6; ++u) coarse[v * 16 + u] = 20;  // 80 px, around the block of (16..23, 16..23) alone
+  }
+  const SearchBandOptions options{
+      .min_half_width_px = 2, .neighbour_min_count = 1, .coarse_tolerance_px = 3, .coarse_margin_px = 2};
+  const auto bands = run(size, {0, 128}, options, maps, 0, coarse).bands;
+  EXPECT_EQ(bands[20 * 64 + 20].first, 38);
+  EXPECT_EQ(bands[20 * 64 + 20].last, 82);
+  EXPECT_EQ(bands[20 * 64 + 60].last, 42) << "nothing was found there";
+  EXPECT_EQ(bands[20 * 64 + 21].first, 36) << "unpredicted: what is predicted around and what was found";
+  EXPECT_EQ(bands[20 * 64 + 21].last, 82);
+  EXPECT_EQ(bands[44 * 64 + 20].last, 127) << "nothing is predicted around";
+  EXPECT_EQ(bands[4096 + 20 * 64 + 20].last, 127) << "the right view";
+
+  const SearchBandOptions two{.neighbour_min_count = 2};
+  EXPECT_EQ(run(size, {0, 128}, two, maps, 0, coarse).bands[20 * 64 + 21].first, 0) << "too few are predicted around";
+
+  // Two of the coarse pixels that stand out are mismatches, three are not.
+  coarse[3 * 16 + 3] = 30, coarse[4 * 16 + 6] = 31;
+  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 82);
+  coarse[6 * 16 + 4] = 29;
+  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 118);
+
+  for (float& d : coarse) d = d > 0 ? 11.2f : d;  // 44.8: within 3 px of what is searched anyway
+  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 42);
+  for (float& d : coarse) d = d > 0 ? 11.3f : d;
+  EXPECT_EQ(run(size, {0, 128}, options, maps, 0, coarse).bands[20 * 64 + 20].last, 48);
+}
+
+// Beside a jump a prediction may lie on the wrong side of it.
+TEST(SearchBand, PredictedPixelReachesWhatItsBlockSpans) {
+  const shared::ImageSize size{24, 8};
+  auto maps = testing::empty_maps(size);
+  for (int x = 8; x < 24; ++x) maps.disparity[3 * 24 + x] = x < 12 ? 40 : 60;
+  const SearchBandOptions options{.min_half_width_px = 2, .coarse_tolerance_px = 3, .coarse_margin_px = 1};
+  const auto bands = run(size, {0, 128}, options, maps).bands;
+  EXPECT_EQ(bands[3 * 24 + 8].first, 38);
+  EXPECT_EQ(bands[3 * 24 + 8].last, 61);
+  EXPECT_EQ(bands[3 * 24 + 15].first, 39);
+  EXPECT_EQ(bands[3 * 24 + 15].last, 62);
+  EXPECT_EQ(bands[3 * 24 + 16].first, 58) << "the block beside";
+  for (int x = 8; x < 12; ++x) maps.disparity[3 * 24 + x] = 55;  // within 3 px of what is searched anyway
+  EXPECT_EQ(run(size, {0, 128}, options, maps).bands[3 * 24 + 15].first, 58);
+  for (int x = 8; x < 12; ++x) maps.disparity[3 * 24 + x] = 54.875f;
+  EXPECT_EQ(run(size, {0, 128}, options, maps).bands[3 * 24 + 15].first, 53);
+}
+
+// Where the frame before lost the upper part of a pole.
+TEST(SearchBand, PredictedPixelReachesAThinThingFarBelow) {
+  const shared::ImageSize size{72, 160};
+  const SearchBandOptions options{.min_half_width_px = 2, .coarse_tolerance_px = 3, .coarse_margin_px = 1};
+  const auto last_at = [&](int first_x, int last_x, float disparity, int x, int block_y, float behind = 40) {
+    auto maps = testing::empty_maps(size);
+    std::fill_n(maps.disparity.begin(), pixel_count(size), 40.0f);
+    for (int y = 96; y < size.height; ++y) {
+      std::fill_n(maps.disparity.begin() + y * size.width, size.width, behind);
+      for (int u = first_x; u <= last_x; ++u) maps.disparity[y * size.width + u] = disparity;
+    }
+    return run(size, {0, 128}, options, maps).bands[8 * block_y * size.width + x].last;
+  };
+  EXPECT_EQ(last_at(36, 38, 60, 36, 4), 61) << "eight blocks above";
+  EXPECT_EQ(last_at(36, 38, 60, 36, 3), 42) << "nine blocks above";
+  EXPECT_EQ(last_at(36, 38, 60, 44, 4), 42) << "the blocks beside hold none of it";
+  EXPECT_EQ(last_at(36, 41, 60, 44, 4), 61) << "two columns of blocks";
+  EXPECT_EQ(last_at(20, 60, 60, 36, 4), 42) << "a wide thing";
+  EXPECT_EQ(last_at(36, 38, 47, 36, 4, 44), 42) << "no jump";
+  EXPECT_EQ(last_at(36, 38, 48, 36, 4, 44), 49);
+  EXPECT_EQ(last_at(0, 2, 60, 0, 4), 42) << "at the edge nobody knows how wide it is";
+}
+
+TEST(SearchBand, CountsCellsAndLanesOfARow) {
+  const shared::ImageSize size{3, 2};
+  auto maps = testing::empty_maps(size);
+  maps.disparity[0] = 50, maps.disparity[2] = 60;
+  const auto result = run(size, {0, 100}, {.sigmas = 0, .min_half_width_px = 2, .from_neighbours = false}, maps);
+  EXPECT_EQ(result.row_sums[0].cells, 8u + 112 + 8);
+  EXPECT_EQ(result.row_sums[0].predicted, 2u);
+  EXPECT_EQ(result.row_sums[1].predicted, 0u);
+  EXPECT_EQ(result.cell_offsets, (std::vector<cl_uint>{0, 1, 15, 0, 14, 28, 0, 14, 28, 0, 14, 28}));
+}
+
+// The left view has a prediction everywhere and searches 5 of 100 disparities, the right one has none and searches all.
+TEST(SearchBand, ReportsAllThatWasMatched) {
+  const shared::ImageSize size{32, 8};
+  auto maps = testing::empty_maps(size);
+  std::fill_n(maps.disparity.begin(), pixel_count(size), 50.0f);
+  ocl::Context context(testing::any_device());
+  SearchBand stage(context, size, {0, 100}, {.sigmas = 0, .min_half_width_px = 2});
+  FrameTransfer transfer(context, size, {0, 100});
+  const StereoMaps predicted = testing::upload(context, size, maps);
+  const VerticalOffset offset(context);
+  SearchBands bands(context, size, {0, 100});
+  const auto report_of = [&](Views views, const MatchedParts& parts) {
+    stage.narrow(predicted, {}, bands, views);
+    transfer.download({predicted, &predicted, predicted, bands, views, parts, offset, /*dynamic=*/nullptr}, {});
+    context.wait();
+    FrameReport report;
+    transfer.collect(report);
+    transfer.release();
+    return report;
+  };
+  const std::vector<Stripe> whole = cut_into_stripes(8, 8, 2), stripes = cut_into_stripes(8, 6, 2);
+  ASSERT_EQ(stripes.size(), 4u);  // 24 rows to match
+  for (const Views views : {Views::kBoth, Views::kLeft, Views::kBoth}) {
+    // Lanes of a band of 5 and of the whole range, of 100 disparities.
+    const double once = views == Views::kLeft ? 0.08 : (0.08 + 1.12) / 2;
+    const FrameReport report = report_of(views, {1, &whole, 0});
+    EXPECT_DOUBLE_EQ(report.search_fraction, once);
+    EXPECT_DOUBLE_EQ(report.predicted_fraction, 1);
+    EXPECT_DOUBLE_EQ(report_of(views, {1, &stripes, 0}).search_fraction, 3 * once);
+    EXPECT_DOUBLE_EQ(report_of(views, {2, &whole, 0}).search_fraction, 2 * once);
+    EXPECT_DOUBLE_EQ(report_of(views, {2, &whole, 256}).search_fraction, 2 * (once + 0.01 / count(views)));
+  }
+}
+
+}  // namespace
+}  // namespace egosgm
