@@ -19,6 +19,7 @@
 #include "host/json_text.h"
 #include "vision/estimate_reader.h"
 #include "vision/file_io.h"
+#include "vision/image_values.h"
 
 namespace egosgm::app {
 namespace {
@@ -60,7 +61,7 @@ struct Result {
 };
 
 /// Throws InvalidArgument, naming both files, where `map` has another size than the estimate.
-void expect_size(const cv::Mat& estimate, const std::filesystem::path& file, const cv::Mat& map,
+void expect_size(const vision::Image& estimate, const std::filesystem::path& file, const vision::Image& map,
                  const std::filesystem::path& its_file) {
   if (map.size() == estimate.size()) return;
   throw InvalidArgument(fmt::format("{} is {}x{}, {} is {}x{}: give maps of one size", file.string(), estimate.cols,
@@ -69,16 +70,16 @@ void expect_size(const cv::Mat& estimate, const std::filesystem::path& file, con
 
 DisparityCounts compare(const vision::EvaluationPair& pair, const EvalArguments& arguments,
                         vision::EstimateReader& estimates) {
-  const cv::Mat estimate = estimates.read(pair.estimate, arguments.scale);
-  cv::Mat truth = vision::read_scaled(pair.truth, arguments.truth_scale);
+  const vision::Image estimate = estimates.read(pair.estimate, arguments.scale);
+  vision::Image truth = vision::read_scaled(pair.truth, arguments.truth_scale);
   expect_size(estimate, pair.estimate, truth, pair.truth);
   estimates.compare(estimate, truth);
   if (!arguments.mask.empty()) {
     std::filesystem::path file = arguments.mask;
     if (is_directory(file)) file /= pair.truth.filename().replace_extension(".png");
-    const cv::Mat kept = vision::read_grey_image(file);
+    const vision::Image kept = vision::read_grey_image(file);
     expect_size(estimate, pair.estimate, kept, file);
-    truth.setTo(kInvalidDisparity, kept == 0);
+    vision::set_where(truth, kInvalidDisparity, kept, [](auto value) { return value == 0; });
   }
   return vision::compare_disparity(estimate, truth);
 }

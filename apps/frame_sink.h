@@ -2,18 +2,18 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <opencv2/core.hpp>
 #include <optional>
 
 #include "egosgm/calibration.h"
 #include "egosgm/options.h"
+#include "egosgm/vision/image.h"
 #include "vision/frame_source.h"
 
 namespace egosgm::app {
 
-/// The maps of a frame as they come from the device: CV_32FC1, and CV_8UC1 of reasons.
+/// The maps of a frame as they come from the device: kF32, and kU8 of reasons.
 struct ShownMaps {
-  cv::Mat disparity, variance, reason;
+  vision::Image disparity, variance, reason;
 };
 
 /// Who takes a run's maps beside its folder, or in place of it.

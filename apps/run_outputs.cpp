@@ -14,8 +14,8 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/evaluation.h"
+#include "egosgm/vision/image.h"
 #include "egosgm/vision/image_io.h"
-#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/point_cloud.h"
 #include "egosgm/vision/render.h"
 #include "vision/file_io.h"
@@ -43,8 +43,8 @@ const char* extension_of(const std::string& kind, const PipelineOptions& options
 }
 
 template <typename T>
-MapView<T> view_of(cv::Mat& map) {
-  return {map.ptr<T>(), map.cols, map.rows, static_cast<std::ptrdiff_t>(map.step)};
+MapView<T> view_of(vision::Image& map) {
+  return {map.row<T>(0), map.cols, map.rows, static_cast<std::ptrdiff_t>(map.stride_bytes)};
 }
 
 }  // namespace
@@ -100,7 +100,7 @@ std::vector<std::string> output_files(const std::set<std::string>& kinds, const 
   return files;
 }
 
-RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size,
+RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, vision::Size size,
                        const PipelineOptions& options, const Calibration& calibration,
                        const vision::PointCloudOptions& cloud)
     : folder_(std::move(folder)),
@@ -109,25 +109,25 @@ RunOutputs::RunOutputs(std::filesystem::path folder, std::set<std::string> kinds
       options_(options),
       calibration_(calibration),
       cloud_(cloud),
-      disparity_(size, CV_32FC1),
+      disparity_(size, vision::kF32),
       panels_(options.disparities) {
   if (!folder_.empty()) {
     vision::make_folder(folder_ / "disparity");
     for (const std::string& kind : kinds_) vision::make_folder(folder_ / kind);
   }
   if (wants("variance") || wants("overview") || wants("cloud") || wants("interpolated_certain"))
-    variance_.create(size, CV_32FC1);
-  if (wants("right")) right_.create(size, CV_32FC1);
-  if (wants("predicted")) predicted_.create(size, CV_32FC1);
-  if (wants("measured")) measured_.create(size, CV_32FC1);
-  if (wants("search") || wants("overview")) search_.create(size, CV_16UC1);
-  if (wants("dynamic")) dynamic_.create(size, CV_8UC1);
-  if (wants("reason")) reason_.create(size, CV_8UC1);
+    variance_.create(size, vision::kF32);
+  if (wants("right")) right_.create(size, vision::kF32);
+  if (wants("predicted")) predicted_.create(size, vision::kF32);
+  if (wants("measured")) measured_.create(size, vision::kF32);
+  if (wants("search") || wants("overview")) search_.create(size, vision::kU16);
+  if (wants("dynamic")) dynamic_.create(size, vision::kU8);
+  if (wants("reason")) reason_.create(size, vision::kU8);
 }
 
 void RunOutputs::make_shown_maps() {
-  variance_.create(size_, CV_32FC1);
-  reason_.create(size_, CV_8UC1);
+  variance_.create(size_, vision::kF32);
+  reason_.create(size_, vision::kU8);
 }
 
 FrameOutputs RunOutputs::views() {
@@ -143,7 +143,7 @@ FrameOutputs RunOutputs::views() {
   return outputs;
 }
 
-WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& left) {
+WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const vision::Image& left) {
   using Path = std::filesystem::path;
   WrittenFrame written;
   const auto depth_m = [&] { return vision::depth_from_disparity(disparity_, calibration_); };
@@ -166,13 +166,13 @@ WrittenFrame RunOutputs::write(const vision::StereoFrame& frame, const cv::Mat& 
        [&](const Path& path) { vision::write_disparity(path, vision::interpolate_background(disparity_)); }},
       {"interpolated_certain",
        [&](const Path& path) {
-         const cv::Mat certain = vision::drop_uncertain(disparity_, variance_);
+         const vision::Image certain = vision::drop_uncertain(disparity_, variance_);
          vision::write_disparity(path, vision::interpolate_background(certain));
        }},
       {"color", [&](const Path& path) { vision::write_png(path, panels_.disparity(disparity_)); }},
       {"cloud",
        [&](const Path& path) {
-         const cv::Mat colors = vision::read_color_image(frame.left);
+         const vision::Image colors = vision::read_color_image(frame.left);
          const vision::PointCloud cloud = vision::point_cloud(disparity_, variance_, colors, calibration_, cloud_);
          vision::write_ply(path, cloud);
          written.cloud = {static_cast<std::int64_t>(cloud.points_m.size()), cloud.left_out};

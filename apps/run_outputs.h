@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <set>
 #include <string>
@@ -11,6 +10,7 @@
 
 #include "apps/frame_sink.h"
 #include "egosgm/pipeline.h"
+#include "egosgm/vision/image.h"
 #include "egosgm/vision/point_cloud.h"
 #include "vision/frame_panels.h"
 
@@ -42,8 +42,8 @@ struct WrittenFrame {
 class RunOutputs {
  public:
   /// Makes the folders, unless `folder` has no name. Throws IoError.
-  RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, cv::Size size, const PipelineOptions& options,
-             const Calibration& calibration, const vision::PointCloudOptions& cloud);
+  RunOutputs(std::filesystem::path folder, std::set<std::string> kinds, vision::Size size,
+             const PipelineOptions& options, const Calibration& calibration, const vision::PointCloudOptions& cloud);
 
   /// Where the pipeline is to write; valid as long as this object lives.
   FrameOutputs views();
@@ -53,18 +53,18 @@ class RunOutputs {
   ShownMaps shown() const { return {disparity_, variance_, reason_}; }
 
   /// Writes the frame that the views hold; `left` is its left image.
-  WrittenFrame write(const vision::StereoFrame& frame, const cv::Mat& left);
+  WrittenFrame write(const vision::StereoFrame& frame, const vision::Image& left);
 
  private:
   bool wants(const char* kind) const { return kinds_.contains(kind); }
 
   const std::filesystem::path folder_;
-  const cv::Size size_;
+  const vision::Size size_;
   const std::set<std::string> kinds_;
   const PipelineOptions options_;
   const Calibration calibration_;
   const vision::PointCloudOptions cloud_;
-  cv::Mat disparity_, variance_, right_, predicted_, measured_, search_, dynamic_, reason_;
+  vision::Image disparity_, variance_, right_, predicted_, measured_, search_, dynamic_, reason_;
   vision::FramePanels panels_;
 };
 

@@ -17,7 +17,7 @@
 #include "apps/trace.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
-#include "egosgm/vision/opencv.h"
+#include "egosgm/vision/image.h"
 #include "egosgm/vision/poses_io.h"
 #include "vision/doubt.h"
 #include "vision/file_io.h"
@@ -196,7 +196,7 @@ class Run {
       if (interrupted()) throw InvalidArgument(frame.pair.unreadable);  // a pipe that was waited for
       return frame;
     }
-    const cv::Mat& left = frame.pair.images.left;
+    const vision::Image& left = frame.pair.images.left;
     if (left.size() != size_) {
       throw InvalidArgument(fmt::format("{} is {}x{} and the sequence {}x{}: all frames need one size",
                                         frame.pair.frame.left.string(), left.cols, left.rows, size_.width,
@@ -370,7 +370,7 @@ class Run {
   const vision::PointCloudOptions cloud_options_;
   std::optional<CloudCounts> clouds_;  // of all frames
   const std::string& input_;
-  const cv::Size size_;
+  const vision::Size size_;
   vision::MotionSource motions_;
   std::optional<RunOutputs> outputs_;  // frames under way are written to it: the pipeline goes first
   std::optional<Waiting> waiting_;     // until all is built

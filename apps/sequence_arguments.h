@@ -14,7 +14,7 @@ namespace egosgm::app {
 
 /// Reads the calibration of a file that this library does not, for images of `size`; none where it is of raw images,
 /// which the caller rectifies. Throws InvalidArgument.
-using CalibrationReader = std::function<std::optional<Calibration>(const std::string& file, cv::Size size)>;
+using CalibrationReader = std::function<std::optional<Calibration>(const std::string& file, vision::Size size)>;
 
 /// The arguments that say which stereo sequence to read.
 struct SequenceArguments {

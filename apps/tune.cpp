@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
-#include <opencv2/core.hpp>
 
 #include "apps/command.h"
 #include "apps/device_arguments.h"
@@ -16,7 +15,7 @@
 #include "apps/tuning_file.h"
 #include "egosgm/error.h"
 #include "egosgm/pipeline.h"
-#include "egosgm/vision/opencv.h"
+#include "egosgm/vision/image.h"
 #include "egosgm/vision/synthetic.h"
 
 namespace egosgm::app {
@@ -102,7 +101,7 @@ class Course {
   std::vector<StageTime> run(const Tuning& tuning) {
     Pipeline pipeline(street_.calibration(), arguments_.width, arguments_.height, options_,
                       device_.with_tuning(tuning));
-    cv::Mat disparity(arguments_.height, arguments_.width, CV_32FC1);
+    vision::Image disparity(arguments_.height, arguments_.width, vision::kF32);
     FrameOutputs outputs;
     outputs.disparity = vision::map_view(disparity);
     std::vector<std::vector<StageTime>> rounds;
@@ -131,9 +130,9 @@ class Course {
     return stages;
   }
 
-  void expect_same(const cv::Mat& disparity) {
+  void expect_same(const vision::Image& disparity) {
     if (expected_.empty()) expected_ = disparity.clone();
-    if (!std::equal(disparity.begin<float>(), disparity.end<float>(), expected_.begin<float>()))
+    if (!std::equal(disparity.row<float>(0), disparity.row<float>(0) + disparity.pixels(), expected_.row<float>(0)))
       throw DeviceError(0, "tune: these sizes change the result on this device: please report it");
   }
 
@@ -153,7 +152,7 @@ class Course {
   const vision::SyntheticSequence street_;
   PipelineOptions options_;
   std::vector<vision::SyntheticFrame> frames_;
-  cv::Mat expected_;
+  vision::Image expected_;
 };
 
 double ms_of(const std::vector<StageTime>& times, const std::vector<std::string>& stages) {

@@ -100,8 +100,8 @@ class Matcher {
  public:
   Matcher(const Clip& clip, const MethodOptions& options, const Device& device)
       : pipeline_(clip.calibration, clip.frames.front().left.cols, clip.frames.front().left.rows, options, device),
-        disparity_(clip.frames.front().left.size(), CV_32FC1),
-        variance_(disparity_.size(), CV_32FC1) {}
+        disparity_(clip.frames.front().left.size(), vision::kF32),
+        variance_(disparity_.size(), vision::kF32) {}
 
   FrameReport operator()(const ClipFrame& frame, const std::optional<Motion>& motion) {
     submit(frame, motion);
@@ -130,7 +130,7 @@ class Matcher {
 
  private:
   Pipeline pipeline_;
-  cv::Mat disparity_, variance_;
+  vision::Image disparity_, variance_;
 };
 
 TurnFunction opencv(const OpencvMode& mode, const Clip& clip, int disparities, int threads) {
@@ -140,7 +140,7 @@ TurnFunction opencv(const OpencvMode& mode, const Clip& clip, int disparities, i
     const ClipFrame& frame = clip.frames.back();
     cv::setNumThreads(threads);
     const Stopwatch watch;
-    matcher->compute(frame.left, frame.right, *disparity);
+    matcher->compute(vision::mat_of(frame.left), vision::mat_of(frame.right), *disparity);
     return watch.turn({{"threads", cv::getNumThreads()}});
   };
 }
@@ -219,8 +219,8 @@ class LeftMatcher {
         images_{ocl::Buffer<cl_uchar>(context_, 2 * pixel_count(size_)), PixelType::kU8},
         measured_(context_, size_),
         disparity_(pixel_count(size_)) {
-    for (const cv::Mat* view : {&clip.frames.back().left, &clip.frames.back().right}) {
-      for (int y = 0; y < view->rows; ++y) pixels_.insert(pixels_.end(), view->ptr(y), view->ptr(y) + view->cols);
+    for (const vision::Image* view : {&clip.frames.back().left, &clip.frames.back().right}) {
+      for (int y = 0; y < view->rows; ++y) pixels_.insert(pixels_.end(), view->row(y), view->row(y) + view->cols);
     }
     matcher_.prepare(images_.type);
   }

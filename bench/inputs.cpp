@@ -26,16 +26,17 @@ Calibration scaled(const Calibration& c, double scale_x, double scale_y) {
           c.baseline_m,   c.doffs_px * scale_x};
 }
 
-cv::Mat resized(const cv::Mat& image, cv::Size size) {
+vision::Image resized(const vision::Image& image, vision::Size size) {
   if (image.size() == size) return image;
   cv::Mat result;
-  cv::resize(image, result, size, 0, 0, image.cols > size.width ? cv::INTER_AREA : cv::INTER_LINEAR);
-  return result;
+  cv::resize(vision::mat_of(image), result, {size.width, size.height}, 0, 0,
+             image.cols > size.width ? cv::INTER_AREA : cv::INTER_LINEAR);
+  return vision::image_of(result);
 }
 
-Clip load_kitti(const std::filesystem::path& folder, cv::Size size) {
+Clip load_kitti(const std::filesystem::path& folder, vision::Size size) {
   const vision::StereoSequence sequence = vision::open_kitti_multiview(folder, "000151", {7, 11});
-  const cv::Size original = vision::check_image_sizes(sequence);
+  const vision::Size original = vision::check_image_sizes(sequence);
   Clip clip{sequence.title,
             scaled(sequence.calibration, static_cast<double>(size.width) / original.width,
                    static_cast<double>(size.height) / original.height),
@@ -50,7 +51,7 @@ Clip load_kitti(const std::filesystem::path& folder, cv::Size size) {
   return clip;
 }
 
-Clip render_clip(cv::Size size) {
+Clip render_clip(vision::Size size) {
   const vision::SyntheticSequence street({.frames = 5, .width = size.width, .height = size.height});
   Clip clip{"a synthetic street (no KITTI data found)", street.calibration(), {}};
   for (int i = 0; i < street.frames(); ++i) {
@@ -62,7 +63,7 @@ Clip render_clip(cv::Size size) {
 
 }  // namespace
 
-Clip load_clip(cv::Size size) {
+Clip load_clip(vision::Size size) {
   const std::filesystem::path kitti = data_folder() / "kitti2012/training";
   return std::filesystem::exists(kitti / "image_0/000151_07.png") ? load_kitti(kitti, size) : render_clip(size);
 }

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "egosgm/calibration.h"
 #include "egosgm/motion.h"
+#include "egosgm/vision/image.h"
 
 namespace egosgm::bench {
 
 struct ClipFrame {
-  cv::Mat left, right;           // CV_8UC1
+  vision::Image left, right;     // kU8
   std::optional<Motion> motion;  // since the frame before
 };
 
@@ -28,6 +28,6 @@ struct Clip {
 /// KITTI 2012 scene 000151, frames 07..11, resized to `size` with its calibration, if $EGOSGM_DATA or ../shared/data
 /// beside the project has it (motion by StereoOdometry, at the original size); else a synthetic street of five frames,
 /// with true motion.
-Clip load_clip(cv::Size size);
+Clip load_clip(vision::Size size);
 
 }  // namespace egosgm::bench

@@ -9,7 +9,7 @@
 
 #include "bench/report.h"
 #include "egosgm/vision/dataset.h"
-#include "egosgm/vision/opencv.h"
+#include "egosgm/vision/image.h"
 #include "egosgm/vision/synthetic.h"
 
 namespace egosgm::bench {

@@ -11,6 +11,7 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
+#include "egosgm/vision/opencv.h"
 
 namespace egosgm::bench {
 namespace {
@@ -59,9 +60,10 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    const cv::Mat left = vision::read_grey_image(argv[2]), right = vision::read_grey_image(argv[3]);
+    const vision::Image left = vision::read_grey_image(argv[2]), right = vision::read_grey_image(argv[3]);
     vision::write_disparity_png(
-        argv[5], bench::match(left, right, bench::mode_named(argv[1]), bench::parse_disparities(argv[4])));
+        argv[5], vision::image_of(bench::match(vision::mat_of(left), vision::mat_of(right), bench::mode_named(argv[1]),
+                                               bench::parse_disparities(argv[4]))));
     return 0;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "egosgm_opencv_sgbm: %s\n", error.what());

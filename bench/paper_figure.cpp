@@ -5,8 +5,8 @@
 
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
+#include "egosgm/vision/image.h"
 #include "egosgm/vision/image_io.h"
-#include "egosgm/vision/opencv.h"
 #include "egosgm/vision/render.h"
 #include "egosgm/vision/synthetic.h"
 #include "host/frame/frame_queue.h"
@@ -22,9 +22,11 @@ constexpr int kFrames = 4;  // the last one is drawn
 constexpr int kColumns = 2, kCellWidth = 480;
 
 /// The left view's map.
-cv::Mat left_of(FrameQueue& frames, const Map& maps) {
+vision::Image left_of(FrameQueue& frames, const Map& maps) {
   std::vector<float> values = maps.read(frames.context());
-  return cv::Mat(frames.size().height, frames.size().width, CV_32FC1, values.data()).clone();
+  return vision::Image(frames.size().height, frames.size().width, vision::kF32, values.data(),
+                       frames.size().width * sizeof(float))
+      .clone();
 }
 
 void draw(const std::string& file) {
@@ -33,11 +35,11 @@ void draw(const std::string& file) {
   PipelineOptions options = PipelineOptions::paper();
   options.disparities = 64;
   FrameQueue frames(street.calibration(), size, options, Device::select(), PixelType::kU8);
-  cv::Mat filled;
+  vision::Image filled;
   frames.method().observer = [&](Step step) {
     if (step == Step::kPredict) filled = left_of(frames, frames.method().workspace().prediction.filled.disparity);
   };
-  cv::Mat previous, measured(size.height, size.width, CV_32FC1), updated = measured.clone();
+  vision::Image previous, measured(size.height, size.width, vision::kF32), updated = measured.clone();
   for (int k = 0; k < kFrames; ++k) {
     previous = updated.clone();
     const vision::SyntheticFrame images = street.render(k);
@@ -50,7 +52,7 @@ void draw(const std::string& file) {
   const Prediction& prediction = frames.method().workspace().prediction;
   const vision::ColorRange range = vision::disparity_range(updated);
   std::vector<vision::CaptionedPicture> pictures;
-  const auto add = [&](const char* caption, const cv::Mat& map) {
+  const auto add = [&](const char* caption, const vision::Image& map) {
     pictures.push_back({vision::color_disparity(map, range), caption});
   };
   add("1. map of the frame before", previous);

@@ -5,7 +5,7 @@ set(egosgm_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/egosgm)
 
 install(DIRECTORY include/egosgm DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT libegosgm-dev
         FILES_MATCHING PATTERN "*.h" PATTERN vision EXCLUDE)
-if(EGOSGM_VISION AND EGOSGM_OPENCV)
+if(EGOSGM_VISION)
   install(DIRECTORY include/egosgm/vision DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/egosgm COMPONENT libegosgm-dev)
 endif()
 
@@ -17,15 +17,8 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/egosgm-config.cmake ${CMAKE_CURRENT_BI
 
 # The prefix is where the file lies, so that a tree can be moved.
 file(RELATIVE_PATH EGOSGM_PC_PREFIX ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE_INSTALL_PREFIX})
-set(EGOSGM_OPENCV_INCLUDES "")
-if(EGOSGM_VISION AND EGOSGM_OPENCV)
-  find_package(OpenCV REQUIRED COMPONENTS core)
-endif()
-foreach(folder IN LISTS OpenCV_INCLUDE_DIRS)
-  string(APPEND EGOSGM_OPENCV_INCLUDES " -I${folder}")
-endforeach()
 foreach(module IN ITEMS egosgm egosgm-vision)
-  if(module STREQUAL egosgm OR (EGOSGM_VISION AND EGOSGM_OPENCV))
+  if(module STREQUAL egosgm OR EGOSGM_VISION)
     configure_file(cmake/${module}.pc.in ${CMAKE_CURRENT_BINARY_DIR}/${module}.pc @ONLY)
     install(FILES ${CMAKE_CURRENT_BINARY_DIR}/${module}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT libegosgm-dev)
   endif()

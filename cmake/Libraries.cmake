@@ -24,10 +24,7 @@ function(egosgm_libraries name component exported)
       target_link_options(${target} PRIVATE LINKER:--no-undefined)
     endif()
     set_target_properties(${target} PROPERTIES INSTALL_RPATH $ORIGIN)
-    if(PROJECT_IS_TOP_LEVEL AND component STREQUAL vision AND NOT EGOSGM_OPENCV)  # its interface is of cmake/small_opencv's types
-      install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libegosgm NAMELINK_SKIP
-              ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libegosgm-dev EXCLUDE_FROM_ALL)
-    elseif(PROJECT_IS_TOP_LEVEL)
+    if(PROJECT_IS_TOP_LEVEL)
       install(TARGETS ${target} EXPORT egosgm-${component}-${linkage}
               LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libegosgm NAMELINK_COMPONENT libegosgm-dev
               ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libegosgm-dev)

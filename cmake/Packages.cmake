@@ -38,7 +38,7 @@ set(CPACK_COMPONENT_LIBEGOSGM_DESCRIPTION "Shared libraries.")
 set(CPACK_DEBIAN_LIBEGOSGM-DEV_PACKAGE_NAME libegosgm-dev)
 set(CPACK_DEBIAN_LIBEGOSGM-DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_LIBEGOSGM-DEV_PACKAGE_DEPENDS
-    "${same_version}, libeigen3-dev, libopencv-dev, libpng-dev, libjpeg-dev, libisal-dev, ocl-icd-opencl-dev, opencl-headers")
+    "${same_version}, libeigen3-dev, libpng-dev, libjpeg-dev, libisal-dev, ocl-icd-opencl-dev, opencl-headers")
 set(CPACK_COMPONENT_LIBEGOSGM-DEV_DESCRIPTION "Headers, static libraries, and files for CMake and pkg-config.")
 
 set(CPACK_DEBIAN_EGOSGM_PACKAGE_NAME egosgm)

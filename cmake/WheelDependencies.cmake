@@ -8,7 +8,6 @@ add_compile_options(-isystem ${EGOSGM_WHEEL_PREFIX}/include -idirafter /usr/incl
 add_link_options(LINKER:--gc-sections)
 set(CMAKE_CXX_STANDARD_LIBRARIES "-ldl -lpthread")
 
-set(EGOSGM_OPENCV OFF)
 foreach(library ZLIB:libz.a PNG:libpng16.a JPEG:libjpeg.a ISAL:libisal.so OpenCL:libOpenCL.so.1)
   string(REPLACE : ";" parts ${library})
   list(GET parts 0 name)

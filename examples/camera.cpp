@@ -129,7 +129,9 @@ void run(const std::string& source, const egosgm::Calibration& calibration, cons
     const cv::Mat disparity = vision::process(*pipeline, left, right, motion).disparity;
     ++matched;
     const std::string text = cv::format("frame %d  %.1f frames/s  %d dropped", matched, rate.tick(), newest.dropped());
-    if (!show(vision::color_disparity(disparity, {0, static_cast<double>(options.disparities)}), text, display)) break;
+    const vision::Image picture =
+        vision::color_disparity(vision::image_of(disparity), {0, static_cast<double>(options.disparities)});
+    if (!show(vision::mat_of(picture), text, display)) break;
   }
   std::printf("%d matched, %d dropped\n", matched, newest.dropped());
 }

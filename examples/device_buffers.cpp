@@ -7,14 +7,14 @@
 #define CL_HPP_TARGET_OPENCL_VERSION 120
 #define CL_HPP_MINIMUM_OPENCL_VERSION 120
 #include <CL/opencl.hpp>
+#include <algorithm>
 #include <cstdio>
-#include <opencv2/core.hpp>
 
 #include "egosgm/odometry.h"
 #include "egosgm/opencl.h"
 #include "egosgm/vision/dataset.h"
 #include "egosgm/vision/disparity_io.h"
-#include "egosgm/vision/opencv.h"
+#include "egosgm/vision/image.h"
 
 namespace {
 
@@ -36,7 +36,7 @@ int main(int argc, char** argv) try {
   using namespace egosgm;
   if (argc != 2) return std::fprintf(stderr, "usage: egosgm_example_device_buffers FOLDER\n"), 2;
   const vision::StereoSequence sequence = vision::open_folder(argv[1]);
-  const cv::Size size = vision::check_image_sizes(sequence);
+  const vision::Size size = vision::check_image_sizes(sequence);
   const Calibration& c = sequence.calibration;
   const std::size_t pixels = static_cast<std::size_t>(size.width) * size.height;
 
@@ -50,12 +50,13 @@ int main(int argc, char** argv) try {
 
   DevicePipeline pipeline(queue(), c, size.width, size.height);
   StereoOdometry odometry(c);
-  cv::Mat picture(size.height, 2 * size.width, CV_8UC1), depth_m(size, CV_32FC1);
+  vision::Image picture(size.height, 2 * size.width, vision::kU8), depth_m(size, vision::kF32);
   for (const vision::StereoFrame& frame : sequence.frames) {
     const vision::StereoImages images = vision::read_images(frame);
     const auto motion = odometry.process(vision::image_view(images.left), vision::image_view(images.right)).motion;
-    if (images.left.type() != CV_8UC1) throw std::runtime_error("give images of 8 bits");
-    cv::hconcat(images.left, images.right, picture);
+    if (images.left.type != vision::kU8) throw std::runtime_error("give images of 8 bits");
+    images.left.copy_to(picture.part(0, 0, size.width, size.height));
+    images.right.copy_to(picture.part(size.width, 0, size.width, size.height));
 
     queue.enqueueWriteBuffer(side_by_side, CL_FALSE, 0, 2 * pixels, picture.data);
     split.setArg(0, size.width), split.setArg(1, size.height), split.setArg(2, side_by_side), split.setArg(3, pair);
@@ -67,7 +68,9 @@ int main(int argc, char** argv) try {
     queue.enqueueNDRangeKernel(to_depth, cl::NullRange, cl::NDRange(pixels));
     queue.enqueueReadBuffer(depth, CL_TRUE, 0, pixels * sizeof(float), depth_m.data);  // the only wait
 
-    depth_m.setTo(kInvalidDisparity, depth_m < 0);
+    float* const depths = depth_m.row<float>(0);
+    std::replace_if(
+        depths, depths + pixels, [](float z) { return z < 0; }, kInvalidDisparity);
     vision::write_disparity(frame.name + ".pfm", depth_m);
   }
 } catch (const std::exception& error) {

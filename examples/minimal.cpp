@@ -5,7 +5,7 @@
 #include <egosgm/pipeline.h>
 #include <egosgm/vision/dataset.h>
 #include <egosgm/vision/disparity_io.h>
-#include <egosgm/vision/opencv.h>
+#include <egosgm/vision/frame_maps.h>
 
 #include <cstdio>
 
@@ -13,7 +13,7 @@ using namespace egosgm;
 
 int main(int argc, char** argv) try {
   const vision::StereoSequence sequence = vision::open_folder(argc > 1 ? argv[1] : ".");
-  const cv::Size size = vision::check_image_sizes(sequence);
+  const vision::Size size = vision::check_image_sizes(sequence);
   Pipeline pipeline(sequence.calibration, size.width, size.height);
   StereoOdometry odometry(sequence.calibration);
   for (const vision::StereoFrame& frame : sequence.frames) {

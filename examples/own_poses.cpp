@@ -4,7 +4,7 @@
 #include <egosgm/pipeline.h>
 #include <egosgm/vision/dataset.h>
 #include <egosgm/vision/disparity_io.h>
-#include <egosgm/vision/opencv.h>
+#include <egosgm/vision/frame_maps.h>
 #include <egosgm/vision/poses_io.h>
 
 #include <cstdio>
@@ -15,7 +15,7 @@ using namespace egosgm;
 void run(const char* folder, const char* poses_file) {
   const vision::StereoSequence sequence = vision::open_folder(folder);
   const auto world_from_camera = vision::poses_of_frames(sequence, poses_file);
-  const cv::Size size = vision::check_image_sizes(sequence);
+  const vision::Size size = vision::check_image_sizes(sequence);
   Pipeline pipeline(sequence.calibration, size.width, size.height);
   for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
     std::optional<Motion> motion;

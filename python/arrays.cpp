@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "egosgm/error.h"
-#include "vision/grey_bytes.h"
+#include "egosgm/vision/image_io.h"
 
 namespace egosgm::python {
 namespace {
@@ -91,7 +91,8 @@ py::array grey_of(const py::array& colour) {
   expect_indexable(packed, "image");
   const int height = static_cast<int>(packed.shape(0)), width = static_cast<int>(packed.shape(1)),
             channels = static_cast<int>(packed.shape(2));
-  const cv::Mat colors(height, width, CV_MAKETYPE(bytes ? CV_8U : CV_16U, channels), const_cast<void*>(packed.data()));
+  const vision::Image colors(height, width, {bytes ? vision::ChannelType::kU8 : vision::ChannelType::kU16, channels},
+                             const_cast<void*>(packed.data()), static_cast<std::size_t>(packed.strides(0)));
   return array_of(channels == 1 ? colors : vision::grey_of_colors(colors, vision::ColorOrder::kRgb));
 }
 
@@ -115,18 +116,18 @@ ImageArray image_of(const py::object& image, const char* name) {
   return {array, view};
 }
 
-cv::Mat mat_of(const py::object& image, const char* name) {
+vision::Image mat_of(const py::object& image, const char* name) {
   const ImageArray owner = image_of(image, name);
   const ImageView& view = owner.view;
-  cv::Mat mat(view.height, view.width, view.type == PixelType::kU8 ? CV_8UC1 : CV_16UC1);
+  vision::Image mat(view.height, view.width, view.type == PixelType::kU8 ? vision::kU8 : vision::kU16);
   for (int y = 0; y < view.height; ++y) {
-    std::memcpy(mat.ptr(y), static_cast<const char*>(view.data) + y * view.stride_bytes,
-                static_cast<std::size_t>(view.width) * mat.elemSize());
+    std::memcpy(mat.row(y), static_cast<const char*>(view.data) + y * view.stride_bytes,
+                static_cast<std::size_t>(view.width) * mat.type.pixel_bytes());
   }
   return mat;
 }
 
-cv::Mat map_of(const py::object& map, const char* name, py::array& keep) {
+vision::Image map_of(const py::object& map, const char* name, py::array& keep) {
   keep = as_array(map, name, "an H x W map of float32");
   if (keep.ndim() != 2 || keep.size() == 0) {
     throw InvalidArgument(std::string(name) + " is " + shape_of(keep) + ": give an H x W map of float32");
@@ -138,8 +139,8 @@ cv::Mat map_of(const py::object& map, const char* name, py::array& keep) {
   }
   if (!rows_are_contiguous(keep) || !is_aligned(keep) || keep.strides(0) < keep.shape(1) * element_bytes(keep))
     keep = contiguous(keep);
-  return cv::Mat(static_cast<int>(keep.shape(0)), static_cast<int>(keep.shape(1)), CV_32FC1,
-                 const_cast<void*>(keep.data()), static_cast<std::size_t>(keep.strides(0)));
+  return vision::Image(static_cast<int>(keep.shape(0)), static_cast<int>(keep.shape(1)), vision::kF32,
+                       const_cast<void*>(keep.data()), static_cast<std::size_t>(keep.strides(0)));
 }
 
 template <typename T>
@@ -161,15 +162,15 @@ template MapView<float> output_of<float>(const py::object&, const std::string&);
 template MapView<std::uint16_t> output_of<std::uint16_t>(const py::object&, const std::string&);
 template MapView<std::uint8_t> output_of<std::uint8_t>(const py::object&, const std::string&);
 
-py::array array_of(const cv::Mat& mat) {
-  if (!mat.u && !mat.empty()) return array_of(mat.clone());  // memory of somebody else's
-  const py::dtype type = mat.depth() == CV_8U    ? py::dtype::of<std::uint8_t>()
-                         : mat.depth() == CV_16U ? py::dtype::of<std::uint16_t>()
-                                                 : py::dtype::of<float>();
-  const py::capsule owner(new cv::Mat(mat), [](void* held) { delete static_cast<cv::Mat*>(held); });
-  const auto item = static_cast<py::ssize_t>(mat.elemSize1());
-  const auto step = static_cast<py::ssize_t>(mat.step[0]);
-  if (mat.channels() == 1) return py::array(type, {mat.rows, mat.cols}, {step, item}, mat.data, owner);
+py::array array_of(const vision::Image& mat) {
+  if (!mat.owner && !mat.empty()) return array_of(mat.clone());  // memory of somebody else's
+  const py::dtype type = mat.type.channel == vision::ChannelType::kU8    ? py::dtype::of<std::uint8_t>()
+                         : mat.type.channel == vision::ChannelType::kU16 ? py::dtype::of<std::uint16_t>()
+                                                                         : py::dtype::of<float>();
+  const py::capsule owner(new vision::Image(mat), [](void* held) { delete static_cast<vision::Image*>(held); });
+  const auto item = static_cast<py::ssize_t>(mat.type.channel_bytes());
+  const auto step = static_cast<py::ssize_t>(mat.stride_bytes);
+  if (mat.type.channels == 1) return py::array(type, {mat.rows, mat.cols}, {step, item}, mat.data, owner);
   return py::array(type, {mat.rows, mat.cols, 3}, {step, 3 * item, -item}, mat.data + 2 * item, owner);  // BGR read RGB
 }
 

@@ -5,11 +5,11 @@
 #include <pybind11/numpy.h>
 
 #include <Eigen/Geometry>
-#include <opencv2/core.hpp>
 #include <vector>
 
 #include "egosgm/image.h"
 #include "egosgm/motion.h"
+#include "egosgm/vision/image.h"
 
 namespace egosgm::python {
 
@@ -26,18 +26,18 @@ struct ImageArray {
 ImageArray image_of(const py::object& image, const char* name);
 
 /// A copy of such an image. Throws InvalidArgument.
-cv::Mat mat_of(const py::object& image, const char* name);
+vision::Image mat_of(const py::object& image, const char* name);
 
 /// An H x W map of float32; other numbers, and rows that are not contiguous, are converted into a copy, which `keep`
 /// holds. Throws InvalidArgument.
-cv::Mat map_of(const py::object& map, const char* name, py::array& keep);
+vision::Image map_of(const py::object& map, const char* name, py::array& keep);
 
 /// A view for the library to fill. Throws InvalidArgument unless a writeable H x W array of T with contiguous rows.
 template <typename T>
 MapView<T> output_of(const py::object& object, const std::string& name);
 
 /// The matrix's memory as an array, without a copy; colours as RGB.
-py::array array_of(const cv::Mat& mat);
+py::array array_of(const vision::Image& mat);
 
 /// A 4x4 (or 3x4) rigid transform. Throws InvalidArgument for another shape or values that are not finite.
 Eigen::Isometry3d transform_of(const py::object& matrix, const char* name);

@@ -13,6 +13,7 @@
 #include "python/bindings.h"
 #include "python/pickling.h"
 #include "vision/estimate_reader.h"
+#include "vision/image_values.h"
 #include "vision/pair_with_truth.h"
 
 namespace egosgm::python {
@@ -23,7 +24,8 @@ using vision::DisparityMetrics;
 
 DisparityCounts compare(const py::object& estimate, const py::object& truth) {
   py::array keep_estimate, keep_truth;
-  const cv::Mat estimated = map_of(estimate, "estimate", keep_estimate), wanted = map_of(truth, "truth", keep_truth);
+  const vision::Image estimated = map_of(estimate, "estimate", keep_estimate),
+                      wanted = map_of(truth, "truth", keep_truth);
   const py::gil_scoped_release other_threads_run;
   return vision::compare_disparity(estimated, wanted);
 }
@@ -36,7 +38,7 @@ py::array of_map(const py::object& map, Function&& function) {
 }
 
 py::array color_disparity(const py::object& disparity, std::optional<double> low, std::optional<double> high) {
-  return of_map(disparity, [&](const cv::Mat& map) {
+  return of_map(disparity, [&](const vision::Image& map) {
     vision::ColorRange range = vision::disparity_range(map);
     if (low) range.low = *low;
     if (high) range.high = *high;
@@ -167,9 +169,10 @@ void bind_evaluation(py::module_& module) {
   module.def(
       "depth_from_disparity",
       [](const py::object& map, const Calibration& calibration) {
-        return of_map(map, [&](const cv::Mat& mat) {
-          cv::Mat depth_m = vision::depth_from_disparity(mat, calibration);
-          depth_m.setTo(std::numeric_limits<float>::quiet_NaN(), depth_m <= 0);
+        return of_map(map, [&](const vision::Image& mat) {
+          vision::Image depth_m = vision::depth_from_disparity(mat, calibration);
+          vision::set_where(depth_m, std::numeric_limits<float>::quiet_NaN(), depth_m,
+                            [](auto value) { return value <= 0; });
           return depth_m;
         });
       },

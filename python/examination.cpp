@@ -18,8 +18,8 @@ void bind_images(py::module_& module) {
   module.def(
       "_coarse_map",
       [](const py::object& left, const py::object& right, double row_offset_px, int least, int end) {
-        const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
-        cv::Mat map;
+        const vision::Image left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
+        vision::Image map;
         {
           const py::gil_scoped_release other_threads_run;
           map = vision::coarse_map(left_image, right_image, row_offset_px, least, end);
@@ -57,7 +57,7 @@ void bind_doubts(py::module_& module) {
       .def(
           "add",
           [](Doubt& self, const py::object& left, const py::object& right, const FrameReport& report, bool has_motion) {
-            const cv::Mat left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
+            const vision::Image left_image = mat_of(left, "left"), right_image = mat_of(right, "right");
             const py::gil_scoped_release other_threads_run;
             self.add(left_image, right_image, report, has_motion);
           },

@@ -65,7 +65,7 @@ void bind_sequences(py::module_& module) {
       .def_property_readonly(
           "size",
           [](const StereoSequence& s) {
-            const cv::Size size = vision::check_image_sizes(s);
+            const vision::Size size = vision::check_image_sizes(s);
             return py::make_tuple(size.width, size.height);
           },
           "(width, height) of all images.")
@@ -96,8 +96,8 @@ void bind_sequences(py::module_& module) {
       "the first right one, and so on; else those of equal names belong together.");
 }
 
-cv::Mat read_if_there(const path& file, cv::Mat (*read)(const path&)) {
-  return std::filesystem::exists(file) ? read(file) : cv::Mat();
+vision::Image read_if_there(const path& file, vision::Image (*read)(const path&)) {
+  return std::filesystem::exists(file) ? read(file) : vision::Image();
 }
 
 /// (name, picture, colour bar or None) of each map that the run in `folder` wrote of a frame, of its left image and of
@@ -109,10 +109,12 @@ py::list layers_of_run(vision::FramePanels& panels, const path& folder, const st
   const auto file = [&](const char* kind, const char* extension) { return folder / kind / (name + extension); };
   const auto grey = [](const path& of) { return vision::read_grey_image(of); };
   const path exact = file("disparity", ".pfm");
-  const cv::Mat disparity = vision::read_disparity(std::filesystem::exists(exact) ? exact : file("disparity", ".png"));
-  const cv::Mat variance = read_if_there(file("variance", ".pfm"), [](const path& of) { return vision::read_pfm(of); });
-  const cv::Mat search = read_if_there(file("search", ".png"), grey);
-  const cv::Mat reasons = read_if_there(file("reason", ".png"), grey);
+  const vision::Image disparity =
+      vision::read_disparity(std::filesystem::exists(exact) ? exact : file("disparity", ".png"));
+  const vision::Image variance =
+      read_if_there(file("variance", ".pfm"), [](const path& of) { return vision::read_pfm(of); });
+  const vision::Image search = read_if_there(file("search", ".png"), grey);
+  const vision::Image reasons = read_if_there(file("reason", ".png"), grey);
   py::list layers;
   for (const vision::Layer& layer : panels.layers({frame, {}, disparity, variance, search, reasons})) {
     const py::object bar = layer.bar.empty() ? py::object(py::none()) : py::object(array_of(layer.bar));
@@ -176,9 +178,9 @@ using Bytes = py::array_t<std::uint8_t, py::array::c_style | py::array::forcecas
 void write_ply(const path& file, const Floats& points, const std::optional<Bytes>& bgr,
                const std::optional<Floats>& normals, bool is_new) {
   vision::PointCloud cloud;
-  cloud.points_m = vectors_of<float, cv::Point3f>(points, "points");
-  cloud.colors = vectors_of<std::uint8_t, cv::Vec3b>(bgr, "colors");
-  cloud.normals = vectors_of<float, cv::Vec3f>(normals, "normals");
+  cloud.points_m = vectors_of<float, std::array<float, 3>>(points, "points");
+  cloud.colors = vectors_of<std::uint8_t, vision::Color>(bgr, "colors");
+  cloud.normals = vectors_of<float, std::array<float, 3>>(normals, "normals");
   const py::gil_scoped_release other_threads_run;
   std::optional<vision::KeepFiles> others;
   if (is_new) others.emplace();
@@ -190,16 +192,17 @@ py::tuple point_cloud(const py::object& disparity, const py::object& variance, c
                       const Calibration& calibration, double max_relative_sigma, double max_depth_m, double max_jump_px,
                       const std::vector<int>& kept, const std::optional<Bytes>& reasons) {
   py::array keep_disparity, keep_variance;
-  const cv::Mat d = map_of(disparity, "disparity", keep_disparity), p = map_of(variance, "variance", keep_variance);
+  const vision::Image d = map_of(disparity, "disparity", keep_disparity),
+                      p = map_of(variance, "variance", keep_variance);
   if (reasons && reasons->ndim() != 2) throw InvalidArgument("reason: give an H x W map of uint8");
-  const auto mat_of = [](const Bytes& bytes, int type) {
-    return cv::Mat(static_cast<int>(bytes.shape(0)), static_cast<int>(bytes.shape(1)), type,
-                   const_cast<std::uint8_t*>(bytes.data()));
+  const auto mat_of = [](const Bytes& bytes, vision::ImageType type) {
+    return vision::Image(static_cast<int>(bytes.shape(0)), static_cast<int>(bytes.shape(1)), type,
+                         const_cast<std::uint8_t*>(bytes.data()), static_cast<std::size_t>(bytes.strides(0)));
   };
   vision::PointCloudOptions options{max_relative_sigma, max_depth_m, max_jump_px, {}};
   for (const int reason : kept) options.reasons.push_back(static_cast<Reason>(reason));
-  const vision::PointCloud cloud = vision::point_cloud(d, p, mat_of(bgr, CV_8UC3), calibration, options,
-                                                       reasons ? mat_of(*reasons, CV_8UC1) : cv::Mat());
+  const vision::PointCloud cloud = vision::point_cloud(d, p, mat_of(bgr, vision::kBgr8), calibration, options,
+                                                       reasons ? mat_of(*reasons, vision::kU8) : vision::Image());
   const auto count = static_cast<py::ssize_t>(cloud.points_m.size());
   const vision::LeftOut& out = cloud.left_out;
   return py::make_tuple(

@@ -95,7 +95,7 @@ class LockedOdometry {
 
 void bind_synthetic(py::module_& module) {
   auto frame = py::class_<SyntheticFrame>(module, "SyntheticFrame", "Images, exact disparities [px] and masks.");
-  const std::pair<const char*, cv::Mat SyntheticFrame::*> maps[] = {
+  const std::pair<const char*, vision::Image SyntheticFrame::*> maps[] = {
       {"left", &SyntheticFrame::left},
       {"right", &SyntheticFrame::right},
       {"left_disparity", &SyntheticFrame::left_disparity},

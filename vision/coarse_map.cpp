@@ -21,13 +21,13 @@ constexpr double kFewest = 0.03;        // of the pixels; below, the map says no
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
 /// The mean difference [grey levels] of the block around (x, y) and the one `d` to the left in the other image.
-double block_difference(const cv::Mat& left, const cv::Mat& right, int x, int y, int d) {
+double block_difference(const Image& left, const Image& right, int x, int y, int d) {
   constexpr int kRadius = 3;
   int sum = 0, count = 0;
   for (int v = std::max(0, y - kRadius); v <= std::min(left.rows - 1, y + kRadius); ++v) {
     for (int u = std::max({0, x - kRadius, d}); u <= std::min({left.cols - 1, x + kRadius, right.cols - 1 + d}); ++u) {
       // To what lies between the neighbours, as a disparity falls between pixels (Birchfield and Tomasi).
-      const auto* row = right.ptr(v);
+      const auto* row = right.row(v);
       const int here = row[u - d], before = (here + row[std::max(u - d - 1, 0)]) / 2,
                 after = (here + row[std::min(u - d + 1, right.cols - 1)]) / 2;
       const int value = left.at<std::uint8_t>(v, u);
@@ -39,7 +39,7 @@ double block_difference(const cv::Mat& left, const cv::Mat& right, int x, int y,
 }
 
 /// Whether a disparity in [least, end) explains the images nearly as well as `d`.
-bool is_ambiguous(const cv::Mat& left, const cv::Mat& right, int x, int y, int d, int least, int end) {
+bool is_ambiguous(const Image& left, const Image& right, int x, int y, int d, int least, int end) {
   constexpr double kNoise = 3;  // grey levels
   const double enough = 1.5 * block_difference(left, right, x, y, d) + kNoise;
   for (int other = std::max(least, x - right.cols + 1); other < std::min(end, x + 1); ++other) {
@@ -49,24 +49,24 @@ bool is_ambiguous(const cv::Mat& left, const cv::Mat& right, int x, int y, int d
 }
 
 /// Across a column, as Sobel has it.
-int slope_at(const cv::Mat& image, int x, int y) {
+int slope_at(const Image& image, int x, int y) {
   int slope = 0;
   for (const auto& [v, weight] : {std::pair{-1, 1}, {0, 2}, {1, 1}}) {
-    const std::uint8_t* row = image.ptr(std::clamp(y + v, 0, image.rows - 1));
+    const std::uint8_t* row = image.row(std::clamp(y + v, 0, image.rows - 1));
     slope += weight * (row[std::min(x + 1, image.cols - 1)] - row[std::max(x - 1, 0)]);
   }
   return slope;
 }
 
 /// As coarse_map, of bytes.
-cv::Mat coarse_map_of(const cv::Mat& left, const cv::Mat& right, double row_offset_px, int least, int end) {
+Image coarse_map_of(const Image& left, const Image& right, double row_offset_px, int least, int end) {
   const int factor = std::max(1, (std::max(left.cols, left.rows) + kCoarseSide - 1) / kCoarseSide);
-  const cv::Size size(left.cols / factor, left.rows / factor);
-  cv::Mat map(std::max(size.height, 0), std::max(size.width, 0), CV_32FC1, cv::Scalar(kNothing));
+  const Size size(left.cols / factor, left.rows / factor);
+  Image map(std::max(size.height, 0), std::max(size.width, 0), kF32, kNothing);
   if (size.width < 32 || size.height < 16) return map;
   const int half = (size.width / 2 + 15) / 16 * 16;
-  const cv::Mat small[2] = {shrunk_grey(left, factor, 0), shrunk_grey(right, factor, row_offset_px)};
-  const cv::Mat found = match_widely(small[0], small[1], half);
+  const Image small[2] = {shrunk_grey(left, factor, 0), shrunk_grey(right, factor, row_offset_px)};
+  const Image found = match_widely(small[0], small[1], half);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
       const float d = found.at<float>(y, x);
@@ -86,17 +86,17 @@ cv::Mat coarse_map_of(const cv::Mat& left, const cv::Mat& right, double row_offs
 
 }  // namespace
 
-cv::Mat coarse_map(const cv::Mat& left, const cv::Mat& right, double row_offset_px, int least, int end) {
+Image coarse_map(const Image& left, const Image& right, double row_offset_px, int least, int end) {
   const auto [left_bytes, right_bytes] = bytes_of(left, right);
   return coarse_map_of(left_bytes, right_bytes, row_offset_px, least, end);
 }
 
-std::optional<Clipped> clipped_by_range(const cv::Mat& left, const cv::Mat& right, int least, int end) {
-  const cv::Mat map = coarse_map(left, right, 0, least, end);
+std::optional<Clipped> clipped_by_range(const Image& left, const Image& right, int least, int end) {
+  const Image map = coarse_map(left, right, 0, least, end);
   std::vector<float> disparities;
-  std::copy_if(map.begin<float>(), map.end<float>(), std::back_inserter(disparities),
+  std::copy_if(map.row<float>(0), map.row<float>(0) + map.pixels(), std::back_inserter(disparities),
                [](float d) { return std::isfinite(d); });
-  if (disparities.empty() || static_cast<double>(disparities.size()) < kFewest * static_cast<double>(map.total())) {
+  if (disparities.empty() || static_cast<double>(disparities.size()) < kFewest * static_cast<double>(map.pixels())) {
     return std::nullopt;
   }
   const auto above = std::count_if(disparities.begin(), disparities.end(), [&](float d) { return d > end - 1; });

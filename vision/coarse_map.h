@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <optional>
 
 #include "egosgm/export.h"
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
 /// Disparities [px, of the images' own size] of images made smaller, sought from minus to plus half the width; NaN
 /// where nothing is sure. One outside of [least, end), the range that is to be searched, counts only where none in it
 /// explains the images nearly as well, as where texture repeats. The right image's rows lie row_offset_px further
-/// down. REQUIRES: images of one size, both CV_8UC1 or both CV_16UC1. Thread-safe.
-EGOSGM_EXPORT cv::Mat coarse_map(const cv::Mat& left, const cv::Mat& right, double row_offset_px, int least, int end);
+/// down. REQUIRES: images of one size, both kU8 or both kU16. Thread-safe.
+EGOSGM_EXPORT Image coarse_map(const Image& left, const Image& right, double row_offset_px, int least, int end);
 
 /// What of a pair is nearer than the range of disparities ends, by its coarse map.
 struct Clipped {
@@ -22,6 +22,6 @@ struct Clipped {
 
 /// None where hardly anything is nearer, or where the map is sure of too little. REQUIRES: as coarse_map, rectified
 /// images. Thread-safe.
-EGOSGM_EXPORT std::optional<Clipped> clipped_by_range(const cv::Mat& left, const cv::Mat& right, int least, int end);
+EGOSGM_EXPORT std::optional<Clipped> clipped_by_range(const Image& left, const Image& right, int least, int end);
 
 }  // namespace egosgm::vision

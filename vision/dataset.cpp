@@ -147,7 +147,7 @@ KittiCameras cameras_of(const fs::path& folder) {
 /// called.
 Calibration calibration_of(const fs::path& file, const fs::path& folder, const std::vector<StereoFrame>& frames) {
   const KittiCameras cameras = cameras_of(folder);
-  if (cameras == KittiCameras::kAny && first_readable_image(frames).channels() == 3) {
+  if (cameras == KittiCameras::kAny && first_readable_image(frames).type.channels == 3) {
     try {
       return read_calibration(file, KittiCameras::kColor);
     } catch (const InvalidArgument&) {  // it has one pair alone, or is told below
@@ -281,8 +281,8 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   if (sequence.has_calibration) {
     sequence.calibration = calibration_of(calibration_file, left_pattern.folder, sequence.frames);
   } else {
-    const cv::Mat image = first_readable_image(sequence.frames);
-    const cv::Size size = image.empty() ? read_image_size(sequence.frames.front().left) : image.size();
+    const Image image = first_readable_image(sequence.frames);
+    const Size size = image.empty() ? read_image_size(sequence.frames.front().left) : image.size();
     sequence.calibration = {.fx = static_cast<double>(size.width),
                             .fy = static_cast<double>(size.width),
                             .cx = size.width / 2.0,

@@ -17,6 +17,7 @@
 #include "vision/file_io.h"
 #include "vision/frame_names.h"
 #include "vision/image_bounds.h"
+#include "vision/image_values.h"
 #include "vision/npy.h"
 #include "vision/png.h"
 
@@ -26,9 +27,9 @@ namespace {
 constexpr float kKittiStepsPerPx = 256.0f;
 constexpr std::size_t kMaxMapFileBytes = static_cast<std::size_t>(kMaxImagePixels) * sizeof(double) + 256;
 
-void require_map(const cv::Mat& map, const std::filesystem::path& file) {
-  if (map.empty() || map.type() != CV_32FC1) {
-    throw InvalidArgument(file.string() + ": only a non-empty CV_32FC1 map can be written");
+void require_map(const Image& map, const std::filesystem::path& file) {
+  if (map.empty() || map.type != kF32) {
+    throw InvalidArgument(file.string() + ": only a non-empty float32 map can be written");
   }
 }
 
@@ -54,25 +55,24 @@ int count_outside(const float* disparity, int width) {
   return count;
 }
 
-cv::Mat parse_disparity_png(std::string_view bytes, const std::filesystem::path& file, float steps_per_px) {
-  const cv::Mat stored = decode_png(bytes, file);
-  if (stored.type() != CV_16UC1) {
+Image parse_disparity_png(std::string_view bytes, const std::filesystem::path& file, float steps_per_px) {
+  const Image stored = decode_png(bytes, file);
+  if (stored.type != kU16) {
     throw InvalidArgument(file.string() + ": not a disparity map: KITTI's are 16-bit grey PNG, this one has " +
-                          std::to_string(stored.channels()) + " channel(s) of " +
-                          std::to_string(8 * stored.elemSize1()) + " bit");
+                          std::to_string(stored.type.channels) + " channel(s) of " +
+                          std::to_string(8 * stored.type.channel_bytes()) + " bit");
   }
-  cv::Mat disparity;
-  stored.convertTo(disparity, CV_32FC1);
+  Image disparity = as_floats(stored);
   for (int y = 0; y < stored.rows; ++y) {
-    auto* row = disparity.ptr<float>(y);
+    auto* row = disparity.row<float>(y);
     for (int x = 0; x < stored.cols; ++x) row[x] /= steps_per_px;
   }
-  disparity.setTo(kInvalidDisparity, stored == 0);
+  set_where(disparity, kInvalidDisparity, stored, [](auto value) { return value == 0; });
   return disparity;
 }
 
 struct PfmHeader {
-  cv::Size size;
+  Size size;
   std::endian byte_order = std::endian::little;
   std::size_t bytes = 0;  // up to the first pixel
 };
@@ -112,7 +112,7 @@ PfmHeader parse_pfm_header(std::string_view bytes, const std::filesystem::path& 
   }
   if (scale == 0 || !std::isfinite(scale)) refuse_pfm(file, "its scale is zero or not a number");
   if (position >= bytes.size() || !is_space(bytes[position])) refuse_pfm(file, "it ends in its header");
-  return {.size = cv::Size(static_cast<int>(width), static_cast<int>(height)),
+  return {.size = {static_cast<int>(width), static_cast<int>(height)},
           .byte_order = scale < 0 ? std::endian::little : std::endian::big,
           .bytes = position + 1};
 }
@@ -124,17 +124,17 @@ float load_float(const char* bytes, std::endian byte_order) {
   return std::bit_cast<float>(word);
 }
 
-cv::Mat parse_pfm(std::string_view bytes, const std::filesystem::path& file) {
+Image parse_pfm(std::string_view bytes, const std::filesystem::path& file) {
   const PfmHeader header = parse_pfm_header(bytes, file);
   const std::size_t expected = static_cast<std::size_t>(header.size.area()) * sizeof(float);
   const std::size_t found = bytes.size() - header.bytes;
   if (found != expected) {
     refuse_pfm(file, "it holds " + std::to_string(found) + " bytes of pixels instead of " + std::to_string(expected));
   }
-  cv::Mat map(header.size, CV_32FC1);
+  Image map(header.size, kF32);
   const char* next = bytes.data() + header.bytes;
   for (int y = map.rows - 1; y >= 0; --y) {
-    auto* row = map.ptr<float>(y);
+    auto* row = map.row<float>(y);
     for (int x = 0; x < map.cols; ++x, next += sizeof(float)) {
       const float value = load_float(next, header.byte_order);
       row[x] = is_valid_disparity(value) ? value : kInvalidDisparity;
@@ -145,37 +145,36 @@ cv::Mat parse_pfm(std::string_view bytes, const std::filesystem::path& file) {
 
 }  // namespace
 
-cv::Mat read_disparity(const std::filesystem::path& file, double png_steps_per_px) {
+Image read_disparity(const std::filesystem::path& file, double png_steps_per_px) {
   if (!(png_steps_per_px > 0 && std::isfinite(png_steps_per_px))) {
     throw InvalidArgument("PNG steps a pixel are " + std::to_string(png_steps_per_px) + ": must be positive");
   }
   const std::string bytes = read_file(file, kMaxMapFileBytes);
   if (starts_like_png(bytes)) return parse_disparity_png(bytes, file, static_cast<float>(png_steps_per_px));
   if (starts_like_npy(bytes)) {
-    cv::Mat map = parse_npy(bytes, file);
-    map.forEach<float>([](float& d, const int*) { d = d > 0 && is_valid_disparity(d) ? d : kInvalidDisparity; });
+    Image map = parse_npy(bytes, file);
+    set_where(map, kInvalidDisparity, map, [](float d) { return !(d > 0 && is_valid_disparity(d)); });
     return map;
   }
   if (bytes.starts_with("Pf") || bytes.starts_with("PF")) return parse_pfm(bytes, file);
   throw InvalidArgument(file.string() + ": not a readable disparity map (truncated?): neither PNG nor PFM nor .npy");
 }
 
-cv::Mat read_values(const std::filesystem::path& file) {
+Image read_values(const std::filesystem::path& file) {
   const std::string bytes = read_file(file, kMaxMapFileBytes);
-  cv::Mat values;
   if (starts_like_png(bytes)) {
-    const cv::Mat stored = decode_png(bytes, file);
-    if (stored.channels() != 1) throw InvalidArgument(file.string() + ": has three channels; give a grey PNG");
-    stored.convertTo(values, CV_32FC1);
-    return values;
+    const Image stored = decode_png(bytes, file);
+    if (stored.type.channels != 1) throw InvalidArgument(file.string() + ": has three channels; give a grey PNG");
+    return as_floats(stored);
   }
   if (starts_like_npy(bytes)) return parse_npy(bytes, file);
-  values = parse_pfm(bytes, file);
-  values.setTo(std::numeric_limits<float>::quiet_NaN(), values == kInvalidDisparity);
+  Image values = parse_pfm(bytes, file);
+  set_where(values, std::numeric_limits<float>::quiet_NaN(), values,
+            [](auto value) { return value == kInvalidDisparity; });
   return values;
 }
 
-std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& disparity) {
+std::int64_t write_disparity(const std::filesystem::path& file, const Image& disparity) {
   const std::string extension = lower(file.extension().string());
   if (extension == ".png") return write_disparity_png(file, disparity);
   if (extension != ".pfm") throw InvalidArgument(file.string() + ": a disparity map's name must end in .png or .pfm");
@@ -183,33 +182,33 @@ std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& d
   return 0;
 }
 
-std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity) {
+std::int64_t write_disparity_png(const std::filesystem::path& file, const Image& disparity) {
   require_map(disparity, file);
-  cv::Mat stored(disparity.size(), CV_16UC1);
+  Image stored(disparity.size(), kU16);
   for (int y = 0; y < disparity.rows; ++y) {
-    store_row(disparity.ptr<float>(y), disparity.cols, stored.ptr<std::uint16_t>(y));
+    store_row(disparity.row<float>(y), disparity.cols, stored.row<std::uint16_t>(y));
   }
   write_png(file, stored);
   return count_outside_png(disparity);
 }
 
-std::int64_t count_outside_png(const cv::Mat& disparity) {
-  if (disparity.type() != CV_32FC1) throw InvalidArgument("count_outside_png: the map must be CV_32FC1");
+std::int64_t count_outside_png(const Image& disparity) {
+  if (disparity.type != kF32) throw InvalidArgument("count_outside_png: the map must be float32");
   std::int64_t outside = 0;
-  for (int y = 0; y < disparity.rows; ++y) outside += count_outside(disparity.ptr<float>(y), disparity.cols);
+  for (int y = 0; y < disparity.rows; ++y) outside += count_outside(disparity.row<float>(y), disparity.cols);
   return outside;
 }
 
-cv::Mat read_pfm(const std::filesystem::path& file) { return parse_pfm(read_file(file, kMaxMapFileBytes), file); }
+Image read_pfm(const std::filesystem::path& file) { return parse_pfm(read_file(file, kMaxMapFileBytes), file); }
 
-void write_pfm(const std::filesystem::path& file, const cv::Mat& map) {
+void write_pfm(const std::filesystem::path& file, const Image& map) {
   require_map(map, file);
   std::string bytes = "Pf\n" + std::to_string(map.cols) + " " + std::to_string(map.rows) + "\n-1.0\n";
   const std::size_t header_bytes = bytes.size();
-  bytes.resize(header_bytes + map.total() * sizeof(float));
+  bytes.resize(header_bytes + map.pixels() * sizeof(float));
   char* next = bytes.data() + header_bytes;
   for (int y = map.rows - 1; y >= 0; --y) {
-    const auto* row = map.ptr<float>(y);
+    const auto* row = map.row<float>(y);
     for (int x = 0; x < map.cols; ++x, next += sizeof(float)) {
       const float value = is_valid_disparity(row[x]) ? row[x] : std::numeric_limits<float>::infinity();
       auto word = std::bit_cast<std::uint32_t>(value);

@@ -32,10 +32,10 @@ std::string formatted(const char* format, Values... values) {
 void append(std::string& text, const std::string& part) { text += (text.empty() ? "" : ", ") + part; }
 
 /// Of all bytes; images that differ have different ones, as good as surely.
-std::uint64_t digest_of(const cv::Mat& image) {
+std::uint64_t digest_of(const Image& image) {
   std::uint64_t digest = 0;
   for (int y = 0; y < image.rows; ++y) {
-    const std::string_view row(image.ptr<char>(y), image.cols * image.elemSize());
+    const std::string_view row(image.row<char>(y), image.cols * image.type.pixel_bytes());
     digest = 31 * digest + std::hash<std::string_view>()(row);
   }
   return digest;
@@ -78,7 +78,7 @@ std::optional<Suspicion> suspect_baseline(double baseline_m, double fx) {
   return std::nullopt;
 }
 
-std::optional<Suspicion> suspect_calibration(const Calibration& c, cv::Size size) {
+std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
   if (auto baseline = suspect_baseline(c.baseline_m, c.fx)) return baseline;
   if (size.empty()) return std::nullopt;
   const std::string remedy =
@@ -104,7 +104,7 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, cv::Size size
   return std::nullopt;
 }
 
-void Doubt::add(const cv::Mat& left, const cv::Mat& right, const FrameReport& report, bool has_motion) {
+void Doubt::add(const Image& left, const Image& right, const FrameReport& report, bool has_motion) {
   if (frames_ % kFramesPerLook == 0) {
     const std::optional<Clipped> clipped = clipped_by_range(left, right, least_, end_);
     if (clipped && (!clipped_ || clipped->share > clipped_->share)) clipped_ = clipped;

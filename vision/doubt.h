@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 
@@ -11,6 +10,7 @@
 #include "egosgm/export.h"
 #include "egosgm/frame.h"
 #include "egosgm/options.h"
+#include "egosgm/vision/image.h"
 #include "vision/coarse_map.h"
 
 namespace egosgm::vision {
@@ -27,7 +27,7 @@ EGOSGM_EXPORT std::optional<Suspicion> suspect_baseline(double baseline_m, doubl
 
 /// The same, and a focal length or a principal point that does not fit images of `size`, where that is known.
 /// Thread-safe.
-EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& calibration, cv::Size size);
+EGOSGM_EXPORT std::optional<Suspicion> suspect_calibration(const Calibration& calibration, Size size);
 
 /// What speaks against a run's input once it is matched: a mean density below a half (maps of good input keep four
 /// fifths and more), no motion in most frames that have one before them, images of 16 bits that hold 8, rows that are
@@ -39,8 +39,8 @@ class EGOSGM_EXPORT Doubt {
   Doubt(const std::optional<Calibration>& calibration, const PipelineOptions& options)
       : calibration_(calibration), least_(options.min_disparity), end_(least_ + options.disparities) {}
 
-  /// The next frame's images, both CV_8UC1 or both CV_16UC1, what the pipeline said of it, and whether it had a motion.
-  void add(const cv::Mat& left, const cv::Mat& right, const FrameReport& report, bool has_motion);
+  /// The next frame's images, both kU8 or both kU16, what the pipeline said of it, and whether it had a motion.
+  void add(const Image& left, const Image& right, const FrameReport& report, bool has_motion);
 
   /// "density 24 % in the mean, no motion in 10 of 11 frames"; empty where nothing does.
   std::string text() const;
@@ -48,7 +48,7 @@ class EGOSGM_EXPORT Doubt {
  private:
   const std::optional<Calibration> calibration_;
   const int least_, end_;
-  cv::Size size_;
+  Size size_;
   double density_ = 0;          // of all frames, added up
   std::uint64_t seen_[2] = {};  // of the last images, left and right
   std::size_t frozen_[2] =

@@ -69,7 +69,7 @@ void require_width(int width) {
   if (width < 1 || width > kMaxPictureSide) throw InvalidArgument("picture width: must be in 1..32768 px");
 }
 
-cv::Vec3b turbo(double position) {
+Color turbo(double position) {
   const double at = position * (kTurbo.size() - 1);
   const auto step = std::min(static_cast<std::size_t>(at), kTurbo.size() - 2);
   const double part = at - static_cast<double>(step);
@@ -82,7 +82,7 @@ cv::Vec3b turbo(double position) {
 
 int text_width(const std::string& text, int scale) { return scale * (kAdvance * static_cast<int>(text.size()) - 1); }
 
-void draw_text(cv::Mat& picture, const std::string& text, int left, int bottom, int scale) {
+void draw_text(Image& picture, const std::string& text, int left, int bottom, int scale) {
   const int top = bottom - scale * (kRows - 1);
   for (const char c : text) {
     const auto letter = static_cast<std::size_t>(static_cast<unsigned char>(c) - ' ');
@@ -90,15 +90,15 @@ void draw_text(cv::Mat& picture, const std::string& text, int left, int bottom, 
       const int u = i % (scale * kColumns), v = i / (scale * kColumns), x = left + u, y = top + v;
       const bool is_set = (kLetters[letter][u / scale] >> (v / scale)) & 1;
       if (is_set && x >= 0 && y >= 0 && x < picture.cols && y < picture.rows) {
-        picture.at<cv::Vec3b>(y, x) = cv::Vec3b(255, 255, 255);
+        picture.at<Color>(y, x) = {255, 255, 255};
       }
     }
     left += scale * kAdvance;
   }
 }
 
-cv::Mat shrunk(const cv::Mat& picture, cv::Size size) {
-  cv::Mat small(size, CV_8UC3);
+Image shrunk(const Image& picture, Size size) {
+  Image small(size, kBgr8);
   const double across = static_cast<double>(picture.cols) / size.width,
                down = static_cast<double>(picture.rows) / size.height;
   for (int y = 0; y < size.height; ++y) {
@@ -107,17 +107,24 @@ cv::Mat shrunk(const cv::Mat& picture, cv::Size size) {
       for_each_part(y * down, (y + 1) * down, picture.rows, [&](int v, double part_y) {
         for_each_part(x * across, (x + 1) * across, picture.cols, [&](int u, double part_x) {
           for (int c = 0; c < 3; ++c) {
-            sums[static_cast<std::size_t>(c)] += part_x * part_y * picture.at<cv::Vec3b>(v, u)[c];
+            sums[static_cast<std::size_t>(c)] += part_x * part_y * picture.at<Color>(v, u)[c];
           }
         });
       });
       for (int c = 0; c < 3; ++c) {
-        small.at<cv::Vec3b>(y, x)[c] =
+        small.at<Color>(y, x)[c] =
             static_cast<std::uint8_t>(std::lround(sums[static_cast<std::size_t>(c)] / (across * down)));
       }
     }
   }
   return small;
+}
+
+Image stacked(const Image& above, const Image& below) {
+  Image both(above.rows + below.rows, below.cols, kBgr8);
+  above.copy_to(both.part(0, 0, above.cols, above.rows));
+  below.copy_to(both.part(0, above.rows, below.cols, below.rows));
+  return both;
 }
 
 }  // namespace egosgm::vision

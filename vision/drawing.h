@@ -2,8 +2,9 @@
 // What pictures of maps are drawn with.
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <string>
+
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
@@ -11,15 +12,18 @@ namespace egosgm::vision {
 void require_width(int width);
 
 /// The colour of a place in 0..1 on the scale Turbo (Mikhailov 2019), BGR.
-cv::Vec3b turbo(double position);
+Color turbo(double position);
 
 /// Letters are 7 pixels high, times `scale`.
 int text_width(const std::string& text, int scale);
-/// White letters of ASCII; what lies outside of the picture, CV_8UC3, is cut off. The lowest row is that above
+/// White letters of ASCII; what lies outside of the picture, kBgr8, is cut off. The lowest row is that above
 /// `bottom`.
-void draw_text(cv::Mat& picture, const std::string& text, int left, int bottom, int scale);
+void draw_text(Image& picture, const std::string& text, int left, int bottom, int scale);
 
-/// A CV_8UC3 picture made smaller: each pixel is the mean of what it covers. REQUIRES: `size` is not larger.
-cv::Mat shrunk(const cv::Mat& picture, cv::Size size);
+/// A kBgr8 picture made smaller: each pixel is the mean of what it covers. REQUIRES: `size` is not larger.
+Image shrunk(const Image& picture, Size size);
+
+/// One picture below the other. REQUIRES: both are as wide, or `above` is empty.
+Image stacked(const Image& above, const Image& below);
 
 }  // namespace egosgm::vision

@@ -36,17 +36,20 @@ double median(std::vector<double> values) {
 
 }  // namespace
 
-cv::Mat read_scaled(const std::filesystem::path& file, double scale) {
-  cv::Mat map = read_disparity(file, scale);
+Image read_scaled(const std::filesystem::path& file, double scale) {
+  Image map = read_disparity(file, scale);
   if (scale == kKittiScale || !is_whole_npy(file)) return map;
-  map.forEach<float>([&](float& d, const int*) {
-    if (is_valid_disparity(d)) d = static_cast<float>(d / scale);
-  });
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      float& d = map.at<float>(y, x);
+      if (is_valid_disparity(d)) d = static_cast<float>(d / scale);
+    }
+  }
   return map;
 }
 
-cv::Mat EstimateReader::read(const std::filesystem::path& file, double scale) {
-  cv::Mat map = read_scaled(file, scale);
+Image EstimateReader::read(const std::filesystem::path& file, double scale) {
+  Image map = read_scaled(file, scale);
   const bool png = is_png(file);
   std::optional<float> marker;
   bool is_marker = true;
@@ -79,7 +82,7 @@ cv::Mat EstimateReader::read(const std::filesystem::path& file, double scale) {
   return map;
 }
 
-void EstimateReader::compare(const cv::Mat& estimate, const cv::Mat& truth) {
+void EstimateReader::compare(const Image& estimate, const Image& truth) {
   if (estimate.size() != truth.size()) return;
   std::vector<double> ratios;
   for (int y = 0; y < estimate.rows; ++y) {

@@ -4,17 +4,17 @@
 #include <cstdint>
 #include <filesystem>
 #include <mutex>
-#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
 #include "egosgm/export.h"
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
 /// A disparity map; `scale`: steps a pixel of a PNG, and, where it is not KITTI's, of a .npy of whole numbers. Throws
 /// as read_disparity does.
-EGOSGM_EXPORT cv::Mat read_scaled(const std::filesystem::path& file, double scale);
+EGOSGM_EXPORT Image read_scaled(const std::filesystem::path& file, double scale);
 
 /// Reads disparity maps of other programs, with one rule of what has no value in all formats, and remembers what speaks
 /// against them. No value: 0, infinite, NaN; a negative value that is the same at all pixels that have one, as -1 is,
@@ -23,10 +23,10 @@ EGOSGM_EXPORT cv::Mat read_scaled(const std::filesystem::path& file, double scal
 class EGOSGM_EXPORT EstimateReader {
  public:
   /// As read_scaled.
-  cv::Mat read(const std::filesystem::path& file, double scale);
+  Image read(const std::filesystem::path& file, double scale);
 
   /// Looks at an estimate beside its truth.
-  void compare(const cv::Mat& estimate, const cv::Mat& truth);
+  void compare(const Image& estimate, const Image& truth);
 
   /// A sentence for each thing that was seen. `scale`: as it was given.
   std::vector<std::string> doubts(double scale) const;

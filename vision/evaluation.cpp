@@ -8,13 +8,14 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "vision/disparity_error.h"
+#include "vision/image_values.h"
 
 namespace egosgm::vision {
 namespace {
 
-void require_map(const cv::Mat& map, const char* name) {
-  if (map.empty() || map.type() != CV_32FC1) {
-    throw InvalidArgument(std::string(name) + ": a disparity map must be CV_32FC1 and not empty");
+void require_map(const Image& map, const char* name) {
+  if (map.empty() || map.type != kF32) {
+    throw InvalidArgument(std::string(name) + ": a disparity map must be float32 and not empty");
   }
 }
 
@@ -31,7 +32,7 @@ void interpolate_row(float* row, int width) {
   }
 }
 
-void extend_columns(cv::Mat& map) {
+void extend_columns(Image& map) {
   for (int x = 0; x < map.cols; ++x) {
     int top = 0, bottom = map.rows - 1;
     while (top < map.rows && !is_valid_disparity(map.at<float>(top, x))) ++top;
@@ -72,7 +73,7 @@ DisparityCounts& DisparityCounts::operator+=(const DisparityCounts& other) {
   return *this;
 }
 
-DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth) {
+DisparityCounts compare_disparity(const Image& estimate, const Image& truth) {
   require_map(estimate, "estimate");
   require_map(truth, "truth");
   if (estimate.size() != truth.size()) {
@@ -80,7 +81,7 @@ DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth)
                           " pixels, its truth " + std::to_string(truth.cols) + "x" + std::to_string(truth.rows) +
                           "; give maps of one size");
   }
-  const cv::Mat interpolated = interpolate_background(estimate);
+  const Image interpolated = interpolate_background(estimate);
   DisparityCounts counts;
   for (int y = 0; y < truth.rows; ++y) {
     for (int x = 0; x < truth.cols; ++x) {
@@ -123,22 +124,22 @@ DisparityMetrics mean_of(const std::vector<DisparityMetrics>& images) {
           .wrong_of_all = mean(&DisparityMetrics::wrong_of_all)};
 }
 
-cv::Mat interpolate_background(const cv::Mat& disparity) {
+Image interpolate_background(const Image& disparity) {
   require_map(disparity, "interpolate_background");
-  cv::Mat filled = disparity.clone();
-  for (int y = 0; y < filled.rows; ++y) interpolate_row(filled.ptr<float>(y), filled.cols);
+  Image filled = disparity.clone();
+  for (int y = 0; y < filled.rows; ++y) interpolate_row(filled.row<float>(y), filled.cols);
   extend_columns(filled);
   return filled;
 }
 
-cv::Mat drop_uncertain(const cv::Mat& disparity, const cv::Mat& variance, float max_variance_px2) {
+Image drop_uncertain(const Image& disparity, const Image& variance, float max_variance_px2) {
   require_map(disparity, "drop_uncertain");
   require_map(variance, "drop_uncertain");
   if (disparity.size() != variance.size()) {
     throw InvalidArgument("drop_uncertain: disparity and variance differ in size");
   }
-  cv::Mat certain = disparity.clone();
-  certain.setTo(kInvalidDisparity, variance > max_variance_px2);
+  Image certain = disparity.clone();
+  set_where(certain, kInvalidDisparity, variance, [&](auto value) { return value > max_variance_px2; });
   return certain;
 }
 

@@ -10,7 +10,7 @@ namespace egosgm::vision {
 FileSource::FileSource(StereoSequence sequence) {
   sequence_ = std::move(sequence);
   size_ = check_image_sizes(sequence_);
-  type_ = first_readable_image(sequence_.frames).depth() == CV_16U ? PixelType::kU16 : PixelType::kU8;
+  type_ = first_readable_image(sequence_.frames).type.channel == ChannelType::kU16 ? PixelType::kU16 : PixelType::kU8;
 }
 
 std::optional<VideoPair> FileSource::next() {

@@ -6,6 +6,8 @@
 #include "egosgm/error.h"
 #include "egosgm/vision/disparity_io.h"
 #include "egosgm/vision/image_io.h"
+#include "vision/drawing.h"
+#include "vision/image_values.h"
 #include "vision/picture_sheet.h"
 
 namespace egosgm::vision {
@@ -13,7 +15,7 @@ namespace {
 
 constexpr int kOverviewCellWidth = 800;
 
-void expect_size(const std::filesystem::path& truth, cv::Size of_truth, cv::Size of_images) {
+void expect_size(const std::filesystem::path& truth, Size of_truth, Size of_images) {
   if (of_truth == of_images) return;
   throw InvalidArgument(truth.string() +
                         ": is of another size than the frame's images: remove it, or write no overview");
@@ -21,9 +23,7 @@ void expect_size(const std::filesystem::path& truth, cv::Size of_truth, cv::Size
 
 CaptionedPicture panel(const Layer& layer) {
   if (layer.bar.empty()) return {layer.picture, layer.name};
-  cv::Mat both;
-  cv::vconcat(layer.picture, layer.bar, both);
-  return {both, layer.name};
+  return {stacked(layer.picture, layer.bar), layer.name};
 }
 
 Layer variance_layer(const ShownFrame& shown) {
@@ -32,25 +32,23 @@ Layer variance_layer(const ShownFrame& shown) {
 }
 
 Layer error_layer(const ShownFrame& shown) {
-  const cv::Mat truth = read_disparity(shown.frame.truth_noc);
+  const Image truth = read_disparity(shown.frame.truth_noc);
   expect_size(shown.frame.truth_noc, truth.size(), shown.disparity.size());
   return {"error [px]", color_error(shown.disparity, truth), error_bar(truth.cols)};
 }
 
 }  // namespace
 
-void expect_truth_of_size(const StereoFrame& frame, cv::Size images) {
+void expect_truth_of_size(const StereoFrame& frame, Size images) {
   if (!frame.truth_noc.empty()) expect_size(frame.truth_noc, read_image_size(frame.truth_noc), images);
 }
 
-const ColorRange& FramePanels::disparity_range(const cv::Mat& disparity) {
+const ColorRange& FramePanels::disparity_range(const Image& disparity) {
   if (!range_) range_ = vision::disparity_range(disparity);
   return *range_;
 }
 
-cv::Mat FramePanels::disparity(const cv::Mat& disparity) {
-  return color_disparity(disparity, disparity_range(disparity));
-}
+Image FramePanels::disparity(const Image& disparity) { return color_disparity(disparity, disparity_range(disparity)); }
 
 Layer FramePanels::disparity_layer(const ShownFrame& shown) {
   return {"disparity", disparity(shown.disparity),
@@ -58,13 +56,12 @@ Layer FramePanels::disparity_layer(const ShownFrame& shown) {
 }
 
 Layer FramePanels::search_layer(const ShownFrame& shown) const {
-  cv::Mat searched;
-  shown.search_width.convertTo(searched, CV_32F);
+  const Image searched = as_floats(shown.search_width);
   const ColorRange widths{1, std::max(2.0, static_cast<double>(disparities_)), true};
   return {"disparities searched", color_map(searched, widths), color_bar(searched.cols, widths, "")};
 }
 
-cv::Mat FramePanels::overview(const ShownFrame& shown) {
+Image FramePanels::overview(const ShownFrame& shown) {
   const bool truth = !shown.frame.truth_noc.empty();
   return compose({{color_grey(shown.left), "left image, frame " + shown.frame.name},
                   panel(disparity_layer(shown)),

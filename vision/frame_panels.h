@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "egosgm/export.h"
 #include "egosgm/vision/dataset.h"
+#include "egosgm/vision/image.h"
 #include "egosgm/vision/render.h"
 
 namespace egosgm::vision {
 
-/// A frame and what the pipeline made of it: disparity, variance CV_32FC1, search width CV_16UC1, reasons CV_8UC1.
+/// A frame and what the pipeline made of it: disparity, variance kF32, search width kU16, reasons kU8.
 /// `frame.truth_noc` and `reasons` may be empty.
 struct ShownFrame {
   const StereoFrame& frame;
-  const cv::Mat& left;
-  const cv::Mat &disparity, &variance, &search_width;
-  const cv::Mat reasons = {};
+  const Image& left;
+  const Image &disparity, &variance, &search_width;
+  const Image reasons = {};
 };
 
 /// Throws InvalidArgument where the frame's truth, a PNG, is of another size than its images. Reads the header alone.
-EGOSGM_EXPORT void expect_truth_of_size(const StereoFrame& frame, cv::Size images);
+EGOSGM_EXPORT void expect_truth_of_size(const StereoFrame& frame, Size images);
 
 /// A map as a picture, and its colour scale of the same width (none for an image).
 struct Layer {
   std::string name;
-  cv::Mat picture, bar;
+  Image picture, bar;
 };
 
 /// A sequence's maps as pictures with their scales. Colours stand for the same values in all frames: the first one's
@@ -37,10 +37,10 @@ class EGOSGM_EXPORT FramePanels {
   explicit FramePanels(int disparities) : disparities_(disparities) {}
 
   /// The range of the first map that it is asked for.
-  const ColorRange& disparity_range(const cv::Mat& disparity);
-  cv::Mat disparity(const cv::Mat& disparity);
+  const ColorRange& disparity_range(const Image& disparity);
+  Image disparity(const Image& disparity);
   /// Left image, disparity, search width, and the error where there is truth, else the variance.
-  cv::Mat overview(const ShownFrame& shown);
+  Image overview(const ShownFrame& shown);
   /// Left image in its colours, disparity, variance, search width, reasons, and the error: those for which there is a
   /// file or a map (an empty one is none).
   std::vector<Layer> layers(const ShownFrame& shown);

@@ -31,7 +31,7 @@ class EGOSGM_EXPORT FrameSource {
 
   /// What is known before the first pair. `frames` may be more than come, and `numbers` are empty where that is so.
   const StereoSequence& sequence() const { return sequence_; }
-  cv::Size size() const { return size_; }
+  Size size() const { return size_; }
   PixelType type() const { return type_; }
   /// Whether the left images are in no files, so that a run writes them, too.
   virtual bool has_no_files() const { return false; }
@@ -47,7 +47,7 @@ class EGOSGM_EXPORT FrameSource {
 
  protected:
   StereoSequence sequence_;
-  cv::Size size_;
+  Size size_;
   PixelType type_ = PixelType::kU8;
 };
 

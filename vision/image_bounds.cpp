@@ -9,7 +9,7 @@
 
 namespace egosgm::vision {
 
-cv::Size checked_image_size(std::int64_t width, std::int64_t height, const std::filesystem::path& file) {
+Size checked_image_size(std::int64_t width, std::int64_t height, const std::filesystem::path& file) {
   if (width <= 0 || height <= 0) refuse_image(file, "its width or height is zero");
   if (width > kMaxImageSide || height > kMaxImageSide || width * height > kMaxImagePixels) {
     throw InvalidArgument(file.string() + ": an image of " + std::to_string(width) + "x" + std::to_string(height) +
@@ -19,8 +19,8 @@ cv::Size checked_image_size(std::int64_t width, std::int64_t height, const std::
   return {static_cast<int>(width), static_cast<int>(height)};
 }
 
-void check_decoded_bytes(cv::Size size, int type, std::size_t file_bytes, const std::filesystem::path& file) {
-  const std::int64_t decoded = std::int64_t{size.width} * size.height * CV_ELEM_SIZE(type);
+void check_decoded_bytes(Size size, ImageType type, std::size_t file_bytes, const std::filesystem::path& file) {
+  const std::int64_t decoded = std::int64_t{size.width} * size.height * type.pixel_bytes();
   if (decoded <= std::max(kAlwaysAllowedBytes, kMaxExpansion * static_cast<std::int64_t>(file_bytes))) return;
   refuse_image(file, std::to_string(file_bytes) + " bytes are too short for " + std::to_string(size.width) + "x" +
                          std::to_string(size.height) + " pixels, which take " + std::to_string(decoded));

@@ -4,7 +4,8 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <opencv2/core.hpp>
+
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
@@ -16,10 +17,10 @@ inline constexpr std::int64_t kAlwaysAllowedBytes = std::int64_t{16} << 20;
 inline constexpr std::int64_t kMaxExpansion = 1032;
 
 /// The size, if it is within the limits of image_io.h. Throws InvalidArgument, naming the file.
-cv::Size checked_image_size(std::int64_t width, std::int64_t height, const std::filesystem::path& file);
+Size checked_image_size(std::int64_t width, std::int64_t height, const std::filesystem::path& file);
 
 /// Throws InvalidArgument where pixels of `type` would take more than a file of `file_bytes` may.
-void check_decoded_bytes(cv::Size size, int type, std::size_t file_bytes, const std::filesystem::path& file);
+void check_decoded_bytes(Size size, ImageType type, std::size_t file_bytes, const std::filesystem::path& file);
 
 /// Throws InvalidArgument.
 [[noreturn]] void refuse_image(const std::filesystem::path& file, const std::string& why);

@@ -7,10 +7,9 @@
 #include <utility>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/render.h"
 #include "vision/file_io.h"
-#include "vision/grey_bytes.h"
 #include "vision/image_bounds.h"
+#include "vision/image_values.h"
 #include "vision/jpeg.h"
 #include "vision/plain_png.h"
 #include "vision/png.h"
@@ -20,30 +19,30 @@ namespace egosgm::vision {
 namespace {
 
 /// By what the file holds, not by its name.
-cv::Mat decode_image(const std::filesystem::path& file) {
+Image decode_image(const std::filesystem::path& file) {
   const std::string bytes = read_file(file, kMaxImageFileBytes);
   return starts_like_jpeg(bytes) ? decode_jpeg(bytes, file) : decode_png(bytes, file);
 }
 
 /// RGB becomes BGR, or the other way round.
-void reverse_colors(cv::Mat& pixels) {
+void reverse_colors(Image& pixels) {
   const auto reverse = [&]<typename T>(T) {
     for (int y = 0; y < pixels.rows; ++y) {
-      auto* row = pixels.ptr<T>(y);
+      auto* row = pixels.row<T>(y);
       for (int x = 0; x < pixels.cols; ++x) std::swap(row[3 * x], row[3 * x + 2]);
     }
   };
-  pixels.depth() == CV_8U ? reverse(std::uint8_t{}) : reverse(std::uint16_t{});
+  pixels.type.channel == ChannelType::kU8 ? reverse(std::uint8_t{}) : reverse(std::uint16_t{});
 }
 
 }  // namespace
 
-cv::Mat grey_of_colors(const cv::Mat& colors, ColorOrder order) {
-  cv::Mat grey(colors.size(), colors.depth());
-  const int channels = colors.channels(), red = order == ColorOrder::kRgb ? 0 : 2;
+Image grey_of_colors(const Image& colors, ColorOrder order) {
+  Image grey(colors.size(), {colors.type.channel, 1});
+  const int channels = colors.type.channels, red = order == ColorOrder::kRgb ? 0 : 2;
   const auto weigh = [&]<typename T>(T) {
     for (int y = 0; y < colors.rows; ++y) {
-      const T* pixel = colors.ptr<T>(y);
+      const T* pixel = colors.row<T>(y);
       for (int x = 0; x < colors.cols; ++x, pixel += channels) {
         const std::uint64_t sum = std::uint64_t{9798} * pixel[red] + std::uint64_t{19235} * pixel[1] +
                                   std::uint64_t{3735} * pixel[2 - red] + (1 << 14);
@@ -51,39 +50,59 @@ cv::Mat grey_of_colors(const cv::Mat& colors, ColorOrder order) {
       }
     }
   };
-  colors.depth() == CV_8U ? weigh(std::uint8_t{}) : weigh(std::uint16_t{});
+  colors.type.channel == ChannelType::kU8 ? weigh(std::uint8_t{}) : weigh(std::uint16_t{});
   return grey;
 }
 
-cv::Mat read_grey_image(const std::filesystem::path& file) {
-  const cv::Mat pixels = decode_image(file);
-  return pixels.channels() == 1 ? pixels : grey_of_colors(pixels, ColorOrder::kRgb);
+Image color_grey(const Image& grey) {
+  if (grey.empty() || (grey.type != kU8 && grey.type != kU16)) {
+    throw InvalidArgument("color_grey: the image must be uint8 or uint16 and not empty");
+  }
+  Image bytes = grey, picture(grey.size(), kBgr8);
+  if (grey.type.channel == ChannelType::kU16) {
+    int highest = 0;
+    for (int y = 0; y < grey.rows; ++y) {
+      const auto* row = grey.row<std::uint16_t>(y);
+      highest = std::max<int>(highest, *std::max_element(row, row + grey.cols));
+    }
+    bytes = as_bytes(grey, highest > 0 ? 255.0 / highest : 1.0);
+  }
+  for (int y = 0; y < bytes.rows; ++y) {
+    const std::uint8_t* row = bytes.row(y);
+    std::transform(row, row + bytes.cols, picture.row<Color>(y), [](auto v) { return Color{v, v, v}; });
+  }
+  return picture;
 }
 
-cv::Mat read_stored_image(const std::filesystem::path& file) {
-  cv::Mat pixels = decode_image(file);
-  if (pixels.channels() == 3) reverse_colors(pixels);
+Image read_grey_image(const std::filesystem::path& file) {
+  const Image pixels = decode_image(file);
+  return pixels.type.channels == 1 ? pixels : grey_of_colors(pixels, ColorOrder::kRgb);
+}
+
+Image read_stored_image(const std::filesystem::path& file) {
+  Image pixels = decode_image(file);
+  if (pixels.type.channels == 3) reverse_colors(pixels);
   return pixels;
 }
 
-cv::Mat read_color_image(const std::filesystem::path& file) {
-  cv::Mat pixels = decode_image(file);
-  if (pixels.channels() == 1) return color_grey(pixels);
-  if (pixels.depth() == CV_16U) pixels.convertTo(pixels, CV_8U, 1.0 / 256.0, -0.499);  // rounds, halves to even numbers
+Image read_color_image(const std::filesystem::path& file) {
+  Image pixels = decode_image(file);
+  if (pixels.type.channels == 1) return color_grey(pixels);
+  if (pixels.type.channel == ChannelType::kU16) pixels = as_bytes(pixels, 1.0 / 256.0, -0.499);  // the upper 8 bits
   reverse_colors(pixels);
   return pixels;
 }
 
-bool holds_8_bits_in_16(const cv::Mat& grey) {
-  if (grey.type() != CV_16UC1) return false;
+bool holds_8_bits_in_16(const Image& grey) {
+  if (grey.type != kU16) return false;
   for (int y = 0; y < grey.rows; ++y) {
-    const auto* row = grey.ptr<std::uint16_t>(y);
+    const auto* row = grey.row<std::uint16_t>(y);
     if (std::any_of(row, row + grey.cols, [](std::uint16_t value) { return value > 255; })) return false;
   }
   return true;
 }
 
-cv::Size read_image_size(const std::filesystem::path& file) {
+Size read_image_size(const std::filesystem::path& file) {
   const std::string start = read_file_start(file, kPngHeaderBytes);
   if (!starts_like_jpeg(start)) return parse_png_size(start, file);
   try {
@@ -100,9 +119,9 @@ PixelType read_pixel_type(const std::filesystem::path& file) {
   return has_16_bits ? PixelType::kU16 : PixelType::kU8;
 }
 
-void write_png(const std::filesystem::path& file, const cv::Mat& image) {
-  const int type = image.type();
-  if (image.empty() || (type != CV_8UC1 && type != CV_8UC3 && type != CV_16UC1)) {
+void write_png(const std::filesystem::path& file, const Image& image) {
+  const ImageType type = image.type;
+  if (image.empty() || (type != kU8 && type != kBgr8 && type != kU16)) {
     throw InvalidArgument(file.string() +
                           ": only non-empty images of 8 or 16 bit grey or 8 bit BGR are written as PNG");
   }

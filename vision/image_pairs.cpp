@@ -48,7 +48,7 @@ ImagePairs find_pairs(const std::string& left, const std::string& right, PairBy 
   return result;
 }
 
-cv::Mat first_readable_image(const std::vector<StereoFrame>& frames) {
+Image first_readable_image(const std::vector<StereoFrame>& frames) {
   for (const StereoFrame& frame : frames) {
     try {
       return read_stored_image(frame.left);

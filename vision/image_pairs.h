@@ -2,13 +2,13 @@
 #pragma once
 
 #include <filesystem>
-#include <opencv2/core.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "egosgm/export.h"
 #include "egosgm/vision/dataset.h"
+#include "egosgm/vision/image.h"
 #include "vision/frame_names.h"
 
 namespace egosgm::vision {
@@ -26,7 +26,7 @@ EGOSGM_EXPORT ImagePairs find_pairs(const std::string& left, const std::string& 
 EGOSGM_EXPORT std::vector<std::filesystem::path> find_images(const std::string& pattern);
 
 /// The first left image that can be read, as it is stored; empty where there is none. Thread-safe.
-EGOSGM_EXPORT cv::Mat first_readable_image(const std::vector<StereoFrame>& frames);
+EGOSGM_EXPORT Image first_readable_image(const std::vector<StereoFrame>& frames);
 
 /// pair_files, where both patterns name one image or both many.
 std::vector<NamedPair> pairs_of_patterns(const NamePattern& left, const NamePattern& right,

@@ -96,11 +96,11 @@ void open(Decoder& decoder, std::string_view bytes, const std::filesystem::path&
   if (!read_header(decoder, bytes)) refuse_image(file, decoder.message);
 }
 
-bool read_rows(Decoder& decoder, cv::Mat& pixels) {
+bool read_rows(Decoder& decoder, Image& pixels) {
   if (setjmp(decoder.on_error)) return false;
   jpeg_start_decompress(&decoder.jpeg);
   while (decoder.jpeg.output_scanline < decoder.jpeg.output_height) {
-    JSAMPROW row = pixels.ptr(static_cast<int>(decoder.jpeg.output_scanline));
+    JSAMPROW row = pixels.row(static_cast<int>(decoder.jpeg.output_scanline));
     jpeg_read_scanlines(&decoder.jpeg, &row, 1);
   }
   jpeg_finish_decompress(&decoder.jpeg);
@@ -111,25 +111,26 @@ bool read_rows(Decoder& decoder, cv::Mat& pixels) {
 
 bool starts_like_jpeg(std::string_view bytes) { return bytes.starts_with(kStart); }
 
-cv::Size parse_jpeg_size(std::string_view bytes, const std::filesystem::path& file) {
+Size parse_jpeg_size(std::string_view bytes, const std::filesystem::path& file) {
   Decoder decoder;
   open(decoder, bytes, file);
   return checked_image_size(decoder.jpeg.image_width, decoder.jpeg.image_height, file);
 }
 
-cv::Mat decode_jpeg(std::string_view bytes, const std::filesystem::path& file) {
+Image decode_jpeg(std::string_view bytes, const std::filesystem::path& file) {
   Decoder decoder;
   open(decoder, bytes, file);
-  const cv::Size size = checked_image_size(decoder.jpeg.image_width, decoder.jpeg.image_height, file);
+  const Size size = checked_image_size(decoder.jpeg.image_width, decoder.jpeg.image_height, file);
   const bool grey = decoder.jpeg.jpeg_color_space == JCS_GRAYSCALE;
   if (!grey && decoder.jpeg.num_components != 3) {
     throw InvalidArgument(file.string() + ": its pixels are neither grey nor RGB but have " +
-                          std::to_string(decoder.jpeg.num_components) + " components, like CMYK; save it as grey or RGB");
+                          std::to_string(decoder.jpeg.num_components) +
+                          " components, like CMYK; save it as grey or RGB");
   }
   decoder.jpeg.out_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
-  const int type = grey ? CV_8UC1 : CV_8UC3;
+  const ImageType type = grey ? kU8 : kBgr8;
   check_decoded_bytes(size, type, bytes.size(), file);
-  cv::Mat pixels(size, type);
+  Image pixels(size, type);
   if (!read_rows(decoder, pixels)) refuse_image(file, decoder.message);
   return pixels;
 }

@@ -4,7 +4,7 @@
 #include <chrono>
 
 #include "egosgm/error.h"
-#include "egosgm/vision/opencv.h"
+#include "egosgm/vision/image.h"
 #include "egosgm/vision/poses_io.h"
 
 namespace egosgm::vision {

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <string>
@@ -49,7 +50,7 @@ std::vector<std::int64_t> parse_shape(std::string_view text, const std::filesyst
   return shape;
 }
 
-cv::Size parse_size(std::string_view text, const std::filesystem::path& file) {
+Size parse_size(std::string_view text, const std::filesystem::path& file) {
   std::vector<std::int64_t> shape = parse_shape(text, file);
   while (shape.size() > 2) {
     const auto one = std::find(shape.begin(), shape.end(), 1);
@@ -76,6 +77,19 @@ float load(const char* bytes, bool swap) {
   return static_cast<float>(value);
 }
 
+/// A half of IEEE 754.
+struct Half {
+  std::uint16_t bits;
+
+  explicit operator float() const {
+    const int exponent = (bits >> 10) & 31, fraction = bits & 1023;
+    const float size = exponent == 31  ? (fraction ? NAN : INFINITY)
+                       : exponent == 0 ? std::ldexp(static_cast<float>(fraction), -24)
+                                       : std::ldexp(static_cast<float>(1024 + fraction), exponent - 25);
+    return bits >> 15 ? -size : size;
+  }
+};
+
 struct Numbers {
   std::string_view name;  // after the byte order, as NumPy calls it
   std::size_t bytes;
@@ -84,7 +98,7 @@ struct Numbers {
 
 constexpr std::array<Numbers, 11> kNumbers = {{{"f4", 4, load<float>},
                                                {"f8", 8, load<double>},
-                                               {"f2", 2, load<cv::float16_t>},
+                                               {"f2", 2, load<Half>},
                                                {"u1", 1, load<std::uint8_t>},
                                                {"u2", 2, load<std::uint16_t>},
                                                {"i2", 2, load<std::int16_t>},
@@ -110,7 +124,7 @@ std::string_view header_of(std::string_view bytes, const std::filesystem::path& 
 
 bool starts_like_npy(std::string_view bytes) { return bytes.starts_with(kMagic); }
 
-cv::Mat parse_npy(std::string_view bytes, const std::filesystem::path& file) {
+Image parse_npy(std::string_view bytes, const std::filesystem::path& file) {
   const std::string_view header = header_of(bytes, file);
   const std::string_view type = value_of(header, "'descr'", file);  // '<f4'
   const auto* numbers = std::find_if(kNumbers.begin(), kNumbers.end(), [&](const Numbers& n) {
@@ -122,14 +136,14 @@ cv::Mat parse_npy(std::string_view bytes, const std::filesystem::path& file) {
   const bool is_big = type[1] == '>';
   const bool swap = numbers->bytes > 1 && is_big != (std::endian::native == std::endian::big);
   const bool columns_first = value_of(header, "'fortran_order'", file).starts_with("True");
-  const cv::Size size = parse_size(value_of(header, "'shape'", file), file);
+  const Size size = parse_size(value_of(header, "'shape'", file), file);
   const std::string_view values = bytes.substr(static_cast<std::size_t>(header.data() - bytes.data()) + header.size());
   const std::size_t expected = static_cast<std::size_t>(size.area()) * numbers->bytes;
   if (values.size() != expected) {
     refuse(file,
            "it holds " + std::to_string(values.size()) + " bytes of numbers instead of " + std::to_string(expected));
   }
-  cv::Mat map(size, CV_32FC1);
+  Image map(size, kF32);
   const char* next = values.data();
   for (int i = 0; i < (columns_first ? size.width : size.height); ++i) {
     for (int j = 0; j < (columns_first ? size.height : size.width); ++j, next += numbers->bytes) {

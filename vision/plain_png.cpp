@@ -51,14 +51,14 @@ std::optional<Chunk> take_chunk(std::string_view& bytes) {
   return chunk;
 }
 
-/// The type of a plain file's pixels, or -1.
-int type_of(const Chunk& header) {
-  if (header.name != "IHDR" || header.data.size() != 13) return -1;
+/// The type of a plain file's pixels.
+std::optional<ImageType> type_of(const Chunk& header) {
+  if (header.name != "IHDR" || header.data.size() != 13) return {};
   const std::uint8_t* field = data_of(header.data) + 8;
   const std::uint8_t bits = field[0], color = field[1], compression = field[2], filter = field[3], interlace = field[4];
-  if (compression != 0 || filter != 0 || interlace != 0) return -1;
-  if (color == kGrey && (bits == 8 || bits == 16)) return bits == 8 ? CV_8UC1 : CV_16UC1;
-  return color == kRgb && bits == 8 ? CV_8UC3 : -1;
+  if (compression != 0 || filter != 0 || interlace != 0) return {};
+  if (color == kGrey && (bits == 8 || bits == 16)) return bits == 8 ? kU8 : kU16;
+  return color == kRgb && bits == 8 ? std::optional(kBgr8) : std::nullopt;
 }
 
 /// What is compressed: the data of one chunk after the other, to the file's end.
@@ -133,10 +133,10 @@ bool unfilter(int filter, const std::uint8_t* above, std::uint8_t* row, std::siz
 }
 
 /// A row's bytes in the order of files, and back: of 16 bits the upper ones first, of colours red.
-void swap_order(int type, const std::uint8_t* from, std::uint8_t* to, std::size_t count) {
-  if (type == CV_8UC1) {
+void swap_order(ImageType type, const std::uint8_t* from, std::uint8_t* to, std::size_t count) {
+  if (type == kU8) {
     std::copy_n(from, count, to);
-  } else if (type == CV_16UC1) {
+  } else if (type == kU16) {
     for (std::size_t i = 0; i + 1 < count; i += 2) {
       to[i] = from[i + 1];
       to[i + 1] = from[i];
@@ -152,12 +152,12 @@ void swap_order(int type, const std::uint8_t* from, std::uint8_t* to, std::size_
 
 /// Each row's filter, and its bytes as that leaves them: the differences to the pixel before, as disparities and grey
 /// values leave little else.
-Bytes filtered_rows(const cv::Mat& image) {
-  const std::size_t pixel = image.elemSize(), count = pixel * static_cast<std::size_t>(image.cols);
+Bytes filtered_rows(const Image& image) {
+  const std::size_t pixel = image.type.pixel_bytes(), count = pixel * static_cast<std::size_t>(image.cols);
   Bytes all((1 + count) * static_cast<std::size_t>(image.rows)), row(count);
   std::uint8_t* next = all.data();
   for (int y = 0; y < image.rows; ++y, next += count) {
-    swap_order(image.type(), image.ptr(y), row.data(), count);
+    swap_order(image.type, image.row(y), row.data(), count);
     *next++ = kSub;
     std::copy_n(row.data(), pixel, next);
     for (std::size_t i = pixel; i < count; ++i) next[i] = static_cast<std::uint8_t>(row[i] - row[i - pixel]);
@@ -203,42 +203,43 @@ void append_chunk(std::string& bytes, std::string_view name, Append&& append) {
 
 }  // namespace
 
-std::optional<cv::Mat> decode_plain_png(std::string_view bytes, cv::Size size, const std::filesystem::path& file) {
+std::optional<Image> decode_plain_png(std::string_view bytes, Size size, const std::filesystem::path& file) {
   std::string_view chunks = bytes.substr(kSignature.size());
   const std::optional<Chunk> header = take_chunk(chunks);
-  const int type = header ? type_of(*header) : -1;
-  if (type < 0) return {};
+  const std::optional<ImageType> plain = header ? type_of(*header) : std::nullopt;
+  if (!plain) return {};
+  const ImageType type = *plain;
   check_decoded_bytes(size, type, bytes.size(), file);
   std::optional<std::string> compressed = compressed_in(chunks);
   if (!compressed) return {};
 
-  const std::size_t pixel = CV_ELEM_SIZE(type), count = pixel * static_cast<std::size_t>(size.width);
+  const std::size_t pixel = type.pixel_bytes(), count = pixel * static_cast<std::size_t>(size.width);
   Bytes rows((1 + count) * static_cast<std::size_t>(size.height));
   if (!inflate(*compressed, rows)) return {};
-  cv::Mat pixels(size, type);
+  Image pixels(size, type);
   const Bytes nothing(count);
   const std::uint8_t* above = nothing.data();
   std::uint8_t* row = rows.data();
   for (int y = 0; y < size.height; ++y, row += count) {
     const int filter = *row++;
     if (!unfilter(filter, above, row, count, pixel)) return {};
-    if (type == CV_16UC1) {
-      swap_order(type, row, pixels.ptr(y), count);
+    if (type == kU16) {
+      swap_order(type, row, pixels.row(y), count);
     } else {
-      std::copy_n(row, count, pixels.ptr(y));
+      std::copy_n(row, count, pixels.row(y));
     }
     above = row;
   }
   return pixels;
 }
 
-std::string encode_plain_png(const cv::Mat& image) {
-  const bool is_color = image.channels() == 3;
+std::string encode_plain_png(const Image& image) {
+  const bool is_color = image.type.channels == 3;
   std::string bytes(kSignature);
   append_chunk(bytes, "IHDR", [&](std::string& to) {
     append_number(to, static_cast<std::uint32_t>(image.cols));
     append_number(to, static_cast<std::uint32_t>(image.rows));
-    to.push_back(static_cast<char>(8 * image.elemSize1()));
+    to.push_back(static_cast<char>(8 * image.type.channel_bytes()));
     to.push_back(static_cast<char>(is_color ? kRgb : kGrey));
     to.append(3, '\0');
   });

@@ -3,19 +3,20 @@
 #pragma once
 
 #include <filesystem>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
 /// The pixels as stored, of a file whose header says `size`; nothing where it is not plain, or not whole: libpng reads
 /// the former and says what is wrong with the latter. Several times as fast as libpng.
 /// REQUIRES: bytes that parse_png_size took, and `size` of it.
-std::optional<cv::Mat> decode_plain_png(std::string_view bytes, cv::Size size, const std::filesystem::path& file);
+std::optional<Image> decode_plain_png(std::string_view bytes, Size size, const std::filesystem::path& file);
 
-/// A file with these pixels. REQUIRES: CV_8UC1, CV_8UC3 (BGR) or CV_16UC1, not empty.
-std::string encode_plain_png(const cv::Mat& image);
+/// A file with these pixels. REQUIRES: kU8, kBgr8 (BGR) or kU16, not empty.
+std::string encode_plain_png(const Image& image);
 
 }  // namespace egosgm::vision

@@ -123,7 +123,7 @@ std::string foreign_kind(std::string_view bytes) {
 
 bool starts_like_png(std::string_view bytes) { return bytes.starts_with(kSignature); }
 
-cv::Size parse_png_size(std::string_view bytes, const std::filesystem::path& file) {
+Size parse_png_size(std::string_view bytes, const std::filesystem::path& file) {
   if (!starts_like_png(bytes)) refuse_image(file, foreign_kind(bytes));
   if (bytes.size() < kPngHeaderBytes) refuse_image(file, "the file ends in its header");
   if (bytes.substr(12, 4) != "IHDR") refuse_image(file, "its header is damaged");
@@ -132,9 +132,9 @@ cv::Size parse_png_size(std::string_view bytes, const std::filesystem::path& fil
   return checked_image_size(width, height, file);
 }
 
-cv::Mat decode_png(std::string_view bytes, const std::filesystem::path& file) {
-  const cv::Size size = parse_png_size(bytes, file);
-  if (std::optional<cv::Mat> plain = decode_plain_png(bytes, size, file)) return *std::move(plain);
+Image decode_png(std::string_view bytes, const std::filesystem::path& file) {
+  const Size size = parse_png_size(bytes, file);
+  if (std::optional<Image> plain = decode_plain_png(bytes, size, file)) return *std::move(plain);
   Decoder decoder;
   decoder.next = bytes.data();
   decoder.left = bytes.size();
@@ -143,10 +143,10 @@ cv::Mat decode_png(std::string_view bytes, const std::filesystem::path& file) {
   if (!decoder.info) throw std::bad_alloc();
   Layout layout;
   if (!read_layout(decoder, layout)) refuse_image(file, decoder.message);
-  const int type = CV_MAKETYPE(layout.bit_depth == 16 ? CV_16U : CV_8U, layout.channels);
+  const ImageType type{layout.bit_depth == 16 ? ChannelType::kU16 : ChannelType::kU8, layout.channels};
   check_decoded_bytes(size, type, bytes.size(), file);  // as widened: one bit may become three bytes
-  cv::Mat pixels(size, type);
-  if (!read_rows(decoder, layout, pixels.data, pixels.step, size.height)) refuse_image(file, decoder.message);
+  Image pixels(size, type);
+  if (!read_rows(decoder, layout, pixels.data, pixels.stride_bytes, size.height)) refuse_image(file, decoder.message);
   return pixels;
 }
 

@@ -2,8 +2,9 @@
 #pragma once
 
 #include <filesystem>
-#include <opencv2/core.hpp>
 #include <string_view>
+
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
@@ -12,10 +13,10 @@ inline constexpr std::size_t kPngHeaderBytes = 33;  // signature, IHDR with its 
 bool starts_like_png(std::string_view bytes);
 
 /// Size from the signature and IHDR, within the limits of image_io.h. `file` is only named in errors.
-cv::Size parse_png_size(std::string_view bytes, const std::filesystem::path& file);
+Size parse_png_size(std::string_view bytes, const std::filesystem::path& file);
 
 /// The pixels as stored: 8 or 16 bits, one channel or three (RGB); less than 8 bits and palettes are widened, alpha is
 /// dropped.
-cv::Mat decode_png(std::string_view bytes, const std::filesystem::path& file);
+Image decode_png(std::string_view bytes, const std::filesystem::path& file);
 
 }  // namespace egosgm::vision

@@ -28,7 +28,7 @@ void require_positive(const char* name, double value) {
                         ": choose a positive number");
 }
 
-bool has_neighbour_within(const cv::Mat& disparity, int x, int y, float max_jump_px) {
+bool has_neighbour_within(const Image& disparity, int x, int y, float max_jump_px) {
   const float d = disparity.at<float>(y, x);
   const auto near = [&](int u, int v) {
     if (u < 0 || v < 0 || u >= disparity.cols || v >= disparity.rows) return false;
@@ -46,23 +46,23 @@ void PointCloudOptions::validate() const {
   require_positive("max_jump_px", max_jump_px);
 }
 
-PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const cv::Mat& colors,
-                       const Calibration& calibration, const PointCloudOptions& options, const cv::Mat& reasons) {
-  require(!disparity.empty() && disparity.type() == CV_32FC1 && variance.type() == CV_32FC1,
-          "disparity and variance must be CV_32FC1");
+PointCloud point_cloud(const Image& disparity, const Image& variance, const Image& colors,
+                       const Calibration& calibration, const PointCloudOptions& options, const Image& reasons) {
+  require(!disparity.empty() && disparity.type == kF32 && variance.type == kF32,
+          "disparity and variance must be float32");
   require(disparity.size() == variance.size() && disparity.size() == colors.size(),
           "disparity, variance and image must have one size");
   const bool judges_reasons = !options.reasons.empty();
-  require(!judges_reasons || (reasons.type() == CV_8UC1 && reasons.size() == disparity.size()),
-          "a choice of reasons needs their map, CV_8UC1, of the disparity's size");
+  require(!judges_reasons || (reasons.type == kU8 && reasons.size() == disparity.size()),
+          "a choice of reasons needs their map, uint8, of the disparity's size");
   options.validate();
   calibration.validate();
   std::array<bool, 256> stays{};
   for (const Reason reason : options.reasons) stays[static_cast<std::uint8_t>(reason)] = true;
-  const cv::Mat picture = colors.type() == CV_8UC3 ? colors : color_grey(colors);
+  const Image picture = colors.type == kBgr8 ? colors : color_grey(colors);
   PointCloud cloud;
-  cloud.points_m.reserve(disparity.total());
-  cloud.colors.reserve(disparity.total());
+  cloud.points_m.reserve(disparity.pixels());
+  cloud.colors.reserve(disparity.pixels());
   for (int y = 0; y < disparity.rows; ++y) {
     for (int x = 0; x < disparity.cols; ++x) {
       const float d = disparity.at<float>(y, x);
@@ -80,10 +80,10 @@ PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const 
         ++*why;
         continue;
       }
-      cloud.points_m.emplace_back(static_cast<float>((x - calibration.cx) / calibration.fx * depth_m),
-                                  static_cast<float>((y - calibration.cy) / calibration.fy * depth_m),
-                                  static_cast<float>(depth_m));
-      cloud.colors.push_back(picture.at<cv::Vec3b>(y, x));
+      cloud.points_m.push_back({static_cast<float>((x - calibration.cx) / calibration.fx * depth_m),
+                                static_cast<float>((y - calibration.cy) / calibration.fy * depth_m),
+                                static_cast<float>(depth_m)});
+      cloud.colors.push_back(picture.at<Color>(y, x));
     }
   }
   return cloud;
@@ -109,21 +109,22 @@ void write_ply(const std::filesystem::path& file, const PointCloud& cloud) {
     next += kVectorBytes;
   };
   for (std::size_t i = 0; i < count; ++i) {
-    put(cloud.points_m[i].x, cloud.points_m[i].y, cloud.points_m[i].z);
+    put(cloud.points_m[i][0], cloud.points_m[i][1], cloud.points_m[i][2]);
     if (has_normals) put(cloud.normals[i][0], cloud.normals[i][1], cloud.normals[i][2]);
-    for (int channel = 2; has_colors && channel >= 0; --channel) *next++ = static_cast<char>(cloud.colors[i][channel]);
+    for (int channel = 2; has_colors && channel >= 0; --channel)
+      *next++ = static_cast<char>(cloud.colors[i][static_cast<std::size_t>(channel)]);
   }
   write_file(file, bytes);
 }
 
-std::int64_t write_depth_png(const std::filesystem::path& file, const cv::Mat& depth_m) {
-  require(!depth_m.empty() && depth_m.type() == CV_32FC1, "a depth map must be CV_32FC1");
+std::int64_t write_depth_png(const std::filesystem::path& file, const Image& depth_m) {
+  require(!depth_m.empty() && depth_m.type == kF32, "a depth map must be float32");
   constexpr float kStepsPerMetre = 1000.0f;
-  cv::Mat stored(depth_m.size(), CV_16UC1, cv::Scalar(0));
+  Image stored(depth_m.size(), kU16, 0);
   std::int64_t not_stored = 0;
   for (int y = 0; y < depth_m.rows; ++y) {
-    const auto* depths = depth_m.ptr<float>(y);
-    auto* row = stored.ptr<std::uint16_t>(y);
+    const auto* depths = depth_m.row<float>(y);
+    auto* row = stored.row<std::uint16_t>(y);
     for (int x = 0; x < depth_m.cols; ++x) {
       if (!is_valid_disparity(depths[x]) || depths[x] <= 0) continue;
       const float steps = std::max(depths[x] * kStepsPerMetre + 0.5f, 1.0f);

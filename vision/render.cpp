@@ -11,20 +11,20 @@
 #include "egosgm/reason.h"
 #include "egosgm/vision/disparity_io.h"
 #include "vision/drawing.h"
+#include "vision/image_values.h"
 
 namespace egosgm::vision {
 namespace {
 
 constexpr int kBarHeight = 40, kBarColors = 22;  // [px]; below the colours stands the text
 constexpr int kSmallWidth = 640;                 // of a bar; below, its letters are small [px]
-const cv::Scalar kBlack(0, 0, 0);
-const cv::Vec3b kMissing(128, 128, 128);
+constexpr Color kBlack{0, 0, 0}, kMissing{128, 128, 128};
 
 /// |error| below limit_px has this colour: ColorBrewer's RdYlBu in ten classes, BGR.
 struct ErrorStep {
   float limit_px;
   const char* label;
-  cv::Vec3b color;
+  Color color;
 };
 const std::array<ErrorStep, 10> kErrorSteps = {{{0.1875f, "0.19", {149, 54, 49}},
                                                 {0.375f, "0.38", {180, 117, 69}},
@@ -38,24 +38,24 @@ const std::array<ErrorStep, 10> kErrorSteps = {{{0.1875f, "0.19", {149, 54, 49}}
                                                 {INFINITY, "", {38, 0, 165}}}};
 
 /// By Reason, BGR.
-const std::array<cv::Vec3b, kReasonCount> kReasonColors = {{{0, 0, 0},         // trusted
-                                                            {160, 90, 40},     // unconfirmed
-                                                            {230, 200, 60},    // uncovered
-                                                            {60, 60, 240},     // contradicted
-                                                            {250, 130, 200},   // nearer
-                                                            {0, 140, 255},     // ambiguous
-                                                            {110, 110, 110},   // flat
-                                                            {255, 255, 255},   // saturated
-                                                            {90, 160, 60},     // speckle
-                                                            {80, 230, 250}}};  // predicted
+const std::array<Color, kReasonCount> kReasonColors = {{{0, 0, 0},         // trusted
+                                                        {160, 90, 40},     // unconfirmed
+                                                        {230, 200, 60},    // uncovered
+                                                        {60, 60, 240},     // contradicted
+                                                        {250, 130, 200},   // nearer
+                                                        {0, 140, 255},     // ambiguous
+                                                        {110, 110, 110},   // flat
+                                                        {255, 255, 255},   // saturated
+                                                        {90, 160, 60},     // speckle
+                                                        {80, 230, 250}}};  // predicted
 
-void require_map(const cv::Mat& map, const char* name) {
-  if (map.empty() || map.type() != CV_32FC1) {
-    throw InvalidArgument(std::string(name) + ": the map must be CV_32FC1 and not empty");
+void require_map(const Image& map, const char* name) {
+  if (map.empty() || map.type != kF32) {
+    throw InvalidArgument(std::string(name) + ": the map must be float32 and not empty");
   }
 }
 
-void require_same_size(const cv::Mat& a, const cv::Mat& b, const char* name) {
+void require_same_size(const Image& a, const Image& b, const char* name) {
   if (a.size() != b.size()) throw InvalidArgument(std::string(name) + ": both maps must have the same size");
 }
 
@@ -88,7 +88,7 @@ double value_at(const ColorRange& range, double position) {
                            : range.low + position * (range.high - range.low);
 }
 
-cv::Vec3b error_color(float error_px) {
+Color error_color(float error_px) {
   for (const ErrorStep& step : kErrorSteps) {
     if (error_px < step.limit_px) return step.color;
   }
@@ -96,7 +96,7 @@ cv::Vec3b error_color(float error_px) {
 }
 
 /// Text centred at x, moved so far that it stays in the picture.
-void put_label(cv::Mat& picture, const std::string& text, double center_x) {
+void put_label(Image& picture, const std::string& text, double center_x) {
   const int scale = picture.cols < kSmallWidth ? 1 : 2, width = text_width(text, scale);
   const int left = std::clamp(static_cast<int>(center_x) - width / 2, 1, std::max(1, picture.cols - width - 1));
   draw_text(picture, text, left, kBarHeight - 2, scale);
@@ -110,12 +110,12 @@ std::string format_value(double value) {
 
 }  // namespace
 
-ColorRange disparity_range(const cv::Mat& disparity) {
+ColorRange disparity_range(const Image& disparity) {
   require_map(disparity, "disparity_range");
   constexpr double kQuantile = 0.995;
   std::vector<float> values;
   for (int y = 0; y < disparity.rows; ++y) {
-    const auto* row = disparity.ptr<float>(y);
+    const auto* row = disparity.row<float>(y);
     std::copy_if(row, row + disparity.cols, std::back_inserter(values), is_valid_disparity);
   }
   if (values.empty()) return {.low = 0, .high = 1};
@@ -126,16 +126,16 @@ ColorRange disparity_range(const cv::Mat& disparity) {
   return {.low = low, .high = std::max(high, low + 1.0)};
 }
 
-cv::Mat color_map(const cv::Mat& map, ColorRange range) {
+Image color_map(const Image& map, ColorRange range) {
   require_map(map, "color_map");
   require_range(range);
   const Scale scale(range);
-  cv::Mat picture(map.size(), CV_8UC3, kBlack);
+  Image picture(map.size(), kBgr8, 0);
   float last = kInvalidDisparity;  // widths of the search are often those of the pixel before
-  cv::Vec3b color;
+  Color color;
   for (int y = 0; y < map.rows; ++y) {
-    const auto* row = map.ptr<float>(y);
-    auto* colored = picture.ptr<cv::Vec3b>(y);
+    const auto* row = map.row<float>(y);
+    auto* colored = picture.row<Color>(y);
     for (int x = 0; x < map.cols; ++x) {
       if (!is_valid_disparity(row[x])) continue;
       if (row[x] != last) color = turbo(scale.position_of(row[x]));
@@ -146,40 +146,38 @@ cv::Mat color_map(const cv::Mat& map, ColorRange range) {
   return picture;
 }
 
-cv::Mat color_disparity(const cv::Mat& disparity) { return color_map(disparity, disparity_range(disparity)); }
+Image color_disparity(const Image& disparity) { return color_map(disparity, disparity_range(disparity)); }
 
-cv::Mat color_disparity(const cv::Mat& disparity, ColorRange range) { return color_map(disparity, range); }
+Image color_disparity(const Image& disparity, ColorRange range) { return color_map(disparity, range); }
 
-cv::Mat color_variance(const cv::Mat& variance, const cv::Mat& disparity, ColorRange range) {
+Image color_variance(const Image& variance, const Image& disparity, ColorRange range) {
   require_map(variance, "color_variance");
   require_map(disparity, "color_variance");
   require_same_size(variance, disparity, "color_variance");
-  cv::Mat picture = color_map(variance, range);
+  Image picture = color_map(variance, range);
   for (int y = 0; y < picture.rows; ++y) {
     for (int x = 0; x < picture.cols; ++x) {
-      if (!is_valid_disparity(disparity.at<float>(y, x))) picture.at<cv::Vec3b>(y, x) = cv::Vec3b(0, 0, 0);
+      if (!is_valid_disparity(disparity.at<float>(y, x))) picture.at<Color>(y, x) = kBlack;
     }
   }
   return picture;
 }
 
-cv::Mat color_error(const cv::Mat& estimate, const cv::Mat& truth) {
+Image color_error(const Image& estimate, const Image& truth) {
   require_map(estimate, "color_error");
   require_map(truth, "color_error");
   require_same_size(estimate, truth, "color_error");
-  cv::Mat picture(truth.size(), CV_8UC3, kBlack);
-  const cv::Rect bounds(0, 0, truth.cols, truth.rows);
+  Image picture(truth.size(), kBgr8, 0);
   for (int y = 0; y < truth.rows; ++y) {
     for (int x = 0; x < truth.cols; ++x) {
       const float t = truth.at<float>(y, x);
       if (!is_valid_disparity(t)) continue;
       const float e = estimate.at<float>(y, x);
-      const cv::Vec3b color = is_valid_disparity(e) ? error_color(std::abs(t - e)) : kMissing;
-      const cv::Rect block = cv::Rect(x - 1, y - 1, 3, 3) & bounds;
-      for (int v = block.y; v < block.br().y; ++v) {
-        for (int u = block.x; u < block.br().x; ++u) {
+      const Color color = is_valid_disparity(e) ? error_color(std::abs(t - e)) : kMissing;
+      for (int v = std::max(y - 1, 0); v <= std::min(y + 1, truth.rows - 1); ++v) {
+        for (int u = std::max(x - 1, 0); u <= std::min(x + 1, truth.cols - 1); ++u) {
           const bool own = u == x && v == y;
-          if (own || !is_valid_disparity(truth.at<float>(v, u))) picture.at<cv::Vec3b>(v, u) = color;
+          if (own || !is_valid_disparity(truth.at<float>(v, u))) picture.at<Color>(v, u) = color;
         }
       }
     }
@@ -187,14 +185,14 @@ cv::Mat color_error(const cv::Mat& estimate, const cv::Mat& truth) {
   return picture;
 }
 
-cv::Mat color_bar(int width, ColorRange range, const std::string& unit) {
+Image color_bar(int width, ColorRange range, const std::string& unit) {
   require_width(width);
   require_range(range);
   constexpr int kIntervals = 4;
-  cv::Mat bar(kBarHeight, width, CV_8UC3, kBlack);
+  Image bar(kBarHeight, width, kBgr8, 0);
   for (int x = 0; x < width; ++x) {
-    const cv::Vec3b color = turbo(static_cast<double>(x) / std::max(1, width - 1));
-    bar(cv::Rect(x, 0, 1, kBarColors)).setTo(cv::Scalar(color));
+    const Color color = turbo(static_cast<double>(x) / std::max(1, width - 1));
+    bar.part(x, 0, 1, kBarColors).fill(color);
   }
   for (int i = 0; i <= kIntervals; ++i) {
     const double position = static_cast<double>(i) / kIntervals;
@@ -203,14 +201,14 @@ cv::Mat color_bar(int width, ColorRange range, const std::string& unit) {
   return bar;
 }
 
-cv::Mat error_bar(int width) {
+Image error_bar(int width) {
   require_width(width);
   constexpr int kFields = static_cast<int>(kErrorSteps.size()) + 1;
-  cv::Mat bar(kBarHeight, width, CV_8UC3, kBlack);
+  Image bar(kBarHeight, width, kBgr8, 0);
   for (int x = 0; x < width; ++x) {
     const auto field = static_cast<std::size_t>(static_cast<std::int64_t>(x) * kFields / width);
-    const cv::Vec3b color = field < kErrorSteps.size() ? kErrorSteps[field].color : kMissing;
-    bar(cv::Rect(x, 0, 1, kBarColors)).setTo(cv::Scalar(color));
+    const Color color = field < kErrorSteps.size() ? kErrorSteps[field].color : kMissing;
+    bar.part(x, 0, 1, kBarColors).fill(color);
   }
   for (std::size_t i = 0; i + 1 < kErrorSteps.size(); ++i) {
     put_label(bar, kErrorSteps[i].label, static_cast<double>(i + 1) * width / kFields);
@@ -219,11 +217,11 @@ cv::Mat error_bar(int width) {
   return bar;
 }
 
-cv::Mat color_reasons(const cv::Mat& reasons) {
-  if (reasons.empty() || reasons.type() != CV_8UC1) {
-    throw InvalidArgument("color_reasons: the map must be CV_8UC1 and not empty");
+Image color_reasons(const Image& reasons) {
+  if (reasons.empty() || reasons.type != kU8) {
+    throw InvalidArgument("color_reasons: the map must be uint8 and not empty");
   }
-  cv::Mat picture(reasons.size(), CV_8UC3);
+  Image picture(reasons.size(), kBgr8);
   for (int y = 0; y < reasons.rows; ++y) {
     for (int x = 0; x < reasons.cols; ++x) {
       const std::uint8_t reason = reasons.at<std::uint8_t>(y, x);
@@ -231,57 +229,35 @@ cv::Mat color_reasons(const cv::Mat& reasons) {
         throw InvalidArgument("color_reasons: " + std::to_string(reason) + " is no reason: they are 0 to " +
                               std::to_string(kReasonCount - 1));
       }
-      picture.at<cv::Vec3b>(y, x) = kReasonColors[reason];
+      picture.at<Color>(y, x) = kReasonColors[reason];
     }
   }
   return picture;
 }
 
-cv::Mat reason_bar(int width) {
+Image reason_bar(int width) {
   require_width(width);
   constexpr int kFields = kReasonCount / 2;
-  cv::Mat rows[2];
+  Image rows[2];
   for (int row = 0; row < 2; ++row) {
-    rows[row] = cv::Mat(kBarHeight, width, CV_8UC3, kBlack);
+    rows[row] = Image(kBarHeight, width, kBgr8, 0);
     for (int field = 0; field < kFields; ++field) {
       const int reason = row * kFields + field, left = field * width / kFields, end = (field + 1) * width / kFields;
-      rows[row](cv::Rect(left, 0, end - left, kBarColors)).setTo(cv::Scalar(kReasonColors[reason]));
+      rows[row].part(left, 0, end - left, kBarColors).fill(kReasonColors[reason]);
       put_label(rows[row], to_string(static_cast<Reason>(reason)), (field + 0.5) * width / kFields);
     }
   }
-  cv::Mat bar;
-  cv::vconcat(rows[0], rows[1], bar);
-  return bar;
+  return stacked(rows[0], rows[1]);
 }
 
-cv::Mat color_grey(const cv::Mat& grey) {
-  if (grey.empty() || (grey.type() != CV_8UC1 && grey.type() != CV_16UC1)) {
-    throw InvalidArgument("color_grey: the image must be CV_8UC1 or CV_16UC1 and not empty");
-  }
-  cv::Mat bytes = grey, picture(grey.size(), CV_8UC3);
-  if (grey.depth() == CV_16U) {
-    int highest = 0;
-    for (int y = 0; y < grey.rows; ++y) {
-      const auto* row = grey.ptr<std::uint16_t>(y);
-      highest = std::max<int>(highest, *std::max_element(row, row + grey.cols));
-    }
-    grey.convertTo(bytes, CV_8U, highest > 0 ? 255.0 / highest : 1.0);
-  }
-  for (int y = 0; y < bytes.rows; ++y) {
-    const std::uint8_t* row = bytes.ptr(y);
-    std::transform(row, row + bytes.cols, picture.ptr<cv::Vec3b>(y), [](auto v) { return cv::Vec3b(v, v, v); });
-  }
-  return picture;
-}
-
-cv::Mat depth_from_disparity(const cv::Mat& disparity, const Calibration& calibration) {
+Image depth_from_disparity(const Image& disparity, const Calibration& calibration) {
   require_map(disparity, "depth_from_disparity");
   calibration.validate();
   const double numerator = calibration.fx * calibration.baseline_m;
-  cv::Mat depth_m(disparity.size(), CV_32FC1, cv::Scalar(kInvalidDisparity));
+  Image depth_m(disparity.size(), kF32, kInvalidDisparity);
   for (int y = 0; y < disparity.rows; ++y) {
-    const auto* row = disparity.ptr<float>(y);
-    auto* depths = depth_m.ptr<float>(y);
+    const auto* row = disparity.row<float>(y);
+    auto* depths = depth_m.row<float>(y);
     for (int x = 0; x < disparity.cols; ++x) {
       const double d = row[x] + calibration.doffs_px;
       if (is_valid_disparity(row[x]) && d > 0) depths[x] = static_cast<float>(numerator / d);

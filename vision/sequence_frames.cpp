@@ -20,30 +20,30 @@ std::string range(int first, int last) {
   return first == last ? std::to_string(first) : std::to_string(first) + ".." + std::to_string(last);
 }
 
-std::string describe(cv::Size size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
+std::string describe(Size size) { return std::to_string(size.width) + "x" + std::to_string(size.height); }
 
 }  // namespace
 
 StereoImages read_images(const StereoFrame& frame) {
   StereoImages images{read_grey_image(frame.left), read_grey_image(frame.right)};
-  const auto describe_image = [](const cv::Mat& image) {
+  const auto describe_image = [](const Image& image) {
     return std::to_string(image.cols) + "x" + std::to_string(image.rows) + ", " +
-           std::to_string(8 * image.elemSize1()) + " bit";
+           std::to_string(8 * image.type.channel_bytes()) + " bit";
   };
-  if (images.left.size() != images.right.size() || images.left.type() != images.right.type()) {
+  if (images.left.size() != images.right.size() || images.left.type != images.right.type) {
     throw InvalidArgument(frame.right.string() + ": " + describe_image(images.right) + ", but its left image " +
                           frame.left.string() + " has " + describe_image(images.left) + "; give a rectified pair");
   }
   return images;
 }
 
-cv::Size check_image_sizes(const StereoSequence& sequence) {
-  std::optional<cv::Size> expected;
+Size check_image_sizes(const StereoSequence& sequence) {
+  std::optional<Size> expected;
   std::exception_ptr unreadable;
   for (const StereoFrame& frame : sequence.frames) {
-    cv::Size of_left;
+    Size of_left;
     for (const fs::path& file : {frame.left, frame.right}) {
-      cv::Size size;
+      Size size;
       try {
         size = read_image_size(file);
       } catch (const Error&) {
@@ -63,7 +63,7 @@ cv::Size check_image_sizes(const StereoSequence& sequence) {
     }
   }
   if (!expected && unreadable) std::rethrow_exception(unreadable);
-  return expected.value_or(cv::Size());
+  return expected.value_or(Size());
 }
 
 std::vector<std::size_t> rows_of_frames(const StereoSequence& sequence, std::size_t rows, const fs::path& file,

@@ -14,6 +14,7 @@
 #include "egosgm/vision/poses_io.h"
 #include "vision/file_io.h"
 #include "vision/frame_names.h"
+#include "vision/image_values.h"
 #include "vision/synthetic_render.h"
 #include "vision/synthetic_scene.h"
 
@@ -35,9 +36,9 @@ void require_range(const char* name, double value, double low, double high) {
   throw InvalidArgument(text("synthetic ", name, " = ", value, " is out of range: choose ", low, " to ", high));
 }
 
-cv::Mat only_noc(const cv::Mat& disparity, const cv::Mat& noc) {
-  cv::Mat kept(disparity.size(), CV_32FC1, cv::Scalar(kInvalidDisparity));
-  disparity.copyTo(kept, noc);
+Image only_noc(const Image& disparity, const Image& noc) {
+  Image kept = disparity.clone();
+  set_where(kept, kInvalidDisparity, noc, [](auto value) { return value == 0; });
   return kept;
 }
 

@@ -246,18 +246,18 @@ uint8_t expose(double radiance, const Camera& camera, int x, int y, double gain,
 }
 
 struct ViewMaps {
-  cv::Mat &image, &disparity, &noc, &moving;
+  Image &image, &disparity, &noc, &moving;
 };
 
 /// `towards_other`: -1 where the other camera is the right one (x_right = x_left - d), 1 where it is the left one.
 void render_view(const View& view, const View& other, int towards_other, const std::vector<Solid>& solids,
                  const SyntheticOptions& options, uint32_t noise_seed, ViewMaps out) {
   const Camera& camera = view.camera();
-  const cv::Size size(camera.width, camera.height);
+  const Size size(camera.width, camera.height);
   const double numerator = camera.focal_px * kBaseline_m,
                gain = options.exposure * (towards_other > 0 ? kRightGain : 1);
-  out.image.create(size, CV_8UC1), out.disparity.create(size, CV_32FC1);
-  out.noc.create(size, CV_8UC1), out.moving.create(size, CV_8UC1);
+  out.image.create(size, kU8), out.disparity.create(size, kF32);
+  out.noc.create(size, kU8), out.moving.create(size, kU8);
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       const Hit hit = view.cast(x, y);

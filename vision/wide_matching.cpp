@@ -25,9 +25,9 @@ constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 using Codes = std::vector<std::uint64_t>;
 using Costs = std::vector<std::uint16_t>;  // of each pixel, the disparities side by side
 
-Codes census_of(const cv::Mat& image) {
-  Codes codes(image.total());
-  const auto row_at = [&](int y) { return image.ptr(std::clamp(y, 0, image.rows - 1)); };
+Codes census_of(const Image& image) {
+  Codes codes(image.pixels());
+  const auto row_at = [&](int y) { return image.row(std::clamp(y, 0, image.rows - 1)); };
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
       std::uint64_t code = 0;
@@ -47,7 +47,7 @@ Codes census_of(const cv::Mat& image) {
 /// Semi-global matching (Hirschmueller 2008) of four paths, of disparities from -half to half - 1.
 class Matching {
  public:
-  Matching(const cv::Mat& left, const cv::Mat& right, int half)
+  Matching(const Image& left, const Image& right, int half)
       : width_(left.cols), height_(left.rows), half_(half), count_(static_cast<std::size_t>(2 * half)) {
     const Codes left_codes = census_of(left), right_codes = census_of(right);
     costs_.assign(left_codes.size() * count_, kLargest);
@@ -75,8 +75,8 @@ class Matching {
   }
 
   /// Where the best disparity is unique, and the right view's the same.
-  cv::Mat map() const {
-    cv::Mat map(height_, width_, CV_32FC1, cv::Scalar(kNothing));
+  Image map() const {
+    Image map(height_, width_, kF32, kNothing);
     for (int y = 0; y < height_; ++y) {
       for (int x = 0; x < width_; ++x) {
         const std::uint16_t* sums = &sums_[at(x, y)];
@@ -143,48 +143,52 @@ class Matching {
 };
 
 /// Patches of less than kLeastPatch pixels go.
-void drop_speckles(cv::Mat& map) {
-  cv::Mat seen(map.size(), CV_8UC1, cv::Scalar(0));
-  std::vector<cv::Point> patch;
+void drop_speckles(Image& map) {
+  Image seen(map.size(), kU8, 0);
+  struct Pixel {
+    int x, y;
+  };
+  std::vector<Pixel> patch;
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.cols; ++x) {
       if (seen.at<std::uint8_t>(y, x) || std::isnan(map.at<float>(y, x))) continue;
       patch.assign(1, {x, y});
       seen.at<std::uint8_t>(y, x) = 1;
       for (std::size_t i = 0; i < patch.size(); ++i) {
-        const cv::Point from = patch[i];
-        for (const cv::Point step : {cv::Point(1, 0), cv::Point(-1, 0), cv::Point(0, 1), cv::Point(0, -1)}) {
-          const cv::Point to = from + step;
-          if (to.x < 0 || to.y < 0 || to.x >= map.cols || to.y >= map.rows || seen.at<std::uint8_t>(to)) continue;
-          if (!(std::abs(map.at<float>(to) - map.at<float>(from)) <= 1)) continue;
-          seen.at<std::uint8_t>(to) = 1;
+        const Pixel from = patch[i];
+        for (const auto [dx, dy] : {Pixel{1, 0}, Pixel{-1, 0}, Pixel{0, 1}, Pixel{0, -1}}) {
+          const Pixel to{from.x + dx, from.y + dy};
+          if (to.x < 0 || to.y < 0 || to.x >= map.cols || to.y >= map.rows || seen.at<std::uint8_t>(to.y, to.x))
+            continue;
+          if (!(std::abs(map.at<float>(to.y, to.x) - map.at<float>(from.y, from.x)) <= 1)) continue;
+          seen.at<std::uint8_t>(to.y, to.x) = 1;
           patch.push_back(to);
         }
       }
       if (patch.size() >= kLeastPatch) continue;
-      for (const cv::Point point : patch) map.at<float>(point) = kNothing;
+      for (const Pixel pixel : patch) map.at<float>(pixel.y, pixel.x) = kNothing;
     }
   }
 }
 
 }  // namespace
 
-cv::Mat match_widely(const cv::Mat& left, const cv::Mat& right, int half) {
-  cv::Mat map = Matching(left, right, half).map();
+Image match_widely(const Image& left, const Image& right, int half) {
+  Image map = Matching(left, right, half).map();
   drop_speckles(map);
   return map;
 }
 
-cv::Mat shrunk_grey(const cv::Mat& image, int factor, double down_px) {
-  cv::Mat small(image.rows / factor, image.cols / factor, CV_8UC1);
+Image shrunk_grey(const Image& image, int factor, double down_px) {
+  Image small(image.rows / factor, image.cols / factor, kU8);
   const int whole = static_cast<int>(std::floor(down_px));
   const double part = down_px - whole;
   for (int y = 0; y < small.rows; ++y) {
     for (int x = 0; x < small.cols; ++x) {
       double sum = 0;
       for (int v = y * factor + whole; v < (y + 1) * factor + whole; ++v) {
-        const std::uint8_t *row = image.ptr(std::clamp(v, 0, image.rows - 1)),
-                           *next = image.ptr(std::clamp(v + 1, 0, image.rows - 1));
+        const std::uint8_t *row = image.row(std::clamp(v, 0, image.rows - 1)),
+                           *next = image.row(std::clamp(v + 1, 0, image.rows - 1));
         for (int u = x * factor; u < (x + 1) * factor; ++u) sum += (1 - part) * row[u] + part * next[u];
       }
       small.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(std::lround(sum / (factor * factor)));

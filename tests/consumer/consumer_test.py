@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Installs the build into a prefix, moves it, and builds somebody else's project against it: CMake and pkg-config, shared and static.
 
-EGOSGM_BUILD names the build folder, EGOSGM_CXX the compiler, EGOSGM_HAS_VISION is ON or OFF, EGOSGM_VERSION the version.
+EGOSGM_BUILD names the build folder, EGOSGM_CXX the compiler, EGOSGM_HAS_VISION is ON or OFF, EGOSGM_HAS_OPENCV says the same of OpenCV, EGOSGM_VERSION the version.
 """
 import os
 import pathlib
@@ -12,7 +12,8 @@ import unittest
 SOURCE = pathlib.Path(__file__).resolve().parent
 BUILD, CXX, VERSION = (os.environ[name] for name in ("EGOSGM_BUILD", "EGOSGM_CXX", "EGOSGM_VERSION"))
 VISION = os.environ["EGOSGM_HAS_VISION"] == "ON"
-PROGRAMS = ["core", "vision"] if VISION else ["core"]
+OPENCV = VISION and os.environ["EGOSGM_HAS_OPENCV"] in ("ON", "1", "TRUE")
+PROGRAMS = ["core"] + ["vision"] * VISION
 
 
 def run(*command, **options):
@@ -43,7 +44,7 @@ class Installed(unittest.TestCase):
 
     def configure(self, *arguments):
         build = pathlib.Path(tempfile.mkdtemp(dir=self.folder))
-        return build, run("cmake", "-S", SOURCE, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}", f"-DVISION={VISION}",
+        return build, run("cmake", "-S", SOURCE, "-B", build, f"-DCMAKE_PREFIX_PATH={self.prefix}", f"-DVISION={VISION}", f"-DOPENCV={OPENCV}",
                           f"-DCMAKE_CXX_COMPILER={CXX}", "-DCMAKE_BUILD_TYPE=Debug", *arguments)
 
     def test_cmake_finds_both_kinds_of_library(self):
@@ -52,7 +53,7 @@ class Installed(unittest.TestCase):
                 build, done = self.configure(f"-DBUILD_SHARED_LIBS={shared}")
                 self.assertEqual(done.returncode, 0, done.stdout)
                 self.assert_runs("cmake", "--build", build)
-                for program in PROGRAMS:
+                for program in PROGRAMS + ["opencv"] * OPENCV:
                     self.assert_runs(build / program, cwd=build)
                     needed = self.assert_runs("readelf", "-d", build / program)
                     self.assertEqual("[libegosgm" in needed, kind == "shared", needed)
@@ -62,7 +63,7 @@ class Installed(unittest.TestCase):
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("choose from core, vision", " ".join(done.stdout.split()))
 
-    def test_pkg_config_and_a_core_without_opencv(self):
+    def test_pkg_config_and_what_programs_load(self):
         environment = dict(os.environ, PKG_CONFIG_PATH=str(self.library_folder() / "pkgconfig"),
                            LD_LIBRARY_PATH=str(self.library_folder()))
         self.assertEqual(self.assert_runs("pkg-config", "--modversion", "egosgm", env=environment).strip(), VERSION)
@@ -71,10 +72,10 @@ class Installed(unittest.TestCase):
             flags = self.assert_runs("pkg-config", "--cflags", "--libs", module, env=environment).split()
             self.assert_runs(CXX, "-std=c++17", SOURCE / f"{program}.cpp", *flags, "-o", self.folder / program)
             self.assert_runs(self.folder / program, env=environment, cwd=self.folder)
-        needed = self.assert_runs("ldd", self.folder / "core", env=environment)  # odometry and pipeline
-        self.assertIn("libegosgm.so", needed)
-        for library in ("opencv", "libpng", "libjpeg", "libisal"):
-            self.assertNotIn(library, needed)
+            needed = self.assert_runs("ldd", self.folder / program, env=environment)
+            self.assertIn("libegosgm.so", needed)
+            for library in ("opencv", *("libpng", "libjpeg", "libisal") * (program == "core")):
+                self.assertNotIn(library, needed)
 
     def test_the_shared_libraries_show_only_what_is_public_and_carry_their_version(self):
         library = self.library_folder() / f"libegosgm.so.{VERSION}"

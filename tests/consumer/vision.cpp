@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <egosgm/error.h>
 #include <egosgm/vision/disparity_io.h>
-#include <egosgm/vision/matcher.h>
+#include <egosgm/vision/frame_maps.h>
 #include <egosgm/vision/odometry.h>
-#include <egosgm/vision/opencv.h>
 #include <egosgm/vision/synthetic.h>
 
 #include <cstdio>
@@ -19,9 +18,6 @@ int main() try {
   egosgm::Pipeline pipeline(street.calibration(), 64, 32);
   const auto maps = egosgm::vision::process(pipeline, frame.left, frame.right, {});
   if (maps.report.density <= 0) return 1;
-  const cv::Ptr<cv::StereoMatcher> matcher = cv::makePtr<egosgm::vision::Matcher>();  // without OpenCV's calib3d
-  cv::Mat steps;
-  matcher->compute(frame.left, frame.right, steps);
   egosgm::vision::write_disparity("street.pfm", maps.disparity);
   egosgm::vision::read_disparity("no such file.png");
   return 1;

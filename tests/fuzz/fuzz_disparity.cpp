@@ -19,7 +19,7 @@ std::string npy_seed(const std::string& shape) {
 std::vector<std::string> seeds() {
   std::string ones;
   for (int i = 0; i < 1000; ++i) ones += "1,";
-  return {png_seed(CV_16UC1),
+  return {png_seed(vision::kU16),
           "Pf\n3 2\n-1.0\n" + std::string(24, '\x3f'),
           "Pf\n3 2\n1.0\n" + std::string(24, '\x3f'),
           "Pf\n16384 16384\n-1.0\n",

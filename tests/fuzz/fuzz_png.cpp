@@ -19,11 +19,12 @@ std::string encoded(const char* extension, const cv::Mat& image, const std::vect
 }  // namespace
 
 std::vector<std::string> seeds() {
-  const cv::Mat mask(1000, 2000, CV_8UC1, cv::Scalar(0)), color(11, 19, CV_8UC3, cv::Scalar(200, 30, 90));
-  return {png_seed(CV_8UC1),
-          png_seed(CV_8UC3),
-          png_seed(CV_8UC4),
-          png_seed(CV_16UC1),
+  const cv::Mat mask(1000, 2000, CV_8UC1, cv::Scalar(0)), color(11, 19, CV_8UC3, cv::Scalar(200, 30, 90)),
+      four(9, 14, CV_8UC4, cv::Scalar(200, 30, 90, 7));
+  return {png_seed(vision::kU8),
+          png_seed(vision::kBgr8),
+          encoded(".png", four, {}),
+          png_seed(vision::kU16),
           encoded(".png", mask, {cv::IMWRITE_PNG_BILEVEL, 1}),  // few bytes, many pixels
           encoded(".jpg", color, {}),
           encoded(".jpg", color, {cv::IMWRITE_JPEG_PROGRESSIVE, 1})};

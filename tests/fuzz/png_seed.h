@@ -1,27 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "egosgm/error.h"
 #include "tests/fuzz/memory_file.h"
+#include "vision/plain_png.h"
 
 namespace egosgm::fuzz {
 
-/// A small PNG of an OpenCV type.
-inline std::string png_seed(int type) {
-  cv::Mat image(9, 14, type);
+/// A small PNG: kU8, kU16 or kBgr8.
+inline std::string png_seed(vision::ImageType type) {
+  vision::Image image(9, 14, type);
   for (int y = 0; y < image.rows; ++y) {
-    auto* row = image.ptr<std::uint8_t>(y);
-    for (std::size_t i = 0; i < image.cols * image.elemSize(); ++i)
+    std::uint8_t* row = image.row(y);
+    for (std::size_t i = 0; i < image.cols * type.pixel_bytes(); ++i)
       row[i] = static_cast<std::uint8_t>(y * 31 + static_cast<int>(i) * 7);
   }
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", image, bytes);
-  return {bytes.begin(), bytes.end()};
+  return vision::encode_plain_png(image);
 }
 
 /// CRC-32 of PNG's chunks.

@@ -8,6 +8,7 @@
 #include "egosgm/vision/image_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
+#include "tests/vision/images.h"
 #include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
 #include "vision/image_pairs.h"
@@ -32,10 +33,10 @@ std::string raw_calibration() {
 /// A folder tree of tiny images.
 class DatasetTest : public ::testing::Test {
  protected:
-  void add_image(const std::string& name, int width = 8, int height = 4, int type = CV_8UC1) {
+  void add_image(const std::string& name, int width = 8, int height = 4, ImageType type = kU8) {
     const auto file = folder_ / name;
     make_folder(file.parent_path());
-    write_png(file, cv::Mat(height, width, type, cv::Scalar(9)));
+    write_png(file, Image(height, width, type, 9));
   }
   void add_text(const std::string& name, const std::string& text) {
     const auto file = folder_ / name;
@@ -134,7 +135,7 @@ TEST_F(DatasetTest, OdometrySequence) {
   EXPECT_EQ(sequence.poses_file, root_ / "poses.txt");
   EXPECT_EQ(sequence.frames[2].truth_noc, root_ / "truth/left_disp_noc/000004.png");
   EXPECT_EQ(sequence.frames[2].truth_occ, "");
-  EXPECT_EQ(check_image_sizes(sequence), cv::Size(8, 4));
+  EXPECT_EQ(check_image_sizes(sequence), (Size{8, 4}));
   EXPECT_EQ(numbers_of(open_kitti_odometry(root_, parse_frame_range("3:4"))), (std::vector<int>{3, 4}));
 }
 
@@ -402,8 +403,7 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
 
 TEST_F(DatasetTest, ImagesInColourAreOfKittisColourCameras) {
   for (const char* side : {"left", "right"}) {
-    add_image(std::string("grey/") + side + "/1.png"),
-        add_image(std::string("colour/") + side + "/1.png", 8, 4, CV_8UC3);
+    add_image(std::string("grey/") + side + "/1.png"), add_image(std::string("colour/") + side + "/1.png", 8, 4, kBgr8);
   }
   add_text("both.txt", kProjections), add_text("grey.txt", kProjections.substr(0, kProjections.find("P2")));
   add_text("own.txt", kOwnCalibration);
@@ -415,7 +415,7 @@ TEST_F(DatasetTest, ImagesInColourAreOfKittisColourCameras) {
   EXPECT_DOUBLE_EQ(baseline_m("grey", "both.txt"), 0.5);
   EXPECT_DOUBLE_EQ(baseline_m("colour", "grey.txt"), 0.5);
   EXPECT_DOUBLE_EQ(baseline_m("colour", "own.txt"), 0.5);
-  add_text("colour/left/0.png", "x"), add_image("colour/right/0.png", 8, 4, CV_8UC3);
+  add_text("colour/left/0.png", "x"), add_image("colour/right/0.png", 8, 4, kBgr8);
   EXPECT_DOUBLE_EQ(baseline_m("colour", "both.txt"), 0.4) << "the first image cannot be read";
   EXPECT_DOUBLE_EQ(open_patterns(path("colour/left/*.png"), path("colour/right/*.png"), "").calibration.fx, 8);
 }
@@ -464,10 +464,10 @@ TEST_F(DatasetTest, SizesAndDepthsMustAgree) {
   add_odometry(0, 2);
   add_image("image_1/000001.png", 9, 4);
   const StereoSequence sequence = open_kitti_odometry(root_);
-  EXPECT_EQ(read_images(sequence.frames[0]).right.size(), cv::Size(8, 4));
+  EXPECT_EQ(read_images(sequence.frames[0]).right.size(), (Size{8, 4}));
   expect_refused([&] { read_images(sequence.frames[1]); }, {"image_1/000001.png", "9x4", "image_0/000001.png", "8x4"});
   expect_refused([&] { check_image_sizes(sequence); }, {"image_1/000001.png", "9x4", "its left image has 8x4"});
-  add_image("image_1/000001.png", 8, 4, CV_16UC1);
+  add_image("image_1/000001.png", 8, 4, kU16);
   expect_refused([&] { read_images(sequence.frames[1]); }, {"16 bit", "8 bit"});
   std::filesystem::remove(root_ / "image_0/000002.png");
   expect_refused([&] { read_images(sequence.frames[2]); }, {"image_0/000002.png", "No such file"});
@@ -530,11 +530,11 @@ TEST(RealData, SequencesOpen) {
   const StereoSequence scene = open_kitti_multiview(data / "kitti2012", "000151", parse_frame_range("7:10"));
   EXPECT_EQ(numbers_of(scene), (std::vector<int>{7, 8, 9, 10}));
   EXPECT_FALSE(scene.frames[3].truth_noc.empty());
-  EXPECT_EQ(check_image_sizes(scene), cv::Size(1242, 375));
-  EXPECT_EQ(read_images(scene.frames[0]).left.type(), CV_8UC1);
+  EXPECT_EQ(check_image_sizes(scene), (Size{1242, 375}));
+  EXPECT_EQ(read_images(scene.frames[0]).left.type, kU8);
   const StereoSequence color = open_kitti_multiview(data / "kitti2015/training", "2");
   EXPECT_EQ(numbers_of(color), (std::vector<int>{10, 11}));
-  EXPECT_EQ(read_images(color.frames[0]).left.type(), CV_8UC1);
+  EXPECT_EQ(read_images(color.frames[0]).left.type, kU8);
   const StereoSequence odometry = open_folder(data / "odometry/sequences/A");
   EXPECT_EQ(odometry.frames.size(), 51u);
   EXPECT_EQ(poses_of_frames(odometry, odometry.poses_file).size(), 51u);

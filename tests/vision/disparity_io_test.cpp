@@ -6,12 +6,12 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 
 #include "egosgm/vision/image_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
+#include "tests/vision/images.h"
 #include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
 
@@ -22,11 +22,11 @@ using testing::expect_refused;
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-cv::Mat row_map(const std::vector<float>& values) { return cv::Mat(values, true).reshape(1, 1); }
+Image row_map(const std::vector<float>& values) { return map_from(1, values); }
 
-void expect_equal(const cv::Mat& a, const cv::Mat& b) {
+void expect_equal(const Image& a, const Image& b) {
   ASSERT_EQ(a.size(), b.size());
-  ASSERT_EQ(a.type(), b.type());
+  ASSERT_EQ(a.type, b.type);
   for (int y = 0; y < a.rows; ++y) {
     for (int x = 0; x < a.cols; ++x) {
       ASSERT_EQ(a.at<float>(y, x), b.at<float>(y, x)) << "first at " << x << ", " << y;
@@ -45,16 +45,16 @@ TEST_F(DisparityIo, PngStoresAsTheDevelopmentKit) {
                                      255.99f,           256.0f, -1.0f,  NAN,        kInf,         -kInf, 1e30f};
   const std::vector<int> stored = {0, 1, 1, 1, 1, 256, 25728, 65533, 0, 0, 0, 0, 0, 0};
   EXPECT_EQ(write_disparity_png(folder_ / "d.png", row_map(values)), 3);  // 256, -1, 1e30
-  const cv::Mat png = cv::imread((folder_ / "d.png").string(), cv::IMREAD_UNCHANGED);
-  ASSERT_EQ(png.type(), CV_16UC1);
+  const Image png = read_stored_image(folder_ / "d.png");
+  ASSERT_EQ(png.type, kU16);
   for (int x = 0; x < png.cols; ++x) EXPECT_EQ(png.at<std::uint16_t>(0, x), stored[static_cast<std::size_t>(x)]) << x;
   EXPECT_THROW(count_outside_png(png), InvalidArgument);
 }
 
 TEST_F(DisparityIo, PngReadsValueBy256) {
-  cv::Mat stored(1, 4, CV_16UC1);
+  Image stored(1, 4, kU16);
   const std::uint16_t values[] = {0, 1, 25728, 65535};
-  std::copy(values, values + 4, stored.ptr<std::uint16_t>());
+  std::copy(values, values + 4, stored.row<std::uint16_t>(0));
   write_png(folder_ / "d.png", stored);
   expect_equal(read_disparity(folder_ / "d.png"), row_map({kInvalidDisparity, 1.0f / 256, 100.5f, 65535.0f / 256}));
 }
@@ -62,28 +62,28 @@ TEST_F(DisparityIo, PngReadsValueBy256) {
 TEST_F(DisparityIo, PngRoundTripIsExactOnItsGrid) {
   std::mt19937 random(1);
   std::uniform_int_distribution<int> value(0, 65535);
-  cv::Mat map(33, 127, CV_32FC1);
-  for (float& d : cv::Mat_<float>(map)) {
+  Image map(33, 127, kF32);
+  visit_values(map, [&](auto& d) {
     const int v = value(random);
     d = v < 1000 ? kInvalidDisparity : static_cast<float>(v) / 256.0f;
-  }
+  });
   EXPECT_EQ(write_disparity(folder_ / "d.png", map), 0);
   expect_equal(read_disparity(folder_ / "d.png"), map);
 }
 
 TEST_F(DisparityIo, OtherPngsAreNoDisparity) {
-  write_png(folder_ / "grey.png", cv::Mat(3, 3, CV_8UC1, cv::Scalar(7)));
+  write_png(folder_ / "grey.png", Image(3, 3, kU8, 7));
   expect_refused([&] { read_disparity(folder_ / "grey.png"); }, {"grey.png", "16-bit grey", "8 bit"});
-  ASSERT_TRUE(cv::imwrite((folder_ / "flow.png").string(), cv::Mat(3, 3, CV_16UC3, cv::Scalar(1, 2, 3))));
-  expect_refused([&] { read_disparity(folder_ / "flow.png"); }, {"flow.png", "3 channel"});
+  write_png(folder_ / "colour.png", picture_of({3, 3}, {1, 2, 3}));
+  expect_refused([&] { read_disparity(folder_ / "colour.png"); }, {"colour.png", "3 channel"});
 }
 
 TEST_F(DisparityIo, PfmRoundTripKeepsEveryBit) {
   std::mt19937 random(2);
   std::uniform_real_distribution<float> value(-500.0f, 2000.0f);
   for (const auto& [width, height] : {std::pair{1, 1}, {7, 5}, {65, 3}}) {
-    cv::Mat map(height, width, CV_32FC1);
-    for (float& d : cv::Mat_<float>(map)) d = random() % 4 == 0 ? kInvalidDisparity : value(random);
+    Image map(height, width, kF32);
+    visit_values(map, [&](auto& d) { d = random() % 4 == 0 ? kInvalidDisparity : value(random); });
     EXPECT_EQ(write_disparity(folder_ / "d.PFM", map), 0);
     expect_equal(read_disparity(folder_ / "d.PFM"), map);
   }
@@ -94,13 +94,13 @@ TEST_F(DisparityIo, PfmIsBottomUpInBothByteOrders) {
   const std::string big("Pf 1 3 1\n\x3f\x80\x00\x00\x40\x00\x00\x00\x7f\xc0\x00\x00", 21);
   write_file(folder_ / "little.pfm", little);
   write_file(folder_ / "big.pfm", big);
-  const cv::Mat expected = (cv::Mat_<float>(3, 1) << kInvalidDisparity, 2.0f, 1.0f);
+  const Image expected = map_from(3, {kInvalidDisparity, 2.0f, 1.0f});
   expect_equal(read_pfm(folder_ / "little.pfm"), expected);
   expect_equal(read_pfm(folder_ / "big.pfm"), expected);
 }
 
 TEST_F(DisparityIo, WrittenPfmHoldsInfinityAndStartsAtTheBottom) {
-  write_pfm(folder_ / "d.pfm", (cv::Mat_<float>(2, 1) << kInvalidDisparity, 1.0f));
+  write_pfm(folder_ / "d.pfm", map_from(2, {kInvalidDisparity, 1.0f}));
   EXPECT_EQ(read_file(folder_ / "d.pfm", 100), std::string("Pf\n1 2\n-1.0\n\x00\x00\x80\x3f\x00\x00\x80\x7f", 20));
 }
 
@@ -115,7 +115,7 @@ std::string npy(const std::string& type, const std::string& order, const std::st
 }
 
 TEST_F(DisparityIo, NpyOfAnyOrderAndType) {
-  const cv::Mat expected = (cv::Mat_<float>(2, 3) << 1, kInvalidDisparity, 3, 4, 5, 6);
+  const Image expected = map_from(2, {1, kInvalidDisparity, 3, 4, 5, 6});
   const std::string rows("\x01\x00\x00\x00\x03\x00\x04\x00\x05\x00\x06\x00", 12);
   const std::string columns("\x01\x04\x00\x05\x03\x06", 6);
   const std::string big("\x00\x01\x00\x00\x00\x03\x00\x04\x00\x05\x00\x06", 12);
@@ -132,8 +132,8 @@ TEST_F(DisparityIo, NpyOfAnyOrderAndType) {
   const double values[] = {-2, 7.25};
   std::memcpy(doubles.data(), values, 16);
   write_file(file_, npy("<f8", "False", "(1, 2)", doubles));
-  expect_equal(read_disparity(file_), (cv::Mat_<float>(1, 2) << kInvalidDisparity, 7.25f));
-  expect_equal(read_values(file_), (cv::Mat_<float>(1, 2) << -2, 7.25f));
+  expect_equal(read_disparity(file_), map_from(1, {kInvalidDisparity, 7.25f}));
+  expect_equal(read_values(file_), map_from(1, {-2, 7.25f}));
 }
 
 TEST_F(DisparityIo, BrokenNpyIsRefused) {
@@ -165,9 +165,9 @@ TEST_F(DisparityIo, BrokenNpyIsRefused) {
 }
 
 TEST_F(DisparityIo, PngOfAnotherScale) {
-  write_png(file_, (cv::Mat_<std::uint16_t>(1, 3) << 0, 100, 250));
-  expect_equal(read_disparity(file_, 100), (cv::Mat_<float>(1, 3) << kInvalidDisparity, 1, 2.5f));
-  expect_equal(read_values(file_), (cv::Mat_<float>(1, 3) << 0, 100, 250));
+  write_png(file_, image_from<std::uint16_t>(1, {0, 100, 250}));
+  expect_equal(read_disparity(file_, 100), map_from(1, {kInvalidDisparity, 1, 2.5f}));
+  expect_equal(read_values(file_), map_from(1, {0, 100, 250}));
   expect_refused([&] { read_disparity(file_, 0); }, {"0.000000", "positive"});
 }
 
@@ -197,24 +197,24 @@ TEST_F(DisparityIo, BrokenPfmIsRefused) {
 }
 
 TEST_F(DisparityIo, WrongTypesAndNamesAreRefused) {
-  const cv::Mat map(2, 2, CV_32FC1, cv::Scalar(1));
+  const Image map(2, 2, kF32, 1);
   expect_refused([&] { write_disparity(folder_ / "d.tiff", map); }, {"d.tiff", ".png or .pfm"});
-  expect_refused([&] { write_disparity(folder_ / "d.png", cv::Mat(2, 2, CV_64FC1)); }, {"d.png", "CV_32FC1"});
-  expect_refused([&] { write_disparity(folder_ / "d.pfm", cv::Mat()); }, {"d.pfm", "CV_32FC1"});
+  expect_refused([&] { write_disparity(folder_ / "d.png", Image(2, 2, kU16)); }, {"d.png", "float32"});
+  expect_refused([&] { write_disparity(folder_ / "d.pfm", Image()); }, {"d.pfm", "float32"});
   expect_refused<IoError>([&] { write_disparity(folder_ / "none/d.png", map); }, {"none/d.png", "No such file"});
 }
 
 TEST(RealData, MiddleburyTruthIsRead) {
   EGOSGM_REQUIRE_DATA(data);
-  const cv::Mat truth = read_disparity(data / "middlebury/Motorcycle/disp0GT.pfm");
-  ASSERT_EQ(truth.size(), cv::Size(741, 497));
-  const cv::Mat valid = truth > kInvalidDisparity;
-  double low = 0, high = 0;
-  cv::minMaxLoc(truth, &low, &high, nullptr, nullptr, valid);
-  EXPECT_GT(cv::countNonZero(valid), 300000);
-  EXPECT_LT(cv::countNonZero(valid), 741 * 497);
-  EXPECT_GT(low, 5.0);                                            // vmin=7 in its calib.txt
-  EXPECT_LT(high, 67.0);                                          // vmax=65
+  const Image truth = read_disparity(data / "middlebury/Motorcycle/disp0GT.pfm");
+  ASSERT_EQ(truth.size(), (Size{741, 497}));
+  std::vector<double> valid = values_of(truth);
+  valid.erase(std::remove(valid.begin(), valid.end(), kInvalidDisparity), valid.end());
+  EXPECT_GT(valid.size(), 300000u);
+  EXPECT_LT(valid.size(), 741u * 497u);
+  const auto [low, high] = std::minmax_element(valid.begin(), valid.end());
+  EXPECT_GT(*low, 5.0);                                           // vmin=7 in its calib.txt
+  EXPECT_LT(*high, 67.0);                                         // vmax=65
   EXPECT_GT(truth.at<float>(490, 370), truth.at<float>(20, 20));  // the floor in front is nearer than the wall behind
 }
 

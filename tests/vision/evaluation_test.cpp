@@ -8,6 +8,7 @@
 #include "egosgm/vision/disparity_io.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
+#include "tests/vision/images.h"
 #include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
 #include "vision/pair_with_truth.h"
@@ -21,8 +22,8 @@ constexpr float kNo = kInvalidDisparity;
 
 TEST(Evaluation, CountsByTheRules) {
   // Errors: 3 (good), 3.5 of 100 (bad, not D1), 6 of 100 (bad and D1), missing (filled with 106: 6, bad), no truth.
-  const cv::Mat truth = (cv::Mat_<float>(1, 5) << 100, 100, 100, 112, kNo);
-  const cv::Mat estimate = (cv::Mat_<float>(1, 5) << 97, 103.5f, 106, kNo, 200);
+  const Image truth = map_from(1, {100, 100, 100, 112, kNo});
+  const Image estimate = map_from(1, {97, 103.5f, 106, kNo, 200});
   const DisparityCounts counts = compare_disparity(estimate, truth);
   EXPECT_EQ(counts.truth, 4);
   EXPECT_EQ(counts.valid, 3);
@@ -43,8 +44,8 @@ TEST(Evaluation, CountsByTheRules) {
 
 TEST(Evaluation, AHoleInTheSkyIsRightAndASurfaceThereIsWrong) {
   // A surface and a hole in one; then sky: right at 3 px, wrong at 3.5 px, a hole that would be filled with 3.5 px.
-  const cv::Mat truth = (cv::Mat_<float>(1, 5) << 10, 10, 0, 0, 1.0f / 256);
-  const cv::Mat estimate = (cv::Mat_<float>(1, 5) << 10, kNo, 3, 3.5f, kNo);
+  const Image truth = map_from(1, {10, 10, 0, 0, 1.0f / 256});
+  const Image estimate = map_from(1, {10, kNo, 3, 3.5f, kNo});
   const DisparityCounts counts = compare_disparity(estimate, truth);
   EXPECT_EQ(counts.sky, 3);
   EXPECT_EQ(counts.sky_valid, 2);
@@ -69,7 +70,7 @@ TEST(Evaluation, OneStepOfKittisPngIsSkyAndTwoAreNot) {
   for (const float sky : {0.0f, 1.0f / 256}) EXPECT_TRUE(is_sky(sky)) << sky;
   for (const float no_sky : {2.0f / 256, 1.0f, -0.1f, kNo, std::nanf("")}) EXPECT_FALSE(is_sky(no_sky)) << no_sky;
   const TemporaryFolder folder;
-  write_disparity_png(folder / "truth.png", cv::Mat(1, 1, CV_32FC1, cv::Scalar(0)));
+  write_disparity_png(folder / "truth.png", Image(1, 1, kF32, 0));
   EXPECT_TRUE(is_sky(read_disparity(folder / "truth.png").at<float>(0, 0)));
 }
 
@@ -84,7 +85,7 @@ TEST(Evaluation, PoolingDiffersFromAveraging) {
 }
 
 TEST(Evaluation, NothingToDivideByIsNan) {
-  const cv::Mat none(3, 4, CV_32FC1, cv::Scalar(kNo)), some(3, 4, CV_32FC1, cv::Scalar(5));
+  const Image none(3, 4, kF32, kNo), some(3, 4, kF32, 5);
   EXPECT_TRUE(std::isnan(metrics_of(compare_disparity(some, none)).density));
   const DisparityMetrics empty = metrics_of(compare_disparity(none, some));
   EXPECT_EQ(empty.density, 0);
@@ -97,36 +98,36 @@ TEST(Evaluation, NothingToDivideByIsNan) {
 }
 
 TEST(Evaluation, SizesAndTypesMustFit) {
-  const cv::Mat a(3, 4, CV_32FC1, cv::Scalar(1)), b(4, 3, CV_32FC1, cv::Scalar(1)), c(3, 4, CV_64FC1, cv::Scalar(1));
+  const Image a(3, 4, kF32, 1), b(4, 3, kF32, 1), c(3, 4, kU16, 1);
   expect_refused([&] { compare_disparity(a, b); }, {"4x3", "3x4"});
-  expect_refused([&] { compare_disparity(c, a); }, {"estimate", "CV_32FC1"});
-  expect_refused([&] { compare_disparity(a, cv::Mat()); }, {"truth", "CV_32FC1"});
+  expect_refused([&] { compare_disparity(c, a); }, {"estimate", "float32"});
+  expect_refused([&] { compare_disparity(a, Image()); }, {"truth", "float32"});
 }
 
 TEST(Evaluation, HolesAreFilledFromTheBackground) {
-  const cv::Mat map = (cv::Mat_<float>(4, 6) << kNo, kNo, kNo, kNo, kNo, kNo,  //
-                       kNo, 5, kNo, kNo, 3, kNo,                               //
-                       2, kNo, 7, kNo, kNo, kNo,                               //
-                       kNo, kNo, kNo, kNo, kNo, kNo);
-  const cv::Mat expected = (cv::Mat_<float>(4, 6) << 5, 5, 3, 3, 3, 3,  //
-                            5, 5, 3, 3, 3, 3,                           //
-                            2, 2, 7, 7, 7, 7,                           //
-                            2, 2, 7, 7, 7, 7);
-  EXPECT_EQ(cv::norm(interpolate_background(map), expected, cv::NORM_INF), 0);
-  const cv::Mat none(3, 4, CV_32FC1, cv::Scalar(kNo));
-  EXPECT_EQ(cv::norm(interpolate_background(none), none, cv::NORM_INF), 0);
-  const cv::Mat one(1, 1, CV_32FC1, cv::Scalar(4));
+  const Image map = map_from(4, {kNo, kNo, kNo, kNo, kNo, kNo,  //
+                                 kNo, 5,   kNo, kNo, 3,   kNo,  //
+                                 2,   kNo, 7,   kNo, kNo, kNo,  //
+                                 kNo, kNo, kNo, kNo, kNo, kNo});
+  const Image expected = map_from(4, {5, 5, 3, 3, 3, 3,  //
+                                      5, 5, 3, 3, 3, 3,  //
+                                      2, 2, 7, 7, 7, 7,  //
+                                      2, 2, 7, 7, 7, 7});
+  EXPECT_EQ(largest_difference(interpolate_background(map), expected), 0);
+  const Image none(3, 4, kF32, kNo);
+  EXPECT_EQ(largest_difference(interpolate_background(none), none), 0);
+  const Image one(1, 1, kF32, 4);
   EXPECT_EQ(interpolate_background(one).at<float>(0, 0), 4);
 }
 
 TEST(Evaluation, DropsWhatIsUncertain) {
-  const cv::Mat disparity = (cv::Mat_<float>(1, 4) << 5, 6, kNo, 8);
-  const cv::Mat variance = (cv::Mat_<float>(1, 4) << 6, 6.25f, 0, 0.1f);
-  const cv::Mat certain = (cv::Mat_<float>(1, 4) << 5, kNo, kNo, 8);
-  EXPECT_EQ(cv::norm(drop_uncertain(disparity, variance), certain, cv::NORM_INF), 0);
-  EXPECT_EQ(cv::norm(drop_uncertain(disparity, variance, 9), disparity, cv::NORM_INF), 0);
+  const Image disparity = map_from(1, {5, 6, kNo, 8});
+  const Image variance = map_from(1, {6, 6.25f, 0, 0.1f});
+  const Image certain = map_from(1, {5, kNo, kNo, 8});
+  EXPECT_EQ(largest_difference(drop_uncertain(disparity, variance), certain), 0);
+  EXPECT_EQ(largest_difference(drop_uncertain(disparity, variance, 9), disparity), 0);
   EXPECT_EQ(disparity.at<float>(0, 1), 6) << "the caller's stays as it is";
-  EXPECT_THROW(drop_uncertain(disparity, variance.colRange(0, 3)), InvalidArgument);
+  EXPECT_THROW(drop_uncertain(disparity, variance.part(0, 0, 3, 1)), InvalidArgument);
 }
 
 TEST(RealData, GoldenFiguresOfTheDevelopmentKit) {

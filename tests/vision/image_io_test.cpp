@@ -12,6 +12,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "egosgm/vision/opencv.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
@@ -30,11 +31,15 @@ cv::Mat random_image(std::mt19937& random, int width, int height, int type) {
   return image;
 }
 
+void write_png(const std::filesystem::path& file, const cv::Mat& image) { vision::write_png(file, image_of(image)); }
+
 void expect_equal(const cv::Mat& a, const cv::Mat& b) {
   ASSERT_EQ(a.size(), b.size());
   ASSERT_EQ(a.type(), b.type());
   EXPECT_EQ(cv::norm(a, b, cv::NORM_INF), 0.0);
 }
+
+void expect_equal(const Image& found, const cv::Mat& expected) { expect_equal(mat_of(found), expected); }
 
 struct PngForm {
   int color_type = PNG_COLOR_TYPE_GRAY, interlace = PNG_INTERLACE_NONE, filters = PNG_ALL_FILTERS;
@@ -86,7 +91,7 @@ TEST_F(ImageIo, GreyImagesKeepEveryBit) {
       write_png(file_, image);
       expect_equal(read_grey_image(file_), image);
       expect_equal(cv::imread(file_.string(), cv::IMREAD_UNCHANGED), image);
-      EXPECT_EQ(read_image_size(file_), image.size());
+      EXPECT_EQ(read_image_size(file_), (Size{width, height}));
     }
   }
 }
@@ -225,7 +230,7 @@ TEST_F(ImageIo, NonImagesAreRefused) {
     expect_unreadable({"not a readable image"});
   }
   expect_refused([&] { read_grey_image(folder_ / "none.png"); }, {"none.png", "No such file"});
-  expect_refused([&] { write_png(file_, cv::Mat()); }, {file_.string()});
+  expect_refused([&] { vision::write_png(file_, Image()); }, {file_.string()});
   expect_refused([&] { write_png(file_, cv::Mat(1, 1, CV_32FC1)); }, {file_.string()});
 }
 
@@ -246,9 +251,9 @@ TEST_F(ImageIo, WhatIsGivenInPlaceOfAnImageIsNamed) {
 
 TEST_F(ImageIo, SixteenBitsMayHoldEight) {
   const cv::Mat grey = (cv::Mat_<std::uint16_t>(1, 2) << 7, 255);
-  EXPECT_TRUE(holds_8_bits_in_16(grey));
-  EXPECT_FALSE(holds_8_bits_in_16(grey + 1));
-  EXPECT_FALSE(holds_8_bits_in_16(cv::Mat(1, 2, CV_8UC1, cv::Scalar(9))));
+  EXPECT_TRUE(holds_8_bits_in_16(image_of(grey)));
+  EXPECT_FALSE(holds_8_bits_in_16(image_of(grey + 1)));
+  EXPECT_FALSE(holds_8_bits_in_16(Image(1, 2, kU8, 9)));
 }
 
 std::string jpeg_of(const cv::Mat& image, const std::vector<int>& parameters = {}) {
@@ -276,7 +281,7 @@ TEST_F(ImageIo, JpegIsReadAsPngIsWhateverItsName) {
           cv::cvtColor(expected, expected, cv::COLOR_BGR2GRAY);
         }
         expect_equal(read_grey_image(file_), expected);
-        EXPECT_EQ(read_image_size(file_), cv::Size(width, height));
+        EXPECT_EQ(read_image_size(file_), (Size{width, height}));
       }
     }
   }
@@ -287,8 +292,8 @@ TEST_F(ImageIo, AJpegsSizeMayStandBehindALongComment) {
   const std::string comment = "\xff\xfe\xff\xff" + std::string(65533, 'x');
   for (int i = 0; i < 3; ++i) bytes.insert(2, comment);
   write_file(file_, bytes);
-  EXPECT_EQ(read_image_size(file_), cv::Size(30, 20));
-  EXPECT_EQ(read_grey_image(file_).size(), cv::Size(30, 20));
+  EXPECT_EQ(read_image_size(file_), (Size{30, 20}));
+  EXPECT_EQ(read_grey_image(file_).size(), (Size{30, 20}));
 }
 
 TEST_F(ImageIo, EveryTruncationOfAJpegIsRefusedInSilence) {
@@ -367,13 +372,13 @@ void write_scans(const std::filesystem::path& file, int coefficients) {
 
 TEST_F(ImageIo, AJpegOfFourColoursIsRefusedForThat) {
   write_jpeg(file_, cv::Mat(8, 8, CV_8UC4, cv::Scalar::all(9)), JCS_CMYK);
-  EXPECT_EQ(read_image_size(file_), cv::Size(8, 8));
+  EXPECT_EQ(read_image_size(file_), (Size{8, 8}));
   expect_unreadable({"4 components, like CMYK", "save it as grey or RGB"});
 }
 
 TEST_F(ImageIo, AJpegOfManyScansIsRefused) {
   write_scans(file_, 40);
-  EXPECT_EQ(read_grey_image(file_).size(), cv::Size(16, 16));
+  EXPECT_EQ(read_grey_image(file_).size(), (Size{16, 16}));
   write_scans(file_, 63);
   expect_unreadable({"scans"});
 }
@@ -405,10 +410,10 @@ TEST_F(ImageIo, TheBoundHoldsForPixelsAsTheyAreWidened) {
     ASSERT_LT(std::filesystem::file_size(file_), 50'000u);
     expect_unreadable({"too short for 16384x16384"});
     write_bomb(file_, 2000, color_type, 1);  // a mask may be as empty as it likes
-    EXPECT_EQ(read_grey_image(file_).size(), cv::Size(2000, 2000));
+    EXPECT_EQ(read_grey_image(file_).size(), (Size{2000, 2000}));
   }
   write_bomb(file_, 6000, PNG_COLOR_TYPE_GRAY, 8);  // one grey, as deflate packs it best
-  EXPECT_EQ(read_grey_image(file_).size(), cv::Size(6000, 6000));
+  EXPECT_EQ(read_grey_image(file_).size(), (Size{6000, 6000}));
 }
 
 }  // namespace

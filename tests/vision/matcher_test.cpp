@@ -14,6 +14,13 @@
 namespace egosgm::vision {
 namespace {
 
+/// A frame of the street as callers of OpenCV have it.
+struct Pair {
+  explicit Pair(const SyntheticFrame& frame) : left(mat_of(frame.left).clone()), right(mat_of(frame.right).clone()) {}
+
+  cv::Mat left, right;
+};
+
 SyntheticSequence street() { return SyntheticSequence({.frames = 2, .width = 160, .height = 64, .seed = 7}); }
 
 PipelineOptions few() {
@@ -32,7 +39,7 @@ cv::Mat disparity_by(Any& matcher, const cv::Mat& left, const cv::Mat& right) {
 }
 
 TEST(Matcher, IsCalledAsOpenCvsAndMeansTheSame) {
-  const SyntheticFrame frame = street().render(0);
+  const Pair frame(street().render(0));
   Matcher ours(few());
   const cv::Mat found = disparity_by(ours, frame.left, frame.right);
   const auto theirs = cv::StereoSGBM::create(0, 48, 5);
@@ -56,7 +63,7 @@ TEST(Matcher, IsAStereoMatcherWhoseOptionsHaveOpenCvsNames) {
   EXPECT_EQ(Matcher().options().paths, 8);
   const cv::Ptr<cv::StereoMatcher> matcher = cv::makePtr<Matcher>(few());
   const auto& options = matcher.dynamicCast<Matcher>()->options();
-  const SyntheticFrame frame = street().render(0);
+  const Pair frame(street().render(0));
   const cv::Mat before = disparity_by(*matcher, frame.left, frame.right);
   EXPECT_EQ(matcher->getNumDisparities(), 48);
   matcher->setNumDisparities(matcher->getNumDisparities() - 8);
@@ -100,7 +107,7 @@ TEST(Matcher, GivesThePipelinesDisparitiesInSixteenths) {
     Matcher matcher(sequence.calibration(), options);
     Pipeline pipeline(sequence.calibration(), 160, 64, options);
     for (int k = 0; k < 2; ++k) {
-      const SyntheticFrame frame = sequence.render(k);
+      const Pair frame(sequence.render(k));
       const auto motion = k ? std::optional(sequence.motion(k)) : std::nullopt;
       cv::Mat expected(64, 160, CV_32FC1), found;
       FrameOutputs outputs;
@@ -119,7 +126,7 @@ TEST(Matcher, GivesThePipelinesDisparitiesInSixteenths) {
 }
 
 TEST(Matcher, TakesColourDepthAndOtherSizes) {
-  const SyntheticFrame frame = street().render(0);
+  const Pair frame(street().render(0));
   Matcher matcher(few());
   const cv::Mat grey = disparity_by(matcher, frame.left, frame.right);
   cv::Mat left, right;
@@ -137,7 +144,7 @@ TEST(Matcher, TakesColourDepthAndOtherSizes) {
 }
 
 TEST(Matcher, RefusesWhatHasNoMeaning) {
-  const SyntheticFrame frame = street().render(0);
+  const Pair frame(street().render(0));
   Matcher matcher(few());
   cv::Mat disparity, real;
   frame.left.convertTo(real, CV_32F);

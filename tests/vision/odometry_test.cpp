@@ -23,6 +23,7 @@
 #include "tests/odometry/motions.h"
 #include "tests/support/expect_refused.h"
 #include "tests/vision/data_folder.h"
+#include "tests/vision/images.h"
 #include "tests/vision/rendered_video.h"
 
 namespace egosgm::vision {
@@ -35,7 +36,7 @@ const RenderedVideo& turning_drive() {
   return drive;
 }
 
-OdometryResult process(StereoOdometry& odometry, const cv::Mat& left, const cv::Mat& right) {
+OdometryResult process(StereoOdometry& odometry, const Image& left, const Image& right) {
   return odometry.process(image_view(left), image_view(right));
 }
 OdometryResult process(StereoOdometry& odometry, const SyntheticFrame& frame) {
@@ -140,15 +141,11 @@ TEST(StereoOdometry, ThreadsChangeNoBit) {
     }
     return found;
   };
-  const int threads = cv::getNumThreads();
-  cv::setNumThreads(1);
   const std::vector<Motion> expected = motions();
-  cv::setNumThreads(4);
   std::vector<Motion> more = motions(), beside[2];
   std::thread first([&] { beside[0] = motions(); }), second([&] { beside[1] = motions(); });
   first.join();
   second.join();
-  cv::setNumThreads(threads);
   ASSERT_EQ(expected.size(), 3u);
   for (const auto& found : {more, beside[0], beside[1]}) {
     ASSERT_EQ(found.size(), expected.size());
@@ -165,11 +162,11 @@ TEST(StereoOdometry, FollowsFastMotion) {
 }
 
 // `image` drawn lower by `rows` [px].
-cv::Mat lowered(const cv::Mat& image, double rows) {
+Image lowered(const Image& image, double rows) {
   const cv::Mat shift = (cv::Mat_<double>(2, 3) << 1, 0, 0, 0, 1, rows);
   cv::Mat out;
-  cv::warpAffine(image, out, shift, image.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-  return out;
+  cv::warpAffine(mat_of(image), out, shift, {image.cols, image.rows}, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  return image_of(out);
 }
 
 TEST(StereoOdometry, BearsAVerticalOffsetBetweenTheImages) {
@@ -188,9 +185,9 @@ TEST(StereoOdometry, BlurGivesAGoodMotionOrNone) {
     StereoOdometry odometry(drive.sequence.calibration());
     process(odometry, drive.frames[0]);
     cv::Mat left, right;
-    cv::blur(drive.frames[1].left, left, {length_px, 1});
-    cv::blur(drive.frames[1].right, right, {length_px, 1});
-    const OdometryResult result = process(odometry, left, right);
+    cv::blur(mat_of(drive.frames[1].left), left, {length_px, 1});
+    cv::blur(mat_of(drive.frames[1].right), right, {length_px, 1});
+    const OdometryResult result = process(odometry, image_of(left), image_of(right));
     if (!result.motion) {
       ++without;
       EXPECT_NE(result.reason.find("too few"), std::string::npos) << result.reason;
@@ -261,11 +258,11 @@ TEST(StereoOdometry, StandstillIsIdentity) {
   std::mt19937 generator(31);
   std::normal_distribution<double> noise(0, 2);
   for (int k = 0; k < 12; ++k) {
-    cv::Mat left = drive.frames[0].left.clone(), right = drive.frames[0].right.clone();
-    for (cv::Mat* image : {&left, &right}) {
-      for (auto pixel = image->begin<std::uint8_t>(); pixel != image->end<std::uint8_t>(); ++pixel) {
-        *pixel = cv::saturate_cast<std::uint8_t>(*pixel + noise(generator));
-      }
+    Image left = drive.frames[0].left.clone(), right = drive.frames[0].right.clone();
+    for (Image* image : {&left, &right}) {
+      visit_values(*image, [&](auto& pixel) {
+        pixel = static_cast<std::uint8_t>(std::clamp(std::nearbyint(pixel + noise(generator)), 0.0, 255.0));
+      });
     }
     const OdometryResult result = process(odometry, left, right);
     if (k == 0) continue;
@@ -282,7 +279,7 @@ TEST(StereoOdometry, StandstillIsIdentity) {
 TEST(StereoOdometry, BlankImageGivesNoMotionAndTheNextFramesRecover) {
   const RenderedVideo& drive = turning_drive();
   StereoOdometry odometry(drive.sequence.calibration());
-  const cv::Mat blank(drive.frames[0].left.size(), CV_8UC1, cv::Scalar(90));
+  const Image blank(drive.frames[0].left.size(), kU8, 90);
   process(odometry, drive.frames[0]);
   const OdometryResult lost = process(odometry, blank, blank);
   EXPECT_FALSE(lost.motion);
@@ -303,9 +300,7 @@ TEST(StereoOdometry, BearsDroppedFramesAndExposureJumps) {
   process(odometry, drive.frames[0]);
   process(odometry, drive.frames[1]);
   expect_from_to(process(odometry, drive.frames[3]), 1, 3);
-  cv::Mat left, right;
-  drive.frames[4].left.convertTo(left, CV_8U, 0.6, 15);
-  drive.frames[4].right.convertTo(right, CV_8U, 0.6, 15);
+  const Image left = as_bytes(drive.frames[4].left, 0.6, 15), right = as_bytes(drive.frames[4].right, 0.6, 15);
   expect_from_to(process(odometry, left, right), 3, 4);
   expect_from_to(process(odometry, drive.frames[5]), 4, 5);
 }
@@ -314,10 +309,14 @@ TEST(StereoOdometry, SixteenBitImagesGiveTheSameMotion) {
   const RenderedVideo& drive = turning_drive();
   StereoOdometry narrow(drive.sequence.calibration()), wide(drive.sequence.calibration());
   for (int k = 0; k < 2; ++k) {
-    cv::Mat left, right;
-    drive.frames[k].left.convertTo(left, CV_16U, 256);
-    drive.frames[k].right.convertTo(right, CV_16U, 256);
-    const auto a = process(narrow, drive.frames[k]), b = process(wide, left, right);
+    const auto deep = [](const Image& bytes) {
+      Image image(bytes.size(), kU16);
+      std::transform(bytes.row(0), bytes.row(0) + bytes.pixels(), image.row<std::uint16_t>(0),
+                     [](int value) { return static_cast<std::uint16_t>(256 * value); });
+      return image;
+    };
+    const auto a = process(narrow, drive.frames[k]),
+               b = process(wide, deep(drive.frames[k].left), deep(drive.frames[k].right));
     ASSERT_EQ(a.motion.has_value(), b.motion.has_value());
     if (k == 0) continue;
     EXPECT_LT(motion_error(a.motion->current_from_previous, b.motion->current_from_previous).translation_m, 0.005);
@@ -349,7 +348,7 @@ TEST(StereoOdometry, PriorGuidesAndAWrongOneDoesNotMislead) {
 TEST(StereoOdometry, LargeMovingVehicleDoesNotWin) {
   const RenderedVideo drive(
       {.frames = 6, .seed = 22, .moving_object = true, .moving_object_scale = 7, .supersampling = 2});
-  EXPECT_GT(cv::countNonZero(drive.frames[3].left_moving), 0.4 * drive.frames[3].left.total());
+  EXPECT_GT(count_nonzero(drive.frames[3].left_moving), 0.4 * drive.frames[3].left.pixels());
   expect_all_motions(drive.sequence, drive.frames, {0.02, 0.1});
 }
 
@@ -383,7 +382,7 @@ TEST(StereoOdometry, RefusesWhatItCannotUse) {
   expect_refused([&] { StereoOdometry odometry(Calibration{}); }, {"fx"});
 
   StereoOdometry odometry(calibration);
-  const cv::Mat small(40, 50, CV_8UC1, cv::Scalar(0));
+  const Image small(40, 50, kU8, 0);
   expect_refused([&] { odometry.process(ImageView{}, ImageView{}); }, {"empty"});
   expect_refused([&] { odometry.process(image_view(drive.frames[0].left), image_view(small)); }, {"50x40"});
   process(odometry, drive.frames[0]);

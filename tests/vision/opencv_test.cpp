@@ -33,15 +33,15 @@ TEST(OpenCv, ProcessGivesTheMapsOfThePipeline) {
     outputs.variance = map_view(variance);
     expected.process(image_view(frame.left), image_view(frame.right), motion, outputs);
     const cv::Mat left = large(cv::Rect(3, 4, 96, 40)), right = large(cv::Rect(101, 7, 96, 40));
-    frame.left.copyTo(left);
-    frame.right.copyTo(right);
-    const FrameMaps maps = process(pipeline, left, right, motion);
+    mat_of(frame.left).copyTo(left);
+    mat_of(frame.right).copyTo(right);
+    const FrameMats maps = process(pipeline, left, right, motion);
     EXPECT_TRUE(same_bits(maps.disparity, disparity)) << "frame " << k;
     EXPECT_TRUE(same_bits(maps.variance, variance)) << "frame " << k;
     EXPECT_EQ(maps.report.unpredicted, k > 0 ? std::nullopt : std::optional(Unpredicted::kFirstFrame));
   }
   expect_refused([&] { process(pipeline, cv::Mat(), cv::Mat(), {}); }, {"left image: no data"});
-  expect_refused([&] { process(pipeline, cv::Mat(40, 96, CV_8UC3), cv::Mat(40, 96, CV_8UC3), {}); }, {"CV_8UC1"});
+  expect_refused([&] { process(pipeline, cv::Mat(40, 96, CV_8UC3), cv::Mat(40, 96, CV_8UC3), {}); }, {"uint8"});
   expect_refused([&] { process(pipeline, cv::Mat(41, 96, CV_8UC1), cv::Mat(41, 96, CV_8UC1), {}); }, {"96x41"});
 }
 
@@ -56,8 +56,27 @@ TEST(OpenCv, ViewsKeepTheStride) {
   cv::Mat map(4, 5, CV_32FC1);
   EXPECT_EQ(map_view(map).data, map.ptr<float>());
   EXPECT_EQ(map_view(map).stride_bytes, 20);
-  expect_refused([&] { image_view(map); }, {"CV_8UC1"});
-  expect_refused([&] { map_view(image); }, {"CV_32FC1"});
+  expect_refused([&] { image_view(map); }, {"uint8"});
+  expect_refused([&] { map_view(image); }, {"float32"});
+}
+
+TEST(OpenCv, ImagesAndMatricesShareTheirMemoryWhichTheImageKeeps) {
+  Image image;
+  {
+    cv::Mat large(6, 10, CV_16UC3, cv::Scalar(1, 2, 3));
+    image = image_of(large(cv::Rect(2, 1, 5, 4)));
+    large.at<cv::Vec3w>(1, 2) = {7, 8, 9};
+  }
+  EXPECT_EQ(image.size(), (Size{5, 4}));
+  EXPECT_EQ(image.type, kBgr16);
+  EXPECT_EQ(image.row<std::uint16_t>(0)[2], 9);
+  EXPECT_EQ(image.row<std::uint16_t>(3)[14], 3);
+  const cv::Mat mat = mat_of(image);
+  EXPECT_EQ(mat.type(), CV_16UC3);
+  EXPECT_EQ(mat.data, image.data);
+  EXPECT_EQ(mat.step[0], image.stride_bytes);
+  EXPECT_TRUE(mat_of(Image()).empty());
+  expect_refused([&] { image_of(cv::Mat(2, 2, CV_64FC1)); }, {"CV_64FC1", "CV_32F"});
 }
 
 }  // namespace

@@ -5,10 +5,11 @@
 
 #include <cmath>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
 
 #include "egosgm/error.h"
 #include "egosgm/image.h"
+#include "egosgm/vision/image_io.h"
+#include "tests/vision/images.h"
 #include "tests/vision/temporary_folder.h"
 #include "vision/file_io.h"
 
@@ -18,21 +19,21 @@ namespace {
 constexpr float kNo = kInvalidDisparity;
 const Calibration kCamera{.fx = 100, .fy = 50, .cx = 2, .cy = 1, .baseline_m = 0.5, .doffs_px = 5};
 
-cv::Mat filled(float value, cv::Size size = {6, 4}) { return cv::Mat(size, CV_32FC1, cv::Scalar(value)); }
-cv::Mat grey(cv::Size size = {6, 4}) { return cv::Mat(size, CV_8UC1, cv::Scalar(90)); }
+Image filled(float value, Size size = {6, 4}) { return Image(size, kF32, value); }
+Image grey(Size size = {6, 4}) { return Image(size, kU8, 90); }
 
 TEST(PointCloud, PutsPixelsWhereTheCameraSawThem) {
   const PointCloud cloud = point_cloud(filled(5), filled(0.01f), grey(), kCamera);
   ASSERT_EQ(cloud.points_m.size(), 24u);
-  const cv::Point3f last = cloud.points_m.back();  // pixel (5, 3), shift 10 px: depth 5 m
-  EXPECT_FLOAT_EQ(last.z, 5.0f);
-  EXPECT_FLOAT_EQ(last.x, 0.15f);
-  EXPECT_FLOAT_EQ(last.y, 0.2f);
-  EXPECT_EQ(cloud.colors.back(), cv::Vec3b(90, 90, 90));
+  const std::array<float, 3> last = cloud.points_m.back();  // pixel (5, 3), shift 10 px: depth 5 m
+  EXPECT_FLOAT_EQ(last[2], 5.0f);
+  EXPECT_FLOAT_EQ(last[0], 0.15f);
+  EXPECT_FLOAT_EQ(last[1], 0.2f);
+  EXPECT_EQ(cloud.colors.back(), (Color{90, 90, 90}));
 }
 
 TEST(PointCloud, LeavesOutWhatIsUncertainFarInvalidOrAlone) {
-  cv::Mat disparity = filled(5), variance = filled(0.01f);
+  Image disparity = filled(5), variance = filled(0.01f);
   disparity.at<float>(0, 0) = kNo;
   disparity.at<float>(0, 2) = -5;    // d + doffs = 0
   disparity.at<float>(1, 4) = 9;     // no neighbour near
@@ -53,7 +54,7 @@ TEST(PointCloud, LeavesOutWhatIsUncertainFarInvalidOrAlone) {
 }
 
 TEST(PointCloud, KeepsPixelsOfTheReasonsThatWereChosen) {
-  cv::Mat reasons(4, 6, CV_8UC1, cv::Scalar(static_cast<int>(Reason::kTrusted)));
+  Image reasons(4, 6, kU8, static_cast<int>(Reason::kTrusted));
   reasons.at<std::uint8_t>(1, 2) = static_cast<std::uint8_t>(Reason::kFlat);
   reasons.at<std::uint8_t>(3, 0) = static_cast<std::uint8_t>(Reason::kPredicted);
   const auto cloud = [&](std::vector<Reason> kept) {
@@ -114,10 +115,10 @@ TEST(PointCloud, PlyHoldsNormalsWhereThereAreAny) {
 
 TEST(PointCloud, DepthIsStoredInMillimetres) {
   const TemporaryFolder folder;
-  const cv::Mat depth = (cv::Mat_<float>(1, 6) << 1.2344f, kNo, 65.535f, 65.536f, 0.0001f, 3e6f);
+  const Image depth = map_from(1, {1.2344f, kNo, 65.535f, 65.536f, 0.0001f, 3e6f});
   EXPECT_EQ(write_depth_png(folder / "depth.png", depth), 2);
-  const cv::Mat stored = cv::imread((folder / "depth.png").string(), cv::IMREAD_UNCHANGED);
-  ASSERT_EQ(stored.type(), CV_16UC1);
+  const Image stored = read_stored_image(folder / "depth.png");
+  ASSERT_EQ(stored.type, kU16);
   const std::vector<int> expected{1234, 0, 65535, 0, 1, 0};
   for (int x = 0; x < 6; ++x) EXPECT_EQ(stored.at<std::uint16_t>(0, x), expected[static_cast<std::size_t>(x)]) << x;
 }

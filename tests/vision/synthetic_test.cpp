@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
+#include <numeric>
 #include <set>
 #include <string>
 
@@ -14,8 +14,10 @@
 #include "egosgm/image.h"
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/disparity_io.h"
+#include "egosgm/vision/image_io.h"
 #include "egosgm/vision/poses_io.h"
 #include "tests/support/expect_refused.h"
+#include "tests/vision/images.h"
 #include "tests/vision/temporary_folder.h"
 
 namespace egosgm::vision {
@@ -23,16 +25,13 @@ namespace {
 
 SyntheticOptions small_options() { return {.frames = 12, .width = 320, .height = 120}; }
 
-bool same_bits(const cv::Mat& a, const cv::Mat& b) {
-  if (a.size() != b.size() || a.type() != b.type()) return false;
-  return std::equal(a.begin<uint8_t>(), a.end<uint8_t>(), b.begin<uint8_t>());
-}
+bool same_bits(const Image& a, const Image& b) { return largest_difference(a, b) == 0; }
 
 struct Range {
   float low, high;
 };
 /// Over the pixels whose centres surround (x, y); REQUIRES them to be in the map.
-Range around(const cv::Mat& map, double x, double y) {
+Range around(const Image& map, double x, double y) {
   const int x0 = static_cast<int>(std::floor(x)), y0 = static_cast<int>(std::floor(y));
   const int x1 = std::min(x0 + 1, map.cols - 1), y1 = std::min(y0 + 1, map.rows - 1);
   const auto [low, high] =
@@ -40,7 +39,7 @@ Range around(const cv::Mat& map, double x, double y) {
   return {low, high};
 }
 
-double linear(const cv::Mat& image, double x, double y) {
+double linear(const Image& image, double x, double y) {
   const int x0 = std::min(static_cast<int>(x), image.cols - 2), y0 = std::min(static_cast<int>(y), image.rows - 2);
   const double a = x - x0, b = y - y0;
   return (1 - b) * ((1 - a) * image.at<uint8_t>(y0, x0) + a * image.at<uint8_t>(y0, x0 + 1)) +
@@ -113,19 +112,19 @@ TEST(Synthetic, MovingVehiclesContradictTheCamerasMotionAndTheRestDoesNot) {
 TEST(Synthetic, MovingMaskIsEmptyWithoutTheOption) {
   SyntheticOptions options = small_options();
   const SyntheticFrame still = SyntheticSequence(options).render(4);
-  EXPECT_EQ(cv::countNonZero(still.left_moving), 0);
-  EXPECT_EQ(cv::countNonZero(still.right_moving), 0);
+  EXPECT_EQ(count_nonzero(still.left_moving), 0);
+  EXPECT_EQ(count_nonzero(still.right_moving), 0);
   options.moving_object = true;
   const SyntheticFrame moving = SyntheticSequence(options).render(4);
-  EXPECT_GT(cv::countNonZero(moving.left_moving), 200);
-  EXPECT_GT(cv::countNonZero(moving.right_moving), 200);
+  EXPECT_GT(count_nonzero(moving.left_moving), 200);
+  EXPECT_GT(count_nonzero(moving.right_moving), 200);
   options.frames = 100;  // one of them stays ahead of the camera
   for (const int frame : {29, 60, 99}) {
-    EXPECT_GT(cv::countNonZero(SyntheticSequence(options).render(frame).left_moving), 200) << "frame " << frame;
+    EXPECT_GT(count_nonzero(SyntheticSequence(options).render(frame).left_moving), 200) << "frame " << frame;
   }
   options.moving_object_scale = 5;
   const SyntheticFrame large = SyntheticSequence(options).render(4);
-  EXPECT_GT(cv::countNonZero(large.left_moving), 0.3 * large.left.total());
+  EXPECT_GT(count_nonzero(large.left_moving), 0.3 * large.left.pixels());
 }
 
 /// Mean |left(x) - right(x - d - error)| over pixels that both cameras see, right linearly interpolated.
@@ -157,7 +156,7 @@ TEST(Synthetic, ImagesAgreeAtTheTrueDisparity) {
   }
 }
 
-void expect_views_agree(const cv::Mat& map, const cv::Mat& noc, const cv::Mat& other, int towards_other) {
+void expect_views_agree(const Image& map, const Image& noc, const Image& other, int towards_other) {
   int seen = 0, agree = 0, hidden = 0, behind = 0;
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.cols; ++x) {
@@ -175,7 +174,7 @@ void expect_views_agree(const cv::Mat& map, const cv::Mat& noc, const cv::Mat& o
       hidden += !noc_here, behind += !noc_here && range.high > d;
     }
   }
-  EXPECT_GT(seen, 0.8 * map.total());
+  EXPECT_GT(seen, 0.8 * map.pixels());
   EXPECT_GT(agree, 0.995 * seen);
   EXPECT_GT(hidden, 100);
   EXPECT_GT(behind, 0.97 * hidden);
@@ -188,10 +187,10 @@ TEST(Synthetic, LeftAndRightTruthAgreeWhereBothSeeThePoint) {
 }
 
 /// Runs of `low` to `high` pixels in a row that stand out from both sides by more than 2 px of disparity.
-int thin_runs(const cv::Mat& map, int low, int high) {
+int thin_runs(const Image& map, int low, int high) {
   int count = 0;
   for (int y = 0; y < map.rows; ++y) {
-    const float* row = map.ptr<float>(y);
+    const float* row = map.row<float>(y);
     for (int x = 1; x < map.cols; ++x) {
       if (row[x] < row[x - 1] + 2) continue;
       int end = x;
@@ -219,11 +218,11 @@ TEST(Synthetic, DisparityIsPositiveAndFitsTheDefaultRange) {
   const SyntheticSequence sequence({.width = 1242, .height = 375, .supersampling = 1});
   for (const int frame : {0, 7, 19}) {
     const SyntheticFrame rendered = sequence.render(frame);
-    for (const cv::Mat& map : {rendered.left_disparity, rendered.right_disparity}) {
-      double low, high;
-      cv::minMaxLoc(map, &low, &high);
-      EXPECT_GT(low, 1.0 / 256);
-      EXPECT_LT(high, 110);
+    for (const Image& map : {rendered.left_disparity, rendered.right_disparity}) {
+      const std::vector<double> values = values_of(map);
+      const auto [low, high] = std::minmax_element(values.begin(), values.end());
+      EXPECT_GT(*low, 1.0 / 256);
+      EXPECT_LT(*high, 110);
     }
   }
 }
@@ -243,11 +242,22 @@ TEST(Synthetic, SameOptionsGiveTheSameBitsAndLengthDoesNotMatter) {
   const SyntheticFrame second = SyntheticSequence(options).render(7);
   EXPECT_TRUE(same_bits(first.left, second.left));
   EXPECT_TRUE(same_bits(first.right, second.right));
-  EXPECT_EQ(cv::norm(first.left_disparity, second.left_disparity, cv::NORM_INF), 0);
-  EXPECT_EQ(cv::norm(first.right_disparity, second.right_disparity, cv::NORM_INF), 0);
+  EXPECT_EQ(largest_difference(first.left_disparity, second.left_disparity), 0);
+  EXPECT_EQ(largest_difference(first.right_disparity, second.right_disparity), 0);
   EXPECT_TRUE(same_bits(first.left_noc, second.left_noc));
   options.seed = 2;
   EXPECT_FALSE(same_bits(first.left, SyntheticSequence(options).render(7).left));
+}
+
+std::vector<double> differences(const Image& a, const Image& b, double scale_of_b = 1) {
+  std::vector<double> of_a = values_of(a);
+  const std::vector<double> of_b = values_of(b);
+  for (std::size_t i = 0; i < of_a.size(); ++i) of_a[i] -= scale_of_b * of_b[i];
+  return of_a;
+}
+
+double mean_product(const std::vector<double>& a, const std::vector<double>& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0) / static_cast<double>(a.size());
 }
 
 TEST(Synthetic, NoiseHasItsStandardDeviationAndDiffersBetweenTheImages) {
@@ -256,13 +266,10 @@ TEST(Synthetic, NoiseHasItsStandardDeviationAndDiffersBetweenTheImages) {
   const SyntheticFrame clean = SyntheticSequence(options).render(0);
   options.noise_grey = 4;
   const SyntheticFrame noisy = SyntheticSequence(options).render(0);
-  cv::Mat left, right, mean, deviation;
-  cv::subtract(noisy.left, clean.left, left, cv::noArray(), CV_32F);
-  cv::subtract(noisy.right, clean.right, right, cv::noArray(), CV_32F);
-  cv::meanStdDev(left, mean, deviation);
-  EXPECT_NEAR(mean.at<double>(0), 0, 0.1);
-  EXPECT_NEAR(deviation.at<double>(0), 4, 0.2);
-  EXPECT_LT(std::abs(left.dot(right)) / (16.0 * left.total()), 0.03);
+  const std::vector<double> left = differences(noisy.left, clean.left), right = differences(noisy.right, clean.right);
+  EXPECT_NEAR(mean_product(left, std::vector<double>(left.size(), 1)), 0, 0.1);
+  EXPECT_NEAR(std::sqrt(mean_product(left, left)), 4, 0.2);
+  EXPECT_LT(std::abs(mean_product(left, right)) / 16.0, 0.03);
 }
 
 TEST(Synthetic, ExposureScalesTheGreyValuesAndNotTheNoise) {
@@ -273,15 +280,16 @@ TEST(Synthetic, ExposureScalesTheGreyValuesAndNotTheNoise) {
   const SyntheticFrame night = SyntheticSequence(options).render(0);
   options.noise_grey = 4;
   const SyntheticFrame noisy = SyntheticSequence(options).render(0);
-  cv::Mat expected, difference;
-  day.right.convertTo(expected, CV_32F, 0.1);
-  cv::subtract(night.right, expected, difference, cv::noArray(), CV_32F);
-  EXPECT_LE(cv::norm(difference, cv::NORM_INF), 0.5 + 0.05 + 1e-3);  // both are rounded
-  EXPECT_EQ(cv::norm(night.left_disparity, day.left_disparity, cv::NORM_INF), 0);
-  cv::Mat mean, deviation;
-  cv::subtract(noisy.right, night.right, difference, night.right >= 14, CV_32F);  // what noise does not cut at black
-  cv::meanStdDev(difference, mean, deviation, night.right >= 14);
-  EXPECT_NEAR(deviation.at<double>(0), 4, 0.2);
+  for (const double difference : differences(night.right, day.right, 0.1)) {
+    ASSERT_LE(std::abs(difference), 0.5 + 0.05 + 1e-3);  // both are rounded
+  }
+  EXPECT_EQ(largest_difference(night.left_disparity, day.left_disparity), 0);
+  const std::vector<double> dark = values_of(night.right), all = differences(noisy.right, night.right);
+  std::vector<double> uncut;  // noise cuts darker ones at black
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (dark[i] >= 14) uncut.push_back(all[i]);
+  }
+  EXPECT_NEAR(std::sqrt(mean_product(uncut, uncut)), 4, 0.2);
 }
 
 TEST(Synthetic, PosesAreRigidStartAtIdentityAndFollowSpeedAndTurn) {
@@ -308,20 +316,19 @@ TEST(Synthetic, StandstillWithoutWobbleIsIdentity) {
   options.speed_m = 0, options.wobble = 0;
   const SyntheticSequence sequence(options);
   EXPECT_TRUE(sequence.motion(5).current_from_previous.isApprox(Eigen::Isometry3d::Identity(), 0));
-  EXPECT_EQ(cv::norm(sequence.render(1).left_disparity, sequence.render(5).left_disparity, cv::NORM_INF), 0);
+  EXPECT_EQ(largest_difference(sequence.render(1).left_disparity, sequence.render(5).left_disparity), 0);
 }
 
 TEST(Synthetic, AnySizeRenders) {
   for (const auto& [width, height] : {std::pair{1, 1}, {1, 5}, {7, 1}, {7, 5}, {65, 3}, {33, 127}}) {
     const SyntheticFrame frame =
         SyntheticSequence({.frames = 2, .width = width, .height = height, .moving_object = true}).render(1);
-    const cv::Size size(width, height);
+    const Size size(width, height);
     EXPECT_EQ(frame.left.size(), size);
     EXPECT_EQ(frame.right_noc.size(), size);
-    double low, high;
-    cv::minMaxLoc(frame.left_disparity, &low, &high);
-    EXPECT_GT(low, 0) << width << "x" << height;
-    EXPECT_TRUE(std::isfinite(high)) << width << "x" << height;
+    for (const double d : values_of(frame.left_disparity)) {
+      EXPECT_TRUE(d > 0 && std::isfinite(d)) << width << "x" << height;
+    }
   }
 }
 
@@ -363,13 +370,12 @@ TEST_F(SyntheticFiles, SequenceReadsBackAsItWasRendered) {
   const SyntheticSequence sequence(options);
   const SyntheticFrame frame = sequence.render(1);
   const std::string name = "000001.png";
-  EXPECT_TRUE(same_bits(cv::imread((folder_ / "image_0" / name).string(), cv::IMREAD_UNCHANGED), frame.left));
-  EXPECT_TRUE(same_bits(cv::imread((folder_ / "image_1" / name).string(), cv::IMREAD_UNCHANGED), frame.right));
-  EXPECT_TRUE(
-      same_bits(cv::imread((folder_ / "truth/left_moving" / name).string(), cv::IMREAD_UNCHANGED), frame.left_moving));
-  const cv::Mat occ = read_disparity(folder_ / "truth/right_disp_occ" / name);
-  const cv::Mat noc = read_disparity(folder_ / "truth/right_disp_noc" / name);
-  EXPECT_LE(cv::norm(occ, frame.right_disparity, cv::NORM_INF), 1.0 / 256);
+  EXPECT_TRUE(same_bits(read_stored_image(folder_ / "image_0" / name), frame.left));
+  EXPECT_TRUE(same_bits(read_stored_image(folder_ / "image_1" / name), frame.right));
+  EXPECT_TRUE(same_bits(read_stored_image(folder_ / "truth/left_moving" / name), frame.left_moving));
+  const Image occ = read_disparity(folder_ / "truth/right_disp_occ" / name);
+  const Image noc = read_disparity(folder_ / "truth/right_disp_noc" / name);
+  EXPECT_LE(largest_difference(occ, frame.right_disparity), 1.0 / 256);
   for (int y = 0; y < noc.rows; ++y) {
     for (int x = 0; x < noc.cols; ++x) {
       const float expected = frame.right_noc.at<uint8_t>(y, x) ? occ.at<float>(y, x) : kInvalidDisparity;

@@ -24,9 +24,9 @@ constexpr int kSteadyFrom = 3;
 double bad_or_missing(const RenderedVideo& video, const std::vector<cv::Mat>& masks, bool temporal) {
   MethodOptions options;
   options.temporal = temporal;
-  const cv::Size size = video.frames.front().left.size();
+  const Size size = video.frames.front().left.size();
   Pipeline pipeline(video.sequence.calibration(), size.width, size.height, options);
-  cv::Mat disparity(size, CV_32FC1);
+  Image disparity(size, kF32);
   FrameOutputs outputs;
   outputs.disparity = map_view(disparity);
   double bad = 0, all = 0;
@@ -35,9 +35,10 @@ double bad_or_missing(const RenderedVideo& video, const std::vector<cv::Mat>& ma
     const std::optional<Motion> motion = k > 0 ? std::optional(video.sequence.motion(k)) : std::nullopt;
     pipeline.process(image_view(frame.left), image_view(frame.right), motion, outputs);
     if (k < kSteadyFrom) continue;
-    const cv::Mat error = cv::abs(disparity - frame.left_disparity);  // huge where there is no disparity
-    bad += cv::countNonZero((error > 3) & masks[k] & frame.left_noc);
-    all += cv::countNonZero(masks[k] & frame.left_noc);
+    const cv::Mat error =
+        cv::abs(mat_of(disparity) - mat_of(frame.left_disparity));  // huge where there is no disparity
+    bad += cv::countNonZero((error > 3) & masks[k] & mat_of(frame.left_noc));
+    all += cv::countNonZero(masks[k] & mat_of(frame.left_noc));
   }
   EXPECT_GT(all, 500) << "pixels";
   return 100 * bad / all;
@@ -53,8 +54,8 @@ std::vector<cv::Mat> masks_of(const RenderedVideo& video,
 /// What is narrower than seven pixels and stands out from both sides.
 cv::Mat thin_things(const SyntheticFrame& frame) {
   cv::Mat wider;
-  cv::morphologyEx(frame.left_disparity, wider, cv::MORPH_OPEN, cv::Mat::ones(1, 7, CV_8U));
-  return frame.left_disparity - wider > 3;
+  cv::morphologyEx(mat_of(frame.left_disparity), wider, cv::MORPH_OPEN, cv::Mat::ones(1, 7, CV_8U));
+  return mat_of(frame.left_disparity) - wider > 3;
 }
 
 // A single frame of the same matcher, which searches everything in both views, loses fewer of them.
@@ -71,7 +72,7 @@ TEST(Video, VehiclesThatMoveAreFollowed) {
   for (const unsigned seed : {1u, 2u}) {
     const RenderedVideo video({.frames = 10, .seed = seed, .moving_object = true, .supersampling = 2});
     const std::vector<cv::Mat> vehicles =
-        masks_of(video, [](const SyntheticFrame& frame) { return frame.left_moving; });
+        masks_of(video, [](const SyntheticFrame& frame) { return mat_of(frame.left_moving).clone(); });
     EXPECT_LE(bad_or_missing(video, vehicles, true), bad_or_missing(video, vehicles, false) + 1) << "seed " << seed;
   }
 }

@@ -3,13 +3,13 @@
 
 #include <Eigen/Geometry>
 #include <filesystem>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
@@ -85,7 +85,7 @@ EGOSGM_EXPORT StereoSequence open_patterns(const std::string& left, const std::s
 EGOSGM_EXPORT StereoSequence open_folder(const std::filesystem::path& folder, FrameRange range = {});
 
 struct StereoImages {
-  cv::Mat left, right;  // both CV_8UC1 or both CV_16UC1, of one size
+  Image left, right;  // both kU8 or both kU16, of one size
 };
 
 /// Reads both images as grey. Throws InvalidArgument, naming both files, where their sizes or depths differ.
@@ -93,7 +93,7 @@ struct StereoImages {
 EGOSGM_EXPORT StereoImages read_images(const StereoFrame& frame);
 
 /// Reads only the headers: throws InvalidArgument at the first image whose size is not that of the first. Thread-safe.
-EGOSGM_EXPORT cv::Size check_image_sizes(const StereoSequence& sequence);
+EGOSGM_EXPORT Size check_image_sizes(const StereoSequence& sequence);
 
 /// Which of a file's `rows` belongs to each frame. A file has a row for each number from 0 to the sequence's last one
 /// (as KITTI's have), or for each frame of the sequence, or for each chosen frame; where `numbers` is empty (unknown),

@@ -3,14 +3,14 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <opencv2/core.hpp>
 
 #include "egosgm/export.h"
 #include "egosgm/image.h"
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
-// In memory a disparity map is CV_32FC1 in pixels, with kInvalidDisparity where there is none. A pixel counts as valid
+// In memory a disparity map is kF32 in pixels, with kInvalidDisparity where there is none. A pixel counts as valid
 // if it is finite and above kInvalidDisparity. All functions are thread-safe (writers: for different files), check
 // sizes before they allocate, and throw InvalidArgument for what cannot be read and IoError for what cannot be written.
 
@@ -21,28 +21,28 @@ inline bool is_sky(float truth) { return truth >= 0 && truth <= 1.0f / 256; }
 
 /// Reads 16-bit grey PNG (KITTI's has 256 steps a pixel), PFM, or NumPy's .npy, in which what is not above 0 or not
 /// finite is invalid; the file's first bytes tell which.
-EGOSGM_EXPORT cv::Mat read_disparity(const std::filesystem::path& file, double png_steps_per_px = 256);
+EGOSGM_EXPORT Image read_disparity(const std::filesystem::path& file, double png_steps_per_px = 256);
 
 /// Reads any map of numbers as they are stored, a variance or a confidence for instance: grey PNG of 8 or 16 bits, PFM
-/// or .npy. CV_32FC1; infinity in a PFM becomes NaN.
-EGOSGM_EXPORT cv::Mat read_values(const std::filesystem::path& file);
+/// or .npy. kF32; infinity in a PFM becomes NaN.
+EGOSGM_EXPORT Image read_values(const std::filesystem::path& file);
 
 /// Writes KITTI's PNG or a PFM by the extension. Returns how many valid pixels could not be stored (see
 /// write_disparity_png).
-EGOSGM_EXPORT std::int64_t write_disparity(const std::filesystem::path& file, const cv::Mat& disparity);
+EGOSGM_EXPORT std::int64_t write_disparity(const std::filesystem::path& file, const Image& disparity);
 
 /// KITTI's disparity PNG: 16-bit grey, disparity = value / 256, 0 = invalid. Stores max(d * 256, 1), truncated, as
 /// KITTI's development kit does, for 0 <= d < 256. The format has no room for a negative disparity or one of 256 and
 /// more: those become invalid. Returns how many; a PFM keeps them.
-EGOSGM_EXPORT std::int64_t write_disparity_png(const std::filesystem::path& file, const cv::Mat& disparity);
+EGOSGM_EXPORT std::int64_t write_disparity_png(const std::filesystem::path& file, const Image& disparity);
 
-/// How many valid pixels of a CV_32FC1 map that PNG has no room for.
-EGOSGM_EXPORT std::int64_t count_outside_png(const cv::Mat& disparity);
+/// How many valid pixels of a kF32 map that PNG has no room for.
+EGOSGM_EXPORT std::int64_t count_outside_png(const Image& disparity);
 
 /// One-channel PFM (Middlebury): rows bottom-up, byte order by the scale's sign, infinity or NaN = invalid.
-EGOSGM_EXPORT cv::Mat read_pfm(const std::filesystem::path& file);
+EGOSGM_EXPORT Image read_pfm(const std::filesystem::path& file);
 
-/// Writes any CV_32FC1 map (disparity, variance, depth), little endian; infinity where it is invalid.
-EGOSGM_EXPORT void write_pfm(const std::filesystem::path& file, const cv::Mat& map);
+/// Writes any kF32 map (disparity, variance, depth), little endian; infinity where it is invalid.
+EGOSGM_EXPORT void write_pfm(const std::filesystem::path& file, const Image& map);
 
 }  // namespace egosgm::vision

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <opencv2/core.hpp>
 #include <vector>
 
 #include "egosgm/export.h"
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
@@ -40,9 +40,9 @@ struct DisparityMetrics {
   double wrong_of_all = 0;     // bad: what is missing does not count
 };
 
-/// Both CV_32FC1 with kInvalidDisparity (see disparity_io.h). Throws InvalidArgument where sizes or types differ.
+/// Both kF32 with kInvalidDisparity (see disparity_io.h). Throws InvalidArgument where sizes or types differ.
 /// Thread-safe.
-EGOSGM_EXPORT DisparityCounts compare_disparity(const cv::Mat& estimate, const cv::Mat& truth);
+EGOSGM_EXPORT DisparityCounts compare_disparity(const Image& estimate, const Image& truth);
 
 EGOSGM_EXPORT DisparityMetrics metrics_of(const DisparityCounts& counts);
 
@@ -55,11 +55,11 @@ constexpr float kCertainVariancePx2 = 6.0f;
 /// Fills the holes from the background, as KITTI's development kit does: in each row, a run of invalid pixels between
 /// two valid ones gets the smaller of the two, the ends of a row its nearest valid value; then the top and bottom of
 /// each column get its nearest valid value. A map without any valid pixel stays so. Thread-safe.
-EGOSGM_EXPORT cv::Mat interpolate_background(const cv::Mat& disparity);
+EGOSGM_EXPORT Image interpolate_background(const Image& disparity);
 
 /// Disparities [px] without those of a variance [px^2] above the bound: of a video, interpolate_background of what is
-/// left is a little better than of all. Both CV_32FC1 of one size, else InvalidArgument. Thread-safe.
-EGOSGM_EXPORT cv::Mat drop_uncertain(const cv::Mat& disparity, const cv::Mat& variance,
-                                     float max_variance_px2 = kCertainVariancePx2);
+/// left is a little better than of all. Both kF32 of one size, else InvalidArgument. Thread-safe.
+EGOSGM_EXPORT Image drop_uncertain(const Image& disparity, const Image& variance,
+                                   float max_variance_px2 = kCertainVariancePx2);
 
 }  // namespace egosgm::vision

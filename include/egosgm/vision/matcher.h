@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// The pipeline as OpenCV's matchers are called, for those who have OpenCV: egosgm::vision itself does not need it.
 #pragma once
 
 #include <memory>
@@ -7,7 +8,6 @@
 
 #include "egosgm/calibration.h"
 #include "egosgm/device.h"
-#include "egosgm/export.h"
 #include "egosgm/motion.h"
 #include "egosgm/options.h"
 
@@ -15,8 +15,8 @@ namespace egosgm::vision {
 
 /// A cv::StereoMatcher, in the place of a cv::StereoSGBM. Sizes may change between calls; each new one builds its
 /// pipeline, and so does each setter. A pair alone depends on no pair before: where options.vertical_alignment is true,
-/// it is matched twice, first to find the vertical offset. Not thread-safe. It links opencv_core alone.
-class EGOSGM_EXPORT Matcher : public cv::StereoMatcher {
+/// it is matched twice, first to find the vertical offset. Not thread-safe. Programs that use it link opencv_core.
+class Matcher : public cv::StereoMatcher {
  public:
   /// What suits single pairs: the default options, with eight paths.
   static PipelineOptions single_pair();
@@ -57,7 +57,17 @@ class EGOSGM_EXPORT Matcher : public cv::StereoMatcher {
 
  private:
   struct State;
+
+  static Calibration any_camera(double cx, double cy);
+  static cv::Mat grey_of(const cv::Mat& image, const char* name);
+  static void expect_sixteenths(const PipelineOptions& options);
+  void prepare(cv::Size size, int type);
+  template <typename Value>
+  void change(Value PipelineOptions::*option, Value value);
+
   std::unique_ptr<State> state_;
 };
 
 }  // namespace egosgm::vision
+
+#include "egosgm/vision/matcher_inline.h"

@@ -3,12 +3,12 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <opencv2/core.hpp>
 #include <vector>
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
 #include "egosgm/reason.h"
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
@@ -22,9 +22,9 @@ struct LeftOut {
 
 /// Points, and what belongs to each of them; colours and normals may be missing.
 struct PointCloud {
-  std::vector<cv::Point3f> points_m;
-  std::vector<cv::Vec3b> colors{};  // BGR
-  std::vector<cv::Vec3f> normals{};
+  std::vector<std::array<float, 3>> points_m;
+  std::vector<Color> colors{};  // BGR
+  std::vector<std::array<float, 3>> normals{};
   LeftOut left_out{};
 };
 
@@ -40,22 +40,22 @@ struct EGOSGM_EXPORT PointCloudOptions {
   void validate() const;
 };
 
-/// The points of a disparity map [px] with its variance [px^2], both CV_32FC1, in the left camera's frame (x right, y
-/// down, z forward), row by row. `colors` is the left image, CV_8UC1, CV_16UC1 (stretched to its maximum) or CV_8UC3;
-/// `reasons` are FrameOutputs::reason, CV_8UC1, which options.reasons needs. Throws InvalidArgument for other types,
+/// The points of a disparity map [px] with its variance [px^2], both kF32, in the left camera's frame (x right, y
+/// down, z forward), row by row. `colors` is the left image, kU8, kU16 (stretched to its maximum) or kBgr8;
+/// `reasons` are FrameOutputs::reason, kU8, which options.reasons needs. Throws InvalidArgument for other types,
 /// for maps of different sizes, as Calibration::validate and as PointCloudOptions::validate. Thread-safe.
-EGOSGM_EXPORT PointCloud point_cloud(const cv::Mat& disparity, const cv::Mat& variance, const cv::Mat& colors,
+EGOSGM_EXPORT PointCloud point_cloud(const Image& disparity, const Image& variance, const Image& colors,
                                      const Calibration& calibration, const PointCloudOptions& options = {},
-                                     const cv::Mat& reasons = {});
+                                     const Image& reasons = {});
 
 /// Writes a binary PLY (x, y, z as float [m]; nx, ny, nz as float and red, green, blue as uchar where there are any),
 /// whole or not at all. Throws InvalidArgument unless there are as many of each as points, and IoError. Thread-safe for
 /// different files.
 EGOSGM_EXPORT void write_ply(const std::filesystem::path& file, const PointCloud& cloud);
 
-/// Writes a depth map [m], CV_32FC1, as a 16-bit PNG of millimetres, 0 where there is none, as RGB-D data sets store
+/// Writes a depth map [m], kF32, as a 16-bit PNG of millimetres, 0 where there is none, as RGB-D data sets store
 /// theirs (TUM's own have 5000 steps a metre, these 1000). Returns how many depths of 65.536 m and more it has no room
 /// for; they become 0. Throws as write_png does. Thread-safe for different files.
-EGOSGM_EXPORT std::int64_t write_depth_png(const std::filesystem::path& file, const cv::Mat& depth_m);
+EGOSGM_EXPORT std::int64_t write_depth_png(const std::filesystem::path& file, const Image& depth_m);
 
 }  // namespace egosgm::vision

@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <opencv2/core.hpp>
 
 #include "egosgm/calibration.h"
 #include "egosgm/export.h"
 #include "egosgm/motion.h"
+#include "egosgm/vision/image.h"
 
 namespace egosgm::vision {
 
@@ -39,11 +39,11 @@ struct EGOSGM_EXPORT SyntheticOptions {
 /// averaged over the pixel). They are positive, since the sky is a dome at a finite distance, but in a plain street:
 /// its sky has 0 (is_sky).
 struct SyntheticFrame {
-  cv::Mat left, right;                      // CV_8UC1
-  cv::Mat left_disparity, right_disparity;  // CV_32FC1, x_left - x_right >= 0 [px]
-  cv::Mat left_noc, right_noc;              // CV_8UC1: 255 where the other camera sees the same surface point, else 0
-  cv::Mat left_moving, right_moving;        // CV_8UC1: 255 on moving objects, else 0
-  Eigen::Isometry3d world_from_camera;      // left camera's pose; identity for frame 0
+  Image left, right;                      // kU8
+  Image left_disparity, right_disparity;  // kF32, x_left - x_right >= 0 [px]
+  Image left_noc, right_noc;              // kU8: 255 where the other camera sees the same surface point, else 0
+  Image left_moving, right_moving;        // kU8: 255 on moving objects, else 0
+  Eigen::Isometry3d world_from_camera;    // left camera's pose; identity for frame 0
 };
 
 /// Renders any frame of the drive on demand. Thread-safe: const calls may run at the same time.
