@@ -359,6 +359,24 @@ TEST(Destruction, IsQuietWhicheverReleaseFails) {
   EXPECT_EQ(process(*make_pipeline(), 0), expected);
 }
 
+// A driver may begin a queue's commands only when it is flushed, or somebody waits: then frames would not overlap.
+TEST(Queues, AllThatWasSubmittedBeginsBeforeAnybodyWaits) {
+  const testing::FaultLayer layer(FAULT_LAYER);
+  for (const int separate : {0, 1}) {
+    layer.separate_memory(separate);
+    const auto pipeline = make_pipeline();
+    layer.separate_memory(0);
+    std::vector<Maps> expected(4), maps(4);
+    OverlappedRun(*pipeline, 0, 3, expected);
+    pipeline->reset();
+    layer.batch(1);
+    OverlappedRun(*pipeline, 0, 3, maps);
+    EXPECT_EQ(layer.begun_by_wait(), 0) << "memory of its own: " << separate;
+    layer.batch(0);
+    EXPECT_EQ(maps, expected);
+  }
+}
+
 TEST(Memory, NoBufferIsMadeInAFrame) {
   const testing::FaultLayer layer(FAULT_LAYER);
   const auto pipeline = make_pipeline();

@@ -117,6 +117,7 @@ void FrameQueue::submit(const ImageView& left, const ImageView& right, const std
                             .dynamic = plan.wanted.dynamic ? &workspace.dynamic : nullptr,
                             .reasons = plan.wanted.reasons ? &workspace.reasons : nullptr},
                            outputs);
+  context_.flush();
 
   drain.is_dismissed = true;
   frame.report.stripes = static_cast<int>(method_.matcher().banded_sgm().stripes().size());
@@ -139,6 +140,7 @@ DeviceMaps FrameQueue::enqueue(const FrameImages& images, const std::optional<Mo
   after.images->clear();
   const StereoMaps result = method_.frame(plan, images, belief_, after, transfer.given_out()).given_out;
   const cl::Event end = done ? context_.end_of_recorded() : cl::Event();
+  context_.flush();
 
   drain.is_dismissed = true;
   for (ocl::Command& command : context_.take_commands()) device_frames_.push_back(std::move(command));

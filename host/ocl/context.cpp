@@ -142,6 +142,7 @@ Context::Apart::~Apart() {
 
 void Context::let_wait(Queue which, const cl::Event& event) {
   expect_not_failed(event);
+  event.getInfo<CL_EVENT_COMMAND_QUEUE>().flush();  // OpenCL 1.2, section 5.13: before another queue waits for it
   const std::vector<cl::Event> events{event};
   cl::Event done;
   queue(which).enqueueBarrierWithWaitList(&events, &done);

@@ -96,6 +96,11 @@ class Context {
   /// failed: PoCL 3.1 never ends a command whose dependency failed before it was enqueued.
   void let_wait(Queue which, const cl::Event& event);
 
+  /// Lets the device begin what was enqueued on all queues: else a driver may wait until somebody waits.
+  void flush() {
+    for (const cl::CommandQueue& queue : queues_) queue.flush();
+  }
+
   /// The last recorded command of `kKernels`. REQUIRES: there is one.
   const cl::Event& last_kernel() const;
 

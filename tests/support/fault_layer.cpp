@@ -48,6 +48,37 @@ std::atomic<int> transfers = 0;
 std::mutex queues_mutex;
 std::map<cl_command_queue, int> queues;  // that live, with their owners
 
+// Where queues batch: an event a queue that its commands wait for until it is flushed, and how many do.
+struct Batch {
+  cl_event gate = nullptr;
+  int commands = 0;
+};
+std::atomic<bool> queues_batch = false;
+std::atomic<int> begun_by_wait = 0;
+std::mutex batches_mutex;
+std::map<cl_command_queue, Batch> batches;
+
+// The batch of a queue begins; returns its number of commands.
+int begin_batch(cl_command_queue queue) {
+  const std::lock_guard lock(batches_mutex);
+  const auto found = batches.extract(queue);
+  if (!found) return 0;
+  next->clSetUserEventStatus(found.mapped().gate, CL_COMPLETE);
+  next->clReleaseEvent(found.mapped().gate);
+  return found.mapped().commands;
+}
+void begin_all_batches() {
+  for (;;) {
+    cl_command_queue queue;
+    {
+      const std::lock_guard lock(batches_mutex);
+      if (batches.empty()) return;
+      queue = batches.begin()->first;
+    }
+    begun_by_wait += begin_batch(queue);
+  }
+}
+
 // Calls that take part: all of them where the fault is to come at once, enqueues only where it is to come later.
 bool fails() {
   const bool chosen = kind == FaultControls::kAtOnce && calls == failing;
@@ -91,6 +122,16 @@ cl_int enqueue(cl_command_queue queue, cl_uint count, const cl_event* given, cl_
   if (failing_context && context_of(queue) == failing_context && commands_of_it++ >= last_good_command)
     return CL_DEVICE_NOT_AVAILABLE;
   if (fails()) return status;
+  std::vector<cl_event> awaited(given, given + count);
+  if (queues_batch) {
+    const std::lock_guard lock(batches_mutex);
+    Batch& batch = batches[queue];
+    if (!batch.gate) batch.gate = next->clCreateUserEvent(context_of(queue), nullptr);
+    ++batch.commands;
+    awaited.push_back(batch.gate);
+    count = static_cast<cl_uint>(awaited.size());
+    given = awaited.data();
+  }
   cl_int result;
   if (fails_later) {
     finish_all_queues();
@@ -241,9 +282,24 @@ void* CL_API_CALL map(cl_command_queue q, cl_mem b, cl_bool bl, cl_map_flags f, 
     mapped = next->clEnqueueMapBuffer(q, b, bl, f, o, n, w, l, e, &result);
     return result;
   };
+  if (bl) begin_batch(q);
   const cl_int result = !bl ? enqueue(q, c, g, e, enqueue_with) : fails() ? status : enqueue_with(c, g);
   if (error) *error = result;
   return mapped;
+}
+cl_int CL_API_CALL flush(cl_command_queue queue) {
+  if (fails()) return status;
+  begin_batch(queue);
+  return next->clFlush(queue);
+}
+cl_int CL_API_CALL finish(cl_command_queue queue) {
+  begin_all_batches();
+  return next->clFinish(queue);
+}
+cl_int CL_API_CALL wait_for_events(cl_uint count, const cl_event* events) {
+  if (fails()) return status;
+  begin_all_batches();
+  return next->clWaitForEvents(count, events);
 }
 cl_int CL_API_CALL event_info(cl_event e, cl_event_info i, size_t n, void* v, size_t* s) {
   if (fails()) return status;
@@ -308,6 +364,13 @@ extern "C" const FaultControls fault_controls{.arm =
                                               .reuse_builds = [](int reused) { builds_are_reused = reused; },
                                               .separate_memory = [](int separate) { separate_memory = separate; },
                                               .hide_svm = [](int hidden) { svm_is_hidden = hidden; },
+                                              .batch =
+                                                  [](int batching) {
+                                                    begin_all_batches();
+                                                    queues_batch = batching;
+                                                    begun_by_wait = 0;
+                                                  },
+                                              .begun_by_wait = []() -> int { return begun_by_wait; },
                                               .calls = []() -> int { return calls; },
                                               .enqueues = []() -> int { return enqueues; },
                                               .releases = []() -> int { return releases; },
@@ -333,7 +396,8 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   layer.clRetainDevice = target->clRetainDevice;
   layer.clReleaseDevice = target->clReleaseDevice;
   layer.clGetProgramBuildInfo = target->clGetProgramBuildInfo;
-  layer.clFinish = target->clFinish;
+  layer.clFinish = finish;
+  layer.clFlush = flush;
   layer.clCreateUserEvent = [](cl_context c, cl_int* e) { return counted(next->clCreateUserEvent(c, e)); };  // of tests
   layer.clSetUserEventStatus = target->clSetUserEventStatus;
   layer.clSVMAlloc = target->clSVMAlloc;
@@ -365,7 +429,7 @@ extern "C" cl_int CL_API_CALL clInitLayer(cl_uint, const cl_icd_dispatch* target
   layer.clGetCommandQueueInfo = ask<&cl_icd_dispatch::clGetCommandQueueInfo>;
   layer.clGetEventInfo = event_info;
   layer.clEnqueueNDRangeKernel = command<&cl_icd_dispatch::clEnqueueNDRangeKernel>;
-  layer.clWaitForEvents = ask<&cl_icd_dispatch::clWaitForEvents>;
+  layer.clWaitForEvents = wait_for_events;
   layer.clGetEventProfilingInfo = ask<&cl_icd_dispatch::clGetEventProfilingInfo>;
 #define COUNT(Name)                                                \
   layer.clRetain##Name = retain<&cl_icd_dispatch::clRetain##Name>; \

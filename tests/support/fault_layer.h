@@ -23,9 +23,11 @@ struct FaultControls {
   void (*reuse_builds)(int reused);       // 1: a program built before is taken from its binary from now on, at once
   void (*separate_memory)(int separate);  // 1: devices say from now on that they have memory of their own
   void (*hide_svm)(int hidden);           // 1: devices do not know shared virtual memory from now on
-  int (*calls)();                         // since `arm`: calls that can fail,
-  int (*enqueues)();                      // and commands among them
-  int (*releases)();                      // and releases beside them
+  void (*batch)(int batches);  // 1: a queue's commands begin from now on when it is flushed, or somebody waits
+  int (*begun_by_wait)();      // since `batch`: commands that began as somebody waited for events
+  int (*calls)();              // since `arm`: calls that can fail,
+  int (*enqueues)();           // and commands among them
+  int (*releases)();           // and releases beside them
   long (*references)();  // to contexts, queues, buffers, programs, kernels and events: created + retained - released
   long (*buffers_created)();  // ever
   int (*transfers)();         // ever: copies, reads, writes, maps and unmaps of buffers
