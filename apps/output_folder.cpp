@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "apps/run_sequence.h"
 #include "egosgm/error.h"
 #include "host/json_text.h"
 #include "vision/file_io.h"
@@ -54,6 +55,9 @@ bool is_there(const fs::path& path) {
 bool is_new_or_empty(const std::string& option, const std::string& shown, const fs::path& path) {
   if (!is_there(path)) return true;
   std::error_code error;
+  if (fs::is_symlink(fs::symlink_status(path, error)) && !fs::exists(path, error)) {
+    throw InvalidArgument(fmt::format("{} {}: is a link that leads nowhere: give a new folder", option, shown));
+  }
   const bool is_folder = fs::is_directory(path, error);
   const bool is_empty = is_folder && fs::is_empty(path, error);
   if (error) throw IoError(fmt::format("{} {}: {}; choose another folder", option, shown, error.message()));
@@ -148,8 +152,6 @@ OutputFolder::OutputFolder(const std::string& folder, bool resume, const std::ve
     : shown_(folder), resume_(resume), planned_(planned.begin(), planned.end()) {
   expect_named("--out", folder);
   path_ = place_of(folder);
-  std::error_code none;
-  if (is_there(path_) && !fs::is_directory(path_, none)) vision::make_folder(path_);  // says what is wrong
   look();
 }
 
@@ -224,6 +226,7 @@ fs::path OutputFolder::named_file(const std::string& option, const std::string& 
 }
 
 void OutputFolder::begin(Json identity) {
+  is_made_ = !is_there(path_);
   vision::make_folder(path_);
   if (earlier_.is_null()) return;
   // One that lost its device went on elsewhere, with the same bits.
@@ -233,6 +236,14 @@ void OutputFolder::begin(Json identity) {
     identity.erase("device");
   }
   expect_same(shown_, earlier_, identity);
+}
+
+void OutputFolder::leave_nothing() const {
+  if (!earlier_.is_null()) return;
+  std::error_code none;  // a folder with a file stays
+  for (const char* file : {"report.json", kRunCalibration}) fs::remove(path_ / file, none);
+  for (const std::string& folder : folders_of(planned_)) fs::remove(path_ / folder, none);
+  if (is_made_) fs::remove(path_, none);
 }
 
 bool OutputFolder::is_to_write(const fs::path& file, std::string_view bytes) const {

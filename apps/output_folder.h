@@ -49,6 +49,9 @@ class OutputFolder {
   /// one that is to go on.
   void begin(nlohmann::ordered_json identity);
 
+  /// Removes what a run that wrote no frame has made: its report, empty folders, and OUT, unless that was there.
+  void leave_nothing() const;
+
   /// To be called before a file is written. Returns whether it is to be written: of a run that goes on, what is there
   /// stays. Throws InvalidArgument where that has other bytes, and IoError where another put it there meanwhile.
   bool is_to_write(const std::filesystem::path& file, std::string_view bytes) const;
@@ -59,7 +62,7 @@ class OutputFolder {
 
   std::filesystem::path path_;
   std::string shown_;  // as the user wrote it
-  bool resume_ = false, lacks_nothing_ = false;
+  bool resume_ = false, lacks_nothing_ = false, is_made_ = false;
   std::set<std::string> planned_, named_;
   nlohmann::ordered_json earlier_;  // the report of the run that goes on, null without one
 };

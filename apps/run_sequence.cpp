@@ -118,6 +118,7 @@ class Run {
       return finished;
     } catch (const std::exception& error) {
       finish_after(interrupted() ? kInterrupt : error.what());
+      if (has_folder() && poses_.empty() && !interrupted()) folder_.leave_nothing();
       throw;
     }
   }

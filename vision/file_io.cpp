@@ -51,8 +51,9 @@ class Descriptor {
 }
 
 [[noreturn]] void fail_writing(const std::filesystem::path& file, int error) {
-  throw IoError(file.string() + ": cannot be written: " + reason(error) +
-                "; free some space or choose a folder that can be written");
+  const char* remedy = error == ENOENT ? "; its folder is gone: choose one that stays"
+                                       : "; free some space or choose a folder that can be written";
+  throw IoError(file.string() + ": cannot be written: " + reason(error) + remedy);
 }
 
 /// For what a pipe without its other end would be waited for without an end: whether to try again.

@@ -66,7 +66,8 @@ struct OdometryResult {
 ///
 /// One frame is kept, so each image is processed once. While the camera stands, motions are exactly the identity, and
 /// the frame where it stopped is the one that is kept. Deterministic: the same images give the same bits; one thread.
-/// Not thread-safe: use one object per thread.
+/// Not thread-safe: use one object per thread. An object that was moved from may be destroyed or assigned to, and
+/// nothing else.
 class EGOSGM_EXPORT StereoOdometry {
  public:
   /// Throws InvalidArgument where the calibration or an option cannot be used.

@@ -19,7 +19,8 @@ namespace egosgm {
 /// Dense disparity from stereo video (Fućek et al. 2017): the last frame's disparity map, moved by the camera's motion,
 /// says where to search, and a Kalman filter per pixel fuses what was predicted with what was measured.
 ///
-/// Not thread-safe; two pipelines may run in two threads, also on one device.
+/// Not thread-safe; two pipelines may run in two threads, also on one device. A pipeline that was moved from may be
+/// destroyed or assigned to, and nothing else.
 class EGOSGM_EXPORT Pipeline {
  public:
   /// Allocates all memory for images of exactly `width` x `height`, and builds the kernels for disparities of images of

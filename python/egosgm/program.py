@@ -58,7 +58,7 @@ def _output_error() -> Optional[OSError]:
 
 def _lead_interrupts(handler: Any) -> None:
     """At first they end the process: modules of others lose an error that comes while they load, and Python would wait for C++ to come back."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         if threading.current_thread() is threading.main_thread() and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, handler)
 

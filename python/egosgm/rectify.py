@@ -167,7 +167,9 @@ def main(arguments: Sequence[str]) -> int:
     folder = _SequenceFolder(pathlib.Path(given.out))
     stops: List[int] = []
     if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) == signal.SIG_IGN:  # as nohup has it
+                continue
             signal.signal(number, lambda *_: stops.append(1))  # a pair that was begun is written whole
     say_line, note = _Lines(given.quiet), pairs.note
     if note:

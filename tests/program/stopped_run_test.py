@@ -55,7 +55,7 @@ class Disk(LongRuns):
 
     def test_an_interrupt_ends_cleanly(self):
         street = self.long_street()
-        for stop in (signal.SIGINT, signal.SIGTERM):
+        for stop in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             out = self.new_folder()
             process = self.start(street, out)
             process.send_signal(stop)

@@ -168,6 +168,24 @@ class BrokenInput(ProgramTest):
             self.assertIn(str(word), text)
             self.assertIn(str(word), report["left_out"][0]["why"])
 
+    def test_a_run_that_read_nothing_leaves_nothing(self):
+        street = self.broken_street()
+        images = {file: file.read_bytes() for file in (street / "image_0").iterdir()}
+        for file in images:
+            file.write_bytes(b"no image")
+        self.assert_sequence_refused(street, f"{FRAMES} of {FRAMES} pairs could not be read")
+        empty = self.new_folder()
+        self.assert_refused(["run", street, "--out", empty], "could not be read")
+        self.assertEqual(list(empty.iterdir()), [])
+        for file, data in images.items():
+            file.write_bytes(data)
+        self.assert_works("run", street, "--out", empty)
+
+    def test_a_folder_that_is_a_link_to_nothing(self):
+        link = self.new_folder() / "link"
+        link.symlink_to("nothing")
+        self.assert_refused(["run", self.street, "--out", link], str(link), "leads nowhere")
+
     def test_a_pipe_among_the_images(self):
         street = self.broken_street()
         (street / "image_0/000002.png").unlink()
