@@ -82,7 +82,7 @@ struct SpeckleRemovalOptions {
 struct KalmanUpdateOptions {
   float gate_px = 3.0f;        // where prediction and measurement differ by more, the measurement is taken; 0: never
   bool keep_predicted = true;  // a prediction without a measurement stays, with its grown variance
-  bool ask_neighbours = true;  // the measurement is taken, too, where most of them are off to the same side
+  bool ask_neighbours = true;  // where most of them are off to one side, they move the prediction first
   float min_variance_px2 = 0.02f;
 };
 struct EvidenceOptions {

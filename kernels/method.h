@@ -89,10 +89,15 @@
 
 // Prediction and measurement differ where they do by more than this.
 #define EGOSGM_DIFFERENCE_PX 1.0f
-// KalmanUpdate asks every fourth pixel this far to all sides: 25. What differs moves by itself where most of them do.
-#define EGOSGM_SUPPORT_RADIUS 8
-#define EGOSGM_SUPPORT_STEP 4
-#define EGOSGM_MOVING_COUNT 13
+// KalmanUpdate takes the mean innovation of a window of blocks, this many to all sides, for their drift: of every
+// second row, where at least so many pixels agree within the gate, most are off to a side by SIDE, and the mean by
+// LEAST_DRIFT. Innovations are summed up in such whole steps.
+#define EGOSGM_DRIFT_RADIUS 2
+#define EGOSGM_DRIFT_ROW_STEP 2
+#define EGOSGM_DRIFT_LEAST_COUNT 60
+#define EGOSGM_DRIFT_SIDE_PX 0.05f
+#define EGOSGM_LEAST_DRIFT_PX 0.1f
+#define EGOSGM_DRIFT_STEPS_PER_PX 256.0f
 
 // DynamicMap looks at every second pixel this far to all sides: 25. It believes so many of them that have a prediction
 // and a measurement: a third.

@@ -91,6 +91,10 @@ AT_EDGE Ints load_bytes_at_edge(global const uchar* row, const int x, const int 
   const Ints at = x + LANE_INDICES, inside = clamp(at, (Ints)(0), (Ints)(width - 1));
   return at == inside ? GATHERED(Ints, row, inside) : (Ints)(0);
 }
+AT_EDGE Ints load_words_at_edge(global const int* row, const int x, const int width) {
+  const Ints at = x + LANE_INDICES, inside = clamp(at, (Ints)(0), (Ints)(width - 1));
+  return at == inside ? GATHERED(Ints, row, inside) : (Ints)(0);
+}
 // `count` < 16 lanes, by powers of two.
 #define STORE_LANES(lanes, to, count) \
   if ((count)&8) {                    \
@@ -180,6 +184,16 @@ static inline void store_bytes(const Ints values, global uchar* row, const int x
 typedef struct __attribute__((packed)) {
   int16 lanes;
 } PackedInts;
+
+// Words x .. x + PIXELS - 1 of a row; what lies outside of it is 0.
+static inline Ints load_words(global const int* row, const int x, const int width) {
+#if PIXELS == 1
+  return x >= 0 && x < width ? row[x] : 0;
+#else
+  return x >= 0 && x + PIXELS <= width ? ((global const PackedInts*)(row + x))->lanes
+                                       : load_words_at_edge(row, x, width);
+#endif
+}
 
 // Stores words of four bytes each, the lowest first.
 static inline void store_words(const Ints words, global uchar* row, const int x, const int width) {

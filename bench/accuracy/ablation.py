@@ -16,7 +16,7 @@ ABLATION = [
     ("census 5x5", {"cost": "census5x5"}, "A smaller window."),
     ("no band from neighbours", {"constants.search_band.from_neighbours": False}, "A pixel without a prediction then searches everything."),
     ("no gate", {"gate_px": 0}, "Prediction and measurement are averaged even where they contradict each other."),
-    ("neighbours not asked", {"constants.kalman_update.ask_neighbours": False}, "The measurement counts wherever it contradicts the prediction."),
+    ("neighbours not asked", {"constants.kalman_update.ask_neighbours": False}, "Nothing around a pixel moves its prediction."),
     ("no prediction kept", {"keep_predicted": False}, "What is not measured in this frame is forgotten."),
     ("edge rejection", {"constants.edge_rejection.max_jump_px": 5}, "Predictions beside a jump go (the paper's)."),
     ("predictions of both views not compared", {"constants.consistency.prediction_px": 1e6}, "A prediction stays whatever the other view's says, if it has one (the paper's)."),

@@ -3,6 +3,9 @@
 
 #include <limits>
 
+#include "host/stages/coarse_match.h"
+#include "kernels/method.h"
+
 namespace egosgm {
 
 KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options,
@@ -13,17 +16,30 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
       keep_predicted_(options.keep_predicted),
       ask_neighbours_(options.ask_neighbours),
       min_variance_px2_(options.min_variance_px2),
+      blocks_(CoarseMatch::coarse_size(size)),
+      sums_(context, 2 * static_cast<std::size_t>(EGOSGM_EVIDENCE_STRIDE(size.width)) * blocks_.height),
+      counts_(context, sums_.size()),
+      drifts_(context, sums_.size()),
+      sum_(stage_, "sum_innovations"),
+      find_drift_(stage_, "find_drift"),
       update_(stage_, "update"),
-      none_(context, {1, 1}) {}
+      none_(context, {1, 1}) {
+  drifts_.fill(stage_.enter(), 0.0f);
+}
 
 void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
                           const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful,
                           FlagMap& updated_evidence, Views views) {
   const BlockEvidence& blocks = evidence ? evidence->blocks : none_;
-  stage_.launch_pixels(update_, count(views), has_gate_, gate_px_, keep_predicted_, ask_neighbours_, min_variance_px2_,
-                       hidden, predicted.disparity, predicted.variance, measured.disparity, measured.variance,
+  if (ask_neighbours_) {
+    const ocl::Range each = ocl::every_pixels(stage_.enter(), blocks_, stage_.pixels(), count(views));
+    stage_.launch(sum_, each, stage_.size(), gate_px_, predicted.disparity, measured.disparity, sums_, counts_);
+    stage_.launch(find_drift_, each, stage_.size(), sums_, counts_, drifts_);
+  }
+  stage_.launch_pixels(update_, count(views), has_gate_, gate_px_, keep_predicted_, min_variance_px2_, hidden,
+                       predicted.disparity, predicted.variance, measured.disparity, measured.variance,
                        measured.doubtful, evidence != nullptr, evidence && evidence->repeats,
-                       evidence ? evidence->before : hidden, blocks.evidence, blocks.found, updated.disparity,
+                       evidence ? evidence->before : hidden, blocks.evidence, blocks.found, drifts_, updated.disparity,
                        updated.variance, doubtful, updated_evidence);
 }
 

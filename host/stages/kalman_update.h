@@ -9,9 +9,9 @@
 namespace egosgm {
 
 /// Fuses prediction and measurement, pixel by pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the
-/// two differ by more than the gate, or to the same side as most around (something moves by itself), or only the
-/// measurement is there, the measurement is taken. Without a gate, as in the paper, all that is predicted and measured
-/// is averaged, and nothing hides it.
+/// two differ by more than the gate, or only the measurement is there, the measurement is taken. Where most pixels
+/// around are off to one side, as on what moves by itself, their mean innovation moves the prediction first. Without a
+/// gate, as in the paper, all that is predicted and measured is averaged, and nothing hides it.
 class KalmanUpdate {
  public:
   /// What is known of a frame before it is fused.
@@ -35,11 +35,18 @@ class KalmanUpdate {
   ocl::Stage stage_;
   const cl_int has_gate_;
   const float gate_px_;
-  const cl_int keep_predicted_, ask_neighbours_;
+  const cl_int keep_predicted_;
+  const bool ask_neighbours_;
   const float min_variance_px2_;
-  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const cl_int, const float,
-              const FlagMap, const Map, const Map, const Map, const Map, const FlagMap, const cl_int, const cl_int,
-              const FlagMap, const ocl::Buffer<cl_int>, const Map, Map, Map, FlagMap, FlagMap>
+  const shared::ImageSize blocks_;
+  ocl::Buffer<cl_int> sums_, counts_;
+  Map drifts_;
+  ocl::Kernel<const shared::ImageSize, const float, const Map, const Map, ocl::Buffer<cl_int>, ocl::Buffer<cl_int>>
+      sum_;
+  ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_int>, Map> find_drift_;
+  ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const float, const FlagMap, const Map,
+              const Map, const Map, const Map, const FlagMap, const cl_int, const cl_int, const FlagMap,
+              const ocl::Buffer<cl_int>, const Map, const Map, Map, Map, FlagMap, FlagMap>
       update_;
   const BlockEvidence none_;
 };

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two contradict each
-// other, by more than the gate or because the measurement is doubtful, or where they differ to the same side as most
-// pixels around, as on what moves by itself, the measurement is taken. It then is doubtful, and its variance is so
-// large that the next frame searches wide. What is hidden by a surface nearer than the range (ForwardWarp) has no
-// disparity: whatever is measured there is a mismatch. Without a gate nothing contradicts anything.
+// other, by more than the gate or because the measurement is doubtful, the measurement is taken. It then is doubtful,
+// and its variance is so large that the next frame searches wide. What is hidden by a surface nearer than the range
+// (ForwardWarp) has no disparity: whatever is measured there is a mismatch. Without a gate nothing contradicts
+// anything.
+//
+// What moves by itself is off to one side of its prediction, together with the pixels around. Their mean innovation m,
+// the drift, moves the prediction to d' + m, and makes it as much less certain: p' + m^2.
 //
 // Evidence (evidence.cl) decides what lives: a pixel's evidence is a sum over frames that moves with the map. Below 0
 // the pixel dies, whatever was predicted or measured. A measurement without evidence moves no prediction, and lowers no
@@ -15,37 +18,85 @@
 // lint: PIXELS=1
 // lint: PIXELS=16
 
-static Ints is_off_to(const Floats side, const Floats d, const Floats z) {
-  return (d > INVALID) & (z > INVALID) & ((z - d) * side > (Floats)(EGOSGM_DIFFERENCE_PX));
+// Innovations of a pixel: the sum of z - d in steps of 1 / EGOSGM_DRIFT_STEPS_PER_PX, and how many there are. Ten bits
+// each count all, those off to the nearer side and those off to the farther one: a window has 200 pixels.
+#define OFF_NEARER (1 << 10)
+#define OFF_FARTHER (1 << 20)
+#define COUNT_OF(counts, unit) ((counts) / (unit)&1023)
+
+static inline void add_innovations(const Floats d, const Floats z, const float gate, Ints* sums, Ints* counts) {
+  const Floats innovation = z - d, steps = EGOSGM_DRIFT_STEPS_PER_PX;
+  const Ints agrees = (d > INVALID) & (z > INVALID) & (fabs(innovation) <= gate);
+  const Ints nearer = innovation > (Floats)(EGOSGM_DRIFT_SIDE_PX),
+             farther = innovation < (Floats)(-EGOSGM_DRIFT_SIDE_PX);
+  *sums += INTS_OF_FLOATS(nearest(agrees ? innovation * steps : (Floats)(0.0f)));
+  *counts += agrees ? (nearer ? (Ints)(1 + OFF_NEARER) : farther ? (Ints)(1 + OFF_FARTHER) : (Ints)(1)) : (Ints)(0);
 }
 
-// Whether the two pixels beside are off to a side as well, which few are: asked without a branch, as what moves by a
-// pixel alone is found in every third block.
-static Ints are_beside_off_to(const Floats side, const int x, const int width, global const float* predictions,
-                              global const float* measurements) {
-  const int left = x - EGOSGM_SUPPORT_STEP, right = x + EGOSGM_SUPPORT_STEP;
-  return is_off_to(side, load_pixels(predictions, left, width), load_pixels(measurements, left, width)) &
-         is_off_to(side, load_pixels(predictions, right, width), load_pixels(measurements, right, width));
-}
-
-// Which of `moves` do so together with EGOSGM_MOVING_COUNT of the 25 around. No row is asked once too many are not off:
-// that decides nearly everywhere.
-static Ints move_together(const ImageSize size, const int x, const int y, const Floats side, Ints moves,
-                          global const float* predictions, global const float* measurements) {
-  const int step = EGOSGM_SUPPORT_STEP;
-  const Floats needed = EGOSGM_MOVING_COUNT;
-  Floats off = 0.0f;
-  for (int v = y - EGOSGM_SUPPORT_RADIUS; v <= y + EGOSGM_SUPPORT_RADIUS && any_of(moves); v += step) {
-    const int is_inside = v >= 0 && v < size.height;
-    const size_t row = is_inside ? (size_t)v * size.width : 0;
-    for (int u = x - EGOSGM_SUPPORT_RADIUS; is_inside && u <= x + EGOSGM_SUPPORT_RADIUS; u += step) {
-      off += one_where(is_off_to(side, load_pixels(predictions + row, u, size.width),
-                                 load_pixels(measurements + row, u, size.width)));
+// The innovations within the gate of blocks of EGOSGM_COARSE x EGOSGM_COARSE pixels, of every second row. A work-item a
+// block, or a row of them; rows have EGOSGM_EVIDENCE_STRIDE places.
+COMPILED_ONCE void sum_row(const WorkItem at, const ImageSize size, const float gate, global const float* predicted,
+                           global const float* measured, global int* sums, global int* counts) {
+  const int width = size.width, blocks_high = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int y = at.y * EGOSGM_COARSE, end = min(y + EGOSGM_COARSE, size.height);
+  const size_t row_of_blocks = ((size_t)at.view * blocks_high + at.y) * EGOSGM_EVIDENCE_STRIDE(width);
+  const int step = PIXELS == 1 ? EGOSGM_COARSE : PIXELS;
+  for (int start = at.x * step; start < width; start += at.items * step) {
+    Ints sum = 0, count = 0;
+    for (int v = y; v < end; v += EGOSGM_DRIFT_ROW_STEP) {
+      const size_t row = ((size_t)at.view * size.height + v) * width;
+      for (int x = start; x < start + step; x += PIXELS) {
+        add_innovations(load_pixels(predicted + row, x, width), load_pixels(measured + row, x, width), gate, &sum,
+                        &count);
+      }
     }
-    const Floats to_come = (y + EGOSGM_SUPPORT_RADIUS - v) / step * 5;
-    moves &= off + to_come >= needed;
+    const size_t block = row_of_blocks + start / EGOSGM_COARSE;
+#if PIXELS == 1
+    sums[block] = sum;
+    counts[block] = count;
+#else
+    const int8 sum8 = sum.even + sum.odd, count8 = count.even + count.odd;
+    vstore4(sum8.even + sum8.odd, 0, sums + block);
+    vstore4(count8.even + count8.odd, 0, counts + block);
+#endif
   }
-  return moves;
+}
+
+KERNEL void sum_innovations(const ImageSize size, const float gate, global const float* predicted,
+                            global const float* measured, global int* sums, global int* counts) {
+  sum_row(THIS_WORK_ITEM, size, gate, predicted, measured, sums, counts);
+}
+
+// The drift of blocks: the mean over a window of blocks, and 0 where few have both values, the mean is small, or less
+// than three fifths are off to its side.
+COMPILED_ONCE void drift_row(const WorkItem at, const ImageSize size, global const int* sums, global const int* counts,
+                             global float* drifts) {
+  const int radius = EGOSGM_DRIFT_RADIUS, stride = EGOSGM_EVIDENCE_STRIDE(size.width);
+  const int width = (size.width + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const int height = (size.height + EGOSGM_COARSE - 1) / EGOSGM_COARSE;
+  const size_t view = (size_t)at.view * height * stride;
+  FOR_PIXELS(x, width) {
+    Ints sum = 0, count = 0;
+    for (int v = max(at.y - radius, 0); v <= min(at.y + radius, height - 1); ++v) {
+      const size_t row = view + (size_t)v * stride;
+#pragma unroll
+      for (int u = -radius; u <= radius; ++u) {
+        sum += load_words(sums + row, x + u, width);
+        count += load_words(counts + row, x + u, width);
+      }
+    }
+    const Ints all = COUNT_OF(count, 1);
+    const Ints off = sum > 0 ? COUNT_OF(count, OFF_NEARER) : COUNT_OF(count, OFF_FARTHER);
+    const Floats steps = EGOSGM_DRIFT_STEPS_PER_PX;
+    const Floats mean = FLOATS_OF_INTS(sum) / (steps * FLOATS_OF_INTS(max(all, (Ints)(1))));
+    const Ints is_drift =
+        (all >= EGOSGM_DRIFT_LEAST_COUNT) & (5 * off >= 3 * all) & (fabs(mean) > (Floats)(EGOSGM_LEAST_DRIFT_PX));
+    store_pixels(is_drift ? mean : (Floats)(0.0f), drifts + view + (size_t)at.y * stride, x, width);
+  }
+}
+
+KERNEL void find_drift(const ImageSize size, global const int* sums, global const int* counts, global float* drifts) {
+  drift_row(THIS_WORK_ITEM, size, sums, counts, drifts);
 }
 
 // What is known of the blocks of pixels x .. x + PIXELS - 1, each pixel what its own is.
@@ -117,17 +168,16 @@ static inline void drop_lone(const ImageSize size, const int start, const int y,
   }
 }
 
-// `hidden`: not 0 where a surface nearer than the range hides what is behind it. ask_neighbours: whether a measurement
-// is taken that differs to the same side as those of EGOSGM_MOVING_COUNT around do. has_gate: else all that is
+// `hidden`: not 0 where a surface nearer than the range hides what is behind it. has_gate: else all that is
 // predicted and measured is averaged, and nothing is hidden or doubtful. has_evidence: else `evidence_before`,
 // `block_evidence` and `found` are not read, and all that lives is confirmed.
 COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int has_gate, const float gate,
-                              const int keep_predicted, const int ask_neighbours, const float min_variance,
-                              global const uchar* hidden, global const float* predicted,
-                              global const float* predicted_variance, global const float* measured,
-                              global const float* measured_variance, global const uchar* measured_doubtful,
-                              const int has_evidence, const int repeats, global const uchar* evidence_before,
-                              global const int* block_evidence, global const float* found, global float* updated,
+                              const int keep_predicted, const float min_variance, global const uchar* hidden,
+                              global const float* predicted, global const float* predicted_variance,
+                              global const float* measured, global const float* measured_variance,
+                              global const uchar* measured_doubtful, const int has_evidence, const int repeats,
+                              global const uchar* evidence_before, global const int* block_evidence,
+                              global const float* found, global const float* drifts, global float* updated,
                               global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
   const int width = size.width;
   const int y = at.y;
@@ -144,7 +194,8 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
     FOR_BLOCKS(x, i, start, width) {
       const Floats d = load_pixels(predicted + row, x, width);
       const Floats z = taken[i];
-      const Floats p = load_pixels(predicted_variance + row, x, width);
+      const Floats drift = OF_ITS_BLOCK(Floats, drifts + row_of_blocks, x);
+      const Floats p = load_pixels(predicted_variance + row, x, width) + drift * drift;
       const Floats r = load_pixels(measured_variance + row, x, width);
       Verdict verdict = {(Ints)(EGOSGM_EVIDENCE_MOST), (Ints)(-1), (Ints)(-1)};
       if (has_evidence) {
@@ -161,31 +212,22 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
       const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
 
       const Floats zero = 0.0f;
-      const Floats innovation = z - d;
       const Floats sum = p + r;
       const Floats gain = sum > zero ? p / sum : zero;
-      const Floats fused = d + gain * innovation;
+      const Floats moved = d + drift;
+      const Floats fused = moved + gain * (z - moved);
       const Floats fused_variance = (1.0f - gain) * p;
 
       const Floats wide = EGOSGM_DOUBTFUL_VARIANCE_PX2;
       const Floats contradicting = r < wide ? wide : r;
       Floats value = fuses ? fused : has_measurement ? z : predicts ? d : INVALID;
       value = verdict.lives ? value : INVALID;
-      Floats variance = fuses ? fused_variance : has_both ? contradicting : has_measurement ? r : p;
+      const Floats variance = fuses ? fused_variance : has_both ? contradicting : has_measurement ? r : p;
 
-      const Floats most = EGOSGM_DIFFERENCE_PX;
-      const Floats side = innovation > zero ? (Floats)(1.0f) : (Floats)(-1.0f);
-      Ints moves = fuses & (fabs(innovation) > most) & (Ints)(ask_neighbours ? -1 : 0) &
-                   are_beside_off_to(side, x, width, predicted + row, measured + row);
-      if (any_of(moves)) {
-        moves = move_together(size, x, y, side, moves, predicted + view, measured + view);
-        value = (moves & (value > INVALID)) ? z : value;
-        variance = moves ? wide : variance;
-      }
       const Floats least = min_variance;
       store_pixels(value, updated + row, x, width);
       store_pixels(variance < least ? least : variance, updated_variance + row, x, width);
-      const Ints contradicted = (has_both & !fuses) | (moves != 0) | (has_measurement & !has_prediction & is_doubtful);
+      const Ints contradicted = (has_both & !fuses) | (has_measurement & !has_prediction & is_doubtful);
       store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
       store_bytes(value > INVALID ? verdict.sums : (Ints)(0), evidence + row, x, width);
     }
@@ -193,13 +235,13 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
 }
 
 KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted,
-                   const int ask_neighbours, const float min_variance, global const uchar* hidden,
-                   global const float* predicted, global const float* predicted_variance, global const float* measured,
+                   const float min_variance, global const uchar* hidden, global const float* predicted,
+                   global const float* predicted_variance, global const float* measured,
                    global const float* measured_variance, global const uchar* measured_doubtful, const int has_evidence,
                    const int repeats, global const uchar* evidence_before, global const int* block_evidence,
-                   global const float* found, global float* updated, global float* updated_variance,
-                   global uchar* updated_doubtful, global uchar* evidence) {
-  update_row(THIS_WORK_ITEM, size, has_gate, gate, keep_predicted, ask_neighbours, min_variance, hidden, predicted,
-             predicted_variance, measured, measured_variance, measured_doubtful, has_evidence, repeats, evidence_before,
-             block_evidence, found, updated, updated_variance, updated_doubtful, evidence);
+                   global const float* found, global const float* drifts, global float* updated,
+                   global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
+  update_row(THIS_WORK_ITEM, size, has_gate, gate, keep_predicted, min_variance, hidden, predicted, predicted_variance,
+             measured, measured_variance, measured_doubtful, has_evidence, repeats, evidence_before, block_evidence,
+             found, drifts, updated, updated_variance, updated_doubtful, evidence);
 }

@@ -25,60 +25,38 @@ Estimate fuse(const Estimate& predicted, const Estimate& measured) {
           false};
 }
 
-/// One view, and what the pixels of it say.
-class View {
- public:
-  View(shared::ImageSize size, const float* predicted, const float* measured)
-      : size_(size), predicted_(predicted), measured_(measured) {}
-
-  /// Of the pixels around, those measured nearer than predicted (sign 1), or farther (-1), by more than a pixel.
-  int moving(int x, int y, float sign) const {
-    return count(x, y, [&](std::size_t i) { return is_moving(i, sign); });
-  }
-  /// Those to the left and to the right among them.
-  bool is_between_moving(int x, int y, float sign) const {
-    const std::size_t i = static_cast<std::size_t>(y) * size_.width + x;
-    return x >= kSupportStep && x + kSupportStep < size_.width && is_moving(i - kSupportStep, sign) &&
-           is_moving(i + kSupportStep, sign);
-  }
-
- private:
-  bool is_moving(std::size_t i, float sign) const {
-    return predicted_[i] != EGOSGM_INVALID_DISPARITY && measured_[i] != EGOSGM_INVALID_DISPARITY &&
-           sign * (measured_[i] - predicted_[i]) > kDifferencePx;
-  }
-
-  template <typename Condition>
-  int count(int x, int y, Condition&& condition) const {
-    int found = 0;
-    for (int v = -2; v <= 2; ++v) {
-      for (int u = -2; u <= 2; ++u) {
-        const int column = x + u * kSupportStep, row = y + v * kSupportStep;
-        if (column < 0 || column >= size_.width || row < 0 || row >= size_.height) continue;
-        found += condition(static_cast<std::size_t>(row) * size_.width + column);
-      }
+/// The mean innovation around a pixel of the view that begins at `view`, over 5x5 blocks of 4x4 pixels, of which every
+/// second row counts; 0 where that is no drift.
+float drift_around(shared::ImageSize size, const testing::HostMaps& predicted, const testing::HostMaps& measured,
+                   int view, int x, int y, float gate_px) {
+  int sum = 0, count = 0, nearer = 0, farther = 0;
+  for (int row = std::max(y / 4 * 4 - 8, 0); row < std::min(y / 4 * 4 + 12, size.height); row += 2) {
+    for (int column = std::max(x / 4 * 4 - 8, 0); column < std::min(x / 4 * 4 + 12, size.width); ++column) {
+      const int i = view + row * size.width + column;
+      const float d = predicted.disparity[i], z = measured.disparity[i];
+      if (d == EGOSGM_INVALID_DISPARITY || z == EGOSGM_INVALID_DISPARITY) continue;
+      if (gate_px > 0 && std::abs(z - d) > gate_px) continue;
+      ++count;
+      sum += static_cast<int>(std::nearbyint((z - d) * 256));
+      nearer += z - d > 0.05f;
+      farther += z - d < -0.05f;
     }
-    return found;
   }
-
-  const shared::ImageSize size_;
-  const float *predicted_, *measured_;
-};
+  if (count < 60) return 0;
+  const float mean = static_cast<float>(sum) / (256.0f * static_cast<float>(count));
+  const bool most_are_off = 5 * (mean > 0 ? nearer : farther) >= 3 * count;
+  return most_are_off && std::abs(mean) > 0.1f ? mean : 0;
+}
 
 bool contradict(float gate_px, float a, float b) { return gate_px > 0 && std::abs(a - b) > gate_px; }
 
-Estimate update(const KalmanUpdateOptions& options, const View& view, int x, int y, const Estimate& predicted,
-                const Estimate& measured) {
+Estimate update(const KalmanUpdateOptions& options, float drift, const Estimate& predicted, const Estimate& measured) {
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
   const bool is_plain = options.gate_px <= 0;  // the paper's: all that is predicted and measured is averaged
   const float z = measured.disparity, wide = kDoubtfulVariancePx2;
   if (!is_valid(predicted)) return measured;
-  const float innovation = z - predicted.disparity;
   if (!contradict(options.gate_px, z, predicted.disparity) && (is_plain || !measured.doubtful)) {
-    const bool moves = options.ask_neighbours && std::abs(innovation) > kDifferencePx &&
-                       view.is_between_moving(x, y, innovation > 0 ? 1.0f : -1.0f) &&
-                       view.moving(x, y, innovation > 0 ? 1.0f : -1.0f) >= 13;
-    return moves ? Estimate{z, wide, true} : fuse(predicted, measured);
+    return fuse({predicted.disparity + drift, predicted.variance}, measured);
   }
   return {z, std::max(measured.variance, wide), true};
 }
@@ -93,7 +71,8 @@ testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOption
   const int pixels = size.width * size.height;
   for (int i = 0; i < 2 * pixels; ++i) {
     const int first = i / pixels * pixels, x = (i - first) % size.width, y = (i - first) / size.width;
-    const View view(size, &predicted.disparity[first], &measured.disparity[first]);
+    const float drift =
+        options.ask_neighbours ? drift_around(size, predicted, measured, first, x, y, options.gate_px) : 0;
     const bool is_hidden = options.gate_px > 0 && !predicted.hidden.empty() && predicted.hidden[i] != 0;
     Estimate of_measurement{measured.disparity[i], measured.variance[i],
                             !measured.doubtful.empty() && measured.doubtful[i] != 0};
@@ -110,7 +89,7 @@ testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOption
     if (!verdict.counts) of_measurement = kNone;
     const bool lives = verdict.lives && !is_hidden;
     const Estimate estimate =
-        update(options, view, x, y, {predicted.disparity[i], predicted.variance[i], false}, of_measurement);
+        update(options, drift, {predicted.disparity[i], predicted.variance[i] + drift * drift, false}, of_measurement);
     const bool is_there = lives && is_valid(estimate);
     out.disparity[i] = is_there ? estimate.disparity : EGOSGM_INVALID_DISPARITY;
     out.doubtful.push_back(!is_hidden && estimate.doubtful);

@@ -188,68 +188,51 @@ TEST(KalmanUpdate, DropsWhatIsMeasuredWhereANearerSurfaceHidesIt) {
   }
 }
 
-/// 21x21 pixels: all have `around` as prediction and measurement, but for the pixel in the middle.
-struct Surroundings {
-  static constexpr shared::ImageSize kSize{21, 21};
-  static constexpr int kMiddle = 10 * 21 + 10;
+/// 20x20 pixels, the window of those in the middle: all are predicted at 20 px and measured `off` nearer, but for the
+/// pixel in the middle, in a row that does not count, which is measured at `z`.
+struct Window {
+  static constexpr shared::ImageSize kSize{20, 20};
+  static constexpr int kMiddle = 9 * 20 + 9, kCounted = 200;
   testing::HostMaps predicted, measured;
 
-  explicit Surroundings(float around) : predicted(all(around)), measured(all(around)) {}
+  Window(float off, float z) : predicted(all(20)), measured(all(20 + off)) { measured.disparity[kMiddle] = z; }
 
   static testing::HostMaps all(float disparity) {
     const std::size_t pixels = 2 * kSize.width * kSize.height;
     return {std::vector<float>(pixels, disparity), std::vector<float>(pixels, 1)};
   }
-  Estimate updated_in_the_middle(const KalmanUpdateOptions& options = {}) const {
+  /// The first `count` pixels that count are measured there.
+  Window& with(int count, float disparity) {
+    for (int i = 0; i < count; ++i) measured.disparity[i / 20 * 40 + i % 20] = disparity;
+    return *this;
+  }
+  Estimate middle(const KalmanUpdateOptions& options = {}) const {
     const testing::HostMaps updated = update(kSize, options, predicted, measured);
     return {updated.disparity[kMiddle], updated.variance[kMiddle], updated.doubtful[kMiddle] != 0};
   }
 };
 
-/// All are measured `off` nearer than predicted, the pixel in the middle `innovation`.
-Surroundings shifted(float off, float innovation) {
-  Surroundings maps(20);
-  for (float& disparity : maps.measured.disparity) disparity += off;
-  maps.measured.disparity[Surroundings::kMiddle] = 20 + innovation;
-  return maps;
+/// A prediction that the pixels around moved by `drift`, fused with z.
+Estimate drifted(float drift, float z) {
+  const float p = 1 + drift * drift, gain = p / (p + 1);
+  return {20 + drift + gain * (z - (20 + drift)), (1 - gain) * p};
 }
 
-TEST(KalmanUpdate, TakesTheMeasurementOfWhatMovesByItself) {
+TEST(KalmanUpdate, MovesThePredictionOfWhatMovesByItself) {
   for (const float sign : {1.0f, -1.0f}) {
-    EXPECT_EQ(shifted(sign * 1.125f, sign * 1.25f).updated_in_the_middle(), (Estimate{20 + sign * 1.25f, kWide, true}));
-    const Estimate fused{20 + sign * 0.625f, 0.5f};
-    EXPECT_EQ(shifted(sign * 1, sign * 1.25f).updated_in_the_middle(), fused) << "the others not far enough";
-    EXPECT_EQ(shifted(sign * -1.125f, sign * 1.25f).updated_in_the_middle(), fused) << "to the other side";
-    EXPECT_EQ(shifted(sign * 1.125f, sign * 1).updated_in_the_middle(), (Estimate{20 + sign * 0.5f, 0.5f}));
-    EXPECT_EQ(shifted(sign * 1.125f, sign * 1.25f).updated_in_the_middle({.ask_neighbours = false}), fused);
+    EXPECT_EQ(Window(sign * 0.5f, 20 + sign).middle(), drifted(sign * 0.5f, 20 + sign));
+    EXPECT_EQ(Window(sign * 0.5f, 20 + sign).middle({.ask_neighbours = false}), drifted(0, 20 + sign));
+    EXPECT_EQ(Window(sign * 0.5f, 20 + sign * 4).middle(), (Estimate{20 + sign * 4, kWide, true})) << "contradicted";
+    EXPECT_EQ(Window(sign * 26 / 256, 20).middle(), drifted(sign * 26 / 256, 20));
+    EXPECT_EQ(Window(sign * 25 / 256, 20).middle(), drifted(0, 20)) << "too little";
   }
-  Surroundings maps = shifted(1.125f, 1.25f);
-  for (const int still : {2, 6, 10, 14, 18}) {
-    maps.measured.disparity[2 * 21 + still] = maps.measured.disparity[18 * 21 + still] = 20;
-  }
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kWide, true})) << "15 of 25";
-  maps.measured.disparity[6 * 21 + 2] = maps.measured.disparity[14 * 21 + 18] = 20;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{21.25f, kWide, true})) << "13 of 25";
-  maps.measured.disparity[14 * 21 + 2] = 20;
-  EXPECT_EQ(maps.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "12 of 25";
-  for (const int beside : {6, 14}) {
-    Surroundings between = shifted(1.125f, 1.25f);
-    between.measured.disparity[10 * 21 + beside] = 20;
-    EXPECT_EQ(between.updated_in_the_middle(), (Estimate{20.625f, 0.5f})) << "but not beside";
-  }
-}
-
-TEST(KalmanUpdate, CountsNoPixelOutsideOfTheImageAmongThoseThatMove) {
-  Surroundings maps(20);
-  maps.measured = Surroundings::all(21.25f);
-  const testing::HostMaps updated = update(Surroundings::kSize, {}, maps.predicted, maps.measured);
-  const auto moved = [&](int view, int x, int y) { return updated.disparity[(view * 21 + y) * 21 + x] == 21.25f; };
-  for (const int view : {0, 1}) {
-    EXPECT_TRUE(moved(view, 10, 3) && moved(view, 10, 17)) << "15 of 25 lie in the image";
-    EXPECT_FALSE(moved(view, 7, 3) || moved(view, 13, 3)) << "12";
-    EXPECT_FALSE(moved(view, 7, 17) || moved(view, 13, 17));
-    EXPECT_FALSE(moved(view, 3, 10) || moved(view, 17, 10)) << "none beside";
-  }
+  EXPECT_EQ(Window(0.5f, 21).with(80, 20).middle(), drifted(0.3f, 21)) << "three fifths";
+  EXPECT_EQ(Window(0.5f, 21).with(81, 20).middle(), drifted(0, 21)) << "fewer";
+  EXPECT_EQ(Window(0.5f, 21).with(100, 19.5f).middle(), drifted(0, 21)) << "to both sides";
+  EXPECT_EQ(Window(0.5f, 21).with(100, 20 + 12.0f / 256).middle(), drifted(0, 21)) << "half are hardly off";
+  EXPECT_EQ(Window(0.5f, 21).with(140, 28).middle(), drifted(0.5f, 21)) << "60 agree within the gate";
+  EXPECT_EQ(Window(0.5f, 21).with(141, 28).middle(), drifted(0, 21)) << "59";
+  EXPECT_EQ(Window(0.5f, 21).with(141, kNone).middle(), drifted(0, 21)) << "59 are measured";
 }
 
 /// The left pixel in the middle of 25x1, whose match lies in the image, and its evidence. `supporters`: how many of the
