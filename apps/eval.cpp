@@ -98,7 +98,7 @@ Result measure(const vision::EvaluationPairs& found, const EvalArguments& argume
     result.add(result.rows.back().counts);
     progress.done(pair.name);
   }
-  result.doubts = estimates.doubts(arguments.scale);
+  result.doubts = estimates.doubts(arguments.scale, arguments.truth_scale);
   return result;
 }
 

@@ -9,6 +9,7 @@
 #include "apps/option_group.h"
 #include "egosgm/error.h"
 #include "egosgm/vision/calibration_io.h"
+#include "vision/folder_contents.h"
 
 namespace egosgm::app {
 namespace {
@@ -45,9 +46,10 @@ vision::PairBy parse_pair_by(const std::string& pair_by) {
 void SequenceArguments::add_to(CLI::App& command) {
   const std::string heading = "Input (one of)";
   OptionGroup input(command, heading);
-  input.add("DATASET,--dataset", folder, "DIR",
-            "folder in the layout of KITTI odometry, KITTI raw or Middlebury, whichever it is, or with left, right and "
-            "calib.txt");
+  input.add(
+      "DATASET,--dataset", folder, "DIR",
+      "folder in the layout of KITTI odometry, KITTI raw or Middlebury, whichever it is, or with left and right, or "
+      "with a folder for each pair; with their calib.txt, or with --calib");
   input.add("RIGHT", other_picture, "", "where DATASET is the left picture of a pair, the right one");
   input.add("--odometry", odometry, "DIR",
             "KITTI odometry sequence: image_0, image_1 (or image_2, image_3), calib.txt");
@@ -58,7 +60,8 @@ void SequenceArguments::add_to(CLI::App& command) {
             "left images: one PNG or JPEG, or a pattern (in quotes) such as 'left/%06d.png' or 'left/*.jpg'");
   input.add("--right", right, "PATTERN", "right images, likewise; rectified");
   input.add("--calib", calib, "FILE",
-            "calibration of --left and --right: KITTI's, Middlebury's, or fx, fy, cx, cy, baseline_m; with the "
+            "calibration of --left and --right, or of a folder without one: KITTI's, Middlebury's, or fx, fy, cx, cy, "
+            "baseline_m; with the "
             "Python package, of whichever program");
   add_pair_by(command, pair_by, heading);
   input.add("--frames", frames, "FIRST:LAST", "frame numbers, both ends included: 7:10, 7:, :10 or 7; without: all");
@@ -74,6 +77,14 @@ vision::StereoSequence SequenceArguments::open(bool needs_calibration, const Cal
     pair.left = std::exchange(pair.folder, "");
     pair.right = std::exchange(pair.other_picture, "");
     return pair.open(needs_calibration, read);
+  }
+  if (!folder.empty() && left.empty() && right.empty() && !calib.empty()) {
+    if (const auto cameras = vision::find_two_cameras(folder); cameras && cameras->calibration.empty()) {
+      SequenceArguments pairs = *this;
+      pairs.folder.clear();
+      pairs.left = cameras->left, pairs.right = cameras->right;
+      return pairs.open(needs_calibration, read);
+    }
   }
   const bool patterns = !left.empty() || !right.empty() || !calib.empty();
   std::vector<std::string> sources;
@@ -102,7 +113,11 @@ vision::StereoSequence SequenceArguments::open(bool needs_calibration, const Cal
   const vision::FrameRange range = frames.empty() ? vision::FrameRange{} : vision::parse_frame_range(frames);
   if (!kitti.empty()) return vision::open_kitti_multiview(kitti, scene, range);
   if (!odometry.empty()) return vision::open_kitti_odometry(odometry, range);
-  if (!folder.empty()) return vision::open_folder(folder, range);
+  if (!folder.empty()) {
+    vision::StereoSequence sequence = vision::open_folder(folder, range);
+    if (sequence.has_calibration || !needs_calibration) return sequence;
+    throw InvalidArgument(folder + ": holds no calibration: put calib.txt there, or give --calib FILE");
+  }
   return open_pictures(range, read);
 }
 

@@ -121,12 +121,12 @@ void bind_estimates(py::module_& module) {
           py::arg("estimate"), py::arg("truth"))
       .def(
           "doubts",
-          [](const EstimateReader& reader, double scale) {
+          [](const EstimateReader& reader, double scale, double truth_scale) {
             py::list doubts;
-            for (const std::string& doubt : reader.doubts(scale)) doubts.append(text_of(doubt));
+            for (const std::string& doubt : reader.doubts(scale, truth_scale)) doubts.append(text_of(doubt));
             return doubts;
           },
-          py::arg("scale"));
+          py::arg("scale"), py::arg("truth_scale"));
   module.def(
       "_parse_frame_range",
       [](const std::string& frames) {

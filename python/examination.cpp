@@ -7,6 +7,7 @@
 #include "vision/coarse_map.h"
 #include "vision/doubt.h"
 #include "vision/grey_bytes.h"
+#include "vision/mosaic.h"
 
 namespace egosgm::python {
 namespace {
@@ -35,6 +36,9 @@ void bind_images(py::module_& module) {
         return py::make_tuple(array_of(left_bytes), array_of(right_bytes));
       },
       py::arg("left"), py::arg("right"), "A pair as uint8, as the odometry sees it.");
+  module.def(
+      "_holds_mosaic", [](const py::object& grey) { return vision::holds_mosaic(mat_of(grey, "grey")); },
+      py::arg("grey"), "Whether a uint8 image is the mosaic of a colour sensor.");
   module.def(
       "_check_range",
       [](int disparities, int min_disparity) {

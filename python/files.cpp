@@ -47,8 +47,9 @@ void bind_sequences(py::module_& module) {
   auto sequence =
       py::class_<StereoSequence>(module, "StereoSequence", "Frames of one rectified camera pair, one after the other.");
   pickle_members<&StereoSequence::title, &StereoSequence::frames, &StereoSequence::numbers, &StereoSequence::note,
-                 &StereoSequence::has_calibration, &StereoSequence::calibration, &StereoSequence::calibration_file,
-                 &StereoSequence::poses_file, &StereoSequence::times_file>(sequence);
+                 &StereoSequence::has_calibration, &StereoSequence::calibration, &StereoSequence::calibrated_width,
+                 &StereoSequence::calibrated_height, &StereoSequence::calibration_file, &StereoSequence::poses_file,
+                 &StereoSequence::times_file>(sequence);
   sequence.def_property_readonly("title", [](const StereoSequence& s) { return text_of(s.title); })
       .def_readonly("frames", &StereoSequence::frames)
       .def_readonly("numbers", &StereoSequence::numbers, "Of all frames that are there, chosen or not.")
@@ -64,8 +65,9 @@ void bind_sequences(py::module_& module) {
       .def_readonly("poses_file", &StereoSequence::poses_file, "The true poses; pathlib.Path() where there are none.")
       .def_property_readonly(
           "size",
-          [](const StereoSequence& s) {
-            const vision::Size size = vision::check_image_sizes(s);
+          [](StereoSequence images) {
+            images.calibrated_width = 0;  // whoever takes the calibration, too, calls _expect_calibrated
+            const auto size = vision::check_image_sizes(images);
             return py::make_tuple(size.width, size.height);
           },
           "(width, height) of all images.")
@@ -75,8 +77,13 @@ void bind_sequences(py::module_& module) {
       "open_folder",
       [](const path& folder, const std::string& frames) { return vision::open_folder(folder, range_of(frames)); },
       py::arg("folder"), py::arg("frames") = "",
-      "Opens a folder in the layout of KITTI odometry, KITTI raw or Middlebury, or with left, right and calib.txt. "
+      "Opens a folder in the layout of KITTI odometry, KITTI raw or Middlebury, with left and right, or with a folder "
+      "for "
+      "each pair, and their calib.txt. "
       "frames: \"7:10\", \"7:\", \":10\".");
+  module.def(
+      "_expect_calibrated", [](const StereoSequence& sequence) { vision::check_image_sizes(sequence); },
+      py::arg("sequence"), "Throws InvalidArgument where its calibration is of images of another size.");
   module.def(
       "open_kitti_multiview",
       [](const path& folder, const std::string& scene, const std::string& frames) {
@@ -235,8 +242,13 @@ void bind_files(py::module_& module) {
   module.def("_expect_writable", &vision::expect_writable, py::arg("file"));
   module.def("_is_stream", &vision::is_stream, py::arg("file"));
   module.def(
-      "_read_calibration", [](const path& file) { return vision::read_calibration(file); }, py::arg("file"),
-      "Reads KITTI's, Middlebury's or EgoSGM's own format.");
+      "_read_calibration",
+      [](const path& file) {
+        const vision::SizedCalibration found = vision::read_sized_calibration(file);
+        return py::make_tuple(found.calibration, py::make_tuple(found.width, found.height));
+      },
+      py::arg("file"),
+      "Reads KITTI's, Middlebury's or EgoSGM's own format: (calibration, size); a size of 0: unknown.");
   module.def("write_calibration", &vision::write_calibration, py::arg("file"), py::arg("calibration"));
   module.def(
       "read_grey", [](const path& file) { return array_of(vision::read_grey_image(file)); }, py::arg("file"),

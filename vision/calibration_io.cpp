@@ -8,11 +8,14 @@
 #include <initializer_list>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "egosgm/error.h"
+#include "egosgm/vision/image_io.h"
 #include "kernels/method.h"
 #include "vision/file_io.h"
 #include "vision/text_rows.h"
@@ -145,31 +148,106 @@ Calibration from_pair(const Entries& entries, const Camera& left, const Camera& 
   return {left.fx, left.fy, left.cx, left.cy, baseline_m, doffs_px};
 }
 
+[[noreturn]] void refuse_transposed(const Entries& entries, const Entry& entry) {
+  refuse_row(entries.file(), entry.row,
+             std::string(entry.key) + " is transposed, as MATLAB writes it: give its numbers row by row");
+}
+
+/// The projection matrix of a row.
+std::vector<double> parse_projection(const Entries& entries, const Entry& entry) {
+  std::vector<double> p = parse_numbers(entries, entry, entry.value, 12);
+  if (p[5] == 0 && p[4] != 0) refuse_transposed(entries, entry);  // fy
+  return p;
+}
+
+/// Throws InvalidArgument where both cameras' rows T say another distance than the projection matrices: in files of
+/// images that were made smaller, the last column of P may be that of the large ones.
+void check_translations(const Entries& entries, const Entry& left, const Entry& right, double baseline_m) {
+  constexpr std::string_view kPrefix = "P_rect_";
+  constexpr double kMostDifference = 0.05;  // of turned cameras, and of digits that are few
+  const auto key_of = [&](const Entry& entry) { return "T_" + std::string(entry.key.substr(kPrefix.size())); };
+  if (!left.key.starts_with(kPrefix) || !entries.has(key_of(left)) || !entries.has(key_of(right))) return;
+  double square = 0;
+  const Entry& of_left = entries.at(key_of(left), "");
+  const Entry& of_right = entries.at(key_of(right), "");
+  const std::vector<double> a = parse_numbers(entries, of_left, of_left.value, 3);
+  const std::vector<double> b = parse_numbers(entries, of_right, of_right.value, 3);
+  for (std::size_t i = 0; i < a.size(); ++i) square += (a[i] - b[i]) * (a[i] - b[i]);
+  const double distance_m = std::sqrt(square);
+  if (std::abs(distance_m - baseline_m) <= kMostDifference * distance_m) return;
+  refuse_row(entries.file(), right.row,
+             std::string(right.key) + " gives a baseline of " + std::to_string(baseline_m) + " m, " +
+                 std::string(of_right.key) + " one of " + std::to_string(distance_m) +
+                 " m: where images were made smaller, as DrivingStereo's of half size, the last column of P may have "
+                 "stayed as it was, and T is right; give rows of fx, fy, cx, cy and the true baseline_m");
+}
+
 Calibration from_projections(const Entries& entries, const std::string& left_key, const std::string& right_key) {
   const std::string remedy = "give the calibration of cameras " + left_key + " and " + right_key;
   const Entry& left = entries.at(left_key, remedy);
   const Entry& right = entries.at(right_key, remedy);
-  const std::vector<double> p_left = parse_numbers(entries, left, left.value, 12);
-  const std::vector<double> p_right = parse_numbers(entries, right, right.value, 12);
-  return from_pair(entries, {left, p_left[0], p_left[5], p_left[2], p_left[6]},
-                   {right, p_right[0], p_right[5], p_right[2], p_right[6]}, right, (p_left[3] - p_right[3]) / p_left[0],
-                   p_right[2] - p_left[2]);
+  const std::vector<double> p_left = parse_projection(entries, left);
+  const std::vector<double> p_right = parse_projection(entries, right);
+  const double baseline_m = (p_left[3] - p_right[3]) / p_left[0];
+  const Calibration calibration =
+      from_pair(entries, {left, p_left[0], p_left[5], p_left[2], p_left[6]},
+                {right, p_right[0], p_right[5], p_right[2], p_right[6]}, right, baseline_m, p_right[2] - p_left[2]);
+  check_translations(entries, left, right, baseline_m);
+  return calibration;
 }
 
-Calibration from_kitti(const Entries& entries, KittiCameras cameras, const std::string& prefix) {
-  const bool grey = cameras == KittiCameras::kGrey ||
-                    (cameras == KittiCameras::kAny && (entries.has(prefix + "0") || !entries.has(prefix + "2")));
-  return grey ? from_projections(entries, prefix + "0", prefix + "1")
-              : from_projections(entries, prefix + "2", prefix + "3");
+/// The image's size of a row or of two rows; 0 where they are not there.
+void read_size(const Entries& entries, const std::vector<std::string>& keys, SizedCalibration& found) {
+  std::vector<double> size;
+  for (const std::string& key : keys) {
+    if (!entries.has(key)) return;
+    const Entry& entry = entries.at(key, "");
+    for (const std::string_view token : split_tokens(entry.value)) size.push_back(parse_finite(entries, entry, token));
+  }
+  if (size.size() != 2) return;
+  for (const double side : size) {
+    if (!(side >= 1 && side <= kMaxImageSide)) return;
+  }
+  found.width = static_cast<int>(std::lround(size[0]));
+  found.height = static_cast<int>(std::lround(size[1]));
+}
+
+/// The names of the left and the right camera, of KITTI's four, or of the only two that there are.
+std::pair<std::string, std::string> names_of_cameras(const Entries& entries, KittiCameras cameras,
+                                                     const std::string& prefix) {
+  const std::string zero = prefix == "P" ? "" : "0";
+  std::set<std::string> names;
+  for (const Entry& entry : entries.all()) {
+    if (entry.key.starts_with(prefix) && prefix != "P") names.emplace(entry.key.substr(prefix.size()));
+  }
+  const bool is_kitti = std::any_of(names.begin(), names.end(), [](const std::string& name) { return name[0] == '0'; });
+  if (!is_kitti && names.size() == 2) return {*names.begin(), *names.rbegin()};
+  if (!is_kitti && names.size() == 1) {
+    throw InvalidArgument(entries.file().string() + ": has the camera " + prefix + *names.begin() +
+                          " alone; give the calibration of both");
+  }
+  const bool grey =
+      cameras == KittiCameras::kGrey ||
+      (cameras == KittiCameras::kAny && (entries.has(prefix + zero + "0") || !entries.has(prefix + zero + "2")));
+  return grey ? std::pair{zero + "0", zero + "1"} : std::pair{zero + "2", zero + "3"};
+}
+
+SizedCalibration from_kitti(const Entries& entries, KittiCameras cameras, const std::string& prefix) {
+  const auto [left, right] = names_of_cameras(entries, cameras, prefix);
+  SizedCalibration found{from_projections(entries, prefix + left, prefix + right)};
+  if (prefix != "P") read_size(entries, {"S_rect_" + left}, found);
+  return found;
 }
 
 std::vector<double> parse_middlebury_matrix(const Entries& entries, const Entry& entry) {
   std::string text(entry.value);
   for (char& c : text) c = c == '[' || c == ']' || c == ';' || c == ',' ? ' ' : c;
-  return parse_numbers(entries, entry, text, 9);
+  std::vector<double> k = parse_numbers(entries, entry, text, 9);
+  if (k[2] == 0 && k[5] == 0 && (k[6] != 0 || k[7] != 0)) refuse_transposed(entries, entry);
+  return k;
 }
 
-Calibration from_middlebury(const Entries& entries) {
+SizedCalibration from_middlebury(const Entries& entries) {
   const std::string remedy = "give a complete calib.txt";
   const Entry& left = entries.at("cam0", remedy);
   const Entry& right = entries.at("cam1", remedy);
@@ -179,9 +257,11 @@ Calibration from_middlebury(const Entries& entries) {
   const double doffs_px = entries.has("doffs")
                               ? parse_finite(entries, entries.at("doffs", remedy), entries.at("doffs", remedy).value)
                               : k_right[2] - k_left[2];
-  return from_pair(entries, {left, k_left[0], k_left[4], k_left[2], k_left[5]},
-                   {right, k_right[0], k_right[4], k_right[2], k_right[5]}, baseline,
-                   parse_finite(entries, baseline, baseline.value) / 1000.0, doffs_px);
+  SizedCalibration found{from_pair(entries, {left, k_left[0], k_left[4], k_left[2], k_left[5]},
+                                   {right, k_right[0], k_right[4], k_right[2], k_right[5]}, baseline,
+                                   parse_finite(entries, baseline, baseline.value) / 1000.0, doffs_px)};
+  read_size(entries, {"width", "height"}, found);
+  return found;
 }
 
 Calibration from_own(const Entries& entries) {
@@ -217,7 +297,7 @@ std::string_view foreign_format(std::string_view text) {
     std::initializer_list<std::string_view> words;
     std::string_view name;
   };
-  static const std::array<Format, 18> kFormats{{
+  static const std::array<Format, 19> kFormats{{
       {{"T_cn_cnm1"}, "a camera chain of Kalibr"},
       {{"cam0:", "camera_model:", "intrinsics:"},
        "a camera chain of Kalibr without T_cn_cnm1, where the second camera stands"},
@@ -229,6 +309,8 @@ std::string_view foreign_format(std::string_view text) {
       {{"Camera.fx"}, "a file of settings of ORB-SLAM"},
       {{"\"extrinsic\"", "\"u0\""}, "Cityscapes' camera.json"},
       {{"LEFT_CAM"}, "a calibration file of a ZED camera"},
+      {{"\nC =", "\nA =", "\nH =", "\nV ="},
+       "one camera of a rover (CAHV), which needs the other one's file beside it"},
       {{"camera_matrix"}, "OpenCV's calibration of one camera"},
       {{"intrinsic", "T_"}, "a YAML or JSON file of intrinsics and transformations"},
       {{"left_camera_matrix"}, "OpenCV's stereo calibration (of raw images)"},
@@ -270,14 +352,18 @@ std::string_view foreign_format(std::string_view text) {
 }  // namespace
 
 Calibration read_calibration(const std::filesystem::path& file, KittiCameras cameras) {
+  return read_sized_calibration(file, cameras).calibration;
+}
+
+SizedCalibration read_sized_calibration(const std::filesystem::path& file, KittiCameras cameras) {
   const std::string text = read_file(file, kMaxCalibrationBytes);
   const bool is_own = has_all(text, {"baseline_m"}) && text.find('{') == std::string::npos;
   if (const std::string_view format = is_own ? "" : foreign_format(text); !format.empty()) refuse_foreign(file, format);
   const Entries entries(file, text);
-  if (entries.has_prefix("P_rect_")) return from_kitti(entries, cameras, "P_rect_0");
+  if (entries.has_prefix("P_rect_")) return from_kitti(entries, cameras, "P_rect_");
   if (entries.has("cam0") || entries.has("cam1")) return from_middlebury(entries);
   if (std::any_of(kOwnKeys.begin(), kOwnKeys.end(), [&](std::string_view key) { return entries.has(key); })) {
-    return from_own(entries);
+    return {from_own(entries)};
   }
   for (const char* key : {"P0", "P1", "P2", "P3"}) {
     if (entries.has(key)) return from_kitti(entries, cameras, "P");

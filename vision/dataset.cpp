@@ -11,6 +11,7 @@
 #include "egosgm/vision/calibration_io.h"
 #include "egosgm/vision/image_io.h"
 #include "vision/folder_contents.h"
+#include "vision/foreign_file.h"
 #include "vision/frame_names.h"
 #include "vision/image_pairs.h"
 
@@ -32,6 +33,9 @@ std::string name_of(const fs::path& folder) {
 
 void require_folder(const fs::path& folder, const std::string& remedy) {
   if (is_folder(folder)) return;
+  if (const std::string kind = foreign_input(folder); !kind.empty()) {
+    throw InvalidArgument(folder.string() + ": is no folder; " + kind);
+  }
   std::error_code error;
   if (!fs::exists(folder, error)) throw MissingPath(folder.string(), "no such folder; " + remedy);
   throw InvalidArgument(folder.string() + ": is no folder; " +
@@ -145,15 +149,21 @@ KittiCameras cameras_of(const fs::path& folder) {
 
 /// Of a file with both of KITTI's pairs of cameras, images in colour are of the second one, whatever their folder is
 /// called.
-Calibration calibration_of(const fs::path& file, const fs::path& folder, const std::vector<StereoFrame>& frames) {
+SizedCalibration calibration_of(const fs::path& file, const fs::path& folder, const std::vector<StereoFrame>& frames) {
   const KittiCameras cameras = cameras_of(folder);
   if (cameras == KittiCameras::kAny && first_readable_image(frames).type.channels == 3) {
     try {
-      return read_calibration(file, KittiCameras::kColor);
+      return read_sized_calibration(file, KittiCameras::kColor);
     } catch (const InvalidArgument&) {  // it has one pair alone, or is told below
     }
   }
-  return read_calibration(file, cameras);
+  return read_sized_calibration(file, cameras);
+}
+
+void calibrate(const SizedCalibration& found, StereoSequence& sequence) {
+  sequence.calibration = found.calibration;
+  sequence.calibrated_width = found.width;
+  sequence.calibrated_height = found.height;
 }
 
 /// times.txt or timestamps.txt in one of the folders.
@@ -208,7 +218,7 @@ StereoSequence open_kitti_multiview(const fs::path& folder, const std::string& s
   for (StereoFrame& frame : sequence.frames) add_multiview_truth(root, name, frame);
   sequence.calibration_file = find_file({root / "calib" / (name + ".txt"), root / "calib_cam_to_cam" / (name + ".txt")},
                                         "get the data set's calibration files");
-  sequence.calibration = read_calibration(sequence.calibration_file, cameras.cameras);
+  calibrate(read_sized_calibration(sequence.calibration_file, cameras.cameras), sequence);
   return sequence;
 }
 
@@ -223,7 +233,7 @@ StereoSequence open_kitti_odometry(const fs::path& folder, FrameRange range) {
     frame.truth_occ = if_there(folder / "truth/left_disp_occ" / (frame.name + ".png"));
   }
   sequence.calibration_file = find_file({folder / "calib.txt"}, "get the sequence's calibration");
-  sequence.calibration = read_calibration(sequence.calibration_file, cameras.cameras);
+  calibrate(read_sized_calibration(sequence.calibration_file, cameras.cameras), sequence);
   sequence.times_file = find_times({folder});
   sequence.poses_file = if_there(folder / "poses.txt");
   if (sequence.poses_file.empty()) {
@@ -245,7 +255,7 @@ StereoSequence open_kitti_raw(const fs::path& folder, FrameRange range) {
   add_frames(folder, cameras, "", 10, range, sequence);
   sequence.calibration_file = find_file({folder / "calib_cam_to_cam.txt", folder / ".." / "calib_cam_to_cam.txt"},
                                         "put the day's calib_cam_to_cam.txt into the drive's folder or its parent");
-  sequence.calibration = read_calibration(sequence.calibration_file, cameras.cameras);
+  calibrate(read_sized_calibration(sequence.calibration_file, cameras.cameras), sequence);
   sequence.times_file = find_times({(folder / cameras.left).parent_path()});
   return sequence;
 }
@@ -279,7 +289,7 @@ StereoSequence open_patterns(const std::string& left, const std::string& right, 
   sequence.calibration_file = calibration_file;
   sequence.has_calibration = !calibration_file.empty();
   if (sequence.has_calibration) {
-    sequence.calibration = calibration_of(calibration_file, left_pattern.folder, sequence.frames);
+    calibrate(calibration_of(calibration_file, left_pattern.folder, sequence.frames), sequence);
   } else {
     const Image image = first_readable_image(sequence.frames);
     const Size size = image.empty() ? read_image_size(sequence.frames.front().left) : image.size();
@@ -301,7 +311,7 @@ StereoSequence open_folder(const fs::path& folder, FrameRange range) {
   if (is_folder(folder / kRawGrey.left) || is_folder(folder / kRawColor.left)) return open_kitti_raw(folder, range);
   if (is_folder(folder / kGrey.left) || is_folder(folder / kColor.left)) return open_kitti_odometry(folder, range);
   if (is_file(image_named(folder, "im0"))) return open_middlebury(folder, range);
-  if (const auto cameras = find_two_cameras(folder); cameras && !cameras->calibration.empty()) {
+  if (const auto cameras = find_two_cameras(folder); cameras && foreign_calibration(folder, *cameras).empty()) {
     StereoSequence sequence = open_patterns(cameras->left, cameras->right, cameras->calibration, range);
     sequence.title = name_of(folder);
     sequence.poses_file = if_there(folder / "poses.txt");
@@ -310,7 +320,8 @@ StereoSequence open_folder(const fs::path& folder, FrameRange range) {
   throw InvalidArgument(
       folder.string() + ": is no stereo sequence; " +
       found_instead(folder).value_or("give a folder with image_0 and image_1, image_00/data and image_01/data, "
-                                     "im0.png and im1.png, or left, right and calib.txt"));
+                                     "im0.png and im1.png, left and right, or a folder with left.png and right.png for "
+                                     "each pair"));
 }
 
 }  // namespace egosgm::vision

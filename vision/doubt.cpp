@@ -11,6 +11,8 @@
 
 #include "egosgm/vision/image_io.h"
 #include "kernels/method.h"
+#include "vision/grey_bytes.h"
+#include "vision/mosaic.h"
 
 namespace egosgm::vision {
 namespace {
@@ -18,6 +20,8 @@ namespace {
 constexpr double kMinBaseline_m = 0.004, kMaxBaseline_m = 3.0;
 constexpr double kUsualBaseline_m[] = {0.02, 1.0};
 constexpr double kMinFocal = 0.15, kMaxFocal = 30;  // of the width
+// Of the sides, from the middle: 35 real sequences lie within 0.1. One that is scaled by itself moves both coordinates.
+constexpr double kMaxOffMiddle = 0.2, kMaxOffBoth = 0.1;
 constexpr double kMinDensity = 0.5;
 constexpr double kFarRows_px = 0.9 * EGOSGM_MAX_OFFSET_PX;
 constexpr std::size_t kFramesPerLook = 50;  // for what is nearer than the range
@@ -40,6 +44,9 @@ std::uint64_t digest_of(const Image& image) {
   }
   return digest;
 }
+
+/// `share`: of a side.
+bool is_within(double share, double most) { return std::abs(share - 0.5) < most; }
 
 bool is_usual(double baseline_m) { return baseline_m >= kUsualBaseline_m[0] && baseline_m <= kUsualBaseline_m[1]; }
 
@@ -85,13 +92,15 @@ std::optional<Suspicion> suspect_calibration(const Calibration& c, Size size) {
       "give the calibration of images of this size: scale fx, fy, cx, cy as the images were scaled, and subtract what "
       "was cropped from cx, cy";
   const std::string of_size = formatted("%dx%d", size.width, size.height);
-  const auto is_centred = [&](double cx) { return cx > 0.25 * size.width && cx < 0.75 * size.width; };
-  if (!(is_centred(c.cx) && c.cy > 0.2 * size.height && c.cy < 0.8 * size.height)) {
+  const double x = c.cx / size.width, y = c.cy / size.height;
+  const bool is_far = !is_within(x, kMaxOffMiddle) || !is_within(y, kMaxOffMiddle);
+  const bool is_scaled = !is_within(x, kMaxOffBoth) && !is_within(y, kMaxOffBoth) && (x > 0.5) == (y > 0.5);
+  if (is_far || is_scaled) {
     return Suspicion{
         "the principal point is far from the middle of " + of_size + formatted(" (cx %.1f, cy %.1f)", c.cx, c.cy),
-        remedy};
+        remedy, is_far};
   }
-  if (!is_centred(c.cx + c.doffs_px)) {
+  if (!is_within((c.cx + c.doffs_px) / size.width, kMaxOffMiddle)) {
     return Suspicion{formatted("with doffs_px %.4g the right principal point is at x %.1f in images of ", c.doffs_px,
                                c.cx + c.doffs_px) +
                          of_size,
@@ -108,6 +117,8 @@ void Doubt::add(const Image& left, const Image& right, const FrameReport& report
   if (frames_ % kFramesPerLook == 0) {
     const std::optional<Clipped> clipped = clipped_by_range(left, right, least_, end_);
     if (clipped && (!clipped_ || clipped->share > clipped_->share)) clipped_ = clipped;
+    ++looks_;
+    if (holds_mosaic(bytes_of(left, right).first)) ++mosaics_;
   }
   const std::uint64_t digests[2] = {digest_of(left), digest_of(right)};
   for (const int side : {0, 1}) {
@@ -130,6 +141,8 @@ std::string Doubt::text() const {
   if (density < kMinDensity) append(text, formatted("density %.0f %% in the mean", 100 * density));
   if (2 * without_motion_ > frames_ - 1)
     append(text, formatted("no motion in %zu of %zu frames", without_motion_, frames_ - 1));
+  if (2 * mosaics_ > looks_)
+    append(text, "the images are mosaics of colour sensors (Bayer: convert them to grey first)");
   if (narrow_ == frames_) append(text, "values of 8 bits in images of 16");
   if (2 * far_rows_ > frames_) {
     append(text, formatted("rows of the two views lie %g px apart, the most that is mended, or farther",

@@ -15,6 +15,8 @@ namespace egosgm::vision {
 namespace {
 
 constexpr double kFarOff = 2.5;  // of a median ratio to the truth: no method errs so far
+constexpr double kOtherScale = 1.15, kAlike = 0.04,
+                 kMostAlike = 0.5;  // of ratios, and of pixels whose ratios are alike
 constexpr double kKittiScale = 256;
 constexpr double kLeastSigned = 65520;  // -16 in 16 bits
 
@@ -85,18 +87,28 @@ Image EstimateReader::read(const std::filesystem::path& file, double scale) {
 void EstimateReader::compare(const Image& estimate, const Image& truth) {
   if (estimate.size() != truth.size()) return;
   std::vector<double> ratios;
+  std::size_t surfaces = 0;
   for (int y = 0; y < estimate.rows; ++y) {
     for (int x = 0; x < estimate.cols; ++x) {
       const float e = estimate.at<float>(y, x), t = truth.at<float>(y, x);
-      if (is_valid_disparity(e) && e > 0 && is_valid_disparity(t) && t > 1) ratios.push_back(e / t);
+      if (!is_valid_disparity(t) || !(t > 1)) continue;
+      ++surfaces;
+      if (is_valid_disparity(e) && e > 0) ratios.push_back(e / t);
     }
   }
+  const double middle = ratios.empty() ? 1 : median(ratios);
+  const auto are_alike = [&](double ratio) { return std::abs(ratio / middle - 1) <= kAlike; };
+  const auto alike = static_cast<double>(std::count_if(ratios.begin(), ratios.end(), are_alike));
+  const auto equal = static_cast<std::size_t>(std::count(ratios.begin(), ratios.end(), 1.0));
   const std::scoped_lock lock(mutex_);
   is_compared_ = true;
-  if (!ratios.empty()) ratios_.push_back(median(std::move(ratios)));
+  differs_ = differs_ || equal != surfaces;
+  if (ratios.empty()) return;
+  ratios_.push_back(middle);
+  alike_.push_back(alike / static_cast<double>(ratios.size()));
 }
 
-std::vector<std::string> EstimateReader::doubts(double scale) const {
+std::vector<std::string> EstimateReader::doubts(double scale, double truth_scale) const {
   const std::scoped_lock lock(mutex_);
   std::vector<std::string> doubts;
   const auto add = [&](const auto&... parts) {
@@ -114,6 +126,9 @@ std::vector<std::string> EstimateReader::doubts(double scale) const {
   if (is_compared_ && ratios_.empty()) {
     add("no estimate has a value above 0 where its truth has one: are they of the other sign, or of other frames?");
   }
+  if (!ratios_.empty() && !differs_) {
+    add("estimates equal their truth in every pixel: is a file compared with itself, or with a copy of it?");
+  }
   const double ratio = ratios_.empty() ? 1 : median(ratios_);
   for (const double factor :
        {2.0, 4.0, 8.0, 16.0, 64.0, 256.0, 1.0 / 2, 1.0 / 4, 1.0 / 8, 1.0 / 16, 1.0 / 64, 1.0 / 256}) {
@@ -124,10 +139,17 @@ std::vector<std::string> EstimateReader::doubts(double scale) const {
         "; maps of images of another width, and other formats, need their values changed");
     return doubts;
   }
-  if (ratio > kFarOff || ratio < 1 / kFarOff) {
+  const auto is_off = [&](double most) { return ratio > most || ratio < 1 / most; };
+  if (is_off(kFarOff)) {
     add(std::setprecision(4), "estimates are ", ratio,
         " times their truth in the median: are they disparities in pixels? Depths, inverse depths and shares of the "
         "width are none");
+  } else if (is_off(kOtherScale) && median(alike_) >= kMostAlike) {
+    add(std::setprecision(4), "estimates are ", ratio,
+        " times their truth in the median, and most of them alike: is one of both of another scale? A truth in PNG of ",
+        truth_scale / ratio, " steps a pixel needs --truth-scale ", truth_scale / ratio, ", an estimate of ",
+        scale * ratio, " --scale ", scale * ratio,
+        "; maps of images of another width, and other formats, need their values changed");
   }
   return doubts;
 }

@@ -28,16 +28,16 @@ class EGOSGM_EXPORT EstimateReader {
   /// Looks at an estimate beside its truth.
   void compare(const Image& estimate, const Image& truth);
 
-  /// A sentence for each thing that was seen. `scale`: as it was given.
-  std::vector<std::string> doubts(double scale) const;
+  /// A sentence for each thing that was seen. Both scales: as they were given.
+  std::vector<std::string> doubts(double scale, double truth_scale) const;
 
  private:
   mutable std::mutex mutex_;
   std::int64_t impossible_ = 0, values_ = 0, markers_ = 0;
   float marker_ = 0;
   std::string first_impossible_;
-  bool is_compared_ = false;
-  std::vector<double> ratios_;  // of an estimate to its truth, in the median of each map
+  bool is_compared_ = false, differs_ = false;  // from its truth
+  std::vector<double> ratios_, alike_;  // of an estimate to its truth in the median of each map, and the share near it
 };
 
 /// Throws InvalidArgument where `option` names another scale than KITTI's, and `file` has none.

@@ -16,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using Contents = std::optional<std::string>;
 
+constexpr std::pair<const char*, const char*> kSides[] = {{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}};
 constexpr std::size_t kMostNamed = 5;
 constexpr std::size_t kMostFolders = 1000;  // a data set has no more beside each other; looking stays short
 
@@ -75,8 +76,7 @@ bool is_sequence(const fs::path& folder) {
   for (const char* image : {"im0.png", "im0.jpg", "im0.jpeg"}) {
     if (is_file(folder / image)) return true;
   }
-  const std::optional<TwoCameras> cameras = find_two_cameras(folder);
-  return cameras && !cameras->calibration.empty();
+  return find_two_cameras(folder).has_value();
 }
 
 Contents multiview(const fs::path& folder) {
@@ -127,14 +127,8 @@ Contents one_camera(const fs::path& folder) {
 Contents two_cameras(const fs::path& folder) {
   const std::optional<TwoCameras> cameras = find_two_cameras(folder);
   if (!cameras) return std::nullopt;
-  std::vector<std::string> files;
-  for (const std::string& name : names_in(folder)) {
-    const std::string type = fs::path(name).extension().string();
-    if (type == ".json" || type == ".yaml" || type == ".yml" || type == ".xml" || type == ".npz") files.push_back(name);
-  }
-  const std::string calibration = files.size() == 1 ? "'" + (folder / files.front()).string() + "'" : "FILE";
-  return "it holds two cameras and no calib.txt: put their calibration there, or give --left '" + cameras->left +
-         "' --right '" + cameras->right + "' --calib " + calibration;
+  return "it holds two cameras and no calib.txt: put their calibration there, or give " + folder.string() +
+         " --calib '" + foreign_calibration(folder, *cameras).string() + "'";
 }
 
 Contents euroc(const fs::path& folder) {
@@ -162,7 +156,7 @@ std::vector<std::pair<std::string, std::string>> names_of_cameras(const fs::path
       {"left", "right"}, {"cam0", "cam1"}, {"image_left", "image_right"}, {"L", "R"}, {"l", "r"}};
   for (const fs::path& child : folders_in(folder)) {
     const std::string name = child.filename().string();
-    for (const auto& [left, right] : {std::pair{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}}) {
+    for (const auto& [left, right] : kSides) {
       const std::size_t at = name.find(left);
       if (at == std::string::npos) continue;
       const std::string partner = std::string(name).replace(at, std::strlen(left), right);
@@ -170,6 +164,34 @@ std::vector<std::pair<std::string, std::string>> names_of_cameras(const fs::path
     }
   }
   return names;
+}
+
+/// The left and the right image of a pair, by their names; nothing where there are none, or several.
+std::optional<std::pair<std::string, std::string>> pair_in(const fs::path& folder) {
+  std::optional<std::pair<std::string, std::string>> found;
+  for (const std::string& name : names_in(folder)) {
+    if (!is_image_name(name)) continue;
+    for (const auto& [left, right] : kSides) {
+      const std::size_t at = name.find(left);
+      if (at == std::string::npos) continue;
+      const std::string partner = std::string(name).replace(at, std::strlen(left), right);
+      if (!is_file(folder / partner)) continue;
+      if (found) return std::nullopt;
+      found.emplace(name, partner);
+    }
+  }
+  return found;
+}
+
+/// Pairs that have a folder each, or the pair that `folder` holds.
+std::optional<TwoCameras> find_pairs_in(const fs::path& folder) {
+  if (const auto pair = pair_in(folder)) return TwoCameras{folder / pair->first, folder / pair->second, {}};
+  for (const fs::path& child : folders_in(folder)) {
+    if (const auto pair = pair_in(child))
+      return TwoCameras{folder / "*" / pair->first, folder / "*" / pair->second, {}};
+    if (!names_in(child).empty()) break;  // those of one sequence are alike
+  }
+  return std::nullopt;
 }
 
 Contents result_of_a_run(const fs::path& folder) {
@@ -187,15 +209,31 @@ Contents found_instead(const fs::path& folder) {
 }
 
 std::optional<TwoCameras> find_two_cameras(const fs::path& folder) {
+  if (result_of_a_run(folder)) return std::nullopt;  // whose right maps are no images
+  std::optional<TwoCameras> cameras;
+  bool is_empty = false;
   for (const auto& [left, right] : names_of_cameras(folder)) {
     if (!holds_both(folder, left, right)) continue;
-    TwoCameras cameras{pattern_in(folder / left, "left"), pattern_in(folder / right, "right"), {}};
-    for (const char* name : {"calib.txt", "calibration.txt"}) {
-      if (cameras.calibration.empty() && is_file(folder / name)) cameras.calibration = folder / name;
-    }
-    return cameras;
+    cameras = {pattern_in(folder / left, "left"), pattern_in(folder / right, "right"), {}};
+    is_empty = !holds_images(folder / left);
+    break;
   }
-  return std::nullopt;
+  if (!cameras) cameras = find_pairs_in(folder);
+  for (const char* name : {"calib.txt", "calibration.txt"}) {
+    if (cameras && cameras->calibration.empty()) cameras->calibration = is_file(folder / name) ? folder / name : "";
+  }
+  return is_empty && cameras->calibration.empty() ? std::nullopt : cameras;
+}
+
+fs::path foreign_calibration(const fs::path& folder, const TwoCameras& cameras) {
+  std::vector<fs::path> files;
+  for (const std::string& name : names_in(folder)) {
+    const std::string type = fs::path(name).extension().string();
+    if (type == ".json" || type == ".yaml" || type == ".yml" || type == ".xml" || type == ".npz" || type == ".conf") {
+      files.push_back(folder / name);
+    }
+  }
+  return cameras.calibration.empty() && files.size() == 1 ? files.front() : fs::path();
 }
 
 std::set<std::string> list_scenes(const fs::path& images) {

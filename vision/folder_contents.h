@@ -6,13 +6,16 @@
 #include <set>
 #include <string>
 
+#include "egosgm/export.h"
+
 namespace egosgm::vision {
 
 /// What a folder that is no stereo sequence holds instead, and what to give in its place: "it holds sequences/00: give
 /// one of them". Nothing where nothing is known. Thread-safe.
 std::optional<std::string> found_instead(const std::filesystem::path& folder);
 
-/// A folder with one folder of images for each camera, beside their calibration: calib.txt or calibration.txt.
+/// A folder with one folder of images for each camera, or with one for each pair, or a pair itself; beside them their
+/// calibration, calib.txt or calibration.txt.
 struct TwoCameras {
   std::string left, right;            // their patterns
   std::filesystem::path calibration;  // empty where there is none
@@ -20,8 +23,13 @@ struct TwoCameras {
 
 /// left and right, cam0 and cam1, L and R, or others with left and right in their names in `folder`; nothing where they
 /// are not both there.
-/// Files that say so in their names too (left_1.png, 1_left.png) are paired by the rest of them. Thread-safe.
-std::optional<TwoCameras> find_two_cameras(const std::filesystem::path& folder);
+/// Files that say so in their names too (left_1.png, 1_left.png) are paired by the rest of them. Else left.png and
+/// right.png, or others with left and right in their names, in `folder` or in each folder in it. Thread-safe.
+EGOSGM_EXPORT std::optional<TwoCameras> find_two_cameras(const std::filesystem::path& folder);
+
+/// The only file beside the images that may be their calibration, of another name or format than calib.txt; empty where
+/// there is none, or more than one.
+std::filesystem::path foreign_calibration(const std::filesystem::path& folder, const TwoCameras& cameras);
 
 /// Scenes of a multi-view folder of images: NNNNNN of NNNNNN_FF.png. Throws InvalidArgument where it cannot be listed.
 std::set<std::string> list_scenes(const std::filesystem::path& images);

@@ -26,7 +26,7 @@ std::string without_zeros(const std::string& digits) {
 /// before it.
 std::optional<std::string> text_in(const std::string& name, const NamePattern& pattern) {
   std::string suffix = pattern.suffix;
-  if (suffix.find('.') == std::string::npos) {
+  if (pattern.below.empty() && suffix.find('.') == std::string::npos) {
     if (!is_image_name(name)) return std::nullopt;
     suffix += fs::path(name).extension().string();
   }
@@ -46,8 +46,9 @@ Files find_files(const NamePattern& pattern) {
   Files files;
   for (const std::string& name : list_folder(pattern.folder)) {
     const std::optional<std::string> text = text_in(name, pattern);
-    if (!text || is_folder(pattern.folder / name)) continue;
-    const auto [other, is_new] = files.emplace(*text, pattern.folder / name);
+    const fs::path file = pattern.below.empty() ? pattern.folder / name : pattern.folder / name / pattern.below;
+    if (!text || is_folder(file) || (!pattern.below.empty() && !is_file(file))) continue;
+    const auto [other, is_new] = files.emplace(*text, file);
     if (is_new) continue;
     throw InvalidArgument(other->second.string() + ": means the same frame as " + name +
                           "; remove one of them, or give a pattern that only one fits");
@@ -225,8 +226,32 @@ std::vector<std::string> list_folder(const fs::path& folder) {
 
 fs::path NamePattern::file_of(const std::string& text) const {
   if (kind == Kind::kPlain) return folder / prefix;
-  return folder / (prefix + (kind == Kind::kNumber ? padded(text, digits) : text) + suffix +
-                   (suffix.find('.') == std::string::npos ? ".png" : ""));
+  const std::string name = prefix + (kind == Kind::kNumber ? padded(text, digits) : text) + suffix;
+  if (!below.empty()) return folder / name / below;
+  return folder / (name + (suffix.find('.') == std::string::npos ? ".png" : ""));
+}
+
+/// `a/*/left.png`: the pattern of the folders, and the file that each of them holds; nothing of other patterns.
+std::optional<NamePattern> parse_folder_pattern(const fs::path& path) {
+  NamePattern parts;
+  bool is_found = false;
+  for (const fs::path& part : path) {
+    const std::string name = part.string();
+    const std::size_t at = name.find('*');
+    if (is_found) {
+      parts.below /= part;
+    } else if (at == std::string::npos) {
+      parts.folder /= part;
+    } else {
+      is_found = true;
+      parts.prefix = name.substr(0, at), parts.suffix = name.substr(at + 1);
+    }
+  }
+  parts.kind = Kind::kAnything;
+  const bool is_one = (parts.suffix + parts.below.string()).find_first_of("*%") == std::string::npos;
+  if (!is_found || !is_one || !parts.below.has_filename() || path.string().find('%') != std::string::npos) return {};
+  if (parts.folder.empty()) parts.folder = ".";
+  return parts;
 }
 
 NamePattern parse_pattern(const std::string& pattern) {
@@ -234,12 +259,15 @@ NamePattern parse_pattern(const std::string& pattern) {
   const std::string name = path.filename().string();
   const auto refuse = [&]() -> NamePattern {
     throw InvalidArgument("pattern '" + pattern +
-                          "': its file name must hold one %d, %06d (or the like) or one *, and its folder none");
+                          "': its file name must hold one %d, %06d (or the like) or one *, or its folder one *");
   };
   NamePattern parts;
   parts.folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   const auto first_wild = [](const std::string& text) { return text.find_first_of("*%"); };
   const bool is_wild = first_wild(parts.folder.string()) != std::string::npos && !is_folder(parts.folder);
+  if (is_wild) {
+    if (const std::optional<NamePattern> of_folders = parse_folder_pattern(path)) return *of_folders;
+  }
   if (name.empty() || is_wild) return refuse();
   const std::size_t begin = is_file(path) ? std::string::npos : first_wild(name);
   if (begin == std::string::npos) {

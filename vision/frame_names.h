@@ -17,15 +17,16 @@ struct NamePattern {
   std::filesystem::path folder;
   std::string prefix, suffix;  // a suffix without a dot stands for those of all kinds of images
   Kind kind = Kind::kPlain;
-  int digits = 1;          // least number of them
-  bool any_width = false;  // fewer or more digits will do, too
+  int digits = 1;               // least number of them
+  bool any_width = false;       // fewer or more digits will do, too
+  std::filesystem::path below;  // the file in each folder that matches; empty where files match
 
   /// The file that `text` in the place of `%06d` or `*` means, whether it is there or not.
   std::filesystem::path file_of(const std::string& text) const;
 };
 
 /// A file or a folder that is there stands for itself, whatever its name holds. Throws InvalidArgument where `pattern`
-/// otherwise holds more than one `%d` or `*`, or one in a folder's name.
+/// otherwise holds more than one `%d` or `*`, or `%d` in a folder's name.
 NamePattern parse_pattern(const std::string& pattern);
 
 /// Files of one moment; one of the paths is empty where only the other camera has one.

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "egosgm/vision/image_io.h"
+#include "vision/foreign_file.h"
 #include "vision/image_bounds.h"
 #include "vision/plain_png.h"
 
@@ -91,40 +92,16 @@ bool read_rows(Decoder& decoder, const Layout& layout, std::uint8_t* rows, std::
   return true;
 }
 
-/// What people give in place of a PNG.
-std::string foreign_kind(std::string_view bytes) {
-  if (bytes.empty()) return "the file is empty";
-  const std::string rectify = ", which `egosgm rectify` reads, with the cameras' calibration";
-  struct Kind {
-    std::size_t at;
-    std::string_view start;
-    std::string meaning;
-  };
-  const Kind kinds[] = {
-      {0, "version https://git-lfs", "it is a pointer of Git LFS, in place of which `git lfs pull` puts the image"},
-      {4, "ftyp", "it is a video" + rectify},
-      {8, "AVI ", "it is a video" + rectify},
-      {0, "\x1a\x45\xdf\xa3", "it is a video" + rectify},
-      {0, std::string_view("II*\0", 4), "it is a TIFF" + rectify},
-      {0, std::string_view("MM\0*", 4), "it is a TIFF" + rectify},
-      {8, "WEBP", "it is a WebP" + rectify},
-      {0, "P5", "it is a PGM" + rectify},
-      {0, "P6", "it is a PPM" + rectify},
-      {0, "BM", "it is a BMP" + rectify},
-      {0, "<", "it is a web page or XML: was its download refused?"},
-  };
-  for (const Kind& kind : kinds) {
-    if (bytes.size() > kind.at && bytes.substr(kind.at).starts_with(kind.start)) return kind.meaning;
-  }
-  return "it does not start like a PNG";
-}
-
 }  // namespace
 
 bool starts_like_png(std::string_view bytes) { return bytes.starts_with(kSignature); }
 
 Size parse_png_size(std::string_view bytes, const std::filesystem::path& file) {
-  if (!starts_like_png(bytes)) refuse_image(file, foreign_kind(bytes));
+  if (bytes.empty()) refuse_image(file, "the file is empty");
+  if (!starts_like_png(bytes)) {
+    const std::string kind = foreign_kind(bytes);
+    refuse_image(file, kind.empty() ? "it does not start like a PNG" : kind);
+  }
   if (bytes.size() < kPngHeaderBytes) refuse_image(file, "the file ends in its header");
   if (bytes.substr(12, 4) != "IHDR") refuse_image(file, "its header is damaged");
   const std::int64_t width = big_endian_at(bytes, 16);

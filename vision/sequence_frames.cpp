@@ -63,6 +63,12 @@ Size check_image_sizes(const StereoSequence& sequence) {
     }
   }
   if (!expected && unreadable) std::rethrow_exception(unreadable);
+  const int width = sequence.calibrated_width, height = sequence.calibrated_height;
+  if (expected && width > 0 && (expected->width != width || expected->height != height)) {
+    throw InvalidArgument(sequence.calibration_file.string() + ": is of images of " + std::to_string(width) + "x" +
+                          std::to_string(height) + ", and these have " + describe(*expected) +
+                          ": give the calibration of this size");
+  }
   return expected.value_or(Size());
 }
 

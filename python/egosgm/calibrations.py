@@ -165,9 +165,12 @@ def _found(file: pathlib.Path, is_fisheye: bool, size: Optional[Tuple[int, int]]
             return formats.of_q(array.astype(float), file)
         raise parts.refuse(file, f"is one NumPy array of the shape {array.shape}: give the folder that holds all of them, or Q")
     try:
-        return _egosgm._read_calibration(file)
+        calibration, calibrated = _egosgm._read_calibration(file)
     except _egosgm.InvalidArgument as error:
         own_error = error
+    else:
+        parts.expect_size(calibrated, size, file)
+        return calibration
     text = parts.text_of(file)
     if re.search(r"(?m)^\[(LEFT|RIGHT)_CAM_\w+\]", text):
         return formats.zed(text, file, size)

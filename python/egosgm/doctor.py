@@ -53,9 +53,9 @@ class _OfSequence(_Source):
     def __init__(self, sequence: _egosgm.StereoSequence, calibration: "_egosgm.Calibration | StereoRig | None", calib: str) -> None:
         self._sequence, self.count, self.note = sequence, len(sequence), sequence.note
         self._rectification = None
-        size = sequence.size
+        _egosgm._expect_calibrated(sequence)
         if isinstance(calibration, StereoRig):
-            self._rectification = Rectification(calibration, *size)
+            self._rectification = Rectification(calibration, *sequence.size)
             self.calibration, self.rectified = self._rectification.calibration, calib
         else:
             self.calibration = calibration

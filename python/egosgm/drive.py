@@ -83,12 +83,15 @@ class Drive:
             raise _egosgm.InvalidArgument(f"motion: is a {type(motion).__name__}: choose True or False; Pipeline.process takes motions that are known")
         self.sequence = source if isinstance(source, _egosgm.StereoSequence) else None
         if calibration is None and self.sequence is not None:
+            _egosgm._expect_calibrated(self.sequence)
             calibration = self.sequence.calibration
         if isinstance(source, Bag):
             if calibration is not None:
                 raise _egosgm.InvalidArgument("calibration: a bag has its own: give it to the Bag, as calib")
             calibration = source.find_cameras().calibration
+        self._calibration_file: "str | os.PathLike[str]" = ""
         if isinstance(calibration, (str, os.PathLike)):
+            self._calibration_file = calibration if self.sequence is None else ""
             calibration = read_calibration(calibration, size=self.sequence.size if self.sequence is not None else None)
         if isinstance(calibration, StereoRig):
             raise _egosgm.InvalidArgument("calibration: is of raw images: rectify them first (egosgm.Rectification, egosgm rectify)")
@@ -143,6 +146,8 @@ class Drive:
                 if not isinstance(pair, (tuple, list)) or len(pair) != 2:
                     raise _egosgm.InvalidArgument(f"pair {number}: is a {type(pair).__name__}: give (left, right), each an image")
                 left, right = (np.array(image) for image in pair)  # copies: a camera may use its buffers again before the frame is handed out
+                if not first and left.ndim >= 2 and os.path.isfile(self._calibration_file):
+                    read_calibration(self._calibration_file, size=left.shape[1::-1])  # refused where it is of another size
                 first = first or left.shape[:2]
                 if left.shape[:2] != first:
                     raise _egosgm.InvalidArgument(f"pair {number}: its left image is of the shape {left.shape}, and the first one's began with {first}: "

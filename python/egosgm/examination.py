@@ -104,7 +104,7 @@ class Examination:
         self._width = self._height = self._bits = 0
         self._brightness = np.zeros(2)
         self._contrasts: List[float] = []
-        self._saturated, self._interlaced = np.zeros(2), 0
+        self._saturated, self._interlaced, self._mosaics = np.zeros(2), 0, 0
         self._matches: List[NDArray[np.float32]] = []
         self._coarse: List[NDArray[np.float32]] = []
         self._coarse_pixels = 0
@@ -117,7 +117,9 @@ class Examination:
         self._pairs += 1
         self._narrow += int(left.dtype == np.uint16 and max(int(left.max()), int(right.max())) < 256)
         self._equal += int(np.array_equal(left, right))
-        self._contrasts.append(min(float(np.ptp(np.quantile(image, (0.01, 0.99)))) for image in _egosgm._grey_bytes(left, right)))
+        greys = _egosgm._grey_bytes(left, right)
+        self._contrasts.append(min(float(np.ptp(np.quantile(image, (0.01, 0.99)))) for image in greys))
+        self._mosaics += int(_egosgm._holds_mosaic(greys[0]))
         for side, image in enumerate((left, right)):
             self._brightness[side] += image.mean()
             largest = image.max()
@@ -179,6 +181,9 @@ class Examination:
         if not self._has_contrast():
             return Finding("problem", "images", f"{text}, of nearly one tone: they hold {np.median(self._contrasts):.0f} of 256 grey levels",
                            "expose longer, or give more light: noise has as many")
+        if 2 * self._mosaics > self._pairs:
+            return Finding("problem", "images", f"{text}, the mosaics of colour sensors (Bayer): neighbouring pixels saw other colours",
+                           "convert both images to grey first, as cv2.cvtColor(image, cv2.COLOR_BayerBG2GRAY) does for one order of the colours")
         if 2 * self._interlaced > self._pairs:
             return Finding("problem", "images", f"{text}, interlaced: every other row is of another moment", "take every other row of both images, or deinterlace the videos")
         left, right = self._brightness / self._pairs

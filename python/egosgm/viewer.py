@@ -26,7 +26,8 @@ class RerunOutput:
             if not file.parent.is_dir():
                 raise _egosgm.InvalidArgument(f"{file}: {file.parent}: no such folder")
             open(file, "xb").close()  # an error names what is wrong with it
-        self._rerun, self._file = rerun, file
+        self._rerun: Any = rerun
+        self._file = file
         self._recording = rerun.RecordingStream("egosgm")
         if file is None:
             self._recording.spawn()

@@ -95,6 +95,41 @@ class Doubts(Brought):
             self.assertIn(named, self.assert_works("run", *arguments, "--out", self.new_folder() / "out"))
             self.assertIn(named, self.assert_only_problem("calibration", *arguments)["text"])
 
+    def test_calibrations_of_images_of_other_sizes(self):
+        """By the size that the file says, else by the principal point."""
+        f, cx, cy, baseline = self.calibration()
+        f, cx, cy = numpy.array([f, WIDTH / 2 - 0.5, HEIGHT / 2 - 0.5])
+        for factor, is_told in ((0.5, True), (0.75, True), (0.9, False), (1, False), (1.1, False), (1.25, True), (1.5, True), (2, True)):
+            arguments = self.with_calibration(self.calibrated(fx=factor * f, fy=factor * f, cx=factor * cx, cy=factor * cy))
+            said = self.assert_works("run", *arguments, "--out", self.new_folder() / "out")
+            self.assertEqual("the principal point is far from the middle" in said, is_told, factor)
+            finding = next(one for one in json.loads(self.run_doctor(*arguments, "--json").stdout) if one["check"] == "calibration")
+            self.assertEqual("the principal point is far from the middle" in finding["text"], is_told, factor)
+        k = f"[{f} 0 {cx}; 0 {f} {cy}; 0 0 1]"
+        p = f"{f} 0 {cx} 0 0 {f} {cy} 0 0 0 1 0"
+        for text in (f"cam0={k}\ncam1={k}\nbaseline={1000 * baseline}\nwidth={2 * WIDTH}\nheight={2 * HEIGHT}\n",
+                     f"S_rect_00: {2 * WIDTH} {2 * HEIGHT}\nP_rect_00: {p}\nP_rect_01: {p.replace(' 0 0', f' {-f * baseline} 0', 1)}\n"):
+            file = self.new_folder() / "calib.txt"
+            file.write_text(text)
+            for command in (["run", *self.with_calibration(file), "--out", self.new_folder() / "never"], ["doctor", *self.with_calibration(file)],
+                            ["odometry", *self.with_calibration(file), "--out", self.new_folder() / "never"]):
+                self.assert_refused(command, f"is of images of {2 * WIDTH}x{2 * HEIGHT}, and these have {WIDTH}x{HEIGHT}")
+            file.write_text(text.replace(str(2 * WIDTH), str(WIDTH)).replace(str(2 * HEIGHT), str(HEIGHT)))
+            self.assert_works("run", *self.with_calibration(file), "--out", self.new_folder() / "out")
+
+    def test_a_folder_without_a_calibration_runs_as_two_pictures_do(self):
+        folder = self.new_folder() / "drive"
+        for side, source in (("left", "image_0"), ("right", "image_1")):
+            shutil.copytree(self.street / source, folder / side)
+        self.assertIn("no depth and no odometry; --calib FILE brings both", self.assert_works("run", folder, "--out", self.new_folder() / "out"))
+        self.assertEqual(self.examine(folder)["calibration"]["verdict"], "note")
+        self.assert_refused(["odometry", folder, "--out", folder / "never"], "holds no calibration", "--calib FILE")
+        out = self.new_folder() / "out"
+        self.assertNotIn("no depth", self.assert_works("run", folder, "--calib", self.street / "calib.txt", "--out", out))
+        self.assertTrue((out / "poses.txt").exists())
+        shutil.copy(self.street / "calib.txt", folder)
+        self.assert_refused(["run", folder, "--calib", self.street / "calib.txt", "--out", folder / "never"], "more than one input")
+
     def test_a_missing_baseline_is_no_reason_to_exchange_cameras(self):
         f, cx, cy, baseline = self.calibration()
         for row in ("", f"baseline = {baseline}\n", "baseline_m = 0\n"):
@@ -288,12 +323,27 @@ class Maps(Brought):
         density, _, doubts = self.figures("wide.npy")
         self.assertAlmostEqual(density, 100 * (1 - self.missing.mean()))
         self.assertIn("beyond the image's width", doubts)
-        self.assertEqual(self.figures("truth.npy")[2], "")
+
+    def test_a_file_that_is_compared_with_itself_is_told(self):
+        self.pfm(self.maps / "copy.pfm", self.truth)
+        self.npy(self.maps / "sparse.npy", numpy.where(self.missing, -1, self.truth).astype(numpy.float32))
+        self.npy(self.maps / "near.npy", self.truth + numpy.float32(0.001))
+        for name, is_told in (("truth.npy", True), ("copy.pfm", True), ("sparse.npy", False), ("near.npy", False)):
+            self.assertEqual("is a file compared with itself" in self.figures(name)[2], is_told, name)
+        said = self.assert_works("eval-video", self.maps / "truth.npy", self.maps / "truth.npy")
+        self.assertIn("is a file compared with itself", said)
 
     def test_another_scale_is_told(self):
         self.png16(self.maps / "map.png", numpy.rint(self.truth * 16))
         self.assertIn("needs --scale 16;", self.figures("map.png")[2])
         self.assertEqual(self.figures("map.png", "--scale", 16)[2], "")
+        for factor in (1.28, 1 / 1.28, 1.2, 0.8):
+            self.npy(self.maps / "scaled.npy", (factor * self.truth).astype(numpy.float32))
+            self.assertIn(f"needs --truth-scale {256 / factor:.4g}, an estimate of {256 * factor:.4g} --scale", self.figures("scaled.npy")[2])
+        noise = numpy.random.default_rng(3).uniform(0.5, 1.9, self.truth.shape)  # of no one scale
+        for name, values in (("poor.npy", noise * self.truth), ("little.npy", 1.1 * self.truth), ("shifted.npy", self.truth + 4)):
+            self.npy(self.maps / name, values.astype(numpy.float32))
+            self.assertEqual(self.figures(name)[2], "", name)
 
     def test_what_is_no_disparity_in_pixels_is_told(self):
         for name, values, named in (("width", self.truth / WIDTH, "are they disparities in pixels?"), ("depth", 20 / self.truth, "are they disparities in pixels?"),

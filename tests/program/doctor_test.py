@@ -141,6 +141,23 @@ class Doctor(InputTest):
                 write_grey(street / f"image_{side}/{i:06d}.png", image)
         self.assertIn("interlaced", self.assert_only_problem("images", street)["text"])
 
+    def test_mosaics_of_colour_sensors(self):
+        for order in (((0.45, 0.8), (0.8, 1.25)), ((0.95, 0.9), (1.0, 0.95)), ((0.8, 1.25), (0.45, 0.8))):
+            for bits in (8, 16):
+                street = self.broken_street()
+                for file in (*(street / "image_0").iterdir(), *(street / "image_1").iterdir()):
+                    image = numpy.clip(read_grey(file) * numpy.tile(order, (HEIGHT // 2, WIDTH // 2)), 0, 255)
+                    if bits == 8:
+                        write_grey(file, image)
+                    else:
+                        rows = (200 * image).astype(">u2")
+                        file.write_bytes(png(WIDTH, HEIGHT, 16, (row.tobytes() for row in rows)))
+                found = self.examine(street, code=2)["images"]
+                self.assertIn("mosaics of colour sensors", found["text"])
+                self.assertNotIn("deinterlace", found["remedy"])
+        self.assertIn("mosaics of colour sensors", self.assert_works("run", street, "--out", self.new_folder() / "out"))
+        self.assertNotIn("mosaics", self.assert_works("run", self.street, "--out", self.new_folder() / "out"))
+
     def test_the_same_image_on_both_sides(self):
         street = self.broken_street()
         for file in (street / "image_0").iterdir():

@@ -128,7 +128,9 @@ def test_of_rectified_images_of_another_size(tmp_path):
     (tmp_path / "orb_slam.yaml").write_text(RECTIFIED["orb_slam3.yaml"] + f"Camera.width: {WIDTH}\nCamera.height: {HEIGHT}\n")
     (tmp_path / "flat.json").write_text(RECTIFIED["flat.json"])
     (tmp_path / "q.json").write_text(json.dumps(dict(Q=Q, image_size=[WIDTH, HEIGHT])))
-    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json"):
+    (tmp_path / "kitti.txt").write_text(RECTIFIED["kitti.txt"].replace("P", "P_rect_0") + f"S_rect_00: {WIDTH} {HEIGHT}\n")
+    (tmp_path / "middlebury.txt").write_text(f"cam0=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\ncam1=[{F} 0 {CX}; 0 {F} {CY}; 0 0 1]\nbaseline={1000 * B}\nwidth={WIDTH}\nheight={HEIGHT}\n")
+    for name in ("kalibr.yaml", "left.yaml", "orb_slam.yaml", "flat.json", "q.json", "kitti.txt", "middlebury.txt"):
         expect_rectified(read(name, np.array([WIDTH, HEIGHT])))
         with pytest.raises(egosgm.InvalidArgument, match=f"{name}.*is of images of 640x480, and these have 320x240"):
             read(name, (WIDTH // 2, HEIGHT // 2))
@@ -260,7 +262,9 @@ TRANSPOSED = np.transpose(K).tolist()
 @pytest.mark.parametrize("text, named", [
     (RAW["nested.json"].replace(json.dumps(K), json.dumps(TRANSPOSED)), "M1"), (json.dumps(dict(Q=np.transpose(Q).tolist())), "Q"),
     (kalibr(T_cn_cnm1=np.transpose(SHIFT).tolist()), "T_cn_cnm1"), (RAW["oak.json"].replace(json.dumps(K), json.dumps(TRANSPOSED)), "intrinsicMatrix"),
+    (f"cam0=[{F} 0 0; 0 {F} 0; {CX} {CY} 1]\ncam1=[{F} 0 0; 0 {F} 0; {CX} {CY} 1]\nbaseline={1000 * B}\n", "cam0"),
     (" ".join(map(str, flat(TRANSPOSED))) + f"\n{B}\n", "K"),
+    (f"P0: {' '.join(map(str, flat(np.transpose(P))))}\nP1: {' '.join(map(str, flat(np.transpose(RIGHT_P))))}\n", "P0"),
 ])
 def test_transposed_matrices_are_named(text, named, tmp_path):
     (tmp_path / "calib.txt").write_text(text)

@@ -145,7 +145,7 @@ def test_what_has_no_map_for_a_frame_is_told(tmp_path, capfd):
     arguments = [estimate, estimate, "--against", str(tmp_path / "other"), "--flow", str(tmp_path / "flow")]
     assert video_program.main(arguments) == 0
     note = f"{tmp_path / 'other'} has nothing for 2 frames, the first is 000001: its figures are of the others"
-    assert capfd.readouterr().out.splitlines()[-1] == note  # the last frame needs no flow
+    assert note in capfd.readouterr().out.splitlines()  # the last frame needs no flow
     assert video_program.main([*arguments, "--json"]) == 0 and json.loads(capfd.readouterr().out)["notes"] == [note]
     with pytest.raises(egosgm.InvalidArgument, match="near -1 px"):
         video_program.main([*arguments, "--near", "-1"])

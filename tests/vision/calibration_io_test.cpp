@@ -121,6 +121,43 @@ TEST_F(CalibrationIo, BrokenFilesAreNamedWithTheirRow) {
   expect_text_refused(std::string("\x01\x02\x00\xff", 4), {":1:", "is not `key: value`"});
 }
 
+TEST_F(CalibrationIo, SizesOfImagesAreRead) {
+  const auto size = [&](const std::string& text, KittiCameras cameras = KittiCameras::kAny) {
+    write_file(file_, text);
+    const SizedCalibration found = read_sized_calibration(file_, cameras);
+    return std::pair{found.width, found.height};
+  };
+  const std::string raw = "P_rect_00: " + kP0 + "\nP_rect_01: " + kP1 + "\nP_rect_02: " + kP2 + "\nP_rect_03: " + kP3;
+  EXPECT_EQ(size(raw + "\nS_00: 1392 512\nS_rect_00: 1.242000e+03 3.750000e+02\nS_rect_02: 800 600\n"),
+            std::pair(1242, 375));
+  EXPECT_EQ(size(raw + "\nS_rect_00: 1242 375\nS_rect_02: 800 600\n", KittiCameras::kColor), std::pair(800, 600));
+  const std::string middlebury = "cam0=[700 0 4; 0 700 2; 0 0 1]\ncam1=[700 0 4; 0 700 2; 0 0 1]\nbaseline=100\n";
+  EXPECT_EQ(size(middlebury + "width=2964\nheight=2000\n"), std::pair(2964, 2000));
+  for (const std::string& text :
+       {raw, raw + "\nS_rect_00: 0 0\n", raw + "\nS_rect_00: 1e9 1\n", middlebury + "width=9\n", kOwn}) {
+    EXPECT_EQ(size(text), std::pair(0, 0)) << text;
+  }
+  expect_text_refused(raw + "\nS_rect_00: wide 2\n", {"'wide' is not a finite number"});
+}
+
+TEST_F(CalibrationIo, OtherNamesOfTwoCameras) {
+  const std::string cameras = "P_rect_101: " + kP0 + "\nP_rect_103: " + kP1 + "\nT_101: 0 0 0\nT_103: ";
+  expect_calibration(read(cameras + "-0.5 0.001 0.002"), 600, 180, 0.5, 0);
+  for (const std::string& text :
+       {cameras + "-0.25 0 0", "P_rect_00: " + kP0 + "\nP_rect_01: " + kP1 + "\nT_00: 0 0 0\nT_01: -0.25 0 0\n"}) {
+    expect_text_refused(
+        text, {":2:", "gives a baseline of 0.500000 m, T_", "one of 0.250000 m", "DrivingStereo", "baseline_m"});
+  }
+  expect_text_refused("P_rect_101: " + kP0, {"has the camera P_rect_101 alone"});
+}
+
+TEST_F(CalibrationIo, TransposedMatricesAreNamed) {
+  const std::string p = "700 0 0 0 710 0 600 180 1 -350 0 0";
+  expect_text_refused("P0: " + p + "\nP1: " + p, {":1:", "P0 is transposed, as MATLAB writes it"});
+  expect_text_refused("cam0=[700 0 0; 0 710 0; 600 180 1]\ncam1=[700 0 600; 0 710 180; 0 0 1]\nbaseline=1",
+                      {":1:", "cam0 is transposed"});
+}
+
 TEST_F(CalibrationIo, MissingCamerasAreNamed) {
   expect_refused([&] { read("P0: " + kP0 + "\nP1: " + kP1, KittiCameras::kColor); }, {"has no row P2"});
   expect_refused([&] { read_calibration(folder_ / "none.txt"); }, {"none.txt", "No such file"});

@@ -314,7 +314,7 @@ TEST_F(DatasetTest, NamesThatAreThereAreNoPatterns) {
     EXPECT_EQ(pair.frames[0].right, root_ / folder / "r%20c.png");
     expect_refused([&] { open_patterns(path(folder + "/l%20d.png"), path(folder + "/r%20d.png"), ""); }, {"l%20d.png"});
   }
-  expect_refused([&] { open_patterns(path("b*/*.png"), path("b*/*.png"), ""); }, {"b*/*.png", "its folder none"});
+  expect_refused([&] { open_patterns(path("b*/*.png"), path("b*/*.png"), ""); }, {"b*/*.png", "or its folder one *"});
 }
 
 TEST_F(DatasetTest, JpegIsAnImageLikeAnother) {
@@ -355,8 +355,9 @@ TEST_F(DatasetTest, AFolderOfAnotherLevelIsNamedWithWhatItHolds) {
   expect_refused([&] { open_folder(root_ / "odo/sequences"); }, {"it holds 00: give", "odo/sequences/00"});
   expect_refused([&] { open_folder(root_ / "odo/sequences/00/image_1"); }, {"belongs to the sequence", "sequences/00"});
   add_images({"own/left/1", "own/right/1"}), add_text("rec/mav0/cam0/data.csv", "x"), add_text("out/report.json", "{}");
-  expect_refused([&] { open_folder(root_ / "own"); }, {"--left '", "own/left/*'", "own/right/*'"});
-  expect_refused([&] { open_folder(root_ / "own/left"); }, {"images of its own"});
+  expect_refused([&] { open_folder(root_ / "own/left"); }, {"it belongs to the sequence", "/own: give that one"});
+  add_images({"alone/0/1"});
+  expect_refused([&] { open_folder(root_ / "alone/0"); }, {"images of its own"});
   expect_refused([&] { open_folder(root_ / "rec"); }, {"egosgm rectify --euroc"});
   expect_refused([&] { open_folder(root_ / "out"); }, {"egosgm run"});
   expect_refused([&] { open_folder(root_ / "own/left/1.png"); }, {"is no folder", "--left PATTERN", "quotes"});
@@ -387,9 +388,12 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
   add_images({"d/left/1", "d/right/2"}), add_text("d/calib.txt", kOwnCalibration);
   expect_refused([&] { open_folder(root_ / "d"); }, {"no right image has the name of a left one"});
   add_images({"e/cam0/1", "e/cam1/1"});
-  expect_refused([&] { open_folder(root_ / "e"); }, {"no calib.txt: put their calibration there", "e/cam1/*'"});
+  EXPECT_FALSE(open_folder(root_ / "e").has_calibration);
   add_text("e/rig.json", "{}");
-  expect_refused([&] { open_folder(root_ / "e"); }, {"--calib '" + path("e/rig.json") + "'"});
+  expect_refused([&] { open_folder(root_ / "e"); },
+                 {"no calib.txt: put their calibration there", "/e --calib '" + path("e/rig.json") + "'"});
+  add_text("e/others.json", "{}");
+  EXPECT_FALSE(open_folder(root_ / "e").has_calibration);
   add_images({"g/cam_Left/1", "g/cam_Right/1", "h/L/1", "h/R/1"});
   for (const char* folder : {"g", "h"}) add_text(std::string(folder) + "/calib.txt", kOwnCalibration);
   add_text("h/L/.1.png", "what a file manager left behind"), add_text("h/R/.1.png", "likewise");
@@ -399,6 +403,65 @@ TEST_F(DatasetTest, TwoFoldersOfImagesAndTheirCalibrationAreASequence) {
   expect_refused([&] { open_folder(root_ / "f"); }, {"holds no images that are PNG or JPEG", "egosgm rectify"});
   add_text("e/calib.txt", "nothing\n");
   expect_refused([&] { open_folder(root_ / "e"); }, {"e/calib.txt"});
+}
+
+TEST_F(DatasetTest, PairsMayHaveAFolderEach) {
+  add_images({"a/000007/left", "a/000007/right", "a/000010/left", "a/000010/right", "a/000011/left"});
+  const StereoSequence sequence = open_folder(root_ / "a");
+  EXPECT_EQ(numbers_of(sequence), (std::vector<int>{7, 10}));
+  EXPECT_EQ(sequence.frames[1].right, root_ / "a/000010/right.png");
+  EXPECT_FALSE(sequence.has_calibration);
+  EXPECT_NE(sequence.note.find("1 image without the other camera's left out"), std::string::npos);
+  add_text("a/calib.txt", kOwnCalibration), add_text("a/times.txt", "0\n1\n");
+  EXPECT_DOUBLE_EQ(open_folder(root_ / "a").calibration.baseline_m, 0.5);
+  EXPECT_TRUE(std::filesystem::equivalent(open_folder(root_ / "a").times_file, root_ / "a/times.txt"));
+  EXPECT_EQ(open("a/*/left.png", "a/*/right.png").frames[0].left, root_ / "a/000007/left.png");
+  EXPECT_EQ(numbers_of(open("a/0000*/left.png", "a/0000*/right.png")), (std::vector<int>{7, 10}));
+  EXPECT_EQ(numbers_of(open_folder(root_ / "a/000010")), (std::vector<int>{0})) << "a pair by itself";
+  expect_refused([&] { open("a/0*/left.png", "a/0*/none.png"); }, {"has no partner"});
+  for (const char* bad : {"a/*/*.png", "a/%d/left.png", "a/*/", "*/*/left.png"}) {
+    expect_refused([&] { open(bad, "a/*/right.png"); }, {"pattern '", bad, "or its folder one *"});
+  }
+  add_images({"b/x/im_Left_view", "b/x/im_Right_view", "b/y/im_Left_view", "b/y/im_Right_view"});
+  EXPECT_EQ(open_folder(root_ / "b").frames[1].right, root_ / "b/y/im_Right_view.png");
+  add_images({"c/x/left", "c/x/right", "c/x/left_mask", "c/x/right_mask"});
+  expect_refused([&] { open_folder(root_ / "c"); }, {"no stereo sequence"});
+}
+
+TEST_F(DatasetTest, WhatARunWroteIsNoInput) {
+  add_images({"out/left/0", "out/right/0"}), add_text("out/report.json", "{}"),
+      add_text("out/calibration.txt", kOwnCalibration);
+  expect_refused([&] { open_folder(root_ / "out"); }, {"it is what `egosgm run` wrote"});
+}
+
+TEST_F(DatasetTest, WhatIsGivenInPlaceOfAFolderIsNamed) {
+  const std::pair<std::string, std::string> kinds[] = {{"PK\x03\x04rest", "a zip archive: unpack it"},
+                                                       {"\x1f\x8b\x08rest", "packed by gzip: unpack it"},
+                                                       {std::string(257, 'x') + "ustar", "a tar archive: unpack it"},
+                                                       {std::string("\0\0\0\x18", 4) + "ftypmp42", "is a video"},
+                                                       {"\x89MCAP0", "by --bag"},
+                                                       {"#ROSBAG V2.0", "by --bag"}};
+  for (const auto& [content, named] : kinds) {
+    add_text("drive.dat", content);
+    expect_refused([&] { open_folder(root_ / "drive.dat"); }, {"drive.dat: is no folder; it is", named});
+  }
+  add_text("DSCF0001.MPO", "\xff\xd8\xff");
+  expect_refused([&] { open_folder(root_ / "DSCF0001.MPO"); }, {"both pictures of a 3D camera", "--side-by-side"});
+  add_text("HD720.svo2", "x");
+  expect_refused([&] { open_folder(root_ / "HD720.svo2"); }, {"recording of a ZED", "ZED_SVO_Export"});
+  for (const char* camera : {"0", "/dev/video77", "rtsp://camera/left"}) {
+    expect_refused([&] { open_folder(camera); }, {camera, "a live camera"});
+  }
+}
+
+TEST_F(DatasetTest, SizesThatACalibrationSaysAreThoseOfTheImages) {
+  const std::string k = "cam0=[700 0 4; 0 700 2; 0 0 1]\ncam1=[700 0 4; 0 700 2; 0 0 1]\nbaseline=100\n";
+  for (const char* name : {"im0.png", "im1.png"}) add_image(name);
+  add_text("calib.txt", k + "width=8\nheight=4\n");
+  EXPECT_EQ(check_image_sizes(open_folder(root_)).width, 8);
+  add_text("calib.txt", k + "width=16\nheight=8\n");
+  expect_refused([&] { check_image_sizes(open_folder(root_)); },
+                 {"calib.txt: is of images of 16x8, and these have 8x4: give the calibration of this size"});
 }
 
 TEST_F(DatasetTest, ImagesInColourAreOfKittisColourCameras) {

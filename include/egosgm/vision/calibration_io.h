@@ -20,7 +20,8 @@ class EGOSGM_EXPORT NegativeBaseline : public InvalidArgument {
 
 /// Reads a rectified pair's calibration. The file's keys tell which of the formats it is:
 ///  - KITTI odometry, KITTI 2012:      `P0: <12 numbers>`, `P1: ...` (and P2, P3), 3x4 projection matrices, row-major;
-///  - KITTI raw, 2015 calib_cam_to_cam: `P_rect_00: <12 numbers>`, ...; other rows are ignored;
+///  - KITTI raw, 2015 calib_cam_to_cam: `P_rect_00: <12 numbers>`, ..., and DrivingStereo's `P_rect_101`, `P_rect_103`;
+///    the baseline is compared with T_00, ... where they are there; other rows are ignored;
 ///  - Middlebury 2014 calib.txt:       `cam0=[f 0 cx; 0 f cy; 0 0 1]`, `cam1=...`, `doffs=` [px], `baseline=` [mm];
 ///  - EgoSGM's own, flat TOML or YAML: `fx = 721.5` or `fx: 721.5`, a row each for fx, fy, cx, cy, baseline_m and, if
 ///  not
@@ -28,9 +29,21 @@ class EGOSGM_EXPORT NegativeBaseline : public InvalidArgument {
 /// With P matrices, baseline_m = (P_left[0][3] - P_right[0][3]) / f and doffs_px = cx_right - cx_left. `cameras`
 /// matters only for KITTI's; kAny takes the grey pair where the file has it, else the colour pair. Throws
 /// InvalidArgument with file, row and remedy: too few numbers, not a number, NaN, zero focal length, zero or negative
-/// baseline (NegativeBaseline), no such cameras, unknown key, a format that is known and not read here. Thread-safe.
+/// baseline (NegativeBaseline), a transposed matrix, no such cameras, unknown key, a format that is known and not read
+/// here. Thread-safe.
 EGOSGM_EXPORT Calibration read_calibration(const std::filesystem::path& file,
                                            KittiCameras cameras = KittiCameras::kAny);
+
+/// A calibration, and the size of the images that it is of, where the file says it (KITTI's S_rect, Middlebury's width
+/// and height), else 0.
+struct SizedCalibration {
+  Calibration calibration;
+  int width = 0, height = 0;
+};
+
+/// As read_calibration.
+EGOSGM_EXPORT SizedCalibration read_sized_calibration(const std::filesystem::path& file,
+                                                      KittiCameras cameras = KittiCameras::kAny);
 
 /// Writes EgoSGM's own format (TOML). Throws IoError, and as Calibration::validate. Thread-safe for different files.
 EGOSGM_EXPORT void write_calibration(const std::filesystem::path& file, const Calibration& calibration);

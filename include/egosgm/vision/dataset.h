@@ -30,6 +30,7 @@ struct StereoSequence {
   std::string note;             // what is unusual about the frames, for the user; empty where nothing is
   bool has_calibration = true;  // else `calibration` stands in for one: there is no depth, and no odometry
   Calibration calibration;
+  int calibrated_width = 0, calibrated_height = 0;  // of the images that the calibration is of, where its file says it
   std::filesystem::path calibration_file;
   std::filesystem::path poses_file;  // the true poses, empty where there are none
   std::filesystem::path times_file;  // when the frames were taken, empty where no file says so
@@ -68,7 +69,8 @@ EGOSGM_EXPORT StereoSequence open_kitti_raw(const std::filesystem::path& folder,
 /// Middlebury 2014 scene: im0.png, im1.png, calib.txt, disp0GT.pfm if there. One frame, number 0.
 EGOSGM_EXPORT StereoSequence open_middlebury(const std::filesystem::path& folder, FrameRange range = {});
 
-/// Any pair of images or patterns. A pattern's file name holds one `%d`, `%06d`, ... (the frame's number) or one `*`;
+/// Any pair of images or patterns. A pattern's file name holds one `%d`, `%06d`, ... (the frame's number) or one `*`,
+/// which may stand in a folder's name instead (`*/left.png`);
 /// without an extension it means PNG and JPEG. Left and right files with equal text there, or one number, belong
 /// together, or, with PairBy::kOrder, the first ones, the second ones, and so on. The (left) text is the frame's number
 /// if all of them are numbers, else frames are counted from 0 in the order of names, numbers in them by their value.
@@ -80,8 +82,8 @@ EGOSGM_EXPORT StereoSequence open_patterns(const std::string& left, const std::s
                                            PairBy pair_by = PairBy::kName);
 
 /// Opens `folder` as whichever of KITTI odometry, KITTI raw or Middlebury it is, or as two folders of images, left and
-/// right (cam0 and cam1, image_left and image_right), with their calibration, calib.txt or calibration.txt, and
-/// poses.txt if there.
+/// right (cam0 and cam1, image_left and image_right), or as a folder for each pair with left.png and right.png; with
+/// their calibration, calib.txt or calibration.txt, and poses.txt if there. A calibration of another name is refused.
 EGOSGM_EXPORT StereoSequence open_folder(const std::filesystem::path& folder, FrameRange range = {});
 
 struct StereoImages {
@@ -92,7 +94,8 @@ struct StereoImages {
 /// Thread-safe.
 EGOSGM_EXPORT StereoImages read_images(const StereoFrame& frame);
 
-/// Reads only the headers: throws InvalidArgument at the first image whose size is not that of the first. Thread-safe.
+/// Reads only the headers: throws InvalidArgument at the first image whose size is not that of the first, and where the
+/// calibration is of images of another size. Thread-safe.
 EGOSGM_EXPORT Size check_image_sizes(const StereoSequence& sequence);
 
 /// Which of a file's `rows` belongs to each frame. A file has a row for each number from 0 to the sequence's last one

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/foreign_file.h"
+
+#include <system_error>
+
+#include "egosgm/error.h"
+#include "vision/file_io.h"
+#include "vision/frame_names.h"
+
+namespace egosgm::vision {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kRectify = ", which `egosgm rectify` reads, with the cameras' calibration";
+constexpr const char* kLive =
+    "it names a live camera: in Python, egosgm.run takes a generator of its pairs; or record both, and `egosgm "
+    "rectify` "
+    "reads the videos";
+
+std::string archive(const char* kind) {
+  return std::string("it is ") + kind + ": unpack it, and give the folder that it holds";
+}
+
+bool names_a_camera(const fs::path& path) {
+  const std::string text = path.string();
+  return text.find("://") != std::string::npos || text.starts_with("/dev/video") || text.starts_with("/dev/v4l") ||
+         is_digits(text);
+}
+
+}  // namespace
+
+std::string foreign_kind(std::string_view start) {
+  using std::string_view_literals::operator""sv;
+  struct Kind {
+    std::size_t at;
+    std::string_view bytes;
+    std::string meaning;
+  };
+  const std::string rosbag = "it is a recording of ROS: `egosgm run` and `doctor` take it by --bag";
+  const Kind kinds[] = {
+      {0, "version https://git-lfs", "it is a pointer of Git LFS, in place of which `git lfs pull` puts the file"},
+      {4, "ftyp", std::string("it is a video") + kRectify},
+      {8, "AVI ", std::string("it is a video") + kRectify},
+      {0, "\x1a\x45\xdf\xa3", std::string("it is a video") + kRectify},
+      {0, "II*\0"sv, std::string("it is a TIFF") + kRectify},
+      {0, "MM\0*"sv, std::string("it is a TIFF") + kRectify},
+      {8, "WEBP", std::string("it is a WebP") + kRectify},
+      {0, "P5", std::string("it is a PGM") + kRectify},
+      {0, "P6", std::string("it is a PPM") + kRectify},
+      {0, "BM", std::string("it is a BMP") + kRectify},
+      {0, "PK\x03\x04", archive("a zip archive")},
+      {0, "7z\xbc\xaf", archive("a 7z archive")},
+      {0, "Rar!", archive("a RAR archive")},
+      {257, "ustar", archive("a tar archive")},
+      {0, "\x1f\x8b", archive("packed by gzip")},
+      {0, "BZh", archive("packed by bzip2")},
+      {0, "\xfd\x37zXZ", archive("packed by xz")},
+      {0, "\x28\xb5\x2f\xfd", archive("packed by zstd")},
+      {0, "\x89MCAP", rosbag},
+      {0, "#ROSBAG", rosbag},
+      {0, "SQLite format 3", rosbag},
+      {0, "\x89HDF", "it is HDF5: write its images as PNG, a folder for each camera"},
+      {0, "<", "it is a web page or XML: was its download refused?"},
+  };
+  for (const Kind& kind : kinds) {
+    if (start.size() > kind.at && start.substr(kind.at).starts_with(kind.bytes)) return kind.meaning;
+  }
+  return {};
+}
+
+std::string foreign_input(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::is_regular_file(status)) return names_a_camera(path) ? kLive : "";
+  const std::string extension = lower(path.extension().string());
+  if (extension == ".mpo") {
+    return "it holds both pictures of a 3D camera (MPO), which `egosgm rectify --side-by-side` reads, with the "
+           "camera's calibration";
+  }
+  if (extension == ".svo" || extension == ".svo2") {
+    return "it is a recording of a ZED: its SDK's ZED_SVO_Export makes a video of it, left and right, which `egosgm "
+           "rectify --side-by-side` reads";
+  }
+  try {
+    return foreign_kind(read_file_start(path, kKindBytes));
+  } catch (const Error&) {  // it cannot be read, and is no folder anyway
+    return {};
+  }
+}
+
+}  // namespace egosgm::vision

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace egosgm::vision {
+
+inline constexpr std::size_t kKindBytes = 300;  // of a file, which tell its kind
+
+/// What a file is that people give in place of an image or of a sequence, by its first bytes, and what to do with it:
+/// "it is a zip archive: unpack it". Empty where that is not known. Thread-safe.
+std::string foreign_kind(std::string_view start);
+
+/// The same of a path that is no folder: what it holds, or the camera that it names. Thread-safe.
+std::string foreign_input(const std::filesystem::path& path);
+
+}  // namespace egosgm::vision

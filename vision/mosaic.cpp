@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/mosaic.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace egosgm::vision {
+namespace {
+
+constexpr int kBlock = 32;
+constexpr double kLeastBrightness = 4;  // of a block, so that noise in the dark is no colour
+// Of the brightness, in the median of all blocks. Grey images of KITTI, Middlebury and others have 0.02 and less; their
+// mosaics 0.1 and more, also where one colour is only a tenth brighter than the others.
+constexpr double kLeastDifference = 0.04;
+
+/// By how much the columns of a block differ, in its even or in its odd rows, as a share of its brightness.
+double difference_in(const Image& grey, int top, int left) {
+  double sums[2][2] = {};  // of even and odd rows and columns
+  for (int y = 0; y < kBlock; ++y) {
+    for (int x = 0; x < kBlock; ++x) sums[y % 2][x % 2] += grey.at<std::uint8_t>(top + y, left + x);
+  }
+  constexpr double kPixels = kBlock * kBlock / 4.0;
+  const double brightness = (sums[0][0] + sums[0][1] + sums[1][0] + sums[1][1]) / (4 * kPixels);
+  const double difference = std::max(std::abs(sums[0][0] - sums[0][1]), std::abs(sums[1][0] - sums[1][1])) / kPixels;
+  return difference / std::max(kLeastBrightness, brightness);
+}
+
+}  // namespace
+
+bool holds_mosaic(const Image& grey) {
+  std::vector<double> differences;
+  for (int y = 0; y + kBlock <= grey.rows; y += kBlock) {
+    for (int x = 0; x + kBlock <= grey.cols; x += kBlock) differences.push_back(difference_in(grey, y, x));
+  }
+  if (differences.empty()) return false;
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::nth_element(differences.begin(), middle, differences.end());
+  return *middle > kLeastDifference;
+}
+
+}  // namespace egosgm::vision
