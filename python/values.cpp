@@ -34,8 +34,18 @@ py::array_t<double> array_of_covariance(const Motion& motion) {
   return array;
 }
 
-Calibration make_calibration(double fx, double fy, double cx, double cy, double baseline_m, double doffs_px) {
-  const Calibration calibration{fx, fy, cx, cy, baseline_m, doffs_px};
+Calibration make_calibration(const py::object& fx, const py::object& fy, const py::object& cx, const py::object& cy,
+                             const py::object& baseline_m, double doffs_px) {
+  const auto number = [](const py::object& value) {
+    try {
+      return value.cast<double>();
+    } catch (const py::cast_error&) {  // a matrix, or nothing
+      throw InvalidArgument(
+          "calibration: give the numbers fx, fy, cx, cy [px] and baseline_m [m]; of a camera matrix K these are "
+          "K[0, 0], K[1, 1], K[0, 2], K[1, 2], and the distance of both cameras");
+    }
+  };
+  const Calibration calibration{number(fx), number(fy), number(cx), number(cy), number(baseline_m), doffs_px};
   calibration.validate();
   return calibration;
 }
@@ -57,8 +67,8 @@ void bind_values(py::module_& module) {
   py::class_<Calibration>(module, "Calibration",
                           "A rectified stereo pair. Disparity is d = x_left - x_right [px], depth is "
                           "fx * baseline_m / (d + doffs_px) [m].")
-      .def(py::init(&make_calibration), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
-           py::arg("baseline_m"), py::arg("doffs_px") = 0.0)
+      .def(py::init(&make_calibration), py::arg("fx"), py::arg("fy") = py::none(), py::arg("cx") = py::none(),
+           py::arg("cy") = py::none(), py::arg("baseline_m") = py::none(), py::arg("doffs_px") = 0.0)
       .def_readonly("fx", &Calibration::fx, "Focal length [px].")
       .def_readonly("fy", &Calibration::fy, "Focal length [px].")
       .def_readonly("cx", &Calibration::cx, "Principal point of the left camera [px].")

@@ -313,9 +313,12 @@ def test_all_errors_are_errors_of_the_library_and_of_python():
         assert issubclass(kind, egosgm.Error) and issubclass(kind, builtin), kind
     with pytest.raises(egosgm.Error, match="fx"):
         egosgm.Calibration(fx=-1, fy=1, cx=0, cy=0, baseline_m=1)
+    for given in ((np.eye(3), 0.3), ([[1, 0, 0], [0, 1, 0], [0, 0, 1]],), (460, 460, 319.5, 239.5), ("460", 460, 320, 240, 0.3)):
+        with pytest.raises(egosgm.InvalidArgument, match=r"give the numbers fx, fy, cx, cy .px. and baseline_m .m.; of a camera matrix K these are"):
+            egosgm.Calibration(*given)
 
 
-def test_the_readmes_lines_run(tmp_path, street_folder, monkeypatch):
+def test_the_readmes_lines_run_where_nothing_is(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     exec((SOURCE / "README.md").read_text().split("```python\n")[1].split("```")[0], {})
 
