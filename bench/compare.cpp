@@ -243,7 +243,7 @@ class LeftMatcher {
   egosgm::Matcher matcher_;
   const SearchBands everything_;
   FrameImages images_;
-  Measurement measured_;
+  StereoMaps measured_;
   std::vector<cl_uchar> pixels_;
   std::vector<float> disparity_;
 };

@@ -20,10 +20,10 @@ void for_each(Options& o, Visit&& visit) {
   visit("forward_warp.motion_noise", o.forward_warp.motion_noise);
   visit("edge_rejection.max_jump_px", o.edge_rejection.max_jump_px);
   visit("hole_fill.max_difference_px", o.hole_fill.max_difference_px);
-  visit("consistency.prediction_px", o.consistency.prediction_px);
   visit("consistency.measurement_px", o.consistency.measurement_px);
   visit("consistency.update_px", o.consistency.update_px);
   visit("consistency.read_off_px", o.consistency.read_off_px);
+  visit("consistency.checks_prediction", o.consistency.checks_prediction);
   visit("consistency.keep_unseen", o.consistency.keep_unseen);
   visit("coarse_match.enabled", o.coarse_match.enabled);
   visit("coarse_match.p1", o.coarse_match.p1);
@@ -49,7 +49,6 @@ void for_each(Options& o, Visit&& visit) {
   visit("banded_sgm.variance_floor_px2", o.banded_sgm.variance_floor_px2);
   visit("banded_sgm.variance_per_step_px2", o.banded_sgm.variance_per_step_px2);
   visit("banded_sgm.variance_per_square_px2", o.banded_sgm.variance_per_square_px2);
-  visit("banded_sgm.doubts_band_ends", o.banded_sgm.doubts_band_ends);
   visit("banded_sgm.scheduling", o.banded_sgm.scheduling);
   visit("banded_sgm.max_memory_mib", o.banded_sgm.max_memory_mib);
   visit("median_filter.enabled", o.median_filter.enabled);
@@ -94,6 +93,7 @@ void for_each_chosen(Options& o, Method& m, Visit&& visit) {
 void choose_as_the_paper(MethodOptions& method) {
   method.forward_warp.motion_noise = 0.0f;
   method.edge_rejection.max_jump_px = 3.0f;
+  method.consistency.checks_prediction = true;
   method.consistency.keep_unseen = false;
   method.search_band.from_neighbours = false;
   method.banded_sgm.p2_slope = 0;
@@ -102,7 +102,6 @@ void choose_as_the_paper(MethodOptions& method) {
   method.banded_sgm.variance_floor_px2 = 1e-6f;
   method.banded_sgm.variance_per_step_px2 = 1.0f;
   method.banded_sgm.variance_per_square_px2 = 0.0f;
-  method.banded_sgm.doubts_band_ends = false;
   method.median_filter.enabled = false;
   method.kalman_update.ask_neighbours = false;
   method.kalman_update.min_variance_px2 = 0.0f;
@@ -120,7 +119,7 @@ void MethodOptions::give_options(PipelineOptions& options) const {
 MethodOptions::MethodOptions(const PipelineOptions& options) {
   if (options.preset == Preset::kPaper) choose_as_the_paper(*this);
   for_each_chosen(options, *this, [](const auto& option, auto& parameter) { parameter = option; });
-  consistency.prediction_px = consistency.update_px = options.left_right_px;
+  consistency.update_px = options.left_right_px;
   for (const auto& [name, value] : options.constants) set_parameter(*this, name, value);
 }
 

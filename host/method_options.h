@@ -26,9 +26,10 @@ struct HoleFillOptions {
   float max_difference_px = 1.0f;  // gamma (eqs. 7-8): neighbours that differ by less fill the gap between them
 };
 struct ConsistencyCheckOptions {
-  float prediction_px = 3.0f, measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences of the three
-  float read_off_px = 1.45f;  // of the measurement, where the right view is read off
-  bool keep_unseen = true;    // of prediction and update: what the other camera cannot see stays
+  float measurement_px = 3.0f, update_px = 3.0f;  // largest left-right differences
+  float read_off_px = 1.45f;                      // of the measurement, where the right view is read off
+  bool checks_prediction = false;  // the prediction is checked as the update is, where both views are tracked
+  bool keep_unseen = true;         // of prediction and update: what the other camera cannot see stays
 };
 struct CoarseMatchOptions {
   bool enabled = true;  // match at a quarter of the resolution too, so that what moves by itself is searched for
@@ -58,7 +59,6 @@ struct BandedSgmOptions {
   int s_max = 80;
   float variance_floor_px2 = 0.15f;
   float variance_per_step_px2 = 0.1f, variance_per_square_px2 = 0.045f;
-  bool doubts_band_ends = true;  // where the sums fall on beyond the end of a band, r is that of what is doubtful
   Scheduling scheduling = Scheduling::kAutomatic;
   // Memory for the path sums. An image that needs more is matched in horizontal stripes that overlap by 32 rows, almost
   // as well (docs/understand/reliability.md). 0: what the device has.

@@ -19,8 +19,8 @@
 #define EGOSGM_THIN_BLOCKS 2
 #define EGOSGM_THIN_REACH 8
 
-// A doubtful disparity is known to 4 px, so that the next frame searches wide: the matching variance where the path
-// sums fall on beyond the end of a band, and the least variance where measurement and prediction contradict each other.
+// A doubtful disparity is known to 4 px, so that the next frame searches wide: the least variance where measurement and
+// prediction contradict each other.
 #define EGOSGM_DOUBTFUL_VARIANCE_PX2 16.0f
 
 // Evidence (stages/evidence.cl) is counted in whole numbers, so many a bit of Hamming distance.

@@ -214,7 +214,6 @@ TEST(Options, PaperChoosesAsThePaperDoes) {
   EXPECT_LT(paper.banded_sgm.variance_floor_px2, 1e-5f) << "r = n_l + n_r,";
   EXPECT_EQ(paper.banded_sgm.variance_per_step_px2, 1);
   EXPECT_EQ(paper.banded_sgm.variance_per_square_px2, 0);
-  EXPECT_FALSE(paper.banded_sgm.doubts_band_ends) << "at the end of a band too";
   EXPECT_FALSE(paper.median_filter.enabled);
   EXPECT_EQ(paper.speckle_removal.max_size_px, 0);
   EXPECT_FALSE(paper.vertical_alignment.enabled);

@@ -19,7 +19,7 @@ ABLATION = [
     ("neighbours not asked", {"constants.kalman_update.ask_neighbours": False}, "Nothing around a pixel moves its prediction."),
     ("no prediction kept", {"keep_predicted": False}, "What is not measured in this frame is forgotten."),
     ("edge rejection", {"constants.edge_rejection.max_jump_px": 5}, "Predictions beside a jump go (the paper's)."),
-    ("predictions of both views not compared", {"constants.consistency.prediction_px": 1e6}, "A prediction stays whatever the other view's says, if it has one (the paper's)."),
+    ("predictions of both views compared", {"constants.consistency.checks_prediction": True}, "A prediction goes where the other view's says something else (the paper's)."),
     ("no hole fill", {"constants.hole_fill.max_difference_px": 0}, "Gaps that forward motion tears open stay unpredicted (the paper's)."),
     ("motion's covariance unused", {"constants.forward_warp.motion_noise": 0}, "The constant q alone stands for the motion's error."),
     ("no vertical alignment", {"vertical_alignment": False}, "The rows of the views are off by what rectification leaves."),

@@ -22,7 +22,7 @@ void FuseStep::prepare(PixelType type) {
 }
 
 void FuseStep::update(const Plan& plan, const Matched& matched, const Prediction& prediction,
-                      const Measurement& measured, Fusion& fusion, Belief& after) {
+                      const StereoMaps& measured, Fusion& fusion, Belief& after) {
   StereoMaps& belief = after.maps;
   StereoMaps fused{fusion.fused, belief.variance};
   if (evidence_) {

@@ -15,7 +15,7 @@ namespace egosgm {
 /// What fusion leaves, beside the belief.
 struct Fusion {
   Map fused, smoothed;  // disparities, until the step ends; the latter where the median filter is on
-  FlagMap doubtful;     // 1 where the measurement was taken although the prediction or its own sums speak against it
+  FlagMap doubtful;     // 1 where the measurement was taken although the prediction speaks against it
   BlockEvidence evidence;
 
   Fusion(ocl::Context& context, shared::ImageSize size)
@@ -41,7 +41,7 @@ class FuseStep {
   };
 
   /// REQUIRES: the plan predicts.
-  void update(const Plan& plan, const Matched& matched, const Prediction& prediction, const Measurement& measured,
+  void update(const Plan& plan, const Matched& matched, const Prediction& prediction, const StereoMaps& measured,
               Fusion& fusion, Belief& belief);
 
   /// A belief without a prediction.

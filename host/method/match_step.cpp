@@ -26,9 +26,9 @@ MatchStep::MatchStep(ocl::Context& context, shared::ImageSize size, const Method
 }
 
 void MatchStep::measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
-                        Measurement& measured) {
+                        StereoMaps& measured) {
   const bool reads_off = plan.matched == Views::kLeft;
-  Measurement matched{{matching.matched, measured.variance}, measured.doubtful};
+  StereoMaps matched{matching.matched, measured.variance};
   if (reads_off) {
     matcher_.reading_off(images, bands, matched);
   } else {

@@ -13,12 +13,10 @@ namespace egosgm {
 struct Matching {
   // Disparities before any was dropped, until the step ends; the latter where the median filter is on.
   Map matched, smoothed;
-  FlagMap doubtful;  // of the measurement
 
   Matching(ocl::Context& context, shared::ImageSize size)
       : matched(context, ocl::Scratch::kOfStep0, 2 * pixel_count(size)),
-        smoothed(context, ocl::Scratch::kOfStep1, 2 * pixel_count(size)),
-        doubtful(context, 2 * pixel_count(size)) {}
+        smoothed(context, ocl::Scratch::kOfStep1, 2 * pixel_count(size)) {}
 };
 
 /// Measures disparities and variances within bands, and drops what is doubtful.
@@ -30,7 +28,7 @@ class MatchStep {
   void prepare(PixelType type) { matcher_.prepare(type); }
 
   void measure(const Plan& plan, const FrameImages& images, const SearchBands& bands, Matching& matching,
-               Measurement& measured);
+               StereoMaps& measured);
 
   const Matcher& matcher() const { return matcher_; }
   /// Null where nothing is dropped as a speckle.

@@ -7,7 +7,7 @@ namespace egosgm {
 FrameResults Method::frame(const Plan& plan, const FrameImages& uploaded, const Belief& before, Belief& after,
                            const GivenOut& given_out) {
   Workspace& w = work_;
-  Measurement measured{plan.predicts() ? w.measured : after.maps, w.matching.doubtful};
+  StereoMaps measured = plan.predicts() ? w.measured : after.maps;
   VerticalOffset offset = before.offset.is_known ? before.offset : unknown_;
   FrameImages images = uploaded;
 
@@ -50,8 +50,8 @@ void Method::refine(const FrameImages& images, const StereoMaps& measured, const
   }
 }
 
-void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction,
-                  const Measurement& measured, Fusion& fusion, Belief& belief) {
+void Method::fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
+                  Fusion& fusion, Belief& belief) {
   if (plan.predicts()) {
     std::optional<CoarseView> coarse;
     if (plan.has_coarse_match) coarse.emplace(CoarseView{search_.coarse_images(), work_.coarse});

@@ -69,7 +69,7 @@ class Method {
   FrameImages align(const FrameImages& uploaded, const VerticalOffset& offset, FrameImages& aligned);
   void refine(const FrameImages& images, const StereoMaps& measured, const VerticalOffset& offset,
               VerticalOffset& refined);
-  void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const Measurement& measured,
+  void fuse(const Plan& plan, const FrameImages& images, const Prediction& prediction, const StereoMaps& measured,
             Fusion& fusion, Belief& belief);
   Map confirmed(const Plan& plan, const Belief& belief, Map& confirmed);
   const FlagMap* evidence_of(const Plan& plan, const Belief& belief) const;

@@ -22,10 +22,11 @@ class PredictStep {
  private:
   const float left_right_px_;
   const OutsideView outside_;
+  const bool checks_;  // left against right
   ForwardWarp forward_warp_;
   std::optional<EdgeRejection> edge_rejection_;
   HoleFill hole_fill_;
-  ConsistencyCheck consistency_;  // of both views, where they are tracked
+  ConsistencyCheck consistency_;
 };
 
 }  // namespace egosgm

@@ -153,7 +153,6 @@ BandedSgm::BandedSgm(ocl::Context& context, shared::ImageSize size, shared::Disp
                   .variance_floor = options.variance_floor_px2,
                   .variance_per_step = options.variance_per_step_px2,
                   .variance_per_square = options.variance_per_square_px2,
-                  .doubts_band_ends = options.doubts_band_ends,
                   .reads_off = 0,
                   .first_view = 0},
       launches_(launches),
@@ -175,15 +174,15 @@ void BandedSgm::prepare_reading_off() {
   read_off_.emplace(context_, size_, parameters_.padding);
 }
 
-void BandedSgm::match(const MatchInputs& image, Measurement& measured, Views views) {
+void BandedSgm::match(const MatchInputs& image, StereoMaps& measured, Views views) {
   match_stripes(image, measured, views, /*reads_off=*/false);
 }
 
-void BandedSgm::reading_off(const MatchInputs& image, Measurement& measured) {
+void BandedSgm::reading_off(const MatchInputs& image, StereoMaps& measured) {
   match_stripes(image, measured, Views::kLeft, /*reads_off=*/true);
 }
 
-void BandedSgm::match_stripes(const MatchInputs& image, Measurement& measured, Views views, bool reads_off) {
+void BandedSgm::match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off) {
   context_.enter("BandedSgm");
   if (!stripe_memory_) return match(image, measured, views, reads_off);
   for (const Stripe& stripe : stripes_) {
@@ -193,7 +192,7 @@ void BandedSgm::match_stripes(const MatchInputs& image, Measurement& measured, V
   }
 }
 
-void BandedSgm::match(const MatchInputs& inputs, Measurement& measured, Views views, bool reads_off) {
+void BandedSgm::match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off) {
   shared::SgmParameters parameters = parameters_;
   parameters.reads_off = reads_off;
   if (reads_off) read_off_->clear();
@@ -208,7 +207,7 @@ void BandedSgm::match(const MatchInputs& inputs, Measurement& measured, Views vi
   if (reads_off) read_off_->read_off(parameters, measured);
 }
 
-void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
+void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
                       int views) {
   Wavefront& wavefront = *wavefront_;
   const Tile tile = wavefront.tile;
@@ -229,8 +228,7 @@ void BandedSgm::sweep(const shared::SgmParameters& parameters, const MatchInputs
   for (cl_int wave = first_wave; wave < end_wave; ++wave) {
     wavefront.stage.launch(wavefront.from_middle, tiles, parameters, wave, tile_columns, inputs.codes,
                            inputs.bands.bands, inputs.bands.cell_offsets, inputs.bands.row_sums, inputs.penalties,
-                           wavefront.slots, wavefront.sums, ranks(), measured.disparity, measured.variance,
-                           measured.doubtful);
+                           wavefront.slots, wavefront.sums, ranks(), measured.disparity, measured.variance);
   }
 }
 

@@ -55,10 +55,10 @@ class BandedSgm {
 
   /// Matches `views`. Of the inputs' codes, which Census makes with a padding of `code_padding(range)`, both views' are
   /// read; of penalties and bands, theirs.
-  void match(const MatchInputs& image, Measurement& measured, Views views);
+  void match(const MatchInputs& image, StereoMaps& measured, Views views);
   /// Matches the left view, and reads the right one's disparities off its sums: half of the work, whole disparities.
   /// REQUIRES: that was prepared.
-  void reading_off(const MatchInputs& image, Measurement& measured);
+  void reading_off(const MatchInputs& image, StereoMaps& measured);
   /// Builds and allocates what that needs.
   void prepare_reading_off();
 
@@ -73,7 +73,7 @@ class BandedSgm {
   using FromMiddle = ocl::Kernel<const shared::SgmParameters, const cl_int, const cl_int, const ocl::Buffer<cl_uint>,
                                  const ocl::Buffer<shared::Band>, const ocl::Buffer<cl_uint>,
                                  const ocl::Buffer<shared::RowSum>, const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uchar>,
-                                 const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>, Map, Map, FlagMap>;
+                                 const ocl::Buffer<cl_uchar>, ocl::Buffer<cl_uint>, Map, Map>;
 
  private:
   struct Wavefront {
@@ -89,9 +89,9 @@ class BandedSgm {
     FromMiddle from_middle;
   };
 
-  void match_stripes(const MatchInputs& image, Measurement& measured, Views views, bool reads_off);
-  void match(const MatchInputs& inputs, Measurement& measured, Views views, bool reads_off);
-  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured, int views);
+  void match_stripes(const MatchInputs& image, StereoMaps& measured, Views views, bool reads_off);
+  void match(const MatchInputs& inputs, StereoMaps& measured, Views views, bool reads_off);
+  void sweep(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured, int views);
   ocl::Buffer<cl_uint>& ranks() { return read_off_ ? read_off_->ranks() : no_ranks_; }
 
   ocl::Context& context_;

@@ -87,7 +87,7 @@ void BandedSgmPaths::follow(int stage, const shared::SgmParameters& parameters, 
                 inputs.bands.cell_offsets, forward_first_, forward_second_, backward_first_, backward_second_);
 }
 
-void BandedSgmPaths::match(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
+void BandedSgmPaths::match(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
                            ocl::Buffer<cl_uint>& ranks, Views views) {
   follow(kStraight, parameters, inputs, views);
   if (paths_ == 8) {
@@ -100,7 +100,7 @@ void BandedSgmPaths::match(const shared::SgmParameters& parameters, const MatchI
       cl::NDRange(work_items, 1, 1)};
   stage_.launch(find_winners_, pixels, parameters, inputs.codes, inputs.bands.bands, inputs.bands.cell_offsets,
                 forward_first_, forward_second_, backward_first_, backward_second_, measured.disparity,
-                measured.variance, measured.doubtful, ranks);
+                measured.variance, ranks);
 }
 
 }  // namespace egosgm

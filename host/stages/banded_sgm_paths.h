@@ -25,7 +25,7 @@ class BandedSgmPaths {
                  const BandedSgmOptions& options, Group group);
 
   /// See BandedSgm.
-  void match(const shared::SgmParameters& parameters, const MatchInputs& inputs, Measurement& measured,
+  void match(const shared::SgmParameters& parameters, const MatchInputs& inputs, StereoMaps& measured,
              ocl::Buffer<cl_uint>& ranks, Views views);
 
   /// On GPUs two quads of disparities a lane (one, where codes of 64 bits take the registers), and a group that fills
@@ -52,7 +52,7 @@ class BandedSgmPaths {
   Sums forward_first_, forward_second_, backward_first_, backward_second_;  // partial sums of paths
   ocl::Kernel<Parameters, const cl_int, const cl_int, Codes, Penalties, Bands, Offsets, Sums, Sums, Sums, Sums>
       follow_paths_;
-  ocl::Kernel<Parameters, Codes, Bands, Offsets, const Sums, const Sums, const Sums, const Sums, Maps, Maps, FlagMap,
+  ocl::Kernel<Parameters, Codes, Bands, Offsets, const Sums, const Sums, const Sums, const Sums, Maps, Maps,
               ocl::Buffer<cl_uint>>
       find_winners_;
 };

@@ -58,7 +58,7 @@ class CoarseMatch {
   ConsistencyCheck consistency_;
   const SearchBands everything_;
   FrameImages images_;
-  Measurement matched_;
+  StereoMaps matched_;
 };
 
 }  // namespace egosgm

@@ -27,7 +27,7 @@ KalmanUpdate::KalmanUpdate(ocl::Context& context, shared::ImageSize size, const 
   drifts_.fill(stage_.enter(), 0.0f);
 }
 
-void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
+void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, const StereoMaps& measured,
                           const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful,
                           FlagMap& updated_evidence, Views views) {
   const BlockEvidence& blocks = evidence ? evidence->blocks : none_;
@@ -38,7 +38,7 @@ void KalmanUpdate::update(const FlagMap& hidden, const StereoMaps& predicted, co
   }
   stage_.launch_pixels(update_, count(views), has_gate_, gate_px_, keep_predicted_, min_variance_px2_, hidden,
                        predicted.disparity, predicted.variance, measured.disparity, measured.variance,
-                       measured.doubtful, evidence != nullptr, evidence && evidence->repeats,
+                       evidence != nullptr, evidence && evidence->repeats,
                        evidence ? evidence->before : hidden, blocks.evidence, blocks.found, drifts_, updated.disparity,
                        updated.variance, doubtful, updated_evidence);
 }

@@ -24,10 +24,10 @@ class KalmanUpdate {
   /// `pixels` of a work-item, 1 or 16; 0: by the device. Same bits.
   KalmanUpdate(ocl::Context& context, shared::ImageSize size, const KalmanUpdateOptions& options, int pixels = 0);
 
-  /// Nothing is believed of what is `hidden`. `doubtful`: 1 where the measurement was taken although the prediction, or
-  /// its own path sums, speak against it. `evidence` is null where the method has none: then all that is updated has
+  /// Nothing is believed of what is `hidden`. `doubtful`: 1 where the measurement was taken although the prediction
+  /// speaks against it. `evidence` is null where the method has none: then all that is updated has
   /// the most of it. REQUIRES: `updated` is neither `predicted` nor `measured`.
-  void update(const FlagMap& hidden, const StereoMaps& predicted, const Measurement& measured,
+  void update(const FlagMap& hidden, const StereoMaps& predicted, const StereoMaps& measured,
               const FrameEvidence* evidence, StereoMaps& updated, FlagMap& doubtful, FlagMap& updated_evidence,
               Views views);
 
@@ -45,7 +45,7 @@ class KalmanUpdate {
       sum_;
   ocl::Kernel<const shared::ImageSize, const ocl::Buffer<cl_int>, const ocl::Buffer<cl_int>, Map> find_drift_;
   ocl::Kernel<const shared::ImageSize, const cl_int, const float, const cl_int, const float, const FlagMap, const Map,
-              const Map, const Map, const Map, const FlagMap, const cl_int, const cl_int, const FlagMap,
+              const Map, const Map, const Map, const cl_int, const cl_int, const FlagMap,
               const ocl::Buffer<cl_int>, const Map, const Map, Map, Map, FlagMap, FlagMap>
       update_;
   const BlockEvidence none_;

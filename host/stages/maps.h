@@ -89,15 +89,6 @@ struct Prediction {
         hidden(context, 2 * pixel_count(size)) {}
 };
 
-/// The result of matching within bands.
-struct Measurement : StereoMaps {
-  FlagMap doubtful;  // 1 where the path sums fall on beyond the end of the band
-
-  Measurement(StereoMaps maps, FlagMap doubts) : StereoMaps(std::move(maps)), doubtful(std::move(doubts)) {}
-  Measurement(ocl::Context& context, shared::ImageSize size)
-      : StereoMaps(context, size), doubtful(context, 2 * pixel_count(size)) {}
-};
-
 /// The views that a stage works on. The values are their number.
 enum class Views { kLeft = 1, kBoth = 2 };
 inline int count(Views views) { return static_cast<int>(views); }

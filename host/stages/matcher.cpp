@@ -18,11 +18,11 @@ void Matcher::prepare(PixelType type) {
   step_penalties_.prepare(type);
 }
 
-void Matcher::match(const FrameImages& images, const SearchBands& bands, Measurement& matched, Views views) {
+void Matcher::match(const FrameImages& images, const SearchBands& bands, StereoMaps& matched, Views views) {
   banded_sgm_.match(inputs(images, bands, views), matched, views);
 }
 
-void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, Measurement& matched) {
+void Matcher::reading_off(const FrameImages& images, const SearchBands& bands, StereoMaps& matched) {
   banded_sgm_.reading_off(inputs(images, bands, Views::kLeft), matched);
 }
 

@@ -19,9 +19,9 @@ std::size_t ReadOff::bytes(shared::ImageSize size, int code_padding) {
   return rank_count(size, code_padding) * sizeof(cl_uint);
 }
 
-void ReadOff::read_off(const shared::SgmParameters& parameters, Measurement& measured) {
+void ReadOff::read_off(const shared::SgmParameters& parameters, StereoMaps& measured) {
   const ocl::Range right = ocl::every_pixels(stage_.enter(), stage_.size(), stage_.pixels(), /*views=*/1);
-  stage_.launch(read_off_, right, parameters, ranks_, measured.disparity, measured.variance, measured.doubtful);
+  stage_.launch(read_off_, right, parameters, ranks_, measured.disparity, measured.variance);
 }
 
 }  // namespace egosgm

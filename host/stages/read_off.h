@@ -20,12 +20,12 @@ class ReadOff {
   ocl::Buffer<cl_uint>& ranks() { return ranks_; }
 
   /// Writes the right half of both maps.
-  void read_off(const shared::SgmParameters& parameters, Measurement& measured);
+  void read_off(const shared::SgmParameters& parameters, StereoMaps& measured);
 
  private:
   ocl::Stage stage_;
   ocl::Buffer<cl_uint> ranks_;
-  ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_uint>, Map, Map, FlagMap> read_off_;
+  ocl::Kernel<const shared::SgmParameters, const ocl::Buffer<cl_uint>, Map, Map> read_off_;
 };
 
 }  // namespace egosgm

@@ -43,8 +43,8 @@ StripeMemory::StripeMemory(ocl::Context& context, shared::ImageSize size, shared
       measured_(context, stripe_size_) {}
 
 std::uint64_t StripeMemory::bytes(int width, int rows, std::size_t words_a_row) {
-  const std::uint64_t a_pixel = kViews * (StepPenalties::kStepsAPixel + sizeof(shared::Band) + sizeof(cl_uint) +
-                                          2 * sizeof(float) + sizeof(cl_uchar));
+  const std::uint64_t a_pixel =
+      kViews * (StepPenalties::kStepsAPixel + sizeof(shared::Band) + sizeof(cl_uint) + 2 * sizeof(float));
   return rows * (kViews * words_a_row * sizeof(cl_uint) + width * a_pixel);
 }
 
@@ -67,7 +67,7 @@ void StripeMemory::load(const MatchInputs& image, const Stripe& stripe) {
   load_rows(image.bands.row_sums, bands_.row_sums, kViews, 1, stripe.first_row);
 }
 
-void StripeMemory::store(const Stripe& stripe, Measurement& image) {
+void StripeMemory::store(const Stripe& stripe, StereoMaps& image) {
   const std::size_t width = size_.width, count = (stripe.kept_end - stripe.kept_begin) * width;
   for (int view = 0; view < kViews; ++view) {
     const std::size_t to = (static_cast<std::size_t>(view) * size_.height + stripe.kept_begin) * width;
@@ -75,7 +75,6 @@ void StripeMemory::store(const Stripe& stripe, Measurement& image) {
         (static_cast<std::size_t>(view) * stripe_size_.height + stripe.kept_begin - stripe.first_row) * width;
     image.disparity.copy(context_, to, measured_.disparity, from, count);
     image.variance.copy(context_, to, measured_.variance, from, count);
-    image.doubtful.copy(context_, to, measured_.doubtful, from, count);
   }
 }
 

@@ -38,10 +38,10 @@ class StripeMemory {
   /// Brings a stripe of both views here.
   void load(const MatchInputs& image, const Stripe& stripe);
   /// Brings what is kept of the stripe's `measured` maps to the image's.
-  void store(const Stripe& stripe, Measurement& image);
+  void store(const Stripe& stripe, StereoMaps& image);
 
   MatchInputs inputs() const { return {codes_, penalties_, bands_}; }
-  Measurement& measured() { return measured_; }
+  StereoMaps& measured() { return measured_; }
 
   /// The device memory that this takes.
   static std::uint64_t bytes(int width, int rows, std::size_t words_a_row);
@@ -57,7 +57,7 @@ class StripeMemory {
   ocl::Buffer<cl_uint> codes_;
   ocl::Buffer<cl_uchar> penalties_;
   SearchBands bands_;
-  Measurement measured_;
+  StereoMaps measured_;
 };
 
 }  // namespace egosgm

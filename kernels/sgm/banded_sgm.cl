@@ -139,7 +139,6 @@ typedef struct {
   global uchar *slots, *sums;
   global uint* ranks;  // of the right pixels, if they are kept
   global float *disparities, *variances;
-  global uchar* doubtful;
 } Sweep;
 
 // The row y of a sweep, from its pixel `from` to `to`. To the pixels before one on the four paths it is `left`, `above`
@@ -217,11 +216,9 @@ ALWAYS_INLINE Place place_in(const bool backward, const SgmParameters q, const S
 }
 
 // Leaves the winners of `count` pixels of a row, from the first one in the image on: disparity with its sub-pixel part,
-// by a symmetric V through the winner and its neighbours, the matching variance (options.h), and whether the disparity
-// is doubtful.
+// by a symmetric V through the winner and its neighbours, and the matching variance (options.h).
 COMPILED_ONCE void leave_winners(const bool backward, const SgmParameters q, const Candidate* candidates,
-                                 const int count, global float* disparities, global float* variances,
-                                 global uchar* doubtful) {
+                                 const int count, global float* disparities, global float* variances) {
   ulong winners[TILE_WIDTH + PIXELS];
   for (int i = 0; i < count; ++i) winners[backward ? count - 1 - i : i] = winner_of(q, &candidates[i]);
   for (int x = 0; x < count; x += PIXELS) {
@@ -229,9 +226,7 @@ COMPILED_ONCE void leave_winners(const bool backward, const SgmParameters q, con
     const Ints rise_before = FIELD(winner, 16), rise_after = FIELD(winner, 32);
     const Ints steps = FIELD(winner, 48);
     store_pixels(refined(FIELD(winner, 0), rise_before, rise_after), disparities, x, count);
-    const Ints is_doubtful = falls_on(q, rise_before, rise_after);
-    store_pixels(matching_variance(q, steps, is_doubtful), variances, x, count);
-    store_bytes(is_doubtful & (Ints)(1), doubtful, x, count);
+    store_pixels(matching_variance(q, steps), variances, x, count);
   }
 }
 
@@ -249,8 +244,7 @@ ALWAYS_INLINE void sweep_tile(const bool meets, const bool backward, const SgmPa
     // Apart from the sweep, whose pixels wait for each other: these do not.
     if (meets) {
       const size_t at = row.bands - sweep->bands - (backward ? to - from - 1 : 0);
-      leave_winners(backward, q, candidates, to - from, sweep->disparities + at, sweep->variances + at,
-                    sweep->doubtful + at);
+      leave_winners(backward, q, candidates, to - from, sweep->disparities + at, sweep->variances + at);
     }
   }
 }
@@ -298,7 +292,6 @@ ALWAYS_INLINE void sweep_view(const bool meets, const bool backward, const SgmPa
   sweep.penalties += 4 * not_matched;
   sweep.disparities += not_matched;
   sweep.variances += not_matched;
-  sweep.doubtful += not_matched;
   sweep.row_sums += (size_t)q.first_view * q.height;
   sweep.slots += (size_t)(2 * sweep.view + backward) * SLOTS_OF(q) * SLOT + SLOT_PADDING;
   if (backward) {
@@ -322,7 +315,7 @@ WITH_BIT_COUNT void from_middle(const bool backward, const SgmParameters q, cons
 KERNEL void sweep_to_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* codes,
                             global const Band* bands, global const uint* offsets, global const RowSum* row_sums,
                             global const uchar* penalties, global uchar* slots, global uchar* sums) {
-  const Sweep sweep = {get_global_id(1), codes, bands, offsets, row_sums, penalties, slots, sums, 0, 0, 0, 0};
+  const Sweep sweep = {get_global_id(1), codes, bands, offsets, row_sums, penalties, slots, sums, 0, 0, 0};
   to_middle(get_global_id(2) > 0, q, sweep, get_global_id(0), wave, tile_columns);
 }
 
@@ -330,9 +323,8 @@ KERNEL void sweep_to_middle(const SgmParameters q, const int wave, const int til
 KERNEL void sweep_from_middle(const SgmParameters q, const int wave, const int tile_columns, global const uint* codes,
                               global const Band* bands, global const uint* offsets, global const RowSum* row_sums,
                               global const uchar* penalties, global uchar* slots, global const uchar* sums,
-                              global uint* ranks, global float* disparities, global float* variances,
-                              global uchar* doubtful) {
-  const Sweep sweep = {get_global_id(1),    codes, bands,       offsets,   row_sums, penalties, slots,
-                       (global uchar*)sums, ranks, disparities, variances, doubtful};
+                              global uint* ranks, global float* disparities, global float* variances) {
+  const Sweep sweep = {get_global_id(1),    codes, bands,       offsets,  row_sums, penalties, slots,
+                       (global uchar*)sums, ranks, disparities, variances};
   from_middle(get_global_id(2) > 0, q, sweep, get_global_id(0), wave, tile_columns);
 }

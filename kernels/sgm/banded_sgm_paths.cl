@@ -122,8 +122,7 @@ static inline void find_winner(const SgmParameters q, const int x, const int lan
                                global const uint* codes, global const Band* bands, global const uint* offsets,
                                global const uchar* forward_first, global const uchar* forward_second,
                                global const uchar* backward_first, global const uchar* backward_second,
-                               global float* disparities, global float* variances, global uchar* doubtful,
-                               global uint* ranks) {
+                               global float* disparities, global float* variances, global uint* ranks) {
   const size_t row_start = ((size_t)get_group_id(2) * q.height + get_group_id(1)) * q.width;
   const bool is_inside = x < q.width;
   const size_t pixel = row_start + (is_inside ? x : 0);
@@ -155,8 +154,7 @@ static inline void find_winner(const SgmParameters q, const int x, const int lan
               rise_after = fits ? total_of(cells, winner + 1) - total : 0;
     const int steps = count_steps(cells, winner, total, -1, q.s_max) + count_steps(cells, winner, total, 1, q.s_max);
     disparities[pixel] = refined(cells_origin + winner, rise_before, rise_after);
-    doubtful[pixel] = falls_on(q, rise_before, rise_after);
-    variances[pixel] = matching_variance(q, steps, doubtful[pixel]);
+    variances[pixel] = matching_variance(q, steps);
   }
 }
 
@@ -164,13 +162,12 @@ static inline void find_winner(const SgmParameters q, const int x, const int lan
 KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winners(
     const SgmParameters q, global const uint* codes, global const Band* bands, global const uint* offsets,
     global const uchar* forward_first, global const uchar* forward_second, global const uchar* backward_first,
-    global const uchar* backward_second, global float* disparities, global float* variances, global uchar* doubtful,
-    global uint* ranks) {
+    global const uchar* backward_second, global float* disparities, global float* variances, global uint* ranks) {
   local uint minima[LINES][MINIMA];
   const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
   const int begin = get_group_id(0) * LINES + line, end = ONE_A_ROW ? q.width : begin + 1;
   for (int x = begin; x < end; ++x) {
     find_winner(q, x, lane, minima[line], codes, bands, offsets, forward_first, forward_second, backward_first,
-                backward_second, disparities, variances, doubtful, ranks);
+                backward_second, disparities, variances, ranks);
   }
 }

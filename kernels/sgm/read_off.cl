@@ -14,9 +14,9 @@ static inline Uints load_ranks(global const uint* row, const int x) {
 #endif
 }
 
-// Writes the right half of the maps. Nothing is doubtful.
+// Writes the right half of the maps.
 COMPILED_ONCE void read_off_row(const WorkItem at, const SgmParameters q, global const uint* ranks,
-                                global float* disparities, global float* variances, global uchar* doubtful) {
+                                global float* disparities, global float* variances) {
   const int y = at.y;
   const size_t row = ((size_t)q.height + y) * q.width;
   global const uint* seen = ranks + (size_t)y * ((size_t)q.width + 2 * (size_t)q.padding) + q.padding;
@@ -26,11 +26,10 @@ COMPILED_ONCE void read_off_row(const WorkItem at, const SgmParameters q, global
     const Ints disparity = q.min_disparity + q.disparities - 1 - INTS_OF_UINTS(rank & 0xffffu);
     store_pixels(is_seen ? FLOATS_OF_INTS(disparity) : INVALID, disparities + row, x, q.width);
     store_pixels((Floats)(q.variance_floor), variances + row, x, q.width);
-    store_bytes((Ints)(0), doubtful + row, x, q.width);
   }
 }
 
 KERNEL void read_off(const SgmParameters q, global const uint* ranks, global float* disparities,
-                     global float* variances, global uchar* doubtful) {
-  read_off_row(THIS_WORK_ITEM, q, ranks, disparities, variances, doubtful);
+                     global float* variances) {
+  read_off_row(THIS_WORK_ITEM, q, ranks, disparities, variances);
 }

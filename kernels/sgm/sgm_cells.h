@@ -25,16 +25,10 @@ static inline Floats refined(const Ints winner, const Ints rise_before, const In
   return FLOATS_OF_INTS(winner) + (is_risen ? clamp(offset, -0.5f, 0.5f) : (Floats)(0.0f));
 }
 
-// If the sums fall on beyond the end of a band, the true disparity rather lies outside.
-static inline Ints falls_on(const SgmParameters q, const Ints rise_before, const Ints rise_after) {
-  return ((rise_before < 0) | (rise_after < 0)) & ((Ints)(q.doubts_band_ends) != 0);
-}
-
 // The matching variance (options.h).
-static inline Floats matching_variance(const SgmParameters q, const Ints steps, const Ints is_doubtful) {
+static inline Floats matching_variance(const SgmParameters q, const Ints steps) {
   const Floats n = FLOATS_OF_INTS(steps);
-  const Floats counted = q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n);
-  return is_doubtful ? (Floats)(EGOSGM_DOUBTFUL_VARIANCE_PX2) : counted;
+  return q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n);
 }
 
 #endif

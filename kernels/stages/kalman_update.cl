@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Kalman update of every pixel: K = p' / (p' + r), d = d' + K (z - d'), p = (1 - K) p'. Where the two contradict each
-// other, by more than the gate or because the measurement is doubtful, the measurement is taken. It then is doubtful,
-// and its variance is so large that the next frame searches wide. What is hidden by a surface nearer than the range
-// (ForwardWarp) has no disparity: whatever is measured there is a mismatch. Without a gate nothing contradicts
-// anything.
+// other by more than the gate, the measurement is taken. It then is doubtful, and its variance is so large that the
+// next frame searches wide. What is hidden by a surface nearer than the range (ForwardWarp) has no disparity: whatever
+// is measured there is a mismatch. Without a gate nothing contradicts anything.
 //
 // What moves by itself is off to one side of its prediction, together with the pixels around. Their mean innovation m,
 // the drift, moves the prediction to d' + m, and makes it as much less certain: p' + m^2.
@@ -175,7 +174,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
                               const int keep_predicted, const float min_variance, global const uchar* hidden,
                               global const float* predicted, global const float* predicted_variance,
                               global const float* measured, global const float* measured_variance,
-                              global const uchar* measured_doubtful, const int has_evidence, const int repeats,
+                              const int has_evidence, const int repeats,
                               global const uchar* evidence_before, global const int* block_evidence,
                               global const float* found, global const float* drifts, global float* updated,
                               global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
@@ -206,9 +205,8 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
       const Ints has_prediction = d > INVALID;
       const Ints has_measurement =
           (z > INVALID) & (is_plain | (load_bytes(hidden + row, x, width) == 0)) & (verdict.counts != 0);
-      const Ints is_doubtful = load_bytes(measured_doubtful + row, x, width) != 0;
       const Ints has_both = has_prediction & has_measurement;
-      const Ints fuses = has_both & (is_plain | ((fabs(z - d) <= gate) & !is_doubtful));
+      const Ints fuses = has_both & (fabs(z - d) <= gate);
       const Ints predicts = has_prediction & ((Ints)(keep_predicted) != 0);
 
       const Floats zero = 0.0f;
@@ -227,7 +225,7 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
       const Floats least = min_variance;
       store_pixels(value, updated + row, x, width);
       store_pixels(variance < least ? least : variance, updated_variance + row, x, width);
-      const Ints contradicted = (has_both & !fuses) | (has_measurement & !has_prediction & is_doubtful);
+      const Ints contradicted = has_both & !fuses;
       store_bytes(contradicted & (Ints)(1), updated_doubtful + row, x, width);
       store_bytes(value > INVALID ? verdict.sums : (Ints)(0), evidence + row, x, width);
     }
@@ -237,11 +235,11 @@ COMPILED_ONCE void update_row(const WorkItem at, const ImageSize size, const int
 KERNEL void update(const ImageSize size, const int has_gate, const float gate, const int keep_predicted,
                    const float min_variance, global const uchar* hidden, global const float* predicted,
                    global const float* predicted_variance, global const float* measured,
-                   global const float* measured_variance, global const uchar* measured_doubtful, const int has_evidence,
+                   global const float* measured_variance, const int has_evidence,
                    const int repeats, global const uchar* evidence_before, global const int* block_evidence,
                    global const float* found, global const float* drifts, global float* updated,
                    global float* updated_variance, global uchar* updated_doubtful, global uchar* evidence) {
   update_row(THIS_WORK_ITEM, size, has_gate, gate, keep_predicted, min_variance, hidden, predicted, predicted_variance,
-             measured, measured_variance, measured_doubtful, has_evidence, repeats, evidence_before, block_evidence,
+             measured, measured_variance, has_evidence, repeats, evidence_before, block_evidence,
              found, drifts, updated, updated_variance, updated_doubtful, evidence);
 }

@@ -25,7 +25,7 @@ struct Matcher {
   ocl::Buffer<cl_uint> codes{context, code_words()};
   ocl::Buffer<cl_uchar> penalties{context, 8 * pixel_count(size)};
   SearchBands bands{context, size, range};
-  Measurement measured{context, size};
+  StereoMaps measured{context, size};
 
   std::size_t code_words() const {
     const std::vector<std::uint64_t> none(pixel_count(size));

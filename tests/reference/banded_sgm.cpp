@@ -148,7 +148,6 @@ void read_off(const View& left, const shared::Band* bands, Cells& sums, testing:
     const int disparity = q.min_disparity + q.disparities - 1 - behind;
     maps.disparity.push_back(rank == kNone ? EGOSGM_INVALID_DISPARITY : static_cast<float>(disparity));
     maps.variance.push_back(rank == kNone ? 0 : q.variance_floor);
-    maps.doubtful.push_back(0);
   }
 }
 
@@ -167,7 +166,6 @@ testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange rang
                                 .variance_floor = options.variance_floor_px2,
                                 .variance_per_step = options.variance_per_step_px2,
                                 .variance_per_square = options.variance_per_square_px2,
-                                .doubts_band_ends = options.doubts_band_ends,
                                 .reads_off = reads_off,
                                 .first_view = 0};
   testing::HostMaps maps;
@@ -186,12 +184,7 @@ testing::HostMaps banded_sgm(shared::ImageSize size, shared::DisparityRange rang
       maps.disparity.push_back(static_cast<float>(winner) + offset(sums, p, winner));
       const int steps = count_steps(q, sums, p, winner, 1) + count_steps(q, sums, p, winner, -1);
       const float n = static_cast<float>(steps);
-      const bool has_both = sums.has(p, winner - 1) && sums.has(p, winner + 1);
-      const bool escaped = has_both && std::min(sums.at(p, winner - 1), sums.at(p, winner + 1)) < sums.at(p, winner);
-      maps.doubtful.push_back(escaped && q.doubts_band_ends);
-      maps.variance.push_back(maps.doubtful.back()
-                                  ? kDoubtfulVariancePx2
-                                  : q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n));
+      maps.variance.push_back(q.variance_floor + n * (q.variance_per_step + q.variance_per_square * n));
     }
     if (q.reads_off) {
       read_off(v, band, sums, maps);

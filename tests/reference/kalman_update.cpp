@@ -52,10 +52,9 @@ bool contradict(float gate_px, float a, float b) { return gate_px > 0 && std::ab
 
 Estimate update(const KalmanUpdateOptions& options, float drift, const Estimate& predicted, const Estimate& measured) {
   if (!is_valid(measured)) return options.keep_predicted ? predicted : kNone;
-  const bool is_plain = options.gate_px <= 0;  // the paper's: all that is predicted and measured is averaged
   const float z = measured.disparity, wide = kDoubtfulVariancePx2;
   if (!is_valid(predicted)) return measured;
-  if (!contradict(options.gate_px, z, predicted.disparity) && (is_plain || !measured.doubtful)) {
+  if (!contradict(options.gate_px, z, predicted.disparity)) {
     return fuse({predicted.disparity + drift, predicted.variance}, measured);
   }
   return {z, std::max(measured.variance, wide), true};
@@ -74,8 +73,7 @@ testing::HostMaps kalman_update(shared::ImageSize size, const KalmanUpdateOption
     const float drift =
         options.ask_neighbours ? drift_around(size, predicted, measured, first, x, y, options.gate_px) : 0;
     const bool is_hidden = options.gate_px > 0 && !predicted.hidden.empty() && predicted.hidden[i] != 0;
-    Estimate of_measurement{measured.disparity[i], measured.variance[i],
-                            !measured.doubtful.empty() && measured.doubtful[i] != 0};
+    Estimate of_measurement{measured.disparity[i], measured.variance[i], false};
     Verdict verdict{kMostEvidence, true, true};
     if (evidence) {
       const float d = predicted.disparity[i];

@@ -133,9 +133,9 @@ void Pipeline::predict(const ViewMotions& motions, Frame& frame) const {
   if (max_jump_px > 0) frame.without_edges = edge_rejection(size_, max_jump_px, frame.warped);
   frame.predicted =
       hole_fill(size_, options_.hole_fill.max_difference_px, max_jump_px > 0 ? frame.without_edges : frame.warped);
-  if (!options_.track_right) return;
+  if (!options_.track_right || !check.checks_prediction) return;
   frame.filled = frame.predicted;
-  frame.predicted = consistency_check(size_, check.prediction_px, check.keep_unseen, frame.filled);
+  frame.predicted = consistency_check(size_, check.update_px, check.keep_unseen, frame.filled);
 }
 
 namespace {
@@ -188,7 +188,6 @@ Pass Pipeline::match(const Images& images, const Frame& frame, const VerticalOff
     std::copy(pass.consistent.disparity.begin() + right, pass.consistent.disparity.end(),
               pass.measured.disparity.begin() + right);
   }
-  pass.measured.doubtful = pass.matched.doubtful;
   pass.offset = known;
   if (options_.vertical_alignment.enabled) {
     pass.offset = estimate_offset(size_, options_.vertical_alignment.gain, pass.images, images.bits == 8 ? 1 : 256,

@@ -60,7 +60,7 @@ double bias(double texture, float half_width_px, int frames, Scheduling scheduli
   matcher.prepare(PixelType::kU8);
   FrameImages images{ocl::Buffer<cl_uchar>(context, 2 * pixel_count(kSize)), PixelType::kU8};
   StereoMaps predicted = testing::upload(context, kSize, surface);
-  Measurement matched(context, kSize);
+  StereoMaps matched(context, kSize);
   for (int frame = 0; frame < frames; ++frame) {
     images.pixels.write(context, slanted_pair(texture, 7 + frame));
     if (half_width_px > 0) search_band.narrow(predicted, nullptr, bands, Views::kBoth);

@@ -103,14 +103,13 @@ Match match(const Case& c, int max_memory_mib = 0) {
   ocl::Context context(testing::any_device());
   const int padding = BandedSgm::code_padding(c.range);
   m.options = {.cost = c.cost, .paths = c.paths, .scheduling = c.scheduling, .max_memory_mib = max_memory_mib};
-  if (c.cost == MatchingCost::kSad3x3) m.options.doubts_band_ends = false;  // as the preset `paper` has both
   SearchBands bands(context, c.size, c.range);
   BandedSgm sgm(context, c.size, c.range, m.options, c.group, c.tile, c.launches);
   const auto padded = reference::padded_codes(c.size, m.codes[0], m.codes[1], padding, c.cost);
   ocl::Buffer<cl_uint> device_codes(context, padded.size());
   device_codes.write(context, {padded.begin(), padded.end()});
   StereoMaps predicted(context, c.size);
-  Measurement measured(context, c.size);
+  StereoMaps measured(context, c.size);
   if (c.banded) {
     const testing::HostMaps maps = predictions(c);
     predicted.disparity.write(context, maps.disparity);
@@ -181,7 +180,6 @@ testing::HostMaps stripe_by_stripe(const Match& m, shared::ImageSize size) {
           (static_cast<std::ptrdiff_t>(view) * stripe.rows + stripe.kept_begin - stripe.first_row) * size.width;
       std::copy_n(maps.disparity.begin() + from, kept, expected.disparity.begin() + to);
       std::copy_n(maps.variance.begin() + from, kept, expected.variance.begin() + to);
-      std::copy_n(maps.doubtful.begin() + from, kept, expected.doubtful.begin() + to);
     }
   }
   return expected;

@@ -30,7 +30,7 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
   ocl::Context context(testing::any_device());
   KalmanUpdate stage(context, size, options, pixels);
   const StereoMaps prediction = testing::upload(context, size, predicted);
-  const Measurement measurement = testing::upload_measurement(context, size, measured);
+  const StereoMaps measurement = testing::upload(context, size, measured);
   StereoMaps out = testing::upload(context, size, testing::earlier_maps(size));
   FlagMap hidden(context, predicted.disparity.size());
   hidden.write(context, predicted.hidden.empty() ? std::vector<cl_uchar>(hidden.size()) : predicted.hidden);
@@ -46,7 +46,8 @@ testing::HostMaps update(shared::ImageSize size, const KalmanUpdateOptions& opti
   }
   const KalmanUpdate::FrameEvidence of_frame{before, blocks, evidence && evidence->repeats};
   stage.update(hidden, prediction, measurement, evidence ? &of_frame : nullptr, out, doubtful, after, views);
-  testing::HostMaps maps = testing::download(context, Measurement{out, doubtful});
+  testing::HostMaps maps = testing::download(context, out);
+  maps.doubtful = doubtful.read(context);
   maps.evidence = after.read(context);
   return maps;
 }
@@ -61,10 +62,10 @@ constexpr Estimate kNothing{kNone, 0};
 constexpr float kWide = 16;  // the variance of what is doubtful
 
 Estimate update_pixel(const KalmanUpdateOptions& options, Estimate predicted, Estimate measured, int is_hidden = 0) {
-  const testing::HostMaps updated = update(
-      {1, 1}, options,
-      {{predicted.disparity, kNone}, {predicted.variance, 0}, {static_cast<std::uint8_t>(is_hidden), 0}},
-      {{measured.disparity, kNone}, {measured.variance, 0}, {}, {static_cast<std::uint8_t>(measured.doubtful), 0}});
+  const testing::HostMaps updated =
+      update({1, 1}, options,
+             {{predicted.disparity, kNone}, {predicted.variance, 0}, {static_cast<std::uint8_t>(is_hidden), 0}},
+             {{measured.disparity, kNone}, {measured.variance, 0}});
   EXPECT_EQ(updated.disparity[1], kNone);
   EXPECT_EQ(updated.variance[1], 0);
   EXPECT_EQ(updated.doubtful[1], 0);
@@ -81,7 +82,6 @@ TEST_P(KalmanUpdateTest, EqualsReference) {
   for (std::size_t i = 0; i < measured.disparity.size(); ++i) {
     predicted.hidden.push_back(predicted.disparity[i] == kNone && i % 13 < 4);
     if (i % 7 == 0 && predicted.disparity[i] != kNone) predicted.variance[i] += 16;
-    measured.doubtful.push_back(i % 11 == 0);
     if (i % 5 == 0 && measured.disparity[i] != kNone) measured.disparity[i] -= 6;
     if (static_cast<int>(i) % size.width < size.width / 2 && i % 23 != 0) {
       predicted.hidden[i] = 0;
@@ -121,7 +121,6 @@ TEST_P(KalmanUpdateTest, EqualsReferenceWithEvidence) {
   const shared::ImageSize size = GetParam();
   const testing::HostMaps predicted = testing::random_maps(size, -4, 4, 0.3, 16);
   testing::HostMaps measured = testing::random_maps(size, -5, 5, 0.2, 17);
-  for (std::size_t i = 0; i < measured.disparity.size(); ++i) measured.doubtful.push_back(i % 11 == 0);
   for (const bool repeats : {false, true}) {
     const reference::FrameEvidence evidence = random_evidence(size, 18, repeats);
     const testing::HostMaps expected = reference::kalman_update(size, {}, predicted, measured, &evidence);
@@ -158,17 +157,11 @@ TEST(KalmanUpdate, TakesTheMeasurementBeyondTheGate) {
   EXPECT_EQ(update_pixel(alone, {10, 1}, {7.75f, 2 * kWide}), (Estimate{7.75f, 2 * kWide, true}));
 }
 
-TEST(KalmanUpdate, TakesAMeasurementThatEscapedItsBand) {
-  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, 1, true}), (Estimate{11, kWide, true}));
-  EXPECT_EQ(update_pixel({.gate_px = 2}, kNothing, {11, kWide, true}), (Estimate{11, kWide, true}));
-  EXPECT_EQ(update_pixel({.gate_px = 2}, {10, 1}, {11, kWide}).doubtful, false) << "uncertain, but where it belongs";
-}
-
-// The paper's update knows of no escape and of nothing that hides.
+// The paper's update knows of nothing that hides.
 TEST(KalmanUpdate, AveragesAllWithoutAGate) {
   const KalmanUpdateOptions plain{.gate_px = 0, .ask_neighbours = false};
   EXPECT_EQ(update_pixel(plain, {10, 1}, {90, 1}), (Estimate{50, 0.5f}));
-  EXPECT_EQ(update_pixel(plain, {10, 16}, {14, 48, true}), (Estimate{11, 12}));
+  EXPECT_EQ(update_pixel(plain, {10, 16}, {14, 48}), (Estimate{11, 12}));
   EXPECT_EQ(update_pixel(plain, kNothing, {12, 3}, /*is_hidden=*/1), (Estimate{12, 3}));
   EXPECT_EQ(update_pixel(plain, kNothing, kNothing, /*is_hidden=*/1), kNothing);
 }

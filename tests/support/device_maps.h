@@ -22,21 +22,9 @@ inline StereoMaps upload(ocl::Context& context, shared::ImageSize size, const Ho
   return on_device;
 }
 
-/// Nothing is doubtful where `maps` does not say so.
-inline Measurement upload_measurement(ocl::Context& context, shared::ImageSize size, const HostMaps& maps) {
-  Measurement on_device(upload(context, size, maps), FlagMap(context, 2 * pixel_count(size)));
-  on_device.doubtful.write(context,
-                           maps.doubtful.empty() ? std::vector<cl_uchar>(2 * pixel_count(size)) : maps.doubtful);
-  return on_device;
-}
-
 /// Without variances that mean nothing.
 inline HostMaps download(ocl::Context& context, const StereoMaps& maps) {
   return masked({maps.disparity.read(context), maps.variance.read(context)});
-}
-
-inline HostMaps download(ocl::Context& context, const Measurement& maps) {
-  return masked({maps.disparity.read(context), maps.variance.read(context), {}, maps.doubtful.read(context)});
 }
 
 /// A prediction whose variances mark what is hidden (EGOSGM_HIDDEN), as `hidden` and variances; and back.

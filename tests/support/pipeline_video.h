@@ -72,7 +72,7 @@ inline std::vector<Setting> settings() {
                    o.kalman_update.gate_px = 0.25f;
                    o.kalman_update.min_variance_px2 = 0.3f;
                    o.output_variance.enabled = false;
-                   o.consistency = {.prediction_px = 0.5f, .measurement_px = 0.75f, .update_px = 1};
+                   o.consistency = {.measurement_px = 0.75f, .update_px = 1, .checks_prediction = true};
                    o.edge_rejection.max_jump_px = 1;
                    o.hole_fill.max_difference_px = 0.25f;
                    o.search_band.neighbour_min_count = 30;

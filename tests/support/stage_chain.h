@@ -84,7 +84,8 @@ class StageChain {
     if (options_.edge_rejection.max_jump_px > 0) {
       frame.without_edges = download_marked(context_, prediction.rejected);
     }
-    if (options_.track_right) frame.filled.disparity = prediction.filled.disparity.read(context_);
+    if (options_.track_right && options_.consistency.checks_prediction)
+      frame.filled.disparity = prediction.filled.disparity.read(context_);
     frame.predicted = download(context_, prediction.maps);
     frame.predicted.hidden = prediction.hidden.read(context_);
   }
@@ -105,7 +106,7 @@ class StageChain {
     pass.penalties.assign(penalties.begin(), penalties.end());
     pass.matched.disparity = matching.matched.read(context_);
     if (options_.median_filter.enabled) pass.smoothed.disparity = matching.smoothed.read(context_);
-    pass.measured = download(context_, Measurement{measured, matching.doubtful});
+    pass.measured = download(context_, measured);
   }
 
   void look(const Fusion& fusion, reference::Frame& frame) {
