@@ -94,7 +94,7 @@ void BandedSgmPaths::match(const shared::SgmParameters& parameters, const MatchI
     for (const int diagonal : kDiagonals) follow(diagonal, parameters, inputs, views);
   }
   const int work_items = group_.lanes * group_.lines;
-  const int groups_a_row = work_items == 1 ? 1 : groups_of(stage_.size().width, group_.lines);
+  const int groups_a_row = groups_of(stage_.size().width, group_.lines);
   const ocl::Range pixels{
       cl::NDRange(static_cast<std::size_t>(groups_a_row) * work_items, stage_.size().height, count(views)),
       cl::NDRange(work_items, 1, 1)};

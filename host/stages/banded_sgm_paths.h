@@ -29,7 +29,7 @@ class BandedSgmPaths {
              ocl::Buffer<cl_uint>& ranks, Views views);
 
   /// On GPUs two quads of disparities a lane (one, where codes of 64 bits take the registers), and a group that fills
-  /// the smallest unit, as far as the device allows it; elsewhere work-items of their own, which wait for nobody.
+  /// the smallest unit, as far as the device allows it; elsewhere a work-item.
   static Group default_group(const ocl::Context& context, shared::DisparityRange range, MatchingCost cost);
   /// The size of one of the four buffers of partial sums: a byte a cell, and the lanes of a pixel's last vector beyond
   /// its band.

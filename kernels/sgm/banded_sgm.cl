@@ -12,16 +12,22 @@
 // sweep up to the middle or from there, row by row, and nobody waits. Where it has no more than the sweeps of a view,
 // the views are matched one after the other, in the same memory.
 //
-// Costs of a path are kept relative to their minimum: L(p, d) = t(d) - min t with t(d) = C(p, d) + min(L(q, d), L(q, d
-// +- 1) + P1, P2(p, q)), which is the paper's recurrence and fits 8 bits. 255 stands for "absent": outside the band of
-// q, or outside the disparity range. The sweep that comes first leaves half the sum of its four paths, in 8 bits, in
-// `sums`; the other one adds its own and finds the winner.
+// Costs of a path are kept relative to their minimum (recurrence.h), which fits 8 bits. 255 stands for "absent":
+// outside the band of the pixel before, or outside the disparity range. The sweep that comes first leaves half the sum
+// of its four paths, in 8 bits, in `sums`; the other one adds its own and finds the winner.
 //
 // A path's costs lie in a slot of their own, at the place of their disparity, and all else in the slot is 255. So a
 // pixel reads its predecessor's costs at its own disparities, whatever the predecessor's band was, and then wipes them
-// before it writes its own. Vectors hold two chunks. Most pixels in bands have one, and those before them the same one:
-// two paths then share a vector, nothing is looked at beside it, and nothing is wiped. Bands of several vectors are
-// matched in blocks (block.h), of which the last one may hold a single vector.
+// before it writes its own. Vectors hold two chunks, blocks (block.h) one vector or two. The recurrence has a form for
+// each width of the band:
+//
+//   the pixel's band      those before it                         form        a vector holds
+//   one chunk, in range   to the left one chunk, above a vector   straight.h  a chunk of two paths, in registers
+//   one or two chunks     any                                     narrow.h    a path
+//   a block of vectors    any                                     one_block.h a path
+//   more                  any                                     wide.h      a block of a path, in two passes
+//
+// banded_sgm_paths.cl has one form for all bands, path_together.h.
 //
 // Where the right view is read off the left one's sums, the sweep that finds the winners leaves at each right pixel the
 // least rank of the left pixels that it may be (sgm_cells.h).

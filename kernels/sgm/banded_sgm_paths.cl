@@ -3,8 +3,7 @@
 // paths a work-group. The same bits as banded_sgm.cl, whose head explains the recurrence and the sums.
 //
 // Work-items that share a path hold its costs in registers (path_together.h), with a barrier a pixel of each of the
-// LINES paths; one that has a path to itself holds them in memory (path_alone.h). Costs come from the codes; there is
-// no cost volume.
+// LINES paths. Costs come from the codes; there is no cost volume.
 //
 // Three launches: horizontal and vertical paths, one diagonal, the other; forward and backward ones together. They do
 // to a cell's partial sums: first = L0, second = L1; first = mean(first, second), second = L2; first += mean(second,
@@ -44,16 +43,9 @@
 // A cost that is absent: less the largest minimum (254), it still exceeds the largest P2 (190) and what 8 bits hold.
 #define ABSENT 511
 
-// Where a work-item is a work-group, it takes all winners of a row, and nobody else offers to the right view's row.
-#define ONE_A_ROW (LANES * LINES == 1)
-
 #include "path.h"
 #include "path_sums.h"
-#if LANES == 1
-#include "path_alone.h"
-#else
 #include "path_together.h"
-#endif
 
 // Group ids 1 and 2: the lines, LINES at a time; views, and after them the same views backward.
 KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_paths(
@@ -72,9 +64,6 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
   const Pixels pixels = {(global const Code*)codes, penalties, bands, offsets};
   const Sums sums = {stage, vertical, backward ? backward_first : forward_first,
                      backward ? backward_second : forward_second};
-#if LANES == 1
-  follow_alone(q, path, pixels, sums);
-#else
   const int lane = get_local_id(0) % LANES;
   // Of each vector the first cost and, in the upper 16 bits, the last; of this pixel and of the one before.
   local uint edges[2][LINES][SLOT];
@@ -85,22 +74,14 @@ KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void follow_pa
   _Pragma("unroll 1") for (int i = 0; i < LINES; ++i) longest =
       max(longest, line_of(q, direction, first_line + i).length);
   follow_together(q, path, longest, lane, pixels, sums, edges[0][line], minima[0][line]);
-#endif
 }
 
 // Offers ranks to right pixels: that of lane i to the one i before `seen`.
-#if ONE_A_ROW
-static inline void offer_to(global uint* seen, const Ranks offered) {
-  global PackedRanks* at = (global PackedRanks*)(seen - (VECTOR - 1));
-  at->ranks = min(at->ranks, BACKWARD(offered));
-}
-#else
 static inline void offer_to(global uint* seen, const Ranks offered) {
   uint each[VECTOR];
   OF(vstore, VECTOR)(offered, 0, each);
   for (int i = 0; i < VECTOR; ++i) atomic_min(seen - i, each[i]);
 }
-#endif
 
 // Offers a left pixel to the right ones that a vector of its cells says it may be. `totals`: in the upper halves, the
 // whole of it NO_WINNER where the band has no cell. `least`: of all its totals. `lane`: of the first disparity in the
@@ -158,16 +139,13 @@ static inline void find_winner(const SgmParameters q, const int x, const int lan
   }
 }
 
-// Group id 0: LINES pixels of a row; where a work-item is a group, it takes the whole row.
+// Group id 0: LINES pixels of a row.
 KERNEL __attribute__((reqd_work_group_size(LANES * LINES, 1, 1))) void find_winners(
     const SgmParameters q, global const uint* codes, global const Band* bands, global const uint* offsets,
     global const uchar* forward_first, global const uchar* forward_second, global const uchar* backward_first,
     global const uchar* backward_second, global float* disparities, global float* variances, global uint* ranks) {
   local uint minima[LINES][MINIMA];
   const int lane = get_local_id(0) % LANES, line = get_local_id(0) / LANES;
-  const int begin = get_group_id(0) * LINES + line, end = ONE_A_ROW ? q.width : begin + 1;
-  for (int x = begin; x < end; ++x) {
-    find_winner(q, x, lane, minima[line], codes, bands, offsets, forward_first, forward_second, backward_first,
-                backward_second, disparities, variances, ranks);
-  }
+  find_winner(q, get_group_id(0) * LINES + line, lane, minima[line], codes, bands, offsets, forward_first,
+              forward_second, backward_first, backward_second, disparities, variances, ranks);
 }

@@ -130,6 +130,28 @@ static inline Block block_from(const int first) {
 // 65535 where a lane is 255; lanes are 0 or 255.
 static inline ushort16 widened(const uchar16 lanes) { return as_ushort16(convert_short16(as_char16(lanes))); }
 
+// As `mean_of` has it of blocks.
+static inline uchar16 mean(const uchar16 a, const uchar16 b) {
+  return convert_uchar16((convert_ushort16(a) + convert_ushort16(b) + (ushort16)(1)) >> (ushort16)(1));
+}
+
+// Half of the sum over all paths, in 8 bits: (L0 + L1 + 1) / 2 + (L2 + L3 + 1) / 2, at most 255.
+static inline uchar16 half_sum(const uchar16* r) {
+#if PATHS == 8
+  return add_sat(mean(r[0], r[1]), mean(r[2], r[3]));
+#else
+  return add_sat(r[0], r[1]);
+#endif
+}
+
+static inline Block half_sum_of_blocks(const Block* r) {
+#if PATHS == 8
+  return saturated_sum(mean_of(r[0], r[1]), mean_of(r[2], r[3]));
+#else
+  return saturated_sum(r[0], r[1]);
+#endif
+}
+
 static inline ushort minimum_of_chunk(const ushort8 v) { return least_word(v).s0; }
 
 static inline ushort minimum_of_totals(const ushort16 totals) { return minimum_of_chunk(min(totals.lo, totals.hi)); }

@@ -7,6 +7,18 @@
 #include "recurrence.h"
 #include "row.h"
 
+// t(d) where the predecessor's costs lie in a slot, `from` at the first of the 16 disparities.
+static inline uchar16 path_cost_from(global const uchar* from, const uchar16 cost, const uchar16 p1, const uchar16 p2) {
+  return add_sat(cost, LEAST_WAY(load(from), load(from - 1), load(from + 1), p1, p2, min, add_sat));
+}
+
+// The same where they are at hand and nothing lies beside them.
+static inline uchar16 path_cost_beside(const uchar16 before, const uchar16 cost, const uchar16 p1, const uchar16 p2) {
+  const uchar16 below = before.s00123456789abcde | (uchar16)(ABSENT, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+  const uchar16 above = before.s123456789abcdeff | (uchar16)(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, ABSENT);
+  return add_sat(cost, LEAST_WAY(before, below, above, p1, p2, min, add_sat));
+}
+
 // The path costs of a pixel, which it leaves in the slots in place of those before it.
 ALWAYS_INLINE void follow_narrow(const SgmParameters q, const Row* row, const uint extent, const uint steps,
                                  const uchar16 absent, const uchar16 cost, Place* place, uchar16* r) {

@@ -25,9 +25,8 @@ ALWAYS_INLINE void follow_block(const SgmParameters q, const Row* row, const uin
     const Block above = beside ? LANES_ABOVE(place->last_block) : load_block(from + 1);
     const Block same = beside ? place->last_block : load_block(from);
     const Block before = beside ? place->least_of_block : (Block)(0);
-    const Block other = saturated_sum(least_of(below, above), p1);
     const Block p2 = saturated_sum(before, (Block)((uchar)(steps >> 8 * n)));
-    r[n] = saturated_sum(cost, least_of(least_of(same, other), p2) - before);
+    r[n] = saturated_sum(cost, LEAST_WAY(same, below, above, p1, p2, least_of, saturated_sum) - before);
     least[n] = LEAST_OF_VECTORS(r[n]);
     wipe(row->slot[n] + (moved + (uint)origin_of(place->wiped[n])), place->wiped[n]);
   }

@@ -3,6 +3,7 @@
 #ifndef EGOSGM_KERNELS_MATCH_PATH_H
 #define EGOSGM_KERNELS_MATCH_PATH_H
 
+#include "recurrence.h"
 #include "vector.h"
 
 // A way across the image: first pixel and number of pixels, seen in the direction of a forward sweep.
@@ -92,9 +93,8 @@ static inline size_t cells_of(const size_t row_start, const size_t pixel, const 
   return (row_start * MAX_CHUNKS + offset) * EGOSGM_LANES + SPARE_CELLS * pixel;
 }
 
-// The lane of the range that a pixel's cells begin with, whose band begins with `first`: that of its vector, where
-// vectors are dealt out.
-static inline int first_cell_of(const int first) { return LANES == 1 ? first : first & -VECTOR; }
+// The lane of the range that a pixel's cells begin with, whose band begins with `first`: that of its vector.
+static inline int first_cell_of(const int first) { return first & -VECTOR; }
 
 static inline Stored stored_at(const Path path, const int i, const Pixels pixels) {
   Stored stored = {0, 0, 0};
@@ -118,11 +118,13 @@ static inline Pixel pixel_of(const SgmParameters q, const Path path, const int i
   return pixel;
 }
 
+#define PLAIN_SUM(a, b) ((a) + (b))
+
 // The costs of VECTOR disparities from `at` on: the matching costs and the least way from those of the pixel before
 // (`same`, `behind` by one disparity, `ahead`), which are less their least. Absent outside of the band.
 static inline Costs path_costs(const SgmParameters q, const Pixel pixel, const int at, const Costs matching,
                                const Costs same, const Costs behind, const Costs ahead) {
-  const Costs costs = matching + min(min(same, min(behind, ahead) + (Costs)(q.p1)), (Costs)(pixel.p2));
+  const Costs costs = matching + LEAST_WAY(same, behind, ahead, (Costs)(q.p1), (Costs)(pixel.p2), min, PLAIN_SUM);
   return are_below((Costs)(at - pixel.first) + (Costs)(INDEX), pixel.end - pixel.first) ? costs : (Costs)(ABSENT);
 }
 

@@ -89,12 +89,13 @@ ALWAYS_INLINE uchar8 follow_chunk(const uchar8 chunk_cost, const uint steps, con
 #endif
   uchar16 t[PATH_PAIRS], least[PATH_PAIRS];
   global const uchar* upper = to->at[PATH_PAIRS] + along;
-  const uchar16 beside = add_sat(min(load_upper(before.below, upper - 1), load_upper(before.above, upper + 1)), p1);
   // No sum of a cost and P2 is above 255, and nothing lies below the minimum.
-  t[0] = min(min(load_upper(before.same, upper), beside), add_sat(left->least, p2_of[0])) + (cost - left->least);
+  t[0] = LEAST_WAY(load_upper(before.same, upper), load_upper(before.below, upper - 1),
+                   load_upper(before.above, upper + 1), p1, add_sat(left->least, p2_of[0]), min, add_sat) +
+         (cost - left->least);
 #if PATHS == 8
-  t[1] = path_cost(cost, load_pair(to, 1, along, 0), load_pair(to, 1, along, -1), load_pair(to, 1, along, 1), p1,
-                   p2_of[1]);
+  t[1] = add_sat(cost, LEAST_WAY(load_pair(to, 1, along, 0), load_pair(to, 1, along, -1), load_pair(to, 1, along, 1),
+                                 p1, p2_of[1], min, add_sat));
 #endif
 #pragma unroll
   for (int n = 1; n < DIRECTIONS; ++n) store((uchar16)(ABSENT), to->wiped_at[n] + along);

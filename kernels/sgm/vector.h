@@ -27,7 +27,6 @@ typedef OF(uint, VECTOR) Ranks;
 
 #if VECTOR == 4
 // Path costs in 32 bits, which a work-item of a GPU computes in.
-typedef int Cost;
 typedef int4 Costs;
 #define UNSIGNED as_uint4
 #define COSTS_OF convert_int4
@@ -35,7 +34,6 @@ typedef int4 Costs;
 #define BEHIND(edge, v) (Costs)(edge, (v).xyz)
 #define AHEAD(v, edge) (Costs)((v).yzw, edge)
 #define LAST(v) (v).w
-#define BACKWARD(v) (v).wzyx
 static inline uint least_rank(const Ranks v) { return min(min(v.x, v.y), min(v.z, v.w)); }
 static inline int least_cost(const Costs v) { return min(min(v.x, v.y), min(v.z, v.w)); }
 
@@ -55,7 +53,6 @@ static inline Bytes saturated_sum(const Bytes a, const Bytes b) {
   return as_uchar4(sum | over * 255);
 }
 #else
-typedef short Cost;
 typedef short16 Costs;
 #define UNSIGNED as_ushort16
 #define COSTS_OF convert_short16
@@ -63,7 +60,6 @@ typedef short16 Costs;
 #define BEHIND(edge, v) (Costs)(edge, (v).s0123, (v).s4567, (v).s89ab, (v).scd, (v).se)
 #define AHEAD(v, edge) (Costs)((v).s1234, (v).s5678, (v).s9abc, (v).sde, (v).sf, edge)
 #define LAST(v) (v).sf
-#define BACKWARD(v) (v).sfedcba9876543210
 static inline uint least_rank(const Ranks v) {
   const uint8 a = min(v.lo, v.hi);
   const uint4 b = min(a.lo, a.hi);
@@ -92,10 +88,6 @@ static inline Bytes mean(const Bytes a, const Bytes b) {
 }
 static inline Bytes saturated_sum(const Bytes a, const Bytes b) { return add_sat(a, b); }
 #endif
-
-typedef struct __attribute__((packed)) {
-  Ranks ranks;
-} PackedRanks;
 
 // Which of `values` lie in [0, end), with one comparison each.
 static inline Costs are_below(const Costs values, const int end) { return UNSIGNED(values) < UNSIGNED((Costs)(end)); }

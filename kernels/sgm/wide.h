@@ -37,8 +37,9 @@ static inline void follow_paths(const Pixel* pixel, const int b, const Block abs
 #pragma unroll
   for (int n = 0; n < DIRECTIONS; ++n) {
     global const uchar* from = pixel->at[n] + at;
-    const Block beside = saturated_sum(least_of(load_block(from - 1), load_block(from + 1)), (Block)(pixel->p1));
-    const Block t = saturated_sum(cost, least_of(least_of(load_block(from), beside), (Block)(pixel->p2[n])));
+    const Block way = LEAST_WAY(load_block(from), load_block(from - 1), load_block(from + 1), (Block)(pixel->p1),
+                                (Block)(pixel->p2[n]), least_of, saturated_sum);
+    const Block t = saturated_sum(cost, way);
     costs->t[n][b] = t;
     least[n] = least_of(least[n], t);
   }
